@@ -1,0 +1,46 @@
+//! The language of the sequential event recorder (SER): what a host and a recorder say to each other.
+//!
+//! A message is a *body*: a command byte and its parameters, the same on every medium. [`Command`] is a body on
+//! its way to the recorder, [`Reply`] one on its way back; both `parse` from bytes and turn `to_body`.
+//! On RS-232 a body travels in an ESC frame: [`FrameEncoder`] makes one, [`FrameDecoder`] finds them in a stream
+//! that may also hold text lines and noise.
+//!
+//! Nothing here performs I/O, reads a clock, allocates or panics, whatever the bytes are.
+//!
+//! Page and table names in the documentation refer to the HE660SER160/320 product manual ("the manual").
+#![cfg_attr(not(test), no_std)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
+)]
+
+mod body;
+mod code;
+mod command;
+mod configuration;
+mod entry;
+mod error;
+mod frame_decoder;
+mod frame_encoder;
+mod last_broadcast;
+mod mode;
+mod model;
+mod params;
+mod read_reply;
+mod reply;
+mod time_stamp;
+
+pub use body::{Body, MAX_BODY_LEN};
+pub use code::Code;
+pub use command::Command;
+pub use configuration::{AutoReport, Baud, Configuration, Configure, MAX_REPORT_ADDRESS, MAX_SIZE};
+pub use entry::{Entry, InputNumbers, Inputs};
+pub use error::ParseError;
+pub use frame_decoder::{Decoded, DroppedFrame, FrameDecoder, FrameError};
+pub use frame_encoder::{ESC, FrameEncoder, encoded_len};
+pub use last_broadcast::LastBroadcast;
+pub use mode::Mode;
+pub use model::Model;
+pub use read_reply::{MAX_ENTRIES, READ_REPLY_HEADER_LEN, ReadReply};
+pub use reply::Reply;
+pub use time_stamp::{InvalidTime, TimeStamp};
