@@ -1,1 +1,42 @@
-//! The recorder itself.
+//! The recorder itself, without a single pin, register or clock of its own.
+//!
+//! One contact change goes through these files, in this order:
+//!
+//! 1. [`capture`]: the 1 kHz interrupt reads all inputs, filters them ([`debounce`]) and queues what changed;
+//! 2. [`sequencer`]: the main loop puts changes in the order in which they began;
+//! 3. [`clock`]: ticks since power-up become date and time;
+//! 4. [`event_log`]: the ring of up to 2048 events;
+//! 5. [`node`]: serves the commands and decides what goes out;
+//! 6. [`serial_port`]: the bytes of the RS-232 line.
+//!
+//! Time and bytes are passed in; bytes come out. A board or the simulator calls
+//! [`Capture::sample`] every millisecond and [`Node::poll`] as often as it can.
+//! Nothing here blocks, allocates or panics, whatever arrives from outside.
+#![cfg_attr(not(test), no_std)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
+)]
+
+pub mod capture;
+pub mod clock;
+pub mod debounce;
+pub mod diagnostics;
+pub mod event_log;
+pub mod liveness;
+pub mod node;
+mod print_line;
+mod recorder;
+pub mod sequencer;
+pub mod serial_port;
+pub mod settings;
+pub mod ticks;
+
+pub use capture::{Capture, CaptureChannel, CaptureReader};
+pub use clock::{NoRtc, Rtc};
+pub use debounce::Debounce;
+pub use diagnostics::Diagnostics;
+pub use event_log::{Event, EventLog};
+pub use liveness::Liveness;
+pub use node::{Node, NodeParts, VERSION};
+pub use settings::{CopyNumber, RECORD_LEN, Storage};

@@ -1,0 +1,239 @@
+//! The interrupt's half of the recorder: read all inputs, filter, compare, queue.
+//!
+//! [`Capture::sample`] runs once per millisecond at the highest priority and waits for nothing. It hands changes to
+//! the main loop through a queue; a change that finds the queue full is counted, and the main loop notices
+//! from the states that something is missing in between.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use heapless::spsc::{Consumer, Producer, Queue};
+
+use crate::debounce::{Debounce, Filter};
+
+/// How many changes may wait for the main loop: a quarter of a second with a change every millisecond.
+pub const QUEUE_LEN: usize = 256;
+
+/// Inputs that changed in one sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) struct Sample {
+    /// When, in milliseconds since power-up, wrapping.
+    pub(crate) tick_ms: u32,
+    /// The inputs that changed; none in the very first sample, which is the baseline.
+    pub(crate) changed: u32,
+    /// The inputs that are on.
+    pub(crate) state: u32,
+}
+
+/// What the interrupt and the main loop share.
+pub struct CaptureChannel {
+    // One slot of the queue always stays free.
+    queue: Queue<Sample, { QUEUE_LEN + 1 }>,
+    shared: Shared,
+}
+
+#[derive(Default)]
+struct Shared {
+    tick_ms: AtomicU32,
+    edges_lost: AtomicU32,
+    samples_missed: AtomicU32,
+}
+
+impl CaptureChannel {
+    /// An empty channel; belongs into a static.
+    #[must_use]
+    pub const fn new() -> CaptureChannel {
+        CaptureChannel {
+            queue: Queue::new(),
+            shared: Shared {
+                tick_ms: AtomicU32::new(0),
+                edges_lost: AtomicU32::new(0),
+                samples_missed: AtomicU32::new(0),
+            },
+        }
+    }
+
+    /// The interrupt's end and the main loop's end.
+    pub fn split(&mut self, debounce: Debounce) -> (Capture<'_>, CaptureReader<'_>) {
+        let (producer, consumer) = self.queue.split();
+        let capture =
+            Capture { queue: producer, shared: &self.shared, debounce, inputs: 0, tick_ms: 0, filter: None };
+        (capture, CaptureReader { queue: consumer, shared: &self.shared, debounce })
+    }
+}
+
+impl Default for CaptureChannel {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The interrupt's end of the channel.
+pub struct Capture<'a> {
+    queue: Producer<'a, Sample>,
+    shared: &'a Shared,
+    debounce: Debounce,
+    /// The latest sample as it was read, and its tick.
+    inputs: u32,
+    tick_ms: u32,
+    /// `None` until the first sample, which is the baseline.
+    filter: Option<Filter>,
+}
+
+impl Capture<'_> {
+    /// Takes the state of all inputs at `tick_ms`, a count of milliseconds since power-up that wraps.
+    ///
+    /// The count is expected to grow by one. Where it grows by more, the samples between were missed: they are
+    /// counted, and the inputs are taken to have stayed as they were.
+    #[inline]
+    pub fn sample(&mut self, tick_ms: u32, inputs: u32) {
+        match &mut self.filter {
+            None => {
+                self.filter = Some(Filter::new(&self.debounce, inputs));
+                self.push(Sample { tick_ms, changed: 0, state: inputs });
+            }
+            Some(_) => {
+                let missed = tick_ms.wrapping_sub(self.tick_ms).wrapping_sub(1);
+                if missed != 0 {
+                    self.make_up(tick_ms, missed);
+                }
+                self.step(tick_ms, inputs);
+            }
+        }
+        self.inputs = inputs;
+        self.tick_ms = tick_ms;
+        // Last: who reads this tick finds everything up to it in the queue.
+        self.shared.tick_ms.store(tick_ms, Ordering::Release);
+    }
+
+    #[inline]
+    fn step(&mut self, tick_ms: u32, inputs: u32) {
+        let Some(filter) = &mut self.filter else { return };
+        let changed = filter.step(inputs);
+        if changed != 0 {
+            let state = filter.accepted();
+            self.push(Sample { tick_ms, changed, state });
+        }
+    }
+
+    /// Runs the filter over samples that were missed, so that debounce times stay times and do not become counts.
+    #[cold]
+    fn make_up(&mut self, tick_ms: u32, missed: u32) {
+        let count = &self.shared.samples_missed;
+        count.store(count.load(Ordering::Relaxed).saturating_add(missed), Ordering::Relaxed);
+        if self.filter.as_ref().is_some_and(Filter::is_off) {
+            return;
+        }
+        // After the longest debounce time an unchanging input has nothing left to count.
+        let settled = missed.min(u32::from(u8::MAX) + 1);
+        let first = tick_ms.wrapping_sub(missed);
+        for step in 0..settled {
+            self.step(first.wrapping_add(step), self.inputs);
+        }
+    }
+
+    #[inline]
+    fn push(&mut self, sample: Sample) {
+        if self.queue.enqueue(sample).is_err() {
+            let lost = &self.shared.edges_lost;
+            let edges = sample.changed.count_ones();
+            lost.store(lost.load(Ordering::Relaxed).saturating_add(edges), Ordering::Relaxed);
+        }
+    }
+}
+
+/// The main loop's end of the channel.
+pub struct CaptureReader<'a> {
+    queue: Consumer<'a, Sample>,
+    shared: &'a Shared,
+    debounce: Debounce,
+}
+
+impl CaptureReader<'_> {
+    /// The tick of the latest sample. All changes up to it can be read.
+    #[must_use]
+    pub fn tick_ms(&self) -> u32 {
+        self.shared.tick_ms.load(Ordering::Acquire)
+    }
+
+    /// Input changes that found the queue full, since power-up.
+    #[must_use]
+    pub fn edges_lost(&self) -> u32 {
+        self.shared.edges_lost.load(Ordering::Relaxed)
+    }
+
+    /// Milliseconds in which no sample was taken because the interrupt came late, since power-up.
+    #[must_use]
+    pub fn samples_missed(&self) -> u32 {
+        self.shared.samples_missed.load(Ordering::Relaxed)
+    }
+
+    /// The debounce times that the samples went through.
+    #[must_use]
+    pub const fn debounce(&self) -> &Debounce {
+        &self.debounce
+    }
+
+    /// The next change for which `due` says yes.
+    pub(crate) fn next_if(&mut self, due: impl FnOnce(&Sample) -> bool) -> Option<Sample> {
+        if self.queue.peek().is_some_and(due) { self.queue.dequeue() } else { None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drain(reader: &mut CaptureReader<'_>) -> Vec<(u32, u32, u32)> {
+        std::iter::from_fn(|| reader.next_if(|_| true))
+            .map(|sample| (sample.tick_ms, sample.changed, sample.state))
+            .collect()
+    }
+
+    #[test]
+    fn the_first_sample_is_the_baseline_and_changes_follow() {
+        let mut channel = CaptureChannel::new();
+        let (mut capture, mut reader) = channel.split(Debounce::OFF);
+        for (tick_ms, inputs) in [(1, 0b1000), (2, 0b1000), (3, 0b1011), (4, 0b0011)] {
+            capture.sample(tick_ms, inputs);
+            assert_eq!(reader.tick_ms(), tick_ms);
+        }
+        assert_eq!(drain(&mut reader), [(1, 0, 0b1000), (3, 0b0011, 0b1011), (4, 0b1000, 0b0011)]);
+    }
+
+    #[test]
+    fn changes_beyond_the_queue_are_counted_edge_by_edge() {
+        let mut channel = CaptureChannel::new();
+        let (mut capture, mut reader) = channel.split(Debounce::OFF);
+        let toggling = |tick_ms: u32| if tick_ms.is_multiple_of(2) { 0 } else { 0b11 };
+        for tick_ms in 0..300 {
+            capture.sample(tick_ms, toggling(tick_ms));
+        }
+        let read = drain(&mut reader);
+        assert_eq!(read.len(), QUEUE_LEN);
+        assert_eq!(reader.edges_lost(), 2 * (300 - 256));
+    }
+
+    #[test]
+    fn a_late_interrupt_is_counted_and_debounce_times_stay_times() {
+        let mut channel = CaptureChannel::new();
+        let (mut capture, mut reader) = channel.split(Debounce::uniform(5));
+        capture.sample(10, 0);
+        capture.sample(11, 1);
+        // Nine samples are missed; the input was seen to change at 11, so the change is accepted as of 16.
+        capture.sample(21, 1);
+        assert_eq!(drain(&mut reader), [(10, 0, 0), (16, 1, 1)]);
+        assert_eq!(reader.samples_missed(), 9);
+    }
+
+    #[test]
+    fn a_very_late_interrupt_settles_every_debounce_time() {
+        let mut channel = CaptureChannel::new();
+        let (mut capture, mut reader) = channel.split(Debounce::uniform(255));
+        capture.sample(u32::MAX - 1, 0);
+        capture.sample(u32::MAX, 1);
+        capture.sample(1_000_000, 0);
+        // 255 ms after the change, across the wrap of the tick.
+        assert_eq!(drain(&mut reader), [(u32::MAX - 1, 0, 0), (254, 1, 1)]);
+    }
+}

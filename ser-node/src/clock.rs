@@ -1,0 +1,118 @@
+//! Date and time: the millisecond tick plus an offset.
+//!
+//! Setting the clock moves the offset and never the tick. A change that happened before the clock was set but is
+//! recorded only afterwards, because debounce held it back, still gets the time of the old setting.
+
+use chrono::{DateTime, NaiveDateTime};
+use ser_proto::TimeStamp;
+
+/// A battery-backed clock that keeps the time while the recorder is off.
+pub trait Rtc {
+    /// The time now, asked once at power-up; `None` when it is not known.
+    fn read(&mut self) -> Option<NaiveDateTime>;
+
+    /// Takes over the time, when the recorder's clock is set.
+    fn write(&mut self, now: NaiveDateTime);
+}
+
+/// No battery-backed clock: the recorder starts at 2000-01-01 00:00 each time.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoRtc;
+
+impl Rtc for NoRtc {
+    fn read(&mut self) -> Option<NaiveDateTime> {
+        None
+    }
+
+    fn write(&mut self, _now: NaiveDateTime) {}
+}
+
+/// 2000-01-01 00:00, in milliseconds since 1970.
+const NEVER_SET_MS: i64 = 946_684_800_000;
+
+/// A hundred years, 1970–2069: what two-digit years can tell apart.
+const CENTURY_MS: i64 = 36_525 * 24 * 60 * 60 * 1000;
+
+/// Turns ticks into date and time.
+#[derive(Clone, Debug)]
+pub(crate) struct Clock {
+    /// Milliseconds since 1970 at tick 0, by the present setting and by the one before.
+    offset_ms: i64,
+    offset_before_ms: i64,
+    /// The tick from which the present setting counts.
+    set_at_ms: u64,
+}
+
+impl Clock {
+    /// A clock that shows `now` at `tick_ms`; 2000-01-01 when the time is not known.
+    pub(crate) fn new(tick_ms: u64, now: Option<NaiveDateTime>) -> Clock {
+        let now_ms = now.map_or(NEVER_SET_MS, to_calendar_ms);
+        let offset_ms = now_ms.saturating_sub_unsigned(tick_ms);
+        Clock { offset_ms, offset_before_ms: offset_ms, set_at_ms: 0 }
+    }
+
+    /// From `tick_ms` on the clock shows `now` and what follows it.
+    pub(crate) fn set(&mut self, tick_ms: u64, now: NaiveDateTime) {
+        self.offset_before_ms = self.offset_ms;
+        self.offset_ms = to_calendar_ms(now).saturating_sub_unsigned(tick_ms);
+        self.set_at_ms = tick_ms;
+    }
+
+    /// Calendar time at `tick_ms`, in milliseconds since 1970 within the hundred years of two-digit years.
+    pub(crate) fn at(&self, tick_ms: u64) -> i64 {
+        let offset = if tick_ms >= self.set_at_ms { self.offset_ms } else { self.offset_before_ms };
+        offset.saturating_add_unsigned(tick_ms).rem_euclid(CENTURY_MS)
+    }
+}
+
+fn to_calendar_ms(time: NaiveDateTime) -> i64 {
+    time.and_utc().timestamp_millis()
+}
+
+/// The date and time `calendar_ms` milliseconds after 1970 began.
+pub(crate) fn to_date_time(calendar_ms: i64) -> NaiveDateTime {
+    DateTime::from_timestamp_millis(calendar_ms).unwrap_or_default().naive_utc()
+}
+
+/// The same as a time stamp of the protocol.
+pub(crate) fn to_time_stamp(calendar_ms: i64) -> TimeStamp {
+    const EPOCH: TimeStamp =
+        TimeStamp { year: 70, month: 1, day: 1, hour: 0, minute: 0, second: 0, millisecond: 0 };
+    TimeStamp::try_from(to_date_time(calendar_ms)).unwrap_or(EPOCH)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn time(text: &str) -> NaiveDateTime {
+        text.parse().unwrap()
+    }
+
+    fn shows(clock: &Clock, tick_ms: u64) -> String {
+        to_time_stamp(clock.at(tick_ms)).to_string()
+    }
+
+    #[test]
+    fn a_clock_that_was_never_set_starts_in_2000() {
+        assert_eq!(shows(&Clock::new(0, None), 0), "2000-01-01T00:00:00.000");
+    }
+
+    #[test]
+    fn the_clock_goes_on_from_where_it_is_set() {
+        let mut clock = Clock::new(5, Some(time("2026-11-22T10:00:00.000")));
+        assert_eq!(shows(&clock, 5), "2026-11-22T10:00:00.000");
+        clock.set(1000, time("2026-11-22T12:00:00.250"));
+        assert_eq!(shows(&clock, 1000), "2026-11-22T12:00:00.250");
+        assert_eq!(shows(&clock, 1751), "2026-11-22T12:00:01.001");
+        // What happened before keeps the time of the old setting.
+        assert_eq!(shows(&clock, 999), "2026-11-22T10:00:00.994");
+    }
+
+    #[test]
+    fn after_2069_comes_1970_as_two_digits_have_it() {
+        let clock = Clock::new(0, Some(time("2069-12-31T23:59:59.999")));
+        assert_eq!(shows(&clock, 0), "2069-12-31T23:59:59.999");
+        assert_eq!(shows(&clock, 1), "1970-01-01T00:00:00.000");
+    }
+}

@@ -1,0 +1,181 @@
+//! The per-input debounce filter: a change counts when the input has held its new state long enough.
+//!
+//! All inputs are filtered together with bit-parallel counters: plane `p` holds bit `p` of every input's counter,
+//! so one pass over the planes counts 32 inputs down, and the work is the same whatever the inputs do.
+
+/// Counters are eight bits wide: debounce times reach 255 ms.
+const PLANES: usize = 8;
+
+/// Debounce time of every input, in milliseconds; 0 is off.
+///
+/// With `n` milliseconds an input must stay in its new state for `n` ms before the change is recorded, and
+/// the event carries the time at which the new state was first seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Debounce {
+    times_ms: [u8; 32],
+}
+
+impl Debounce {
+    /// No filter: every change counts at once.
+    pub const OFF: Debounce = Debounce::uniform(0);
+
+    /// The same time for every input.
+    #[must_use]
+    pub const fn uniform(time_ms: u8) -> Debounce {
+        Debounce { times_ms: [time_ms; 32] }
+    }
+
+    /// The same, but with `time_ms` for input `number` (1–32). Other numbers change nothing.
+    #[must_use]
+    pub fn with(mut self, number: u8, time_ms: u8) -> Debounce {
+        if let Some(time) = usize::from(number).checked_sub(1).and_then(|index| self.times_ms.get_mut(index))
+        {
+            *time = time_ms;
+        }
+        self
+    }
+
+    /// The time of input `number` (1–32); 0 for other numbers.
+    #[must_use]
+    pub fn time_ms(&self, number: u8) -> u8 {
+        usize::from(number).checked_sub(1).and_then(|index| self.times_ms.get(index)).copied().unwrap_or(0)
+    }
+
+    /// The longest of all times.
+    #[must_use]
+    pub fn longest_ms(&self) -> u8 {
+        self.times_ms.iter().copied().max().unwrap_or(0)
+    }
+}
+
+/// The filter at work: one step per sample.
+#[derive(Clone, Debug)]
+pub(crate) struct Filter {
+    accepted: u32,
+    /// What is left to count for every input; equal to `reload` while an input agrees with its accepted state.
+    counters: [u32; PLANES],
+    reload: [u32; PLANES],
+    planes: usize,
+}
+
+impl Filter {
+    /// A filter that takes `inputs` for accepted.
+    pub(crate) fn new(debounce: &Debounce, inputs: u32) -> Filter {
+        let mut reload = [0; PLANES];
+        for (plane, bits) in reload.iter_mut().enumerate() {
+            for (input, time_ms) in debounce.times_ms.iter().enumerate() {
+                *bits |= u32::from(time_ms >> plane & 1) << input;
+            }
+        }
+        let planes = (u8::BITS - debounce.longest_ms().leading_zeros()) as usize;
+        Filter { accepted: inputs, counters: reload, reload, planes }
+    }
+
+    /// The state that has been accepted.
+    pub(crate) const fn accepted(&self) -> u32 {
+        self.accepted
+    }
+
+    /// Whether no input has a debounce time, so that repeating a sample changes nothing.
+    pub(crate) const fn is_off(&self) -> bool {
+        self.planes == 0
+    }
+
+    /// Takes the next sample; returns the inputs whose change has just been accepted.
+    #[inline]
+    pub(crate) fn step(&mut self, inputs: u32) -> u32 {
+        let differ = inputs ^ self.accepted;
+        // Counting down borrows; a borrow out of the highest plane means that the counter was at zero.
+        let mut borrow = differ;
+        for (counter, reload) in self.counters.iter_mut().zip(&self.reload).take(self.planes) {
+            let counted = *counter ^ borrow;
+            borrow &= !*counter;
+            *counter = (counted & differ) | (*reload & !differ);
+        }
+        let accepted = borrow;
+        if accepted != 0 {
+            self.accepted ^= accepted;
+            for (counter, reload) in self.counters.iter_mut().zip(&self.reload).take(self.planes) {
+                *counter = (*counter & !accepted) | (*reload & accepted);
+            }
+        }
+        accepted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// The filter as one would write it for one input: how long has the new state lasted?
+    struct OneInput {
+        time_ms: u8,
+        accepted: bool,
+        lasted: u32,
+    }
+
+    impl OneInput {
+        fn step(&mut self, on: bool) -> bool {
+            self.lasted = if on == self.accepted { 0 } else { self.lasted + 1 };
+            let accept = self.lasted > u32::from(self.time_ms);
+            if accept {
+                self.accepted = on;
+                self.lasted = 0;
+            }
+            accept
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn thirty_two_inputs_at_once_equal_one_input_at_a_time(
+            times in prop::array::uniform32(prop_oneof![Just(0_u8), 1..4_u8, any::<u8>()]),
+            start: u32,
+            // Runs of equal samples, so that long debounce times are reached too.
+            runs in prop::collection::vec((any::<u32>(), 1..300_usize), 0..40),
+        ) {
+            let debounce = Debounce { times_ms: times };
+            let mut filter = Filter::new(&debounce, start);
+            let mut inputs: Vec<_> = (0..32)
+                .map(|bit| OneInput { time_ms: times[bit], accepted: start >> bit & 1 == 1, lasted: 0 })
+                .collect();
+            for (sample, times) in runs {
+                for _ in 0..times {
+                    let mut expected = 0;
+                    for (bit, input) in inputs.iter_mut().enumerate() {
+                        expected |= u32::from(input.step(sample >> bit & 1 == 1)) << bit;
+                    }
+                    prop_assert_eq!(filter.step(sample), expected);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn without_a_time_every_change_counts_at_once() {
+        let mut filter = Filter::new(&Debounce::OFF, 0);
+        assert!(filter.is_off());
+        assert_eq!(filter.step(0b101), 0b101);
+        assert_eq!(filter.step(0b001), 0b100);
+        assert_eq!(filter.step(0b001), 0);
+    }
+
+    #[test]
+    fn with_three_milliseconds_the_fourth_sample_counts_and_a_bounce_starts_anew() {
+        let mut filter = Filter::new(&Debounce::OFF.with(1, 3), 0);
+        let bounce = [1, 1, 1, 0, 1, 1, 1, 1, 1];
+        let accepted = bounce.map(|sample| filter.step(sample));
+        assert_eq!(accepted, [0, 0, 0, 0, 0, 0, 0, 1, 0]);
+        assert_eq!(filter.accepted(), 1);
+    }
+
+    #[test]
+    fn inputs_that_do_not_exist_have_no_time() {
+        let debounce = Debounce::OFF.with(0, 9).with(33, 9).with(32, 7);
+        assert_eq!((debounce.time_ms(0), debounce.time_ms(33), debounce.time_ms(32)), (0, 0, 7));
+        assert_eq!(debounce.longest_ms(), 7);
+    }
+}

@@ -1,0 +1,191 @@
+//! Puts accepted changes in the order in which they began.
+//!
+//! A debounced change is accepted late but stamped with its first moment. Inputs with different debounce times are
+//! therefore accepted in another order than they changed. The sequencer holds changes back for as long as
+//! an earlier one can still turn up, the longest debounce time, and hands them on in order; without debounce it
+//! holds nothing back.
+
+use ser_proto::Inputs;
+
+use crate::debounce::Debounce;
+
+/// The longest debounce time is 255 ms, so changes of 256 different milliseconds can be waiting.
+const WINDOW: usize = 256;
+
+/// Inputs that changed in the same millisecond, by the time of their first moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Change {
+    /// When, in milliseconds since power-up.
+    pub tick_ms: u64,
+    /// The inputs that changed.
+    pub changed: u32,
+    /// The inputs that are on after it.
+    pub state: u32,
+}
+
+/// Changes on their way from capture to log.
+pub(crate) struct Sequencer {
+    debounce: Debounce,
+    hold_ms: u64,
+    /// Changes by the low bits of the tick at which they began.
+    waiting: [u32; WINDOW],
+    waiting_count: usize,
+    /// No change that began before this tick is waiting or will come.
+    front_ms: u64,
+    /// The state after the changes that were accepted, and after those that were handed on.
+    accepted: u32,
+    state: u32,
+}
+
+impl Sequencer {
+    pub(crate) fn new(debounce: Debounce) -> Sequencer {
+        Sequencer {
+            debounce,
+            hold_ms: debounce.longest_ms().into(),
+            waiting: [0; WINDOW],
+            waiting_count: 0,
+            front_ms: 0,
+            accepted: 0,
+            state: 0,
+        }
+    }
+
+    /// Takes the baseline: the state of the inputs before any change.
+    pub(crate) fn baseline(&mut self, state: u32) {
+        self.accepted = state;
+        self.state = state;
+    }
+
+    /// Takes a change that was accepted at `tick_ms`; every earlier one must have been taken out with [`next`](Self::next).
+    pub(crate) fn push(&mut self, tick_ms: u64, changed: u32, state: u32) {
+        // Changes that capture had to drop are in no sample, but the states show them: they are in effect.
+        let dropped = state ^ changed ^ self.accepted;
+        self.state ^= dropped;
+        self.accepted = state;
+        for number in Inputs(changed).numbers() {
+            let began_ms = tick_ms.saturating_sub(self.debounce.time_ms(number).into());
+            if let Some(waiting) = self.waiting.get_mut(slot(began_ms)) {
+                self.waiting_count += usize::from(*waiting == 0);
+                *waiting |= 1 << (number - 1);
+            }
+        }
+    }
+
+    /// The next change in order, when all samples before `before_ms` have been pushed.
+    pub(crate) fn next(&mut self, before_ms: u64) -> Option<Change> {
+        let end_ms = before_ms.saturating_sub(self.hold_ms);
+        while self.waiting_count > 0 && self.front_ms < end_ms {
+            let tick_ms = self.front_ms;
+            self.front_ms += 1;
+            let changed = core::mem::take(self.waiting.get_mut(slot(tick_ms))?);
+            if changed != 0 {
+                self.waiting_count -= 1;
+                self.state ^= changed;
+                return Some(Change { tick_ms, changed, state: self.state });
+            }
+        }
+        if self.waiting_count == 0 {
+            self.front_ms = self.front_ms.max(end_ms);
+        }
+        None
+    }
+}
+
+fn slot(tick_ms: u64) -> usize {
+    #[expect(clippy::cast_possible_truncation, reason = "reduced modulo the window")]
+    let slot = (tick_ms % WINDOW as u64) as usize;
+    slot
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::CaptureChannel;
+    use crate::ticks::Ticks;
+
+    /// Runs samples through capture and sequencer, with the main loop looking only every `every` samples.
+    fn sequence(debounce: Debounce, samples: &[u32], every: usize) -> Vec<Change> {
+        let mut channel = CaptureChannel::new();
+        let (mut capture, mut reader) = channel.split(debounce);
+        let (mut sequencer, mut ticks, mut changes) = (Sequencer::new(debounce), Ticks::new(), Vec::new());
+        let settling = std::iter::repeat_n(*samples.last().unwrap_or(&0), 2 * WINDOW);
+        for (tick_ms, inputs) in (1_u32..).zip(samples.iter().copied().chain(settling)) {
+            capture.sample(tick_ms, inputs);
+            if !(tick_ms as usize).is_multiple_of(every) {
+                continue;
+            }
+            while let Some(sample) = reader.next_if(|_| true) {
+                let tick_ms = ticks.extend(sample.tick_ms);
+                changes.extend(std::iter::from_fn(|| sequencer.next(tick_ms)));
+                match sample.changed {
+                    0 => sequencer.baseline(sample.state),
+                    changed => sequencer.push(tick_ms, changed, sample.state),
+                }
+            }
+            changes.extend(std::iter::from_fn(|| sequencer.next(u64::from(tick_ms) + 1)));
+        }
+        changes
+    }
+
+    /// What must come out: for each input alone, the first moments of changes that lasted; then sorted by time.
+    fn expected(debounce: Debounce, samples: &[u32]) -> Vec<(u64, u32)> {
+        let mut toggles = std::collections::BTreeMap::<u64, u32>::new();
+        for bit in 0..32_u8 {
+            let time = usize::from(debounce.time_ms(bit + 1));
+            let on = |index: usize| samples.get(index).or(samples.last()).unwrap() >> bit & 1;
+            let mut accepted = on(0);
+            let mut index = 0;
+            while index < samples.len() {
+                if on(index) != accepted && (index..=index + time).all(|later| on(later) != accepted) {
+                    accepted ^= 1;
+                    *toggles.entry(index as u64 + 1).or_default() |= 1 << bit;
+                }
+                index += 1;
+            }
+        }
+        toggles.into_iter().collect()
+    }
+
+    proptest! {
+        #[test]
+        fn changes_come_out_in_the_order_in_which_they_began(
+            times in prop::collection::vec((1..=32_u8, any::<u8>()), 0..8),
+            runs in prop::collection::vec((any::<u32>(), 1..40_usize), 1..40),
+            every in 1..8_usize,
+        ) {
+            let debounce = times.iter().fold(Debounce::OFF, |all, &(number, time)| all.with(number, time));
+            let samples: Vec<u32> =
+                runs.iter().flat_map(|&(inputs, times)| std::iter::repeat_n(inputs, times)).collect();
+            let changes = sequence(debounce, &samples, every);
+            let seen: Vec<_> = changes.iter().map(|change| (change.tick_ms, change.changed)).collect();
+            prop_assert_eq!(seen, expected(debounce, &samples));
+            let mut state = samples[0];
+            for change in changes {
+                state ^= change.changed;
+                prop_assert_eq!(change.state, state);
+            }
+        }
+    }
+
+    #[test]
+    fn a_debounced_contact_that_moved_first_comes_first() {
+        // Input 1 moves at tick 2 and has 5 ms of debounce; input 2 moves at tick 4 and has none.
+        let changes = sequence(Debounce::OFF.with(1, 5), &[0, 1, 1, 3], 1);
+        let seen: Vec<_> = changes.iter().map(|c| (c.tick_ms, c.changed, c.state)).collect();
+        assert_eq!(seen, [(2, 1, 1), (4, 2, 3)]);
+    }
+
+    #[test]
+    fn changes_that_capture_dropped_do_not_falsify_the_state() {
+        let mut sequencer = Sequencer::new(Debounce::OFF);
+        sequencer.baseline(0);
+        // Input 3 came on in a sample that was dropped: the next one shows it as on without a change.
+        sequencer.push(10, 0b0001, 0b0101);
+        assert_eq!(sequencer.next(11), Some(Change { tick_ms: 10, changed: 0b0001, state: 0b0101 }));
+        sequencer.push(12, 0b0100, 0b0001);
+        assert_eq!(sequencer.next(13), Some(Change { tick_ms: 12, changed: 0b0100, state: 0b0001 }));
+    }
+}
