@@ -86,6 +86,14 @@ enum State {
     },
 }
 
+/// [`Decoded`] without the borrow of the body.
+#[derive(Clone, Copy)]
+enum Completed {
+    Text(u8),
+    Frame,
+    Dropped(DroppedFrame),
+}
+
 const AFTER_ESC: State = State::Frame { high: None, length: None };
 
 impl<const N: usize> FrameDecoder<N> {
@@ -97,26 +105,42 @@ impl<const N: usize> FrameDecoder<N> {
 
     /// Takes the next byte of the stream; says what it completed, if anything.
     pub fn push(&mut self, byte: u8) -> Option<Decoded<'_>> {
+        self.step(byte).map(|completed| self.show(completed))
+    }
+
+    /// Takes bytes from the front of `stream` up to and including the one that completes something; the bytes after
+    /// it stay. `None`: all were taken and nothing more was completed.
+    pub fn push_slice(&mut self, stream: &mut &[u8]) -> Option<Decoded<'_>> {
+        while let Some((&byte, rest)) = stream.split_first() {
+            *stream = rest;
+            if let Some(completed) = self.step(byte) {
+                return Some(self.show(completed));
+            }
+        }
+        None
+    }
+
+    fn step(&mut self, byte: u8) -> Option<Completed> {
         let at = self.position;
         self.position += 1;
         match (self.state, hex_value(byte)) {
             (State::Frame { .. }, _) if byte == ESC => {
                 let dropped = DroppedFrame { start: self.start, at, cause: FrameError::Interrupted };
                 self.begin(at);
-                Some(Decoded::Dropped(dropped))
+                Some(Completed::Dropped(dropped))
             }
             (State::Text | State::Skip { .. }, _) if byte == ESC => {
                 self.begin(at);
                 None
             }
-            (State::Text, _) => Some(Decoded::Text(byte)),
+            (State::Text, _) => Some(Completed::Text(byte)),
             (State::Skip { digits }, Some(_)) => {
                 self.state = if digits > 1 { State::Skip { digits: digits - 1 } } else { State::Text };
                 None
             }
             (State::Skip { .. }, None) => {
                 self.state = State::Text;
-                Some(Decoded::Text(byte))
+                Some(Completed::Text(byte))
             }
             (State::Frame { .. }, None) => Some(self.drop_frame(at, FrameError::NotHex { byte })),
             (State::Frame { high: None, length }, Some(digit)) => {
@@ -126,6 +150,14 @@ impl<const N: usize> FrameDecoder<N> {
             (State::Frame { high: Some(high), length }, Some(low)) => {
                 self.take_byte(at, length, high << 4 | low)
             }
+        }
+    }
+
+    fn show(&self, completed: Completed) -> Decoded<'_> {
+        match completed {
+            Completed::Text(byte) => Decoded::Text(byte),
+            Completed::Frame => Decoded::Frame(&self.body),
+            Completed::Dropped(dropped) => Decoded::Dropped(dropped),
         }
     }
 
@@ -158,7 +190,7 @@ impl<const N: usize> FrameDecoder<N> {
         self.state = AFTER_ESC;
     }
 
-    fn take_byte(&mut self, at: u64, length: Option<u8>, byte: u8) -> Option<Decoded<'_>> {
+    fn take_byte(&mut self, at: u64, length: Option<u8>, byte: u8) -> Option<Completed> {
         self.state = State::Frame { high: None, length: Some(length.unwrap_or(byte)) };
         match length {
             None if byte == 0 => Some(self.drop_frame(at, FrameError::Empty)),
@@ -174,19 +206,19 @@ impl<const N: usize> FrameDecoder<N> {
                     return Some(self.drop_frame(at, FrameError::Checksum { computed, received: byte }));
                 }
                 self.state = State::Text;
-                Some(Decoded::Frame(&self.body))
+                Some(Completed::Frame)
             }
         }
     }
 
-    fn drop_frame(&mut self, at: u64, cause: FrameError) -> Decoded<'static> {
+    fn drop_frame(&mut self, at: u64, cause: FrameError) -> Completed {
         self.state = match cause {
             // ESC and length have been taken; an empty body still has its checksum to come.
             FrameError::TooLong { length } => State::Skip { digits: encoded_len(length.into()) - 3 },
             FrameError::Empty => State::Skip { digits: 2 },
             _ => State::Text,
         };
-        Decoded::Dropped(DroppedFrame { start: self.start, at, cause })
+        Completed::Dropped(DroppedFrame { start: self.start, at, cause })
     }
 }
 

@@ -1,1 +1,3 @@
-//! Helpers of the end-to-end tests.
+//! Helpers of the end-to-end tests, which live in `tests/`.
+
+pub mod vectors;
