@@ -30,6 +30,7 @@ mod recorder;
 pub mod sequencer;
 pub mod serial_port;
 pub mod settings;
+mod tick_counter;
 pub mod ticks;
 
 pub use capture::{Capture, CaptureChannel, CaptureReader};
@@ -40,3 +41,4 @@ pub use event_log::{Event, EventLog};
 pub use liveness::Liveness;
 pub use node::{Node, NodeParts, VERSION};
 pub use settings::{CopyNumber, RECORD_LEN, Storage};
+pub use tick_counter::TickCounter;
