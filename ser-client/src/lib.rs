@@ -1,1 +1,44 @@
-//! A host`s conversation with a recorder.
+//! A host's conversation with a sequential event recorder: one command at a time, answers told apart from what the
+//! recorder says by itself, and a log that is read by cursor, so that every event arrives once and in order.
+//!
+//! Most programs want [`open`] and [`Unit`]: blocking calls over a serial port or TCP. Underneath, [`Session`] (one
+//! request and its answer) and [`LogReader`] (which entries to read next) know neither clock nor port; they can be
+//! driven by any event loop, and by tests without waiting.
+
+mod counters;
+mod cursor;
+mod diagnosis;
+mod endpoint;
+mod line_rate;
+mod log_position;
+mod open;
+mod ports;
+mod range_reader;
+pub mod reader;
+mod request_error;
+mod serial;
+pub mod session;
+mod tcp;
+mod text_line;
+mod transport;
+mod unit;
+mod unsolicited;
+
+pub use counters::Counters;
+pub use cursor::{Cursor, Delivery, Lost};
+pub use diagnosis::Diagnosis;
+pub use endpoint::{Endpoint, EndpointError};
+pub use line_rate::LineRate;
+pub use log_position::LogPosition;
+pub use open::{OpenError, open};
+pub use ports::{PortInfo, ports};
+pub use range_reader::RangeReader;
+pub use reader::{Disturbed, LogReader, ReadRequest, Summary};
+pub use request_error::RequestError;
+pub use serial::SerialTransport;
+pub use session::{Attempt, Busy, NoReply, Session, Timing};
+pub use tcp::TcpTransport;
+pub use text_line::{LineAssembler, MAX_LINE_LEN, TextLine};
+pub use transport::{Transport, TransportError};
+pub use unit::{Options, Unit};
+pub use unsolicited::Unsolicited;

@@ -1,0 +1,123 @@
+//! Opening the line to a unit, with an error that says what to do about it.
+
+use std::error::Error;
+use std::{fmt, io};
+
+use crate::{Endpoint, SerialTransport, TcpTransport, Transport};
+
+/// Opens the line. `baud` is the rate in bits per second; a line without a rate ignores it.
+///
+/// # Errors
+/// See [`OpenError`].
+pub fn open(endpoint: &Endpoint, baud: u32) -> Result<Box<dyn Transport>, OpenError> {
+    match endpoint {
+        Endpoint::Serial { path } => Ok(Box::new(SerialTransport::open(path, baud)?)),
+        Endpoint::Tcp { address } => Ok(Box::new(TcpTransport::connect(address)?)),
+    }
+}
+
+/// Why the line could not be opened.
+#[derive(Debug)]
+pub enum OpenError {
+    /// There is no serial port of this name.
+    NoSuchPort {
+        /// What was asked for.
+        path: String,
+    },
+    /// Another program has the serial port open.
+    Busy {
+        /// The port.
+        path: String,
+    },
+    /// The user may not use the serial port.
+    PermissionDenied {
+        /// The port.
+        path: String,
+    },
+    /// There is something of this name, but it is no serial port.
+    NotSerial {
+        /// What was asked for.
+        path: String,
+    },
+    /// The serial port does not have this rate.
+    UnsupportedBaud {
+        /// The port.
+        path: String,
+        /// The rate in bits per second.
+        baud: u32,
+    },
+    /// The host is there and nothing listens at this port.
+    Refused {
+        /// `HOST:PORT`.
+        address: String,
+    },
+    /// No host of this name is known.
+    HostNotFound {
+        /// `HOST:PORT`.
+        address: String,
+    },
+    /// The host did not answer.
+    Unreachable {
+        /// `HOST:PORT`.
+        address: String,
+    },
+    /// Anything else.
+    Other {
+        /// What was asked for.
+        name: String,
+        /// What the system says.
+        error: io::Error,
+    },
+}
+
+impl OpenError {
+    /// What a person can try next.
+    #[must_use]
+    pub const fn hint(&self) -> &'static str {
+        match self {
+            OpenError::NoSuchPort { .. } => {
+                "list the serial ports of this computer; is the adapter plugged in?"
+            }
+            OpenError::Busy { .. } => "close the other program that uses the port (terminal, modem manager)",
+            OpenError::PermissionDenied { .. } if cfg!(target_os = "linux") => {
+                "add yourself to the group that owns the port (sudo usermod -aG dialout $USER) and log in again"
+            }
+            OpenError::PermissionDenied { .. } => "ask for the right to use the port",
+            OpenError::NotSerial { .. } => "name a serial port, as in /dev/ttyUSB0, or tcp://HOST:PORT",
+            OpenError::UnsupportedBaud { .. } => {
+                "recorders have 300, 600, 1200, 2400, 4800, 9600 and 19200 baud"
+            }
+            OpenError::Refused { .. } => {
+                "is the terminal server or the simulated unit running, on this TCP port?"
+            }
+            OpenError::HostNotFound { .. } => "check the spelling, or give the IP address",
+            OpenError::Unreachable { .. } => "check network and firewall; does the host answer a ping?",
+            OpenError::Other { .. } => "see what the system says above",
+        }
+    }
+}
+
+impl fmt::Display for OpenError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            OpenError::NoSuchPort { path } => write!(f, "there is no serial port {path}"),
+            OpenError::Busy { path } => write!(f, "serial port {path} is in use"),
+            OpenError::PermissionDenied { path } => write!(f, "no permission to open {path}"),
+            OpenError::NotSerial { path } => write!(f, "{path} is not a serial port"),
+            OpenError::UnsupportedBaud { path, baud } => write!(f, "{path} does not have {baud} baud"),
+            OpenError::Refused { address } => write!(f, "nothing listens at tcp://{address}"),
+            OpenError::HostNotFound { address } => write!(f, "the host of tcp://{address} is not known"),
+            OpenError::Unreachable { address } => write!(f, "tcp://{address} does not answer"),
+            OpenError::Other { name, error } => write!(f, "cannot open {name}: {error}"),
+        }
+    }
+}
+
+impl Error for OpenError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            OpenError::Other { error, .. } => Some(error),
+            _ => None,
+        }
+    }
+}

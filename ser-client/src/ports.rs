@@ -1,0 +1,79 @@
+//! Which serial ports this computer has.
+
+use std::fmt;
+
+use serialport::SerialPortType;
+
+/// A serial port that can be opened by its path.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PortInfo {
+    /// Path or name.
+    pub path: String,
+    /// What it is, in a few words: maker and product of a USB adapter, `PCI`, `Bluetooth`; may be empty.
+    pub description: String,
+}
+
+/// Lists the serial ports, sorted by path.
+///
+/// On Linux the kernel's list of terminals is read. Not in it are pseudo-terminals (a simulated unit) and links such
+/// as `/dev/serial/by-id/…`; both can be opened by their path all the same.
+#[must_use]
+pub fn ports() -> Vec<PortInfo> {
+    // serialport panics where the kernel's list is missing, as in some containers.
+    if cfg!(target_os = "linux") && !std::path::Path::new("/sys/class/tty").is_dir() {
+        return Vec::new();
+    }
+    let mut ports: Vec<PortInfo> = serialport::available_ports()
+        .unwrap_or_default()
+        .into_iter()
+        .map(|port| PortInfo { path: port.port_name, description: describe(&port.port_type) })
+        .collect();
+    ports.sort_by(|a, b| a.path.cmp(&b.path));
+    ports
+}
+
+fn describe(port_type: &SerialPortType) -> String {
+    match port_type {
+        SerialPortType::UsbPort(usb) => {
+            let words = [&usb.manufacturer, &usb.product, &usb.serial_number];
+            let words: Vec<&str> = words.into_iter().flatten().map(String::as_str).collect();
+            let ids = format!("USB {:04x}:{:04x}", usb.vid, usb.pid);
+            if words.is_empty() { ids } else { format!("{} ({ids})", words.join(" ")) }
+        }
+        SerialPortType::PciPort => "PCI".to_owned(),
+        SerialPortType::BluetoothPort => "Bluetooth".to_owned(),
+        SerialPortType::Unknown => String::new(),
+    }
+}
+
+impl fmt::Display for PortInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.path)?;
+        if self.description.is_empty() { Ok(()) } else { write!(f, "  {}", self.description) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serialport::UsbPortInfo;
+
+    use super::*;
+
+    #[test]
+    fn listing_ports_never_fails() {
+        let _ = ports();
+    }
+
+    #[test]
+    fn a_usb_adapter_is_named_by_maker_and_product() {
+        let named = SerialPortType::UsbPort(UsbPortInfo {
+            vid: 0x0403,
+            pid: 0x6001,
+            serial_number: None,
+            manufacturer: Some("FTDI".to_owned()),
+            product: Some("FT232R USB UART".to_owned()),
+        });
+        assert_eq!(describe(&named), "FTDI FT232R USB UART (USB 0403:6001)");
+        assert_eq!(describe(&SerialPortType::Unknown), "");
+    }
+}

@@ -1,0 +1,553 @@
+//! Reading a log by cursor: which entries to ask for next, and what the answers mean.
+//!
+//! [`LogReader`] delivers every event once and in order: across the end of the ring, across the wrap of the 16-bit
+//! total, and with events arriving meanwhile. What the recorder overwrote before it could be read is counted exactly.
+//! The reader performs no I/O: send what [`request`](LogReader::request) asks for, hand in the reply with
+//! [`take`](LogReader::take), and so on until there is no request any more.
+//!
+//! # How it works
+//!
+//! Events have a running index, 0 for the first after an erase. A recorder with total `T` and next slot `S` keeps
+//! event `q` in slot `(S - (T - q)) mod size`, and has overwritten it once `T - q > size`. Every reply carries `T` and
+//! `S` of the very moment at which its entries were copied, so for each entry it is certain which event it is.
+//!
+//! Each request begins one entry early, with the last event that was delivered (the *anchor*). If it is still in its
+//! place, this is still the same log; if another entry is there, or none, the log was erased or lost its contents, and
+//! reading begins anew with [`Lost::LogRestarted`]. That costs one entry in ten and makes an erase in the middle of a
+//! reading as visible as one before it.
+//!
+//! Where the anchor is overwritten itself, the log must be full, which the entry with the highest number shows: if it
+//! does not exist, the log was erased (or the ring was made larger; then total and next slot do not agree, and what
+//! the resize threw away is counted).
+//!
+//! A reading ends when everything that had happened when it began is delivered, so it ends also when events come
+//! faster than they can be read. Events that come meanwhile are delivered when they fit the same replies.
+//!
+//! # What cannot be known
+//!
+//! - The total counts modulo 65536. If more than 65,535 events happen between two readings, the count of lost ones is
+//!   too low by a multiple of 65536.
+//! - An erase that is followed by at least as many events as the log holds, before the next reading, looks like
+//!   overwriting. The events are delivered; the count of lost ones is that of the totals, whatever it is worth.
+//! - A log that was empty has no anchor. Events that came and were erased before the next reading leave no trace.
+//! - Between the last entry of the ring and the first a request cannot overlap. An erase in just this moment is seen in
+//!   the total, which goes back, unless as many events follow at once as there were before.
+//! - The first reading of a log cannot know how often the total has wrapped: [`Lost::OverwrittenAtLeast`].
+//! - When events come so fast that the oldest entries are overwritten while the request for them is on its way, the
+//!   reader gives up some more of the oldest, to get ahead of the recorder. They are counted as lost like the rest.
+//!
+//! - A resize in the middle of a reading shows when total and next slot part, or when the anchor is in another place.
+//!   In a ring of a few entries both may agree by chance, and an entry be taken for its neighbour.
+//!
+//! The size of the ring must be right. An original unit does not tell it.
+
+use std::error::Error;
+use std::fmt;
+
+use ser_proto::{Command, Entry, MAX_ENTRIES, MAX_SIZE, Model, ReadReply};
+
+use crate::{Cursor, Delivery, LogPosition, Lost};
+
+/// The index that total 0 gets in the arithmetic here, large enough that nothing ever goes below zero.
+const BASE: u64 = 1 << 32;
+
+/// A reading needs a few replies now and then that bring no event; so many in a row mean that something is wrong.
+const MAX_FRUITLESS: u32 = 32;
+
+/// Entries to ask for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReadRequest {
+    /// Number of the first entry, from 1.
+    pub start: u16,
+    /// How many, 1–10.
+    pub count: u8,
+}
+
+impl ReadRequest {
+    /// Asks where the log stands. One entry comes along, because no manual promises an answer to a count of 0.
+    pub const POSITION: ReadRequest = ReadRequest { start: 1, count: 1 };
+}
+
+impl From<ReadRequest> for Command {
+    fn from(request: ReadRequest) -> Command {
+        Command::Read { start: request.start, count: request.count }
+    }
+}
+
+/// Why a reading cannot go on. The cursor stands behind the last event that was delivered: a new reading from there
+/// sorts most of these out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Disturbed {
+    /// Total and next slot moved in a way that recording does not explain: the log was erased or resized meanwhile.
+    Changed,
+    /// The ring does not have the size that was given.
+    WrongSize,
+    /// The replies bring no events although there must be some.
+    NoProgress,
+}
+
+/// What a reading came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Summary {
+    /// Events that were delivered.
+    pub delivered: u32,
+    /// Events that are known to be lost.
+    pub lost: u32,
+    /// Whether the log began anew, so that an unknown number is lost besides.
+    pub restarted: bool,
+    /// Where the log stood in the latest reply.
+    pub position: LogPosition,
+}
+
+/// The head of the log in the latest reply: index and slot of the next event.
+#[derive(Clone, Copy, Debug)]
+struct Head {
+    total: u64,
+    slot: u64,
+    /// How many events it moved by since the reply before.
+    happened: u64,
+}
+
+/// What makes us believe that `next` is what follows what was delivered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Footing {
+    /// Nothing: it is not known either how many entries the log holds.
+    Uncounted,
+    /// This is event `next - 1`.
+    Anchored(Entry),
+    /// Nothing but the total.
+    Loose,
+    /// The latest reply has shown it.
+    Firm,
+}
+
+/// What was lost since the last delivery. It is delivered with the next event: if the reading ends before, the cursor
+/// has not moved past it and the next reading finds it again.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Pending {
+    restarted: bool,
+    /// Overwritten before the log was first seen.
+    at_least: u64,
+    overwritten: u64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Plan {
+    Locate(ReadRequest),
+    /// Whether the log is full: does the last entry of the ring exist?
+    Probe(ReadRequest),
+    Anchored(ReadRequest, Entry),
+    Plain(ReadRequest),
+    Done,
+}
+
+/// One reading from a cursor to the end of the log; see the [module documentation](self).
+#[derive(Debug)]
+pub struct LogReader {
+    size: u64,
+    cursor: Option<Cursor>,
+    /// Where the last entry that was delivered probably is.
+    expected_slot: Option<u64>,
+    head: Option<Head>,
+    /// Index of the next event to deliver, up to date with `head`.
+    next: u64,
+    /// The reading is done when `next` is here.
+    target: u64,
+    footing: Footing,
+    /// Whether the anchor has been seen in its place during this reading.
+    checked: bool,
+    pending: Pending,
+    /// How far ahead of the oldest entry reading goes on after a loss; above 0 once the recorder was faster.
+    margin: u64,
+    fruitless: u32,
+    delivered: u32,
+    lost: u32,
+    restarted: bool,
+}
+
+impl LogReader {
+    /// Reads what has happened since `cursor`, or everything, from a log of `size` entries (1–2048; what is outside
+    /// is taken for the nearest).
+    #[must_use]
+    pub fn new(cursor: Option<Cursor>, size: u16) -> LogReader {
+        LogReader {
+            size: size.clamp(1, MAX_SIZE).into(),
+            cursor,
+            expected_slot: None,
+            head: None,
+            next: 0,
+            target: 0,
+            footing: Footing::Uncounted,
+            checked: false,
+            pending: Pending::default(),
+            margin: 0,
+            fruitless: 0,
+            delivered: 0,
+            lost: 0,
+            restarted: false,
+        }
+    }
+
+    /// Uses the position in which an earlier reading ended: if nothing has happened since, one request will do
+    /// instead of two. A position that does not belong to the cursor does no harm.
+    #[must_use]
+    pub fn starting_near(mut self, position: LogPosition) -> LogReader {
+        let slot = u64::from(position.next_slot);
+        if slot < self.size && self.cursor.is_some_and(|cursor| cursor.anchor.is_some()) {
+            self.expected_slot = Some((slot + self.size - 1) % self.size);
+        }
+        self
+    }
+
+    /// The entries to ask for next; `None` when the reading is done.
+    #[must_use]
+    pub fn request(&self) -> Option<ReadRequest> {
+        match self.plan() {
+            Plan::Locate(request)
+            | Plan::Probe(request)
+            | Plan::Anchored(request, _)
+            | Plan::Plain(request) => Some(request),
+            Plan::Done => None,
+        }
+    }
+
+    /// Takes the reply to [`request`](Self::request) and delivers what it brings. A reply that begins with another
+    /// entry is not the reply to it and is ignored.
+    ///
+    /// # Errors
+    /// See [`Disturbed`].
+    pub fn take(&mut self, reply: &ReadReply, on: &mut dyn FnMut(Delivery)) -> Result<(), Disturbed> {
+        let plan = self.plan();
+        let Some(request) = self.request().filter(|request| request.start == reply.start) else {
+            return Ok(());
+        };
+        let delivered_before = self.delivered;
+        let asked_for = reply.entries.len().min(request.count.into());
+        let entries = reply.entries.get(..asked_for).unwrap_or_default();
+        let batch = Batch { entries, model: reply.model.unwrap_or(Model::Ser160) };
+        self.see_head(LogPosition::from(reply))?;
+        match plan {
+            Plan::Done => {}
+            Plan::Locate(_) => self.located(request, batch, on)?,
+            Plan::Probe(_) => self.probed(entries.len(), on)?,
+            Plan::Anchored(_, anchor) => self.take_anchored(anchor, batch, on)?,
+            Plan::Plain(_) => self.take_plain(request, batch, on)?,
+        }
+        self.fruitless = if self.delivered == delivered_before { self.fruitless + 1 } else { 0 };
+        if self.fruitless > MAX_FRUITLESS { Err(Disturbed::NoProgress) } else { Ok(()) }
+    }
+
+    /// Where the next reading has to begin; it only ever moves past what was delivered.
+    #[must_use]
+    pub const fn cursor(&self) -> Option<Cursor> {
+        self.cursor
+    }
+
+    /// How many events the log is known to hold that are not delivered yet.
+    #[must_use]
+    pub fn pending(&self) -> u32 {
+        let pending = self.head.map_or(0, |head| (head.total - self.next).min(self.size));
+        u32::try_from(pending).unwrap_or(u32::MAX)
+    }
+
+    /// What the reading came to so far.
+    #[must_use]
+    pub fn summary(&self) -> Summary {
+        Summary {
+            delivered: self.delivered,
+            lost: self.lost,
+            restarted: self.restarted,
+            position: self.head.map_or(LogPosition { total: 0, next_slot: 0 }, |head| LogPosition {
+                total: low_16(head.total),
+                next_slot: low_16(head.slot),
+            }),
+        }
+    }
+
+    fn plan(&self) -> Plan {
+        let Some(head) = self.head else {
+            return Plan::Locate(
+                self.expected_slot.map_or(ReadRequest::POSITION, |slot| self.entries(slot, 2)),
+            );
+        };
+        let behind = head.total - self.next;
+        let at_target = self.next >= self.target && self.pending == Pending::default();
+        match self.footing {
+            Footing::Anchored(_) if at_target && self.checked => Plan::Done,
+            Footing::Loose | Footing::Firm if at_target => Plan::Done,
+            Footing::Anchored(anchor) if behind < self.size => {
+                Plan::Anchored(self.entries(self.slot_of(head, self.next - 1), behind + 1), anchor)
+            }
+            Footing::Loose if behind < self.size => {
+                Plan::Plain(self.entries(self.slot_of(head, self.next), behind))
+            }
+            Footing::Firm => Plan::Plain(self.entries(self.slot_of(head, self.next), behind)),
+            Footing::Uncounted | Footing::Anchored(_) | Footing::Loose => Plan::Probe(self.probe()),
+        }
+    }
+
+    /// Asks for the last entry of the ring, and for one more that must not exist.
+    fn probe(&self) -> ReadRequest {
+        let count = if self.size < MAX_SIZE.into() { 2 } else { 1 };
+        ReadRequest { start: low_16(self.size), count }
+    }
+
+    /// Asks for `count` entries from `slot` on, as far as one request goes.
+    fn entries(&self, slot: u64, count: u64) -> ReadRequest {
+        let count = count.min(self.size - slot).clamp(1, MAX_ENTRIES as u64);
+        ReadRequest { start: low_16(slot + 1), count: u8::try_from(count).unwrap_or(1) }
+    }
+
+    /// The slot of event `index`, which is at most one ring behind the head.
+    fn slot_of(&self, head: Head, index: u64) -> u64 {
+        (head.slot + self.size - (head.total - index) % self.size) % self.size
+    }
+
+    fn behind(&self) -> u64 {
+        self.head.map_or(0, |head| head.total - self.next)
+    }
+
+    fn see_head(&mut self, position: LogPosition) -> Result<(), Disturbed> {
+        let slot = u64::from(position.next_slot);
+        if slot >= self.size {
+            // A ring that has just been made larger shows in the same way.
+            return Err(Disturbed::WrongSize);
+        }
+        let Some(head) = self.head else {
+            let cursor_total = self.cursor.map_or(position.total, |cursor| cursor.total);
+            self.next = BASE + u64::from(cursor_total);
+            let total = self.next + u64::from(position.total.wrapping_sub(cursor_total));
+            self.head = Some(Head { total, slot, happened: 0 });
+            self.target = total;
+            return Ok(());
+        };
+        let happened = u64::from(position.total.wrapping_sub(low_16(head.total)));
+        let total = head.total + happened;
+        // A total that went back looks as if almost 65536 events had happened.
+        if slot != (head.slot + happened) % self.size || total - self.next > u16::MAX.into() {
+            return Err(Disturbed::Changed);
+        }
+        self.head = Some(Head { total, slot, happened });
+        Ok(())
+    }
+
+    fn located(
+        &mut self,
+        request: ReadRequest,
+        batch: Batch<'_>,
+        on: &mut dyn FnMut(Delivery),
+    ) -> Result<(), Disturbed> {
+        let (Some(cursor), Some(head)) = (self.cursor, self.head) else { return Ok(()) };
+        let Some(anchor) = cursor.anchor else {
+            self.footing = Footing::Loose;
+            // The log was empty and has as many events as then; one that holds some has counted once around.
+            if self.behind() == 0 && cursor.total == 0 && !batch.entries.is_empty() {
+                self.restart();
+            }
+            return Ok(());
+        };
+        self.footing = Footing::Anchored(anchor);
+        let anchor_entry = self.slot_of(head, self.next - 1) + 1;
+        if self.expected_slot.is_some() && u64::from(request.start) == anchor_entry {
+            return self.take_anchored(anchor, batch, on);
+        }
+        Ok(())
+    }
+
+    fn probed(&mut self, entries: usize, on: &mut dyn FnMut(Delivery)) -> Result<(), Disturbed> {
+        let Some(head) = self.head else { return Ok(()) };
+        if entries > 1 {
+            return Err(Disturbed::WrongSize);
+        }
+        let full = entries == 1;
+        if self.footing == Footing::Uncounted {
+            return self.count(head, if full { self.size } else { head.slot }, on);
+        }
+        if !full {
+            return self.not_full(head);
+        }
+        if head.total - self.next >= self.size {
+            self.skip_to(head.total - self.size + self.margin.min(self.size - 1));
+        }
+        self.footing = Footing::Firm;
+        Ok(())
+    }
+
+    /// Begins a log of which nothing is known but that it holds `held` entries.
+    fn count(&mut self, head: Head, held: u64, on: &mut dyn FnMut(Delivery)) -> Result<(), Disturbed> {
+        if held == 0 && low_16(head.total) != 0 {
+            return Err(Disturbed::WrongSize);
+        }
+        self.next = head.total - held;
+        self.target = head.total;
+        self.pending.at_least = low_16(self.next).into();
+        self.footing = Footing::Firm;
+        if held == 0 {
+            self.deliver_losses(on);
+            self.cursor = Some(Cursor { total: low_16(head.total), anchor: None });
+        }
+        Ok(())
+    }
+
+    /// The log is not full: entries 1 … next slot exist, and no others.
+    fn not_full(&mut self, head: Head) -> Result<(), Disturbed> {
+        let held = head.slot;
+        let behind = head.total - self.next;
+        let anchored = matches!(self.footing, Footing::Anchored(_));
+        // As many entries as events: nothing has been thrown away since the erase, so the anchor would be there.
+        if u64::from(low_16(head.total)) == held && (anchored || behind > held) {
+            self.restart();
+            return Ok(());
+        }
+        if held == 0 {
+            return Err(Disturbed::WrongSize);
+        }
+        // A larger ring than before, and what did not fit the smaller one is gone.
+        self.skip_to(self.next.max(head.total - held));
+        self.footing = Footing::Firm;
+        Ok(())
+    }
+
+    fn restart(&mut self) {
+        // What was counted for the log that is gone is worth nothing.
+        self.pending = Pending { restarted: self.cursor.is_some(), ..Pending::default() };
+        self.footing = Footing::Uncounted;
+        self.margin = 0;
+        self.next = self.head.map_or(self.next, |head| head.total);
+    }
+
+    fn skip_to(&mut self, index: u64) {
+        self.pending.overwritten += index - self.next;
+        self.next = index;
+    }
+
+    fn take_anchored(
+        &mut self,
+        anchor: Entry,
+        batch: Batch<'_>,
+        on: &mut dyn FnMut(Delivery),
+    ) -> Result<(), Disturbed> {
+        let Some(head) = self.head else { return Ok(()) };
+        if self.behind() >= self.size {
+            // The anchor has been overwritten meanwhile: the next step is to ask whether the log is full.
+            return Ok(());
+        }
+        match batch.entries.split_first() {
+            None => self.not_full(head)?,
+            // It was there a moment ago. Perhaps the ring was resized and the slots mean something else now.
+            Some((first, _)) if *first != anchor && self.checked => return Err(Disturbed::Changed),
+            Some((first, _)) if *first != anchor => self.restart(),
+            Some((_, entries)) => {
+                self.checked = true;
+                let before = self.delivered;
+                self.deliver(Batch { entries, ..batch }, on);
+                if self.delivered == before {
+                    // At the end of the ring, where no request can overlap.
+                    self.footing = Footing::Firm;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn take_plain(
+        &mut self,
+        request: ReadRequest,
+        batch: Batch<'_>,
+        on: &mut dyn FnMut(Delivery),
+    ) -> Result<(), Disturbed> {
+        let Some(head) = self.head else { return Ok(()) };
+        if batch.entries.is_empty() {
+            return self.not_full(head);
+        }
+        self.footing = Footing::Loose;
+        let overwritten = self.behind().saturating_sub(self.size);
+        let alive = usize::try_from(overwritten).ok().and_then(|skip| batch.entries.get(skip..));
+        if let Some(entries) = alive.filter(|alive| !alive.is_empty()) {
+            self.skip_to(self.next + overwritten);
+            self.deliver(Batch { entries, ..batch }, on);
+            return Ok(());
+        }
+        // Everything asked for was overwritten on the way, it seems.
+        if self.margin < self.size {
+            // Twice what happened during this request will do if events do not come faster still.
+            self.margin = self.margin.max(2 * head.happened);
+            return Ok(());
+        }
+        // The ring turns over during one request, and is still the same: whatever the reply holds is all that can be had.
+        let slot = u64::from(request.start) - 1;
+        let age = (head.slot + self.size - slot - 1) % self.size;
+        self.skip_to(self.next.max(head.total - 1 - age));
+        self.deliver(batch, on);
+        Ok(())
+    }
+
+    /// Delivers entries that are events `next`, `next + 1` and so on, as far as these have happened.
+    fn deliver(&mut self, batch: Batch<'_>, on: &mut dyn FnMut(Delivery)) {
+        let Some(head) = self.head else { return };
+        for &entry in batch.entries {
+            if self.next >= head.total {
+                break;
+            }
+            self.deliver_losses(on);
+            let entry_number = low_16(self.slot_of(head, self.next) + 1);
+            on(Delivery::Event { entry_number, entry, model: batch.model });
+            self.next += 1;
+            self.delivered = self.delivered.saturating_add(1);
+            self.cursor = Some(Cursor { total: low_16(self.next), anchor: Some(entry) });
+            self.footing = Footing::Anchored(entry);
+            self.checked = true;
+        }
+    }
+
+    fn deliver_losses(&mut self, on: &mut dyn FnMut(Delivery)) {
+        let Pending { restarted, at_least, overwritten } = std::mem::take(&mut self.pending);
+        if restarted {
+            self.restarted = true;
+            on(Delivery::Lost(Lost::LogRestarted));
+        }
+        let count = u32::try_from(at_least + overwritten).unwrap_or(u32::MAX);
+        self.lost = self.lost.saturating_add(count);
+        if at_least > 0 {
+            on(Delivery::Lost(Lost::OverwrittenAtLeast { count }));
+        } else if overwritten > 0 {
+            on(Delivery::Lost(Lost::Overwritten { count }));
+        }
+    }
+}
+
+/// The entries of a reply.
+#[derive(Clone, Copy)]
+struct Batch<'a> {
+    entries: &'a [Entry],
+    model: Model,
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the low 16 bits are what is wanted")]
+const fn low_16(value: u64) -> u16 {
+    value as u16
+}
+
+impl Disturbed {
+    /// What a person can try next.
+    #[must_use]
+    pub const fn hint(&self) -> &'static str {
+        match self {
+            Disturbed::Changed => "read again; does another host erase or resize the log?",
+            Disturbed::WrongSize => "give the size that the unit was configured with",
+            Disturbed::NoProgress => "read again, at a higher baud rate if events come very fast",
+        }
+    }
+}
+
+impl fmt::Display for Disturbed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Disturbed::Changed => "the log was erased or resized while it was being read",
+            Disturbed::WrongSize => "the log does not have the size that was expected",
+            Disturbed::NoProgress => "the log tells of events and does not hand them out",
+        })
+    }
+}
+
+impl Error for Disturbed {}

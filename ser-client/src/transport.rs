@@ -1,0 +1,88 @@
+//! How bytes get to a unit and back.
+
+use std::error::Error;
+use std::io;
+use std::time::Duration;
+use std::{fmt, io::ErrorKind};
+
+/// A line to a unit, blocking.
+pub trait Transport: Send {
+    /// Waits up to `timeout` for bytes and takes those that are there. 0 means that none came in time.
+    ///
+    /// # Errors
+    /// A line that has ended is an error, never 0: `NotConnected` for a device that was unplugged, `UnexpectedEof`
+    /// or one of the connection kinds for a peer that went away.
+    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize>;
+
+    /// Sends all bytes; they may still be on the line when this returns.
+    ///
+    /// # Errors
+    /// As for [`read`](Self::read).
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Changes the rate of the line. A line without a rate does nothing.
+    ///
+    /// # Errors
+    /// If the port does not have this rate.
+    fn set_baud(&mut self, bits_per_second: u32) -> io::Result<()>;
+
+    /// The rate of the line, if it has one.
+    fn bits_per_second(&self) -> Option<u32>;
+}
+
+/// How a line failed in the middle of a conversation.
+#[derive(Debug)]
+pub enum TransportError {
+    /// The serial device is gone.
+    Unplugged,
+    /// The other end of the connection went away.
+    Closed,
+    /// Anything else.
+    Io(io::Error),
+}
+
+impl TransportError {
+    /// What a person can try next, if there is something to say.
+    #[must_use]
+    pub const fn hint(&self) -> Option<&'static str> {
+        match self {
+            TransportError::Unplugged => Some("plug the adapter in again; its name may have changed"),
+            TransportError::Closed => {
+                Some("is the program or the terminal server at the other end still running?")
+            }
+            TransportError::Io(_) => None,
+        }
+    }
+}
+
+impl From<io::Error> for TransportError {
+    fn from(error: io::Error) -> TransportError {
+        match error.kind() {
+            ErrorKind::NotConnected => TransportError::Unplugged,
+            ErrorKind::UnexpectedEof
+            | ErrorKind::BrokenPipe
+            | ErrorKind::ConnectionReset
+            | ErrorKind::ConnectionAborted => TransportError::Closed,
+            _ => TransportError::Io(error),
+        }
+    }
+}
+
+impl fmt::Display for TransportError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            TransportError::Unplugged => write!(f, "the serial port is gone"),
+            TransportError::Closed => write!(f, "the connection was closed by the other end"),
+            TransportError::Io(error) => write!(f, "the line failed: {error}"),
+        }
+    }
+}
+
+impl Error for TransportError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            TransportError::Io(error) => Some(error),
+            TransportError::Unplugged | TransportError::Closed => None,
+        }
+    }
+}

@@ -1,0 +1,392 @@
+//! A unit behind a line: blocking calls, one per thing that a recorder can do.
+
+use std::time::{Duration, Instant};
+
+use ser_proto::{Code, Command, Configuration, Configure, LastBroadcast, Mode, ReadReply, Reply, TimeStamp};
+
+use crate::session::NoReply;
+use crate::{
+    Counters, Cursor, Delivery, Disturbed, LineRate, LogPosition, LogReader, RangeReader, ReadRequest,
+    RequestError, Session, Summary, Timing, Transport, TransportError, Unsolicited,
+};
+
+/// How often a reading begins anew because the log was changed under it.
+const MAX_RESYNCS: u32 = 4;
+
+/// How much is taken from the line before a request, at most: a peer that never stops must not keep us from asking.
+const MAX_STALE_BYTES: usize = 64 * 1024;
+
+/// A unit changes its rate when the reply is out; what arrives in that moment it would not understand.
+const BAUD_SETTLING: Duration = Duration::from_millis(20);
+
+/// How patient to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// How long a unit may take to answer, on top of the time that the bytes are on the line. Behind a terminal
+    /// server that time is not known, so a slow line there wants a longer timeout.
+    pub timeout: Duration,
+    /// How often a request is repeated when no answer comes. Requests that must not be carried out twice never are.
+    pub retries: u32,
+}
+
+/// One second, and two repeats.
+impl Default for Options {
+    fn default() -> Self {
+        Options { timeout: Duration::from_secs(1), retries: 2 }
+    }
+}
+
+/// A unit at the other end of a line.
+pub struct Unit {
+    transport: Box<dyn Transport>,
+    session: Session,
+    /// The session's time zero.
+    epoch: Instant,
+    /// Where the log stood at the end of the last reading by cursor.
+    last_position: Option<LogPosition>,
+}
+
+impl Unit {
+    /// A unit behind `transport`. Nothing is sent yet.
+    #[must_use]
+    pub fn new(transport: Box<dyn Transport>, options: Options) -> Unit {
+        let Options { timeout, retries } = options;
+        let line_rate = LineRate::from(transport.bits_per_second());
+        let session = Session::new(Timing { timeout, retries, line_rate });
+        Unit { transport, session, epoch: Instant::now(), last_position: None }
+    }
+
+    /// Sends a command and waits for the reply. A [`Command::SetClock`] is sent once, with the time that it has:
+    /// [`set_clock`](Self::set_clock) is more exact.
+    ///
+    /// # Errors
+    /// If no reply comes or the line fails.
+    pub fn request(&mut self, command: &Command) -> Result<Reply, RequestError> {
+        self.prepare()?;
+        // Nothing else is under way now.
+        let _ = self.session.request(*command);
+        self.converse(&mut |_| None)
+    }
+
+    /// Whether the unit records, and its version. Original units do not answer this query.
+    ///
+    /// # Errors
+    /// If no reply comes or the line fails.
+    pub fn mode(&mut self) -> Result<Mode, RequestError> {
+        match self.request(&Command::QueryMode)? {
+            Reply::Mode(mode) => Ok(mode),
+            _ => Err(unexpected(Code::Mode)),
+        }
+    }
+
+    /// Starts or stops recording.
+    ///
+    /// # Errors
+    /// If no reply comes, the unit stays in the other mode, or the line fails.
+    pub fn set_recording(&mut self, recording: bool) -> Result<Mode, RequestError> {
+        match self.request(&Command::SetMode { recording })? {
+            Reply::Mode(mode) if mode.recording == recording => Ok(mode),
+            _ => Err(unexpected(Code::Mode)),
+        }
+    }
+
+    /// The settings in force. Original units do not answer this query.
+    ///
+    /// # Errors
+    /// If no reply comes or the line fails.
+    pub fn configuration(&mut self) -> Result<Configuration, RequestError> {
+        match self.request(&Command::QueryConfiguration)? {
+            Reply::Configuration(configuration) => Ok(configuration),
+            _ => Err(unexpected(Code::Configure)),
+        }
+    }
+
+    /// Changes the settings and returns those in force. A new baud rate is followed on this side as soon as the
+    /// reply is there; the command is then sent only once.
+    ///
+    /// # Errors
+    /// If no reply comes, the unit refuses the settings, or the line fails or does not have the new rate.
+    pub fn configure(&mut self, configure: Configure) -> Result<Configuration, RequestError> {
+        let Reply::Configuration(in_force) = self.request(&Command::Configure(configure))? else {
+            return Err(unexpected(Code::Configure));
+        };
+        let rate = in_force.baud.bits_per_second();
+        if configure.baud == Some(in_force.baud)
+            && self.transport.bits_per_second().is_some_and(|now| now != rate)
+        {
+            self.set_baud(rate)?;
+            self.listen_for(BAUD_SETTLING)?;
+        }
+        // What the command leaves open cannot disagree with what is in force.
+        if configure.apply_to(&in_force) == in_force {
+            Ok(in_force)
+        } else {
+            Err(RequestError::Refused { in_force })
+        }
+    }
+
+    /// Sets the clock. `time_at` is asked for the time that it will be after a delay: the one at which the last byte
+    /// arrives at the unit. It is asked again for each attempt. Returns the time that was set last.
+    ///
+    /// # Errors
+    /// If there is no such time, no reply comes or the line fails.
+    pub fn set_clock(
+        &mut self,
+        mut time_at: impl FnMut(Duration) -> TimeStamp,
+    ) -> Result<TimeStamp, RequestError> {
+        time_at(Duration::ZERO).check().map_err(RequestError::InvalidTime)?;
+        self.prepare()?;
+        let _ = self.session.request_set_clock();
+        let mut sent = None;
+        self.converse(&mut |delay| {
+            sent = Some(time_at(delay));
+            sent
+        })?;
+        sent.ok_or_else(|| unexpected(Code::SetClock))
+    }
+
+    /// Erases the log. Sent once: if no reply comes, it may or may not have been done.
+    ///
+    /// # Errors
+    /// If no reply comes or the line fails.
+    pub fn erase(&mut self) -> Result<(), RequestError> {
+        self.request(&Command::Erase).map(drop)
+    }
+
+    /// The command that the unit last received as a broadcast, if any.
+    ///
+    /// # Errors
+    /// If no reply comes or the line fails.
+    pub fn last_broadcast(&mut self) -> Result<Option<LastBroadcast>, RequestError> {
+        match self.request(&Command::LastBroadcast)? {
+            Reply::LastBroadcast(last) => Ok(last),
+            _ => Err(unexpected(Code::LastBroadcast)),
+        }
+    }
+
+    /// Has entries printed. The lines come through [`wait_event`](Self::wait_event). Sent once.
+    ///
+    /// # Errors
+    /// If no reply comes or the line fails.
+    pub fn print(&mut self, start: u16, count: u16) -> Result<(), RequestError> {
+        self.request(&Command::Print { start, count }).map(drop)
+    }
+
+    /// Where the log stands.
+    ///
+    /// # Errors
+    /// If no reply comes or the line fails.
+    pub fn log_position(&mut self) -> Result<LogPosition, RequestError> {
+        self.read(ReadRequest::POSITION).map(|reply| LogPosition::from(&reply))
+    }
+
+    /// Reads entries by their physical numbers, those that exist; returns how many there were.
+    ///
+    /// # Errors
+    /// If no reply comes or the line fails.
+    pub fn read_range(
+        &mut self,
+        start: u16,
+        count: u16,
+        size: u16,
+        on: &mut dyn FnMut(Delivery),
+    ) -> Result<u16, RequestError> {
+        let mut reader = RangeReader::new(start, count, size);
+        while let Some(request) = reader.request() {
+            reader.take(&self.read(request)?, on);
+        }
+        Ok(reader.delivered())
+    }
+
+    /// Reads what has happened since `cursor` (everything, if there is none) from a log of `size` entries, each event
+    /// once and in order, and says what was lost; see [`reader`](crate::reader).
+    ///
+    /// `cursor` moves on with every reply, never past what was handed to `on`. After an error the next call goes on
+    /// where this one stopped.
+    ///
+    /// # Errors
+    /// If no reply comes, the line fails, or the log is changed again and again while it is read.
+    pub fn read_new(
+        &mut self,
+        cursor: &mut Option<Cursor>,
+        size: u16,
+        on: &mut dyn FnMut(Delivery),
+    ) -> Result<Summary, RequestError> {
+        let (mut delivered, mut lost, mut restarted) = (0_u32, 0_u32, false);
+        let mut size = size;
+        let mut resyncs = 0;
+        loop {
+            let mut reader = LogReader::new(*cursor, size);
+            if let Some(position) = self.last_position.take() {
+                reader = reader.starting_near(position);
+            }
+            let end = self.read_with(&mut reader, cursor, on);
+            let summary = reader.summary();
+            delivered = delivered.saturating_add(summary.delivered);
+            lost = lost.saturating_add(summary.lost);
+            restarted |= summary.restarted;
+            match end {
+                Ok(()) => {
+                    self.last_position = Some(summary.position);
+                    return Ok(Summary { delivered, lost, restarted, position: summary.position });
+                }
+                Err(RequestError::Disturbed(Disturbed::Changed | Disturbed::WrongSize))
+                    if resyncs < MAX_RESYNCS =>
+                {
+                    resyncs += 1;
+                    size = self.size_now(size)?;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    fn read_with(
+        &mut self,
+        reader: &mut LogReader,
+        cursor: &mut Option<Cursor>,
+        on: &mut dyn FnMut(Delivery),
+    ) -> Result<(), RequestError> {
+        while let Some(request) = reader.request() {
+            let reply = self.read(request)?;
+            let taken = reader.take(&reply, on);
+            *cursor = reader.cursor();
+            taken.map_err(RequestError::Disturbed)?;
+        }
+        Ok(())
+    }
+
+    /// The size of the log, which somebody may have changed. Original units do not tell: then it is `believed`.
+    fn size_now(&mut self, believed: u16) -> Result<u16, RequestError> {
+        match self.configuration() {
+            Ok(configuration) => Ok(configuration.size),
+            Err(RequestError::NoReply { .. }) => Ok(believed),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Waits for the next message that answers no request: an auto report or a line of text. Those that came during
+    /// requests come first. `None` when nothing comes in time.
+    ///
+    /// # Errors
+    /// If the line fails.
+    pub fn wait_event(&mut self, timeout: Duration) -> Result<Option<Unsolicited>, RequestError> {
+        let until = self.now().saturating_add(timeout);
+        loop {
+            if let Some(message) = self.session.take_unsolicited() {
+                return Ok(Some(message));
+            }
+            let left = until.saturating_sub(self.now());
+            if self.receive(left)? == 0 && left.is_zero() {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// Talks at another rate from now on, on this side only.
+    ///
+    /// # Errors
+    /// If the port does not have this rate.
+    pub fn set_baud(&mut self, bits_per_second: u32) -> Result<(), RequestError> {
+        self.transport.set_baud(bits_per_second).map_err(TransportError::from)?;
+        self.session.set_line_rate(LineRate::from(self.transport.bits_per_second()));
+        Ok(())
+    }
+
+    /// The rate of the line, if it has one.
+    #[must_use]
+    pub fn bits_per_second(&self) -> Option<u32> {
+        self.transport.bits_per_second()
+    }
+
+    /// What has been seen on the line so far.
+    #[must_use]
+    pub fn counters(&self) -> Counters {
+        self.session.counters()
+    }
+
+    /// How many reports and lines were dropped because [`wait_event`](Self::wait_event) did not take them in time.
+    #[must_use]
+    pub fn unsolicited_dropped(&self) -> u64 {
+        self.session.unsolicited_dropped()
+    }
+
+    fn read(&mut self, request: ReadRequest) -> Result<ReadReply, RequestError> {
+        match self.request(&request.into())? {
+            Reply::Read(reply) => Ok(reply),
+            _ => Err(unexpected(Code::Read)),
+        }
+    }
+
+    /// Takes what arrived before the request: it answers nothing that is asked from now on. A request that an error
+    /// of the line has cut short is forgotten.
+    fn prepare(&mut self) -> Result<(), RequestError> {
+        self.session.cancel(self.now());
+        let mut taken = 0;
+        while taken < MAX_STALE_BYTES {
+            match self.receive(Duration::ZERO)? {
+                0 => break,
+                count => taken += count,
+            }
+        }
+        Ok(())
+    }
+
+    fn converse(
+        &mut self,
+        time_at: &mut dyn FnMut(Duration) -> Option<TimeStamp>,
+    ) -> Result<Reply, RequestError> {
+        loop {
+            let now = self.now();
+            if let Some(mut attempt) = self.session.dispatch(now) {
+                if attempt.wants_time()
+                    && let Some(time) = time_at(attempt.duration())
+                {
+                    attempt.set_time(time);
+                }
+                self.transport.write_all(attempt.frame()).map_err(TransportError::from)?;
+            }
+            match self.session.take_answer() {
+                Some(Ok(reply)) => return Ok(reply),
+                Some(Err(no_reply)) => return Err(no_reply.into()),
+                None => {}
+            }
+            let left = self.session.poll_at().unwrap_or_default().saturating_sub(self.now());
+            self.receive(left)?;
+        }
+    }
+
+    fn listen_for(&mut self, time: Duration) -> Result<(), RequestError> {
+        let until = self.now().saturating_add(time);
+        loop {
+            let left = until.saturating_sub(self.now());
+            if left.is_zero() {
+                return Ok(());
+            }
+            self.receive(left)?;
+        }
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<usize, RequestError> {
+        let mut buf = [0; 1024];
+        let count = self.transport.read(&mut buf, timeout).map_err(TransportError::from)?;
+        let now = self.now();
+        self.session.process(now, buf.get(..count).unwrap_or_default());
+        Ok(count)
+    }
+
+    fn now(&self) -> Duration {
+        self.epoch.elapsed()
+    }
+}
+
+const fn unexpected(command: Code) -> RequestError {
+    RequestError::UnexpectedReply { command }
+}
+
+impl From<NoReply> for RequestError {
+    fn from(no_reply: NoReply) -> RequestError {
+        let NoReply { command, attempts, diagnosis, may_have_been_done } = no_reply;
+        RequestError::NoReply { command, attempts, diagnosis, may_have_been_done }
+    }
+}

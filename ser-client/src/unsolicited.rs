@@ -1,0 +1,44 @@
+//! What a recorder says without being asked.
+
+use std::collections::VecDeque;
+
+use ser_proto::ReadReply;
+
+use crate::TextLine;
+
+/// A message that answers no request.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Unsolicited {
+    /// A read reply that nobody asked for: an auto report. In rare cases it is the late answer to a read that was
+    /// given up, so take the place of its entries from their numbers and the header, not from the order of arrival.
+    Report(ReadReply),
+    /// A line of text: auto print, or an answer to a print command.
+    Line(TextLine),
+}
+
+/// Messages that wait until somebody wants them; the oldest go when there are too many.
+#[derive(Debug, Default)]
+pub(crate) struct UnsolicitedQueue {
+    messages: VecDeque<Unsolicited>,
+    dropped: u64,
+}
+
+impl UnsolicitedQueue {
+    pub(crate) const CAPACITY: usize = 4096;
+
+    pub(crate) fn push(&mut self, message: Unsolicited) {
+        if self.messages.len() == Self::CAPACITY {
+            self.messages.pop_front();
+            self.dropped += 1;
+        }
+        self.messages.push_back(message);
+    }
+
+    pub(crate) fn pop(&mut self) -> Option<Unsolicited> {
+        self.messages.pop_front()
+    }
+
+    pub(crate) const fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}

@@ -1,0 +1,197 @@
+//! A recorder behind a transport, without a line in between.
+
+use std::collections::VecDeque;
+use std::io;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
+
+use ser_client::{Options, Transport, Unit};
+use ser_proto::{
+    Baud, Command, Configuration, Decoded, FrameDecoder, FrameEncoder, LastBroadcast, Mode, ParseError, Reply,
+};
+
+use super::Recorder;
+
+/// Everything that a test can look at and change while the client talks.
+pub(crate) struct Fake {
+    pub(crate) recorder: Recorder,
+    pub(crate) configuration: Configuration,
+    /// The rate at which the unit talks; the client's rate has to be the same.
+    pub(crate) unit_rate: u32,
+    pub(crate) line_rate: u32,
+    /// Whether the client knows that the line has a rate, and waits accordingly.
+    pub(crate) has_rate: bool,
+    pub(crate) recording: bool,
+    /// How many replies are swallowed from now on.
+    pub(crate) swallow: usize,
+    /// Original units do not know the queries.
+    pub(crate) original: bool,
+    /// After so many more commands the line fails.
+    pub(crate) breaks_in: Option<usize>,
+    /// The line fails with this.
+    pub(crate) broken: Option<io::ErrorKind>,
+    pub(crate) commands: Vec<Command>,
+    /// Called after each command with its number.
+    pub(crate) meanwhile: Box<dyn FnMut(&mut Recorder, &mut Configuration, usize) + Send>,
+    /// Bytes under way, with the rate at which they were sent.
+    to_client: VecDeque<(u8, u32)>,
+    decoder: FrameDecoder<168>,
+}
+
+impl Fake {
+    pub(crate) fn say(&mut self, bytes: &[u8]) {
+        self.to_client.extend(bytes.iter().map(|&byte| (byte, self.unit_rate)));
+    }
+
+    pub(crate) fn reply(&mut self, reply: &Reply) {
+        self.say(&FrameEncoder::new(reply.to_body()).collect::<Vec<_>>());
+    }
+
+    fn hear(&mut self, byte: u8) {
+        let command = match self.decoder.push(byte) {
+            Some(Decoded::Frame(body)) => Command::parse(body),
+            _ => return,
+        };
+        let command = match command {
+            Ok(command) => command,
+            Err(ParseError::BadValue { code: 0x43, .. }) => {
+                self.reply(&Reply::Configuration(self.configuration));
+                return;
+            }
+            Err(_) => return,
+        };
+        self.commands.push(command);
+        let mut new_rate = None;
+        let reply = match command {
+            Command::QueryConfiguration | Command::QueryMode if self.original => None,
+            Command::QueryConfiguration => Some(Reply::Configuration(self.configuration)),
+            Command::Configure(configure) => {
+                self.configuration = configure.apply_to(&self.configuration);
+                self.recorder.resize(self.configuration.size.into());
+                new_rate = Some(self.configuration.baud.bits_per_second());
+                Some(Reply::Configuration(self.configuration))
+            }
+            Command::Erase => {
+                self.recorder.erase();
+                Some(Reply::Erased)
+            }
+            Command::LastBroadcast => Some(Reply::LastBroadcast(Some(LastBroadcast {
+                code: 0x45,
+                hour: 1,
+                minute: 2,
+                second: 3,
+                millisecond: 4,
+            }))),
+            Command::QueryMode => Some(Reply::Mode(Mode { recording: self.recording, version: 125 })),
+            Command::SetMode { recording } => {
+                self.recording = recording;
+                Some(Reply::Mode(Mode { recording, version: 125 }))
+            }
+            Command::Print { .. } => Some(Reply::PrintAccepted),
+            Command::Read { start, count } => Some(Reply::Read(self.recorder.read(start, count))),
+            Command::SetClock(_) => Some(Reply::ClockSet),
+        };
+        if self.swallow > 0 {
+            self.swallow -= 1;
+        } else if let Some(reply) = reply {
+            self.reply(&reply);
+        }
+        if matches!(command, Command::Print { .. }) {
+            self.say(b"1 10:00:00.000 1 ON\r\n");
+        }
+        if let Some(rate) = new_rate {
+            self.unit_rate = rate;
+        }
+        match &mut self.breaks_in {
+            Some(0) => self.broken = Some(io::ErrorKind::NotConnected),
+            Some(left) => *left -= 1,
+            None => {}
+        }
+        (self.meanwhile)(&mut self.recorder, &mut self.configuration, self.commands.len());
+    }
+}
+
+/// The client's end.
+struct FakeTransport(Arc<Mutex<Fake>>);
+
+impl Transport for FakeTransport {
+    fn read(&mut self, buf: &mut [u8], _: Duration) -> io::Result<usize> {
+        let mut fake = self.0.lock().unwrap();
+        if let Some(kind) = fake.broken {
+            return Err(kind.into());
+        }
+        let count = buf.len().min(fake.to_client.len());
+        let line_rate = fake.line_rate;
+        for (to, (byte, rate)) in buf.iter_mut().zip(fake.to_client.drain(..count)) {
+            *to = if rate == line_rate { byte } else { byte | 0x80 };
+        }
+        Ok(count)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let mut fake = self.0.lock().unwrap();
+        if let Some(kind) = fake.broken {
+            return Err(kind.into());
+        }
+        if fake.line_rate == fake.unit_rate {
+            bytes.iter().for_each(|&byte| fake.hear(byte));
+        } else {
+            fake.say(b"?!");
+        }
+        Ok(())
+    }
+
+    fn set_baud(&mut self, bits_per_second: u32) -> io::Result<()> {
+        self.0.lock().unwrap().line_rate = bits_per_second;
+        Ok(())
+    }
+
+    fn bits_per_second(&self) -> Option<u32> {
+        let fake = self.0.lock().unwrap();
+        fake.has_rate.then_some(fake.line_rate)
+    }
+}
+
+/// A client and what it talks to.
+pub(crate) struct Bench {
+    pub(crate) unit: Unit,
+    fake: Arc<Mutex<Fake>>,
+}
+
+impl Bench {
+    /// Over a line of which the client does not know the rate: what is not answered is given up soon.
+    pub(crate) fn new(size: u16) -> Bench {
+        Bench::with(size, false)
+    }
+
+    /// Over a line with a rate.
+    pub(crate) fn serial(size: u16) -> Bench {
+        Bench::with(size, true)
+    }
+
+    fn with(size: u16, has_rate: bool) -> Bench {
+        let configuration = Configuration { size, baud: Baud::B19200, ..Configuration::default() };
+        let fake = Arc::new(Mutex::new(Fake {
+            recorder: Recorder::new(size.into()),
+            configuration,
+            unit_rate: 19_200,
+            line_rate: 19_200,
+            has_rate,
+            recording: true,
+            swallow: 0,
+            original: false,
+            breaks_in: None,
+            broken: None,
+            commands: Vec::new(),
+            meanwhile: Box::new(|_, _, _| {}),
+            to_client: VecDeque::new(),
+            decoder: FrameDecoder::new(),
+        }));
+        let options = Options { timeout: Duration::from_millis(1), retries: 2 };
+        Bench { unit: Unit::new(Box::new(FakeTransport(Arc::clone(&fake))), options), fake }
+    }
+
+    pub(crate) fn fake(&self) -> MutexGuard<'_, Fake> {
+        self.fake.lock().unwrap()
+    }
+}

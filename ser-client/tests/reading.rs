@@ -1,0 +1,456 @@
+//! Reading by cursor, against a recorder that is nothing but a list.
+
+mod common;
+
+use common::{Recorder, Told, serial, told};
+use proptest::prelude::*;
+use ser_client::{Cursor, Delivery, Disturbed, LogReader, Summary};
+
+/// A host that keeps its cursor from reading to reading, and a judge that knows what really happened.
+struct Host {
+    cursor: Option<Cursor>,
+    /// Serial number of the event that has to come next; not known before the first.
+    expected: Option<u32>,
+    /// The most events that happen between two replies.
+    rate: u32,
+}
+
+/// What happens to the recorder behind the host's back.
+#[derive(Clone, Copy, Debug)]
+enum Change {
+    Nothing,
+    /// Erase or power cycle.
+    Erase,
+    Resize(usize),
+}
+
+impl Host {
+    fn new() -> Host {
+        Host { cursor: None, expected: None, rate: 0 }
+    }
+
+    /// One reading, as `Unit::read_new` does it; `meanwhile` is called after each reply.
+    fn read(
+        &mut self,
+        recorder: &mut Recorder,
+        mut meanwhile: impl FnMut(&mut Recorder),
+    ) -> (Vec<Told>, Summary) {
+        let mut all = Vec::new();
+        for _ in 0..6 {
+            let mut reader = LogReader::new(self.cursor, u16::try_from(recorder.size).unwrap());
+            match self.read_with(&mut reader, recorder, &mut meanwhile, &mut all) {
+                Ok(()) => return (all, reader.summary()),
+                Err(Disturbed::NoProgress) => panic!("no progress: {reader:?}"),
+                Err(_) => {}
+            }
+        }
+        panic!("disturbed again and again");
+    }
+
+    fn read_with(
+        &mut self,
+        reader: &mut LogReader,
+        recorder: &mut Recorder,
+        meanwhile: &mut dyn FnMut(&mut Recorder),
+        all: &mut Vec<Told>,
+    ) -> Result<(), Disturbed> {
+        let mut requests = 0;
+        let mut after_loss = false;
+        while let Some(request) = reader.request() {
+            requests += 1;
+            assert!(requests < 20_000, "no end: {reader:?}");
+            assert!((1..=10).contains(&request.count));
+            assert!(usize::from(request.start) + usize::from(request.count) <= recorder.size.max(2047) + 2);
+            let reply = recorder.read(request.start, request.count);
+            let result = reader.take(&reply, &mut |delivery| {
+                if let Delivery::Event { entry_number, entry, model } = delivery {
+                    let held = recorder.read(entry_number, 1);
+                    assert_eq!(held.entries[..], [entry], "entry {entry_number} is another event");
+                    assert_eq!(model, recorder.model);
+                    let given_up = serial(&entry) - oldest_serial(recorder);
+                    assert!(!after_loss || given_up <= 2 * self.rate, "{given_up} could have been read");
+                }
+                after_loss = matches!(delivery, Delivery::Lost(_));
+                all.push(told(delivery));
+            });
+            self.cursor = reader.cursor();
+            result?;
+            meanwhile(recorder);
+        }
+        Ok(())
+    }
+
+    /// Checks what was told against what happened. `first_of_life` is the serial of the first event after the latest
+    /// erase.
+    fn judge(&mut self, told: &[Told], first_of_life: u32) {
+        for &told in told {
+            match told {
+                Told::Event(serial) => {
+                    assert_eq!(serial, self.expected.unwrap_or(serial), "not the event that comes next");
+                    self.expected = Some(serial + 1);
+                }
+                Told::Overwritten(count) | Told::AtLeast(count) => {
+                    self.expected = self.expected.map(|expected| expected + count);
+                }
+                Told::Restarted => self.expected = Some(first_of_life),
+            }
+        }
+    }
+}
+
+fn events(serials: impl IntoIterator<Item = u32>) -> Vec<Told> {
+    serials.into_iter().map(Told::Event).collect()
+}
+
+fn oldest_serial(recorder: &Recorder) -> u32 {
+    serial(&recorder.history[recorder.history.len() - recorder.held()])
+}
+
+#[test]
+fn a_first_reading_delivers_everything_in_order_and_a_second_one_nothing() {
+    for size in [1, 2, 7, 10, 2048] {
+        for count in [0, 1, 2, 9, 10, 11, 25] {
+            let mut recorder = Recorder::new(size);
+            recorder.append_many(count);
+            let mut host = Host::new();
+            let count = u32::try_from(count).unwrap();
+            let lost = count.saturating_sub(u32::try_from(size).unwrap());
+            let mut expected = events(lost + 1..=count);
+            if lost > 0 {
+                expected.insert(0, Told::AtLeast(lost));
+            }
+            let (told, summary) = host.read(&mut recorder, |_| {});
+            assert_eq!(told, expected, "size {size}, {count} events");
+            assert_eq!((summary.delivered, summary.lost, summary.restarted), (count - lost, lost, false));
+            assert_eq!(u32::from(summary.position.total), count);
+            assert_eq!(host.read(&mut recorder, |_| {}).0, []);
+        }
+    }
+}
+
+#[test]
+fn only_what_is_new_is_delivered_across_the_end_of_the_ring_and_of_the_total() {
+    for size in [1, 2, 7, 10, 2048] {
+        let mut recorder = Recorder::after(size, 65_530);
+        let mut host = Host::new();
+        host.read(&mut recorder, |_| {});
+        for _ in 0..40 {
+            recorder.append();
+            let newest = serial(recorder.history.last().unwrap());
+            assert_eq!(host.read(&mut recorder, |_| {}).0, events([newest]), "size {size}");
+        }
+        assert!(recorder.total() < 100);
+    }
+}
+
+#[test]
+fn what_was_overwritten_is_counted() {
+    let mut recorder = Recorder::new(7);
+    let mut host = Host::new();
+    recorder.append_many(5);
+    host.read(&mut recorder, |_| {});
+    recorder.append_many(10);
+    let mut expected = vec![Told::Overwritten(3)];
+    expected.extend(events(9..=15));
+    assert_eq!(host.read(&mut recorder, |_| {}).0, expected);
+    // As many as fit: nothing is lost, although the anchor is.
+    recorder.append_many(7);
+    assert_eq!(host.read(&mut recorder, |_| {}).0, events(16..=22));
+}
+
+#[test]
+fn an_erased_log_is_noticed_whatever_its_total_is() {
+    for before in [1, 5, 6, 7, 8, 20] {
+        for after in 0..7 {
+            let mut recorder = Recorder::new(7);
+            let mut host = Host::new();
+            recorder.append_many(before);
+            host.read(&mut recorder, |_| {});
+            recorder.erase();
+            recorder.append_many(after);
+            let first = u32::try_from(before).unwrap() + 1;
+            let mut expected = vec![Told::Restarted];
+            expected.extend(events(first..first + u32::try_from(after).unwrap()));
+            let (told, summary) = host.read(&mut recorder, |_| {});
+            assert_eq!(told, expected, "{before} events, erased, {after} events");
+            assert!(summary.restarted);
+            assert_eq!(host.read(&mut recorder, |_| {}).0, [], "told twice");
+        }
+    }
+}
+
+#[test]
+fn an_empty_log_that_gets_events_has_lost_none() {
+    let mut recorder = Recorder::new(10);
+    let mut host = Host::new();
+    assert_eq!(host.read(&mut recorder, |_| {}).0, []);
+    assert_eq!(host.cursor, Some(Cursor { total: 0, anchor: None }));
+    recorder.append_many(10);
+    assert_eq!(host.read(&mut recorder, |_| {}).0, events(1..=10));
+}
+
+#[test]
+fn a_resize_between_two_readings_loses_what_it_throws_away() {
+    let mut recorder = Recorder::new(10);
+    let mut host = Host::new();
+    recorder.append_many(25);
+    host.read(&mut recorder, |_| {});
+    // Smaller: of eight new events the newest four are left.
+    recorder.append_many(8);
+    recorder.resize(4);
+    let mut expected = vec![Told::Overwritten(4)];
+    expected.extend(events(30..=33));
+    assert_eq!(host.read(&mut recorder, |_| {}).0, expected);
+    // Larger: of six new events four were there at the resize, and another two came after it.
+    recorder.append_many(8);
+    recorder.resize(100);
+    recorder.append_many(2);
+    let mut expected = vec![Told::Overwritten(4)];
+    expected.extend(events(38..=43));
+    assert_eq!(host.read(&mut recorder, |_| {}).0, expected);
+    recorder.append();
+    assert_eq!(host.read(&mut recorder, |_| {}).0, events([44]));
+}
+
+#[test]
+fn a_reading_that_breaks_off_goes_on_where_it_stopped() {
+    let mut recorder = Recorder::new(50);
+    recorder.append_many(50);
+    let mut cursor = None;
+    let mut all = Vec::new();
+    // Each reading is given up after its fourth reply.
+    for _ in 0..20 {
+        let mut reader = LogReader::new(cursor, 50);
+        for _ in 0..4 {
+            let Some(request) = reader.request() else { break };
+            let reply = recorder.read(request.start, request.count);
+            reader.take(&reply, &mut |delivery| all.push(told(delivery))).unwrap();
+        }
+        cursor = reader.cursor();
+    }
+    assert_eq!(all, events(1..=50));
+}
+
+#[test]
+fn polling_an_idle_log_takes_one_request_when_the_position_is_known() {
+    for size in [1, 7, 2048] {
+        let mut recorder = Recorder::after(size, 20);
+        let mut host = Host::new();
+        let (_, summary) = host.read(&mut recorder, |_| {});
+        let mut reader =
+            LogReader::new(host.cursor, u16::try_from(size).unwrap()).starting_near(summary.position);
+        let request = reader.request().unwrap();
+        let reply = recorder.read(request.start, request.count);
+        reader.take(&reply, &mut |delivery| panic!("{delivery:?}")).unwrap();
+        assert_eq!(reader.request(), None, "size {size}");
+    }
+}
+
+#[test]
+fn a_size_that_is_not_the_recorders_is_noticed() {
+    let mut recorder = Recorder::new(20);
+    recorder.append_many(25);
+    let mut reader = LogReader::new(None, 10);
+    let mut result = Ok(());
+    while let (Ok(()), Some(request)) = (result, reader.request()) {
+        result = reader.take(&recorder.read(request.start, request.count), &mut |_| {});
+    }
+    assert_eq!(result, Err(Disturbed::WrongSize));
+}
+
+#[test]
+fn replies_that_make_no_sense_end_the_reading() {
+    // Always the same reply, with a total and no entries.
+    let recorder = Recorder::new(5);
+    let mut reader = LogReader::new(Some(Cursor { total: 3, anchor: None }), 100);
+    let mut result = Ok(());
+    for _ in 0..1000 {
+        let Some(request) = reader.request() else { break };
+        let mut reply = recorder.read(request.start, request.count);
+        reply.total = 40;
+        reply.next_slot = 30;
+        result = reader.take(&reply, &mut |delivery| panic!("{delivery:?}"));
+        if result.is_err() {
+            break;
+        }
+    }
+    assert_eq!(result, Err(Disturbed::NoProgress));
+}
+
+fn any_size() -> impl Strategy<Value = usize> {
+    prop_oneof![Just(1), Just(2), Just(7), Just(10), Just(11), Just(2048), 1_usize..40]
+}
+
+fn any_past() -> impl Strategy<Value = u64> {
+    prop_oneof![Just(0), 0_u64..30, 65_500_u64..65_600, 0_u64..200_000]
+}
+
+fn any_change() -> impl Strategy<Value = Change> {
+    prop_oneof![
+        4 => Just(Change::Nothing),
+        1 => Just(Change::Erase),
+        1 => any_size().prop_map(Change::Resize),
+    ]
+}
+
+/// Lets something happen that a host is able to notice; see "what cannot be known" in the reader's documentation.
+/// Returns how many events may follow before the next reply.
+fn change(recorder: &mut Recorder, change: Change) -> usize {
+    match change {
+        Change::Erase if recorder.count() < 60_000 => {
+            let followers =
+                recorder.history.len().min(recorder.size) - usize::from(!recorder.history.is_empty());
+            recorder.erase();
+            followers
+        }
+        // A total that has wrapped and happens to be what the ring holds looks as if nothing had been thrown away.
+        Change::Resize(size) if recorder.count() < 65_536 || size <= recorder.size => {
+            recorder.resize(size);
+            usize::MAX
+        }
+        _ => usize::MAX,
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Nothing happens during the readings: what is lost is exactly what the recorder does not hold any more.
+    #[test]
+    fn each_event_once_and_every_loss_counted(
+        size in any_size(),
+        past in any_past(),
+        reply_limit in prop_oneof![Just(10), Just(7), Just(1)],
+        rounds in prop::collection::vec((any_change(), 0_usize..50), 1..12),
+    ) {
+        let mut recorder = Recorder::after(size, past);
+        recorder.reply_limit = reply_limit;
+        let mut host = Host::new();
+        let mut first_of_life = 1;
+        let (told, _) = host.read(&mut recorder, |_| {});
+        host.judge(&told, first_of_life);
+        if past > 0 {
+            prop_assert_eq!(told.iter().filter(|told| matches!(told, Told::Event(_))).count(), recorder.held());
+        }
+        let mut next_serial = recorder.history.last().map_or(1, |entry| serial(entry) + 1);
+        prop_assert!(host.expected.is_none_or(|expected| expected == next_serial));
+        host.expected = Some(next_serial);
+        for (what, count) in rounds {
+            let followers = change(&mut recorder, what);
+            if recorder.history.is_empty() && recorder.count() == 0 {
+                first_of_life = next_serial;
+            }
+            let count = count.min(followers);
+            recorder.append_many(count);
+            next_serial += u32::try_from(count).unwrap();
+            let oldest = if recorder.held() == 0 { next_serial } else { oldest_serial(&recorder) };
+            let unread = host.expected.unwrap().max(first_of_life);
+            let (told, _) = host.read(&mut recorder, |_| {});
+            let lost: u32 = told
+                .iter()
+                .map(|told| match *told {
+                    Told::Overwritten(count) | Told::AtLeast(count) => count,
+                    _ => 0,
+                })
+                .sum();
+            prop_assert_eq!(lost, oldest.saturating_sub(unread), "{:?}", told);
+            host.judge(&told, first_of_life);
+            prop_assert_eq!(host.expected, Some(next_serial), "{:?}", told);
+        }
+    }
+
+    /// Events happen during the readings, up to so many that the ring turns over: order and count still hold.
+    #[test]
+    fn events_during_the_reading_are_delivered_or_counted(
+        size in any_size(),
+        past in any_past(),
+        rate in prop_oneof![Just(0_usize), Just(1), Just(3), Just(12), 0_usize..100],
+        rounds in prop::collection::vec((0_usize..50, prop::collection::vec(0_usize..=100, 1..8)), 1..8),
+    ) {
+        let mut recorder = Recorder::after(size, past);
+        let mut host = Host::new();
+        host.expected = recorder.first_serial_known();
+        host.rate = u32::try_from(rate).unwrap();
+        for (before, meanwhile) in rounds {
+            recorder.append_many(before);
+            let due = recorder.history.last().map(serial);
+            let mut percents = meanwhile.iter().cycle();
+            let (told, _) = host.read(&mut recorder, |recorder| {
+                recorder.append_many(rate * percents.next().unwrap() / 100);
+            });
+            host.judge(&told, 1);
+            if let Some(due) = due {
+                prop_assert!(host.expected.unwrap() > due, "the reading ended before its time");
+            }
+        }
+        // In peace the rest comes, too.
+        let (told, _) = host.read(&mut recorder, |_| {});
+        host.judge(&told, 1);
+        let next_serial = recorder.history.last().map_or(1, |entry| serial(entry) + 1);
+        prop_assert_eq!(host.expected.unwrap_or(next_serial), next_serial);
+        prop_assert_eq!(host.read(&mut recorder, |_| {}).0, vec![]);
+    }
+
+    /// Somebody erases or resizes the log in the middle of a reading.
+    #[test]
+    fn changes_during_the_reading_are_noticed(
+        size in any_size(),
+        past in prop_oneof![1_u64..40, 1_u64..5000],
+        new in 0_usize..40,
+        at in 0_usize..8,
+        what in any_change(),
+        followers in 0_usize..20,
+    ) {
+        let mut recorder = Recorder::after(size, past);
+        let mut host = Host::new();
+        host.read(&mut recorder, |_| {});
+        host.expected = Some(recorder.history.last().map_or(1, |entry| serial(entry) + 1));
+        recorder.append_many(new);
+        host.rate = u32::try_from(followers).unwrap();
+        let mut first_of_life = 1;
+        let mut replies = 0;
+        let (mut told, _) = host.read(&mut recorder, |recorder| {
+            if replies == at {
+                let next_serial = recorder.history.last().map_or(1, |entry| serial(entry) + 1);
+                let mut unchanged = recorder.clone();
+                let room = change(recorder, what);
+                unchanged.append_many(followers.min(room));
+                let mut changed = recorder.clone();
+                changed.append_many(followers.min(room));
+                if matches!(what, Change::Resize(_)) && unchanged.read(1, 0).next_slot == changed.read(1, 0).next_slot {
+                    // Not to be seen in the header.
+                    *recorder = unchanged;
+                    return;
+                }
+                if recorder.history.is_empty() {
+                    first_of_life = next_serial;
+                }
+                recorder.append_many(followers.min(room));
+            }
+            replies += 1;
+        });
+        told.extend(host.read(&mut recorder, |_| {}).0);
+        host.judge(&told, first_of_life);
+        let next_serial = recorder.history.last().map_or(first_of_life, |entry| serial(entry) + 1);
+        prop_assert_eq!(host.expected, Some(next_serial), "{:?}", told);
+    }
+
+    /// Whatever a broken unit sends, reading neither panics nor goes on for ever.
+    #[test]
+    fn no_reply_can_break_the_reader(
+        size in any::<u16>(),
+        cursor in prop::option::of((any::<u16>(), any::<bool>())),
+        replies in prop::collection::vec((any::<u16>(), 0_u16..2048, 0_usize..=10, any::<u32>()), 1..200),
+    ) {
+        let cursor = cursor.map(|(total, anchored)| Cursor { total, anchor: anchored.then(|| common::event(0)) });
+        let mut reader = LogReader::new(cursor, size);
+        for (total, next_slot, count, event) in replies {
+            let Some(request) = reader.request() else { break };
+            let entries: heapless::Vec<_, 10> = std::iter::repeat_n(common::event(event), count).collect();
+            let model = (count > 0).then_some(ser_proto::Model::Ser160);
+            let reply = ser_proto::ReadReply { start: request.start, total, next_slot, model, entries };
+            let _ = reader.take(&reply, &mut |_| {});
+            prop_assert!(reader.pending() <= 2048);
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! The blocking façade, against a recorder that answers at once.
+
+mod common;
+
+use std::io::ErrorKind;
+use std::time::Duration;
+
+use common::unit::Bench;
+use common::{Told, told};
+use ser_client::{
+    Cursor, Diagnosis, Disturbed, LogPosition, RequestError, Summary, TransportError, Unit, Unsolicited,
+};
+use ser_proto::{AutoReport, Baud, Code, Command, Configure, Mode, Reply, TimeStamp};
+
+const NOON: TimeStamp =
+    TimeStamp { year: 26, month: 11, day: 22, hour: 12, minute: 0, second: 0, millisecond: 0 };
+
+fn keep_everything() -> Configure {
+    Configure { size: None, baud: None, auto_report: AutoReport::Off, report_address: 0, auto_print: false }
+}
+
+fn read_new(
+    unit: &mut Unit,
+    cursor: &mut Option<Cursor>,
+    size: u16,
+) -> (Vec<Told>, Result<Summary, RequestError>) {
+    let mut all = Vec::new();
+    let result = unit.read_new(cursor, size, &mut |delivery| all.push(told(delivery)));
+    (all, result)
+}
+
+#[test]
+fn every_command_has_its_call() {
+    let mut bench = Bench::new(100);
+    let running = Mode { recording: true, version: 125 };
+    assert_eq!(bench.unit.mode().unwrap(), running);
+    assert!(!bench.unit.set_recording(false).unwrap().recording);
+    assert_eq!(bench.unit.configuration().unwrap().size, 100);
+    assert_eq!(bench.unit.last_broadcast().unwrap().unwrap().code, 0x45);
+    bench.fake().recorder.append_many(3);
+    assert_eq!(bench.unit.log_position().unwrap(), LogPosition { total: 3, next_slot: 3 });
+    bench.unit.erase().unwrap();
+    assert_eq!(bench.fake().recorder.held(), 0);
+    assert_eq!(bench.unit.request(&Command::SetClock(NOON)).unwrap(), Reply::ClockSet);
+    bench.unit.print(1, 1).unwrap();
+    let line = bench.unit.wait_event(Duration::ZERO).unwrap();
+    assert!(matches!(line, Some(Unsolicited::Line(line)) if line.text == "1 10:00:00.000 1 ON"));
+    assert_eq!(bench.unit.wait_event(Duration::ZERO).unwrap(), None);
+}
+
+#[test]
+fn settings_are_checked_against_what_is_in_force() {
+    let mut bench = Bench::new(100);
+    let in_force =
+        bench.unit.configure(Configure { size: Some(50), auto_print: true, ..keep_everything() }).unwrap();
+    assert_eq!((in_force.size, in_force.auto_print, in_force.baud), (50, true, Baud::B19200));
+    assert_eq!(bench.fake().recorder.size, 50);
+    // A unit that finds a field out of range changes nothing and answers with what it has.
+    let result = bench.unit.configure(Configure { size: Some(2049), ..keep_everything() });
+    assert!(matches!(result, Err(RequestError::Refused { in_force: old }) if old == in_force), "{result:?}");
+}
+
+#[test]
+fn an_answer_from_before_the_question_is_none() {
+    let mut bench = Bench::new(100);
+    let running = Reply::Mode(Mode { recording: true, version: 125 });
+    bench.fake().reply(&running);
+    assert!(!bench.unit.set_recording(false).unwrap().recording);
+    assert_eq!(bench.unit.counters().stray_replies, 1);
+}
+
+#[test]
+fn the_line_follows_a_new_baud_rate() {
+    let mut bench = Bench::serial(100);
+    let in_force = bench.unit.configure(Configure { baud: Some(Baud::B9600), ..keep_everything() }).unwrap();
+    assert_eq!(in_force.baud, Baud::B9600);
+    assert_eq!((bench.fake().line_rate, bench.fake().unit_rate), (9600, 9600));
+    assert_eq!(bench.unit.bits_per_second(), Some(9600));
+    assert!(bench.unit.mode().unwrap().recording);
+}
+
+#[test]
+fn a_wrong_baud_rate_shows_as_garbage() {
+    let mut bench = Bench::new(100);
+    bench.unit.set_baud(9600).unwrap();
+    let error = bench.unit.mode().unwrap_err();
+    let RequestError::NoReply { attempts: 3, diagnosis, may_have_been_done: false, .. } = error else {
+        panic!("{error:?}")
+    };
+    assert_eq!(diagnosis, Diagnosis::Garbage { bytes: 6 });
+    assert!(error.hint().unwrap().contains("baud"));
+    bench.unit.set_baud(19_200).unwrap();
+    assert!(bench.unit.mode().unwrap().recording);
+}
+
+#[test]
+fn an_erase_without_reply_is_not_repeated_and_says_that_it_may_have_been_done() {
+    let mut bench = Bench::new(100);
+    bench.fake().recorder.append();
+    bench.fake().swallow = 1;
+    let error = bench.unit.erase().unwrap_err();
+    assert!(matches!(
+        error,
+        RequestError::NoReply { attempts: 1, diagnosis: Diagnosis::Silent, may_have_been_done: true, .. }
+    ));
+    assert!(error.to_string().ends_with("it may or may not have been carried out"), "{error}");
+    assert_eq!(bench.fake().commands, [Command::Erase]);
+}
+
+#[test]
+fn an_original_unit_is_silent_on_the_queries() {
+    let mut bench = Bench::new(100);
+    bench.fake().original = true;
+    for result in [bench.unit.mode().map(drop), bench.unit.configuration().map(drop)] {
+        assert!(matches!(
+            result,
+            Err(RequestError::NoReply { attempts: 3, diagnosis: Diagnosis::Silent, .. })
+        ));
+    }
+    assert!(bench.unit.set_recording(true).unwrap().recording);
+}
+
+#[test]
+fn the_clock_is_asked_for_the_time_of_each_attempt() {
+    let mut bench = Bench::serial(100);
+    bench.fake().swallow = 2;
+    let mut delays = Vec::new();
+    let set = bench
+        .unit
+        .set_clock(|delay| {
+            delays.push(delay);
+            TimeStamp { second: u8::try_from(delays.len()).unwrap(), ..NOON }
+        })
+        .unwrap();
+    // Once to see that there is such a time, then for three attempts.
+    assert_eq!(set, TimeStamp { second: 4, ..NOON });
+    let on_the_line = Duration::from_nanos(230 * 1_000_000_000 / 19_200);
+    assert_eq!(delays, [Duration::ZERO, on_the_line, on_the_line, on_the_line]);
+    let sent = [2, 3, 4].map(|second| Command::SetClock(TimeStamp { second, ..NOON }));
+    assert_eq!(bench.fake().commands, sent);
+}
+
+#[test]
+fn a_time_that_does_not_exist_is_not_sent() {
+    let mut bench = Bench::new(100);
+    let error = bench.unit.set_clock(|_| TimeStamp { day: 31, ..NOON }).unwrap_err();
+    assert!(matches!(error, RequestError::InvalidTime(_)));
+    assert!(bench.fake().commands.is_empty());
+}
+
+#[test]
+fn a_log_is_read_over_a_line_that_loses_replies() {
+    let mut bench = Bench::new(100);
+    bench.fake().recorder.append_many(130);
+    let mut cursor = None;
+    bench.fake().swallow = 1;
+    let (all, result) = read_new(&mut bench.unit, &mut cursor, 100);
+    assert_eq!(all[0], Told::AtLeast(30));
+    assert_eq!(all[1..], (31..=130).map(Told::Event).collect::<Vec<_>>());
+    let position = LogPosition { total: 130, next_slot: 30 };
+    assert_eq!(result.unwrap(), Summary { delivered: 100, lost: 30, restarted: false, position });
+    assert_eq!(cursor.unwrap().total, 130);
+    // A second reading with nothing new is one request.
+    bench.fake().commands.clear();
+    assert_eq!(read_new(&mut bench.unit, &mut cursor, 100).0, []);
+    assert_eq!(bench.fake().commands.len(), 1);
+    // And what comes then is read from there.
+    bench.fake().recorder.append_many(2);
+    assert_eq!(read_new(&mut bench.unit, &mut cursor, 100).0, [Told::Event(131), Told::Event(132)]);
+}
+
+#[test]
+fn a_reading_that_fails_goes_on_where_it_stopped() {
+    let mut bench = Bench::new(100);
+    bench.fake().recorder.append_many(100);
+    let mut cursor = None;
+    let mut all = Vec::new();
+    let mut failures = 0;
+    loop {
+        bench.fake().breaks_in = Some(4);
+        let (told, result) = read_new(&mut bench.unit, &mut cursor, 100);
+        all.extend(told);
+        bench.fake().broken = None;
+        match result {
+            Ok(_) => break,
+            Err(RequestError::Transport(TransportError::Unplugged)) => failures += 1,
+            Err(error) => panic!("{error:?}"),
+        }
+    }
+    assert_eq!(all, (1..=100).map(Told::Event).collect::<Vec<_>>());
+    assert!(failures > 2);
+}
+
+#[test]
+fn a_log_that_is_resized_under_the_reading_is_read_to_its_end() {
+    let mut bench = Bench::new(100);
+    bench.fake().recorder.append_many(100);
+    bench.fake().meanwhile = Box::new(|recorder, configuration, commands| {
+        if commands == 5 {
+            recorder.append_many(3);
+            recorder.resize(90);
+            configuration.size = 90;
+        }
+    });
+    let mut cursor = None;
+    let (all, result) = read_new(&mut bench.unit, &mut cursor, 100);
+    assert_eq!(result.unwrap().delivered, 103);
+    assert_eq!(all, (1..=103).map(Told::Event).collect::<Vec<_>>());
+    assert!(bench.fake().commands.contains(&Command::QueryConfiguration));
+}
+
+#[test]
+fn a_log_that_never_rests_ends_in_an_error() {
+    let mut bench = Bench::new(99);
+    bench.fake().recorder.append_many(150);
+    bench.fake().meanwhile = Box::new(|recorder, _, _| {
+        recorder.erase();
+        recorder.append_many(150);
+    });
+    // Every total is the same, every entry another: each reading sees a log that began anew.
+    let mut cursor = None;
+    let (_, result) = read_new(&mut bench.unit, &mut cursor, 99);
+    assert!(matches!(result, Err(RequestError::Disturbed(Disturbed::Changed))), "{result:?}");
+}
+
+#[test]
+fn entries_are_read_by_their_numbers() {
+    let mut bench = Bench::new(30);
+    bench.fake().recorder.append_many(35);
+    let mut read = |start, count| {
+        let mut all = Vec::new();
+        let number =
+            bench.unit.read_range(start, count, 30, &mut |delivery| all.push(told(delivery))).unwrap();
+        assert_eq!(usize::from(number), all.len());
+        all
+    };
+    assert_eq!(read(1, 2), [Told::Event(31), Told::Event(32)]);
+    assert_eq!(read(5, 12), [35].into_iter().chain(6..=16).map(Told::Event).collect::<Vec<_>>());
+    assert_eq!(read(29, 100), [Told::Event(29), Told::Event(30)]);
+    assert_eq!(read(0, 10), []);
+    assert_eq!(read(31, 10), []);
+    assert_eq!(read(u16::MAX, u16::MAX), []);
+    assert_eq!(read(1, 0), []);
+}
+
+#[test]
+fn a_range_ends_where_the_log_ends_and_short_replies_go_on() {
+    let mut bench = Bench::new(30);
+    bench.fake().recorder.append_many(18);
+    bench.fake().recorder.reply_limit = 7;
+    let mut all = Vec::new();
+    assert_eq!(bench.unit.read_range(1, 30, 30, &mut |delivery| all.push(told(delivery))).unwrap(), 18);
+    assert_eq!(all, (1..=18).map(Told::Event).collect::<Vec<_>>());
+}
+
+#[test]
+fn reports_and_lines_during_requests_are_kept_in_order() {
+    let mut bench = Bench::new(30);
+    bench.fake().recorder.append();
+    let report = bench.fake().recorder.read(1, 1);
+    bench.fake().say(b"a line from before\r\n");
+    bench.fake().reply(&Reply::Read(report.clone()));
+    // The report would be a fine answer, but it was there before the question.
+    assert_eq!(bench.unit.log_position().unwrap().total, 1);
+    assert_eq!(bench.fake().commands.len(), 1);
+    let mut next = || bench.unit.wait_event(Duration::ZERO).unwrap();
+    assert!(matches!(next(), Some(Unsolicited::Line(line)) if line.text == "a line from before"));
+    assert_eq!(next(), Some(Unsolicited::Report(report)));
+    assert_eq!(next(), None);
+    assert_eq!(bench.unit.unsolicited_dropped(), 0);
+    assert_eq!(bench.unit.counters().reports, 1);
+}
+
+#[test]
+fn a_line_that_breaks_says_how_and_can_be_used_again() {
+    let mut bench = Bench::new(30);
+    bench.fake().broken = Some(ErrorKind::NotConnected);
+    let error = bench.unit.mode().unwrap_err();
+    assert!(matches!(error, RequestError::Transport(TransportError::Unplugged)), "{error:?}");
+    bench.fake().broken = Some(ErrorKind::ConnectionReset);
+    let error = bench.unit.wait_event(Duration::from_secs(1)).unwrap_err();
+    assert!(matches!(error, RequestError::Transport(TransportError::Closed)), "{error:?}");
+    bench.fake().broken = None;
+    assert!(bench.unit.mode().unwrap().recording);
+}
