@@ -1,1 +1,39 @@
-//! The world around a recorder.
+//! The world around a recorder: contacts that move, a serial line, and the node itself in virtual time or as the
+//! ARM image in an emulator.
+//!
+//! - [`Scenario`] says which contact moves at which millisecond; [`Contacts`] says where it comes from.
+//! - [`SimNode`] is a node that knows no time but the one it is told: for tests that must give the same
+//!   result on every machine.
+//! - [`Simulator`] is a node that keeps pace with real time and answers on a pseudo-terminal or a TCP port:
+//!   what a host program can be tried against.
+
+mod breaker_trip;
+mod contacts;
+#[cfg(unix)]
+mod emulator;
+mod error;
+#[cfg(unix)]
+mod external_bus;
+mod line;
+mod machine;
+mod native;
+mod non_volatile;
+mod pace;
+mod player;
+#[cfg(unix)]
+mod pty;
+mod scenario;
+mod scenario_lines;
+mod service;
+mod sim_node;
+mod simulator;
+mod tcp;
+
+pub use contacts::Contacts;
+pub use error::SimError;
+pub use line::Port;
+pub use non_volatile::{MemoryStorage, NonVolatile, SimRtc};
+pub use player::{Played, STREAM_LEAD_MS};
+pub use scenario::{MAX_STEPS, Scenario, ScenarioError, ScenarioFault, Step};
+pub use sim_node::{LineRate, PoweredOff, Ram, SimNode, SimNodeOptions};
+pub use simulator::{Backend, EmulatorOptions, Notice, SimOptions, Simulator, run};

@@ -1,0 +1,89 @@
+//! Where contact scenarios come from.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{self, ErrorKind, Read};
+use std::path::Path;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread;
+
+use ser_proto::Model;
+
+use crate::error::SimError;
+use crate::scenario::{Scenario, ScenarioError, ScenarioFault};
+use crate::scenario_lines::{Item, ScenarioLines, Scenarios};
+
+/// What moves the contacts of a simulated node from its start on.
+#[derive(Default)]
+pub enum Contacts {
+    /// Nothing; scenarios may be played later.
+    #[default]
+    None,
+    /// A scenario, as soon as the node answers.
+    Scenario(Scenario),
+    /// Scenarios that arrive while the node runs, with an empty line after each. Milliseconds count from the
+    /// arrival of the scenario's first line, or from the end of the scenario before if that is later.
+    Stream {
+        /// What errors call the source.
+        name: String,
+        /// The source. Reading may block; a thread of its own waits for it.
+        source: Box<dyn Read + Send>,
+    },
+}
+
+impl Contacts {
+    /// Contacts from a path as a user gives it: `-` is standard input, anything else a file with one scenario.
+    ///
+    /// # Errors
+    /// When the file cannot be opened or is wrong. What is wrong on standard input shows as it arrives.
+    pub fn from_path(path: &Path, model: Model) -> Result<Contacts, SimError> {
+        if path == Path::new("-") {
+            return Ok(Contacts::Stream { name: "standard input".to_owned(), source: Box::new(io::stdin()) });
+        }
+        let name = path.display().to_string();
+        let file = File::open(path).map_err(SimError::io(format!("open {name}")))?;
+        Ok(Contacts::Scenario(Scenario::from_csv(&name, file, model)?))
+    }
+}
+
+impl fmt::Debug for Contacts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Contacts::None => write!(f, "None"),
+            Contacts::Scenario(scenario) => f.debug_tuple("Scenario").field(scenario).finish(),
+            Contacts::Stream { name, .. } => {
+                f.debug_struct("Stream").field("name", name).finish_non_exhaustive()
+            }
+        }
+    }
+}
+
+/// What one read from a stream brought: lines that were written together stay together, so they all keep their
+/// milliseconds however long it takes until they are looked at.
+pub(crate) type Arrived = Result<Vec<Item>, ScenarioError>;
+
+/// Reads a stream in a thread of its own. The channel closes at the end of the stream and after an error.
+pub(crate) fn read_stream(name: String, source: Box<dyn Read + Send>, model: Model) -> Receiver<Arrived> {
+    let (sender, receiver) = channel();
+    // Nobody waits for this thread: a read from a terminal cannot be cut short.
+    thread::spawn(move || forward(&name, source, model, &sender));
+    receiver
+}
+
+fn forward(name: &str, mut source: Box<dyn Read + Send>, model: Model, sender: &Sender<Arrived>) {
+    let mut lines = ScenarioLines::new(name, model, Scenarios::Many);
+    let mut chunk = [0; 65_536];
+    loop {
+        let mut items = Vec::new();
+        let (result, more) = match source.read(&mut chunk) {
+            Ok(0) => (lines.finish(&mut items), false),
+            Ok(read) => (lines.push(&chunk[..read], &mut items), true),
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(error) => (Err(lines.fault(ScenarioFault::Unreadable(error.to_string()))), false),
+        };
+        let more = more && result.is_ok();
+        if sender.send(result.map(|()| items)).is_err() || !more {
+            return;
+        }
+    }
+}

@@ -1,0 +1,483 @@
+//! The ARM image in QEMU as a machine.
+//!
+//! # Design
+//! QEMU's standard input and output are the RS-232 port. The contacts are a latch in the board's external memory, a
+//! file that both sides map, and there the board says which sample it took last.
+//!
+//! A step is written when its time has come, and not before the board has sampled the step before: on a stalled
+//! machine contacts move late, but no two moves become one and none is lost. What was played is recorded with the
+//! samples around it.
+
+use std::collections::VecDeque;
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Read, Write};
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::ffi::{OsStrExt, OsStringExt};
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command as Process, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+use ser_proto::{Baud, Command, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Model, Reply};
+use tempfile::TempDir;
+
+use crate::error::SimError;
+use crate::external_bus::ExternalBus;
+use crate::machine::Machine;
+use crate::pace::Pace;
+use crate::player::{Move, Played, Player};
+use crate::scenario::Scenario;
+use crate::scenario_lines::Item;
+use crate::simulator::EmulatorOptions;
+
+const PROGRAM: &str = "qemu-system-arm";
+
+/// How long the image may take to answer: QEMU starts slowly on a busy machine.
+const ANSWER_WITHIN: Duration = Duration::from_secs(60);
+
+/// How often it is asked meanwhile.
+const ASK_EVERY: Duration = Duration::from_millis(250);
+
+/// Bytes that may wait for the board, and for the host.
+const WAITING_LIMIT: usize = 4096;
+
+/// How soon the board is looked after when nothing is going on, and when contacts move.
+const PATIENCE: Duration = Duration::from_millis(2);
+const PATIENCE_PLAYING: Duration = Duration::from_micros(300);
+
+/// A board in QEMU.
+pub(crate) struct Emulator {
+    program: PathBuf,
+    arguments: Vec<OsString>,
+    bus: ExternalBus,
+    running: Option<Running>,
+    player: Player,
+    played: Vec<Played>,
+    moving: Option<Moving>,
+    pace: Pace,
+    /// Holds the memory, where no file was given, and what QEMU prints. Goes last.
+    directory: TempDir,
+}
+
+/// A move of contacts that the board has not sampled for sure.
+struct Moving {
+    moved: Move,
+    tick_before: u32,
+    latest: u32,
+    /// How often the sample counter has moved on since. The first time may be a sample that was under way.
+    moved_on: u32,
+}
+
+/// QEMU at work.
+struct Running {
+    qemu: Qemu,
+    input: ChildStdin,
+    output: ChildStdout,
+    to_board: VecDeque<u8>,
+    from_board: FromBoard,
+}
+
+/// The process; goes with us.
+struct Qemu(Child);
+
+impl Drop for Qemu {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Emulator {
+    pub(crate) fn new(
+        options: &EmulatorOptions,
+        model: Model,
+        debounce_ms: u8,
+    ) -> Result<Emulator, SimError> {
+        // QEMU's own words for a missing image are less clear.
+        File::open(&options.image)
+            .map_err(SimError::io(format!("open the image {}", options.image.display())))?;
+        let directory = TempDir::with_prefix("ser-sim-")
+            .map_err(SimError::io("make a temporary directory for the emulator"))?;
+        let memory = options.memory.clone().unwrap_or_else(|| directory.path().join("memory"));
+        let bus = ExternalBus::open(&memory)
+            .map_err(SimError::io(format!("use {} as external memory", memory.display())))?;
+        bus.set_straps(model, debounce_ms);
+        bus.set_inputs(0);
+        Ok(Emulator {
+            program: options.program.clone().unwrap_or_else(|| PROGRAM.into()),
+            arguments: arguments(options, &memory),
+            bus,
+            running: None,
+            player: Player::default(),
+            played: Vec::new(),
+            moving: None,
+            pace: Pace::new(),
+            directory,
+        })
+    }
+
+    /// Switches the board on, or off and on again, and waits until it answers. Returns early when told to stop.
+    pub(crate) fn power_up(&mut self, stop: &AtomicBool) -> Result<(), SimError> {
+        self.running = None;
+        // Contacts that were about to be sampled move now: the board takes them as they are at power-up.
+        self.moving = None;
+        self.bus.clear_sample_counter();
+        self.running = Some(self.start()?);
+        let began = Instant::now();
+        let mut asked: Option<Instant> = None;
+        let mut settled = false;
+        while !stop.load(Ordering::Relaxed) {
+            self.look_after()?;
+            let waited = began.elapsed();
+            let Some(running) = &mut self.running else { break };
+            if running.from_board.told_mode && self.bus.sample_counter() != 0 {
+                running.forget_output();
+                return Ok(());
+            }
+            if waited > ANSWER_WITHIN {
+                return Err(SimError::NoAnswer { waited, printed: self.printed() });
+            }
+            if running.from_board.rate.is_none() {
+                if asked.is_none_or(|asked| asked.elapsed() > ASK_EVERY) {
+                    asked = Some(Instant::now());
+                    running.ask(&Command::QueryConfiguration);
+                }
+            } else if !settled {
+                // Answers come in order: after this one, none to the questions before is left to confuse a host.
+                settled = true;
+                running.ask(&Command::QueryMode);
+            }
+            let timeout = Timespec::try_from(PATIENCE).unwrap_or_default();
+            // Only a pause: whatever comes of it, the loop looks again.
+            let _ = poll(&mut [PollFd::new(&running.output, PollFlags::IN)], Some(&timeout));
+        }
+        Ok(())
+    }
+
+    fn start(&self) -> Result<Running, SimError> {
+        let doing = || format!("start {}", self.program.display());
+        let printed = File::create(self.printed_path()).map_err(SimError::io("make a temporary file"))?;
+        let mut process = Process::new(&self.program);
+        process.args(&self.arguments);
+        process.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(printed);
+        // Ctrl-C at the terminal is for us; we end it when we end.
+        process.process_group(0);
+        let mut child = match process.spawn() {
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                return Err(SimError::EmulatorMissing { program: self.program.clone() });
+            }
+            spawned => spawned.map_err(SimError::io(doing()))?,
+        };
+        let (input, output) = (child.stdin.take(), child.stdout.take());
+        let qemu = Qemu(child);
+        let (Some(input), Some(output)) = (input, output) else {
+            return Err(SimError::io(doing())(io::Error::other("no pipes")));
+        };
+        never_wait(&input).and_then(|()| never_wait(&output)).map_err(SimError::io(doing()))?;
+        Ok(Running { qemu, input, output, to_board: VecDeque::new(), from_board: FromBoard::new() })
+    }
+
+    /// Carries bytes to and from QEMU and sees that it is alive.
+    fn look_after(&mut self) -> Result<(), SimError> {
+        let Some(running) = &mut self.running else { return Ok(()) };
+        let ended = running.qemu.0.try_wait().map_err(SimError::io("look after the emulator"))?;
+        if let Some(status) = ended {
+            return Err(SimError::EmulatorEnded { how: status.to_string(), printed: self.printed() });
+        }
+        running.carry().map_err(SimError::io("talk to the emulator"))
+    }
+
+    fn move_contacts(&mut self) {
+        let counter = self.bus.sample_counter();
+        if let Some(moving) = &mut self.moving {
+            if counter != moving.latest {
+                moving.latest = counter;
+                moving.moved_on += 1;
+            }
+            if moving.moved_on < 2 {
+                return;
+            }
+            self.played.push(moving.moved.played(moving.tick_before, counter));
+            self.moving = None;
+        }
+        if let Some(moved) = self.player.due(self.pace.now_ms()) {
+            let tick_before = self.bus.sample_counter();
+            self.bus.set_inputs(moved.state);
+            self.moving = Some(Moving { moved, tick_before, latest: tick_before, moved_on: 0 });
+        }
+    }
+
+    fn printed_path(&self) -> PathBuf {
+        self.directory.path().join("qemu.txt")
+    }
+
+    fn printed(&self) -> String {
+        let printed = fs::read(self.printed_path()).unwrap_or_default();
+        String::from_utf8_lossy(&printed).trim().to_owned()
+    }
+}
+
+impl Running {
+    fn ask(&mut self, question: &Command) {
+        self.to_board.extend(FrameEncoder::new(question.to_body()));
+    }
+
+    fn carry(&mut self) -> io::Result<()> {
+        while !self.to_board.is_empty() {
+            let (first, _) = self.to_board.as_slices();
+            match self.input.write(first) {
+                Ok(written) => drop(self.to_board.drain(..written)),
+                Err(error) if is_temporary(&error) => break,
+                // It is ending; the next look at the process says how.
+                Err(error) if error.kind() == ErrorKind::BrokenPipe => break,
+                Err(error) => return Err(error),
+            }
+        }
+        let mut buffer = [0; 1024];
+        while self.from_board.bytes.len() < WAITING_LIMIT {
+            match self.output.read(&mut buffer) {
+                Ok(0) => break,
+                Ok(read) => buffer[..read].iter().for_each(|&byte| self.from_board.push(byte)),
+                Err(error) if is_temporary(&error) => break,
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+
+    /// Drops what was said before anybody could listen, and the answers to our own questions.
+    fn forget_output(&mut self) {
+        self.from_board.taken(usize::MAX);
+    }
+}
+
+/// Bytes from the board, and the rates at which they are sent: the emulated UART does not tell, but every change of
+/// rate is announced by a configuration reply.
+struct FromBoard {
+    bytes: VecDeque<u8>,
+    decoder: FrameDecoder<MAX_BODY_LEN>,
+    /// The rate of the first byte; `None` until the board has said anything about it.
+    rate: Option<Baud>,
+    /// Where in `bytes` other rates begin.
+    changes: VecDeque<(usize, Baud)>,
+    /// Whether a mode reply has come.
+    told_mode: bool,
+}
+
+impl FromBoard {
+    fn new() -> FromBoard {
+        FromBoard {
+            bytes: VecDeque::new(),
+            decoder: FrameDecoder::new(),
+            rate: None,
+            changes: VecDeque::new(),
+            told_mode: false,
+        }
+    }
+
+    fn push(&mut self, byte: u8) {
+        self.bytes.push_back(byte);
+        let Some(Decoded::Frame(body)) = self.decoder.push(byte) else { return };
+        let configuration = match Reply::parse(body) {
+            Ok(Reply::Configuration(configuration)) => configuration,
+            Ok(Reply::Mode(_)) => return self.told_mode = true,
+            _ => return,
+        };
+        let latest = self.changes.back().map(|&(_, rate)| rate).or(self.rate);
+        match latest {
+            None => self.rate = Some(configuration.baud),
+            Some(rate) if rate == configuration.baud => {}
+            Some(_) => self.changes.push_back((self.bytes.len(), configuration.baud)),
+        }
+    }
+
+    /// The waiting bytes that are sent at the present rate.
+    fn output(&mut self) -> &[u8] {
+        let end = self.changes.front().map_or(self.bytes.len(), |&(at, _)| at);
+        self.bytes.make_contiguous().get(..end).unwrap_or_default()
+    }
+
+    fn taken(&mut self, count: usize) {
+        let count = count.min(self.bytes.len());
+        self.bytes.drain(..count);
+        for (at, _) in &mut self.changes {
+            *at = at.saturating_sub(count);
+        }
+        while let Some(&(0, rate)) = self.changes.front() {
+            self.rate = Some(rate);
+            self.changes.pop_front();
+        }
+    }
+}
+
+impl Machine for Emulator {
+    fn advance(&mut self) -> Result<(), SimError> {
+        self.look_after()?;
+        self.move_contacts();
+        Ok(())
+    }
+
+    fn room(&self) -> usize {
+        self.running.as_ref().map_or(0, |running| WAITING_LIMIT.saturating_sub(running.to_board.len()))
+    }
+
+    fn receive(&mut self, bytes: &[u8]) {
+        if let Some(running) = &mut self.running {
+            running.to_board.extend(bytes);
+            // What cannot be written now is written by the next pass, which also reports what is wrong.
+            let _ = running.carry();
+        }
+    }
+
+    fn output(&mut self) -> &[u8] {
+        self.running.as_mut().map_or(&[], |running| running.from_board.output())
+    }
+
+    fn taken(&mut self, count: usize) {
+        if let Some(running) = &mut self.running {
+            running.from_board.taken(count);
+        }
+    }
+
+    fn baud(&self) -> Baud {
+        self.running.as_ref().and_then(|running| running.from_board.rate).unwrap_or_default()
+    }
+
+    fn play(&mut self, scenario: &Scenario) -> u64 {
+        self.player.play(self.pace.now_ms(), scenario)
+    }
+
+    fn stream(&mut self, items: &[Item]) -> Option<u64> {
+        self.player.stream(self.pace.now_ms(), items)
+    }
+
+    fn is_idle(&self) -> bool {
+        self.player.is_idle() && self.moving.is_none()
+    }
+
+    fn take_played(&mut self) -> Vec<Played> {
+        std::mem::take(&mut self.played)
+    }
+
+    fn patience(&self) -> Duration {
+        if self.is_idle() { PATIENCE } else { PATIENCE_PLAYING }
+    }
+
+    fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
+        // While nobody takes what waits, more of it is no reason to wake up.
+        let running = self.running.iter().filter(|running| running.from_board.bytes.len() < WAITING_LIMIT);
+        running.map(|running| running.output.as_fd()).collect()
+    }
+}
+
+fn arguments(options: &EmulatorOptions, memory: &Path) -> Vec<OsString> {
+    let mut backend = OsString::from(format!(
+        "memory-backend-file,id=ext,size={},share=on,mem-path=",
+        crate::external_bus::MEMORY_LEN
+    ));
+    backend.push(doubled_commas(memory));
+    let log = match &options.log {
+        Some(log) => {
+            let mut log_to = OsString::from("file:");
+            log_to.push(log);
+            log_to
+        }
+        None => "null".into(),
+    };
+    let mut arguments: Vec<OsString> = [
+        "-M",
+        "mps2-an385,memory-backend=ext",
+        "-display",
+        "none",
+        "-monitor",
+        "none",
+        "-chardev",
+        "stdio,id=rs232,signal=off",
+        "-serial",
+        "chardev:rs232",
+        "-serial",
+    ]
+    .map(OsString::from)
+    .to_vec();
+    arguments.extend([log, "-object".into(), backend, "-kernel".into(), options.image.clone().into()]);
+    arguments
+}
+
+/// A comma ends an option of QEMU unless it is doubled.
+fn doubled_commas(path: &Path) -> OsString {
+    let bytes = path.as_os_str().as_bytes();
+    OsString::from_vec(
+        bytes.iter().flat_map(|&byte| [byte].repeat(if byte == b',' { 2 } else { 1 })).collect(),
+    )
+}
+
+fn never_wait(descriptor: impl AsFd) -> io::Result<()> {
+    let flags = fcntl_getfl(&descriptor)?;
+    Ok(fcntl_setfl(&descriptor, flags | OFlags::NONBLOCK)?)
+}
+
+fn is_temporary(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
+}
+
+#[cfg(test)]
+mod tests {
+    use ser_proto::{Configuration, Mode};
+
+    use super::*;
+
+    fn frame(reply: &Reply) -> Vec<u8> {
+        FrameEncoder::new(reply.to_body()).collect()
+    }
+
+    #[test]
+    fn a_new_rate_holds_from_the_byte_after_the_reply_that_announces_it() {
+        let mut from_board = FromBoard::new();
+        let configuration = Configuration::default();
+        let changed = Configuration { baud: Baud::B19200, ..configuration };
+        let first = frame(&Reply::Configuration(configuration));
+        let announcement = frame(&Reply::Configuration(changed));
+        let after = frame(&Reply::Mode(Mode { recording: true, version: 100 }));
+        for &byte in first.iter().chain(&announcement).chain(&after) {
+            from_board.push(byte);
+        }
+        assert_eq!(from_board.output(), [first, announcement].concat());
+        assert_eq!(from_board.rate, Some(Baud::B9600));
+        from_board.taken(5);
+        let rest = from_board.output().len();
+        from_board.taken(rest);
+        assert_eq!(from_board.rate, Some(Baud::B19200));
+        assert_eq!(from_board.output(), after);
+    }
+
+    #[test]
+    fn commas_in_paths_do_not_end_qemus_options() {
+        assert_eq!(doubled_commas(Path::new("/a,b/c")), "/a,,b/c");
+    }
+
+    #[test]
+    fn a_missing_emulator_is_named_with_its_package() {
+        let image = tempfile::NamedTempFile::new().unwrap();
+        let mut options = EmulatorOptions::new(image.path());
+        options.program = Some("/nonexistent/qemu-system-arm".into());
+        let mut emulator = Emulator::new(&options, Model::Ser160, 0).unwrap();
+        let error = emulator.power_up(&AtomicBool::new(false)).unwrap_err().to_string();
+        assert!(error.contains("not installed") && error.contains("package qemu-system-arm"), "{error}");
+    }
+
+    #[test]
+    fn an_emulator_that_ends_says_how_and_why() {
+        let image = tempfile::NamedTempFile::new().unwrap();
+        let mut options = EmulatorOptions::new(image.path());
+        // The shell knows no option -M.
+        options.program = Some("/bin/sh".into());
+        let mut emulator = Emulator::new(&options, Model::Ser160, 0).unwrap();
+        let error = emulator.power_up(&AtomicBool::new(false)).unwrap_err().to_string();
+        assert!(error.contains("exit status: 2") && error.contains("-M"), "{error}");
+    }
+}

@@ -1,0 +1,110 @@
+//! What can go wrong around a simulated node.
+
+use std::path::PathBuf;
+use std::time::Duration;
+use std::{fmt, io};
+
+use crate::scenario::ScenarioError;
+
+/// Why a simulator did not start, or ended.
+#[derive(Debug)]
+pub enum SimError {
+    /// The contact scenario is wrong.
+    Scenario(ScenarioError),
+    /// An operation failed.
+    Io {
+        /// What was being tried, as in `listen on 127.0.0.1:4000`.
+        doing: String,
+        /// Why it failed.
+        source: io::Error,
+    },
+    /// The place of the link is taken by something that is not ours to replace.
+    LinkTaken(PathBuf),
+    /// The emulator is not installed.
+    EmulatorMissing {
+        /// The program looked for.
+        program: PathBuf,
+    },
+    /// The emulator ended by itself.
+    EmulatorEnded {
+        /// How, as in `exit status: 1`.
+        how: String,
+        /// What it printed on standard error.
+        printed: String,
+    },
+    /// The image runs and does not answer.
+    NoAnswer {
+        /// How long it had.
+        waited: Duration,
+        /// What the emulator printed on standard error.
+        printed: String,
+    },
+    /// This operating system has no such thing.
+    Unsupported(&'static str),
+    /// The simulator has ended; [`Simulator::stop`](crate::Simulator::stop) says why.
+    Ended,
+    /// The contacts have not finished moving in the time given.
+    StillPlaying,
+}
+
+impl SimError {
+    pub(crate) fn io(doing: impl Into<String>) -> impl FnOnce(io::Error) -> SimError {
+        let doing = doing.into();
+        |source| SimError::Io { doing, source }
+    }
+}
+
+impl fmt::Display for SimError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SimError::Scenario(error) => error.fmt(f),
+            SimError::Io { doing, source } => write!(f, "cannot {doing}: {source}"),
+            SimError::LinkTaken(path) => {
+                write!(
+                    f,
+                    "{} exists already and is no link to a terminal: remove it or name another",
+                    path.display()
+                )
+            }
+            SimError::EmulatorMissing { program } => write!(
+                f,
+                "{} is not installed; it comes with the package qemu-system-arm (Debian, Ubuntu) or qemu (others)",
+                program.display()
+            ),
+            SimError::EmulatorEnded { how, printed } => {
+                write!(f, "the emulator ended ({how})")?;
+                write_printed(f, printed)
+            }
+            SimError::NoAnswer { waited, printed } => {
+                write!(f, "the image in the emulator did not answer within {} s", waited.as_secs())?;
+                write_printed(f, printed)
+            }
+            SimError::Unsupported(what) => write!(f, "{what} cannot be had on this system"),
+            SimError::Ended => write!(f, "the simulator has ended"),
+            SimError::StillPlaying => write!(f, "the contacts have not finished moving"),
+        }
+    }
+}
+
+fn write_printed(f: &mut fmt::Formatter<'_>, printed: &str) -> fmt::Result {
+    match printed.trim() {
+        "" => write!(f, " and printed nothing"),
+        printed => write!(f, " and printed: {printed}"),
+    }
+}
+
+impl std::error::Error for SimError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            SimError::Scenario(error) => Some(error),
+            SimError::Io { source, .. } => Some(source),
+            _ => None,
+        }
+    }
+}
+
+impl From<ScenarioError> for SimError {
+    fn from(error: ScenarioError) -> Self {
+        SimError::Scenario(error)
+    }
+}

@@ -1,0 +1,109 @@
+//! The desktop's view of the emulated board's external bus: the file behind its external memory.
+//!
+//! # Design
+//! The file is mapped and used one aligned 32-bit word at a time. Plain writes to the file would show up on the board
+//! as well, but the kernel copies a few bytes one by one, and an input latch caught between two of its bytes
+//! would be a contact change that never was.
+
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::path::Path;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use memmap2::MmapRaw;
+use ser_proto::Model;
+
+/// Bytes of the external memory; QEMU is told the same.
+pub(crate) const MEMORY_LEN: u64 = 16 << 20;
+
+/// Inputs, input 1 in bit 0; written here.
+const INPUT_LATCH: usize = 0x8000;
+/// The tick of the latest sample, written by the board once it has been taken.
+const SAMPLE_COUNTER: usize = 0x8004;
+/// 160 or 320; read by the board at boot.
+const MODEL_STRAP: usize = 0x8008;
+/// Milliseconds for all inputs; read by the board at boot.
+const DEBOUNCE_STRAP: usize = 0x800C;
+
+/// The mapped memory.
+pub(crate) struct ExternalBus {
+    memory: MmapRaw,
+}
+
+impl ExternalBus {
+    /// Opens the file, makes it if need be, and gives it the size of the memory.
+    pub(crate) fn open(path: &Path) -> io::Result<ExternalBus> {
+        let file: File = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
+        if file.metadata()?.len() != MEMORY_LEN {
+            file.set_len(MEMORY_LEN)?;
+        }
+        Ok(ExternalBus { memory: MmapRaw::map_raw(&file)? })
+    }
+
+    pub(crate) fn set_straps(&self, model: Model, debounce_ms: u8) {
+        let model = match model {
+            Model::Ser160 => 160,
+            Model::Ser320 => 320,
+        };
+        self.write(MODEL_STRAP, model);
+        self.write(DEBOUNCE_STRAP, debounce_ms.into());
+    }
+
+    /// Moves all contacts at once.
+    pub(crate) fn set_inputs(&self, inputs: u32) {
+        self.write(INPUT_LATCH, inputs);
+    }
+
+    /// The tick of the board's latest sample.
+    pub(crate) fn sample_counter(&self) -> u32 {
+        u32::from_le(self.word(SAMPLE_COUNTER).load(Ordering::SeqCst))
+    }
+
+    /// Puts the counter back to where it is before the first sample.
+    pub(crate) fn clear_sample_counter(&self) {
+        self.write(SAMPLE_COUNTER, 0);
+    }
+
+    fn write(&self, offset: usize, value: u32) {
+        self.word(offset).store(value.to_le(), Ordering::SeqCst);
+    }
+
+    #[expect(unsafe_code, reason = "memory shared with the emulator")]
+    fn word(&self, offset: usize) -> &AtomicU32 {
+        assert!(
+            offset.is_multiple_of(size_of::<AtomicU32>())
+                && offset + size_of::<AtomicU32>() <= self.memory.len()
+        );
+        // SAFETY: the word lies inside the mapping (asserted), which lives as long as `self`; a mapping begins at a
+        // page, so the word is aligned (asserted). Both sides use it as a whole word only, and any value is valid.
+        // The file keeps its size: nobody but us and QEMU, which does not change it, is supposed to know it.
+        unsafe { AtomicU32::from_ptr(self.memory.as_mut_ptr().add(offset).cast()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn words_stand_in_the_file_where_the_board_looks_for_them() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("memory");
+        let bus = ExternalBus::open(&path).unwrap();
+        bus.set_straps(Model::Ser160, 20);
+        bus.set_inputs(0x8001_0203);
+        let file = fs::read(&path).unwrap();
+        assert_eq!(file.len() as u64, MEMORY_LEN);
+        assert_eq!(file[0x8000..0x8010], [3, 2, 1, 0x80, 0, 0, 0, 0, 160, 0, 0, 0, 20, 0, 0, 0]);
+    }
+
+    #[test]
+    fn what_a_file_holds_already_is_kept() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("memory");
+        ExternalBus::open(&path).unwrap().write(0x9000, 7);
+        assert_eq!(ExternalBus::open(&path).unwrap().word(0x9000).load(Ordering::SeqCst), 7);
+    }
+}

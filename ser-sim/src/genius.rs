@@ -1,0 +1,47 @@
+//! Genius: a model of the GENI board, of the bus it sits on, and of other devices there, in virtual time.
+//!
+//! A [`Bus`] knows no time but the one it is told with [`Bus::advance_to`], and says with [`Bus::next_due_us`] when
+//! something happens next. What is connected to it implements [`Device`]: [`Board`]s, [`DiscreteBlock`]s and
+//! [`BusInterfaceUnit`]s. A host works with its board through the shared RAM alone:
+//!
+//! ```
+//! use ser_sim::genius::{Board, BoardOptions, Bus, BusRate};
+//!
+//! let mut bus = Bus::new(BusRate::default());
+//! let board = bus.connect(Board::powered(BoardOptions::at(31)));
+//! // The manual: no access for 1.7 seconds, then wait for the OK flag.
+//! bus.advance_to(2_000_000);
+//! assert_eq!(bus.get_mut(board).host_read(0x0893), 1);
+//! ```
+//!
+//! The manual meant throughout is that of the GENI board, GFK-0073. Nothing in here shares code with the driver for the
+//! board, so that a misreading on one side shows on the other.
+
+mod block;
+mod board;
+mod bus;
+mod bus_interface_unit;
+mod datagram;
+mod device;
+mod faults;
+mod identity;
+mod map;
+mod outbox;
+mod scan_time;
+mod split_mix;
+mod station;
+#[cfg(test)]
+mod tests;
+
+pub use block::{Circuits, DiscreteBlock};
+pub use board::{Board, BoardOptions, Led, Leds, Timing, Violation, ViolationKind};
+pub use bus::{ADDRESSES, Bus, DeviceId, Handle, Traffic};
+pub use bus_interface_unit::{BusInterfaceUnit, Side, StationData};
+pub use datagram::{
+    BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, Priority, STANDARD, subfunction,
+};
+pub use device::{Device, Message};
+pub use faults::{DeviceFault, Fault, Noise};
+pub use identity::{BlockKind, Identity};
+pub use map::RAM_LEN;
+pub use scan_time::{BusRate, MIN_SCAN_NS};

@@ -1,0 +1,101 @@
+//! The far end of the node's serial line, where a host plugs in.
+
+use std::io;
+#[cfg(unix)]
+use std::os::fd::BorrowedFd;
+use std::path::PathBuf;
+
+use ser_proto::Baud;
+
+use crate::error::SimError;
+
+/// Where a host reaches the simulated node: it has one RS-232 port, hence one of these.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Port {
+    /// A pseudo-terminal, which hosts open as they would a serial port.
+    Pty {
+        /// The symbolic link under which it is found; `None` makes one in a temporary directory.
+        link: Option<PathBuf>,
+    },
+    /// A TCP port for one client at a time.
+    Tcp {
+        /// Address to listen on, as in `127.0.0.1:4000`; port 0 takes a free one.
+        address: String,
+    },
+}
+
+/// A medium that carries the bytes of a line. Nothing here waits.
+pub(crate) trait Line: Send {
+    /// What a host has sent; 0 when there is nothing at present.
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
+
+    /// Takes bytes for the host and says how many. Without a host they are all taken, and lost, as on a wire.
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
+
+    /// The rate that the host's end is set to, if there is a host and its end has such a setting.
+    fn host_bits_per_second(&self) -> Option<u32>;
+
+    /// Whether another host has come since this was last asked: what was meant for the one before is not for it.
+    fn take_host_change(&mut self) -> bool;
+
+    /// Makes the line known, now that the node answers.
+    fn publish(&mut self) -> Result<(), SimError>;
+
+    /// What to give to a host to reach this line.
+    fn name(&self) -> String;
+
+    /// Descriptors that become readable when [`read`](Self::read) has something to do; the one of a host comes first.
+    #[cfg(unix)]
+    fn descriptors(&self) -> Vec<BorrowedFd<'_>>;
+}
+
+/// Makes the line of `port`, not yet known to anybody.
+pub(crate) fn open(port: &Port) -> Result<Box<dyn Line>, SimError> {
+    match port {
+        #[cfg(unix)]
+        Port::Pty { link } => Ok(Box::new(crate::pty::PtyLine::open(link.as_deref())?)),
+        #[cfg(not(unix))]
+        Port::Pty { .. } => Err(SimError::Unsupported("a pseudo-terminal")),
+        Port::Tcp { address } => Ok(Box::new(crate::tcp::TcpLine::listen(address)?)),
+    }
+}
+
+/// Whether a host set to `host` bit/s can understand a node at `node`.
+pub(crate) fn rates_agree(host: Option<u32>, node: Baud) -> bool {
+    host.is_none_or(|bits_per_second| bits_per_second == node.bits_per_second())
+}
+
+/// What bytes look like to a receiver at another rate: nothing that could be part of a frame or a text.
+///
+/// Real garbage depends on both rates and on the gaps between bytes. What matters here is that it is the same
+/// every time and never passes for sense: every byte has its highest bit set.
+pub(crate) fn garble(bytes: &mut [u8]) {
+    for byte in bytes {
+        *byte = (byte.rotate_left(3) ^ 0x5A) | 0x80;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ser_proto::{Command, FrameDecoder, FrameEncoder};
+
+    use super::*;
+
+    #[test]
+    fn garbled_bytes_are_neither_frame_nor_ascii() {
+        let mut bytes: Vec<u8> = (0..=255).chain(FrameEncoder::new(Command::Erase.to_body())).collect();
+        garble(&mut bytes);
+        let mut decoder = FrameDecoder::<168>::new();
+        for byte in bytes {
+            assert!(!byte.is_ascii());
+            assert_eq!(decoder.push(byte), Some(ser_proto::Decoded::Text(byte)));
+        }
+    }
+
+    #[test]
+    fn a_medium_without_rates_always_agrees() {
+        assert!(rates_agree(None, Baud::B300));
+        assert!(rates_agree(Some(9600), Baud::B9600));
+        assert!(!rates_agree(Some(19_200), Baud::B9600));
+    }
+}

@@ -1,0 +1,253 @@
+//! A serial line over a pseudo-terminal, found under a symbolic link.
+//!
+//! # Notes
+//! The node holds the master end. The slave end is open only while a host has it open, so the kernel tells us when
+//! there is no host: bytes then go nowhere, as on a wire, and do not wait for the next host to be confused by.
+//!
+//! A host usually takes the terminal for itself (`TIOCEXCL`), and one that is killed never gives it back: nobody but
+//! root could open the terminal again. The link is then moved to a fresh pseudo-terminal.
+
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Read, Write};
+use std::mem;
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+
+use std::time::{Duration, Instant};
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{Mode, OFlags};
+use rustix::io::{Errno, FdFlags, fcntl_setfd};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, QueueSelector, Termios};
+use rustix::{fs as rfs, termios};
+use tempfile::TempDir;
+
+use crate::error::SimError;
+use crate::line::Line;
+
+/// The rate of a port that nobody has set: what a factory-fresh node uses.
+const INITIAL_BITS_PER_SECOND: u32 = 9600;
+
+/// How often the terminal is made ready while no host is there: one may have come and gone between two looks.
+const FREE_EVERY: Duration = Duration::from_millis(100);
+
+pub(crate) struct PtyLine {
+    pair: Pair,
+    link: PathBuf,
+    published: bool,
+    host_present: bool,
+    host_changed: bool,
+    freed: Instant,
+    /// Holds the link, where no place was given for it.
+    _directory: Option<TempDir>,
+}
+
+/// A pseudo-terminal: the open master and the name of its slave.
+struct Pair {
+    master: File,
+    slave: PathBuf,
+}
+
+impl Pair {
+    fn new() -> io::Result<Pair> {
+        let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY;
+        // In one step where there is one: a child that inherits the master would keep the terminal alive.
+        #[cfg(target_os = "linux")]
+        let flags = flags | OpenptFlags::CLOEXEC;
+        let master = openpt(flags)?;
+        fcntl_setfd(&master, FdFlags::CLOEXEC)?;
+        grantpt(&master)?;
+        unlockpt(&master)?;
+        rfs::fcntl_setfl(&master, rfs::fcntl_getfl(&master)? | OFlags::NONBLOCK)?;
+        let slave = PathBuf::from(OsStr::from_bytes(ptsname(&master, Vec::new())?.as_bytes()));
+        let pair = Pair { master: File::from(master), slave };
+        // Raw from the start: otherwise the terminal echoes what the node says before a host has set it up.
+        let slave = pair.open_slave()?;
+        let mut settings: Termios = termios::tcgetattr(&slave)?;
+        settings.make_raw();
+        settings.set_speed(INITIAL_BITS_PER_SECOND)?;
+        termios::tcsetattr(&slave, OptionalActions::Now, &settings)?;
+        Ok(pair)
+    }
+
+    fn open_slave(&self) -> rustix::io::Result<rustix::fd::OwnedFd> {
+        rfs::open(
+            &self.slave,
+            OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK,
+            Mode::empty(),
+        )
+    }
+
+    /// Whether anybody has the slave open.
+    fn has_host(&self) -> bool {
+        let mut descriptors = [PollFd::new(&self.master, PollFlags::IN)];
+        match poll(&mut descriptors, Some(&Timespec::default())) {
+            Ok(_) => !descriptors[0].revents().contains(PollFlags::HUP),
+            Err(_) => true,
+        }
+    }
+}
+
+impl PtyLine {
+    pub(crate) fn open(link: Option<&Path>) -> Result<PtyLine, SimError> {
+        let (link, directory) = match link {
+            Some(link) => (link.to_owned(), None),
+            None => {
+                let directory = TempDir::with_prefix("ser-sim-")
+                    .map_err(SimError::io("make a temporary directory for the pseudo-terminal"))?;
+                (directory.path().join("port"), Some(directory))
+            }
+        };
+        check_replaceable(&link)?;
+        let pair = Pair::new().map_err(SimError::io("open a pseudo-terminal"))?;
+        Ok(PtyLine {
+            pair,
+            link,
+            published: false,
+            host_present: false,
+            host_changed: false,
+            freed: Instant::now(),
+            _directory: directory,
+        })
+    }
+
+    /// Nobody has the terminal open: makes it ready for the next host.
+    fn free(&mut self) -> io::Result<()> {
+        self.host_present = false;
+        self.freed = Instant::now();
+        match self.pair.open_slave() {
+            Ok(slave) => {
+                // The next host shall find it free, and none of what the last one did not read.
+                let _ = termios::ioctl_tiocnxcl(&slave);
+                let _ = termios::tcflush(&slave, QueueSelector::IFlush);
+            }
+            // Taken and nobody there to have it: see the notes above.
+            Err(Errno::BUSY) if !self.pair.has_host() => {
+                self.pair = Pair::new()?;
+                if self.published {
+                    replace_link(&self.pair.slave, &self.link)?;
+                }
+            }
+            Err(_) => {}
+        }
+        Ok(())
+    }
+}
+
+impl Line for PtyLine {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match (&self.pair.master).read(buffer) {
+            Ok(read @ 1..) => {
+                self.host_is_there();
+                Ok(read)
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
+                self.host_is_there();
+                Ok(0)
+            }
+            // Linux reports a slave that nobody has open as EIO, others as the end of the file.
+            Ok(0) => self.no_host(),
+            Err(error) if error.raw_os_error() == Some(Errno::IO.raw_os_error()) => self.no_host(),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        // Nothing said before a host was noticed is an answer to it.
+        if !self.host_present || !self.pair.has_host() {
+            return Ok(bytes.len());
+        }
+        match (&self.pair.master).write(bytes) {
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
+            Err(error) if error.raw_os_error() == Some(Errno::IO.raw_os_error()) => Ok(bytes.len()),
+            written => written,
+        }
+    }
+
+    fn host_bits_per_second(&self) -> Option<u32> {
+        // Asked of the master, the settings are those that the host made on the slave.
+        let settings = termios::tcgetattr(&self.pair.master).ok()?;
+        Some(settings.output_speed()).filter(|&bits_per_second| bits_per_second != 0)
+    }
+
+    fn take_host_change(&mut self) -> bool {
+        mem::take(&mut self.host_changed)
+    }
+
+    fn publish(&mut self) -> Result<(), SimError> {
+        let doing = || format!("make the link {}", self.link.display());
+        match symlink(&self.pair.slave, &self.link) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                check_replaceable(&self.link)?;
+                replace_link(&self.pair.slave, &self.link).map_err(SimError::io(doing()))?;
+            }
+            made => made.map_err(SimError::io(doing()))?,
+        }
+        self.published = true;
+        Ok(())
+    }
+
+    fn name(&self) -> String {
+        self.link.display().to_string()
+    }
+
+    fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
+        // Without a host the master reports that over and over and would keep us from waiting at all.
+        if self.host_present { vec![self.pair.master.as_fd()] } else { Vec::new() }
+    }
+}
+
+impl PtyLine {
+    fn host_is_there(&mut self) {
+        if !self.host_present {
+            self.host_present = true;
+            self.host_changed = true;
+        }
+    }
+
+    fn no_host(&mut self) -> io::Result<usize> {
+        if self.host_present || self.freed.elapsed() > FREE_EVERY {
+            self.free()?;
+        }
+        Ok(0)
+    }
+}
+
+impl Drop for PtyLine {
+    fn drop(&mut self) {
+        // Somebody may have put another link in the place meanwhile.
+        if self.published && fs::read_link(&self.link).is_ok_and(|target| target == self.pair.slave) {
+            let _ = fs::remove_file(&self.link);
+        }
+    }
+}
+
+/// Refuses a place that holds anything but a link that a simulator may have left behind.
+fn check_replaceable(link: &Path) -> Result<(), SimError> {
+    match fs::symlink_metadata(link) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(SimError::io(format!("look at {}", link.display()))(error)),
+        Ok(_) => {
+            let target = fs::read_link(link).map_err(|_| SimError::LinkTaken(link.to_owned()))?;
+            // Terminal numbers are used again: a link left behind may well lead to somebody's terminal today.
+            if target.starts_with("/dev/pts") || !link.exists() {
+                Ok(())
+            } else {
+                Err(SimError::LinkTaken(link.to_owned()))
+            }
+        }
+    }
+}
+
+/// Puts a link to `target` in the place of the one that is there, with no moment without any.
+fn replace_link(target: &Path, link: &Path) -> io::Result<()> {
+    let mut fresh = link.as_os_str().to_owned();
+    fresh.push(format!(".{}", std::process::id()));
+    let fresh = PathBuf::from(fresh);
+    symlink(target, &fresh)?;
+    fs::rename(&fresh, link).inspect_err(|_| drop(fs::remove_file(&fresh)))
+}

@@ -1,0 +1,340 @@
+//! A simulated node that keeps pace with real time and answers on a serial line.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use ser_node::Debounce;
+use ser_proto::Model;
+
+use crate::contacts::{Contacts, read_stream};
+use crate::error::SimError;
+use crate::line::{self, Port};
+use crate::machine::Machine;
+use crate::native::Native;
+use crate::non_volatile::NonVolatile;
+use crate::pace::Pace;
+use crate::player::Played;
+use crate::scenario::Scenario;
+use crate::service::{Outcome, Request, Service, Shared};
+use crate::sim_node::{LineRate, PoweredOff, Ram, SimNodeOptions};
+
+/// How soon [`run`] and [`Simulator::wait`] notice that they are to stop.
+const STOP_CHECK: Duration = Duration::from_millis(20);
+
+/// What is simulated, and how.
+#[derive(Debug)]
+pub struct SimOptions {
+    /// Which recorder.
+    pub model: Model,
+    /// Where a host reaches it.
+    pub port: Port,
+    /// What moves its contacts.
+    pub contacts: Contacts,
+    /// Debounce time of all inputs; 0 is off.
+    pub debounce_ms: u8,
+    /// What plays the node.
+    pub backend: Backend,
+    /// Called with a sentence for the user when something is not as it should be but goes on.
+    pub notice: Option<Notice>,
+}
+
+/// Takes a sentence for the user.
+pub struct Notice(pub Box<dyn Fn(&str) + Send>);
+
+impl fmt::Debug for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Notice")
+    }
+}
+
+impl SimOptions {
+    /// A native node on `port` with still contacts.
+    #[must_use]
+    pub fn new(model: Model, port: Port) -> SimOptions {
+        SimOptions {
+            model,
+            port,
+            contacts: Contacts::None,
+            debounce_ms: 0,
+            backend: Backend::default(),
+            notice: None,
+        }
+    }
+}
+
+/// What plays the node.
+#[derive(Clone, Debug)]
+pub enum Backend {
+    /// The recorder itself, in this process.
+    Native {
+        /// How fast its bytes leave it.
+        line_rate: LineRate,
+        /// Its memory and clock; keep a clone and the next simulator has the same node.
+        non_volatile: NonVolatile,
+    },
+    /// The ARM image, in QEMU.
+    Emulator(EmulatorOptions),
+}
+
+impl Default for Backend {
+    fn default() -> Self {
+        Backend::Native { line_rate: LineRate::Unlimited, non_volatile: NonVolatile::new() }
+    }
+}
+
+/// The emulated board.
+#[derive(Clone, Debug)]
+pub struct EmulatorOptions {
+    /// The image, an ELF file for `mps2-an385`.
+    pub image: PathBuf,
+    /// File behind the board's external memory. It holds the stored configuration, so a node that is given the same
+    /// file again remembers it. `None` makes a temporary one.
+    pub memory: Option<PathBuf>,
+    /// File for what the image logs on its second serial port. `None` drops it.
+    pub log: Option<PathBuf>,
+    /// The emulator; `qemu-system-arm` when `None`.
+    pub program: Option<PathBuf>,
+}
+
+impl EmulatorOptions {
+    /// `image` in the installed QEMU, with temporary memory and no log.
+    #[must_use]
+    pub fn new(image: impl Into<PathBuf>) -> EmulatorOptions {
+        EmulatorOptions { image: image.into(), memory: None, log: None, program: None }
+    }
+}
+
+/// A node that runs, until this is dropped.
+pub struct Simulator {
+    port: String,
+    requests: Sender<Request>,
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<Result<(), SimError>>>,
+}
+
+impl Simulator {
+    /// Switches a node on and returns as soon as it answers on its port.
+    ///
+    /// # Errors
+    /// When the port cannot be opened, the emulator cannot be started or the image does not answer.
+    pub fn start(options: SimOptions) -> Result<Simulator, SimError> {
+        Simulator::start_unless(options, &AtomicBool::new(false))
+    }
+
+    fn start_unless(options: SimOptions, stop: &AtomicBool) -> Result<Simulator, SimError> {
+        let line = line::open(&options.port)?;
+        let (requests, request_receiver) = channel();
+        let shared = Arc::new(Shared::default());
+        let (ready_sender, ready) = channel();
+        let SimOptions { model, contacts, debounce_ms, backend, notice, port: _ } = options;
+        let mut service =
+            Service { line, requests: request_receiver, stream: None, notice, shared: Arc::clone(&shared) };
+        let thread = thread::Builder::new()
+            .name("ser-sim".to_owned())
+            .spawn(move || {
+                let shared = Arc::clone(&service.shared);
+                let start = Start { model, contacts, ready: ready_sender };
+                let result = match backend {
+                    Backend::Native { line_rate, non_volatile } => {
+                        let debounce = Debounce::uniform(debounce_ms);
+                        let options = SimNodeOptions { model, debounce, line_rate, non_volatile };
+                        run_native(&mut service, options, start)
+                    }
+                    #[cfg(unix)]
+                    Backend::Emulator(options) => run_emulator(&mut service, &options, debounce_ms, start),
+                    #[cfg(not(unix))]
+                    Backend::Emulator(_) => Err(SimError::Unsupported("the emulated board")),
+                };
+                // The link goes before anybody is told that it is over.
+                drop(service);
+                shared.update(|status| status.ended = true);
+                result
+            })
+            .map_err(SimError::io("start a thread"))?;
+        let mut simulator = Simulator { port: String::new(), requests, shared, thread: Some(thread) };
+        loop {
+            match ready.recv_timeout(STOP_CHECK) {
+                Ok(port) => {
+                    simulator.port = port;
+                    return Ok(simulator);
+                }
+                Err(RecvTimeoutError::Timeout) if !stop.load(Ordering::Relaxed) => {}
+                Err(_) => return Err(simulator.join().err().unwrap_or(SimError::Ended)),
+            }
+        }
+    }
+
+    /// How a host reaches the node: the path of a pseudo-terminal, or `tcp://ADDRESS:PORT`.
+    #[must_use]
+    pub fn port(&self) -> &str {
+        &self.port
+    }
+
+    /// Plays a scenario from the next millisecond on, or after those before it. Says in which millisecond since the
+    /// simulator's start it begins.
+    ///
+    /// # Errors
+    /// When the simulator has ended.
+    pub fn play(&self, scenario: Scenario) -> Result<u64, SimError> {
+        self.ask(|reply| Request::Play(scenario, reply))
+    }
+
+    /// Waits until all contacts have moved and the node has sampled them.
+    ///
+    /// # Errors
+    /// When that takes longer than `timeout`, or the simulator has ended.
+    pub fn wait_played(&self, timeout: Duration) -> Result<(), SimError> {
+        let status = self.shared.wait(timeout, |status| status.idle || status.ended);
+        if status.ended {
+            Err(SimError::Ended)
+        } else if status.idle {
+            Ok(())
+        } else {
+            Err(SimError::StillPlaying)
+        }
+    }
+
+    /// Every move of contacts so far that changed anything.
+    #[must_use]
+    pub fn played(&self) -> Vec<Played> {
+        self.shared.status().played.clone()
+    }
+
+    /// Switches the node off and on again, contacts and line staying as they are; returns when it answers.
+    ///
+    /// # Errors
+    /// When the simulator has ended, or the node does not come up again.
+    pub fn power_cycle(&self) -> Result<(), SimError> {
+        self.ask(Request::PowerCycle)
+    }
+
+    /// Waits until `stop` is set or the simulator ends by itself, and ends it.
+    ///
+    /// # Errors
+    /// What ended it: contacts that are wrong, an emulator that ended, a line that failed.
+    pub fn wait(self, stop: &AtomicBool) -> Result<(), SimError> {
+        while !stop.load(Ordering::Relaxed) && !self.shared.wait(STOP_CHECK, |status| status.ended).ended {}
+        self.stop()
+    }
+
+    /// Ends the simulator: the line is gone when this returns.
+    ///
+    /// # Errors
+    /// What ended it before, if something did.
+    pub fn stop(mut self) -> Result<(), SimError> {
+        self.join()
+    }
+
+    fn ask<T>(&self, request: impl FnOnce(Sender<T>) -> Request) -> Result<T, SimError> {
+        let (reply, answer) = channel();
+        self.requests.send(request(reply)).map_err(|_| SimError::Ended)?;
+        answer.recv().map_err(|_| SimError::Ended)
+    }
+
+    fn join(&mut self) -> Result<(), SimError> {
+        self.shared.stop.store(true, Ordering::Relaxed);
+        let Some(thread) = self.thread.take() else { return Ok(()) };
+        // A panic has printed its message; there is nothing to add.
+        thread.join().unwrap_or(Err(SimError::Ended))
+    }
+}
+
+impl Drop for Simulator {
+    fn drop(&mut self) {
+        let _ = self.join();
+    }
+}
+
+impl fmt::Debug for Simulator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Simulator").field("port", &self.port).finish_non_exhaustive()
+    }
+}
+
+/// Simulates a node until `stop` is set. `ready` is told, when the node answers, how a host reaches it.
+///
+/// # Errors
+/// As [`Simulator::start`] and [`Simulator::wait`]. Being stopped is none, at no time.
+pub fn run(options: SimOptions, stop: &AtomicBool, ready: impl FnOnce(&str)) -> Result<(), SimError> {
+    match Simulator::start_unless(options, stop) {
+        Ok(simulator) => {
+            ready(simulator.port());
+            simulator.wait(stop)
+        }
+        Err(SimError::Ended) if stop.load(Ordering::Relaxed) => Ok(()),
+        Err(error) => Err(error),
+    }
+}
+
+/// What is done once, when the node answers for the first time.
+struct Start {
+    model: Model,
+    contacts: Contacts,
+    ready: Sender<String>,
+}
+
+impl Start {
+    fn go(self, service: &mut Service, machine: &mut dyn Machine) -> Result<(), SimError> {
+        service.line.publish()?;
+        match self.contacts {
+            Contacts::None => {}
+            Contacts::Scenario(scenario) => {
+                machine.play(&scenario);
+            }
+            Contacts::Stream { name, source } => service.stream = Some(read_stream(name, source, self.model)),
+        }
+        service.report(machine);
+        // The caller of `start` waits for this, unless it is gone.
+        let _ = self.ready.send(service.line.name());
+        Ok(())
+    }
+}
+
+fn run_native(service: &mut Service, options: SimNodeOptions, start: Start) -> Result<(), SimError> {
+    let pace = Pace::new();
+    let mut ram = Ram::new();
+    let mut off = PoweredOff::new(options);
+    let mut start = Some(start);
+    let mut cycled: Option<Sender<()>> = None;
+    loop {
+        let mut native = Native { node: off.power_up(&mut ram), pace };
+        if let Some(start) = start.take() {
+            start.go(service, &mut native)?;
+        }
+        if let Some(reply) = cycled.take() {
+            let _ = reply.send(());
+        }
+        match service.serve(&mut native)? {
+            Outcome::Stopped => return Ok(()),
+            Outcome::PowerCycle(reply) => cycled = Some(reply),
+        }
+        off = native.node.power_off();
+    }
+}
+
+#[cfg(unix)]
+fn run_emulator(
+    service: &mut Service,
+    options: &EmulatorOptions,
+    debounce_ms: u8,
+    start: Start,
+) -> Result<(), SimError> {
+    let shared = Arc::clone(&service.shared);
+    let mut emulator = crate::emulator::Emulator::new(options, start.model, debounce_ms)?;
+    emulator.power_up(&shared.stop)?;
+    start.go(service, &mut emulator)?;
+    loop {
+        match service.serve(&mut emulator)? {
+            Outcome::Stopped => return Ok(()),
+            Outcome::PowerCycle(reply) => {
+                emulator.power_up(&shared.stop)?;
+                let _ = reply.send(());
+            }
+        }
+    }
+}
