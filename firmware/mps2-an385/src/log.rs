@@ -1,0 +1,105 @@
+//! The log: defmt frames on UART 1.
+//!
+//! # Design
+//! Bytes are written by polling. No critical section guards the log, so that logging never delays the capture
+//! interrupt: whoever interrupts a record that is being written writes nothing.
+//!
+//! # Tradeoffs
+//! Polling holds up the main loop by the length of a record (2 ms at most), which is why events are not logged.
+//! The only ones to interrupt the main loop with a record are faults, and these take the log over.
+//!
+//! # Notes
+//! `ser-cli sim` writes the frames into a file; `cargo xtask log` turns them into text with the ELF file's help.
+
+use core::cell::UnsafeCell;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use crate::device::{self, base};
+use crate::mmio::Word;
+use crate::timer;
+
+const BITS_PER_SECOND: u32 = 115_200;
+
+const TRANSMIT_FULL: u32 = 1 << 0;
+const TRANSMIT_ENABLE: u32 = 1 << 0;
+
+/// Looks at a full transmitter before a byte is given up: some four characters' time.
+const MAX_LOOKS: u32 = 1000;
+
+// SAFETY: AN385 has the UART's registers at these addresses.
+const DATA: Word = unsafe { Word::at(base::UART1) };
+// SAFETY: as above.
+const STATE: Word = unsafe { Word::at(base::UART1 + 0x4) };
+// SAFETY: as above.
+const CONTROL: Word = unsafe { Word::at(base::UART1 + 0x8) };
+// SAFETY: as above.
+const BAUD_DIVIDER: Word = unsafe { Word::at(base::UART1 + 0x10) };
+
+/// Starts the UART. Without, log records go nowhere.
+pub(crate) fn start() {
+    BAUD_DIVIDER.write(device::CLOCK_HZ / BITS_PER_SECOND);
+    CONTROL.write(TRANSMIT_ENABLE);
+}
+
+/// Takes the log away from a record that will never be completed.
+pub(crate) fn take_over() {
+    // SAFETY: called on the way to a reset, with interrupts off: nobody goes on with what was interrupted.
+    unsafe { *ENCODER.0.get() = defmt::Encoder::new() };
+    DEPTH.store(0, Ordering::Relaxed);
+}
+
+defmt::timestamp!("{=u32:ms}", timer::tick_ms());
+
+#[defmt::global_logger]
+struct Logger;
+
+struct SharedEncoder(UnsafeCell<defmt::Encoder>);
+
+// SAFETY: touched only while `DEPTH` is 1, that is by the one whose `acquire` found 0. Contexts nest: one that interrupts
+// it has released the log again before it goes on.
+unsafe impl Sync for SharedEncoder {}
+
+static ENCODER: SharedEncoder = SharedEncoder(UnsafeCell::new(defmt::Encoder::new()));
+
+/// How many records are being written, one inside the other.
+static DEPTH: AtomicU32 = AtomicU32::new(0);
+
+fn with_encoder(step: impl FnOnce(&mut defmt::Encoder)) {
+    if DEPTH.load(Ordering::Relaxed) == 1 {
+        // SAFETY: see `SharedEncoder`.
+        step(unsafe { &mut *ENCODER.0.get() });
+    }
+}
+
+// SAFETY: `acquire` and `release` only count, which is safe from anywhere; see `SharedEncoder` for the rest.
+unsafe impl defmt::Logger for Logger {
+    fn acquire() {
+        DEPTH.fetch_add(1, Ordering::Relaxed);
+        with_encoder(|encoder| encoder.start_frame(write_bytes));
+    }
+
+    unsafe fn flush() {
+        wait_for_room();
+    }
+
+    unsafe fn release() {
+        with_encoder(|encoder| encoder.end_frame(write_bytes));
+        DEPTH.fetch_sub(1, Ordering::Relaxed);
+    }
+
+    unsafe fn write(bytes: &[u8]) {
+        with_encoder(|encoder| encoder.write(bytes, write_bytes));
+    }
+}
+
+fn write_bytes(bytes: &[u8]) {
+    for &byte in bytes {
+        if wait_for_room() {
+            DATA.write(u32::from(byte));
+        }
+    }
+}
+
+fn wait_for_room() -> bool {
+    (0..MAX_LOOKS).any(|_| STATE.read() & TRANSMIT_FULL == 0)
+}

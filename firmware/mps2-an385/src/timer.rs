@@ -1,0 +1,98 @@
+//! The capture interrupt and the clock behind it.
+//!
+//! # Design
+//! Timer 0 interrupts every millisecond. Timer 1 counts without end, and the tick is read off it: the interrupt says
+//! *look now*, never *one more millisecond*.
+//!
+//! # Tradeoffs
+//! Two timers instead of one. With a tick that counts interrupts, every interrupt that comes later than the next one is due
+//! would put the clock back for good.
+//!
+//! # Notes
+//! The timers count down; timer 1 goes round after 172 s, which is how long the interrupt may stay away
+//! unnoticed. The watchdog acts long before that.
+
+use core::num::NonZeroU32;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use ser_node::TickCounter;
+
+use crate::device::{self, base};
+use crate::mmio::Word;
+
+const COUNTS_PER_MS: NonZeroU32 = NonZeroU32::new(device::CLOCK_HZ / 1000).unwrap();
+
+const ENABLE: u32 = 1 << 0;
+const INTERRUPT_ENABLE: u32 = 1 << 3;
+
+struct Registers {
+    control: Word,
+    value: Word,
+    reload: Word,
+    interrupt_clear: Word,
+}
+
+impl Registers {
+    /// # Safety
+    /// There is a timer at `base`.
+    const unsafe fn at(base: usize) -> Registers {
+        // SAFETY: a timer has these four registers, and none of them reaches into memory.
+        #[expect(clippy::multiple_unsafe_ops_per_block, reason = "one reason for all four")]
+        unsafe {
+            Registers {
+                control: Word::at(base),
+                value: Word::at(base + 0x4),
+                reload: Word::at(base + 0x8),
+                interrupt_clear: Word::at(base + 0xC),
+            }
+        }
+    }
+
+    fn start(&self, reload: u32, control: u32) {
+        self.control.write(0);
+        self.reload.write(reload);
+        self.value.write(reload);
+        self.interrupt_clear.write(1);
+        self.control.write(control);
+    }
+}
+
+// SAFETY: AN385 has timers there.
+const TIMER0: Registers = unsafe { Registers::at(base::TIMER0) };
+// SAFETY: as above.
+const TIMER1: Registers = unsafe { Registers::at(base::TIMER1) };
+
+static TICK_MS: AtomicU32 = AtomicU32::new(0);
+
+/// Milliseconds since boot, wrapping. The same tick as that of the latest sample, for those who have no part in capture.
+pub(crate) fn tick_ms() -> u32 {
+    TICK_MS.load(Ordering::Relaxed)
+}
+
+/// Both timers, running.
+pub(crate) struct Timer {
+    ticks: TickCounter,
+}
+
+impl Timer {
+    /// Starts both timers.
+    pub(crate) fn start() -> Timer {
+        TIMER1.start(u32::MAX, ENABLE);
+        TIMER0.start(COUNTS_PER_MS.get() - 1, ENABLE | INTERRUPT_ENABLE);
+        Timer { ticks: TickCounter::new(COUNTS_PER_MS, count_up()) }
+    }
+
+    /// Takes the interrupt back; gives the tick, or `None` when the one before has already counted this
+    /// millisecond.
+    #[inline]
+    pub(crate) fn on_interrupt(&mut self) -> Option<u32> {
+        TIMER0.interrupt_clear.write(1);
+        let tick_ms = self.ticks.advance(count_up())?;
+        TICK_MS.store(tick_ms, Ordering::Relaxed);
+        Some(tick_ms)
+    }
+}
+
+fn count_up() -> u32 {
+    !TIMER1.value.read()
+}

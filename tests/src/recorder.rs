@@ -1,0 +1,146 @@
+//! A recorder under test, native or as the ARM image, behind a pseudo-terminal.
+
+use std::time::{Duration, Instant};
+
+use chrono::NaiveDateTime;
+use ser_client::{Endpoint, Options, Unit, Unsolicited, open};
+use ser_proto::{Entry, Model};
+use ser_sim::{Backend, EmulatorOptions, Played, Port, Scenario, SimOptions, Simulator, Step};
+
+/// How long anything may take: these tests run on machines that stall for seconds.
+pub const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Where the ARM image is: set by `cargo xtask test`, which builds it.
+pub const IMAGE_VARIABLE: &str = "SER_IMAGE_MPS2_AN385";
+
+/// What plays the node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The recorder in this process.
+    Native,
+    /// The ARM image in the emulator.
+    Emulated,
+}
+
+/// A recorder that is switched on.
+pub struct Recorder {
+    simulator: Simulator,
+}
+
+impl Recorder {
+    /// Switches a recorder on; all contacts are open.
+    ///
+    /// # Panics
+    /// When it does not answer, or the image is not there.
+    #[must_use]
+    pub fn start(kind: Kind, model: Model) -> Recorder {
+        let mut options = SimOptions::new(model, Port::Pty { link: None });
+        if kind == Kind::Emulated {
+            let image = std::env::var_os(IMAGE_VARIABLE)
+                .unwrap_or_else(|| panic!("{IMAGE_VARIABLE} is not set: run `cargo xtask test`"));
+            options.backend = Backend::Emulator(EmulatorOptions::new(image));
+        }
+        let simulator = Simulator::start(options).unwrap_or_else(|error| panic!("{error}"));
+        Recorder { simulator }
+    }
+
+    /// What `--port` takes.
+    #[must_use]
+    pub fn port(&self) -> &str {
+        self.simulator.port()
+    }
+
+    /// A client on the line, at 9600 bit/s.
+    ///
+    /// # Panics
+    /// When the line cannot be opened.
+    #[must_use]
+    pub fn unit(&self) -> Unit {
+        let endpoint: Endpoint = self.port().parse().expect("the simulator names its port");
+        let transport = open(&endpoint, 9600).unwrap_or_else(|error| panic!("{error}"));
+        Unit::new(transport, Options { timeout: Duration::from_secs(20), retries: 5 })
+    }
+
+    /// Moves contacts, `(ms, input, closed)`, and waits until the recorder has sampled them all.
+    ///
+    /// # Panics
+    /// When that takes too long.
+    pub fn play(&self, steps: &[(u64, u8, bool)]) {
+        self.start_playing(steps);
+        self.simulator.wait_played(PATIENCE).unwrap_or_else(|error| panic!("{error}"));
+    }
+
+    /// Moves contacts while the caller goes on.
+    ///
+    /// # Panics
+    /// When the simulator has ended.
+    pub fn start_playing(&self, steps: &[(u64, u8, bool)]) {
+        let steps = steps.iter().map(|&(at_ms, input, on)| Step { at_ms, input, on });
+        self.simulator.play(Scenario::from_steps(steps)).unwrap_or_else(|error| panic!("{error}"));
+    }
+
+    /// Waits until all contacts have moved.
+    ///
+    /// # Panics
+    /// When that takes too long.
+    pub fn wait_played(&self) {
+        self.simulator.wait_played(PATIENCE).unwrap_or_else(|error| panic!("{error}"));
+    }
+
+    /// What has moved, and between which samples.
+    #[must_use]
+    pub fn played(&self) -> Vec<Played> {
+        self.simulator.played()
+    }
+
+    /// Switches the recorder off and on.
+    ///
+    /// # Panics
+    /// When it does not come up again.
+    pub fn power_cycle(&self) {
+        self.simulator.power_cycle().unwrap_or_else(|error| panic!("{error}"));
+    }
+}
+
+/// Waits for what the recorder says unasked until `enough` has been seen.
+///
+/// # Panics
+/// When that takes too long.
+pub fn listen(unit: &mut Unit, mut enough: impl FnMut(Unsolicited) -> bool) {
+    let deadline = Instant::now() + PATIENCE;
+    while Instant::now() < deadline {
+        if let Some(message) = unit.wait_event(Duration::from_millis(100)).expect("the line is up")
+            && enough(message)
+        {
+            return;
+        }
+    }
+    panic!("the recorder has not said what it should");
+}
+
+/// The time of an entry in milliseconds since 1970.
+///
+/// # Panics
+/// When there is no such time.
+#[must_use]
+pub fn stamp_ms(entry: &Entry) -> i64 {
+    let time = NaiveDateTime::try_from(entry.time).expect("a recorder stamps with a real date");
+    time.and_utc().timestamp_millis()
+}
+
+/// Checks that entries are the moves that were played: the same inputs in the same order, stamps exactly as far apart as the
+/// samples that can have seen them.
+///
+/// # Panics
+/// When they are not.
+pub fn assert_entries_are(entries: &[Entry], played: &[Played]) {
+    assert_eq!(entries.len(), played.len(), "each move of contacts is one event");
+    let Some((first, first_move)) = entries.first().zip(played.first()) else { return };
+    for (entry, moved) in entries.iter().zip(played) {
+        assert_eq!((entry.changed, entry.state), (moved.changed, moved.state), "{moved:?}");
+        let delta_ms = stamp_ms(entry) - stamp_ms(first);
+        let least = i64::from(moved.tick_before) - i64::from(first_move.tick_after);
+        let most = i64::from(moved.tick_after) - i64::from(first_move.tick_before);
+        assert!((least..=most).contains(&delta_ms), "{delta_ms} ms after the first, {least}…{most} played");
+    }
+}
