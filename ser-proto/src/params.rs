@@ -3,7 +3,7 @@
 //! The length is checked before any field, so a body of a wrong length is never mistaken for one with a bad value.
 
 use nom::error::{ErrorKind, FromExternalError, ParseError as NomParseError};
-use nom::{Finish, Parser};
+use nom::Parser;
 
 use crate::{Code, ParseError};
 
@@ -39,12 +39,13 @@ pub(crate) fn parse_params<'a, T>(
     parser: impl Parser<Bytes<'a>, Output = T, Error = Fault>,
 ) -> Result<T, ParseError> {
     let length = params.len() + 1;
-    match nom::combinator::all_consuming(parser).parse(params).finish() {
+    // `finish()` would do, but it panics on `Incomplete`, which these parsers never return.
+    match nom::combinator::all_consuming(parser).parse(params) {
         Ok((_, message)) => Ok(message),
-        Err(Fault { remaining, value: Some(value) }) => {
+        Err(nom::Err::Error(Fault { remaining, value: Some(value) })) => {
             Err(ParseError::BadValue { code: code.byte(), offset: length - remaining, value })
         }
-        Err(Fault { value: None, .. }) => Err(ParseError::WrongLength { code: code.byte(), length }),
+        Err(_) => Err(ParseError::WrongLength { code: code.byte(), length }),
     }
 }
 
