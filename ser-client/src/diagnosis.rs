@@ -9,7 +9,7 @@ use crate::Counters;
 /// Why there was no answer, as far as the bytes that did arrive can tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Diagnosis {
-    /// Not one byte arrived.
+    /// Not one byte arrived. A unit that is asked at the wrong baud rate hears garbage and is silent, too.
     Silent,
     /// Bytes arrived and none of them made sense: most likely the wrong baud rate.
     Garbage {
@@ -57,7 +57,9 @@ impl Diagnosis {
     #[must_use]
     pub const fn hint(&self) -> &'static str {
         match self {
-            Diagnosis::Silent => "is the unit powered, the cable a null modem cable and this the right port?",
+            Diagnosis::Silent => {
+                "check power, port, cable (null modem?) and baud rate (units are delivered with 9600)"
+            }
             Diagnosis::Garbage { .. } => "try another baud rate; units are delivered with 9600",
             Diagnosis::Damaged { .. } => "check cable, shielding and ground, or choose a lower baud rate",
             Diagnosis::NotUnderstood(_) => {

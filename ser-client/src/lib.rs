@@ -4,6 +4,10 @@
 //! Most programs want [`open`] and [`Unit`]: blocking calls over a serial port or TCP. Underneath, [`Session`] (one
 //! request and its answer) and [`LogReader`] (which entries to read next) know neither clock nor port; they can be
 //! driven by any event loop, and by tests without waiting.
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
+)]
 
 mod counters;
 mod cursor;

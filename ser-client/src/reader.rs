@@ -35,7 +35,6 @@
 //! - The first reading of a log cannot know how often the total has wrapped: [`Lost::OverwrittenAtLeast`].
 //! - When events come so fast that the oldest entries are overwritten while the request for them is on its way, the
 //!   reader gives up some more of the oldest, to get ahead of the recorder. They are counted as lost like the rest.
-//!
 //! - A resize in the middle of a reading shows when total and next slot part, or when the anchor is in another place.
 //!   In a ring of a few entries both may agree by chance, and an entry be taken for its neighbour.
 //!

@@ -91,3 +91,9 @@ impl From<TransportError> for RequestError {
         RequestError::Transport(error)
     }
 }
+
+impl From<Disturbed> for RequestError {
+    fn from(disturbed: Disturbed) -> RequestError {
+        RequestError::Disturbed(disturbed)
+    }
+}

@@ -214,6 +214,7 @@ impl Unit {
     ) -> Result<Summary, RequestError> {
         let (mut delivered, mut lost, mut restarted) = (0_u32, 0_u32, false);
         let mut size = size;
+        let mut tells_size = true;
         let mut resyncs = 0;
         loop {
             let mut reader = LogReader::new(*cursor, size);
@@ -230,11 +231,18 @@ impl Unit {
                     self.last_position = Some(summary.position);
                     return Ok(Summary { delivered, lost, restarted, position: summary.position });
                 }
-                Err(RequestError::Disturbed(Disturbed::Changed | Disturbed::WrongSize))
+                Err(RequestError::Disturbed(disturbed @ (Disturbed::Changed | Disturbed::WrongSize)))
                     if resyncs < MAX_RESYNCS =>
                 {
                     resyncs += 1;
-                    size = self.size_now(size)?;
+                    if tells_size {
+                        let asked = self.size_now()?;
+                        tells_size = asked.is_some();
+                        if disturbed == Disturbed::WrongSize && asked.is_none_or(|asked| asked == size) {
+                            return Err(disturbed.into());
+                        }
+                        size = asked.unwrap_or(size);
+                    }
                 }
                 Err(error) => return Err(error),
             }
@@ -251,16 +259,16 @@ impl Unit {
             let reply = self.read(request)?;
             let taken = reader.take(&reply, on);
             *cursor = reader.cursor();
-            taken.map_err(RequestError::Disturbed)?;
+            taken?;
         }
         Ok(())
     }
 
-    /// The size of the log, which somebody may have changed. Original units do not tell: then it is `believed`.
-    fn size_now(&mut self, believed: u16) -> Result<u16, RequestError> {
+    /// The size of the log, which somebody may have changed. Original units do not tell.
+    fn size_now(&mut self) -> Result<Option<u16>, RequestError> {
         match self.configuration() {
-            Ok(configuration) => Ok(configuration.size),
-            Err(RequestError::NoReply { .. }) => Ok(believed),
+            Ok(configuration) => Ok(Some(configuration.size)),
+            Err(RequestError::NoReply { .. }) => Ok(None),
             Err(error) => Err(error),
         }
     }

@@ -232,6 +232,53 @@ fn a_reading_that_breaks_off_goes_on_where_it_stopped() {
 }
 
 #[test]
+fn a_download_wastes_one_entry_in_ten() {
+    let mut recorder = Recorder::after(2048, 5000);
+    let mut requests = 0;
+    Host::new().read(&mut recorder, |_| requests += 1);
+    // Position, whether the log is full, ten entries, nine at a time for the rest, and once around the end of the ring.
+    assert!((2 + 1 + 227..=2 + 1 + 227 + 2).contains(&requests), "{requests}");
+}
+
+#[test]
+fn a_total_that_is_the_same_after_65536_events_is_not_an_empty_log() {
+    let mut recorder = Recorder::new(10);
+    let mut host = Host::new();
+    host.read(&mut recorder, |_| {});
+    recorder.append_many(65_536);
+    let mut expected = vec![Told::Restarted, Told::AtLeast(65_526)];
+    expected.extend(events(65_527..=65_536));
+    assert_eq!(host.read(&mut recorder, |_| {}).0, expected);
+    // The total is 0 once more, but now there is an anchor.
+    recorder.erase();
+    recorder.append_many(3);
+    let mut expected = vec![Told::Restarted];
+    expected.extend(events(65_537..=65_539));
+    assert_eq!(host.read(&mut recorder, |_| {}).0, expected);
+}
+
+#[test]
+fn a_total_that_goes_back_during_the_reading_is_an_erase() {
+    let mut recorder = Recorder::new(8);
+    let mut host = Host::new();
+    recorder.append_many(4);
+    host.read(&mut recorder, |_| {});
+    recorder.append_many(8);
+    let mut replies = 0;
+    let (told, _) = host.read(&mut recorder, |recorder| {
+        replies += 1;
+        if replies == 1 {
+            // The slots agree: 8 divides 65536.
+            recorder.erase();
+            recorder.append_many(11);
+        }
+    });
+    let mut expected = vec![Told::Restarted, Told::AtLeast(3)];
+    expected.extend(events(16..=23));
+    assert_eq!(told, expected);
+}
+
+#[test]
 fn polling_an_idle_log_takes_one_request_when_the_position_is_known() {
     for size in [1, 7, 2048] {
         let mut recorder = Recorder::after(size, 20);

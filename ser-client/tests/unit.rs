@@ -10,7 +10,7 @@ use common::{Told, told};
 use ser_client::{
     Cursor, Diagnosis, Disturbed, LogPosition, RequestError, Summary, TransportError, Unit, Unsolicited,
 };
-use ser_proto::{AutoReport, Baud, Code, Command, Configure, Mode, Reply, TimeStamp};
+use ser_proto::{AutoReport, Baud, Command, Configure, Mode, Reply, TimeStamp};
 
 const NOON: TimeStamp =
     TimeStamp { year: 26, month: 11, day: 22, hour: 12, minute: 0, second: 0, millisecond: 0 };
@@ -74,7 +74,7 @@ fn the_line_follows_a_new_baud_rate() {
     let mut bench = Bench::serial(100);
     let in_force = bench.unit.configure(Configure { baud: Some(Baud::B9600), ..keep_everything() }).unwrap();
     assert_eq!(in_force.baud, Baud::B9600);
-    assert_eq!((bench.fake().line_rate, bench.fake().unit_rate), (9600, 9600));
+    assert_eq!(bench.fake().unit_rate, 9600);
     assert_eq!(bench.unit.bits_per_second(), Some(9600));
     assert!(bench.unit.mode().unwrap().recording);
 }
@@ -221,6 +221,22 @@ fn a_log_that_never_rests_ends_in_an_error() {
     let mut cursor = None;
     let (_, result) = read_new(&mut bench.unit, &mut cursor, 99);
     assert!(matches!(result, Err(RequestError::Disturbed(Disturbed::Changed))), "{result:?}");
+}
+
+#[test]
+fn a_size_that_is_wrong_is_corrected_if_the_unit_tells_it() {
+    for original in [false, true] {
+        let mut bench = Bench::new(30);
+        bench.fake().recorder.append_many(30);
+        bench.fake().original = original;
+        let (all, result) = read_new(&mut bench.unit, &mut None, 20);
+        if original {
+            assert!(matches!(result, Err(RequestError::Disturbed(Disturbed::WrongSize))), "{result:?}");
+            assert_eq!(all, []);
+        } else {
+            assert_eq!(result.unwrap().delivered, 30);
+        }
+    }
 }
 
 #[test]

@@ -12,6 +12,9 @@ use ser_proto::{
 
 use super::Recorder;
 
+/// What happens to a recorder behind the client's back.
+type Meanwhile = Box<dyn FnMut(&mut Recorder, &mut Configuration, usize) + Send>;
+
 /// Everything that a test can look at and change while the client talks.
 pub(crate) struct Fake {
     pub(crate) recorder: Recorder,
@@ -32,7 +35,7 @@ pub(crate) struct Fake {
     pub(crate) broken: Option<io::ErrorKind>,
     pub(crate) commands: Vec<Command>,
     /// Called after each command with its number.
-    pub(crate) meanwhile: Box<dyn FnMut(&mut Recorder, &mut Configuration, usize) + Send>,
+    pub(crate) meanwhile: Meanwhile,
     /// Bytes under way, with the rate at which they were sent.
     to_client: VecDeque<(u8, u32)>,
     decoder: FrameDecoder<168>,

@@ -1,0 +1,222 @@
+//! The arguments of the command line: what is common to all subcommands, and the list of them.
+
+use std::time::Duration;
+
+use clap::{Args as _, CommandFactory, FromArgMatches, Parser, Subcommand};
+use ser_proto::Baud;
+
+use crate::commands;
+use crate::error;
+use crate::values;
+
+const EXAMPLES: &str = "\
+Examples:
+  ser-cli demo                          see it work, no unit needed
+  ser-cli ports                         which serial ports there are
+  ser-cli -p /dev/ttyUSB0 status        is the unit there? how is it?
+  ser-cli -p /dev/ttyUSB0 read          all events as a table
+  ser-cli -p tcp://10.0.0.7:4000 watch  events as they happen
+  export SER_PORT=/dev/ttyUSB0          say the port once
+
+Exit codes: 0 done, 1 the unit did not answer or something else failed, 2 the command line makes no sense. \
+Only data goes to standard output; everything else goes to standard error.";
+
+/// Subcommands that talk to no unit: how to reach one is accepted there, and not mentioned.
+const OFFLINE: [&str; 6] = ["ports", "decode", "encode", "sim", "demo", "completions"];
+
+/// Reads, configures, watches and simulates sequential event recorders (HE660SER160, HE660SER320).
+#[derive(Debug, Parser)]
+#[command(name = "ser-cli", version, after_help = EXAMPLES, max_term_width = 110)]
+pub(crate) struct Cli {
+    #[command(flatten)]
+    pub(crate) connection: ConnectionArgs,
+
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// How to reach the unit. Accepted before and after the subcommand.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Connection")]
+pub(crate) struct ConnectionArgs {
+    /// Serial port of the unit (/dev/ttyUSB0, COM3), or tcp://HOST:PORT.
+    #[arg(short, long, global = true, env = "SER_PORT", value_name = "PORT")]
+    pub(crate) port: Option<String>,
+
+    /// Rate of the serial port.
+    #[arg(long, global = true, value_name = "RATE", default_value = "9600", value_parser = values::baud)]
+    pub(crate) baud: Baud,
+
+    /// How long the unit may take to answer, on top of the time on the line: 500ms, 2s.
+    #[arg(long, global = true, value_name = "TIME", value_parser = values::duration)]
+    pub(crate) timeout: Option<Duration>,
+
+    /// How often a question is asked again when no good answer comes.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100))]
+    pub(crate) retries: Option<u32>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Ports(commands::ports::Args),
+    Status(commands::status::Args),
+    Config(commands::config::Args),
+    Clock(commands::clock::Args),
+    Start(commands::recording::StartArgs),
+    Stop(commands::recording::StopArgs),
+    Erase(commands::erase::Args),
+    LastBroadcast(commands::last_broadcast::Args),
+    Read(commands::read::Args),
+    Print(commands::print::Args),
+    Watch(commands::watch::Args),
+    Decode(commands::decode::Args),
+    Encode(commands::encode::Args),
+    Sim(commands::sim::Args),
+    Demo(commands::demo::Args),
+    Completions(commands::completions::Args),
+}
+
+impl Cli {
+    /// The definition of all arguments.
+    pub(crate) fn definition() -> clap::Command {
+        let connection = ConnectionArgs::augment_args(clap::Command::new("connection"));
+        OFFLINE.into_iter().fold(Cli::command(), |definition, name| {
+            definition.mut_subcommand(name, |subcommand| {
+                subcommand.args(connection.get_arguments().map(|arg| arg.clone().hide(true)))
+            })
+        })
+    }
+
+    /// Reads the command line, or ends the program with help or a usage error.
+    pub(crate) fn from_command_line() -> Cli {
+        match Cli::try_from_words(std::env::args_os()) {
+            Ok(cli) => cli,
+            Err(error) => error.exit(),
+        }
+    }
+
+    fn try_from_words<W>(words: impl IntoIterator<Item = W>) -> Result<Cli, clap::Error>
+    where
+        W: Into<std::ffi::OsString> + Clone,
+    {
+        let mut definition = Cli::definition();
+        let matches = definition.try_get_matches_from_mut(words)?;
+        Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut definition))
+    }
+
+    /// Does what the command line asks for.
+    pub(crate) fn run(&self) -> error::Result<()> {
+        let connection = &self.connection;
+        match &self.command {
+            Command::Ports(args) => commands::ports::run(args),
+            Command::Status(args) => commands::status::run(args, connection),
+            Command::Config(args) => commands::config::run(args, connection),
+            Command::Clock(args) => commands::clock::run(args, connection),
+            Command::Start(args) => commands::recording::start(args, connection),
+            Command::Stop(args) => commands::recording::stop(args, connection),
+            Command::Erase(args) => commands::erase::run(args, connection),
+            Command::LastBroadcast(args) => commands::last_broadcast::run(args, connection),
+            Command::Read(args) => commands::read::run(args, connection),
+            Command::Print(args) => commands::print::run(args, connection),
+            Command::Watch(args) => commands::watch::run(args, connection),
+            Command::Decode(args) => commands::decode::run(args),
+            Command::Encode(args) => commands::encode::run(args),
+            Command::Sim(args) => commands::sim::run(args),
+            Command::Demo(args) => commands::demo::run(args),
+            Command::Completions(args) => commands::completions::run(args),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_definition_of_the_arguments_is_sound() {
+        Cli::definition().debug_assert();
+    }
+
+    #[test]
+    fn the_help_of_every_subcommand_has_an_example_that_is_accepted() {
+        for command in Cli::definition().get_subcommands_mut() {
+            let name = command.get_name().to_string();
+            let help = command.render_long_help().to_string();
+            let examples: Vec<_> = example_lines(&help).collect();
+            assert!(!examples.is_empty(), "{name} has no example");
+            assert!(examples.iter().any(|line| line.contains(&name)), "{name}: {examples:?}");
+            for line in examples {
+                assert!(line.chars().count() <= 76, "too long for 80 columns: {line}");
+                accepts(line);
+            }
+        }
+    }
+
+    #[test]
+    fn the_examples_of_the_whole_are_accepted() {
+        let help = Cli::definition().render_long_help().to_string();
+        assert!(example_lines(&help).map(accepts).count() >= 4);
+    }
+
+    /// The lines below "Examples:" that run the program.
+    fn example_lines(help: &str) -> impl Iterator<Item = &str> {
+        let below = help.split_once("Examples:\n").map_or("", |(_, below)| below);
+        below.lines().map(str::trim).filter(|line| line.starts_with("ser-cli "))
+    }
+
+    /// The words of an example up to a redirection, a pipe or the explanation two blanks away.
+    fn accepts(line: &str) {
+        let command = line.split("  ").next().unwrap_or(line);
+        let words = command.split(' ').take_while(|word| !["|", ">", ">>", "&"].contains(word));
+        if let Err(error) = Cli::try_from_words(words) {
+            assert!(!error.use_stderr(), "`{command}`: {error}");
+        }
+    }
+
+    #[test]
+    fn impossible_arguments_are_refused() {
+        for line in [
+            "read --from 0 --count 1",
+            "read --from 1 --count 2049",
+            "read --from 1",
+            "read --count 1",
+            "read --all --new",
+            "read --new --from 1 --count 1",
+            "read --format xml",
+            "--baud 115200 status",
+            "--timeout 0 status",
+            "config --size 0",
+            "config --size 2049",
+            "config --report-to 32",
+            "config --auto-print maybe",
+            "clock set --at yesterday",
+            "print --from 1",
+            "encode read --from 1 --count 11",
+            "encode set-clock 2026-02-29T00:00:00",
+            "sim --model ser640",
+            "",
+        ] {
+            let words = std::iter::once("ser-cli").chain(line.split_whitespace());
+            let error = Cli::try_from_words(words).expect_err(line);
+            assert_eq!(error.exit_code(), 2, "{line}");
+        }
+    }
+
+    #[test]
+    fn the_port_may_stand_on_either_side() {
+        for words in [["ser-cli", "-p", "COM3", "status"], ["ser-cli", "status", "--port", "COM3"]] {
+            assert_eq!(Cli::try_from_words(words).unwrap().connection.port.as_deref(), Some("COM3"));
+        }
+    }
+
+    #[test]
+    fn how_to_reach_a_unit_is_not_mentioned_where_none_is_reached() {
+        let mut definition = Cli::definition();
+        definition.build();
+        for command in definition.get_subcommands_mut().filter(|command| command.get_name() != "help") {
+            let (name, help) = (command.get_name().to_string(), command.render_long_help().to_string());
+            assert_eq!(help.contains("--retries"), !OFFLINE.contains(&&*name), "{name}");
+        }
+        assert!(Cli::try_from_words(["ser-cli", "-p", "COM3", "demo"]).is_ok());
+    }
+}

@@ -1,0 +1,58 @@
+//! `clock`: the unit's clock.
+
+use std::io::{self, Write};
+
+use ser_proto::TimeStamp;
+
+use crate::cli::ConnectionArgs;
+use crate::connection;
+use crate::error::{Failure, Result};
+use crate::time::{local_time_in, parse_time};
+
+const EXAMPLES: &str = "\
+Examples:
+  ser-cli clock set                               to the time of this computer
+  ser-cli clock set --at 2026-11-22T10:00:00.250  to any other";
+
+/// Set the unit's clock.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Set the clock; events that are recorded already keep their times.
+    ///
+    /// The time sent is the one at which the last byte arrives, so that the line adds no delay. The unit knows no
+    /// time zone and no daylight saving time. Shown is the time that was sent.
+    #[command(after_help = EXAMPLES)]
+    Set {
+        /// The time to set, as it will be when the last byte arrives; the local time of this computer if not given.
+        #[arg(long, value_name = "TIME", value_parser = parse_time)]
+        at: Option<TimeStamp>,
+    },
+}
+
+pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
+    let What::Set { at } = args.what;
+    // Checked before anything is sent; no download takes us from one century into the next.
+    if at.is_none() {
+        local_time_in(std::time::Duration::ZERO).map_err(|year| {
+            Failure::new(format!("a unit's clock runs from 1970 to 2069; this computer's says {year}"))
+                .hint("set this computer's clock, or give the time with --at")
+        })?;
+    }
+    let mut unit = connection::open(connection)?;
+    let sent = unit.set_clock(|ahead| at.or(local_time_in(ahead).ok()).unwrap_or(NO_TIME))?;
+    let mut out = io::stdout().lock();
+    writeln!(out, "{sent}")?;
+    out.flush()?;
+    Ok(())
+}
+
+/// No unit and no client takes this for a date.
+const NO_TIME: TimeStamp =
+    TimeStamp { year: 0, month: 0, day: 0, hour: 0, minute: 0, second: 0, millisecond: 0 };

@@ -1,0 +1,29 @@
+//! `last-broadcast`: the last command that came over the Genius bus as a broadcast.
+
+use std::io::{self, Write};
+
+use crate::cli::ConnectionArgs;
+use crate::connection;
+use crate::error::Result;
+
+const EXAMPLES: &str = "\
+Examples:
+  ser-cli last-broadcast --port /dev/ttyUSB0";
+
+/// Show which command the unit last received as a Genius broadcast, and when.
+///
+/// Broadcasts get no reply on the bus; this is how to check that one was received.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Args {}
+
+pub(crate) fn run(_args: &Args, connection: &ConnectionArgs) -> Result<()> {
+    let last = connection::open(connection)?.last_broadcast()?;
+    let mut out = io::stdout().lock();
+    match last {
+        Some(last) => writeln!(out, "{last}")?,
+        None => writeln!(out, "none since power-up")?,
+    }
+    out.flush()?;
+    Ok(())
+}

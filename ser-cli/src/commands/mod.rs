@@ -1,0 +1,17 @@
+//! The subcommands, one file each: arguments, help and what is done.
+
+pub(crate) mod clock;
+pub(crate) mod completions;
+pub(crate) mod config;
+pub(crate) mod decode;
+pub(crate) mod demo;
+pub(crate) mod encode;
+pub(crate) mod erase;
+pub(crate) mod last_broadcast;
+pub(crate) mod ports;
+pub(crate) mod print;
+pub(crate) mod read;
+pub(crate) mod recording;
+pub(crate) mod sim;
+pub(crate) mod status;
+pub(crate) mod watch;

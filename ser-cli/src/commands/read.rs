@@ -1,0 +1,139 @@
+//! `read`: events from the unit's log.
+
+use std::ops::ControlFlow;
+
+use ser_client::{Cursor, Delivery, RangeReader, RequestError, Unit};
+use ser_proto::{Code, Command, MAX_SIZE, Reply};
+
+use crate::cli::ConnectionArgs;
+use crate::connection;
+use crate::delivery::Outlet;
+use crate::error::{Result, advise, inform};
+use crate::keeper::{Keeper, StateArgs};
+use crate::output::Format;
+use crate::reading::LogFollower;
+use crate::values;
+
+const EXAMPLES: &str = "\
+Examples:
+  ser-cli read                              everything, oldest first
+  ser-cli read --format csv > events.csv    for a spreadsheet
+  ser-cli read --new --format jsonl >> log  what has not been delivered yet
+  ser-cli read --from 2040 --count 9        entries by their numbers
+  ser-cli read --log-size 2048              an original unit
+
+Formats:
+  table   entry, time, time since previous and first event, changes
+  csv     a row per change, as in 17,2026-11-22T10:00:00.250,3,1
+  jsonl   an object per event: entry, time, changed, state (inputs on)
+
+Events that were overwritten before they were read are reported on standard error, in the table also at their \
+place. The exit code stays 0.";
+
+/// Read events.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Args {
+    /// Everything the unit has, oldest first; this is what happens if nothing else is asked for.
+    #[arg(long, conflicts_with_all = ["new", "from", "count"])]
+    all: bool,
+
+    /// What has not been delivered yet by read --new or watch from this port; remembered from run to run.
+    #[arg(long, conflicts_with_all = ["from", "count"])]
+    new: bool,
+
+    /// Number of the first entry, as the unit numbers them: place in memory, not age.
+    #[arg(long, value_name = "N", requires = "count", value_parser = values::entries())]
+    from: Option<u16>,
+
+    /// How many entries; those that exist are read.
+    #[arg(long, value_name = "N", requires = "from", value_parser = values::entries())]
+    count: Option<u16>,
+
+    /// How the events are written.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+
+    /// How many entries the unit's log holds; then the unit is not asked (original units do not answer).
+    #[arg(long, value_name = "N", value_parser = values::entries())]
+    log_size: Option<u16>,
+
+    #[command(flatten)]
+    state: StateArgs,
+}
+
+pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
+    let mut keeper = match args.new {
+        true => Some(Keeper::load(&args.state, connection)?),
+        false => None,
+    };
+    let mut unit = connection::open(connection)?;
+    let mut outlet = Outlet::new(args.format);
+    if let (Some(from), Some(count)) = (args.from, args.count) {
+        return read_range(&mut unit, &mut outlet, (from, count), args.log_size);
+    }
+    let remembered = keeper.as_ref().and_then(Keeper::size);
+    let size = connection::log_size(&mut unit, args.log_size, remembered)?;
+    let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), size);
+    // What did reach standard output is remembered also when the unit fell silent in the middle.
+    let saved = keeper.as_mut().map_or(Ok(()), Keeper::save);
+    let delivered = result?;
+    saved?;
+    if delivered == 0 {
+        inform(if args.new { "nothing new" } else { "the log is empty" });
+    }
+    Ok(())
+}
+
+fn read_by_cursor(
+    unit: &mut Unit,
+    outlet: &mut Outlet,
+    mut keeper: Option<&mut Keeper>,
+    size: u16,
+) -> Result<u32> {
+    let cursor: Option<Cursor> = keeper.as_ref().and_then(|keeper| keeper.cursor());
+    let mut follower = LogFollower::new(cursor, size);
+    let summary = follower.read_new(unit, &mut |step| {
+        outlet.take(step.deliveries, step.pending)?;
+        match &mut keeper {
+            Some(keeper) => keeper.delivered(step.cursor, size),
+            None => Ok(()),
+        }
+    })?;
+    outlet.finish()?;
+    Ok(summary.delivered)
+}
+
+/// Reads entries by number. Neither cursor nor size come into it: the unit answers with what exists.
+fn read_range(
+    unit: &mut Unit,
+    outlet: &mut Outlet,
+    (from, count): (u16, u16),
+    log_size: Option<u16>,
+) -> Result<()> {
+    let mut reader = RangeReader::new(from, count, log_size.unwrap_or(MAX_SIZE));
+    while let ControlFlow::Continue(deliveries) = next_of_range(unit, &mut reader)? {
+        let pending = u32::from(count - reader.delivered());
+        outlet.take(&deliveries, pending)?;
+    }
+    outlet.finish()?;
+    match reader.delivered() {
+        0 => {
+            inform(format_args!("entry {from} does not exist yet"));
+            advise("ser-cli status shows how far the log is filled");
+        }
+        found if found < count => inform(format_args!("{found} of {count} entries exist")),
+        _ => {}
+    }
+    Ok(())
+}
+
+fn next_of_range(unit: &mut Unit, reader: &mut RangeReader) -> Result<ControlFlow<(), Vec<Delivery>>> {
+    let Some(request) = reader.request() else { return Ok(ControlFlow::Break(())) };
+    let Reply::Read(reply) = unit.request(&Command::from(request))? else {
+        return Err(RequestError::UnexpectedReply { command: Code::Read }.into());
+    };
+    let mut deliveries = Vec::new();
+    reader.take(&reply, &mut |delivery| deliveries.push(delivery));
+    Ok(ControlFlow::Continue(deliveries))
+}

@@ -1,0 +1,37 @@
+//! `start` and `stop`: whether the unit records.
+
+use crate::cli::ConnectionArgs;
+use crate::connection;
+use crate::error::{Result, inform};
+
+const START_EXAMPLES: &str = "\
+Examples:
+  ser-cli start --port /dev/ttyUSB0";
+
+const STOP_EXAMPLES: &str = "\
+Examples:
+  ser-cli stop --port /dev/ttyUSB0";
+
+/// Start recording. What changed while the unit was stopped is no event.
+#[derive(Debug, clap::Args)]
+#[command(after_help = START_EXAMPLES)]
+pub(crate) struct StartArgs {}
+
+/// Stop recording until `start` or the next power-up. Events recorded so far stay.
+#[derive(Debug, clap::Args)]
+#[command(after_help = STOP_EXAMPLES)]
+pub(crate) struct StopArgs {}
+
+pub(crate) fn start(_args: &StartArgs, connection: &ConnectionArgs) -> Result<()> {
+    set_recording(connection, true)
+}
+
+pub(crate) fn stop(_args: &StopArgs, connection: &ConnectionArgs) -> Result<()> {
+    set_recording(connection, false)
+}
+
+fn set_recording(connection: &ConnectionArgs, recording: bool) -> Result<()> {
+    let mode = connection::open(connection)?.set_recording(recording)?;
+    inform(mode);
+    Ok(())
+}

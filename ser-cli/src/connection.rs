@@ -1,0 +1,147 @@
+//! From `--port` to a unit that can be talked to, and from the client's errors to what the user is told.
+
+use std::time::Duration;
+
+use ser_client::{Diagnosis, Endpoint, OpenError, Options, RequestError, Unit};
+use ser_proto::Configuration;
+
+use crate::cli::ConnectionArgs;
+use crate::error::{Failure, Result, advise, warn};
+
+/// What the user calls the unit: names its state file and appears in hints.
+pub(crate) fn port_text(connection: &ConnectionArgs) -> Result<&str> {
+    connection.port.as_deref().map(str::trim).filter(|port| !port.is_empty()).ok_or_else(no_port)
+}
+
+/// Opens the line to the unit. Nothing is sent yet.
+pub(crate) fn open(connection: &ConnectionArgs) -> Result<Unit> {
+    let endpoint: Endpoint = port_text(connection)?.parse().map_err(|error| {
+        Failure::usage(format!("--port: {error}"))
+            .hint("ser-cli ports lists the serial ports of this computer")
+    })?;
+    let transport = ser_client::open(&endpoint, connection.baud.bits_per_second())
+        .map_err(|error| open_failure(&error))?;
+    let mut options = Options::default();
+    options.timeout = connection.timeout.unwrap_or(options.timeout);
+    options.retries = connection.retries.unwrap_or(options.retries);
+    Ok(Unit::new(transport, options))
+}
+
+fn no_port() -> Failure {
+    let failure = Failure::usage("which unit? No --port is given and SER_PORT is not set");
+    let failure = match &ser_client::ports()[..] {
+        [only] => failure.hint(format!("this computer has one serial port: try --port {}", only.path)),
+        _ => failure.hint("name a serial port, as in --port /dev/ttyUSB0; ser-cli ports lists them"),
+    };
+    failure
+        .hint("name a terminal server, as in --port tcp://10.0.0.7:4000")
+        .hint("no unit at hand? ser-cli demo")
+}
+
+fn open_failure(error: &OpenError) -> Failure {
+    let failure = Failure::new(error).hint(error.hint());
+    match error {
+        OpenError::NoSuchPort { .. } | OpenError::NotSerial { .. } => {
+            failure.hint("ser-cli ports lists them")
+        }
+        _ => failure,
+    }
+}
+
+impl From<RequestError> for Failure {
+    fn from(error: RequestError) -> Failure {
+        let hint = error.hint().unwrap_or("try again; ser-cli status tells whether the unit is well");
+        let failure = Failure::new(&error).hint(hint);
+        match error {
+            // A unit that is asked at another rate sees no question, and says nothing.
+            RequestError::NoReply { diagnosis: Diagnosis::Silent, .. } => failure.hint(
+                "a unit that is asked at another rate than its own stays silent: try --baud 19200, --baud 4800, …",
+            ),
+            _ => failure,
+        }
+    }
+}
+
+/// Asks for the settings; `None` from an original unit, which does not know the question and stays silent.
+///
+/// A read, which every unit answers, goes first: so a unit that is not there at all is told apart, and waited for
+/// only once.
+pub(crate) fn settings(unit: &mut Unit) -> Result<Option<Configuration>> {
+    unit.log_position()?;
+    unless_unanswered(unit.configuration())
+}
+
+/// `None` where a unit that is there does not answer.
+pub(crate) fn unless_unanswered<T>(answer: std::result::Result<T, RequestError>) -> Result<Option<T>> {
+    use Diagnosis::{Ignored, Silent};
+    match answer {
+        Ok(answer) => Ok(Some(answer)),
+        Err(RequestError::NoReply { diagnosis: Silent | Ignored { .. }, .. }) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The failure to do without the settings.
+pub(crate) fn settings_unknown() -> Failure {
+    Failure::new(
+        "the unit does not tell its settings: original units (HE660SER160, HE660SER320) never answer this query",
+    )
+}
+
+/// How many entries the unit's log holds: as the user says, or as the unit says, or as it was the last time.
+pub(crate) fn log_size(unit: &mut Unit, given: Option<u16>, remembered: Option<u16>) -> Result<u16> {
+    match given {
+        Some(size) => Ok(size),
+        None => settings(unit)?.map(|settings| settings.size).or(remembered).ok_or_else(log_size_unknown),
+    }
+}
+
+/// The failure to do without the size of the log.
+pub(crate) fn log_size_unknown() -> Failure {
+    settings_unknown().hint("say with --log-size N how many entries its log has (2048 as delivered)")
+}
+
+/// Tells that the unit talks at another rate from now on.
+pub(crate) fn tell_new_baud(connection: &ConnectionArgs, now: &Configuration) {
+    if connection.baud != now.baud {
+        let rate = now.baud.bits_per_second();
+        warn(format_args!("the unit's RS-232 port runs at {rate} baud from now on"));
+        advise(format_args!("add --baud {rate} from now on (a terminal server has to be told as well)"));
+    }
+}
+
+/// How long to wait in one go where an interrupt has to be noticed soon.
+pub(crate) const HEARTBEAT: Duration = Duration::from_millis(100);
+
+#[cfg(test)]
+mod tests {
+    use ser_proto::Baud;
+
+    use super::*;
+
+    fn opened(port: Option<&str>) -> Failure {
+        let connection = ConnectionArgs {
+            port: port.map(str::to_string),
+            baud: Baud::B9600,
+            timeout: None,
+            retries: None,
+        };
+        open(&connection).err().expect("there is no such unit")
+    }
+
+    #[test]
+    fn without_a_port_the_ways_to_name_one_are_listed() {
+        for port in [None, Some(""), Some("  ")] {
+            let failure = opened(port);
+            let text = failure.text();
+            assert!(failure.is_usage() && text.contains("--port") && text.contains("hint: "), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_port_that_cannot_be_is_a_mistake_and_one_that_is_not_there_a_failure() {
+        assert!(opened(Some("tcp://somewhere")).is_usage());
+        let missing = opened(Some("/dev/no-such-port"));
+        assert!(!missing.is_usage() && missing.text().contains("hint: "), "{}", missing.text());
+    }
+}

@@ -1,0 +1,237 @@
+//! A message in words.
+
+use clap::ValueEnum;
+use ser_proto::{
+    AutoReport, Command, Configuration, Configure, Entry, Mode, Model, ParseError, ReadReply, Reply,
+    TimeStamp,
+};
+
+use super::Kind;
+use crate::values::on_off;
+
+/// Who sent a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Side {
+    /// Commands.
+    Host,
+    /// Replies and auto reports.
+    Unit,
+}
+
+/// What a body says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Explanation {
+    pub(crate) kind: Kind,
+    pub(crate) text: String,
+    /// The entries of a read reply.
+    pub(crate) details: Vec<String>,
+}
+
+/// Puts a body into words; when `from` is not known and both sides could have sent it, both readings.
+pub(crate) fn explain(body: &[u8], from: Option<Side>) -> Explanation {
+    let command = (from != Some(Side::Unit)).then(|| Command::parse(body));
+    let reply = (from != Some(Side::Host)).then(|| Reply::parse(body));
+    let plain = |kind, text| Explanation { kind, text, details: Vec::new() };
+    match (command, reply) {
+        (Some(Ok(command)), Some(Ok(reply))) => {
+            plain(Kind::Either, format!("host: {} | unit: {}", command_text(&command), reply_text(&reply)))
+        }
+        (Some(Ok(command)), _) => plain(Kind::Host, command_text(&command)),
+        (_, Some(Ok(reply))) => {
+            Explanation { kind: Kind::Unit, text: reply_text(&reply), details: entry_lines(&reply) }
+        }
+        (command, reply) => {
+            plain(Kind::Damage, no_message(body, command.and_then(Result::err), reply.and_then(Result::err)))
+        }
+    }
+}
+
+fn no_message(body: &[u8], as_command: Option<ParseError>, as_reply: Option<ParseError>) -> String {
+    let why = match (as_command, as_reply) {
+        (Some(command), Some(reply)) if command != reply => {
+            format!("as a command: {command}; as a reply: {reply}")
+        }
+        (Some(why), _) | (None, Some(why)) => why.to_string(),
+        (None, None) => "empty".to_string(),
+    };
+    format!("no message: {why} ({})", hex_text(body))
+}
+
+/// Bytes as `52 01 F4 05`.
+pub(crate) fn hex_text(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ")
+}
+
+fn command_text(command: &Command) -> String {
+    match *command {
+        Command::QueryConfiguration => "query the configuration".to_string(),
+        Command::Configure(configure) => format!("configure: {}", configure_text(&configure)),
+        Command::Erase => "erase the event buffer".to_string(),
+        Command::LastBroadcast => "query the last broadcast".to_string(),
+        Command::QueryMode => "query mode and version".to_string(),
+        Command::SetMode { recording: true } => "start recording".to_string(),
+        Command::SetMode { recording: false } => "stop recording".to_string(),
+        Command::Print { start, count } => format!("print {} from entry {start}", entries(count)),
+        Command::Read { count: 0, start } => format!("read no entries from entry {start}, the header only"),
+        Command::Read { start, count } => format!("read {} from entry {start}", entries(count.into())),
+        Command::SetClock(time) => format!("set the clock to {time}"),
+    }
+}
+
+fn reply_text(reply: &Reply) -> String {
+    match reply {
+        Reply::Configuration(configuration) => {
+            format!("configuration: {}", configuration_text(configuration))
+        }
+        Reply::Erased => "event buffer erased".to_string(),
+        Reply::LastBroadcast(None) => "no broadcast yet".to_string(),
+        Reply::LastBroadcast(Some(last)) => format!("last broadcast: {last}"),
+        Reply::Mode(mode) => mode_text(*mode),
+        Reply::PrintAccepted => "print accepted".to_string(),
+        Reply::Read(reply) => read_reply_text(reply),
+        Reply::ClockSet => "clock set".to_string(),
+    }
+}
+
+fn mode_text(mode: Mode) -> String {
+    mode.to_string()
+}
+
+fn configure_text(configure: &Configure) -> String {
+    let size = configure.size.map_or("size kept".to_string(), |size| format!("size {size}"));
+    let baud =
+        configure.baud.map_or("baud kept".to_string(), |baud| format!("{} baud", baud.bits_per_second()));
+    format!(
+        "{size}, {baud}, {}, auto print {}",
+        auto_report_text(configure.auto_report, configure.report_address),
+        on_off(configure.auto_print)
+    )
+}
+
+fn configuration_text(configuration: &Configuration) -> String {
+    configure_text(&Configure::from(*configuration))
+}
+
+fn auto_report_text(auto_report: AutoReport, address: u8) -> String {
+    match auto_report {
+        AutoReport::Off => format!("auto report off (address {address})"),
+        AutoReport::Genius => format!("auto report to Genius address {address}"),
+        AutoReport::Rs232 => format!("auto report on RS-232 (address {address})"),
+    }
+}
+
+fn read_reply_text(reply: &ReadReply) -> String {
+    let ReadReply { start, total, next_slot, model, entries: found } = reply;
+    let count = u16::try_from(found.len()).unwrap_or(u16::MAX);
+    let inputs = model.map_or(String::new(), |model: Model| format!("; {} inputs", model.inputs()));
+    format!("read reply: {} from entry {start}; total {total}, next slot {next_slot}{inputs}", entries(count))
+}
+
+fn entry_lines(reply: &Reply) -> Vec<String> {
+    let Reply::Read(reply) = reply else { return Vec::new() };
+    (u32::from(reply.start)..)
+        .zip(&reply.entries)
+        .map(|(number, entry)| {
+            format!("{number:>5}  {}{}  {}", entry.time, remark(&entry.time), changes(entry))
+        })
+        .collect()
+}
+
+fn remark(time: &TimeStamp) -> String {
+    time.check().err().map_or(String::new(), |invalid| format!(" ({invalid})"))
+}
+
+fn changes(entry: &Entry) -> String {
+    if entry.changed.is_empty() {
+        return "no input".to_string();
+    }
+    let change = |input| format!("{input} {}", if entry.state.contains(input) { "ON" } else { "OFF" });
+    entry.changed.numbers().map(change).collect::<Vec<_>>().join("  ")
+}
+
+fn entries(count: u16) -> String {
+    match count {
+        0 => "no entries".to_string(),
+        1 => "1 entry".to_string(),
+        count => format!("{count} entries"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(body: &[u8], from: Option<Side>) -> String {
+        let explanation = explain(body, from);
+        format!("{:?}: {}", explanation.kind, explanation.text)
+    }
+
+    #[test]
+    fn the_manuals_examples_read_like_this() {
+        for (body, meaning) in [
+            (
+                &[0x43, 4, 0, 6, 2, 1, 0][..],
+                "Host: configure: size 1024, 9600 baud, auto report to Genius address 1, auto print off",
+            ),
+            (&[0x45], "Host: erase the event buffer"),
+            (&[0x4C], "Host: query the last broadcast"),
+            (&[0x4D], "Host: query mode and version"),
+            (&[0x43], "Host: query the configuration"),
+            (&[0x4D, 1, 0x7D], "Host: start recording"),
+            (&[0x50, 0x32, 0x64], "Host: print 100 entries from entry 50"),
+            (&[0x52, 1, 0xF4, 5], "Host: read 5 entries from entry 500"),
+            (&[0x52, 0, 1, 0], "Host: read no entries from entry 1, the header only"),
+            (&[0x53, 96, 11, 21, 22, 30, 50, 0, 250], "Host: set the clock to 1996-11-21T22:30:50.250"),
+        ] {
+            assert_eq!(text(body, Some(Side::Host)), meaning);
+        }
+        for (body, meaning) in [
+            (
+                &[0x43, 4, 0, 6, 3, 1, 1][..],
+                "Unit: configuration: size 1024, 9600 baud, auto report on RS-232 (address 1), auto print on",
+            ),
+            (&[0x45], "Unit: event buffer erased"),
+            (&[0x4C, 0x45, 14, 30, 50, 0, 250], "Unit: last broadcast: erase at 14:30:50.250"),
+            (&[0x4D, 1, 0x7D], "Unit: recording, version 1.25"),
+            (&[0x50], "Unit: print accepted"),
+            (&[0x53], "Unit: clock set"),
+        ] {
+            assert_eq!(text(body, Some(Side::Unit)), meaning);
+        }
+    }
+
+    #[test]
+    fn what_both_could_have_sent_gets_both_readings() {
+        assert_eq!(text(&[0x45], None), "Either: host: erase the event buffer | unit: event buffer erased");
+        assert_eq!(text(&[0x53], None), "Unit: clock set");
+    }
+
+    #[test]
+    fn entries_are_listed_with_their_numbers() {
+        let mut body = vec![0x52, 0x07, 0xFF, 2, 0x10, 0, 0, 1];
+        body.extend([0, 5, 0, 1, 26, 11, 22, 10, 0, 0, 0, 250]);
+        body.extend([0, 0, 0, 1, 26, 13, 22, 10, 0, 0, 0, 250]);
+        let explanation = explain(&body, None);
+        assert_eq!(
+            explanation.text,
+            "read reply: 2 entries from entry 2047; total 4096, next slot 1; 16 inputs"
+        );
+        assert_eq!(
+            explanation.details,
+            [
+                " 2047  2026-11-22T10:00:00.250  1 ON  3 OFF",
+                " 2048  2026-13-22T10:00:00.250 (there is no month 13 in such a date)  no input"
+            ]
+        );
+    }
+
+    #[test]
+    fn what_is_no_message_is_shown_with_the_reason() {
+        assert_eq!(text(&[0x58, 1], None), "Damage: no message: unknown command byte 58h (58 01)");
+        let why = Command::parse(&[0x4D, 2, 0]).unwrap_err();
+        assert_eq!(text(&[0x4D, 2, 0], Some(Side::Host)), format!("Damage: no message: {why} (4D 02 00)"));
+        let no_command = Command::parse(&[0x52, 0, 1, 0, 0, 0, 0, 0, 9]).unwrap_err();
+        let both = text(&[0x52, 0, 1, 0, 0, 0, 0, 0, 9], None);
+        assert!(both.contains(&format!("as a command: {no_command}; as a reply: ")), "{both}");
+    }
+}

@@ -1,0 +1,72 @@
+//! Keeps the state file up to date while events are delivered.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use ser_client::Cursor;
+
+use crate::cli::ConnectionArgs;
+use crate::connection;
+use crate::error::Result;
+use crate::state::{Delivered, StateFile};
+
+/// How much a crash may repeat, in time: writing the file after every event would wear a memory card.
+const SAVE_EVERY: Duration = Duration::from_secs(1);
+
+/// Where what was delivered is remembered.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct StateArgs {
+    /// Where to remember what was delivered; without it, the user's state directory (~/.local/state/ser-cli).
+    #[arg(long, env = "SER_STATE_DIR", value_name = "DIR")]
+    state_dir: Option<PathBuf>,
+}
+
+/// The state file of a unit, and what is to be written to it.
+pub(crate) struct Keeper {
+    file: StateFile,
+    saved: Option<Delivered>,
+    unsaved: Option<Delivered>,
+    saved_at: Instant,
+}
+
+impl Keeper {
+    /// Loads what has been delivered from this unit.
+    pub(crate) fn load(args: &StateArgs, connection: &ConnectionArgs) -> Result<Keeper> {
+        let file = StateFile::of_unit(connection::port_text(connection)?, args.state_dir.as_deref())?;
+        let saved = file.load()?;
+        Ok(Keeper { file, saved, unsaved: None, saved_at: Instant::now() })
+    }
+
+    /// Where reading goes on.
+    pub(crate) fn cursor(&self) -> Option<Cursor> {
+        self.saved.map(|Delivered { total, last, .. }| Cursor { total, anchor: last })
+    }
+
+    /// The size that the log had.
+    pub(crate) fn size(&self) -> Option<u16> {
+        self.saved.map(|delivered| delivered.size)
+    }
+
+    /// Everything up to `cursor` has reached standard output.
+    pub(crate) fn delivered(&mut self, cursor: Option<Cursor>, size: u16) -> Result<()> {
+        let Some(Cursor { total, anchor }) = cursor else { return Ok(()) };
+        let delivered = Delivered { total, last: anchor, size };
+        self.unsaved = (self.saved != Some(delivered)).then_some(delivered);
+        self.save_if_due()
+    }
+
+    /// Writes what is not written yet, unless that was done a moment ago.
+    pub(crate) fn save_if_due(&mut self) -> Result<()> {
+        if self.saved_at.elapsed() >= SAVE_EVERY { self.save() } else { Ok(()) }
+    }
+
+    /// Writes what is not written yet.
+    pub(crate) fn save(&mut self) -> Result<()> {
+        if let Some(delivered) = self.unsaved.take() {
+            self.file.save(&delivered)?;
+            self.saved = Some(delivered);
+            self.saved_at = Instant::now();
+        }
+        Ok(())
+    }
+}

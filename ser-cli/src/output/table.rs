@@ -1,0 +1,125 @@
+//! A table for people: what changed, when, and how long after the previous and after the first event.
+
+use std::io::{self, Write};
+
+use ser_proto::Entry;
+
+use super::{Elapsed, EventWriter, Palette};
+
+/// Wide enough for a delta of less than an hour, and for a shorter text of more.
+const WIDTH: usize = "+59m59.999 s".len();
+
+/// Writes lines like `17  2026-11-22T10:00:00.250  +0.012 s  +1.204 s  3 ON  17 OFF`.
+pub(crate) struct Table<W> {
+    out: W,
+    palette: Palette,
+    header_due: bool,
+    elapsed: Elapsed,
+}
+
+impl<W: Write> Table<W> {
+    pub(crate) fn new(out: W, palette: Palette) -> Table<W> {
+        Table { out, palette, header_due: true, elapsed: Elapsed::default() }
+    }
+
+    fn header(&mut self) -> io::Result<()> {
+        if !std::mem::take(&mut self.header_due) {
+            return Ok(());
+        }
+        let title = self.palette.title;
+        let (time, previous, first) = ("time", "Δ previous", "Δ first");
+        writeln!(self.out, "{title}entry  {time:<23}  {previous:>WIDTH$}  {first:>WIDTH$}  changes{title:#}")
+    }
+
+    fn changes(&mut self, entry: &Entry) -> io::Result<()> {
+        if entry.changed.is_empty() {
+            return writeln!(self.out, "none");
+        }
+        let on = self.palette.on;
+        for (position, input) in entry.changed.numbers().enumerate() {
+            let gap = if position == 0 { "" } else { "  " };
+            match entry.state.contains(input) {
+                true => write!(self.out, "{gap}{on}{input} ON{on:#}")?,
+                false => write!(self.out, "{gap}{input} OFF")?,
+            }
+        }
+        writeln!(self.out)
+    }
+}
+
+impl<W: Write> EventWriter for Table<W> {
+    fn event(&mut self, number: u16, entry: &Entry) -> io::Result<()> {
+        self.header()?;
+        let [previous, first] = self.elapsed.at(entry.time);
+        write!(
+            self.out,
+            "{number:>5}  {:<23}  {previous:>WIDTH$}  {first:>WIDTH$}  ",
+            entry.time.to_string()
+        )?;
+        self.changes(entry)
+    }
+
+    fn lost(&mut self, what: &str) -> io::Result<()> {
+        self.header()?;
+        let alarm = self.palette.alarm;
+        writeln!(self.out, "{alarm}    -  {what}{alarm:#}")
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::testing::entry;
+
+    fn written(write: impl FnOnce(&mut Table<&mut Vec<u8>>) -> io::Result<()>) -> String {
+        let mut out = Vec::new();
+        write(&mut Table::new(&mut out, Palette::plain())).unwrap();
+        String::from_utf8(out).unwrap()
+    }
+
+    #[test]
+    fn a_line_tells_what_changed_and_when() {
+        let text = written(|table| {
+            table.event(9, &entry("00.250", &[3, 17], &[3]))?;
+            table.event(10, &entry("00.262", &[17], &[3, 17]))?;
+            table.lost("4 events were overwritten")?;
+            table.event(2048, &entry("59.250", &[3], &[17]))
+        });
+        assert_eq!(
+            text.lines().collect::<Vec<_>>(),
+            [
+                "entry  time                       Δ previous       Δ first  changes",
+                "    9  2026-11-22T10:00:00.250                              3 ON  17 OFF",
+                "   10  2026-11-22T10:00:00.262      +0.012 s      +0.012 s  17 ON",
+                "    -  4 events were overwritten",
+                " 2048  2026-11-22T10:00:59.250     +58.988 s     +59.000 s  3 OFF",
+            ]
+        );
+    }
+
+    #[test]
+    fn nothing_is_written_without_events() {
+        assert_eq!(written(|table| table.flush()), "");
+    }
+
+    #[test]
+    fn an_impossible_date_has_no_delta_and_an_event_may_be_empty() {
+        let mut odd = entry("00.000", &[], &[]);
+        odd.time.month = 0;
+        let text = written(|table| {
+            table.event(1, &entry("00.000", &[1], &[1]))?;
+            table.event(2, &odd)
+        });
+        let last = text.lines().last().unwrap();
+        assert_eq!(last, "    2  2026-00-22T10:00:00.000             ?             ?  none");
+    }
+
+    #[test]
+    fn colours_come_from_the_palette_only() {
+        assert!(!written(|table| table.lost("1 event")).contains('\x1B'));
+    }
+}

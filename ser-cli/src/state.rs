@@ -1,0 +1,240 @@
+//! What has been delivered already, kept in the user's state directory between two runs: one file per unit.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use ser_proto::{Entry, Inputs, TimeStamp};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Failure, Result};
+
+/// The layout of the file. A change that old versions would misread gets the next number.
+const VERSION: u32 = 1;
+
+/// Where a unit's log had been read to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Delivered {
+    /// The unit's total after the last delivered event.
+    pub(crate) total: u16,
+    /// The last delivered event itself, to tell the log from another one with the same total.
+    pub(crate) last: Option<Entry>,
+    /// Entries that the log could hold then.
+    pub(crate) size: u16,
+}
+
+/// The file of one unit.
+#[derive(Debug)]
+pub(crate) struct StateFile {
+    path: PathBuf,
+    unit: String,
+}
+
+/// The file's content.
+#[derive(Serialize, Deserialize)]
+struct Content {
+    version: u32,
+    /// The `--port` text, for whoever looks into the file.
+    unit: String,
+    total: u16,
+    size: u16,
+    last: Option<LastEntry>,
+}
+
+/// An entry, field by field: its time need not be a date that exists.
+#[derive(Serialize, Deserialize)]
+struct LastEntry {
+    changed: u32,
+    state: u32,
+    /// Two-digit year, month, day, hour, minute, second.
+    time: [u8; 6],
+    millisecond: u16,
+}
+
+impl StateFile {
+    /// The file for the unit behind `port`, in `directory` or where the system wants state to be.
+    pub(crate) fn of_unit(port: &str, directory: Option<&Path>) -> Result<StateFile> {
+        let directory = match directory {
+            Some(directory) => directory.to_path_buf(),
+            None => default_directory()?,
+        };
+        Ok(StateFile { path: directory.join(file_name(port)), unit: port.to_string() })
+    }
+
+    /// What had been delivered; `None` when nothing has yet.
+    pub(crate) fn load(&self) -> Result<Option<Delivered>> {
+        let text = match fs::read(&self.path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(Failure::reading(self.path.display(), &error)),
+        };
+        let content: Content = serde_json::from_slice(&text).map_err(|error| self.damaged(&error))?;
+        if content.version != VERSION {
+            return Err(self.damaged(&format_args!("version {} is not {VERSION}", content.version)));
+        }
+        Ok(Some(Delivered { total: content.total, last: content.last.map(Entry::from), size: content.size }))
+    }
+
+    /// Remembers what has been delivered. After a crash the file holds either the old or the new content.
+    pub(crate) fn save(&self, delivered: &Delivered) -> Result<()> {
+        self.try_save(delivered).map_err(|error| {
+            Failure::new(format!("cannot remember in {} what was delivered: {error}", self.path.display()))
+                .hint("the next --new will deliver the same events again")
+                .hint("choose another directory with --state-dir DIR")
+        })
+    }
+
+    fn try_save(&self, delivered: &Delivered) -> io::Result<()> {
+        let content = Content {
+            version: VERSION,
+            unit: self.unit.clone(),
+            total: delivered.total,
+            size: delivered.size,
+            last: delivered.last.as_ref().map(LastEntry::from),
+        };
+        if let Some(directory) = self.path.parent() {
+            fs::create_dir_all(directory)?;
+        }
+        // The process id keeps two runs apart; the last to rename wins.
+        let temporary = self.path.with_extension(format!("{}.tmp", std::process::id()));
+        let result = write_whole(&temporary, &content).and_then(|()| fs::rename(&temporary, &self.path));
+        if result.is_err() {
+            // The first error is the one to tell.
+            let _ = fs::remove_file(&temporary);
+        }
+        result
+    }
+
+    fn damaged(&self, why: &dyn std::fmt::Display) -> Failure {
+        Failure::new(format!("{} does not say what was delivered: {why}", self.path.display()))
+            .hint("read --all delivers everything the unit has and needs no state")
+            .hint("delete the file to begin anew: the next --new then delivers everything")
+    }
+}
+
+fn write_whole(path: &Path, content: &Content) -> io::Result<()> {
+    let mut file = fs::File::create(path)?;
+    serde_json::to_writer(&mut file, content)?;
+    writeln!(file)?;
+    file.sync_all()
+}
+
+fn default_directory() -> Result<PathBuf> {
+    use etcetera::BaseStrategy;
+
+    let strategy = etcetera::choose_base_strategy().map_err(|error| {
+        Failure::new(error).hint("say with --state-dir DIR where to keep what was delivered")
+    })?;
+    let base = strategy.state_dir().unwrap_or_else(|| strategy.data_dir());
+    Ok(base.join("ser-cli"))
+}
+
+/// A name that any file system takes, that people can read, and that no other port text gives.
+fn file_name(port: &str) -> String {
+    let mut name = String::new();
+    for byte in port.bytes() {
+        match byte {
+            b'/' => name.push('_'),
+            // A leading dot would hide the file; `_` is taken.
+            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'-' => name.push(char::from(byte)),
+            b'.' if !name.is_empty() => name.push('.'),
+            other => name.push_str(&format!("%{other:02X}")),
+        }
+    }
+    name + ".json"
+}
+
+impl From<&Entry> for LastEntry {
+    fn from(entry: &Entry) -> LastEntry {
+        let TimeStamp { year, month, day, hour, minute, second, millisecond } = entry.time;
+        LastEntry {
+            changed: entry.changed.0,
+            state: entry.state.0,
+            time: [year, month, day, hour, minute, second],
+            millisecond,
+        }
+    }
+}
+
+impl From<LastEntry> for Entry {
+    fn from(last: LastEntry) -> Entry {
+        let [year, month, day, hour, minute, second] = last.time;
+        Entry {
+            changed: Inputs(last.changed),
+            state: Inputs(last.state),
+            time: TimeStamp { year, month, day, hour, minute, second, millisecond: last.millisecond },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::testing::entry;
+
+    fn state_in(directory: &tempfile::TempDir) -> StateFile {
+        StateFile::of_unit("/dev/ttyUSB0", Some(&directory.path().join("new"))).unwrap()
+    }
+
+    #[test]
+    fn what_is_saved_is_loaded_again() {
+        let directory = tempfile::tempdir().unwrap();
+        let state = state_in(&directory);
+        assert_eq!(state.load().unwrap(), None);
+        let mut last = entry("00.250", &[3, 32], &[32]);
+        last.time.month = 200;
+        for delivered in [
+            Delivered { total: 65_535, last: Some(last), size: 2048 },
+            Delivered { total: 0, last: None, size: 1 },
+        ] {
+            state.save(&delivered).unwrap();
+            assert_eq!(state.load().unwrap(), Some(delivered));
+        }
+        let names: Vec<_> = fs::read_dir(state.path.parent().unwrap()).unwrap().collect();
+        assert_eq!(names.len(), 1, "no temporary files are left: {names:?}");
+    }
+
+    #[test]
+    fn a_damaged_file_is_named_with_what_to_do() {
+        let directory = tempfile::tempdir().unwrap();
+        let state = state_in(&directory);
+        state.save(&Delivered { total: 7, last: None, size: 2048 }).unwrap();
+        let good = fs::read_to_string(&state.path).unwrap();
+        let wrong = [
+            String::new(),
+            "{".to_string(),
+            good[..good.len() / 2].to_string(),
+            good.replace("\"version\":1", "\"version\":2"),
+            good.replace(":7", ":70000"),
+        ];
+        for content in wrong {
+            fs::write(&state.path, content).unwrap();
+            let text = state.load().unwrap_err().text();
+            assert!(text.contains("_dev_ttyUSB0.json does not say what was delivered"), "{text}");
+            assert!(text.contains("--all") && text.contains("delete the file"), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_directory_that_cannot_be_made_is_an_error_with_advice() {
+        let directory = tempfile::tempdir().unwrap();
+        fs::write(directory.path().join("new"), "a file in the way").unwrap();
+        let text =
+            state_in(&directory).save(&Delivered { total: 7, last: None, size: 1 }).unwrap_err().text();
+        assert!(text.contains("--state-dir"), "{text}");
+    }
+
+    #[test]
+    fn every_port_has_a_readable_file_name_of_its_own() {
+        for (port, name) in [
+            ("/dev/ttyUSB0", "_dev_ttyUSB0.json"),
+            ("COM3", "COM3.json"),
+            ("tcp://10.0.0.7:4000", "tcp%3A__10.0.0.7%3A4000.json"),
+            ("/dev/a_b", "_dev_a%5Fb.json"),
+            ("../x", "%2E._x.json"),
+            ("./\u{e4} *", "%2E_%C3%A4%20%2A.json"),
+        ] {
+            assert_eq!(file_name(port), name);
+        }
+    }
+}

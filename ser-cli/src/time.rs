@@ -1,0 +1,130 @@
+//! Times as people write them, and the time between two events.
+
+use std::fmt;
+
+use chrono::{Local, NaiveDateTime, TimeDelta, Timelike};
+use ser_proto::TimeStamp;
+
+const FORMATS: [&str; 4] =
+    ["%Y-%m-%dT%H:%M:%S%.f", "%Y-%m-%d %H:%M:%S%.f", "%Y-%m-%dT%H:%M", "%Y-%m-%d %H:%M"];
+
+/// Understands `2026-11-22T10:00:00.250`, also with a blank for the `T`, without fraction or without seconds.
+pub(crate) fn parse_time(text: &str) -> Result<TimeStamp, String> {
+    if text.ends_with(['Z', 'z']) || text.get(19..).is_some_and(|tail| tail.contains(['+', '-'])) {
+        return Err("a unit's clock has no time zone: give the local time without Z or offset".to_string());
+    }
+    let time = FORMATS
+        .iter()
+        .find_map(|format| NaiveDateTime::parse_from_str(text, format).ok())
+        .ok_or("not a date and time like 2026-11-22T10:00:00.250")?;
+    if time.nanosecond() >= 1_000_000_000 {
+        return Err("a unit's clock has no second 60".to_string());
+    }
+    if time.nanosecond() % 1_000_000 != 0 {
+        return Err("a unit's clock has milliseconds, not finer: give up to three decimals".to_string());
+    }
+    stamp(time).map_err(|year| format!("a unit's clock runs from 1970 to 2069, not in {year}"))
+}
+
+/// The stamp of a calendar time; its year when the two digits of a stamp cannot say it.
+pub(crate) fn stamp(time: NaiveDateTime) -> Result<TimeStamp, i32> {
+    TimeStamp::try_from(time).map_err(|_| chrono::Datelike::year(&time))
+}
+
+/// The local time `ahead` from now, as a unit's clock would show it.
+pub(crate) fn local_time_in(ahead: std::time::Duration) -> Result<TimeStamp, i32> {
+    let ahead = TimeDelta::from_std(ahead).unwrap_or_default();
+    stamp((Local::now() + ahead).naive_local())
+}
+
+/// The time between two events, with its sign.
+///
+/// As `+0.001 s`, `+1m02.003 s`, `+3h01m02 s`, `+2d03h01m`: the further apart, the coarser, so that it is taken in at
+/// a glance and fits a narrow column. The times themselves always show the millisecond.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Delta {
+    ms: i64,
+}
+
+impl Delta {
+    /// From `earlier` to `later`; `None` when one of them is no date.
+    pub(crate) fn between(earlier: TimeStamp, later: TimeStamp) -> Option<Delta> {
+        let earlier = NaiveDateTime::try_from(earlier).ok()?;
+        let later = NaiveDateTime::try_from(later).ok()?;
+        Some(Delta { ms: (later - earlier).num_milliseconds() })
+    }
+}
+
+impl fmt::Display for Delta {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sign = if self.ms < 0 { '-' } else { '+' };
+        let ms = self.ms.unsigned_abs();
+        let (seconds, minutes, hours, days) =
+            (ms / 1000 % 60, ms / 60_000 % 60, ms / 3_600_000 % 24, ms / 86_400_000);
+        let ms = ms % 1000;
+        let text = match (days, hours, minutes) {
+            (0, 0, 0) => format!("{sign}{seconds}.{ms:03} s"),
+            (0, 0, _) => format!("{sign}{minutes}m{seconds:02}.{ms:03} s"),
+            (0, _, _) => format!("{sign}{hours}h{minutes:02}m{seconds:02} s"),
+            _ => format!("{sign}{days}d{hours:02}h{minutes:02}m"),
+        };
+        f.pad(&text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_may_be_written_in_a_few_ways() {
+        for (text, meaning) in [
+            ("2026-11-22T10:00:00.250", "2026-11-22T10:00:00.250"),
+            ("2026-11-22 10:00:00.25", "2026-11-22T10:00:00.250"),
+            ("2026-11-22T10:00:00", "2026-11-22T10:00:00.000"),
+            ("2026-11-22 10:00", "2026-11-22T10:00:00.000"),
+            ("1996-11-22T23:59:59.999", "1996-11-22T23:59:59.999"),
+        ] {
+            assert_eq!(parse_time(text).map(|time| time.to_string()), Ok(meaning.to_string()));
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_time_is_said() {
+        for (text, complaint) in [
+            ("10:00", "not a date and time"),
+            ("2026-02-30T10:00:00", "not a date and time"),
+            ("2026-11-22T10:00:00Z", "no time zone"),
+            ("2026-11-22T10:00:00+01:00", "no time zone"),
+            ("2026-11-22T10:00:60", "no second 60"),
+            ("2026-11-22T10:00:00.0005", "three decimals"),
+            ("2070-01-01T00:00:00", "from 1970 to 2069, not in 2070"),
+        ] {
+            let error = parse_time(text).unwrap_err();
+            assert!(error.contains(complaint), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_delta_shows_what_is_needed() {
+        for (ms, text) in [
+            (0, "+0.000 s"),
+            (1, "+0.001 s"),
+            (-1, "-0.001 s"),
+            (59_999, "+59.999 s"),
+            (62_003, "+1m02.003 s"),
+            (10_862_003, "+3h01m02 s"),
+            (-183_662_003, "-2d03h01m"),
+        ] {
+            assert_eq!(Delta { ms }.to_string(), text);
+        }
+    }
+
+    #[test]
+    fn there_is_no_delta_to_an_impossible_date() {
+        let trip = parse_time("2026-11-22T10:00:00.250").unwrap();
+        let later = parse_time("2026-11-22T10:00:00.262").unwrap();
+        assert_eq!(Delta::between(trip, later), Some(Delta { ms: 12 }));
+        assert_eq!(Delta::between(TimeStamp { month: 0, ..trip }, later), None);
+    }
+}

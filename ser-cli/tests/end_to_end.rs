@@ -1,0 +1,470 @@
+//! The command line as a user types it, against simulated units: the native one and the ARM image.
+#![cfg(unix)]
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+/// How long anything may take: these tests run on machines that stall for seconds.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// What plays the unit.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Native,
+    Emulated,
+}
+
+fn ser_cli() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ser-cli"));
+    command.env_remove("SER_PORT").env_remove("SER_STATE_DIR").env("NO_COLOR", "1");
+    command
+}
+
+/// A running `ser-cli`, ended with the test.
+struct Running(Child);
+
+impl Running {
+    fn start(command: &mut Command) -> Running {
+        Running(command.spawn().expect("ser-cli runs"))
+    }
+
+    /// Presses Ctrl-C and gives the exit code.
+    fn interrupt(&mut self) -> Option<i32> {
+        let id = self.0.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill runs").success());
+        self.wait()
+    }
+
+    fn wait(&mut self) -> Option<i32> {
+        let mut code = None;
+        wait_until("ser-cli ends", || {
+            code = self.0.try_wait().expect("a child");
+            code.is_some()
+        });
+        code.and_then(|status| status.code())
+    }
+
+    /// The lines of standard output, as they come.
+    fn lines(&mut self) -> Receiver<String> {
+        let output = BufReader::new(self.0.stdout.take().expect("piped"));
+        let (sender, lines) = channel();
+        thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+        lines
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
+    let deadline = Instant::now() + PATIENCE;
+    while !condition() {
+        assert!(Instant::now() < deadline, "waited in vain: {what}");
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// A unit made with `ser-cli sim`, whose contacts are moved through its standard input.
+struct Bench {
+    folder: TempDir,
+    sim: Running,
+}
+
+impl Bench {
+    fn start(kind: Kind, options: &[&str]) -> Bench {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut command = ser_cli();
+        command
+            .arg("sim")
+            .arg("--pty")
+            .arg(folder.path().join("unit"))
+            .args(["--contacts", "-"])
+            .args(options);
+        if kind == Kind::Emulated {
+            let image = std::env::var_os("SER_IMAGE_MPS2_AN385").expect("run `cargo xtask test`");
+            command.arg("--image").arg(image);
+        }
+        let sim = Running::start(command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()));
+        let bench = Bench { folder, sim };
+        wait_until("the link appears", || bench.link().exists());
+        bench
+    }
+
+    fn link(&self) -> PathBuf {
+        self.folder.path().join("unit")
+    }
+
+    fn command(&self, arguments: &str) -> Command {
+        let mut command = ser_cli();
+        command
+            .env("SER_PORT", self.link())
+            .env("SER_STATE_DIR", self.folder.path().join("state"))
+            .args(["--timeout", "20s"])
+            .args(arguments.split_whitespace());
+        command
+    }
+
+    fn run(&self, arguments: &str) -> Output {
+        self.command(arguments).output().expect("ser-cli runs")
+    }
+
+    /// Standard output of a command that must go well.
+    fn ok(&self, arguments: &str) -> String {
+        let output = self.run(arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments}: {}", text(&output.stderr));
+        text(&output.stdout)
+    }
+
+    /// Standard error of a command that must end with this code, and with nothing on standard output.
+    fn fails(&self, code: i32, arguments: &str) -> String {
+        let output = self.run(arguments);
+        assert_eq!((output.status.code(), text(&output.stdout)), (Some(code), String::new()), "{arguments}");
+        text(&output.stderr)
+    }
+
+    /// Moves contacts and waits until so many entries more have been recorded.
+    fn contacts(&mut self, lines: &str, entries: usize) {
+        let before = self.entries();
+        let input = self.sim.0.stdin.as_mut().expect("piped");
+        write!(input, "ms,input,state\n{lines}\n\n").expect("the simulator reads");
+        wait_until("the contacts have moved", || self.entries() == before + entries);
+    }
+
+    fn entries(&self) -> usize {
+        let entries: std::collections::BTreeSet<_> = self
+            .ok("read --format csv")
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').next().map(str::to_owned))
+            .collect();
+        entries.len()
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).expect("UTF-8")
+}
+
+/// Runs each test with both kinds of unit.
+macro_rules! with_both_kinds {
+    ($($test:ident),* $(,)?) => {
+        mod native {
+            $(#[test]
+            fn $test() {
+                super::$test(super::Kind::Native);
+            })*
+        }
+        mod emulated {
+            $(#[test]
+            #[ignore = "needs the emulator and the image: cargo xtask test"]
+            fn $test() {
+                super::$test(super::Kind::Emulated);
+            })*
+        }
+    };
+}
+
+with_both_kinds! {
+    contacts_are_recorded_and_read_back_in_every_format,
+    read_new_delivers_each_event_once_and_says_what_is_lost,
+    every_other_command_does_what_it_says,
+    watch_shows_events_as_they_happen_and_puts_the_configuration_back,
+}
+
+fn contacts_are_recorded_and_read_back_in_every_format(kind: Kind) {
+    let mut bench = Bench::start(kind, &["--model", "ser160"]);
+    assert_eq!(bench.ok("read --format csv"), "entry,time,input,state\n");
+    let set = bench.ok("clock set --at 2026-11-22T10:00:00");
+    assert_eq!(set, "2026-11-22T10:00:00.000\n");
+    bench.contacts("0,3,1\n250,16,1\n250,1,1\n251,3,0", 3);
+
+    let csv = bench.ok("read --format csv");
+    let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows[0], ["entry", "time", "input", "state"]);
+    let changes: Vec<_> = rows[1..].iter().map(|row| (row[0], row[2], row[3])).collect();
+    assert_eq!(changes, [("1", "3", "1"), ("2", "1", "1"), ("2", "16", "1"), ("3", "3", "0")]);
+    assert!(rows[1][1].starts_with("2026-11-22T10:0"), "{csv}");
+
+    let times: Vec<_> = [1, 2, 4].map(|row: usize| rows[row][1]).to_vec();
+    let jsonl = bench.ok("read --format jsonl --from 2 --count 2");
+    let expected = format!(
+        "{{\"entry\":2,\"time\":\"{}\",\"changed\":[1,16],\"state\":[1,3,16]}}\n\
+         {{\"entry\":3,\"time\":\"{}\",\"changed\":[3],\"state\":[1,16]}}\n",
+        times[1], times[2]
+    );
+    assert_eq!(jsonl, expected);
+
+    let table = bench.ok("read");
+    for (line, time) in table.lines().skip(1).zip(&times) {
+        assert!(line.contains(time), "{table}");
+    }
+    if kind == Kind::Native {
+        assert!(
+            table.contains("+0.250 s") && table.contains("+0.001 s") && table.contains("+0.251 s"),
+            "{table}"
+        );
+    }
+}
+
+fn read_new_delivers_each_event_once_and_says_what_is_lost(kind: Kind) {
+    let mut bench = Bench::start(kind, &[]);
+    bench.ok("config --size 8");
+    bench.contacts("0,1,1\n1,2,1\n2,3,1", 3);
+    assert_eq!(bench.ok("read --new --format jsonl").lines().count(), 3);
+    assert_eq!(bench.ok("read --new --format jsonl"), "");
+    // Twenty more events into eight entries: twelve are overwritten.
+    let steps: Vec<_> = (0..20).map(|index| format!("{},5,{}", 2 * index, (index + 1) % 2)).collect();
+    bench.contacts(&steps.join("\n"), 5);
+    wait_until("all have moved", || bench.ok("status").contains("23 since"));
+    let output = bench.run("read --new --format jsonl");
+    assert_eq!((output.status.code(), text(&output.stdout).lines().count()), (Some(0), 8));
+    assert!(text(&output.stderr).contains("12"), "{}", text(&output.stderr));
+    assert_eq!(bench.ok("read --new --format jsonl"), "");
+}
+
+fn every_other_command_does_what_it_says(kind: Kind) {
+    let mut bench = Bench::start(kind, &[]);
+    let status = bench.ok("status");
+    assert!(status.contains("recording") && status.contains("0.10") && status.contains("2048"), "{status}");
+
+    assert!(bench.ok("config").contains("9600"));
+    let config = bench.ok("config --size 1024 --auto-report genius --report-to 1");
+    for shown in ["1024 entries", "9600", "genius", "1"] {
+        assert!(config.to_lowercase().contains(shown), "{config}");
+    }
+    assert_eq!(bench.ok("config"), config);
+    bench.ok("config --auto-report off");
+
+    bench.ok("stop");
+    assert!(bench.ok("status").contains("stopped"));
+    bench.ok("start");
+    bench.contacts("0,1,1\n5,32,1", 2);
+
+    let printed = bench.ok("print --from 1 --count 2");
+    let lines: Vec<_> = printed.lines().collect();
+    assert!(lines[0].starts_with("0001 ") && lines[0].ends_with("  1 ON"), "{printed}");
+    assert!(lines[1].starts_with("0002 ") && lines[1].ends_with("  32 ON"), "{printed}");
+
+    assert!(bench.ok("last-broadcast").contains("none"));
+
+    let refused = bench.fails(2, "erase");
+    assert!(refused.contains("--yes"), "{refused}");
+    assert_eq!(bench.entries(), 2);
+    bench.ok("erase --yes");
+    assert_eq!(bench.entries(), 0);
+
+    bench.ok("config --line-baud 19200");
+    assert!(bench.ok("--baud 19200 status").contains("19200"));
+    bench.ok("--baud 19200 config --line-baud 9600");
+}
+
+fn watch_shows_events_as_they_happen_and_puts_the_configuration_back(kind: Kind) {
+    let mut bench = Bench::start(kind, &[]);
+    let before = bench.ok("config");
+    bench.contacts("0,1,1", 1);
+    let mut watch =
+        Running::start(bench.command("watch --format csv").stdout(Stdio::piped()).stderr(Stdio::null()));
+    let lines = watch.lines();
+    let next = || lines.recv_timeout(PATIENCE).expect("a line of watch");
+    assert_eq!(next(), "entry,time,input,state");
+    assert!(next().ends_with(",1,1"));
+    let input = bench.sim.0.stdin.as_mut().expect("piped");
+    input.write_all(b"ms,input,state\n0,2,1\n3,1,0\n\n").expect("the simulator reads");
+    assert!(next().ends_with(",2,1"));
+    assert!(next().ends_with(",1,0"));
+    assert_eq!(watch.interrupt(), Some(0));
+    assert_eq!(bench.ok("config"), before);
+    // What watch has shown is not new any more.
+    assert_eq!(bench.ok("read --new --format jsonl"), "");
+}
+
+#[test]
+fn the_link_goes_with_the_simulator() {
+    let mut bench = Bench::start(Kind::Native, &[]);
+    assert_eq!(bench.sim.interrupt(), Some(0));
+    assert!(!bench.link().exists() && fs::symlink_metadata(bench.link()).is_err());
+}
+
+#[test]
+fn a_unit_over_tcp_answers_like_one_on_a_port() {
+    let mut sim = Running::start(
+        ser_cli().args(["sim", "--tcp", "127.0.0.1:0"]).stdout(Stdio::piped()).stderr(Stdio::null()),
+    );
+    let port = sim.lines().recv_timeout(PATIENCE).expect("what to give to --port");
+    assert!(port.starts_with("tcp://127.0.0.1:"), "{port}");
+    let status =
+        ser_cli().args(["--timeout", "20s", "--port", &port, "status"]).output().expect("ser-cli runs");
+    assert!(text(&status.stdout).contains("recording"), "{}", text(&status.stderr));
+}
+
+#[test]
+fn a_wrong_contacts_file_is_refused_with_file_line_and_reason() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("trip.csv");
+    let wrong = [
+        ("input,ms,state\n0,1,1\n", 1),
+        ("ms,input,state\n0,1,1\n5,33,1\n", 3),
+        ("ms,input,state\n0,1,2\n", 2),
+        ("ms,input,state\n10,1,1\n9,1,0\n", 3),
+        ("ms,input,state\n0,1\n", 2),
+        ("ms,input,state\nsoon,1,1\n", 2),
+    ];
+    for (content, line) in wrong {
+        fs::write(&file, content).expect("written");
+        let output = ser_cli()
+            .args(["sim", "--tcp", "127.0.0.1:0", "--contacts"])
+            .arg(&file)
+            .output()
+            .expect("ser-cli runs");
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{error}");
+        assert!(error.contains("trip.csv") && error.contains(&format!("line {line}")), "{content}: {error}");
+    }
+}
+
+#[test]
+fn each_way_of_not_being_there_has_its_own_message() {
+    let bench = Bench::start(Kind::Native, &[]);
+    let fails = |arguments: &[&str]| {
+        let output = ser_cli().args(arguments).output().expect("ser-cli runs");
+        let error = text(&output.stderr);
+        assert!(error.starts_with("error: ") && error.contains("hint: "), "{error}");
+        (output.status.code(), error.lines().next().map(str::to_owned))
+    };
+    let link = bench.link();
+    let link = link.to_str().expect("UTF-8");
+    let silent = tempfile::tempdir().expect("a folder");
+    let file = silent.path().join("file");
+    fs::write(&file, "").expect("written");
+    let messages = [
+        fails(&["status"]),
+        fails(&["--port", "/dev/there-is-no-such-port", "status"]),
+        fails(&["--port", file.to_str().expect("UTF-8"), "status"]),
+        fails(&["--port", "tcp://127.0.0.1:1", "status"]),
+        fails(&["--port", link, "--baud", "300", "--timeout", "50ms", "--retries", "0", "status"]),
+    ];
+    let codes: Vec<_> = messages.iter().map(|(code, _)| *code).collect();
+    assert_eq!(codes, [Some(2), Some(1), Some(1), Some(1), Some(1)]);
+    for (index, message) in messages.iter().enumerate() {
+        assert!(!messages[..index].contains(message), "{message:?} stands for two things");
+    }
+}
+
+#[test]
+fn a_port_that_somebody_else_has_is_busy() {
+    let bench = Bench::start(Kind::Native, &[]);
+    let mut watch =
+        Running::start(bench.command("watch --format csv").stdout(Stdio::piped()).stderr(Stdio::null()));
+    let lines = watch.lines();
+    lines.recv_timeout(PATIENCE).expect("watch has the port");
+    let error = bench.fails(1, "status");
+    assert!(error.contains("in use") && error.contains("hint: "), "{error}");
+}
+
+#[test]
+fn what_encode_writes_decode_reads() {
+    let output =
+        ser_cli().args(["encode", "read", "--from", "500", "--count", "5"]).output().expect("it runs");
+    let frame = text(&output.stdout);
+    assert_eq!(frame.trim_end(), "1B 30 34 35 32 30 31 46 34 30 35 34 43");
+    let mut decode = Running::start(
+        ser_cli().arg("decode").stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()),
+    );
+    let mut input = decode.0.stdin.take().expect("piped");
+    input.write_all(frame.as_bytes()).expect("decode reads");
+    drop(input);
+    let mut decoded = String::new();
+    decode.0.stdout.take().expect("piped").read_to_string(&mut decoded).expect("text");
+    assert!(decoded.contains("500") && decoded.contains('5'), "{decoded}");
+}
+
+#[test]
+fn a_damaged_capture_is_decoded_with_the_damage_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let capture = folder.path().join("capture.bin");
+    fs::write(&capture, b"\x1B014546hello\r\n\x1B0145\x1B014545").expect("written");
+    let output = ser_cli().arg("decode").arg(&capture).output().expect("ser-cli runs");
+    let lines = text(&output.stdout);
+    let starts: Vec<Vec<&str>> =
+        lines.lines().map(|line| line.split_whitespace().take(2).collect()).collect();
+    assert_eq!(
+        starts,
+        [vec!["0", "damage"], vec!["7", "text"], vec!["14", "damage"], vec!["19", "either"]],
+        "{lines}"
+    );
+}
+
+#[test]
+fn the_demo_finds_the_first_out_and_loses_nothing() {
+    demo(&[]);
+}
+
+#[test]
+#[ignore = "needs the emulator and the image: cargo xtask test"]
+fn the_demo_does_the_same_with_the_image() {
+    let image = std::env::var("SER_IMAGE_MPS2_AN385").expect("run `cargo xtask test`");
+    demo(&["--image", &image]);
+}
+
+fn demo(options: &[&str]) {
+    let output = ser_cli().arg("demo").args(options).output().expect("ser-cli runs");
+    let shown = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(shown.contains("first-out"), "{shown}");
+    assert!(shown.contains("63 events, complete"), "{shown}");
+}
+
+#[test]
+fn every_command_explains_itself_with_an_example() {
+    let help = text(&ser_cli().arg("--help").output().expect("ser-cli runs").stdout);
+    let commands: Vec<_> = help
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .take_while(|line| !line.is_empty())
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|command| *command != "help")
+        .collect();
+    assert!(commands.len() >= 15, "{commands:?}");
+    for command in commands {
+        let help = text(&ser_cli().args([command, "--help"]).output().expect("ser-cli runs").stdout);
+        assert!(help.contains(&format!("ser-cli {command}")) || help.contains("Example"), "{help}");
+    }
+}
+
+#[test]
+fn output_that_nobody_reads_is_no_failure() {
+    let mut help = Running::start(ser_cli().arg("demo").stdout(Stdio::piped()).stderr(Stdio::piped()));
+    drop(help.0.stdout.take());
+    let _ = help.wait();
+    let mut error = String::new();
+    help.0.stderr.take().expect("piped").read_to_string(&mut error).expect("text");
+    assert!(!error.contains("panicked"), "{error}");
+}
+
+#[test]
+fn completions_know_the_subcommands() {
+    for shell in ["bash", "zsh", "fish"] {
+        let script = text(&ser_cli().args(["completions", shell]).output().expect("ser-cli runs").stdout);
+        assert!(script.contains("last-broadcast"), "{shell}");
+    }
+}
+
+#[test]
+fn a_folder_is_no_capture() {
+    let output = ser_cli().arg("decode").arg(Path::new("/")).output().expect("ser-cli runs");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("hint: "), "{}", text(&output.stderr));
+}
