@@ -2,8 +2,8 @@
 //!
 //! The length is checked before any field, so a body of a wrong length is never mistaken for one with a bad value.
 
-use nom::error::{ErrorKind, FromExternalError, ParseError as NomParseError};
 use nom::Parser;
+use nom::error::{ErrorKind, FromExternalError, ParseError as NomParseError};
 
 use crate::{Code, ParseError};
 
