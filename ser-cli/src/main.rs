@@ -10,7 +10,6 @@ mod interrupt;
 mod keeper;
 mod output;
 mod progress;
-mod reading;
 mod state;
 mod time;
 mod values;

@@ -6,12 +6,9 @@ use ser_proto::{Code, Command, Configuration, Configure, LastBroadcast, Mode, Re
 
 use crate::session::NoReply;
 use crate::{
-    Counters, Cursor, Delivery, Disturbed, LineRate, LogPosition, LogReader, RangeReader, ReadRequest,
-    RequestError, Session, Summary, Timing, Transport, TransportError, Unsolicited,
+    Counters, Cursor, Delivery, LineRate, LogFollower, LogPosition, RangeReader, ReadRequest, RequestError,
+    Session, Summary, Timing, Transport, TransportError, Unsolicited,
 };
-
-/// How often a reading begins anew because the log was changed under it.
-const MAX_RESYNCS: u32 = 4;
 
 /// How much is taken from the line before a request, at most: a peer that never stops must not keep us from asking.
 const MAX_STALE_BYTES: usize = 64 * 1024;
@@ -212,65 +209,14 @@ impl Unit {
         size: u16,
         on: &mut dyn FnMut(Delivery),
     ) -> Result<Summary, RequestError> {
-        let (mut delivered, mut lost, mut restarted) = (0_u32, 0_u32, false);
-        let mut size = size;
-        let mut tells_size = true;
-        let mut resyncs = 0;
-        loop {
-            let mut reader = LogReader::new(*cursor, size);
-            if let Some(position) = self.last_position.take() {
-                reader = reader.starting_near(position);
-            }
-            let end = self.read_with(&mut reader, cursor, on);
-            let summary = reader.summary();
-            delivered = delivered.saturating_add(summary.delivered);
-            lost = lost.saturating_add(summary.lost);
-            restarted |= summary.restarted;
-            match end {
-                Ok(()) => {
-                    self.last_position = Some(summary.position);
-                    return Ok(Summary { delivered, lost, restarted, position: summary.position });
-                }
-                Err(RequestError::Disturbed(disturbed @ (Disturbed::Changed | Disturbed::WrongSize)))
-                    if resyncs < MAX_RESYNCS =>
-                {
-                    resyncs += 1;
-                    if tells_size {
-                        let asked = self.size_now()?;
-                        tells_size = asked.is_some();
-                        if disturbed == Disturbed::WrongSize && asked.is_none_or(|asked| asked == size) {
-                            return Err(disturbed.into());
-                        }
-                        size = asked.unwrap_or(size);
-                    }
-                }
-                Err(error) => return Err(error),
-            }
-        }
-    }
-
-    fn read_with(
-        &mut self,
-        reader: &mut LogReader,
-        cursor: &mut Option<Cursor>,
-        on: &mut dyn FnMut(Delivery),
-    ) -> Result<(), RequestError> {
-        while let Some(request) = reader.request() {
-            let reply = self.read(request)?;
-            let taken = reader.take(&reply, on);
-            *cursor = reader.cursor();
-            taken?;
-        }
-        Ok(())
-    }
-
-    /// The size of the log, which somebody may have changed. Original units do not tell.
-    fn size_now(&mut self) -> Result<Option<u16>, RequestError> {
-        match self.configuration() {
-            Ok(configuration) => Ok(Some(configuration.size)),
-            Err(RequestError::NoReply { .. }) => Ok(None),
-            Err(error) => Err(error),
-        }
+        let mut follower = LogFollower::new(*cursor, size).starting_near(self.last_position.take());
+        let summary = follower.read_new(self, &mut |step| {
+            step.deliveries.iter().copied().for_each(&mut *on);
+            *cursor = step.cursor;
+            Ok::<(), RequestError>(())
+        })?;
+        self.last_position = follower.position();
+        Ok(summary)
     }
 
     /// Waits for the next message that answers no request: an auto report or a line of text. Those that came during
@@ -319,7 +265,7 @@ impl Unit {
         self.session.unsolicited_dropped()
     }
 
-    fn read(&mut self, request: ReadRequest) -> Result<ReadReply, RequestError> {
+    pub(crate) fn read(&mut self, request: ReadRequest) -> Result<ReadReply, RequestError> {
         match self.request(&request.into())? {
             Reply::Read(reply) => Ok(reply),
             _ => Err(unexpected(Code::Read)),

@@ -4,14 +4,13 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use ser_client::{Delivery, Endpoint, Options, Unit};
+use ser_client::{Delivery, Endpoint, LogFollower, Options, Unit};
 use ser_proto::{Baud, Configuration, Model};
 use ser_sim::{Backend, LineRate, Port, Scenario, SimOptions, Simulator, Step};
 
 use super::sim;
 use crate::error::{Failure, Result};
 use crate::output::{EventWriter, Palette, PointNames, Sequence};
-use crate::reading::LogFollower;
 use crate::time::local_time_in;
 
 const EXAMPLES: &str = "\
@@ -134,7 +133,7 @@ fn download(
 ) -> Result<Download> {
     let mut table = Sequence::new(&mut story.out, story.palette, names);
     let (bytes, began) = (unit.counters().bytes, Instant::now());
-    let summary = LogFollower::new(None, configuration.size).read_new(unit, &mut |step| {
+    let summary = LogFollower::new(None, configuration.size).read_new(unit, &mut |step| -> Result<()> {
         for delivery in step.deliveries {
             match delivery {
                 Delivery::Event { entry_number, entry, .. } => table.event(*entry_number, entry)?,

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use ser_client::{Cursor, Delivery, RangeReader, RequestError, Unit};
+use ser_client::{Cursor, Delivery, LogFollower, RangeReader, RequestError, Unit};
 use ser_proto::{Code, Command, MAX_SIZE, Reply};
 
 use crate::cli::ConnectionArgs;
@@ -11,7 +11,6 @@ use crate::delivery::Outlet;
 use crate::error::{Result, advise, inform};
 use crate::keeper::{Keeper, StateArgs};
 use crate::output::Format;
-use crate::reading::LogFollower;
 use crate::values;
 
 const EXAMPLES: &str = "\
@@ -93,7 +92,7 @@ fn read_by_cursor(
 ) -> Result<u32> {
     let cursor: Option<Cursor> = keeper.as_ref().and_then(|keeper| keeper.cursor());
     let mut follower = LogFollower::new(cursor, size);
-    let summary = follower.read_new(unit, &mut |step| {
+    let summary = follower.read_new(unit, &mut |step| -> Result<()> {
         outlet.take(step.deliveries, step.pending)?;
         match &mut keeper {
             Some(keeper) => keeper.delivered(step.cursor, size),

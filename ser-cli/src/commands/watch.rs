@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use ser_client::{Unit, Unsolicited};
+use ser_client::{LogFollower, Unit, Unsolicited};
 use ser_proto::{AutoReport, Configuration, Configure, ReadReply};
 
 use crate::cli::ConnectionArgs;
@@ -14,7 +14,6 @@ use crate::error::{Failure, Result, inform};
 use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
 use crate::output::Format;
-use crate::reading::LogFollower;
 use crate::values;
 
 const EXAMPLES: &str = "\
@@ -184,7 +183,7 @@ impl Watch {
     fn read_new(&mut self) -> Result<()> {
         let Watch { unit, follower, outlet, keeper, stop, .. } = self;
         let size = follower.size();
-        follower.read_new(unit, &mut |step| {
+        follower.read_new(unit, &mut |step| -> Result<()> {
             outlet.take(step.deliveries, 0)?;
             keeper.delivered(step.cursor, size)?;
             if stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }

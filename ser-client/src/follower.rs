@@ -1,25 +1,26 @@
-//! Reading a unit's log from where the last reading ended, in steps between which a command can stop.
+//! Following a log: reading after reading from where the last one ended, and auto reports where they fit.
 
-use ser_client::{Cursor, Delivery, Disturbed, LogPosition, LogReader, RequestError, Summary, Unit};
-use ser_proto::{Code, Command, Entry, Model, ReadReply, Reply};
+use ser_proto::{Entry, Model, ReadReply};
 
-use crate::error::Result;
+use crate::{Cursor, Delivery, Disturbed, LogPosition, LogReader, RequestError, Summary, Unit};
 
 /// How often a reading begins anew because the log was changed under it.
 const MAX_RESYNCS: u32 = 4;
 
 /// What a reply has brought.
-pub(crate) struct Step<'a> {
+#[derive(Clone, Copy, Debug)]
+pub struct Step<'a> {
     /// Events and losses, in order.
-    pub(crate) deliveries: &'a [Delivery],
+    pub deliveries: &'a [Delivery],
     /// Where the next reading has to begin once these are delivered.
-    pub(crate) cursor: Option<Cursor>,
+    pub cursor: Option<Cursor>,
     /// How many more events the log is known to hold.
-    pub(crate) pending: u32,
+    pub pending: u32,
 }
 
 /// A log and how far it has been read.
-pub(crate) struct LogFollower {
+#[derive(Clone, Debug)]
+pub struct LogFollower {
     size: u16,
     cursor: Option<Cursor>,
     position: Option<LogPosition>,
@@ -27,71 +28,103 @@ pub(crate) struct LogFollower {
 
 impl LogFollower {
     /// Begins behind `cursor`, or with the oldest event. `size` is how many entries the log holds.
-    pub(crate) fn new(cursor: Option<Cursor>, size: u16) -> LogFollower {
+    #[must_use]
+    pub fn new(cursor: Option<Cursor>, size: u16) -> LogFollower {
         LogFollower { size, cursor, position: None }
     }
 
     /// How many entries the log holds, as far as is known.
-    pub(crate) fn size(&self) -> u16 {
+    #[must_use]
+    pub fn size(&self) -> u16 {
         self.size
     }
 
-    /// Reads what is new and hands it to `take`, reply by reply. When `take` fails, the reading ends with that.
-    pub(crate) fn read_new(
+    /// Where the next reading begins.
+    #[must_use]
+    pub fn cursor(&self) -> Option<Cursor> {
+        self.cursor
+    }
+
+    /// The same, when the log was last seen at `position`: if nothing has happened since, the next reading is shorter.
+    #[must_use]
+    pub fn starting_near(mut self, position: Option<LogPosition>) -> LogFollower {
+        self.position = position;
+        self
+    }
+
+    /// Where the log stood at the end of the last reading.
+    #[must_use]
+    pub fn position(&self) -> Option<LogPosition> {
+        self.position
+    }
+
+    /// Reads what is new and hands it to `take`, reply by reply; each event comes once and in order, and what was lost is
+    /// told. When `take` fails, the reading ends with its error, and the next one begins before what it was given.
+    ///
+    /// # Errors
+    /// Those of `take`; no reply, a line that fails, or a log that is changed again and again while it is read.
+    pub fn read_new<E: From<RequestError>>(
         &mut self,
         unit: &mut Unit,
-        take: &mut dyn FnMut(&Step<'_>) -> Result<()>,
-    ) -> Result<Summary> {
-        for _ in 0..MAX_RESYNCS {
-            match self.read_once(unit, take)? {
-                Ok(summary) => return Ok(summary),
+        take: &mut dyn FnMut(&Step<'_>) -> Result<(), E>,
+    ) -> Result<Summary, E> {
+        let (mut delivered, mut lost, mut restarted) = (0_u32, 0_u32, false);
+        let mut resyncs = 0;
+        loop {
+            let (summary, end) = self.read_once(unit, take)?;
+            delivered = delivered.saturating_add(summary.delivered);
+            lost = lost.saturating_add(summary.lost);
+            restarted |= summary.restarted;
+            match end {
+                Ok(()) => return Ok(Summary { delivered, lost, restarted, ..summary }),
                 // Somebody erased or resized the log: what is still there is sorted out from the cursor.
-                Err(Disturbed::Changed | Disturbed::WrongSize) => self.learn_size(unit)?,
+                Err(Disturbed::Changed | Disturbed::WrongSize) if resyncs < MAX_RESYNCS => {
+                    resyncs += 1;
+                    self.learn_size(unit)?;
+                }
                 Err(disturbed) => return Err(RequestError::Disturbed(disturbed).into()),
             }
         }
-        self.read_once(unit, take)?.map_err(|disturbed| RequestError::Disturbed(disturbed).into())
     }
 
-    fn read_once(
+    fn read_once<E: From<RequestError>>(
         &mut self,
         unit: &mut Unit,
-        take: &mut dyn FnMut(&Step<'_>) -> Result<()>,
-    ) -> Result<std::result::Result<Summary, Disturbed>> {
+        take: &mut dyn FnMut(&Step<'_>) -> Result<(), E>,
+    ) -> Result<(Summary, Result<(), Disturbed>), E> {
         let mut reader = LogReader::new(self.cursor, self.size);
         if let Some(position) = self.position.take() {
             reader = reader.starting_near(position);
         }
+        let mut deliveries = Vec::new();
         while let Some(request) = reader.request() {
-            let Reply::Read(reply) = unit.request(&Command::from(request))? else {
-                return Err(RequestError::UnexpectedReply { command: Code::Read }.into());
-            };
-            let mut deliveries = Vec::new();
+            let reply = unit.read(request)?;
+            deliveries.clear();
             let taken = reader.take(&reply, &mut |delivery| deliveries.push(delivery));
             let (cursor, pending) = (reader.cursor(), reader.pending());
             take(&Step { deliveries: &deliveries, cursor, pending })?;
             self.cursor = cursor;
-            if let Err(disturbed) = taken {
-                return Ok(Err(disturbed));
+            if taken.is_err() {
+                return Ok((reader.summary(), taken));
             }
         }
         let summary = reader.summary();
         self.position = Some(summary.position);
-        Ok(Ok(summary))
+        Ok((summary, Ok(())))
     }
 
     /// Asks for the size again; original units do not tell, then it stays what it was said to be.
-    fn learn_size(&mut self, unit: &mut Unit) -> Result<()> {
+    fn learn_size(&mut self, unit: &mut Unit) -> Result<(), RequestError> {
         match unit.configuration() {
             Ok(configuration) => self.size = configuration.size,
             Err(RequestError::NoReply { .. }) => {}
-            Err(error) => return Err(error.into()),
+            Err(error) => return Err(error),
         }
         Ok(())
     }
 
     /// Takes events out of an auto report, if they are the very next ones. `None`: only a reading can tell.
-    pub(crate) fn continue_with(&mut self, report: &ReadReply) -> Option<(Vec<Delivery>, Cursor)> {
+    pub fn continue_with(&mut self, report: &ReadReply) -> Option<(Vec<Delivery>, Cursor)> {
         let mut cursor = self.cursor?;
         let mut deliveries = Vec::new();
         for (entry_number, entry, model) in numbered(report) {
@@ -130,10 +163,13 @@ fn numbered(report: &ReadReply) -> impl Iterator<Item = (u16, Entry, Model)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::testing::entry;
+    use ser_proto::{Inputs, TimeStamp};
 
     fn report(start: u16, total: u16, next_slot: u16, count: usize) -> ReadReply {
-        let entries = std::iter::repeat_n(entry("00.250", &[1], &[1]), count).collect();
+        let time =
+            TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 250 };
+        let entry = Entry { changed: Inputs(1), state: Inputs(1), time };
+        let entries = std::iter::repeat_n(entry, count).collect();
         ReadReply { start, total, next_slot, model: Some(Model::Ser160), entries }
     }
 
