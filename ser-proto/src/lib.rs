@@ -22,6 +22,7 @@ mod entry;
 mod error;
 mod frame_decoder;
 mod frame_encoder;
+pub mod genius;
 mod last_broadcast;
 mod mode;
 mod model;

@@ -1,0 +1,220 @@
+//! The board as a whole: from reset to the bus.
+
+use super::{Done, Driver};
+use crate::command_block::CommandStatus;
+use crate::counters::count;
+use crate::elapsed::elapsed_ms;
+use crate::event::{ConfigurationOutcome, Event, Failure};
+use crate::interrupts::Interrupts;
+use crate::map;
+use crate::options::Start;
+use crate::ram::SharedRam;
+use crate::setup_table::Configuration;
+use crate::timing;
+
+/// Attempts to configure that may end in a status that does not exist.
+const MAX_FUTILE_CONFIGURATIONS: u8 = 3;
+
+/// Where a board is in its life.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Phase {
+    /// Before the first poll.
+    Begin,
+    /// The reset line is low.
+    Reset { since_ms: u32, hold_ms: u32 },
+    /// The reset line goes up after this poll; time counts from the next one.
+    Released,
+    /// Self-test: first no access at all, then the OK flag is waited for.
+    SelfTest { since_ms: u32 },
+    /// A board that should be running: its OK flag has been cleared and should come back.
+    Attaching { since_ms: u32 },
+    /// The OK flag is there. `window_since_ms` says since when when the board is not on the bus yet.
+    Configuring { window_since_ms: Option<u32>, futile: u8 },
+    /// The board stays off the bus for a while. When it is `silent`, its tables need no lock.
+    Joining { since_ms: Option<u32>, silent: bool },
+    /// Traffic.
+    Running,
+    /// Nothing can be done for a while.
+    Failed { since_ms: u32, pause_ms: u32 },
+}
+
+/// How long to leave a board alone after so many futile attempts: none, then a second, doubled each time.
+pub(super) fn pause_ms(futile_starts: u32) -> u32 {
+    match futile_starts {
+        0 => 0,
+        futile => 1_000_u32.saturating_mul(1 << (futile - 1).min(6)).min(timing::MAX_RETRY_MS),
+    }
+}
+
+impl<R: SharedRam> Driver<R> {
+    /// One step, whatever the phase is.
+    pub(super) fn step(&mut self, now_ms: u32) -> Result<Option<Event>, Failure> {
+        match self.phase {
+            Phase::Begin => {
+                self.phase = match self.options.start {
+                    Start::Reset { hold_ms } if self.options.reset_line => {
+                        Phase::Reset { since_ms: now_ms, hold_ms }
+                    }
+                    Start::Reset { .. } | Start::Released => Phase::SelfTest { since_ms: now_ms },
+                    Start::Running => self.attach(now_ms),
+                };
+                Ok(None)
+            }
+            Phase::Reset { since_ms, hold_ms } => {
+                if elapsed_ms(now_ms, since_ms) >= hold_ms {
+                    self.phase = Phase::Released;
+                }
+                Ok(None)
+            }
+            Phase::Released => {
+                self.phase = Phase::SelfTest { since_ms: now_ms };
+                Ok(None)
+            }
+            Phase::SelfTest { since_ms } => self.await_self_test(now_ms, since_ms),
+            Phase::Attaching { since_ms } => {
+                if self.ram.read(map::STATUS_OK) == 1 {
+                    self.enter_configuring(now_ms, None);
+                    Ok(None)
+                } else if elapsed_ms(now_ms, since_ms) >= self.options.heartbeat_timeout_ms {
+                    Err(Failure::NoHeartbeat)
+                } else {
+                    Ok(None)
+                }
+            }
+            Phase::Configuring { window_since_ms, futile } => {
+                self.watch_heart(now_ms, timing::OFF_BUS_MS)?;
+                self.configuring(now_ms, window_since_ms, futile)
+            }
+            Phase::Joining { since_ms, silent } => {
+                self.watch_heart(now_ms, timing::OFF_BUS_MS)?;
+                if silent {
+                    // What the board says first on the bus is not to be what its memory happened to hold.
+                    self.global.write(&mut self.ram, self.in_force.broadcast_len());
+                }
+                let joined =
+                    since_ms.is_none_or(|since_ms| elapsed_ms(now_ms, since_ms) >= timing::OFF_BUS_MS);
+                Ok(joined.then(|| self.ready(now_ms)))
+            }
+            Phase::Running => {
+                self.locker.end_hold(&mut self.ram, now_ms, &mut self.counters);
+                self.watch_heart(now_ms, 0)?;
+                self.serve(now_ms)
+            }
+            Phase::Failed { since_ms, pause_ms } => {
+                if elapsed_ms(now_ms, since_ms) >= pause_ms {
+                    self.phase = if self.options.reset_line {
+                        count(&mut self.counters.resets);
+                        Phase::Reset { since_ms: now_ms, hold_ms: timing::RESET_MS }
+                    } else {
+                        self.attach(now_ms)
+                    };
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    /// The flag may be a relic, so it is cleared first.
+    fn attach(&mut self, now_ms: u32) -> Phase {
+        self.ram.write(map::STATUS_OK, 0);
+        Phase::Attaching { since_ms: now_ms }
+    }
+
+    fn await_self_test(&mut self, now_ms: u32, since_ms: u32) -> Result<Option<Event>, Failure> {
+        let elapsed = elapsed_ms(now_ms, since_ms);
+        if elapsed < timing::NO_ACCESS_MS {
+            return Ok(None);
+        }
+        if self.ram.read(map::STATUS_OK) == 1 {
+            self.enter_configuring(now_ms, Some(now_ms));
+            return Ok(None);
+        }
+        if elapsed < timing::START_UP_MS + timing::START_UP_MARGIN_MS {
+            return Ok(None);
+        }
+        Err(Failure::SelfTest { faults: self.ram.read(map::STATUS_FAULTS) })
+    }
+
+    fn enter_configuring(&mut self, now_ms: u32, window_since_ms: Option<u32>) {
+        self.heart.begin(now_ms);
+        self.commander.forget();
+        self.options.interrupts.enable(&mut self.ram);
+        Interrupts::take(&mut self.ram);
+        self.phase = Phase::Configuring { window_since_ms, futile: 0 };
+    }
+
+    /// With some more patience while the board starts up or changes its configuration: it may have no time for beats.
+    fn watch_heart(&mut self, now_ms: u32, more_ms: u32) -> Result<(), Failure> {
+        let patience_ms = self.options.heartbeat_timeout_ms.saturating_add(more_ms);
+        if self.heart.watch(&mut self.ram, now_ms, patience_ms)? {
+            self.status.due();
+        }
+        Ok(())
+    }
+
+    /// The command is sent even when the setup table already holds what is wanted: somebody may have written
+    /// it without
+    /// making it known. It costs nothing, the board says that nothing has changed.
+    fn configuring(
+        &mut self,
+        now_ms: u32,
+        window_since_ms: Option<u32>,
+        futile: u8,
+    ) -> Result<Option<Event>, Failure> {
+        let status = match self.commander.poll(&self.ram, now_ms, self.in_force, &mut self.counters)? {
+            Some(Done::Configured(status)) => status,
+            Some(_) => return Ok(None),
+            None => {
+                if self.commander.is_idle() {
+                    self.configure_due = false;
+                    let configuration = self.options.configuration;
+                    self.commander.start_configure(&mut self.ram, now_ms, configuration, &mut self.counters);
+                }
+                return Ok(None);
+            }
+        };
+        let accepted = match status {
+            CommandStatus::Complete => ConfigurationOutcome::Changed,
+            CommandStatus::ProcessError => ConfigurationOutcome::Unchanged,
+            // The board has put back what is in force.
+            CommandStatus::SyntaxError => {
+                ConfigurationOutcome::Refused(Configuration::read(&self.ram).unwrap_or(self.in_force))
+            }
+            CommandStatus::Cleared | CommandStatus::Pending | CommandStatus::Unknown(_) => {
+                count(&mut self.counters.commands_unknown);
+                let futile = futile + 1;
+                if futile >= MAX_FUTILE_CONFIGURATIONS {
+                    return Err(Failure::Configuration);
+                }
+                self.phase = Phase::Configuring { window_since_ms, futile };
+                return Ok(None);
+            }
+        };
+        let before = self.in_force;
+        self.in_force = Configuration::read(&self.ram).map_err(|_| Failure::Configuration)?;
+        let outcome = if self.in_force == self.commander.configured() {
+            accepted
+        } else {
+            ConfigurationOutcome::Refused(self.in_force)
+        };
+        let changed = accepted == ConfigurationOutcome::Changed;
+        self.phase = Phase::Joining {
+            since_ms: if changed { Some(now_ms) } else { window_since_ms },
+            silent: window_since_ms.is_some() || (changed && self.in_force.silences_the_bus(before)),
+        };
+        self.global.due();
+        Ok(Some(self.configured(outcome)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pauses_double_up_to_a_minute() {
+        let pauses: Vec<u32> = (0..10).map(pause_ms).collect();
+        assert_eq!(pauses, [0, 1_000, 2_000, 4_000, 8_000, 16_000, 32_000, 60_000, 60_000, 60_000]);
+        assert_eq!(pause_ms(u32::MAX), 60_000);
+    }
+}

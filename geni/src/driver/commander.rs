@@ -1,0 +1,307 @@
+//! One command at a time (chapter 10): starts them, waits for them without waiting, gives them up.
+
+use crate::command_block::{
+    CommandStatus, read_datagram, read_reply, start_configure, start_read, start_transmission,
+};
+use crate::counters::{Counters, count};
+use crate::datagram::{Completion, Received, Transmission, TransmitError};
+use crate::elapsed::elapsed_ms;
+use crate::event::{CommandError, Failure};
+use crate::ram::SharedRam;
+use crate::setup_table::Configuration;
+use crate::timing;
+
+/// What a command came to.
+#[derive(Debug)]
+pub(super) enum Done {
+    Read(Received),
+    /// The receive queue is empty, or what came out of it is nothing to pass on.
+    NothingRead,
+    Sent(Result<(), CommandError>),
+    Replied(Result<Received, CommandError>),
+    Configured(CommandStatus),
+}
+
+/// What has to be remembered of a datagram once the board has it.
+#[derive(Clone, Copy, Debug)]
+struct Sending {
+    destination: u8,
+    function: u8,
+    completion: Completion,
+    timeout_ms: u32,
+}
+
+impl Sending {
+    fn ended(self, error: CommandError) -> Done {
+        match self.completion {
+            Completion::Reply { .. } => Done::Replied(Err(error)),
+            Completion::Taken | Completion::Acknowledged => Done::Sent(Err(error)),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+enum State {
+    Idle,
+    Reading {
+        since_ms: u32,
+    },
+    Configuring {
+        since_ms: u32,
+    },
+    Sending {
+        sending: Sending,
+        since_ms: u32,
+    },
+    /// Something that nobody waits for is going on: our own command, `given_up`, or somebody else's.
+    Occupied {
+        since_ms: u32,
+        given_up: bool,
+    },
+}
+
+/// The command block and what waits for it.
+#[derive(Debug)]
+pub(super) struct Commander {
+    state: State,
+    outbox: Option<Transmission>,
+    read_due: bool,
+    /// Whether a datagram was read last: then it is the outbox's turn.
+    read_last: bool,
+    configured: Configuration,
+}
+
+impl Commander {
+    pub(super) const fn new() -> Commander {
+        Commander {
+            state: State::Idle,
+            outbox: None,
+            read_due: false,
+            read_last: false,
+            configured: Configuration::DEFAULT,
+        }
+    }
+
+    /// There may be datagrams to be read.
+    pub(super) fn read_due(&mut self) {
+        self.read_due = true;
+    }
+
+    pub(super) fn is_idle(&self) -> bool {
+        matches!(self.state, State::Idle)
+    }
+
+    pub(super) fn can_transmit(&self) -> bool {
+        self.outbox.is_none() && !matches!(self.state, State::Sending { .. })
+    }
+
+    pub(super) fn put(&mut self, transmission: Transmission) -> Result<(), TransmitError> {
+        if !self.can_transmit() {
+            return Err(TransmitError::Busy);
+        }
+        self.outbox = Some(transmission);
+        Ok(())
+    }
+
+    /// The configuration that was sent last.
+    pub(super) fn configured(&self) -> Configuration {
+        self.configured
+    }
+
+    /// The board has been started anew: nothing is going on.
+    pub(super) fn forget(&mut self) {
+        self.state = State::Idle;
+    }
+
+    /// The board has failed. Gives what was to be known about the datagram that went down with it.
+    pub(super) fn abandon(&mut self) -> Option<Completion> {
+        let waiting = self.outbox.take().map(|transmission| transmission.completion);
+        let sending = match self.state {
+            State::Sending { sending, .. } => Some(sending.completion),
+            _ => None,
+        };
+        self.state = State::Idle;
+        sending.or(waiting)
+    }
+
+    /// Looks whether the command in progress is finished.
+    pub(super) fn poll<R: SharedRam>(
+        &mut self,
+        ram: &R,
+        now_ms: u32,
+        in_force: Configuration,
+        counters: &mut Counters,
+    ) -> Result<Option<Done>, Failure> {
+        if self.is_idle() {
+            return Ok(None);
+        }
+        let status = CommandStatus::read(ram);
+        if status == CommandStatus::Pending {
+            return self.still_pending(now_ms, counters);
+        }
+        if let State::Reading { .. } | State::Sending { .. } = self.state {
+            // A board that has restarted shows a completed command, and default settings.
+            if Configuration::read(ram) != Ok(in_force) {
+                return Err(Failure::Restarted);
+            }
+        }
+        let state = core::mem::replace(&mut self.state, State::Idle);
+        Ok(match state {
+            State::Idle => None,
+            State::Reading { .. } => Some(self.read(ram, status, counters)),
+            State::Configuring { .. } => Some(Done::Configured(status)),
+            State::Sending { sending, .. } => Some(sent(ram, sending, status, counters)),
+            State::Occupied { given_up, .. } => {
+                if given_up {
+                    count(&mut counters.commands_late);
+                }
+                None
+            }
+        })
+    }
+
+    fn still_pending(&mut self, now_ms: u32, counters: &mut Counters) -> Result<Option<Done>, Failure> {
+        match self.state {
+            State::Idle => Ok(None),
+            // What a late Read Datagram brings is out of the queue for good, so it is never given up alone.
+            State::Reading { since_ms }
+            | State::Configuring { since_ms }
+            | State::Occupied { since_ms, .. } => {
+                if elapsed_ms(now_ms, since_ms) < timing::COMMAND_STUCK_MS {
+                    return Ok(None);
+                }
+                count(&mut counters.commands_timed_out);
+                Err(Failure::CommandStuck)
+            }
+            State::Sending { sending, since_ms } => {
+                if elapsed_ms(now_ms, since_ms) < sending.timeout_ms {
+                    return Ok(None);
+                }
+                count(&mut counters.commands_timed_out);
+                self.state = State::Occupied { since_ms: now_ms, given_up: true };
+                Ok(Some(sending.ended(CommandError::TimedOut)))
+            }
+        }
+    }
+
+    fn read<R: SharedRam>(&mut self, ram: &R, status: CommandStatus, counters: &mut Counters) -> Done {
+        match status {
+            CommandStatus::Complete => {
+                let Some(received) = read_datagram(ram) else {
+                    count(&mut counters.datagrams_refused);
+                    return Done::NothingRead;
+                };
+                Done::Read(received)
+            }
+            // The receive queue is empty.
+            CommandStatus::SyntaxError => {
+                self.read_due = false;
+                Done::NothingRead
+            }
+            // "Should not occur": leave it until the next flag or the next look around.
+            CommandStatus::ProcessError => {
+                self.read_due = false;
+                count(&mut counters.commands_failed);
+                Done::NothingRead
+            }
+            CommandStatus::Cleared | CommandStatus::Pending | CommandStatus::Unknown(_) => {
+                self.read_due = false;
+                count(&mut counters.commands_unknown);
+                Done::NothingRead
+            }
+        }
+    }
+
+    /// Starts what waits, reading and sending by turns.
+    pub(super) fn start_next<R: SharedRam>(
+        &mut self,
+        ram: &mut R,
+        now_ms: u32,
+        scan_ms: u32,
+        counters: &mut Counters,
+    ) {
+        if !self.read_due && self.outbox.is_none() || !self.take_block(ram, now_ms, counters) {
+            return;
+        }
+        if self.read_due && (self.outbox.is_none() || !self.read_last) {
+            self.read_last = true;
+            self.state = State::Reading { since_ms: now_ms };
+            start_read(ram);
+        } else if let Some(transmission) = self.outbox.take() {
+            self.read_last = false;
+            let timeout_ms = match transmission.completion {
+                Completion::Reply { .. } => timing::REPLY_TIMEOUT_MS,
+                Completion::Taken | Completion::Acknowledged => {
+                    timing::TRANSMIT_TIMEOUT_MS.max(scan_ms.saturating_mul(5))
+                }
+            };
+            let sending = Sending {
+                destination: transmission.destination.to_byte(),
+                function: transmission.function,
+                completion: transmission.completion,
+                timeout_ms,
+            };
+            self.state = State::Sending { sending, since_ms: now_ms };
+            start_transmission(ram, &transmission);
+        }
+    }
+
+    /// Writes the setup table and makes it known.
+    pub(super) fn start_configure<R: SharedRam>(
+        &mut self,
+        ram: &mut R,
+        now_ms: u32,
+        configuration: Configuration,
+        counters: &mut Counters,
+    ) {
+        if self.take_block(ram, now_ms, counters) {
+            self.configured = configuration;
+            self.state = State::Configuring { since_ms: now_ms };
+            configuration.write(ram);
+            start_configure(ram);
+        }
+    }
+
+    /// Whether the block is free. If not, somebody has left a command in it, which has to end first.
+    fn take_block<R: SharedRam>(&mut self, ram: &R, now_ms: u32, counters: &mut Counters) -> bool {
+        let free = CommandStatus::read(ram).is_free();
+        if !free {
+            count(&mut counters.commands_blocked);
+            self.state = State::Occupied { since_ms: now_ms, given_up: false };
+        }
+        free
+    }
+}
+
+/// What became of a datagram.
+fn sent<R: SharedRam>(ram: &R, sending: Sending, status: CommandStatus, counters: &mut Counters) -> Done {
+    match (status, sending.completion) {
+        (CommandStatus::Complete, Completion::Reply { subfunction }) => {
+            let reply = read_reply(ram, sending.destination, sending.function, subfunction);
+            if reply.is_none() {
+                count(&mut counters.datagrams_refused);
+            }
+            Done::Replied(reply.ok_or(CommandError::BadReply))
+        }
+        // By the table of status values an acknowledged datagram ends with 4, by the text above it with 0.
+        (CommandStatus::Complete | CommandStatus::Cleared, Completion::Taken | Completion::Acknowledged) => {
+            Done::Sent(Ok(()))
+        }
+        (CommandStatus::SyntaxError, _) => {
+            count(&mut counters.commands_refused);
+            sending.ended(CommandError::Refused)
+        }
+        (CommandStatus::ProcessError, _) => {
+            count(&mut counters.commands_failed);
+            sending.ended(CommandError::Failed)
+        }
+        (CommandStatus::Unknown(unknown), _) => {
+            count(&mut counters.commands_unknown);
+            sending.ended(CommandError::UnknownStatus(unknown))
+        }
+        (CommandStatus::Cleared | CommandStatus::Pending, _) => {
+            count(&mut counters.commands_unknown);
+            sending.ended(CommandError::Cleared)
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! Keeps the request queue moving (chapter 13): a full one loses requests without a word.
+
+use crate::counters::{Counters, count};
+use crate::elapsed::elapsed_ms;
+use crate::event::Event;
+use crate::options::Requests;
+use crate::ram::SharedRam;
+use crate::request_queue::{
+    AnswerError, Pointers, RequestAnswer, RequestStatus, finish, read_header, read_request, write_data,
+};
+use crate::timing;
+
+/// The request that waits for an answer.
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    index: u8,
+    len: u8,
+    since_ms: u32,
+}
+
+/// Takes requests one at a time.
+#[derive(Debug)]
+pub(super) struct RequestServer {
+    due: bool,
+    waiting: Option<Waiting>,
+}
+
+impl RequestServer {
+    pub(super) const fn new() -> RequestServer {
+        RequestServer { due: false, waiting: None }
+    }
+
+    pub(super) fn due(&mut self) {
+        self.due = true;
+    }
+
+    pub(super) fn poll<R: SharedRam>(
+        &mut self,
+        ram: &mut R,
+        now_ms: u32,
+        policy: Requests,
+        counters: &mut Counters,
+    ) -> Option<Event> {
+        if let Some(waiting) = self.waiting {
+            if elapsed_ms(now_ms, waiting.since_ms) < timing::REQUEST_ANSWER_MS {
+                return None;
+            }
+            self.waiting = None;
+            count(&mut counters.requests_unanswered);
+            return Some(refuse(ram, waiting.index, counters));
+        }
+        if !self.due {
+            return None;
+        }
+        let Ok(pointers) = Pointers::read(ram) else {
+            count(&mut counters.request_pointers_refused);
+            self.due = false;
+            return None;
+        };
+        if pointers.is_empty() {
+            self.due = false;
+            return None;
+        }
+        if pointers.is_full() {
+            count(&mut counters.request_queue_full);
+        }
+        let index = pointers.head;
+        if policy == Requests::Refuse {
+            return Some(refuse(ram, index, counters));
+        }
+        let Some(request) = read_request(ram, index) else {
+            count(&mut counters.requests_malformed);
+            return Some(refuse(ram, index, counters));
+        };
+        self.waiting = Some(Waiting { index, len: request.header.len, since_ms: now_ms });
+        Some(Event::Request(request))
+    }
+
+    pub(super) fn answer<R: SharedRam>(
+        &mut self,
+        ram: &mut R,
+        answer: RequestAnswer<'_>,
+    ) -> Result<(), AnswerError> {
+        let waiting = self.waiting.ok_or(AnswerError::NoRequest)?;
+        // The head is ours: somewhere else, or in an empty queue, it means that the board has started anew.
+        let still_there =
+            Pointers::read(ram).is_ok_and(|pointers| pointers.head == waiting.index && !pointers.is_empty());
+        if !still_there {
+            self.waiting = None;
+            return Err(AnswerError::NoRequest);
+        }
+        let status = match answer {
+            RequestAnswer::Data(data) => {
+                if data.len() != usize::from(waiting.len) {
+                    return Err(AnswerError::WrongLength { expected: waiting.len });
+                }
+                write_data(ram, waiting.index, data);
+                RequestStatus::Complete
+            }
+            RequestAnswer::Status(status) => status,
+        };
+        self.waiting = None;
+        finish(ram, waiting.index, status);
+        Ok(())
+    }
+}
+
+/// There is nothing here that could be read or written.
+fn refuse<R: SharedRam>(ram: &mut R, index: u8, counters: &mut Counters) -> Event {
+    let header = read_header(ram, index);
+    finish(ram, index, RequestStatus::Syntax);
+    count(&mut counters.requests_refused);
+    Event::RequestRefused(header)
+}

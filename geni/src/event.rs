@@ -1,0 +1,166 @@
+//! What the driver has to say.
+
+use core::fmt;
+
+use crate::datagram::Received;
+use crate::device_table::Device;
+use crate::request_queue::{MemoryRequest, RequestHeader};
+use crate::setup_table::{Configuration, DipSwitches};
+use crate::status_table::Status;
+
+/// Something that happened between two calls of [`Driver::poll`](crate::Driver::poll).
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Event {
+    /// The board has dealt with the configuration.
+    Configured(ConfigurationOutcome),
+    /// The board is free to join the bus: datagrams are accepted, tables can be locked. Whether it has joined
+    /// is told next, by
+    /// [`Event::StatusChanged`].
+    Ready(Identity),
+    /// The board has failed and will be reset, if it has a reset line, and started again. All devices are gone.
+    Failed(Failure),
+    /// The board came onto the bus or left it, or a monitor or excessive errors came or went. Also once after
+    /// [`Event::Ready`].
+    StatusChanged(Status),
+    /// A device came, went or changed.
+    Device {
+        /// Its number, 0–31.
+        number: u8,
+        /// What it did.
+        change: DeviceChange,
+    },
+    /// A datagram has arrived.
+    Received(Received),
+    /// The datagram that was to be sent has been, or not.
+    Sent(Result<(), CommandError>),
+    /// The reply to the datagram that was sent, or the lack of it.
+    Replied(Result<Received, CommandError>),
+    /// Another device asks for this host's memory: see [`Driver::answer_request`](crate::Driver::answer_request).
+    Request(MemoryRequest),
+    /// A request for this host's memory was refused.
+    RequestRefused(RequestHeader),
+    /// The tables are locked until the next call of `poll`: see [`Driver::tables`](crate::Driver::tables).
+    TablesLocked,
+    /// The board has had its turn on the bus. Only with
+    /// [`Interrupts::OUTPUTS_SENT`](crate::Interrupts::OUTPUTS_SENT) enabled.
+    OutputsSent,
+}
+
+/// What the board thinks of a configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ConfigurationOutcome {
+    /// It is in force, and the board is off the bus for 1.5 s.
+    Changed,
+    /// It was in force already.
+    Unchanged,
+    /// It is not in force. This is.
+    Refused(Configuration),
+}
+
+/// Who the board is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Identity {
+    /// Software revision.
+    pub revision: u8,
+    /// Its switches.
+    pub switches: DipSwitches,
+    /// Its configuration.
+    pub configuration: Configuration,
+}
+
+/// How a board was found to have failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Failure {
+    /// Its self-test did not end well in time, with these faults.
+    SelfTest {
+        /// Hardware status byte.
+        faults: u8,
+    },
+    /// It stopped setting its OK flag.
+    NoHeartbeat,
+    /// It reports hardware faults.
+    Hardware {
+        /// Hardware status byte.
+        faults: u8,
+    },
+    /// Its setup table is not what it was: it has restarted by itself.
+    Restarted,
+    /// It does not finish its commands.
+    CommandStuck,
+    /// It does not answer lockout requests.
+    LockoutStuck,
+    /// It does not say whether it takes the configuration.
+    Configuration,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Failure::SelfTest { faults } => {
+                write!(f, "the GENI board did not pass its self-test (faults {faults:02X}h)")
+            }
+            Failure::NoHeartbeat => f.write_str("the GENI board has lost its heartbeat"),
+            Failure::Hardware { faults } => write!(f, "the GENI board reports hardware faults {faults:02X}h"),
+            Failure::Restarted => f.write_str("the GENI board has restarted by itself"),
+            Failure::CommandStuck => f.write_str("the GENI board does not finish its commands"),
+            Failure::LockoutStuck => f.write_str("the GENI board does not answer lockout requests"),
+            Failure::Configuration => f.write_str("the GENI board does not take its configuration"),
+        }
+    }
+}
+
+impl core::error::Error for Failure {}
+
+/// What a device did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum DeviceChange {
+    /// It logged in.
+    LoggedIn(Device),
+    /// It is logged in with other data.
+    Changed(Device),
+    /// It logged out.
+    LoggedOut,
+}
+
+/// Why a datagram was not sent, or had no reply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum CommandError {
+    /// The board calls it wrong.
+    Refused,
+    /// No acknowledgement, no reply within 10 s, or the board had no memory: another attempt may help.
+    Failed,
+    /// The board cleared the command without carrying it out.
+    Cleared,
+    /// A status that does not exist.
+    UnknownStatus(u8),
+    /// The reply has an impossible length.
+    BadReply,
+    /// The board did not finish in time. The datagram may have been sent or may still be.
+    TimedOut,
+    /// The board failed meanwhile. The datagram may have been sent.
+    BoardFailed,
+}
+
+impl fmt::Display for CommandError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            CommandError::Refused => f.write_str("the GENI board refused the datagram"),
+            CommandError::Failed => f.write_str("the datagram was not acknowledged or not answered"),
+            CommandError::Cleared => f.write_str("the GENI board dropped the command"),
+            CommandError::UnknownStatus(status) => {
+                write!(f, "the GENI board gave the unknown status {status:02X}h")
+            }
+            CommandError::BadReply => f.write_str("the reply has an impossible length"),
+            CommandError::TimedOut => f.write_str("the GENI board did not finish in time"),
+            CommandError::BoardFailed => f.write_str("the GENI board failed meanwhile"),
+        }
+    }
+}
+
+impl core::error::Error for CommandError {}

@@ -1,0 +1,13 @@
+//! The driver and a scripted board that does what the manual's procedures and example algorithms say, step by step.
+//!
+//! Offsets are written out here as the manual has them, so that a slip in the crate's map cannot hide.
+
+mod board;
+mod commands;
+mod failures;
+mod hostile;
+mod requests;
+mod start_up;
+mod tables;
+mod watching;
+mod world;

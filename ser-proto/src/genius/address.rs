@@ -1,0 +1,104 @@
+//! Who is on the bus, and to whom a datagram goes.
+
+use core::fmt;
+
+use crate::MAX_REPORT_ADDRESS;
+
+/// A device on the bus: its number is its address, 0–31.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Device(u8);
+
+impl Device {
+    /// Number 0, by custom a hand-held monitor.
+    pub(super) const FIRST: Device = Device(0);
+
+    /// The device with that number, 0–31.
+    #[must_use]
+    pub const fn new(number: u8) -> Option<Device> {
+        if number <= MAX_REPORT_ADDRESS { Some(Device(number)) } else { None }
+    }
+
+    /// Its number, 0–31.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        self.0
+    }
+
+    /// Every device that a bus can have, in the order in which they take turns.
+    pub fn all() -> impl Iterator<Item = Device> {
+        (0..=MAX_REPORT_ADDRESS).map(Device)
+    }
+}
+
+/// As `5`.
+impl fmt::Display for Device {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.0, f)
+    }
+}
+
+/// Where a datagram goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Address {
+    /// To one device.
+    Device(Device),
+    /// To every device on the bus, number 255.
+    Broadcast,
+}
+
+impl Address {
+    /// The address with that number: 0–31 or 255.
+    #[must_use]
+    pub const fn from_number(number: u8) -> Option<Address> {
+        match (number, Device::new(number)) {
+            (u8::MAX, _) => Some(Address::Broadcast),
+            (_, Some(device)) => Some(Address::Device(device)),
+            (_, None) => None,
+        }
+    }
+
+    /// The number, 0–31 or 255.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        match self {
+            Address::Device(device) => device.number(),
+            Address::Broadcast => u8::MAX,
+        }
+    }
+}
+
+impl From<Device> for Address {
+    fn from(device: Device) -> Address {
+        Address::Device(device)
+    }
+}
+
+/// As `5` or `all`.
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Address::Device(device) => device.fmt(f),
+            Address::Broadcast => f.pad("all"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn devices_are_0_to_31_and_255_is_everybody() {
+        for number in 0..=255 {
+            let address = Address::from_number(number);
+            assert_eq!(address.is_some(), number <= 31 || number == 255, "{number}");
+            assert!(address.is_none_or(|address| address.number() == number));
+            assert_eq!(Device::new(number).map(Device::number), (number <= 31).then_some(number));
+        }
+        assert_eq!(Device::all().count(), 32);
+        assert_eq!(Address::Broadcast.to_string(), "all");
+        assert_eq!(Address::from_number(7).unwrap().to_string(), "7");
+    }
+}
