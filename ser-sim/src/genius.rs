@@ -1,7 +1,8 @@
 //! Genius: a model of the GENI board, of the bus it sits on, and of other devices there, in virtual time.
 //!
-//! A [`Bus`] knows no time but the one it is told with [`Bus::advance_to`], and says with [`Bus::next_due_us`] when
-//! something happens next. What is connected to it implements [`Device`]: [`Board`]s, [`DiscreteBlock`]s and
+//! A [`Bus`] knows no time but the one it is told with [`Bus::advance_to`], and says with
+//! [`Bus::next_due_us`] when something happens next. What is connected to it implements [`Device`]:
+//! [`Board`]s, [`DiscreteBlock`]s and
 //! [`BusInterfaceUnit`]s. A host works with its board through the shared RAM alone:
 //!
 //! ```
@@ -14,8 +15,8 @@
 //! assert_eq!(bus.get_mut(board).host_read(0x0893), 1);
 //! ```
 //!
-//! The manual meant throughout is that of the GENI board, GFK-0073. Nothing in here shares code with the driver for the
-//! board, so that a misreading on one side shows on the other.
+//! The manual meant throughout is that of the GENI board, GFK-0073. Nothing in here shares code with the
+//! driver for the board, so that a misreading on one side shows on the other.
 
 mod block;
 mod board;
@@ -37,9 +38,7 @@ pub use block::{Circuits, DiscreteBlock};
 pub use board::{Board, BoardOptions, Led, Leds, Timing, Violation, ViolationKind};
 pub use bus::{ADDRESSES, Bus, DeviceId, Handle, Traffic};
 pub use bus_interface_unit::{BusInterfaceUnit, Side, StationData};
-pub use datagram::{
-    BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, Priority, STANDARD, subfunction,
-};
+pub use datagram::{BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, Priority, STANDARD, subfunction};
 pub use device::{Device, Message};
 pub use faults::{DeviceFault, Fault, Noise};
 pub use identity::{BlockKind, Identity};

@@ -6,6 +6,7 @@
 //!   result on every machine.
 //! - [`Simulator`] is a node that keeps pace with real time and answers on a pseudo-terminal or a TCP port:
 //!   what a host program can be tried against.
+//! - [`genius`] is the other way to a node: a GENI board, the Genius bus it sits on, and other devices there.
 
 mod breaker_trip;
 mod contacts;
@@ -14,6 +15,7 @@ mod emulator;
 mod error;
 #[cfg(unix)]
 mod external_bus;
+pub mod genius;
 mod line;
 mod machine;
 mod native;

@@ -1,0 +1,112 @@
+//! A GENI board, as a host sees it through the shared RAM and other devices see it on the bus.
+//!
+//! Chapters and tables named here are those of the GENI board's manual. Readings of unclear places are in the
+//! comments of the module that acts on them.
+
+mod bus_side;
+mod commands;
+mod host_side;
+mod interrupts;
+mod io_tables;
+mod live;
+mod lockout;
+mod log_in;
+mod options;
+mod ram;
+mod receive_queue;
+mod request_queue;
+mod setup;
+mod start_up;
+mod status;
+mod violations;
+
+pub use options::{BoardOptions, Timing};
+pub use start_up::{Led, Leds};
+pub use violations::{Violation, ViolationKind};
+
+use self::interrupts::InterruptPin;
+use self::live::Live;
+use self::ram::Ram;
+use self::start_up::Power;
+use self::violations::Violations;
+use super::map::RAM_LEN;
+
+/// A GENI board.
+///
+/// The host's side: [`host_read`](Board::host_read) and [`host_write`](Board::host_write) at any time, or
+/// [`sync_from_host`](Board::sync_from_host) and [`publish`](Board::publish) when host and board share a
+/// file; the
+/// [`interrupt`](Board::take_interrupt) pin, the reset pin, the [lamps](Board::leds) and the switches.
+/// [`violations`](Board::violations) tells what the host did that the manual forbids.
+pub struct Board {
+    options: BoardOptions,
+    now_us: u64,
+    /// The switches as they stand; read at reset, except for the device number in a conflict.
+    switches: u8,
+    monitor_plugged: bool,
+    power: Power,
+    ram: Ram,
+    /// The shared RAM as the host knows it, when that is another process with a file between.
+    host_image: Box<[u8; RAM_LEN]>,
+    interrupts: InterruptPin,
+    violations: Violations,
+    faults: BoardFaults,
+    /// Everything that a reset forgets.
+    live: Live,
+}
+
+/// What is wrong with a board.
+#[derive(Clone, Copy, Debug, Default)]
+struct BoardFaults {
+    late_by_us: u64,
+    next_start: u8,
+    out_of_memory: u32,
+}
+
+impl Board {
+    /// A board without power, which is as if it were held in reset.
+    #[must_use]
+    pub fn new(options: BoardOptions) -> Board {
+        let mut board = Board {
+            options,
+            now_us: 0,
+            switches: options.switches,
+            monitor_plugged: false,
+            power: Power::InReset,
+            ram: Ram::new(),
+            host_image: Box::new([0; RAM_LEN]),
+            interrupts: InterruptPin::default(),
+            violations: Violations::default(),
+            faults: BoardFaults::default(),
+            live: Live::new(options.switches),
+        };
+        board.hold_reset();
+        board
+    }
+
+    /// A board whose reset is released at once: at time zero, or when it is connected to a bus.
+    #[must_use]
+    pub fn powered(options: BoardOptions) -> Board {
+        let mut board = Board::new(options);
+        board.release_reset();
+        board
+    }
+
+    /// Turns the switches: takes effect at the next reset, and a device number also ends a conflict.
+    pub fn set_switches(&mut self, switches: u8) {
+        self.switches = switches;
+        self.leave_conflict();
+    }
+
+    /// Plugs a hand-held monitor into the host's connector, or pulls it out.
+    pub fn plug_monitor(&mut self, plugged: bool) {
+        self.monitor_plugged = plugged;
+        self.show_active();
+    }
+
+    /// The device number in force.
+    #[must_use]
+    pub fn number(&self) -> u8 {
+        self.live.setup.number()
+    }
+}

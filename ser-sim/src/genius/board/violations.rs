@@ -1,0 +1,53 @@
+//! What a host did although the manual forbids it.
+
+/// Which rule was broken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ViolationKind {
+    /// Access in the first 1.7 seconds after reset (chapters 2 and 3).
+    TooEarly,
+    /// Access to the reserved area (chapter 3).
+    ReservedArea,
+    /// A write to something only the board writes: the switches in the setup table, the status table but for
+    /// the OK flag, the device table but for the outputs flag (chapters 4, 5, 7).
+    ReadOnly,
+    /// A write to the lockout state, or a request that does not fit it (chapter 9).
+    Lockout,
+    /// A command while another was being carried out (chapter 10).
+    CommandBusy,
+    /// A write to the request queue's tail pointer (chapter 13).
+    TailPointer,
+    /// A head pointer beyond the tail, or a request released without a status (chapter 13).
+    RequestQueue,
+}
+
+/// A rule that the host broke.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Violation {
+    /// When.
+    pub at_us: u64,
+    /// Which rule.
+    pub kind: ViolationKind,
+    /// Where in the shared RAM.
+    pub offset: u16,
+}
+
+/// How many are kept; a host that breaks rules does it again and again.
+const KEPT: usize = 64;
+
+#[derive(Debug, Default)]
+pub(super) struct Violations {
+    kept: Vec<Violation>,
+}
+
+impl Violations {
+    pub(super) fn note(&mut self, at_us: u64, kind: ViolationKind, offset: usize) {
+        if self.kept.len() < KEPT {
+            let offset = u16::try_from(offset).unwrap_or(u16::MAX);
+            self.kept.push(Violation { at_us, kind, offset });
+        }
+    }
+
+    pub(super) fn kept(&self) -> &[Violation] {
+        &self.kept
+    }
+}

@@ -1,0 +1,66 @@
+//! Datagrams and the few of them that boards and blocks deal with themselves.
+
+/// The function code of the standard datagrams.
+pub const STANDARD: u8 = 0x20;
+/// A GENI refuses to send function codes above this one.
+pub const MAX_FUNCTION: u8 = 112;
+/// The most data a datagram carries; 128 bytes and, for memory accesses, a header.
+pub const MAX_DATAGRAM_LEN: usize = 134;
+/// The device number that means all of them.
+pub const BROADCAST: u8 = 255;
+
+/// Subfunction codes of standard datagrams.
+pub mod subfunction {
+    /// Who are you?
+    pub const READ_ID: u8 = 0x00;
+    /// The answer.
+    pub const READ_ID_REPLY: u8 = 0x01;
+    /// Sets or resets bits in a host's memory.
+    pub const WRITE_POINT: u8 = 0x0B;
+    /// Reads a host's memory.
+    pub const READ_DEVICE: u8 = 0x1E;
+    /// The answer.
+    pub const READ_DEVICE_REPLY: u8 = 0x1F;
+    /// Writes a host's memory.
+    pub const WRITE_DEVICE: u8 = 0x20;
+    /// A device was configured anew.
+    pub const CONFIGURATION_CHANGE: u8 = 0x22;
+    /// Which points of a bus interface unit are forced?
+    pub const READ_IO_FORCES: u8 = 0x40;
+    /// The answer.
+    pub const READ_IO_FORCES_REPLY: u8 = 0x41;
+}
+
+/// A message that is sent once, on request.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Datagram {
+    /// What kind of message.
+    pub function: u8,
+    /// Which one of the kind.
+    pub subfunction: u8,
+    /// Its content.
+    pub data: Vec<u8>,
+}
+
+impl Datagram {
+    /// A standard datagram.
+    #[must_use]
+    pub fn standard(subfunction: u8, data: impl Into<Vec<u8>>) -> Datagram {
+        Datagram { function: STANDARD, subfunction, data: data.into() }
+    }
+
+    /// Whether it is the standard datagram with this subfunction.
+    #[must_use]
+    pub fn is(&self, subfunction: u8) -> bool {
+        self.function == STANDARD && self.subfunction == subfunction
+    }
+}
+
+/// Whether a datagram waits until the scan's turn for one is free.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Priority {
+    /// One in each scan, from all devices together.
+    Normal,
+    /// On the sender's own turn, whatever else was sent in the scan.
+    High,
+}

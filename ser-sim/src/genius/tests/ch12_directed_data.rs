@@ -1,0 +1,35 @@
+//! Chapter 12: directed control data.
+
+use super::rig::{COMPLETE, Rig, lengths};
+
+#[test]
+fn each_host_gets_its_own_data() {
+    // The manual's example: 128 bytes from 30 to 29 and 56 bytes to 31.
+    let (mut rig, [b, a, c]) = Rig::started([29, 30, 31]);
+    assert_eq!(rig.configure(b, lengths(0, 128, 128)), COMPLETE);
+    assert_eq!(rig.configure(c, lengths(0, 56, 128)), COMPLETE);
+    rig.advance_ms(3_000);
+    assert_eq!((rig.device(a, 29)[6], rig.device(a, 31)[6]), (128, 56), "how much the sender may send");
+    // Boards that start with outputs enabled send to everyone who takes data; only one of them should.
+    rig.write(b, 0x1E01 + 8 * 31, 1);
+    rig.write(c, 0x1E01 + 8 * 29, 1);
+    rig.write_all(a, 0x3000 + 128 * 29, &[2; 128]);
+    rig.write_all(a, 0x3000 + 128 * 31, &[3; 128]);
+    rig.advance_ms(100);
+    assert_eq!(rig.read_array(b, 0x1F00), [2; 128]);
+    assert_eq!(rig.read_array(c, 0x1F00), [3; 56]);
+    assert_eq!(rig.read_array(c, 0x1F00 + 56), [0; 72], "no more than it asked for");
+    rig.assert_lawful(&[a, b, c]);
+}
+
+#[test]
+fn global_and_directed_data_go_together() {
+    let (mut rig, [a, b]) = Rig::started([30, 31]);
+    assert_eq!(rig.configure(a, lengths(56, 0, 128)), COMPLETE);
+    assert_eq!(rig.configure(b, lengths(0, 128, 128)), COMPLETE);
+    rig.write_all(a, 0x1F80, &[7; 56]);
+    rig.write_all(a, 0x3000 + 128 * 31, &[8; 128]);
+    rig.advance_ms(3_000);
+    assert_eq!(rig.read_array(b, 0x2000 + 128 * 30), [7; 56]);
+    assert_eq!(rig.read_array(b, 0x1F00), [8; 128]);
+}
