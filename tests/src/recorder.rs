@@ -1,5 +1,6 @@
 //! A recorder under test, native or as the ARM image, behind a pseudo-terminal.
 
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use chrono::NaiveDateTime;
@@ -12,6 +13,17 @@ pub const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Where the ARM image is: set by `cargo xtask test`, which builds it.
 pub const IMAGE_VARIABLE: &str = "SER_IMAGE_MPS2_AN385";
+
+/// The ARM image.
+///
+/// # Panics
+/// When nobody says where it is.
+#[must_use]
+pub fn image() -> PathBuf {
+    std::env::var_os(IMAGE_VARIABLE)
+        .unwrap_or_else(|| panic!("{IMAGE_VARIABLE} is not set: run `cargo xtask test`"))
+        .into()
+}
 
 /// What plays the node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,12 +46,25 @@ impl Recorder {
     /// When it does not answer, or the image is not there.
     #[must_use]
     pub fn start(kind: Kind, model: Model) -> Recorder {
-        let mut options = SimOptions::new(model, Port::Pty { link: None });
-        if kind == Kind::Emulated {
-            let image = std::env::var_os(IMAGE_VARIABLE)
-                .unwrap_or_else(|| panic!("{IMAGE_VARIABLE} is not set: run `cargo xtask test`"));
-            options.backend = Backend::Emulator(EmulatorOptions::new(image));
-        }
+        let backend = match kind {
+            Kind::Native => Backend::default(),
+            Kind::Emulated => Backend::Emulator(EmulatorOptions::new(image())),
+        };
+        Recorder::start_with(SimOptions { backend, ..SimOptions::new(model, Port::Pty { link: None }) })
+    }
+
+    /// Switches on the ARM image, which writes its log to a file.
+    ///
+    /// # Panics
+    /// When it does not answer, or the image is not there.
+    #[must_use]
+    pub fn start_logging(log: &Path) -> Recorder {
+        let emulator = EmulatorOptions { log: Some(log.to_owned()), ..EmulatorOptions::new(image()) };
+        let options = SimOptions::new(Model::Ser320, Port::Pty { link: None });
+        Recorder::start_with(SimOptions { backend: Backend::Emulator(emulator), ..options })
+    }
+
+    fn start_with(options: SimOptions) -> Recorder {
         let simulator = Simulator::start(options).unwrap_or_else(|error| panic!("{error}"));
         Recorder { simulator }
     }

@@ -12,7 +12,8 @@
 //! | 8018h         | the fault mark that the latest boot found              | recorder   |
 //! | 9000h, 9040h  | configuration memory, two blocks of 64 bytes           | recorder   |
 //!
-//! Words have 32 bits, little-endian. Fault marks: 0 none, 1 panic, 2 hard fault, 3 watchdog.
+//! Words have 32 bits, little-endian. Fault marks: 0 none, 1 panic, 2 hard fault, 3 watchdog, 4 stack
+//! overflow.
 //!
 //! # Design
 //! Straps are read once, at boot. The sample counter is written *after* the sample has been taken: whoever changes the
@@ -92,8 +93,21 @@ pub(crate) fn debounce() -> Debounce {
 #[repr(u32)]
 pub(crate) enum Fault {
     Panic = 1,
-    HardFault = 2,
+    Exception = 2,
     Watchdog = 3,
+    StackOverflow = 4,
+}
+
+/// The words for a fault mark; `None` when there is none.
+pub(crate) fn fault_name(mark: u32) -> Option<&'static str> {
+    Some(match mark {
+        0 => return None,
+        1 => "panic",
+        2 => "hard fault",
+        3 => "watchdog",
+        4 => "stack overflow",
+        _ => "unknown fault mark",
+    })
 }
 
 /// What was found at boot.
@@ -116,6 +130,7 @@ pub(crate) fn boot() -> Boot {
 }
 
 /// Leaves a mark for the next boot.
+#[inline]
 pub(crate) fn mark_fault(fault: Fault) {
     FAULT_MARK.write(fault as u32);
 }

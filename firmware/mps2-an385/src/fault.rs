@@ -7,7 +7,7 @@ use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
 
 use crate::external_bus::{self, Fault};
-use crate::log;
+use crate::{log, stack};
 
 /// The watchdog's first time-out has come and the second one has not.
 static WATCHDOG_BARKED: AtomicBool = AtomicBool::new(false);
@@ -37,7 +37,13 @@ fn panic(info: &PanicInfo<'_>) -> ! {
 
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    prepare(Fault::HardFault);
+    if !stack::contains(frame) {
+        // There is nothing to read and nothing to stand on: no calls from here. Should the compiler need the stack
+        // nevertheless, the processor locks up, and the watchdog resets the board.
+        external_bus::mark_fault(Fault::StackOverflow);
+        SCB::sys_reset()
+    }
+    prepare(Fault::Exception);
     // SAFETY: reading the fault status has no side effects.
     let status = unsafe { (*SCB::PTR).cfsr.read() };
     defmt::error!(

@@ -61,8 +61,8 @@ mod app {
         let boot = external_bus::boot();
         let model = external_bus::model();
         defmt::info!("version {=u8}, {}, boot {=u32}", VERSION, model, boot.count);
-        if boot.fault != 0 {
-            defmt::error!("reset itself: {=u32}", boot.fault);
+        if let Some(fault) = external_bus::fault_name(boot.fault) {
+            defmt::error!("the run before ended with a reset: {=str}", fault);
         }
 
         let (capture, reader) = channel.split(external_bus::debounce());

@@ -27,8 +27,8 @@ impl Report {
         self.looked_ms = now_ms;
         let diagnostics = diagnostics();
         if diagnostics != self.diagnostics {
+            log_changed(&self.diagnostics, &diagnostics);
             self.diagnostics = diagnostics;
-            defmt::warn!("{}", diagnostics);
         }
         let stack_bytes = stack::high_water();
         if stack_bytes > self.stack_bytes {
@@ -36,4 +36,36 @@ impl Report {
             defmt::info!("stack: {=usize} bytes used at most", stack_bytes);
         }
     }
+}
+
+/// One line for each counter that has moved.
+fn log_changed(before: &Diagnostics, after: &Diagnostics) {
+    macro_rules! each {
+        ($($counter:ident),* $(,)?) => {
+            // Without `..`, so that a new counter is not forgotten here.
+            let Diagnostics { $($counter),* } = after;
+            for (name, before, after) in [$((stringify!($counter), before.$counter, *$counter)),*] {
+                if after != before {
+                    defmt::warn!("{=str}: {=u32}", name, after);
+                }
+            }
+        };
+    }
+    each!(
+        frames_interrupted,
+        frames_not_hex,
+        frames_checksum,
+        frames_too_long,
+        frames_empty,
+        line_errors,
+        commands_unknown,
+        commands_wrong_length,
+        parameters_refused,
+        commands_overrun,
+        edges_lost,
+        samples_missed,
+        events_unreported,
+        events_unprinted,
+        storage_errors,
+    );
 }

@@ -1,4 +1,4 @@
-//! How much of the stack has been in use.
+//! The stack: where it is and how much of it has been in use.
 
 use core::ptr;
 
@@ -9,6 +9,13 @@ unsafe extern "C" {
     static _stack_end: u32;
     /// The word above the stack.
     static _stack_start: u32;
+}
+
+/// Whether all of `value` lies in the stack.
+#[inline]
+pub(crate) fn contains<T>(value: *const T) -> bool {
+    let (end, start) = (&raw const _stack_end, &raw const _stack_start);
+    value.addr() >= end.addr() && value.wrapping_add(1).addr() <= start.addr()
 }
 
 /// Bytes of the stack that have been in use at some time since boot.

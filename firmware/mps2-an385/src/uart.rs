@@ -179,7 +179,7 @@ impl SerialLine {
     /// Whether everything sent has left the transmitter. Notices bytes only when asked at least once per
     /// millisecond while they are being sent.
     pub(crate) fn is_quiet(&mut self, now_ms: u32) -> bool {
-        if self.to_send.len() > 0 || STATE.read() & TRANSMIT_FULL != 0 {
+        if !self.to_send.is_empty() || STATE.read() & TRANSMIT_FULL != 0 {
             self.busy_ms = now_ms;
         }
         // One character may be in the shift register; the tick may be just about to end.

@@ -1,0 +1,55 @@
+//! `lint`: format, clippy and documentation.
+
+use crate::places;
+use crate::setup::components;
+use crate::setup::cross::{self, CrossToolchain};
+use crate::steps::{self, Result, heading, note};
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask lint
+  cargo fmt --all           mends the format; in firmware/, too";
+
+/// Check format, clippy and documentation of both workspaces; warnings are errors.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Arguments {}
+
+pub(crate) fn run(_arguments: &Arguments) -> Result<()> {
+    host()?;
+    match cross::find() {
+        Ok(toolchain) => firmware(&toolchain),
+        Err(missing) => {
+            note(&format!("left out: clippy on the firmware.{missing}"));
+            Ok(())
+        }
+    }
+}
+
+/// All that needs no cross toolchain.
+pub(crate) fn host() -> Result<()> {
+    components::find()?;
+    heading("Format");
+    steps::run(steps::cargo().args(["fmt", "--all", "--check"]))?;
+    steps::run(steps::cargo().current_dir(places::firmware()).args(["fmt", "--all", "--check"]))?;
+
+    heading("Clippy");
+    let deny = ["--", "-D", "warnings"];
+    steps::run(steps::cargo().args(["clippy", "--workspace", "--all-targets"]).args(deny))?;
+    steps::run(steps::cargo().args(["clippy", "--package", "xtask", "--features", "log"]).args(deny))?;
+
+    heading("Documentation");
+    steps::run(steps::cargo().env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--no-deps", "--workspace"]))
+}
+
+/// What is flashed.
+pub(crate) fn firmware(toolchain: &CrossToolchain) -> Result<()> {
+    heading("Clippy on the firmware");
+    match toolchain.clippy() {
+        Some(mut clippy) => steps::run(clippy.args(["--release", "--", "-D", "warnings"])),
+        None => {
+            note("left out: this cross toolchain has no clippy");
+            Ok(())
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! `qemu`: the ARM image in the emulator, on a pseudo-terminal or a TCP port.
+
+use std::ffi::OsString;
+use std::process::Command;
+
+use crate::firmware;
+use crate::setup::{cross, emulator};
+use crate::steps::{self, Result, heading};
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask qemu --pty /tmp/ser                    then: ser-cli -p /tmp/ser status
+  cargo xtask qemu --tcp 127.0.0.1:4000              then: ser-cli -p tcp://127.0.0.1:4000 status
+  cargo xtask qemu --pty /tmp/ser --log ser.log      then: cargo xtask log --follow ser.log
+
+`ser-cli sim --help` lists all options.";
+
+/// Run the ARM image in QEMU until Ctrl-C; takes the options of `ser-cli sim`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Arguments {
+    /// Options of `ser-cli sim`.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    options: Vec<OsString>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    emulator::find()?;
+    let toolchain = cross::find()?;
+    heading("Firmware");
+    let image = firmware::build(&toolchain, &firmware::MPS2_AN385)?;
+    build_ser_cli()?;
+    steps::become_program(ser_cli("sim").arg("--image").arg(image).args(&arguments.options))
+}
+
+/// Builds `ser-cli`, showing the progress; the first time takes a while.
+pub(crate) fn build_ser_cli() -> Result<()> {
+    heading("ser-cli");
+    steps::run(steps::cargo().args(["build", "--package", "ser-cli"]))?;
+    eprintln!();
+    Ok(())
+}
+
+/// `ser-cli` with this subcommand. File names among the options are meant from where the user is.
+pub(crate) fn ser_cli(subcommand: &str) -> Command {
+    let mut command = steps::cargo();
+    if let Ok(here) = std::env::current_dir() {
+        command.current_dir(here);
+    }
+    command.args(["run", "--quiet", "--package", "ser-cli", "--manifest-path"]);
+    command.arg(crate::places::root().join("Cargo.toml"));
+    command.args(["--", subcommand]);
+    command
+}

@@ -1,0 +1,194 @@
+//! A Rust that builds for the boards.
+//!
+//! In this order: the toolchain in use, if it has the target's library; the same after `rustup target add`;
+//! Debian's own Rust, which comes with the library's source and builds that as well.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use crate::places;
+use crate::setup::apt;
+use crate::steps::{self, Failure, Result, heading, note, output, unrelated, works};
+
+/// Cortex-M3.
+pub(crate) const TARGET: &str = "thumbv7m-none-eabi";
+
+/// What `Cargo.toml` asks for.
+const OLDEST_RUST: (u32, u32) = (1, 88);
+
+/// The target's library is a few megabytes; a network that takes longer is as good as none.
+const DOWNLOAD_WITHIN: Duration = Duration::from_secs(180);
+
+/// Debian's packages for Rust: what browsers are built with is the newest there is. Elsewhere the plain names may do.
+const DEBIAN_RUST: [[&str; 3]; 2] =
+    [["rustc-web", "cargo-web", "rust-web-src"], ["rustc", "cargo", "rust-src"]];
+const DEBIAN_CLIPPY: [&str; 2] = ["rust-web-clippy", "rust-clippy"];
+
+const DEBIAN_CARGO: &str = "/usr/bin/cargo";
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+const DEBIAN_CARGO_CLIPPY: &str = "/usr/bin/cargo-clippy";
+
+/// A Rust that builds for the boards.
+#[derive(Debug)]
+pub(crate) enum CrossToolchain {
+    /// The toolchain in use.
+    InUse,
+    /// Debian's Rust, with the linker that it is to use.
+    Debian { linker: PathBuf },
+}
+
+impl CrossToolchain {
+    /// Cargo with this subcommand, for the firmware workspace.
+    pub(crate) fn cargo(&self, subcommand: &str) -> Command {
+        match self {
+            CrossToolchain::InUse => {
+                let mut cargo = steps::cargo();
+                cargo.arg(subcommand);
+                common(cargo)
+            }
+            CrossToolchain::Debian { linker } => debian(DEBIAN_CARGO, subcommand, linker),
+        }
+    }
+
+    /// Clippy for the firmware workspace, if there is one.
+    pub(crate) fn clippy(&self) -> Option<Command> {
+        match self {
+            CrossToolchain::InUse => Some(self.cargo("clippy")),
+            // Through /usr/bin/cargo, rustup's clippy would be found first.
+            CrossToolchain::Debian { linker } => {
+                Path::new(DEBIAN_CARGO_CLIPPY).exists().then(|| debian(DEBIAN_CARGO_CLIPPY, "clippy", linker))
+            }
+        }
+    }
+}
+
+fn common(mut cargo: Command) -> Command {
+    cargo.current_dir(places::firmware());
+    cargo.arg("--target-dir").arg(places::firmware_target());
+    cargo
+}
+
+fn debian(program: &str, subcommand: &str, linker: &Path) -> Command {
+    let mut cargo = unrelated(program);
+    cargo.env("CARGO", DEBIAN_CARGO).env("RUSTC", DEBIAN_RUSTC);
+    // Building the library is not stable yet; the compiler and its source are of one version, so it works.
+    cargo.env("RUSTC_BOOTSTRAP", "1");
+    cargo.env(format!("CARGO_TARGET_{}_LINKER", TARGET.to_uppercase().replace('-', "_")), linker);
+    cargo.args([subcommand, "-Zbuild-std=core"]);
+    common(cargo)
+}
+
+/// Finds a toolchain, or installs one.
+pub(crate) fn find() -> Result<CrossToolchain> {
+    if has_library() {
+        return Ok(CrossToolchain::InUse);
+    }
+    if works(unrelated("rustup").arg("--version")) {
+        heading(&format!("Adding {TARGET} to the toolchain"));
+        if add_target() && has_library() {
+            return Ok(CrossToolchain::InUse);
+        }
+        note("rustup cannot get it");
+    }
+    if apt::there() {
+        if let Some(toolchain) = debian_toolchain() {
+            return Ok(toolchain);
+        }
+        heading("Installing Debian's Rust for the firmware");
+        for packages in DEBIAN_RUST {
+            match apt::install(&packages) {
+                Ok(()) => break,
+                Err(why) => note(&why),
+            }
+        }
+        // Nothing depends on it but how much is checked.
+        let _ = DEBIAN_CLIPPY.into_iter().any(|package| apt::install(&[package]).is_ok());
+        if rust_lld().is_none() && !on_path("ld.lld") {
+            let _ = apt::install(&["lld"]).map_err(|why| note(&why));
+        }
+        if let Some(toolchain) = debian_toolchain() {
+            return Ok(toolchain);
+        }
+    }
+    Err(Failure::new(format!(
+        "there is no Rust for {TARGET}; get it with\n  rustup target add {TARGET}\n\
+         or, on Debian 12 without access to static.rust-lang.org, with\n  \
+         sudo apt-get install --no-install-recommends {} {} lld",
+        DEBIAN_RUST[0].join(" "),
+        DEBIAN_CLIPPY[0]
+    )))
+}
+
+/// Whether the toolchain in use has the target's library.
+fn has_library() -> bool {
+    let library = output(steps::in_use("rustc").args(["--print", "target-libdir", "--target", TARGET]));
+    library.is_some_and(|library| {
+        let mut files = Path::new(&library).read_dir().into_iter().flatten().flatten();
+        files.any(|file| file.file_name().to_string_lossy().starts_with("libcore"))
+    })
+}
+
+/// `rustup target add`, silently, and not for long.
+fn add_target() -> bool {
+    let mut rustup = steps::in_use("rustup");
+    rustup.args(["target", "add", TARGET]).env("RUSTUP_MAX_RETRIES", "0");
+    rustup.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let Ok(mut child) = rustup.spawn() else { return false };
+    let began = Instant::now();
+    while began.elapsed() < DOWNLOAD_WITHIN {
+        match child.try_wait() {
+            Ok(Some(status)) => return status.success(),
+            Ok(None) => sleep(Duration::from_millis(50)),
+            Err(_) => break,
+        }
+    }
+    // Whether or not it still runs: we do not wait for it.
+    let _ = child.kill();
+    let _ = child.wait();
+    false
+}
+
+/// Debian's Rust, if it is installed, new enough, and has source and linker.
+fn debian_toolchain() -> Option<CrossToolchain> {
+    let version = output(unrelated(DEBIAN_RUSTC).arg("--version"))?;
+    let sysroot = PathBuf::from(output(unrelated(DEBIAN_RUSTC).args(["--print", "sysroot"]))?);
+    let has_source = sysroot.join("lib/rustlib/src/rust/library/core").exists();
+    let complete = parse_version(&version)? >= OLDEST_RUST && has_source && Path::new(DEBIAN_CARGO).exists();
+    let linker = rust_lld().or_else(|| on_path("ld.lld").then(|| "ld.lld".into()))?;
+    complete.then_some(CrossToolchain::Debian { linker })
+}
+
+/// The linker that comes with rustup's toolchain.
+fn rust_lld() -> Option<PathBuf> {
+    // <sysroot>/lib/rustlib/<host>/lib; the programs are beside.
+    let libraries = PathBuf::from(output(steps::in_use("rustc").args(["--print", "target-libdir"]))?);
+    Some(libraries.parent()?.join("bin/rust-lld")).filter(|linker| linker.exists())
+}
+
+fn on_path(program: &str) -> bool {
+    works(unrelated(program).arg("--version"))
+}
+
+/// Of `rustc 1.96.0 (ac68faa20 2026-05-25)`.
+fn parse_version(text: &str) -> Option<(u32, u32)> {
+    let mut numbers = text.split_whitespace().nth(1)?.split('.');
+    Some((numbers.next()?.parse().ok()?, numbers.next()?.parse().ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions_are_compared_as_numbers() {
+        assert_eq!(
+            parse_version("rustc 1.96.0 (ac68faa20 2026-05-25) (built from a source tarball)"),
+            Some((1, 96))
+        );
+        assert!(parse_version("rustc 1.100.0") > Some(OLDEST_RUST));
+        assert!(parse_version("rustc 1.63.0") < Some(OLDEST_RUST));
+        assert_eq!(parse_version(""), None);
+    }
+}

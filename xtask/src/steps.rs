@@ -1,0 +1,152 @@
+//! Runs other programs: headings with the time, and how to repeat what failed.
+
+use std::ffi::OsStr;
+use std::fmt;
+use std::path::Path;
+use std::process::Command;
+use std::sync::OnceLock;
+use std::time::Instant;
+
+/// Why a verb ended early; says what to do.
+#[derive(Debug)]
+pub(crate) struct Failure(String);
+
+impl Failure {
+    pub(crate) fn new(text: impl Into<String>) -> Failure {
+        Failure(text.into())
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "\nxtask: {}", self.0)
+    }
+}
+
+pub(crate) type Result<T> = std::result::Result<T, Failure>;
+
+/// Announces the next step, with the time since the first one.
+pub(crate) fn heading(text: &str) {
+    static BEGAN: OnceLock<Instant> = OnceLock::new();
+    let seconds = BEGAN.get_or_init(Instant::now).elapsed().as_secs();
+    eprintln!("\n==> {}:{:02}  {text}", seconds / 60, seconds % 60);
+}
+
+/// A remark on what is not done, and why.
+pub(crate) fn note(text: &str) {
+    eprintln!("    {text}");
+}
+
+/// Variables that cargo and rustup set for xtask, and that mislead other toolchains.
+const OURS: [&str; 14] = [
+    "CARGO",
+    "CARGO_BIN_NAME",
+    "CARGO_CRATE_NAME",
+    "CARGO_MANIFEST_DIR",
+    "CARGO_MANIFEST_PATH",
+    "CARGO_PRIMARY_PACKAGE",
+    "DYLD_FALLBACK_LIBRARY_PATH",
+    "LD_LIBRARY_PATH",
+    "OUT_DIR",
+    "RUSTC",
+    "RUSTDOC",
+    "RUSTUP_TOOLCHAIN",
+    "RUSTUP_TOOLCHAIN_SOURCE",
+    "RUST_RECURSION_COUNT",
+];
+
+/// A program that knows nothing of the cargo that runs xtask.
+pub(crate) fn unrelated(program: impl AsRef<OsStr>) -> Command {
+    let mut command = Command::new(program);
+    OURS.into_iter().for_each(|name| _ = command.env_remove(name));
+    command
+}
+
+/// A program of the toolchain that runs xtask.
+pub(crate) fn in_use(program: &str) -> Command {
+    let mut command = unrelated(program);
+    if let Some(toolchain) = std::env::var_os("RUSTUP_TOOLCHAIN") {
+        command.env("RUSTUP_TOOLCHAIN", toolchain);
+    }
+    command
+}
+
+/// The host's cargo, in the root of the repository.
+pub(crate) fn cargo() -> Command {
+    let mut command = in_use("cargo");
+    command.current_dir(crate::places::root());
+    command
+}
+
+/// Runs a program to its end; it prints what it likes.
+pub(crate) fn run(command: &mut Command) -> Result<()> {
+    let status = command
+        .status()
+        .map_err(|error| Failure::new(format!("cannot run {}: {error}", command.get_program().display())))?;
+    if status.success() {
+        Ok(())
+    } else {
+        Err(Failure::new(format!("this failed ({status}); to repeat it alone:\n  {}", repeat(command))))
+    }
+}
+
+/// Becomes the program: Ctrl-C and exit status are between it and whoever called us.
+pub(crate) fn become_program(command: &mut Command) -> Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::process::CommandExt;
+        let error = command.exec();
+        Err(Failure::new(format!("cannot run {}: {error}", command.get_program().display())))
+    }
+    #[cfg(not(unix))]
+    run(command)
+}
+
+/// What a program prints, if it can be run and succeeds.
+pub(crate) fn output(command: &mut Command) -> Option<String> {
+    let output = command.output().ok().filter(|output| output.status.success())?;
+    Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+/// Whether a program can be run and succeeds, silently.
+pub(crate) fn works(command: &mut Command) -> bool {
+    output(command).is_some()
+}
+
+/// The command as one would type it.
+fn repeat(command: &Command) -> String {
+    let mut line = String::new();
+    if let Some(directory) = command.get_current_dir().filter(|&directory| directory != Path::new(".")) {
+        line += &format!("cd {} && ", quoted(directory.as_os_str()));
+    }
+    for (name, value) in command.get_envs() {
+        // Who types the command has no variables to remove, and no toolchain chosen by cargo.
+        if let Some(value) = value.filter(|_| name != "RUSTUP_TOOLCHAIN") {
+            line += &format!("{}={} ", name.display(), quoted(value));
+        }
+    }
+    line += &quoted(command.get_program());
+    for argument in command.get_args() {
+        line += " ";
+        line += &quoted(argument);
+    }
+    line
+}
+
+fn quoted(text: &OsStr) -> String {
+    let text = text.to_string_lossy();
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@\\".contains(c);
+    if !text.is_empty() && text.chars().all(plain) { text.into_owned() } else { format!("'{text}'") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_is_repeated_as_one_would_type_it() {
+        let mut command = unrelated("cargo");
+        command.current_dir("/a b").env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--no-deps"]);
+        assert_eq!(repeat(&command), "cd '/a b' && RUSTDOCFLAGS='-D warnings' cargo doc --no-deps");
+    }
+}
