@@ -116,19 +116,19 @@ fn parse_set_mode(params: &[u8]) -> Result<Command, ParseError> {
         [mode, _version] => core::slice::from_ref(mode),
         other => other,
     };
-    parse_params(Code::Mode, params, byte(flag)).map(|recording| Command::SetMode { recording })
+    parse_params(Code::Mode, params, 1, byte(flag)).map(|recording| Command::SetMode { recording })
 }
 
 fn parse_print(params: &[u8]) -> Result<Command, ParseError> {
     let (start, count) = match params.len() {
-        2 => parse_params(Code::Print, params, (be_u8.map(u16::from), be_u8.map(u16::from)))?,
-        _ => parse_params(Code::Print, params, (be_u16, be_u16))?,
+        2 => parse_params(Code::Print, params, 2, (be_u8.map(u16::from), be_u8.map(u16::from)))?,
+        _ => parse_params(Code::Print, params, 4, (be_u16, be_u16))?,
     };
     Ok(Command::Print { start, count })
 }
 
 fn parse_set_clock(params: &[u8]) -> Result<Command, ParseError> {
-    let time = parse_params(Code::SetClock, params, TimeStamp::parser())?;
+    let time = parse_params(Code::SetClock, params, TimeStamp::LEN, TimeStamp::parser())?;
     time.check().map_err(|invalid| ParseError::BadValue {
         code: Code::SetClock.byte(),
         offset: 1 + invalid.offset,
@@ -172,12 +172,17 @@ mod tests {
             (Code::SetClock, &[9]),
         ];
         for (code, lengths) in allowed {
-            for length in 1..=255 {
-                let mut body = vec![0; length];
+            // With values that are right and with values that no field can have.
+            for (length, filling) in (1..=255).flat_map(|length| [(length, 0), (length, 0xFF)]) {
+                let mut body = vec![filling; length];
                 body[0] = code.byte();
                 let refused =
                     Command::parse(&body) == Err(ParseError::WrongLength { code: code.byte(), length });
-                assert_eq!(refused, !lengths.contains(&length), "{code:?} with {length} bytes");
+                assert_eq!(
+                    refused,
+                    !lengths.contains(&length),
+                    "{code:?} with {length} bytes {filling:02X}h"
+                );
             }
         }
     }

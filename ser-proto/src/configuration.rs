@@ -191,7 +191,7 @@ impl Configure {
                     auto_print,
                 },
             );
-        parse_params(Code::Configure, params, fields)
+        parse_params(Code::Configure, params, Configuration::BODY_LEN - 1, fields)
     }
 
     pub(crate) fn to_body(self) -> Body {

@@ -41,7 +41,7 @@ impl LastBroadcast {
                 millisecond,
             },
         );
-        let reply = parse_params(Code::LastBroadcast, params, fields)?;
+        let reply = parse_params(Code::LastBroadcast, params, 6, fields)?;
         Ok((reply != LastBroadcast::NONE).then_some(reply))
     }
 

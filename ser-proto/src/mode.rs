@@ -25,7 +25,7 @@ pub struct Mode {
 impl Mode {
     pub(crate) fn parse(params: Bytes<'_>) -> Result<Mode, ParseError> {
         let fields = (byte(flag), be_u8).map(|(recording, version)| Mode { recording, version });
-        parse_params(Code::Mode, params, fields)
+        parse_params(Code::Mode, params, 2, fields)
     }
 
     pub(crate) fn to_body(self) -> Body {

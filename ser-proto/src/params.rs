@@ -32,13 +32,17 @@ impl FromExternalError<Bytes<'_>, u16> for Fault {
     }
 }
 
-/// Parses `params`, the bytes after the command byte, completely.
+/// Parses `params`, the bytes after the command byte, which must be `expected_len` bytes.
 pub(crate) fn parse_params<'a, T>(
     code: Code,
     params: Bytes<'a>,
+    expected_len: usize,
     parser: impl Parser<Bytes<'a>, Output = T, Error = Fault>,
 ) -> Result<T, ParseError> {
     let length = params.len() + 1;
+    if params.len() != expected_len {
+        return Err(ParseError::WrongLength { code: code.byte(), length });
+    }
     // `finish()` would do, but it panics on `Incomplete`, which these parsers never return.
     match nom::combinator::all_consuming(parser).parse(params) {
         Ok((_, message)) => Ok(message),

@@ -41,8 +41,12 @@ impl ReadReply {
             .split_at_checked(READ_REPLY_HEADER_LEN - 1)
             .ok_or(ParseError::WrongLength { code: Code::Read.byte(), length: params.len() + 1 })?;
         let count = byte(|count| (usize::from(count) <= MAX_ENTRIES).then_some(count));
-        let (start, count, total, next_slot) =
-            parse_params(Code::Read, header, (be_u16, count, be_u16, word(below(MAX_SIZE))))?;
+        let (start, count, total, next_slot) = parse_params(
+            Code::Read,
+            header,
+            READ_REPLY_HEADER_LEN - 1,
+            (be_u16, count, be_u16, word(below(MAX_SIZE))),
+        )?;
         let model = model_of(count, entries.len())?;
         let entries = match model {
             Some(model) => parse_entries(model, count, entries)?,
@@ -81,7 +85,7 @@ fn model_of(count: u8, bytes: usize) -> Result<Option<Model>, ParseError> {
 fn parse_entries(model: Model, count: u8, bytes: Bytes<'_>) -> Result<Vec<Entry, MAX_ENTRIES>, ParseError> {
     let mut entries = Vec::new();
     for entry in bytes.chunks_exact(model.entry_len()) {
-        let entry = parse_params(Code::Read, entry, Entry::parser(model))?;
+        let entry = parse_params(Code::Read, entry, model.entry_len(), Entry::parser(model))?;
         entries.push(entry).map_err(|_| ParseError::EntrySize { count, bytes: bytes.len() })?;
     }
     Ok(entries)
@@ -89,5 +93,5 @@ fn parse_entries(model: Model, count: u8, bytes: Bytes<'_>) -> Result<Vec<Entry,
 
 /// The parameters of an `R` command: start and count as they came, not checked against any log.
 pub(crate) fn parse_request(params: Bytes<'_>) -> Result<(u16, u8), ParseError> {
-    parse_params(Code::Read, params, (be_u16, be_u8))
+    parse_params(Code::Read, params, 3, (be_u16, be_u8))
 }
