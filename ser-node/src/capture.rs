@@ -11,7 +11,9 @@ use heapless::spsc::{Consumer, Producer, Queue};
 use crate::debounce::{Debounce, Filter};
 
 /// How many changes may wait for the main loop: a quarter of a second with a change every millisecond.
-pub const QUEUE_LEN: usize = 256;
+///
+/// One less than a power of two: one slot of the queue stays free, and its index is then masked instead of divided.
+pub const QUEUE_LEN: usize = 255;
 
 /// Inputs that changed in one sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +29,6 @@ pub(crate) struct Sample {
 
 /// What the interrupt and the main loop share.
 pub struct CaptureChannel {
-    // One slot of the queue always stays free.
     queue: Queue<Sample, { QUEUE_LEN + 1 }>,
     shared: Shared,
 }
@@ -35,6 +36,8 @@ pub struct CaptureChannel {
 #[derive(Default)]
 struct Shared {
     tick_ms: AtomicU32,
+    /// The inputs that are on after debounce, whether or not the queue had room for the change.
+    state: AtomicU32,
     edges_lost: AtomicU32,
     samples_missed: AtomicU32,
 }
@@ -47,6 +50,7 @@ impl CaptureChannel {
             queue: Queue::new(),
             shared: Shared {
                 tick_ms: AtomicU32::new(0),
+                state: AtomicU32::new(0),
                 edges_lost: AtomicU32::new(0),
                 samples_missed: AtomicU32::new(0),
             },
@@ -93,9 +97,13 @@ impl Capture<'_> {
                 self.push(Sample { tick_ms, changed: 0, state: inputs });
             }
             Some(_) => {
-                let missed = tick_ms.wrapping_sub(self.tick_ms).wrapping_sub(1);
-                if missed != 0 {
-                    self.make_up(tick_ms, missed);
+                let elapsed = tick_ms.wrapping_sub(self.tick_ms);
+                if elapsed == 0 || elapsed > u32::MAX / 2 {
+                    // There is one sample to a millisecond, and none to one that is past.
+                    return;
+                }
+                if elapsed > 1 {
+                    self.make_up(tick_ms, elapsed - 1);
                 }
                 self.step(tick_ms, inputs);
             }
@@ -134,6 +142,7 @@ impl Capture<'_> {
 
     #[inline]
     fn push(&mut self, sample: Sample) {
+        self.shared.state.store(sample.state, Ordering::Relaxed);
         if self.queue.enqueue(sample).is_err() {
             let lost = &self.shared.edges_lost;
             let edges = sample.changed.count_ones();
@@ -154,6 +163,12 @@ impl CaptureReader<'_> {
     #[must_use]
     pub fn tick_ms(&self) -> u32 {
         self.shared.tick_ms.load(Ordering::Acquire)
+    }
+
+    /// The inputs that are on as of the latest sample, after debounce.
+    #[must_use]
+    pub fn state(&self) -> u32 {
+        self.shared.state.load(Ordering::Relaxed)
     }
 
     /// Input changes that found the queue full, since power-up.
@@ -211,7 +226,20 @@ mod tests {
         }
         let read = drain(&mut reader);
         assert_eq!(read.len(), QUEUE_LEN);
-        assert_eq!(reader.edges_lost(), 2 * (300 - 256));
+        assert_eq!(reader.edges_lost(), 2 * (300 - 255));
+        // The last change was dropped, and is in effect all the same.
+        assert_eq!(reader.state(), 0b11);
+    }
+
+    #[test]
+    fn a_second_sample_in_a_millisecond_is_none() {
+        let mut channel = CaptureChannel::new();
+        let (mut capture, mut reader) = channel.split(Debounce::OFF);
+        capture.sample(1, 0);
+        capture.sample(1, 1);
+        capture.sample(2, 1);
+        assert_eq!(drain(&mut reader), [(1, 0, 0), (2, 1, 1)]);
+        assert_eq!(reader.samples_missed(), 0);
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! Date and time: the millisecond tick plus an offset.
 //!
 //! Setting the clock moves the offset and never the tick. A change that happened before the clock was set but is
-//! recorded only afterwards, because debounce held it back, still gets the time of the old setting.
+//! recorded only afterwards, because debounce held it back, still gets the time of the setting of its moment.
 
 use chrono::{DateTime, NaiveDateTime};
 use ser_proto::TimeStamp;
+
+use crate::history::History;
 
 /// A battery-backed clock that keeps the time while the recorder is off.
 pub trait Rtc {
@@ -36,33 +38,36 @@ const CENTURY_MS: i64 = 36_525 * 24 * 60 * 60 * 1000;
 /// Turns ticks into date and time.
 #[derive(Clone, Debug)]
 pub(crate) struct Clock {
-    /// Milliseconds since 1970 at tick 0, by the present setting and by the one before.
-    offset_ms: i64,
-    offset_before_ms: i64,
-    /// The tick from which the present setting counts.
-    set_at_ms: u64,
+    /// Milliseconds since 1970 at tick 0.
+    offset_ms: History<i64>,
 }
 
 impl Clock {
     /// A clock that shows `now` at `tick_ms`; 2000-01-01 when the time is not known.
     pub(crate) fn new(tick_ms: u64, now: Option<NaiveDateTime>) -> Clock {
         let now_ms = now.map_or(NEVER_SET_MS, to_calendar_ms);
-        let offset_ms = now_ms.saturating_sub_unsigned(tick_ms);
-        Clock { offset_ms, offset_before_ms: offset_ms, set_at_ms: 0 }
+        Clock { offset_ms: History::new(now_ms.saturating_sub_unsigned(tick_ms)) }
     }
 
-    /// From `tick_ms` on the clock shows `now` and what follows it.
+    /// In `tick_ms` the clock shows `now`.
     pub(crate) fn set(&mut self, tick_ms: u64, now: NaiveDateTime) {
-        self.offset_before_ms = self.offset_ms;
-        self.offset_ms = to_calendar_ms(now).saturating_sub_unsigned(tick_ms);
-        self.set_at_ms = tick_ms;
+        self.offset_ms.set(tick_ms, to_calendar_ms(now).saturating_sub_unsigned(tick_ms));
     }
 
-    /// Calendar time at `tick_ms`, in milliseconds since 1970 within the hundred years of two-digit years.
-    pub(crate) fn at(&self, tick_ms: u64) -> i64 {
-        let offset = if tick_ms >= self.set_at_ms { self.offset_ms } else { self.offset_before_ms };
-        offset.saturating_add_unsigned(tick_ms).rem_euclid(CENTURY_MS)
+    /// Calendar time of the sample of `tick_ms`, as the clock was set then.
+    pub(crate) fn stamp_ms(&self, tick_ms: u64) -> i64 {
+        within_century(self.offset_ms.at_sample(tick_ms), tick_ms)
     }
+
+    /// Calendar time in `tick_ms`, as the clock is set now.
+    pub(crate) fn now_ms(&self, tick_ms: u64) -> i64 {
+        within_century(self.offset_ms.latest(), tick_ms)
+    }
+}
+
+/// Milliseconds since 1970, within the hundred years of two-digit years.
+fn within_century(offset_ms: i64, tick_ms: u64) -> i64 {
+    offset_ms.saturating_add_unsigned(tick_ms).rem_euclid(CENTURY_MS)
 }
 
 fn to_calendar_ms(time: NaiveDateTime) -> i64 {
@@ -90,7 +95,7 @@ mod tests {
     }
 
     fn shows(clock: &Clock, tick_ms: u64) -> String {
-        to_time_stamp(clock.at(tick_ms)).to_string()
+        to_time_stamp(clock.stamp_ms(tick_ms)).to_string()
     }
 
     #[test]
@@ -103,10 +108,11 @@ mod tests {
         let mut clock = Clock::new(5, Some(time("2026-11-22T10:00:00.000")));
         assert_eq!(shows(&clock, 5), "2026-11-22T10:00:00.000");
         clock.set(1000, time("2026-11-22T12:00:00.250"));
-        assert_eq!(shows(&clock, 1000), "2026-11-22T12:00:00.250");
+        assert_eq!(to_time_stamp(clock.now_ms(1000)).to_string(), "2026-11-22T12:00:00.250");
+        assert_eq!(shows(&clock, 1001), "2026-11-22T12:00:00.251");
         assert_eq!(shows(&clock, 1751), "2026-11-22T12:00:01.001");
-        // What happened before keeps the time of the old setting.
-        assert_eq!(shows(&clock, 999), "2026-11-22T10:00:00.994");
+        // What was sampled before keeps the time of the old setting.
+        assert_eq!(shows(&clock, 1000), "2026-11-22T10:00:00.995");
     }
 
     #[test]

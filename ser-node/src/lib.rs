@@ -7,7 +7,8 @@
 //! 3. [`clock`]: ticks since power-up become date and time;
 //! 4. [`event_log`]: the ring of up to 2048 events;
 //! 5. [`node`]: serves the commands and decides what goes out;
-//! 6. [`serial_port`]: the bytes of the RS-232 line.
+//! 6. [`serial_port`]: the bytes of the RS-232 line; [`genius_port`]: the datagrams of the Genius bus, for boards that
+//!    have one.
 //!
 //! Time and bytes are passed in; bytes come out. A board or the simulator calls
 //! [`Capture::sample`] every millisecond and [`Node::poll`] as often as it can.
@@ -23,6 +24,8 @@ pub mod clock;
 pub mod debounce;
 pub mod diagnostics;
 pub mod event_log;
+pub mod genius_port;
+mod history;
 pub mod liveness;
 pub mod node;
 mod print_line;
@@ -38,6 +41,7 @@ pub use clock::{NoRtc, Rtc};
 pub use debounce::Debounce;
 pub use diagnostics::Diagnostics;
 pub use event_log::{Event, EventLog};
+pub use genius_port::{GeniusDiagnostics, GeniusOptions, GeniusPort};
 pub use liveness::Liveness;
 pub use node::{Node, NodeParts, VERSION};
 pub use settings::{CopyNumber, RECORD_LEN, Storage};

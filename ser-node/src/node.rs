@@ -3,7 +3,7 @@
 //! A main loop reads the tick, hands over the bytes that have arrived, calls [`Node::poll`] with that tick, and takes
 //! bytes to send for as long as there is room for them.
 
-use ser_proto::{Baud, Code, Command, Model};
+use ser_proto::{Baud, Command, Inputs, MAX_ENTRIES, Model, Reply};
 
 use crate::capture::CaptureReader;
 use crate::clock::Rtc;
@@ -47,7 +47,7 @@ pub struct Node<'a, S, R> {
     capture: CaptureReader<'a>,
     ticks: Ticks,
     sequencer: Sequencer,
-    recorder: Recorder<'a, S, R>,
+    pub(crate) recorder: Recorder<'a, S, R>,
     serial: SerialPort,
 }
 
@@ -77,19 +77,28 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.record_until(now_ms);
     }
 
-    /// Takes a byte from the RS-232 line that arrived at `tick_ms`, and carries out the command that it completes.
+    /// Takes a byte from the RS-232 line that arrived at `tick_ms`, and the command that it completes.
+    ///
+    /// Clock and mode are set at once, by that tick; everything else is done when the reply has its turn.
     pub fn serial_receive(&mut self, byte: u8, tick_ms: u32) {
         let Some(received) = self.serial.receive(byte, &mut self.recorder) else { return };
-        let tick_ms = self.ticks.extend(tick_ms);
-        // What changed before the command arrived is recorded by the clock and mode of that time.
-        self.record_until(tick_ms);
-        if !self.serial.has_room() {
+        let answer = match received {
+            Ok(_) if !self.serial.has_room() => {
+                count(&mut self.recorder.diagnostics.commands_overrun, 1);
+                None
+            }
+            received => self.arrived(received, tick_ms),
+        };
+        if let Some(answer) = answer
+            && !self.serial.answer(answer)
+        {
             count(&mut self.recorder.diagnostics.commands_overrun, 1);
-            return;
         }
-        if let Some(answer) = self.carry_out(received, tick_ms) {
-            self.serial.answer(answer);
-        }
+    }
+
+    /// Whether another command finds room to wait for its turn. A board that can keep bytes back does so until then.
+    pub fn serial_has_room(&self) -> bool {
+        self.serial.has_room()
     }
 
     /// The UART lost or misread a byte.
@@ -99,7 +108,14 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
 
     /// The next byte for the RS-232 line; `None` when there is nothing to send, or the rate must change first.
     pub fn serial_transmit(&mut self) -> Option<u8> {
-        self.serial.transmit(&mut self.recorder, self.capture.edges_lost())
+        if let Some(byte) = self.serial.next_byte() {
+            return Some(byte);
+        }
+        if self.baud_change().is_some() {
+            return None;
+        }
+        self.begin_message();
+        self.serial.next_byte()
     }
 
     /// The rate at which the line starts after power-up.
@@ -128,38 +144,79 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         }
     }
 
-    fn carry_out(&mut self, received: Received, tick_ms: u64) -> Option<Answer> {
-        let command = match received {
-            Ok(command) => command,
-            Err(error) => return self.recorder.refuse(error),
-        };
-        if let Command::Print { start, count: entries } = command
+    /// The inputs that are on now, whether or not events are recorded.
+    pub(crate) fn inputs(&self) -> Inputs {
+        Inputs(self.capture.state())
+    }
+
+    /// Takes a command that arrived over Genius at `tick_ms`; what is to be answered, if anything.
+    pub(crate) fn genius_command(&mut self, received: Received, tick_ms: u32) -> Option<Answer> {
+        self.arrived(received, tick_ms)
+    }
+
+    /// Carries out a command that was meant for all recorders. Nobody is answered; reading and printing, which are
+    /// requests of one host to one recorder, have no effect.
+    pub(crate) fn genius_broadcast(&mut self, received: Received, tick_ms: u32) {
+        let answer = self.arrived(received, tick_ms);
+        if let Some(answer @ Answer::To(Command::Configure(_) | Command::Erase)) = answer {
+            self.reply(answer, 0);
+        }
+        if let Ok(command) = received {
+            let tick_ms = self.ticks.extend(tick_ms);
+            self.recorder.broadcast_received(command.code(), tick_ms);
+        }
+    }
+
+    /// Does what an answer needs, and gives the reply; `None` when it is refused by silence.
+    pub(crate) fn reply(&mut self, answer: Answer, max_entries: usize) -> Option<Reply> {
+        if let Answer::To(Command::Print { start, count: entries }) = answer
             && !self.serial.print(start, entries)
         {
             count(&mut self.recorder.diagnostics.commands_overrun, 1);
             return None;
         }
         let before = self.recorder.configuration;
-        let answer = self.recorder.execute(&command, tick_ms);
+        let reply = self.recorder.reply(answer, max_entries);
         self.serial.configured(&before, &self.recorder.configuration, &self.recorder.log);
-        if command.code() == Code::Erase {
+        if reply == Reply::Erased {
             self.serial.erased(&self.recorder.log);
         }
-        Some(answer)
+        Some(reply)
+    }
+
+    /// Lines up the next message for RS-232: replies first, in the order of their commands.
+    fn begin_message(&mut self) {
+        while let Some(answer) = self.serial.next_answer() {
+            if let Some(reply) = self.reply(answer, MAX_ENTRIES) {
+                return self.serial.send(&reply);
+            }
+        }
+        self.serial.begin_unasked(&mut self.recorder, self.capture.edges_lost());
+    }
+
+    /// What changed before a command arrived is recorded first, by the clock and mode of that time.
+    fn arrived(&mut self, received: Received, tick_ms: u32) -> Option<Answer> {
+        let tick_ms = self.ticks.extend(tick_ms);
+        self.record_until(tick_ms);
+        match received {
+            Ok(command) => Some(self.recorder.arrived(&command, tick_ms)),
+            Err(error) => self.recorder.refuse(error),
+        }
     }
 
     /// Takes the changes of all samples up to `until_ms` into the log.
     fn record_until(&mut self, until_ms: u64) {
         let Node { capture, ticks, sequencer, recorder, .. } = self;
+        let mask = recorder.model.mask();
         while let Some(sample) = capture.next_if(|sample| ticks.extend(sample.tick_ms) <= until_ms) {
             let tick_ms = ticks.extend(sample.tick_ms);
             while let Some(change) = sequencer.next(tick_ms) {
                 recorder.record(change);
             }
             if sample.changed == 0 {
-                sequencer.baseline(sample.state);
-            } else {
-                sequencer.push(tick_ms, sample.changed, sample.state);
+                sequencer.baseline(sample.state & mask);
+            } else if sample.changed & mask != 0 {
+                sequencer.push(tick_ms, sample.changed & mask, sample.state & mask);
             }
         }
         while let Some(change) = sequencer.next(until_ms + 1) {

@@ -9,21 +9,24 @@ use ser_proto::{
 use crate::clock::{Clock, Rtc, to_time_stamp};
 use crate::diagnostics::{Diagnostics, count};
 use crate::event_log::{Event, EventLog};
+use crate::history::History;
 use crate::node::VERSION;
 use crate::sequencer::Change;
 use crate::settings::{Settings, Storage};
 
-/// What a command is answered with. The content is looked up when the reply goes out, so that it is true then.
+/// A command that has arrived and whose reply waits for its turn.
+///
+/// Where the moment of arrival matters, the command has been carried out; all others are carried out when their turn
+/// comes, so that a read is never answered from a log that a later command has erased already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) enum Answer {
-    Configuration,
-    Erased,
-    LastBroadcast,
-    Mode,
-    PrintAccepted,
-    Read { start: u16, count: u8 },
+    /// Still to be carried out.
+    To(Command),
+    /// The clock was set on arrival.
     ClockSet,
+    /// The mode was set, or asked for, on arrival.
+    Mode { recording: bool },
 }
 
 /// The part of the node that all ports share.
@@ -33,8 +36,10 @@ pub(crate) struct Recorder<'a, S, R> {
     pub(crate) configuration: Configuration,
     pub(crate) diagnostics: Diagnostics,
     clock: Clock,
-    recording: Recording,
+    recording: History<bool>,
     last_broadcast: Option<LastBroadcast>,
+    /// Sequence number of the next event to report, whichever port reports.
+    report_next: u64,
     settings: Settings<S>,
     rtc: R,
 }
@@ -58,8 +63,9 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
             configuration,
             diagnostics: Diagnostics::default(),
             clock,
-            recording: Recording::ON,
+            recording: History::new(true),
             last_broadcast: None,
+            report_next: 0,
             settings,
             rtc,
         }
@@ -67,30 +73,27 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
 
     /// Puts a change into the log, if recording was on when it happened.
     pub(crate) fn record(&mut self, change: Change) {
-        if self.recording.at(change.tick_ms) {
-            let time_ms = self.clock.at(change.tick_ms);
+        if self.recording.at_sample(change.tick_ms) {
+            let time_ms = self.clock.stamp_ms(change.tick_ms);
             self.log.append(Event { time_ms, changed: change.changed, state: change.state });
         }
     }
 
-    /// Carries out a command that arrived at `tick_ms`.
-    pub(crate) fn execute(&mut self, command: &Command, tick_ms: u64) -> Answer {
+    /// Takes a command that arrived at `tick_ms`, and carries it out if that moment matters.
+    pub(crate) fn arrived(&mut self, command: &Command, tick_ms: u64) -> Answer {
         match *command {
-            Command::QueryConfiguration => Answer::Configuration,
-            Command::Configure(configure) => self.configure(&configure),
-            Command::Erase => {
-                self.log.erase();
-                Answer::Erased
+            Command::SetClock(time) => {
+                self.set_clock(time, tick_ms);
+                Answer::ClockSet
             }
-            Command::LastBroadcast => Answer::LastBroadcast,
-            Command::QueryMode => Answer::Mode,
             Command::SetMode { recording } => {
-                self.recording.switch(recording, tick_ms);
-                Answer::Mode
+                if recording != self.recording.latest() {
+                    self.recording.set(tick_ms, recording);
+                }
+                self.mode()
             }
-            Command::Print { .. } => Answer::PrintAccepted,
-            Command::Read { start, count } => Answer::Read { start, count },
-            Command::SetClock(time) => self.set_clock(time, tick_ms),
+            Command::QueryMode => self.mode(),
+            other => Answer::To(other),
         }
     }
 
@@ -99,26 +102,37 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         self.diagnostics.count_parse_error(error);
         match error {
             ParseError::BadValue { code, .. } => match Code::from_byte(code)? {
-                Code::Configure => Some(Answer::Configuration),
-                Code::Mode => Some(Answer::Mode),
+                Code::Configure => Some(Answer::To(Command::QueryConfiguration)),
+                Code::Mode => Some(self.mode()),
                 _ => None,
             },
             _ => None,
         }
     }
 
-    /// The reply that goes with an answer, with at most `max_entries` entries.
-    pub(crate) fn reply(&self, answer: Answer, max_entries: usize) -> Reply {
+    /// Carries out what is still to be done, and gives the reply, with at most `max_entries` entries.
+    pub(crate) fn reply(&mut self, answer: Answer, max_entries: usize) -> Reply {
         match answer {
-            Answer::Configuration => Reply::Configuration(self.configuration),
-            Answer::Erased => Reply::Erased,
-            Answer::LastBroadcast => Reply::LastBroadcast(self.last_broadcast),
-            Answer::Mode => Reply::Mode(Mode { recording: self.recording.now, version: VERSION }),
-            Answer::PrintAccepted => Reply::PrintAccepted,
-            Answer::Read { start, count } => {
-                Reply::Read(self.read(start, usize::from(count).min(max_entries)))
-            }
             Answer::ClockSet => Reply::ClockSet,
+            Answer::Mode { recording } => Reply::Mode(Mode { recording, version: VERSION }),
+            Answer::To(command) => match command {
+                Command::Configure(configure) => self.configure(&configure),
+                Command::Erase => self.erase(),
+                Command::Print { start, .. } => {
+                    self.count_refused(start == 0 || start > self.log.size());
+                    Reply::PrintAccepted
+                }
+                Command::Read { start, count } => {
+                    let count = usize::from(count);
+                    self.count_refused(start == 0 || start > self.log.size() || count > max_entries);
+                    Reply::Read(self.read(start, count.min(max_entries)))
+                }
+                Command::LastBroadcast => Reply::LastBroadcast(self.last_broadcast),
+                Command::QueryConfiguration
+                | Command::QueryMode
+                | Command::SetMode { .. }
+                | Command::SetClock(_) => Reply::Configuration(self.configuration),
+            },
         }
     }
 
@@ -138,6 +152,40 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
+    /// The oldest events that auto report owes to its receiver, and the sequence number of the first one.
+    ///
+    /// They stay owed until [`reported`](Self::reported); those that the ring has overwritten meanwhile are counted.
+    pub(crate) fn report(&mut self, max_entries: usize) -> Option<(u64, ReadReply)> {
+        let overwritten = self.log.oldest_sequence().saturating_sub(self.report_next);
+        self.report_next += overwritten;
+        count(&mut self.diagnostics.events_unreported, overwritten);
+        let start = self.log.entry_number(self.report_next)?;
+        // In a ring that has wrapped, the slots behind the newest event hold the oldest ones.
+        let owed = usize::try_from(self.log.next_sequence() - self.report_next).unwrap_or(usize::MAX);
+        Some((self.report_next, self.read(start, owed.min(max_entries))))
+    }
+
+    /// So many events from `first` on have reached their receiver. Means nothing when others are owed by now.
+    pub(crate) fn reported(&mut self, first: u64, entries: usize) {
+        if self.report_next == first {
+            self.report_next += entries as u64;
+        }
+    }
+
+    /// A command came by broadcast and has been carried out.
+    ///
+    /// The time is that of reception by the clock as it is now: after a broadcast that set it, the time that was set.
+    pub(crate) fn broadcast_received(&mut self, code: Code, tick_ms: u64) {
+        let time = to_time_stamp(self.clock.now_ms(tick_ms));
+        self.last_broadcast = Some(LastBroadcast {
+            code: code.byte(),
+            hour: time.hour,
+            minute: time.minute,
+            second: time.second,
+            millisecond: time.millisecond,
+        });
+    }
+
     fn entry(&self, event: &Event) -> Entry {
         Entry {
             changed: Inputs(event.changed),
@@ -146,54 +194,45 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
-    fn configure(&mut self, configure: &Configure) -> Answer {
+    fn configure(&mut self, configure: &Configure) -> Reply {
         if configure.size.is_some_and(|size| size > self.log.capacity()) {
-            count(&mut self.diagnostics.parameters_refused, 1);
-            return Answer::Configuration;
+            self.count_refused(true);
+            return Reply::Configuration(self.configuration);
         }
         let configuration = configure.apply_to(&self.configuration);
-        if configuration != self.configuration {
-            self.log.resize(configuration.size);
-            self.configuration = configuration;
-            if self.settings.save(&configuration).is_err() {
-                count(&mut self.diagnostics.storage_errors, 1);
-            }
+        self.log.resize(configuration.size);
+        if configuration.auto_report != self.configuration.auto_report {
+            // It begins with the next event when it is switched on, or over to the other port.
+            self.report_next = self.log.next_sequence();
         }
-        Answer::Configuration
+        self.configuration = configuration;
+        // Also when nothing changes: it may be in force and not stored, because storing failed.
+        if !self.settings.holds(&configuration) && self.settings.save(&configuration).is_err() {
+            count(&mut self.diagnostics.storage_errors, 1);
+        }
+        Reply::Configuration(configuration)
     }
 
-    fn set_clock(&mut self, time: TimeStamp, tick_ms: u64) -> Answer {
+    fn erase(&mut self) -> Reply {
+        self.log.erase();
+        // Erased events are not owed to anybody.
+        self.report_next = self.log.next_sequence();
+        Reply::Erased
+    }
+
+    fn mode(&self) -> Answer {
+        Answer::Mode { recording: self.recording.latest() }
+    }
+
+    fn count_refused(&mut self, refused: bool) {
+        count(&mut self.diagnostics.parameters_refused, u64::from(refused));
+    }
+
+    fn set_clock(&mut self, time: TimeStamp, tick_ms: u64) {
         // The parser let no impossible date through.
         if let Ok(time) = NaiveDateTime::try_from(time) {
             self.clock.set(tick_ms, time);
             self.rtc.write(time);
         }
-        Answer::ClockSet
-    }
-}
-
-/// Whether events are recorded, and since when.
-///
-/// Debounce brings changes up to 255 ms after they happened; the mode of that moment decides about them.
-#[derive(Clone, Copy, Debug)]
-struct Recording {
-    now: bool,
-    before: bool,
-    since_ms: u64,
-}
-
-impl Recording {
-    /// As after power-up.
-    const ON: Recording = Recording { now: true, before: true, since_ms: 0 };
-
-    fn switch(&mut self, on: bool, tick_ms: u64) {
-        if on != self.now {
-            *self = Recording { now: on, before: self.now, since_ms: tick_ms };
-        }
-    }
-
-    /// The state of the inputs at the switch belongs to the time before it: it is the baseline.
-    fn at(&self, tick_ms: u64) -> bool {
-        if tick_ms > self.since_ms { self.now } else { self.before }
     }
 }

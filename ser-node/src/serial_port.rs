@@ -1,11 +1,14 @@
 //! The RS-232 port: frames in, frames and text lines out.
 //!
-//! Commands are carried out as soon as their last byte is in; their replies wait in line. What nobody asked for
-//! (print jobs, auto report, auto print) goes out when no reply is waiting, from the log itself: only a position is
-//! kept, so nothing is lost until the ring overwrites it, and then it is counted.
+//! Commands wait in line and are answered in the order in which they came. What nobody asked for (print jobs, auto
+//! report, auto print) goes out when no command is waiting, from the log itself: only a position is kept, so nothing
+//! is lost until the ring overwrites it, and then it is counted.
 
 use heapless::Deque;
-use ser_proto::{Baud, Command, Configuration, Decoded, FrameDecoder, FrameEncoder, MAX_ENTRIES, ParseError};
+use ser_proto::{
+    AutoReport, Baud, Command, Configuration, Decoded, FrameDecoder, FrameEncoder, MAX_ENTRIES, ParseError,
+    Reply,
+};
 
 use crate::clock::Rtc;
 use crate::diagnostics::count;
@@ -14,7 +17,7 @@ use crate::print_line::PrintLine;
 use crate::recorder::{Answer, Recorder};
 use crate::settings::Storage;
 
-/// Replies that may wait while another one is being sent.
+/// Commands that may wait while a message is being sent.
 const MAX_ANSWERS: usize = 16;
 
 /// Print jobs that may wait.
@@ -31,8 +34,7 @@ pub(crate) struct SerialPort {
     outgoing: Outgoing,
     /// Rate at which the board drives the line.
     baud: Baud,
-    /// Sequence numbers of the next event to report and to print.
-    report_next: u64,
+    /// Sequence number of the next event to print.
     print_next: u64,
     edges_lost_printed: u32,
 }
@@ -78,7 +80,6 @@ impl SerialPort {
             print_jobs: Deque::new(),
             outgoing: Outgoing::Nothing,
             baud,
-            report_next: 0,
             print_next: 0,
             edges_lost_printed: 0,
         }
@@ -106,10 +107,19 @@ impl SerialPort {
         !self.answers.is_full()
     }
 
-    /// Puts a reply in line.
-    pub(crate) fn answer(&mut self, answer: Answer) {
-        let queued = self.answers.push_back(answer).is_ok();
-        debug_assert!(queued, "has_room() is asked before a command is carried out");
+    /// Puts an answer in line; false when there is no room.
+    pub(crate) fn answer(&mut self, answer: Answer) -> bool {
+        self.answers.push_back(answer).is_ok()
+    }
+
+    /// The answer whose turn it is.
+    pub(crate) fn next_answer(&mut self) -> Option<Answer> {
+        self.answers.pop_front()
+    }
+
+    /// Sends a reply after what is being sent, which must be nothing.
+    pub(crate) fn send(&mut self, reply: &Reply) {
+        self.outgoing = Outgoing::Frame(FrameEncoder::new(reply.to_body()));
     }
 
     /// Puts a print job in line; false when too many are waiting.
@@ -117,62 +127,47 @@ impl SerialPort {
         self.print_jobs.push_back(PrintJob { next: start, left: count }).is_ok()
     }
 
-    /// Auto report and auto print begin with the next event when they are switched on.
+    /// Auto print begins with the next event when it is switched on.
     pub(crate) fn configured(&mut self, before: &Configuration, after: &Configuration, log: &EventLog<'_>) {
-        if before.auto_report != after.auto_report {
-            self.report_next = log.next_sequence();
-        }
         if before.auto_print != after.auto_print {
             self.print_next = log.next_sequence();
         }
     }
 
-    /// Erased events are not owed to anybody.
+    /// Erased events are not printed, and neither is what a print job was still to find among them.
     pub(crate) fn erased(&mut self, log: &EventLog<'_>) {
-        self.report_next = log.next_sequence();
         self.print_next = log.next_sequence();
+        self.print_jobs.clear();
     }
 
-    /// The next byte for the line.
-    pub(crate) fn transmit<S: Storage, R: Rtc>(
-        &mut self,
-        recorder: &mut Recorder<'_, S, R>,
-        edges_lost: u32,
-    ) -> Option<u8> {
-        if let Some(byte) = self.outgoing.next() {
-            return Some(byte);
-        }
-        if self.baud_change(&recorder.configuration).is_some() {
-            return None;
-        }
-        self.outgoing = self.next_message(recorder, edges_lost);
+    /// The next byte of what is being sent.
+    pub(crate) fn next_byte(&mut self) -> Option<u8> {
         self.outgoing.next()
     }
 
-    /// The rate to which the line shall change now. The reply to the command that asked for it goes first.
+    /// Sends what nobody asked for, if there is any.
+    pub(crate) fn begin_unasked<S: Storage, R: Rtc>(
+        &mut self,
+        recorder: &mut Recorder<'_, S, R>,
+        edges_lost: u32,
+    ) {
+        self.outgoing = self
+            .next_print_line(&recorder.log)
+            .or_else(|| self.next_report(recorder))
+            .or_else(|| self.next_auto_line(recorder, edges_lost))
+            .unwrap_or(Outgoing::Nothing);
+    }
+
+    /// The rate to which the line shall change now. A configuration is carried out when its reply goes out, so that
+    /// reply is the last message at the old rate.
     pub(crate) fn baud_change(&self, configuration: &Configuration) -> Option<Baud> {
         let drained = matches!(self.outgoing, Outgoing::Nothing);
-        let reply_waits = self.answers.iter().any(|answer| *answer == Answer::Configuration);
-        (configuration.baud != self.baud && drained && !reply_waits).then_some(configuration.baud)
+        (configuration.baud != self.baud && drained).then_some(configuration.baud)
     }
 
     /// The line has changed its rate.
     pub(crate) fn baud_changed(&mut self, baud: Baud) {
         self.baud = baud;
-    }
-
-    fn next_message<S: Storage, R: Rtc>(
-        &mut self,
-        recorder: &mut Recorder<'_, S, R>,
-        edges_lost: u32,
-    ) -> Outgoing {
-        if let Some(answer) = self.answers.pop_front() {
-            return Outgoing::Frame(FrameEncoder::new(recorder.reply(answer, MAX_ENTRIES).to_body()));
-        }
-        self.next_print_line(&recorder.log)
-            .or_else(|| self.next_report(recorder))
-            .or_else(|| self.next_auto_line(recorder, edges_lost))
-            .unwrap_or(Outgoing::Nothing)
     }
 
     fn next_print_line(&mut self, log: &EventLog<'_>) -> Option<Outgoing> {
@@ -192,17 +187,13 @@ impl SerialPort {
         None
     }
 
-    fn next_report<S: Storage, R: Rtc>(&mut self, recorder: &mut Recorder<'_, S, R>) -> Option<Outgoing> {
-        if recorder.configuration.auto_report != ser_proto::AutoReport::Rs232 {
+    fn next_report<S: Storage, R: Rtc>(&self, recorder: &mut Recorder<'_, S, R>) -> Option<Outgoing> {
+        if recorder.configuration.auto_report != AutoReport::Rs232 {
             return None;
         }
-        let overwritten = skip_overwritten(&mut self.report_next, &recorder.log);
-        count(&mut recorder.diagnostics.events_unreported, overwritten);
-        let start = recorder.log.entry_number(self.report_next)?;
-        let pending = recorder.log.next_sequence() - self.report_next;
-        let reply = recorder.read(start, usize::try_from(pending).unwrap_or(usize::MAX));
-        self.report_next += reply.entries.len() as u64;
-        Some(Outgoing::Frame(FrameEncoder::new(ser_proto::Reply::Read(reply).to_body())))
+        let (first, reply) = recorder.report(MAX_ENTRIES)?;
+        recorder.reported(first, reply.entries.len());
+        Some(Outgoing::Frame(FrameEncoder::new(Reply::Read(reply).to_body())))
     }
 
     fn next_auto_line<S: Storage, R: Rtc>(

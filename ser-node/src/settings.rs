@@ -55,8 +55,8 @@ pub(crate) struct NotStored;
 /// Loads and saves the configuration.
 pub(crate) struct Settings<S> {
     storage: S,
-    /// The copy that holds the newest record, and its sequence number.
-    newest: Option<(CopyNumber, u32)>,
+    /// The copy that holds the newest record, its sequence number, and what it says.
+    newest: Option<(CopyNumber, u32, Configuration)>,
 }
 
 impl<S: Storage> Settings<S> {
@@ -64,29 +64,35 @@ impl<S: Storage> Settings<S> {
     pub(crate) fn load(mut storage: S) -> (Settings<S>, Configuration) {
         let first = read(&mut storage, CopyNumber::First);
         let second = read(&mut storage, CopyNumber::Second);
-        let (newest, configuration) = match (first, second) {
+        let newest = match (first, second) {
             // The second is newer when it is ahead by less than half of the range: sequence numbers may wrap.
             (Some((older, _)), Some((newer, configuration))) if newer.wrapping_sub(older) <= u32::MAX / 2 => {
-                (Some((CopyNumber::Second, newer)), configuration)
+                Some((CopyNumber::Second, newer, configuration))
             }
-            (Some((sequence, configuration)), _) => (Some((CopyNumber::First, sequence)), configuration),
-            (None, Some((sequence, configuration))) => (Some((CopyNumber::Second, sequence)), configuration),
-            (None, None) => (None, Configuration::default()),
+            (Some((sequence, configuration)), _) => Some((CopyNumber::First, sequence, configuration)),
+            (None, Some((sequence, configuration))) => Some((CopyNumber::Second, sequence, configuration)),
+            (None, None) => None,
         };
+        let configuration = newest.map_or_else(Configuration::default, |(_, _, configuration)| configuration);
         (Settings { storage, newest }, configuration)
+    }
+
+    /// Whether this is the configuration that the next power-up will find.
+    pub(crate) fn holds(&self, configuration: &Configuration) -> bool {
+        self.newest.is_some_and(|(_, _, stored)| stored == *configuration)
     }
 
     /// Stores the configuration over the older copy and reads it back.
     pub(crate) fn save(&mut self, configuration: &Configuration) -> Result<(), NotStored> {
         let (copy, sequence) = match self.newest {
-            Some((CopyNumber::First, sequence)) => (CopyNumber::Second, sequence.wrapping_add(1)),
-            Some((CopyNumber::Second, sequence)) => (CopyNumber::First, sequence.wrapping_add(1)),
+            Some((CopyNumber::First, sequence, _)) => (CopyNumber::Second, sequence.wrapping_add(1)),
+            Some((CopyNumber::Second, sequence, _)) => (CopyNumber::First, sequence.wrapping_add(1)),
             None => (CopyNumber::First, 0),
         };
         self.storage.write(copy, &encode(sequence, configuration)).map_err(|_| NotStored)?;
         match read(&mut self.storage, copy) {
             Some(stored) if stored == (sequence, *configuration) => {
-                self.newest = Some((copy, sequence));
+                self.newest = Some((copy, sequence, *configuration));
                 Ok(())
             }
             _ => Err(NotStored),

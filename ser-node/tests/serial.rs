@@ -18,6 +18,8 @@ use ser_proto::{
 struct Survivors {
     copies: Rc<RefCell<[[u8; RECORD_LEN]; 2]>>,
     clock: Rc<RefCell<Option<NaiveDateTime>>>,
+    /// Whether memory refuses to be written.
+    write_protected: Rc<RefCell<bool>>,
 }
 
 impl Storage for Survivors {
@@ -29,6 +31,9 @@ impl Storage for Survivors {
     }
 
     fn write(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), ()> {
+        if *self.write_protected.borrow() {
+            return Err(());
+        }
         self.copies.borrow_mut()[copy as usize] = *record;
         Ok(())
     }
@@ -225,7 +230,97 @@ fn a_debounced_change_is_stamped_with_its_first_moment_and_recorded_by_the_mode_
     assert_eq!(changes(&reply), [(1, 1, "2026-11-22T10:00:00.001".to_owned())]);
 }
 
+#[test]
+fn each_change_is_judged_by_what_was_in_force_in_its_millisecond() {
+    let mut bench = Bench::with(Model::Ser160, Debounce::uniform(20), 2048, Survivors::default());
+    bench.ask(&Command::SetClock(TEN_O_CLOCK));
+    bench.contacts(0b01);
+    // All of this while the change waits for its debounce time.
+    for hour in [22, 23] {
+        bench.pass_ms(3);
+        bench.ask(&Command::SetClock(TimeStamp { hour, ..TEN_O_CLOCK }));
+        bench.ask(&Command::SetMode { recording: hour == 23 });
+    }
+    bench.pass_ms(60);
+    assert_eq!(changes(&bench.read(1, 10)), [(0b01, 0b01, "2026-11-22T10:00:00.001".to_owned())]);
+}
+
+#[test]
+fn a_change_in_the_millisecond_in_which_the_clock_is_set_came_before_it() {
+    for debounce in [Debounce::OFF, Debounce::uniform(5)] {
+        let mut bench = Bench::with(Model::Ser160, debounce, 2048, Survivors::default());
+        bench.contacts(1);
+        bench.ask(&Command::SetClock(TEN_O_CLOCK));
+        bench.pass_ms(60);
+        assert_eq!(bench.read(1, 1).entries[0].time.to_string(), "2000-01-01T00:00:00.002");
+    }
+}
+
+#[test]
+fn stamps_go_on_where_the_tick_wraps() {
+    let mut bench = Bench::new(Model::Ser160);
+    for tick_ms in [0x7000_0000, 0xE000_0000, u32::MAX - 3] {
+        bench.tick_ms = tick_ms;
+        bench.pass_ms(1);
+    }
+    bench.ask(&Command::SetClock(TEN_O_CLOCK));
+    bench.tick_ms -= 1;
+    for ms in 1..=9 {
+        bench.tick_ms = (u32::MAX - 2).wrapping_add(ms);
+        bench.inputs ^= 1;
+        bench.capture.sample(bench.tick_ms, bench.inputs);
+        bench.node.poll(bench.tick_ms);
+    }
+    let stamps: Vec<_> = bench.read(1, 10).entries.iter().map(|entry| entry.time.millisecond).collect();
+    assert_eq!(stamps, (1..=9).collect::<Vec<_>>());
+}
+
+#[test]
+fn inputs_that_the_model_does_not_have_are_no_event() {
+    let mut bench = Bench::new(Model::Ser160);
+    bench.contacts(0x0001_0000);
+    assert_eq!(bench.read(1, 1).total, 0);
+    bench.contacts(0x8001_8000);
+    let reply = bench.read(1, 1);
+    assert_eq!((reply.entries[0].changed.0, reply.entries[0].state.0), (0x8000, 0x8000));
+}
+
 // R: read entries
+
+#[test]
+fn commands_that_come_in_a_row_are_answered_as_if_they_had_come_one_by_one() {
+    let mut bench = Bench::new(Model::Ser160);
+    bench.events(13);
+    bench.send(FrameEncoder::new(Command::Read { start: 1, count: 10 }.to_body()));
+    bench.send(FrameEncoder::new(Command::Read { start: 11, count: 10 }.to_body()));
+    bench.send(FrameEncoder::new(Command::Erase.to_body()));
+    bench.send(FrameEncoder::new(Command::SetMode { recording: false }.to_body()));
+    bench.send(FrameEncoder::new(Command::SetMode { recording: true }.to_body()));
+    let replies = replies(&bench.line());
+    let [Reply::Read(first), Reply::Read(second), Reply::Erased, stopped, started] = &replies[..] else {
+        panic!("{replies:?}")
+    };
+    assert_eq!((first.entries.len(), second.entries.len(), second.total), (10, 3, 13));
+    assert_eq!(*stopped, Reply::Mode(Mode { recording: false, version: VERSION }));
+    assert_eq!(*started, Reply::Mode(Mode { recording: true, version: VERSION }));
+}
+
+#[test]
+fn a_read_out_of_range_is_answered_with_what_exists_and_counted() {
+    let mut bench = Bench::new(Model::Ser160);
+    bench.events(2);
+    let refused = [(0, 10, 0), (2049, 1, 0), (1, 11, 2)];
+    for (counted, (start, count, entries)) in (1..).zip(refused) {
+        assert_eq!(bench.read(start, count).entries.len(), entries);
+        assert_eq!(bench.diagnostics().parameters_refused, counted);
+    }
+    bench.ask(&Command::Print { start: 3000, count: 1 });
+    assert_eq!(bench.diagnostics().parameters_refused, 4);
+    // Nothing there yet, or nothing asked for, is no mistake.
+    bench.read(3, 10);
+    bench.read(1, 0);
+    assert_eq!(bench.diagnostics().parameters_refused, 4);
+}
 
 #[test]
 fn a_read_past_the_last_used_entry_returns_what_exists() {
@@ -415,7 +510,67 @@ fn the_baud_rate_changes_after_the_reply() {
     assert!(matches!(replies(&bench.line())[..], [Reply::Mode(_)]));
 }
 
+#[test]
+fn the_baud_rate_changes_right_after_the_reply_whatever_waits_behind_it() {
+    let mut bench = Bench::new(Model::Ser160);
+    for baud in [Baud::B19200, Baud::B9600] {
+        let configuration = Configuration { baud, ..Configuration::default() };
+        bench.send(FrameEncoder::new(Command::Configure(configuration.into()).to_body()));
+        bench.send(FrameEncoder::new(Command::QueryConfiguration.to_body()));
+    }
+    for (baud, replies_at_this_rate) in [(Baud::B19200, 1), (Baud::B9600, 2)] {
+        assert_eq!(replies(&bench.line()).len(), replies_at_this_rate);
+        assert_eq!(bench.node.baud_change(), Some(baud));
+        bench.node.baud_changed(baud);
+    }
+    assert_eq!(replies(&bench.line()).len(), 1);
+}
+
+#[test]
+fn a_configuration_that_could_not_be_stored_is_stored_when_it_is_sent_again() {
+    let survivors = Survivors::default();
+    let mut bench = Bench::with(Model::Ser160, Debounce::OFF, 2048, survivors.clone());
+    *survivors.write_protected.borrow_mut() = true;
+    assert_eq!(bench.configure(|configuration| configuration.size = 7).size, 7);
+    assert_eq!(bench.diagnostics().storage_errors, 1);
+    *survivors.write_protected.borrow_mut() = false;
+    assert_eq!(bench.configure(|configuration| configuration.size = 7).size, 7);
+    assert_eq!(bench.diagnostics().storage_errors, 1);
+    let mut bench = Bench::with(Model::Ser160, Debounce::OFF, 2048, survivors);
+    assert_eq!(bench.configure(|_| ()).size, 7);
+}
+
 // Auto report
+
+#[test]
+fn a_report_from_a_full_ring_holds_new_events_only() {
+    let mut bench = Bench::new(Model::Ser160);
+    bench.configure(|configuration| {
+        configuration.size = 8;
+        configuration.auto_report = AutoReport::Rs232;
+    });
+    bench.events(8);
+    bench.line();
+    bench.events(2);
+    let [Reply::Read(report)] = &replies(&bench.line())[..] else { panic!("no report") };
+    assert_eq!((report.start, report.entries.len(), report.total), (1, 2, 10));
+}
+
+#[test]
+fn erased_events_are_neither_reported_nor_printed() {
+    let mut bench = Bench::new(Model::Ser160);
+    bench.configure(|configuration| {
+        configuration.auto_report = AutoReport::Rs232;
+        configuration.auto_print = true;
+    });
+    bench.events(5);
+    bench.send(FrameEncoder::new(Command::Print { start: 1, count: 5 }.to_body()));
+    bench.send(FrameEncoder::new(Command::Erase.to_body()));
+    assert!(matches!(replies(&bench.line())[..], [Reply::PrintAccepted, Reply::Erased]));
+    bench.events(1);
+    let lines = bench.line().iter().filter(|&&byte| byte == b'\n').count();
+    assert_eq!(lines, 1);
+}
 
 #[test]
 fn auto_report_sends_every_event_once_in_order() {
@@ -516,8 +671,8 @@ fn input_changes_that_could_not_be_recorded_are_printed_as_such() {
     }
     bench.node.poll(bench.tick_ms);
     let printed = String::from_utf8(bench.line()).unwrap();
-    assert!(printed.starts_with("*** 44 INPUT CHANGES NOT RECORDED ***\r\n0001 "), "{printed}");
-    assert_eq!(bench.diagnostics().edges_lost, 44);
+    assert!(printed.starts_with("*** 45 INPUT CHANGES NOT RECORDED ***\r\n0001 "), "{printed}");
+    assert_eq!(bench.diagnostics().edges_lost, 45);
 }
 
 #[test]
@@ -597,6 +752,24 @@ fn commands_beyond_the_waiting_line_are_counted_not_carried_out() {
     assert_eq!(replies(&bench.line()).len(), 16);
     assert_eq!(bench.diagnostics().commands_overrun, 1);
     assert_eq!(bench.read(1, 0).total, 3);
+}
+
+#[test]
+fn what_is_no_command_needs_no_place_in_line() {
+    let mut bench = Bench::new(Model::Ser160);
+    for _ in 0..16 {
+        bench.send(FrameEncoder::new(Command::QueryMode.to_body()));
+    }
+    bench.send(*b"\x1B015858");
+    assert_eq!((bench.diagnostics().commands_unknown, bench.diagnostics().commands_overrun), (1, 0));
+}
+
+#[test]
+fn a_wrong_length_is_ignored_whatever_the_values_are() {
+    let mut bench = Bench::new(Model::Ser160);
+    bench.send(*b"\x1B0343FFFF41");
+    assert_eq!(bench.line(), b"");
+    assert_eq!((bench.diagnostics().commands_wrong_length, bench.diagnostics().parameters_refused), (1, 0));
 }
 
 #[test]

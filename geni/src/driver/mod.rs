@@ -306,6 +306,11 @@ impl<R: SharedRam> Driver<R> {
         &self.ram
     }
 
+    /// The RAM, for whoever owns what is behind it.
+    pub fn ram_mut(&mut self) -> &mut R {
+        &mut self.ram
+    }
+
     fn present(&self, device_number: u8) -> Result<Device, TableError> {
         if !self.is_ready() {
             return Err(TableError::NotReady);
