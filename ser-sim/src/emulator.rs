@@ -47,7 +47,7 @@ const WAITING_LIMIT: usize = 4096;
 
 /// How soon the board is looked after when nothing is going on, and when contacts move.
 const PATIENCE: Duration = Duration::from_millis(2);
-const PATIENCE_PLAYING: Duration = Duration::from_micros(300);
+const PATIENCE_PLAYING: Duration = Duration::from_micros(100);
 
 /// A board in QEMU.
 pub(crate) struct Emulator {
@@ -58,18 +58,17 @@ pub(crate) struct Emulator {
     player: Player,
     played: Vec<Played>,
     moving: Option<Moving>,
+    /// By how much the latest moves came late at most.
+    late_ms: u64,
     pace: Pace,
     /// Holds the memory, where no file was given, and what QEMU prints. Goes last.
     directory: TempDir,
 }
 
-/// A move of contacts that the board has not sampled for sure.
+/// A move of contacts that the board has not sampled.
 struct Moving {
     moved: Move,
     tick_before: u32,
-    latest: u32,
-    /// How often the sample counter has moved on since. The first time may be a sample that was under way.
-    moved_on: u32,
 }
 
 /// QEMU at work.
@@ -116,6 +115,7 @@ impl Emulator {
             player: Player::default(),
             played: Vec::new(),
             moving: None,
+            late_ms: 0,
             pace: Pace::new(),
             directory,
         })
@@ -126,7 +126,7 @@ impl Emulator {
         self.running = None;
         // Contacts that were about to be sampled move now: the board takes them as they are at power-up.
         self.moving = None;
-        self.bus.clear_sample_counter();
+        self.bus.clear_sample();
         self.running = Some(self.start()?);
         let began = Instant::now();
         let mut asked: Option<Instant> = None;
@@ -135,7 +135,7 @@ impl Emulator {
             self.look_after()?;
             let waited = began.elapsed();
             let Some(running) = &mut self.running else { break };
-            if running.from_board.told_mode && self.bus.sample_counter() != 0 {
+            if running.from_board.told_mode && self.bus.is_sampled() {
                 running.forget_output();
                 return Ok(());
             }
@@ -193,22 +193,19 @@ impl Emulator {
     }
 
     fn move_contacts(&mut self) {
-        let counter = self.bus.sample_counter();
-        if let Some(moving) = &mut self.moving {
-            if counter != moving.latest {
-                moving.latest = counter;
-                moving.moved_on += 1;
-            }
-            if moving.moved_on < 2 {
-                return;
-            }
-            self.played.push(moving.moved.played(moving.tick_before, counter));
-            self.moving = None;
+        if let Some(moving) = self.moving.take_if(|moving| self.bus.sampled_inputs() == moving.moved.state) {
+            self.played.push(moving.moved.played(moving.tick_before, self.bus.sample_counter()));
         }
-        if let Some(moved) = self.player.due(self.pace.now_ms()) {
+        if self.moving.is_some() {
+            return;
+        }
+        let now_ms = self.pace.now_ms();
+        if let Some(moved) = self.player.due(now_ms) {
+            self.late_ms =
+                self.late_ms.max(now_ms.saturating_sub(moved.start_ms.saturating_add(moved.at_ms)));
             let tick_before = self.bus.sample_counter();
             self.bus.set_inputs(moved.state);
-            self.moving = Some(Moving { moved, tick_before, latest: tick_before, moved_on: 0 });
+            self.moving = Some(Moving { moved, tick_before });
         }
     }
 
@@ -362,6 +359,10 @@ impl Machine for Emulator {
 
     fn take_played(&mut self) -> Vec<Played> {
         std::mem::take(&mut self.played)
+    }
+
+    fn take_lateness_ms(&mut self) -> u64 {
+        std::mem::take(&mut self.late_ms)
     }
 
     fn patience(&self) -> Duration {

@@ -20,6 +20,8 @@ pub(crate) const MEMORY_LEN: u64 = 16 << 20;
 const INPUT_LATCH: usize = 0x8000;
 /// The tick of the latest sample, written by the board once it has been taken.
 const SAMPLE_COUNTER: usize = 0x8004;
+/// The inputs as the latest sample saw them, written by the board after the counter.
+const SAMPLED_INPUTS: usize = 0x8020;
 /// 160 or 320; read by the board at boot.
 const MODEL_STRAP: usize = 0x8008;
 /// Milliseconds for all inputs; read by the board at boot.
@@ -54,14 +56,27 @@ impl ExternalBus {
         self.write(INPUT_LATCH, inputs);
     }
 
+    /// The inputs as the board's latest sample saw them. Its tick is not later than the counter read after this.
+    pub(crate) fn sampled_inputs(&self) -> u32 {
+        u32::from_le(self.word(SAMPLED_INPUTS).load(Ordering::SeqCst))
+    }
+
     /// The tick of the board's latest sample.
     pub(crate) fn sample_counter(&self) -> u32 {
         u32::from_le(self.word(SAMPLE_COUNTER).load(Ordering::SeqCst))
     }
 
     /// Puts the counter back to where it is before the first sample.
-    pub(crate) fn clear_sample_counter(&self) {
+    pub(crate) fn clear_sample(&self) {
         self.write(SAMPLE_COUNTER, 0);
+        // What no sample can have seen.
+        self.write(SAMPLED_INPUTS, !u32::from_le(self.word(INPUT_LATCH).load(Ordering::SeqCst)));
+    }
+
+    /// Whether the board has taken a sample of the contacts as they are.
+    pub(crate) fn is_sampled(&self) -> bool {
+        self.sample_counter() != 0
+            && self.sampled_inputs() == u32::from_le(self.word(INPUT_LATCH).load(Ordering::SeqCst))
     }
 
     fn write(&self, offset: usize, value: u32) {

@@ -30,6 +30,7 @@ mod service;
 mod sim_node;
 mod simulator;
 mod tcp;
+mod wire;
 
 pub use contacts::Contacts;
 pub use error::SimError;

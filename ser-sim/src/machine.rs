@@ -43,6 +43,9 @@ pub(crate) trait Machine {
     /// What has moved since this was last asked.
     fn take_played(&mut self) -> Vec<Played>;
 
+    /// By how much contacts have moved too late at most, since this was last asked.
+    fn take_lateness_ms(&mut self) -> u64;
+
     /// How long it may be left alone.
     fn patience(&self) -> Duration;
 

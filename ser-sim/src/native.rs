@@ -66,6 +66,11 @@ impl Machine for Native<'_> {
         self.node.take_played()
     }
 
+    fn take_lateness_ms(&mut self) -> u64 {
+        // Virtual time waits for no host, and no host for it.
+        0
+    }
+
     fn patience(&self) -> Duration {
         PATIENCE
     }

@@ -4,7 +4,7 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::contacts::Arrived;
 use crate::error::SimError;
@@ -13,6 +13,10 @@ use crate::machine::Machine;
 use crate::player::Played;
 use crate::scenario::Scenario;
 use crate::simulator::Notice;
+use crate::wire::Wire;
+
+/// Contacts of the emulated board move when this computer has time; less than this is not worth a word.
+const NOTICEABLE_MS: u64 = 3;
 
 /// What the owner of a simulator wants from it.
 pub(crate) enum Request {
@@ -65,6 +69,7 @@ pub(crate) enum Outcome {
 /// Everything around the machine.
 pub(crate) struct Service {
     pub(crate) line: Box<dyn Line>,
+    pub(crate) wire: Wire,
     pub(crate) requests: Receiver<Request>,
     pub(crate) stream: Option<Receiver<Arrived>>,
     pub(crate) notice: Option<Notice>,
@@ -128,6 +133,10 @@ impl Service {
     pub(crate) fn report(&self, machine: &mut dyn Machine) {
         let played = machine.take_played();
         let idle = machine.is_idle() && self.stream.is_none();
+        let newly_idle = idle && !self.shared.status().idle;
+        if newly_idle && let late_ms @ NOTICEABLE_MS.. = machine.take_lateness_ms() {
+            self.notify(&format!("contacts moved up to {late_ms} ms late: this computer is busy"));
+        }
         if !played.is_empty() || self.shared.status().idle != idle {
             self.shared.update(|status| {
                 status.played.extend(played);
@@ -138,19 +147,21 @@ impl Service {
 
     /// Carries bytes both ways, as many as go without waiting.
     fn carry(&mut self, machine: &mut dyn Machine, buffer: &mut [u8]) -> io::Result<()> {
-        let room = machine.room().min(buffer.len());
+        let room = self.wire.room().min(buffer.len());
         if room > 0 {
             let received = self.line.read(&mut buffer[..room])?;
             let received = &mut buffer[..received];
-            if !rates_agree(self.line.host_bits_per_second(), machine.baud()) {
+            let host_rate = self.line.host_bits_per_second();
+            if !rates_agree(host_rate, machine.baud()) {
                 garble(received);
             }
             if self.line.take_host_change() {
                 let stale = machine.output().len();
                 machine.taken(stale);
             }
-            machine.receive(received);
+            self.wire.send(Instant::now(), received, host_rate);
         }
+        self.deliver(machine);
         loop {
             let baud = machine.baud();
             let output = machine.output();
@@ -171,17 +182,34 @@ impl Service {
         }
     }
 
-    /// Waits for bytes or for the machine's patience to end.
+    /// Gives the machine what has arrived, as far as it has room.
+    fn deliver(&mut self, machine: &mut dyn Machine) {
+        let now = Instant::now();
+        for _ in 0..machine.room().min(self.wire.waiting()) {
+            let Some(byte) = self.wire.receive(now) else { break };
+            machine.receive(&[byte]);
+        }
+    }
+
+    /// How long nothing can happen, but for bytes that come and go.
+    fn patience(&self, machine: &dyn Machine) -> Duration {
+        let on_the_wire = self.wire.next_arrival_in(Instant::now());
+        on_the_wire.map_or(machine.patience(), |arrival| arrival.min(machine.patience()))
+    }
+
+    /// Waits for bytes or for our patience to end.
     #[cfg(unix)]
     fn wait(&self, machine: &mut dyn Machine) -> Result<(), SimError> {
         use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-        let patience = machine.patience();
+        let patience = self.patience(machine);
         let sending = !machine.output().is_empty();
         let host = self.line.descriptors();
         let board = machine.descriptors();
+        // A host that sends faster than the wire takes it is no reason to wake up.
+        let listened_to = if self.wire.room() > 0 { &host[..] } else { &[] };
         let mut waiting: Vec<PollFd<'_>> =
-            host.iter().chain(&board).map(|fd| PollFd::new(fd, PollFlags::IN)).collect();
+            listened_to.iter().chain(&board).map(|fd| PollFd::new(fd, PollFlags::IN)).collect();
         if let (true, Some(host)) = (sending, host.first()) {
             waiting.push(PollFd::new(host, PollFlags::OUT));
         }
@@ -196,7 +224,7 @@ impl Service {
     #[cfg(not(unix))]
     #[expect(clippy::unnecessary_wraps, reason = "waiting can fail elsewhere")]
     fn wait(&self, machine: &mut dyn Machine) -> Result<(), SimError> {
-        std::thread::sleep(machine.patience().min(Duration::from_millis(1)));
+        std::thread::sleep(self.patience(machine).min(Duration::from_millis(1)));
         Ok(())
     }
 }
@@ -273,6 +301,7 @@ mod tests {
         let desk = Arc::new(Mutex::new(Desk { takes: usize::MAX, ..Desk::default() }));
         let mut service = Service {
             line: Box::new(DeskLine(Arc::clone(&desk))),
+            wire: Wire::without_delay(),
             requests: channel().1,
             stream: None,
             notice: None,

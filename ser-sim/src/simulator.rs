@@ -22,6 +22,7 @@ use crate::player::Played;
 use crate::scenario::Scenario;
 use crate::service::{Outcome, Request, Service, Shared};
 use crate::sim_node::{LineRate, PoweredOff, Ram, SimNodeOptions};
+use crate::wire::Wire;
 
 /// How soon [`run`] and [`Simulator::wait`] notice that they are to stop.
 const STOP_CHECK: Duration = Duration::from_millis(20);
@@ -132,8 +133,14 @@ impl Simulator {
         let shared = Arc::new(Shared::default());
         let (ready_sender, ready) = channel();
         let SimOptions { model, contacts, debounce_ms, backend, notice, port: _ } = options;
-        let mut service =
-            Service { line, requests: request_receiver, stream: None, notice, shared: Arc::clone(&shared) };
+        let mut service = Service {
+            line,
+            wire: Wire::new(),
+            requests: request_receiver,
+            stream: None,
+            notice,
+            shared: Arc::clone(&shared),
+        };
         let thread = thread::Builder::new()
             .name("ser-sim".to_owned())
             .spawn(move || {

@@ -41,6 +41,7 @@ with_both_kinds! {
     a_full_ser160_log_is_read_while_events_keep_arriving,
     a_full_ser320_log_is_read_while_events_keep_arriving,
     an_overrun_log_says_exactly_how_many_are_lost,
+    a_full_printout_keeps_the_recorder_from_nothing,
 }
 
 const TEN_O_CLOCK: TimeStamp =
@@ -305,4 +306,24 @@ fn an_overrun_log_says_exactly_how_many_are_lost(kind: Kind) {
         })
         .collect();
     assert_entries_are(&entries, &recorder.played()[170..]);
+}
+
+/// Four printouts of a full log, as many as may wait, while contacts move and a host reads.
+fn a_full_printout_keeps_the_recorder_from_nothing(kind: Kind) {
+    let recorder = Recorder::start(kind, Model::Ser320);
+    let mut unit = recorder.unit();
+    recorder.play(&toggling(2048, 1));
+    let mut cursor = None;
+    let mut entries = Vec::new();
+    let mut deliver = |delivery: Delivery| match delivery {
+        Delivery::Event { entry, .. } => entries.push(entry),
+        Delivery::Lost(lost) => panic!("{lost:?}"),
+    };
+    unit.read_new(&mut cursor, 2048, &mut deliver).expect("the log is read");
+    for _ in 0..4 {
+        unit.print(1, 2048).expect("accepted");
+    }
+    recorder.play(&toggling(500, 2));
+    unit.read_new(&mut cursor, 2048, &mut deliver).expect("a reply goes before the lines");
+    assert_entries_are(&entries, &recorder.played());
 }

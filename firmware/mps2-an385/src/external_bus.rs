@@ -10,15 +10,17 @@
 //! | 8010h         | boot count                                             | recorder   |
 //! | 8014h         | fault mark: why the recorder is about to reset itself  | recorder   |
 //! | 8018h         | the fault mark that the latest boot found              | recorder   |
+//! | 8020h         | the inputs as the latest sample saw them               | recorder   |
 //! | 9000h, 9040h  | configuration memory, two blocks of 64 bytes           | recorder   |
 //!
 //! Words have 32 bits, little-endian. Fault marks: 0 none, 1 panic, 2 hard fault, 3 watchdog, 4 stack
 //! overflow.
 //!
 //! # Design
-//! Straps are read once, at boot. The sample counter is written *after* the sample has been taken: whoever changes the
-//! latch and then sees the counter move on twice knows that the change has been sampled, as with a trigger output on a
-//! scope. Configuration memory stands for an FRAM: it needs no erasing, and the two blocks never share a write.
+//! Straps are read once, at boot. After each sample the recorder writes first its tick and then what it saw: whoever
+//! changes the latch and then finds the change at 8020h knows that it has been sampled, and not later than at the tick
+//! that stands at 8004h. It is what a trigger output is to a scope. Configuration memory stands for an FRAM: it needs no
+//! erasing, and the two blocks never share a write.
 //!
 //! # Tradeoffs
 //! Everything sits on one bus, so one file on the desktop holds all there is to see and to set.
@@ -56,6 +58,8 @@ const BOOT_COUNT: Word = unsafe { word(0x8010) };
 const FAULT_MARK: Word = unsafe { word(0x8014) };
 // SAFETY: see the map.
 const FAULT_FOUND: Word = unsafe { word(0x8018) };
+// SAFETY: see the map.
+const SAMPLED_INPUTS: Word = unsafe { word(0x8020) };
 
 const CONFIGURATION_MEMORY: usize = 0x9000;
 const COPY_DISTANCE: usize = 0x40;
@@ -68,10 +72,11 @@ pub(crate) fn read_inputs() -> u32 {
     INPUT_LATCH.read()
 }
 
-/// Tells the bench that the sample of `tick_ms` has been taken.
+/// Tells the bench that the sample of `tick_ms` has been taken, and what it was. The order is a promise: see the design.
 #[inline]
-pub(crate) fn mark_sample(tick_ms: u32) {
+pub(crate) fn mark_sample(tick_ms: u32, inputs: u32) {
     SAMPLE_COUNTER.write(tick_ms);
+    SAMPLED_INPUTS.write(inputs);
 }
 
 /// Which recorder the board is strapped to be.

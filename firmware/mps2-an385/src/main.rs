@@ -86,8 +86,9 @@ mod app {
     #[task(binds = TIMER0, priority = 3, local = [timer, capture, input_mask])]
     fn capture(cx: capture::Context) {
         if let Some(tick_ms) = cx.local.timer.on_interrupt() {
-            cx.local.capture.sample(tick_ms, external_bus::read_inputs() & *cx.local.input_mask);
-            external_bus::mark_sample(tick_ms);
+            let inputs = external_bus::read_inputs();
+            cx.local.capture.sample(tick_ms, inputs & *cx.local.input_mask);
+            external_bus::mark_sample(tick_ms, inputs);
         }
     }
 
@@ -109,17 +110,19 @@ mod app {
         loop {
             let now_ms = node.tick_ms();
             for _ in 0..uart::RECEIVE_RING_LEN {
+                // Commands that find no room in the node wait in the ring.
+                if !node.serial_has_room() {
+                    break;
+                }
                 let Some(received) = serial.receive() else { break };
                 node.serial_receive(received.byte, received.tick_ms);
                 if received.overrun {
                     node.serial_line_error();
                 }
-                // Replies leave the node as soon as they can: it has room for a few only.
-                transmit_pending(node, serial);
             }
             node.poll(now_ms);
             change_baud(node, serial, now_ms);
-            transmit_pending(node, serial);
+            hand_out(node, serial);
 
             if liveness.pass(now_ms) {
                 watchdog.feed();
@@ -137,10 +140,13 @@ mod app {
         }
     }
 
-    fn transmit_pending(node: &mut BoardNode, serial: &mut SerialLine) {
-        while serial.can_send()
-            && let Some(byte) = node.serial_transmit()
-        {
+    /// Hands out no more than the ring holds: a line that takes bytes as fast as they come must not keep the main loop.
+    fn hand_out(node: &mut BoardNode, serial: &mut SerialLine) {
+        for _ in 0..uart::TRANSMIT_RING_LEN {
+            if !serial.can_send() {
+                break;
+            }
+            let Some(byte) = node.serial_transmit() else { break };
             serial.send(byte);
         }
     }

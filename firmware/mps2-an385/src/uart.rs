@@ -25,7 +25,7 @@ use crate::mmio::Word;
 /// Received bytes that may wait for the main loop: 133 ms at 19200 bit/s.
 pub(crate) const RECEIVE_RING_LEN: usize = 256;
 /// Bytes that may wait for the transmitter; little more is in flight when a baud change or a reset comes.
-const TRANSMIT_RING_LEN: usize = 128;
+pub(crate) const TRANSMIT_RING_LEN: usize = 128;
 
 /// Bits of a character with start and stop bit.
 const CHARACTER_BITS: u32 = 10;
@@ -58,7 +58,7 @@ const BAUD_DIVIDER: Word = unsafe { Word::at(base::UART0 + 0x10) };
 pub(crate) struct Received {
     pub(crate) byte: u8,
     pub(crate) tick_ms: u32,
-    /// At least one byte after this one was lost.
+    /// At least one byte was lost before or after this one: which of them the UART keeps is up to it.
     pub(crate) overrun: bool,
 }
 
@@ -87,7 +87,7 @@ pub(crate) fn start(
     INTERRUPT_CLEAR.write(TRANSMIT_INTERRUPT | RECEIVE_INTERRUPT);
     CONTROL.write(TRANSMIT_ENABLE | RECEIVE_ENABLE | TRANSMIT_INTERRUPT_ENABLE | RECEIVE_INTERRUPT_ENABLE);
     (
-        SerialLine { received: receive_out, to_send: transmit_in, baud, busy_ms: 0 },
+        SerialLine { received: receive_out, to_send: transmit_in, baud, idle_since_ms: None },
         ReceiveInterrupt { received: receive_in },
         TransmitInterrupt { to_send: transmit_out },
     )
@@ -112,7 +112,6 @@ impl ReceiveInterrupt {
                 return;
             }
             INTERRUPT_CLEAR.write(RECEIVE_INTERRUPT);
-            // An overrun leaves the older byte in the buffer: the loss comes after it.
             let byte = (DATA.read() & 0xFF) as u8;
             let overrun = STATE.read() & RECEIVE_OVERRUN != 0;
             if overrun {
@@ -145,8 +144,8 @@ pub(crate) struct SerialLine {
     received: Consumer<'static, Received>,
     to_send: Producer<'static, u8>,
     baud: Baud,
-    /// When the transmitter was last seen at work.
-    busy_ms: u32,
+    /// Since when the transmitter has not been seen at work.
+    idle_since_ms: Option<u32>,
 }
 
 impl SerialLine {
@@ -172,19 +171,22 @@ impl SerialLine {
 
     /// Puts a byte in line for the transmitter; one for which there is no room is dropped.
     pub(crate) fn send(&mut self, byte: u8) {
+        self.idle_since_ms = None;
         let _ = self.to_send.enqueue(byte);
         NVIC::pend(Interrupt::UART0_TX);
     }
 
-    /// Whether everything sent has left the transmitter. Notices bytes only when asked at least once per
-    /// millisecond while they are being sent.
+    /// Whether everything sent has left the transmitter. Counts from the first time that it is asked and finds nothing
+    /// to do, so however late it is asked, no character is cut short.
     pub(crate) fn is_quiet(&mut self, now_ms: u32) -> bool {
         if !self.to_send.is_empty() || STATE.read() & TRANSMIT_FULL != 0 {
-            self.busy_ms = now_ms;
+            self.idle_since_ms = None;
+            return false;
         }
+        let idle_since_ms = *self.idle_since_ms.get_or_insert(now_ms);
         // One character may be in the shift register; the tick may be just about to end.
         let characters_ms = 2 * CHARACTER_BITS * 1000 / self.baud.bits_per_second() + 1;
-        now_ms.wrapping_sub(self.busy_ms) > characters_ms
+        now_ms.wrapping_sub(idle_since_ms) > characters_ms
     }
 
     /// Changes the rate; what is in the transmitter would be garbled.
