@@ -20,6 +20,8 @@ pub enum SimError {
     },
     /// The place of the link is taken by something that is not ours to replace.
     LinkTaken(PathBuf),
+    /// Another simulator has the link.
+    LinkInUse(PathBuf),
     /// The emulator is not installed.
     EmulatorMissing {
         /// The program looked for.
@@ -59,6 +61,9 @@ impl fmt::Display for SimError {
         match self {
             SimError::Scenario(error) => error.fmt(f),
             SimError::Io { doing, source } => write!(f, "cannot {doing}: {source}"),
+            SimError::LinkInUse(path) => {
+                write!(f, "another simulator has {}", path.display())
+            }
             SimError::LinkTaken(path) => {
                 write!(
                     f,

@@ -16,7 +16,8 @@
 //! ```
 //!
 //! The manual meant throughout is that of the GENI board, GFK-0073. Nothing in here shares code with the
-//! driver for the board, so that a misreading on one side shows on the other.
+//! driver for the board, so that a misreading on one side shows on the other; [`BoardWindow`] lets the driver
+//! reach the board's shared RAM.
 
 mod block;
 mod board;
@@ -33,6 +34,7 @@ mod split_mix;
 mod station;
 #[cfg(test)]
 mod tests;
+mod window;
 
 pub use block::{Circuits, DiscreteBlock};
 pub use board::{Board, BoardOptions, Led, Leds, Timing, Violation, ViolationKind};
@@ -44,3 +46,4 @@ pub use faults::{DeviceFault, Fault, Noise};
 pub use identity::{BlockKind, Identity};
 pub use map::RAM_LEN;
 pub use scan_time::{BusRate, MIN_SCAN_NS};
+pub use window::BoardWindow;

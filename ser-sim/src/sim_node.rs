@@ -6,7 +6,8 @@
 
 use std::collections::VecDeque;
 
-use ser_node::{Capture, CaptureChannel, Debounce, Diagnostics, Event, Node, NodeParts};
+use geni::SharedRam;
+use ser_node::{Capture, CaptureChannel, Debounce, Diagnostics, Event, GeniusPort, Node, NodeParts};
 use ser_proto::{Baud, MAX_SIZE, Model};
 
 use crate::non_volatile::{MemoryStorage, NonVolatile, SimRtc};
@@ -197,6 +198,13 @@ impl<'a> SimNode<'a> {
             self.node.poll(tick);
             self.pump();
         }
+    }
+
+    /// Lets a Genius port of the node work in the present millisecond: once in each that passes.
+    pub fn serve<W: SharedRam>(&mut self, port: &mut GeniusPort<W>) {
+        let tick = self.tick_at(self.now_ms);
+        port.poll(&mut self.node, tick);
+        self.pump();
     }
 
     /// Bytes arrive on the node's line in the present millisecond.

@@ -66,6 +66,18 @@ fn without_a_place_the_link_is_in_a_directory_that_goes_with_it() {
 }
 
 #[test]
+fn the_link_of_a_simulator_that_runs_is_left_to_it() {
+    let place = Place::new();
+    let link = place.link();
+    let first = Simulator::start(on(&link)).unwrap();
+    let error = Simulator::start(on(&link)).unwrap_err();
+    assert!(matches!(&error, SimError::LinkInUse(path) if *path == link), "{error}");
+    Terminal::open(&link, 9600).ask(&Command::QueryMode);
+    drop(first);
+    Simulator::start(on(&link)).unwrap();
+}
+
+#[test]
 fn a_link_left_behind_is_replaced_and_anything_else_is_refused() {
     let place = Place::new();
     let link = place.link();

@@ -17,9 +17,9 @@ pub(crate) fn install(packages: &[&str]) -> Result<(), String> {
     if !root && !works(unrelated("sudo").args(["-n", "true"])) {
         return Err("installing packages takes root, or sudo without a password".to_owned());
     }
-    let log = places::firmware_target().join("apt.log");
-    let result = places::firmware_target();
-    fs::create_dir_all(&result)
+    let log = places::firmware_target().join(format!("apt-{}.log", packages.first().unwrap_or(&"")));
+
+    fs::create_dir_all(places::firmware_target())
         .and_then(|()| File::create(&log).map(drop))
         .map_err(|error| format!("{}: {error}", log.display()))?;
 
