@@ -6,6 +6,7 @@ use clap::{Args as _, CommandFactory, FromArgMatches, Parser, Subcommand};
 use ser_proto::Baud;
 
 use crate::commands;
+use crate::connection;
 use crate::error;
 use crate::values;
 
@@ -22,7 +23,7 @@ Exit codes: 0 done, 1 the unit did not answer or something else failed, 2 the co
 Only data goes to standard output; everything else goes to standard error.";
 
 /// Subcommands that talk to no unit: how to reach one is accepted there, and not mentioned.
-const OFFLINE: [&str; 6] = ["ports", "decode", "encode", "sim", "demo", "completions"];
+const OFFLINE: [&str; 7] = ["ports", "decode", "encode", "comm-req", "sim", "demo", "completions"];
 
 /// Reads, configures, watches and simulates sequential event recorders (HE660SER160, HE660SER320).
 #[derive(Debug, Parser)]
@@ -39,13 +40,15 @@ pub(crate) struct Cli {
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Connection")]
 pub(crate) struct ConnectionArgs {
-    /// Serial port of the unit (/dev/ttyUSB0, COM3), or tcp://HOST:PORT.
+    /// Serial port of the unit (/dev/ttyUSB0, COM3), tcp://HOST:PORT, or geni:FILE?node=N on a Genius bus.
+    ///
+    /// FILE is the window that this computer shares with its GENI board, N the unit's number on the bus.
     #[arg(short, long, global = true, env = "SER_PORT", value_name = "PORT")]
     pub(crate) port: Option<String>,
 
-    /// Rate of the serial port.
-    #[arg(long, global = true, value_name = "RATE", default_value = "9600", value_parser = values::baud)]
-    pub(crate) baud: Baud,
+    /// Rate of the serial port, 9600 if not given. Over TCP: of the terminal server's port, for `clock set` to reckon with.
+    #[arg(long, global = true, value_name = "RATE", value_parser = values::baud)]
+    pub(crate) baud: Option<Baud>,
 
     /// How long the unit may take to answer, on top of the time on the line: 500ms, 2s.
     #[arg(long, global = true, value_name = "TIME", value_parser = values::duration)]
@@ -69,8 +72,11 @@ enum Command {
     Read(commands::read::Args),
     Print(commands::print::Args),
     Watch(commands::watch::Args),
+    #[cfg(unix)]
+    Genius(commands::genius::Args),
     Decode(commands::decode::Args),
     Encode(commands::encode::Args),
+    CommReq(commands::comm_req::Args),
     Sim(commands::sim::Args),
     Demo(commands::demo::Args),
     Completions(commands::completions::Args),
@@ -106,6 +112,14 @@ impl Cli {
 
     /// Does what the command line asks for.
     pub(crate) fn run(&self) -> error::Result<()> {
+        self.run_command().map_err(|failure| match self.command {
+            // The demo's recorder is not the one behind `--port`.
+            Command::Demo(_) => failure,
+            _ => connection::explain_silence(failure, &self.connection),
+        })
+    }
+
+    fn run_command(&self) -> error::Result<()> {
         let connection = &self.connection;
         match &self.command {
             Command::Ports(args) => commands::ports::run(args),
@@ -119,8 +133,11 @@ impl Cli {
             Command::Read(args) => commands::read::run(args, connection),
             Command::Print(args) => commands::print::run(args, connection),
             Command::Watch(args) => commands::watch::run(args, connection),
+            #[cfg(unix)]
+            Command::Genius(args) => commands::genius::run(args, connection),
             Command::Decode(args) => commands::decode::run(args),
             Command::Encode(args) => commands::encode::run(args),
+            Command::CommReq(args) => commands::comm_req::run(args),
             Command::Sim(args) => commands::sim::run(args),
             Command::Demo(args) => commands::demo::run(args),
             Command::Completions(args) => commands::completions::run(args),
@@ -193,7 +210,19 @@ mod tests {
             "print --from 1",
             "encode read --from 1 --count 11",
             "encode set-clock 2026-02-29T00:00:00",
+            "comm-req send --to 32 erase",
+            "comm-req send --to 5 --status %M1 erase",
+            "comm-req dequeue --from 5 --max-words 0",
+            "comm-req parse 65536",
+            "comm-req parse",
+            "genius forces --node 32 --table input-values",
+            "genius forces --node 5",
+            "genius broadcast",
             "sim --model ser640",
+            "sim --genius /tmp/host",
+            "sim --node 5",
+            "sim --genius /tmp/host --node 32",
+            "sim --genius /tmp/host --node 5:ser640",
             "",
         ] {
             let words = std::iter::once("ser-cli").chain(line.split_whitespace());

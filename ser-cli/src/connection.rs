@@ -2,29 +2,80 @@
 
 use std::time::Duration;
 
-use ser_client::{Diagnosis, Endpoint, OpenError, Options, RequestError, Unit};
-use ser_proto::Configuration;
+use ser_client::{Diagnosis, Endpoint, GeniusError, LineRate, OpenError, Options, RequestError, Unit};
+use ser_proto::{Baud, Configuration};
 
 use crate::cli::ConnectionArgs;
-use crate::error::{Failure, Result, advise, warn};
+use crate::error::{Failure, Result, advise, inform, warn};
 
 /// What the user calls the unit: names its state file and appears in hints.
 pub(crate) fn port_text(connection: &ConnectionArgs) -> Result<&str> {
     connection.port.as_deref().map(str::trim).filter(|port| !port.is_empty()).ok_or_else(no_port)
 }
 
-/// Opens the line to the unit. Nothing is sent yet.
-pub(crate) fn open(connection: &ConnectionArgs) -> Result<Unit> {
-    let endpoint: Endpoint = port_text(connection)?.parse().map_err(|error| {
+fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint> {
+    port_text(connection)?.parse().map_err(|error| {
         Failure::usage(format!("--port: {error}"))
             .hint("ser-cli ports lists the serial ports of this computer")
-    })?;
-    let transport = ser_client::open(&endpoint, connection.baud.bits_per_second())
+    })
+}
+
+/// What the unit is called wherever this program is started: a relative path is made absolute. Links stay as they
+/// are: they are names that last.
+pub(crate) fn unit_name(connection: &ConnectionArgs) -> Result<String> {
+    let text = port_text(connection)?;
+    // Elsewhere the names of ports are no paths.
+    if cfg!(unix)
+        && let Endpoint::Geni { file, node } = endpoint(connection)?
+        && let Ok(path) = std::path::absolute(&file)
+        && let Some(path) = path.to_str()
+    {
+        return Ok(Endpoint::Geni { file: path.to_owned(), node }.to_string());
+    }
+    if cfg!(unix)
+        && matches!(endpoint(connection)?, Endpoint::Serial { .. })
+        && let Ok(path) = std::path::absolute(text)
+        && let Some(path) = path.to_str()
+    {
+        return Ok(path.to_owned());
+    }
+    Ok(text.to_owned())
+}
+
+/// Opens the line to the unit. Nothing is sent yet.
+pub(crate) fn open(connection: &ConnectionArgs) -> Result<Unit> {
+    let endpoint = endpoint(connection)?;
+    let mut unit = Unit::open(&endpoint, baud(connection).bits_per_second(), options(connection))
         .map_err(|error| open_failure(&error))?;
+    // A terminal server does not tell how fast its port is; who uses it may.
+    if let (false, Some(baud)) = (endpoint.has_baud(), connection.baud) {
+        unit.set_line_rate(LineRate::BitsPerSecond(baud.bits_per_second()));
+    }
+    Ok(unit)
+}
+
+/// The rate of the line: the one that units are delivered with, if no other is given.
+fn baud(connection: &ConnectionArgs) -> Baud {
+    connection.baud.unwrap_or_default()
+}
+
+/// How patient the user wants us to be.
+pub(crate) fn options(connection: &ConnectionArgs) -> Options {
     let mut options = Options::default();
     options.timeout = connection.timeout.unwrap_or(options.timeout);
     options.retries = connection.retries.unwrap_or(options.retries);
-    Ok(Unit::new(transport, options))
+    options
+}
+
+/// Joins the Genius bus, whichever unit on it is named.
+#[cfg(unix)]
+pub(crate) fn open_bus(connection: &ConnectionArgs) -> Result<ser_client::GeniHost> {
+    let Endpoint::Geni { file, .. } = endpoint(connection)? else {
+        return Err(Failure::usage(format!("{} is no Genius bus", port_text(connection)?))
+            .hint("name the window of this host's GENI board, as in --port geni:/dev/shm/host")
+            .hint("no board at hand? ser-cli sim --genius /dev/shm/host --node 5"));
+    };
+    ser_client::GeniHost::open(&file, options(connection).timeout).map_err(|error| open_failure(&error))
 }
 
 fn no_port() -> Failure {
@@ -44,6 +95,9 @@ fn open_failure(error: &OpenError) -> Failure {
         OpenError::NoSuchPort { .. } | OpenError::NotSerial { .. } => {
             failure.hint("ser-cli ports lists them")
         }
+        OpenError::Genius { error: GeniusError::NotOnBus { .. }, path } => {
+            failure.hint(format!("ser-cli genius devices --port geni:{path} lists them"))
+        }
         _ => failure,
     }
 }
@@ -54,11 +108,42 @@ impl From<RequestError> for Failure {
         let failure = Failure::new(&error).hint(hint);
         match error {
             // A unit that is asked at another rate sees no question, and says nothing.
-            RequestError::NoReply { diagnosis: Diagnosis::Silent, .. } => failure.hint(
-                "a unit that is asked at another rate than its own stays silent: try --baud 19200, --baud 4800, …",
-            ),
+            RequestError::NoReply {
+                diagnosis: Diagnosis::Silent | Diagnosis::Garbage { .. } | Diagnosis::Damaged { .. },
+                ..
+            } => failure.unanswered(),
             _ => failure,
         }
+    }
+}
+
+/// When nothing was understood at the rate of the port, looks whether the unit is there at another one.
+pub(crate) fn explain_silence(failure: Failure, connection: &ConnectionArgs) -> Failure {
+    if !failure.is_unanswered() {
+        return failure;
+    }
+    if !endpoint(connection).is_ok_and(|endpoint| endpoint.has_baud()) {
+        return failure.hint(
+            "a unit stays silent also when a terminal server talks to it at another rate than its own",
+        );
+    }
+    inform("no answer: looking for the unit at other rates …");
+    // Whatever hinders the search, the failure that led to it is the one to tell.
+    match open(connection).ok().and_then(|mut unit| unit.find_baud().ok()) {
+        Some(Some(found)) => {
+            let (asked, found) = (baud(connection).bits_per_second(), found.bits_per_second());
+            Failure::new(format!("no answer at {asked} baud; the unit answers at {found}"))
+                .hint(format!("add --baud {found}"))
+        }
+        Some(None) => failure.hint("the unit does not answer at any other rate either"),
+        None => failure,
+    }
+}
+
+/// What went wrong on a Genius bus, with advice.
+impl From<GeniusError> for Failure {
+    fn from(error: GeniusError) -> Failure {
+        Failure::new(error).hint(error.hint())
     }
 }
 
@@ -73,10 +158,12 @@ pub(crate) fn settings(unit: &mut Unit) -> Result<Option<Configuration>> {
 
 /// `None` where a unit that is there does not answer.
 pub(crate) fn unless_unanswered<T>(answer: std::result::Result<T, RequestError>) -> Result<Option<T>> {
-    use Diagnosis::{Ignored, Silent};
+    use Diagnosis::{Ignored, Silent, SilentOnBus};
     match answer {
         Ok(answer) => Ok(Some(answer)),
-        Err(RequestError::NoReply { diagnosis: Silent | Ignored { .. }, .. }) => Ok(None),
+        Err(RequestError::NoReply { diagnosis: Silent | SilentOnBus { .. } | Ignored { .. }, .. }) => {
+            Ok(None)
+        }
         Err(error) => Err(error.into()),
     }
 }
@@ -101,13 +188,14 @@ pub(crate) fn log_size_unknown() -> Failure {
     settings_unknown().hint("say with --log-size N how many entries its log has (2048 as delivered)")
 }
 
-/// Tells that the unit talks at another rate from now on.
-pub(crate) fn tell_new_baud(connection: &ConnectionArgs, now: &Configuration) {
-    if connection.baud != now.baud {
+/// Tells that the unit talks at another rate from now on, where the rate is ours to follow.
+pub(crate) fn tell_new_baud(connection: &ConnectionArgs, now: &Configuration) -> Result<()> {
+    if baud(connection) != now.baud && endpoint(connection)?.has_baud() {
         let rate = now.baud.bits_per_second();
         warn(format_args!("the unit's RS-232 port runs at {rate} baud from now on"));
-        advise(format_args!("add --baud {rate} from now on (a terminal server has to be told as well)"));
+        advise(format_args!("add --baud {rate} from now on"));
     }
+    Ok(())
 }
 
 /// How long to wait in one go where an interrupt has to be noticed soon.
@@ -115,14 +203,13 @@ pub(crate) const HEARTBEAT: Duration = Duration::from_millis(100);
 
 #[cfg(test)]
 mod tests {
-    use ser_proto::Baud;
 
     use super::*;
 
     fn opened(port: Option<&str>) -> Failure {
         let connection = ConnectionArgs {
             port: port.map(str::to_string),
-            baud: Baud::B9600,
+            baud: Some(Baud::B9600),
             timeout: None,
             retries: None,
         };

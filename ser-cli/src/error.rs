@@ -10,7 +10,7 @@ use anstyle::{AnsiColor, Style};
 pub(crate) type Result<T> = std::result::Result<T, Failure>;
 
 /// The unit did not answer or refused, or something else went wrong while running.
-const EXIT_FAILURE: u8 = 1;
+pub(crate) const EXIT_FAILURE: u8 = 1;
 
 /// The command line asks for something that cannot be; clap uses the same code.
 const EXIT_USAGE: u8 = 2;
@@ -32,6 +32,8 @@ pub(crate) struct Report {
     message: String,
     hints: Vec<String>,
     exit: u8,
+    /// Nothing that the unit said was understood, if it said anything.
+    unanswered: bool,
 }
 
 impl Failure {
@@ -46,7 +48,12 @@ impl Failure {
     }
 
     fn with_exit(message: impl Display, exit: u8) -> Failure {
-        Failure::Told(Box::new(Report { message: message.to_string(), hints: Vec::new(), exit }))
+        Failure::Told(Box::new(Report {
+            message: message.to_string(),
+            hints: Vec::new(),
+            exit,
+            unanswered: false,
+        }))
     }
 
     /// Adds what to try next; every failure has at least one such line.
@@ -55,6 +62,19 @@ impl Failure {
             report.hints.push(hint.to_string());
         }
         self
+    }
+
+    /// Notes that nothing was understood of the unit: the rate may be wrong.
+    pub(crate) fn unanswered(mut self) -> Failure {
+        if let Failure::Told(report) = &mut self {
+            report.unanswered = true;
+        }
+        self
+    }
+
+    /// Whether nothing was understood of the unit.
+    pub(crate) fn is_unanswered(&self) -> bool {
+        matches!(self, Failure::Told(report) if report.unanswered)
     }
 
     /// The failure to write to `what` (a file, standard output).

@@ -8,7 +8,8 @@ use ser_client::Cursor;
 use crate::cli::ConnectionArgs;
 use crate::connection;
 use crate::error::Result;
-use crate::state::{Delivered, StateFile};
+use crate::output;
+use crate::state::{Delivered, StateFile, StateLock};
 
 /// How much a crash may repeat, in time: writing the file after every event would wear a memory card.
 const SAVE_EVERY: Duration = Duration::from_secs(1);
@@ -27,14 +28,17 @@ pub(crate) struct Keeper {
     saved: Option<Delivered>,
     unsaved: Option<Delivered>,
     saved_at: Instant,
+    /// Held until the end: two that read what is new would deliver it twice, or move the cursor back.
+    _lock: StateLock,
 }
 
 impl Keeper {
     /// Loads what has been delivered from this unit.
     pub(crate) fn load(args: &StateArgs, connection: &ConnectionArgs) -> Result<Keeper> {
-        let file = StateFile::of_unit(connection::port_text(connection)?, args.state_dir.as_deref())?;
+        let file = StateFile::of_unit(&connection::unit_name(connection)?, args.state_dir.as_deref())?;
+        let lock = file.lock()?;
         let saved = file.load()?;
-        Ok(Keeper { file, saved, unsaved: None, saved_at: Instant::now() })
+        Ok(Keeper { file, saved, unsaved: None, saved_at: Instant::now(), _lock: lock })
     }
 
     /// Where reading goes on.
@@ -63,6 +67,9 @@ impl Keeper {
     /// Writes what is not written yet.
     pub(crate) fn save(&mut self) -> Result<()> {
         if let Some(delivered) = self.unsaved.take() {
+            // The events have to be on the disk before it is remembered that they are: after a power cut it is better
+            // to get some twice than to miss some.
+            output::sync_stdout();
             self.file.save(&delivered)?;
             self.saved = Some(delivered);
             self.saved_at = Instant::now();

@@ -1,6 +1,6 @@
 //! What has been delivered already, kept in the user's state directory between two runs: one file per unit.
 
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -28,6 +28,12 @@ pub(crate) struct Delivered {
 pub(crate) struct StateFile {
     path: PathBuf,
     unit: String,
+}
+
+/// Keeps other runs away from a state file, until it is dropped or the program ends.
+#[derive(Debug)]
+pub(crate) struct StateLock {
+    _file: File,
 }
 
 /// The file's content.
@@ -59,6 +65,30 @@ impl StateFile {
             None => default_directory()?,
         };
         Ok(StateFile { path: directory.join(file_name(port)), unit: port.to_string() })
+    }
+
+    /// Takes the file for this run alone.
+    pub(crate) fn lock(&self) -> Result<StateLock> {
+        // The state file itself is replaced whenever it is saved, so the lock is on one that stays.
+        let path = self.path.with_extension("lock");
+        let cannot = |error: io::Error| {
+            Failure::new(format!("cannot lock {}: {error}", path.display()))
+                .hint("choose another directory with --state-dir DIR")
+        };
+        if let Some(directory) = path.parent() {
+            fs::create_dir_all(directory).map_err(cannot)?;
+        }
+        let file = File::options().write(true).create(true).truncate(false).open(&path).map_err(cannot)?;
+        match file.try_lock() {
+            Ok(()) => Ok(StateLock { _file: file }),
+            Err(TryLockError::WouldBlock) => Err(Failure::new(format!(
+                "another ser-cli is reading what is new from {}",
+                self.unit
+            ))
+            .hint("wait until it has ended, or end it: is a watch running?")
+            .hint("read --all needs no state; with --state-dir DIR a second reader gets everything, too")),
+            Err(TryLockError::Error(error)) => Err(cannot(error)),
+        }
     }
 
     /// What had been delivered; `None` when nothing has yet.
@@ -95,8 +125,7 @@ impl StateFile {
         if let Some(directory) = self.path.parent() {
             fs::create_dir_all(directory)?;
         }
-        // The process id keeps two runs apart; the last to rename wins.
-        let temporary = self.path.with_extension(format!("{}.tmp", std::process::id()));
+        let temporary = self.path.with_extension("tmp");
         let result = write_whole(&temporary, &content).and_then(|()| fs::rename(&temporary, &self.path));
         if result.is_err() {
             // The first error is the one to tell.
@@ -131,13 +160,13 @@ fn default_directory() -> Result<PathBuf> {
 
 /// A name that any file system takes, that people can read, and that no other port text gives.
 fn file_name(port: &str) -> String {
-    let mut name = String::new();
+    // Windows takes COM3.json for the port itself.
+    let mut name = String::from("port-");
     for byte in port.bytes() {
         match byte {
             b'/' => name.push('_'),
-            // A leading dot would hide the file; `_` is taken.
-            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'-' => name.push(char::from(byte)),
-            b'.' if !name.is_empty() => name.push('.'),
+            // `_` is taken.
+            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'-' | b'.' => name.push(char::from(byte)),
             other => name.push_str(&format!("%{other:02X}")),
         }
     }
@@ -216,6 +245,17 @@ mod tests {
     }
 
     #[test]
+    fn one_run_at_a_time_has_the_file() {
+        let directory = tempfile::tempdir().unwrap();
+        let lock = state_in(&directory).lock().unwrap();
+        let text = state_in(&directory).lock().unwrap_err().text();
+        assert!(text.contains("another ser-cli") && text.contains("/dev/ttyUSB0"), "{text}");
+        StateFile::of_unit("/dev/ttyUSB1", Some(directory.path())).unwrap().lock().unwrap();
+        drop(lock);
+        state_in(&directory).lock().unwrap();
+    }
+
+    #[test]
     fn a_directory_that_cannot_be_made_is_an_error_with_advice() {
         let directory = tempfile::tempdir().unwrap();
         fs::write(directory.path().join("new"), "a file in the way").unwrap();
@@ -227,12 +267,12 @@ mod tests {
     #[test]
     fn every_port_has_a_readable_file_name_of_its_own() {
         for (port, name) in [
-            ("/dev/ttyUSB0", "_dev_ttyUSB0.json"),
-            ("COM3", "COM3.json"),
-            ("tcp://10.0.0.7:4000", "tcp%3A__10.0.0.7%3A4000.json"),
-            ("/dev/a_b", "_dev_a%5Fb.json"),
-            ("../x", "%2E._x.json"),
-            ("./\u{e4} *", "%2E_%C3%A4%20%2A.json"),
+            ("/dev/ttyUSB0", "port-_dev_ttyUSB0.json"),
+            ("COM3", "port-COM3.json"),
+            ("tcp://10.0.0.7:4000", "port-tcp%3A__10.0.0.7%3A4000.json"),
+            ("/dev/a_b", "port-_dev_a%5Fb.json"),
+            ("../x", "port-.._x.json"),
+            ("./\u{e4} *", "port-._%C3%A4%20%2A.json"),
         ] {
             assert_eq!(file_name(port), name);
         }

@@ -37,6 +37,12 @@ pub(crate) fn local_time_in(ahead: std::time::Duration) -> Result<TimeStamp, i32
     stamp((Local::now() + ahead).naive_local())
 }
 
+/// The time `elapsed` after `time`, which is a date; past the year 2069 it stays the same.
+pub(crate) fn time_after(time: TimeStamp, elapsed: std::time::Duration) -> TimeStamp {
+    let elapsed = TimeDelta::from_std(elapsed).unwrap_or_default();
+    NaiveDateTime::try_from(time).map_or(time, |start| stamp(start + elapsed).unwrap_or(time))
+}
+
 /// The time between two events, with its sign.
 ///
 /// As `+0.001 s`, `+1m02.003 s`, `+3h01m02 s`, `+2d03h01m`: the further apart, the coarser, so that it is taken in at
@@ -75,6 +81,13 @@ impl fmt::Display for Delta {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_time_goes_on_from_where_it_is() {
+        let time = parse_time("2026-12-31T23:59:59.990").unwrap();
+        let later = time_after(time, std::time::Duration::from_millis(2040));
+        assert_eq!(later.to_string(), "2027-01-01T00:00:02.030");
+    }
 
     #[test]
     fn a_time_may_be_written_in_a_few_ways() {

@@ -11,6 +11,11 @@ use crate::Counters;
 pub enum Diagnosis {
     /// Not one byte arrived. A unit that is asked at the wrong baud rate hears garbage and is silent, too.
     Silent,
+    /// The unit is on the Genius bus and did not answer.
+    SilentOnBus {
+        /// Its number.
+        node: u8,
+    },
     /// Bytes arrived and none of them made sense: most likely the wrong baud rate.
     Garbage {
         /// How many bytes.
@@ -35,8 +40,8 @@ pub enum Diagnosis {
 
 impl Diagnosis {
     /// Judges what was counted while the answer was awaited; `not_understood` is the last answer to the command that
-    /// made no sense.
-    pub(crate) fn of(seen: &Counters, not_understood: Option<ParseError>) -> Diagnosis {
+    /// made no sense, `unfinished` whether a frame had begun and never ended.
+    pub(crate) fn of(seen: &Counters, not_understood: Option<ParseError>, unfinished: bool) -> Diagnosis {
         if seen.bytes == 0 {
             return Diagnosis::Silent;
         }
@@ -47,8 +52,9 @@ impl Diagnosis {
             return Diagnosis::Ignored { frames: seen.frames, lines: seen.lines };
         }
         // At a wrong rate an ESC may appear by chance, but hardly ever a length and a body of digits after it.
-        if seen.bad_checksums > 0 {
-            return Diagnosis::Damaged { frames: seen.bad_checksums + seen.broken_frames };
+        if seen.bad_checksums > 0 || unfinished {
+            let frames = seen.bad_checksums + seen.broken_frames + u64::from(unfinished);
+            return Diagnosis::Damaged { frames };
         }
         Diagnosis::Garbage { bytes: seen.bytes }
     }
@@ -59,6 +65,9 @@ impl Diagnosis {
         match self {
             Diagnosis::Silent => {
                 "check power, port, cable (null modem?) and baud rate (units are delivered with 9600)"
+            }
+            Diagnosis::SilentOnBus { .. } => {
+                "is this device a recorder, and is the bus free of errors? Or wait longer for the answer"
             }
             Diagnosis::Garbage { .. } => "try another baud rate; units are delivered with 9600",
             Diagnosis::Damaged { .. } => "check cable, shielding and ground, or choose a lower baud rate",
@@ -74,6 +83,9 @@ impl fmt::Display for Diagnosis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Diagnosis::Silent => write!(f, "not one byte came back"),
+            Diagnosis::SilentOnBus { node } => {
+                write!(f, "device {node} is on the bus and does not reply")
+            }
             Diagnosis::Garbage { bytes } => write!(f, "{bytes} bytes came back and none made sense"),
             Diagnosis::Damaged { frames } => write!(f, "{frames} damaged frames came back"),
             Diagnosis::NotUnderstood(error) => write!(f, "the answer was not understood: {error}"),

@@ -4,9 +4,13 @@ use std::error::Error;
 use std::fmt;
 use std::str::FromStr;
 
-const TCP_PREFIX: &str = "tcp://";
+use ser_proto::genius::Device;
 
-/// Where a unit is reached: `tcp://HOST:PORT`, or the path or name of a serial port.
+const TCP_PREFIX: &str = "tcp://";
+const GENI_PREFIX: &str = "geni:";
+const NODE_QUERY: &str = "?node=";
+
+/// Where a unit is reached: `tcp://HOST:PORT`, `geni:FILE?node=N`, or the path or name of a serial port.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Endpoint {
@@ -19,6 +23,13 @@ pub enum Endpoint {
     Tcp {
         /// `HOST:PORT`.
         address: String,
+    },
+    /// A Genius bus, through the window that this host shares with its GENI board.
+    Geni {
+        /// The file that is the window.
+        file: String,
+        /// The unit's number on the bus, 0-31; `None` for the bus as a whole.
+        node: Option<u8>,
     },
 }
 
@@ -37,6 +48,10 @@ pub enum EndpointError {
     Empty,
     /// `tcp://` is not followed by `HOST:PORT` with a port of 1–65535.
     TcpAddress,
+    /// `geni:` is not followed by a file.
+    GeniFile,
+    /// What follows `?node=` is no number of 0–31.
+    GeniNode,
     /// Something like `udp://…`.
     UnknownScheme,
 }
@@ -48,6 +63,9 @@ impl FromStr for Endpoint {
         let text = text.trim();
         if text.is_empty() {
             return Err(EndpointError::Empty);
+        }
+        if let Some(window) = text.strip_prefix(GENI_PREFIX) {
+            return geni(window);
         }
         let Some(address) = text.strip_prefix(TCP_PREFIX) else {
             return if text.contains("://") {
@@ -66,11 +84,26 @@ impl FromStr for Endpoint {
     }
 }
 
+fn geni(window: &str) -> Result<Endpoint, EndpointError> {
+    let (file, node) = match window.rsplit_once(NODE_QUERY) {
+        Some((file, number)) => (file, Some(number)),
+        None => (window, None),
+    };
+    if file.is_empty() {
+        return Err(EndpointError::GeniFile);
+    }
+    let number = |text: &str| text.parse().ok().and_then(Device::new).map(Device::number);
+    let node = node.map(|text| number(text).ok_or(EndpointError::GeniNode)).transpose()?;
+    Ok(Endpoint::Geni { file: file.to_owned(), node })
+}
+
 impl fmt::Display for Endpoint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Endpoint::Serial { path } => f.write_str(path),
             Endpoint::Tcp { address } => write!(f, "{TCP_PREFIX}{address}"),
+            Endpoint::Geni { file, node: Some(node) } => write!(f, "{GENI_PREFIX}{file}{NODE_QUERY}{node}"),
+            Endpoint::Geni { file, node: None } => write!(f, "{GENI_PREFIX}{file}"),
         }
     }
 }
@@ -82,6 +115,10 @@ impl fmt::Display for EndpointError {
             EndpointError::TcpAddress => {
                 "tcp:// needs HOST:PORT, as in tcp://localhost:5300 or tcp://[::1]:5300"
             }
+            EndpointError::GeniFile => {
+                "geni: needs the window of a GENI board, as in geni:/dev/shm/host?node=5"
+            }
+            EndpointError::GeniNode => "a unit's number on the bus is 0 to 31, as in geni:FILE?node=5",
             EndpointError::UnknownScheme => {
                 "a port is tcp://HOST:PORT or the name of a serial port, as in /dev/ttyUSB0"
             }
@@ -112,6 +149,21 @@ mod tests {
     }
 
     #[test]
+    fn a_geni_window_may_name_a_node() {
+        for (text, file, node) in [
+            ("geni:/dev/shm/host?node=5", "/dev/shm/host", Some(5)),
+            ("geni:host?node=0", "host", Some(0)),
+            ("geni:a?node=1?node=31", "a?node=1", Some(31)),
+            ("geni:host", "host", None),
+        ] {
+            let endpoint: Endpoint = text.parse().unwrap();
+            assert_eq!(endpoint, Endpoint::Geni { file: file.to_owned(), node });
+            assert_eq!(endpoint.to_string(), text);
+            assert!(!endpoint.has_baud());
+        }
+    }
+
+    #[test]
     fn what_cannot_be_a_port_says_why() {
         for (text, error) in [
             ("", EndpointError::Empty),
@@ -122,6 +174,11 @@ mod tests {
             ("tcp://host:0", EndpointError::TcpAddress),
             ("tcp://host:65536", EndpointError::TcpAddress),
             ("tcp://::1:5300", EndpointError::TcpAddress),
+            ("geni:", EndpointError::GeniFile),
+            ("geni:?node=5", EndpointError::GeniFile),
+            ("geni:host?node=", EndpointError::GeniNode),
+            ("geni:host?node=32", EndpointError::GeniNode),
+            ("geni:host?node=x", EndpointError::GeniNode),
             ("udp://host:1", EndpointError::UnknownScheme),
         ] {
             assert_eq!(text.parse::<Endpoint>(), Err(error), "{text:?}");

@@ -16,6 +16,8 @@ pub struct Step<'a> {
     pub cursor: Option<Cursor>,
     /// How many more events the log is known to hold.
     pub pending: u32,
+    /// How many entries the log holds, as far as is known by now.
+    pub size: u16,
 }
 
 /// A log and how far it has been read.
@@ -102,7 +104,7 @@ impl LogFollower {
             deliveries.clear();
             let taken = reader.take(&reply, &mut |delivery| deliveries.push(delivery));
             let (cursor, pending) = (reader.cursor(), reader.pending());
-            take(&Step { deliveries: &deliveries, cursor, pending })?;
+            take(&Step { deliveries: &deliveries, cursor, pending, size: self.size })?;
             self.cursor = cursor;
             if taken.is_err() {
                 return Ok((reader.summary(), taken));

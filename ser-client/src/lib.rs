@@ -4,6 +4,9 @@
 //! Most programs want [`open`] and [`Unit`]: blocking calls over a serial port or TCP. Underneath, [`Session`] (one
 //! request and its answer) and [`LogReader`] (which entries to read next) know neither clock nor port; they can be
 //! driven by any event loop, and by tests without waiting.
+//!
+//! On a Genius bus a unit is reached through the window that a host shares with its GENI board; [`GeniHost`] also knows
+//! who else is on the bus, and speaks to all of them.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
@@ -14,7 +17,9 @@ mod cursor;
 mod diagnosis;
 mod endpoint;
 mod follower;
+mod genius;
 mod line_rate;
+mod link;
 mod log_position;
 mod open;
 mod ports;
@@ -34,6 +39,9 @@ pub use cursor::{Cursor, Delivery, Lost};
 pub use diagnosis::Diagnosis;
 pub use endpoint::{Endpoint, EndpointError};
 pub use follower::{LogFollower, Step};
+pub use genius::{BlockKind, DeviceRecord, GeniusError};
+#[cfg(unix)]
+pub use genius::{BusDevice, GeniHost};
 pub use line_rate::LineRate;
 pub use log_position::LogPosition;
 pub use open::{OpenError, open};

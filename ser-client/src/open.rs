@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::{fmt, io};
 
-use crate::{Endpoint, SerialTransport, TcpTransport, Transport};
+use crate::{Endpoint, GeniusError, SerialTransport, TcpTransport, Transport};
 
 /// Opens the line. `baud` is the rate in bits per second; a line without a rate ignores it.
 ///
@@ -13,6 +13,15 @@ pub fn open(endpoint: &Endpoint, baud: u32) -> Result<Box<dyn Transport>, OpenEr
     match endpoint {
         Endpoint::Serial { path } => Ok(Box::new(SerialTransport::open(path, baud)?)),
         Endpoint::Tcp { address } => Ok(Box::new(TcpTransport::connect(address)?)),
+        Endpoint::Geni { file, node } => Err(no_line(file, *node)),
+    }
+}
+
+/// A window is opened by [`Unit::open`](crate::Unit::open) and [`GeniHost`](crate::GeniHost), where that can be.
+fn no_line(file: &str, node: Option<u8>) -> OpenError {
+    match node {
+        Some(_) => OpenError::NotAWindow { path: file.to_owned() },
+        None => OpenError::NoNode { path: file.to_owned() },
     }
 }
 
@@ -61,6 +70,40 @@ pub enum OpenError {
         /// `HOST:PORT`.
         address: String,
     },
+    /// There is no file of this name that could be a GENI window.
+    NoSuchWindow {
+        /// What was asked for.
+        path: String,
+    },
+    /// There is something of this name, but it cannot be a GENI window.
+    NotAWindow {
+        /// What was asked for.
+        path: String,
+    },
+    /// The file has another size than a GENI window.
+    WindowSize {
+        /// The file.
+        path: String,
+        /// Its bytes.
+        len: u64,
+    },
+    /// Another program uses the GENI window.
+    WindowInUse {
+        /// The file.
+        path: String,
+    },
+    /// A GENI window, and no word of which unit on the bus is meant.
+    NoNode {
+        /// The file.
+        path: String,
+    },
+    /// The GENI board, or the bus behind it.
+    Genius {
+        /// The window.
+        path: String,
+        /// What is wrong.
+        error: GeniusError,
+    },
     /// Anything else.
     Other {
         /// What was asked for.
@@ -92,6 +135,14 @@ impl OpenError {
             }
             OpenError::HostNotFound { .. } => "check the spelling, or give the IP address",
             OpenError::Unreachable { .. } => "check network and firewall; does the host answer a ping?",
+            OpenError::NoSuchWindow { .. } => {
+                "check the name; is the program that makes the window (ser-cli sim --genius FILE) running?"
+            }
+            OpenError::NotAWindow { .. } => "name the file that this host shares with its GENI board",
+            OpenError::WindowSize { .. } => "a GENI window has 16 KiB (16384 bytes): is this the right file?",
+            OpenError::WindowInUse { .. } => "wait until the other program has ended, or end it",
+            OpenError::NoNode { .. } => "say which unit on the bus, as in geni:FILE?node=5",
+            OpenError::Genius { error, .. } => error.hint(),
             OpenError::Other { .. } => "see what the system says above",
         }
     }
@@ -108,6 +159,14 @@ impl fmt::Display for OpenError {
             OpenError::Refused { address } => write!(f, "nothing listens at tcp://{address}"),
             OpenError::HostNotFound { address } => write!(f, "the host of tcp://{address} is not known"),
             OpenError::Unreachable { address } => write!(f, "tcp://{address} does not answer"),
+            OpenError::NoSuchWindow { path } => write!(f, "there is no GENI window {path}"),
+            OpenError::NotAWindow { path } => write!(f, "{path} cannot be a GENI window"),
+            OpenError::WindowSize { path, len } => {
+                write!(f, "{path} has {len} bytes and cannot be a GENI window")
+            }
+            OpenError::WindowInUse { path } => write!(f, "the GENI window {path} is in use"),
+            OpenError::NoNode { path } => write!(f, "no unit on the bus behind {path} is named"),
+            OpenError::Genius { path, error } => write!(f, "{error} (GENI window {path})"),
             OpenError::Other { name, error } => write!(f, "cannot open {name}: {error}"),
         }
     }
@@ -117,6 +176,7 @@ impl Error for OpenError {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
             OpenError::Other { error, .. } => Some(error),
+            OpenError::Genius { error, .. } => Some(error),
             _ => None,
         }
     }

@@ -5,12 +5,15 @@ use ser_proto::{MAX_ENTRIES, MAX_SIZE, ReadReply};
 use crate::{Delivery, LogPosition, ReadRequest};
 
 /// Reads a range of entries. Events that are recorded meanwhile may overwrite entries of the range between two
-/// replies; [`LogReader`](crate::LogReader) notices that, this does not.
+/// replies; [`LogReader`](crate::LogReader) follows them, this only tells: [`is_mixed`](Self::is_mixed).
 #[derive(Debug)]
 pub struct RangeReader {
+    start: u16,
     next: u16,
     /// Behind the last entry.
     end: u16,
+    /// Where the log stood in the first reply.
+    first: Option<LogPosition>,
     position: Option<LogPosition>,
     delivered: u16,
 }
@@ -22,7 +25,8 @@ impl RangeReader {
     pub fn new(start: u16, count: u16, size: u16) -> RangeReader {
         let size = size.clamp(1, MAX_SIZE);
         let end = start.saturating_add(count).min(size + 1);
-        RangeReader { next: if start == 0 { end } else { start }, end, position: None, delivered: 0 }
+        let next = if start == 0 { end } else { start };
+        RangeReader { start, next, end, first: None, position: None, delivered: 0 }
     }
 
     /// The entries to ask for next; `None` when all have come, or those that exist.
@@ -37,6 +41,7 @@ impl RangeReader {
     pub fn take(&mut self, reply: &ReadReply, on: &mut dyn FnMut(Delivery)) {
         let Some(request) = self.request().filter(|request| request.start == reply.start) else { return };
         self.position = Some(LogPosition::from(reply));
+        self.first = self.first.or(self.position);
         let Some(model) = reply.model else {
             // The log ends here.
             self.end = self.next;
@@ -55,9 +60,63 @@ impl RangeReader {
         self.position
     }
 
+    /// Whether events that were recorded during the reading may stand in place of entries that were delivered.
+    #[must_use]
+    pub fn is_mixed(&self) -> bool {
+        let (Some(first), Some(last)) = (self.first, self.position) else { return false };
+        if first == last {
+            return false;
+        }
+        // Slot `n - 1` holds entry `n`.
+        let slots = self.start.saturating_sub(1)..self.next.saturating_sub(1);
+        let went_straight = last.total.wrapping_sub(first.total)
+            == last.next_slot.wrapping_sub(first.next_slot)
+            && first.next_slot < last.next_slot;
+        // Where the ring turned, or the log was erased, every entry may have been written.
+        !went_straight || (first.next_slot < slots.end && slots.start < last.next_slot)
+    }
+
     /// How many entries were delivered.
     #[must_use]
     pub const fn delivered(&self) -> u16 {
         self.delivered
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ser_proto::{Entry, Inputs, Model, TimeStamp};
+
+    fn reply(start: u16, count: usize, total: u16, next_slot: u16) -> ReadReply {
+        let time =
+            TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 250 };
+        let entry = Entry { changed: Inputs(1), state: Inputs(1), time };
+        let entries = std::iter::repeat_n(entry, count).collect();
+        ReadReply { start, total, next_slot, model: Some(Model::Ser160), entries }
+    }
+
+    /// Reads entries 11 to 30 of 100 while the log goes from one total and next slot to the other.
+    fn is_mixed(first: (u16, u16), last: (u16, u16)) -> bool {
+        let mut reader = RangeReader::new(11, 20, 100);
+        reader.take(&reply(11, 10, first.0, first.1), &mut drop);
+        reader.take(&reply(21, 10, last.0, last.1), &mut drop);
+        assert_eq!((reader.delivered(), reader.request()), (20, None));
+        reader.is_mixed()
+    }
+
+    #[test]
+    fn events_that_took_the_place_of_entries_are_noticed() {
+        assert!(!RangeReader::new(1, 1, 1).is_mixed());
+        assert!(!is_mixed((215, 15), (215, 15)), "nothing has happened");
+        assert!(!is_mixed((205, 5), (210, 10)), "before the range");
+        assert!(!is_mixed((230, 30), (240, 40)), "behind the range");
+        assert!(is_mixed((205, 5), (211, 11)), "its first entry");
+        assert!(is_mixed((229, 29), (230, 30)), "its last entry");
+        assert!(is_mixed((240, 40), (310, 10)), "over the end of the ring");
+        assert!(is_mixed((205, 5), (306, 6)), "once around");
+        assert!(is_mixed((205, 5), (305, 5)), "once around to the same place");
+        assert!(is_mixed((205, 5), (10, 10)), "erased");
+        assert!(!is_mixed((65_535, 50), (3, 54)), "over the wrap of the total, behind the range");
     }
 }

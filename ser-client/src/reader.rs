@@ -130,6 +130,15 @@ struct Pending {
     overwritten: u64,
 }
 
+/// A log that is not full and has had more events than it holds was made larger, or does not have the size that
+/// was given. If there is an entry behind the next slot, the ring goes round earlier than it should.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Growth {
+    Unasked,
+    Asking,
+    Certain,
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Plan {
     Locate(ReadRequest),
@@ -155,6 +164,8 @@ pub struct LogReader {
     footing: Footing,
     /// Whether the anchor has been seen in its place during this reading.
     checked: bool,
+    /// Whether a log that is not full holds fewer entries than events because its ring was made larger.
+    growth: Growth,
     pending: Pending,
     /// How far ahead of the oldest entry reading goes on after a loss; above 0 once the recorder was faster.
     margin: u64,
@@ -178,6 +189,7 @@ impl LogReader {
             target: 0,
             footing: Footing::Uncounted,
             checked: false,
+            growth: Growth::Unasked,
             pending: Pending::default(),
             margin: 0,
             fruitless: 0,
@@ -228,7 +240,7 @@ impl LogReader {
         match plan {
             Plan::Done => {}
             Plan::Locate(_) => self.located(request, batch, on)?,
-            Plan::Probe(_) => self.probed(entries.len(), on)?,
+            Plan::Probe(_) => self.probed(request, entries.len(), on)?,
             Plan::Anchored(_, anchor) => self.take_anchored(anchor, batch, on)?,
             Plan::Plain(_) => self.take_plain(request, batch, on)?,
         }
@@ -269,6 +281,9 @@ impl LogReader {
                 self.expected_slot.map_or(ReadRequest::POSITION, |slot| self.entries(slot, 2)),
             );
         };
+        if self.growth == Growth::Asking {
+            return Plan::Probe(self.entries(head.slot, MAX_ENTRIES as u64));
+        }
         let behind = head.total - self.next;
         let at_target = self.next >= self.target && self.pending == Pending::default();
         match self.footing {
@@ -353,13 +368,36 @@ impl LogReader {
         Ok(())
     }
 
-    fn probed(&mut self, entries: usize, on: &mut dyn FnMut(Delivery)) -> Result<(), Disturbed> {
+    fn probed(
+        &mut self,
+        request: ReadRequest,
+        entries: usize,
+        on: &mut dyn FnMut(Delivery),
+    ) -> Result<(), Disturbed> {
         let Some(head) = self.head else { return Ok(()) };
+        if self.growth == Growth::Asking {
+            // Events may have come into these slots meanwhile; any entry behind them is from the round before.
+            let end = u64::from(request.start) - 1 + entries as u64;
+            if end > head.slot {
+                return Err(Disturbed::WrongSize);
+            }
+            if entries == usize::from(request.count) {
+                return Ok(());
+            }
+            self.growth = Growth::Certain;
+            return match self.footing {
+                Footing::Uncounted => self.count(head, head.slot, on),
+                _ => self.not_full(head),
+            };
+        }
         if entries > 1 {
             return Err(Disturbed::WrongSize);
         }
         let full = entries == 1;
         if self.footing == Footing::Uncounted {
+            if !full && !self.may_hold_fewer_than(head) {
+                return Ok(());
+            }
             return self.count(head, if full { self.size } else { head.slot }, on);
         }
         if !full {
@@ -401,10 +439,23 @@ impl LogReader {
         if held == 0 {
             return Err(Disturbed::WrongSize);
         }
+        if !self.may_hold_fewer_than(head) {
+            return Ok(());
+        }
         // A larger ring than before, and what did not fit the smaller one is gone.
         self.skip_to(self.next.max(head.total - held));
         self.footing = Footing::Firm;
         Ok(())
+    }
+
+    /// Whether a log that is not full can be believed to hold fewer entries than it has had events. If that is not
+    /// known, it is asked next.
+    fn may_hold_fewer_than(&mut self, head: Head) -> bool {
+        let all_held = u64::from(low_16(head.total)) == head.slot;
+        if !all_held && self.growth == Growth::Unasked {
+            self.growth = Growth::Asking;
+        }
+        all_held || self.growth == Growth::Certain
     }
 
     fn restart(&mut self) {

@@ -214,11 +214,22 @@ impl Attempt<'_> {
         }
     }
 
+    /// The command to send, where that is done without a frame.
+    #[must_use]
+    pub fn command(&self) -> &Command {
+        &self.request.command
+    }
+
     /// The bytes to send.
     #[must_use]
     pub fn frame(&self) -> &[u8] {
         self.frame
     }
+}
+
+/// The reply in a body, or which one it seemed to be.
+fn understand(body: &[u8]) -> Result<Reply, (Option<u8>, ParseError)> {
+    Reply::parse(body).map_err(|error| (body.first().copied(), error))
 }
 
 fn encode(command: &Command, frame: &mut Vec<u8>) {
@@ -348,15 +359,23 @@ impl Session {
                     self.lines.damaged();
                     continue;
                 }
-                Some(Decoded::Frame(body)) => {
-                    Reply::parse(body).map_err(|error| (body.first().copied(), error))
-                }
+                Some(Decoded::Frame(body)) => understand(body),
             };
-            self.counters.frames += 1;
-            match message {
-                Ok(reply) => self.take_reply(now, reply),
-                Err((code, error)) => self.take_nonsense(code, error),
-            }
+            self.take_message(now, message);
+        }
+    }
+
+    /// Takes a body that has arrived without a frame, as on a Genius bus.
+    pub fn process_body(&mut self, now: Duration, body: &[u8]) {
+        self.counters.bytes += body.len() as u64;
+        self.take_message(now, understand(body));
+    }
+
+    fn take_message(&mut self, now: Duration, message: Result<Reply, (Option<u8>, ParseError)>) {
+        self.counters.frames += 1;
+        match message {
+            Ok(reply) => self.take_reply(now, reply),
+            Err((code, error)) => self.take_nonsense(code, error),
         }
     }
 
@@ -383,6 +402,11 @@ impl Session {
         if let Some(request) = self.request.take_if(|request| request.is_answered_by(&reply)) {
             let until = request.deadline.unwrap_or(now);
             self.remember_owed(&request, request.attempts - 1, until);
+            if reply == Reply::PrintAccepted {
+                // Nothing but their time tells earlier lines from those that were asked for.
+                self.unsolicited.drop_lines();
+                self.lines.clear();
+            }
             self.answer = Some(Ok(reply));
             return;
         }
@@ -409,7 +433,7 @@ impl Session {
         self.answer = Some(Err(NoReply {
             command: request.command.code(),
             attempts: request.attempts,
-            diagnosis: Diagnosis::of(&seen, request.not_understood),
+            diagnosis: Diagnosis::of(&seen, request.not_understood, self.decoder.inside_frame()),
             may_have_been_done: changes_something(&request.command),
         }));
     }
@@ -455,6 +479,12 @@ impl Session {
     #[must_use]
     pub const fn timing(&self) -> Timing {
         self.timing
+    }
+
+    /// Changes how long to wait and how often to try, from the next request on.
+    pub fn set_patience(&mut self, timeout: Duration, retries: u32) {
+        self.timing.timeout = timeout;
+        self.timing.retries = retries;
     }
 
     /// Tells that the line has another rate now. What was under way at the old rate is forgotten.

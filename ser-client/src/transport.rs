@@ -5,6 +5,8 @@ use std::io;
 use std::time::Duration;
 use std::{fmt, io::ErrorKind};
 
+use crate::GeniusError;
+
 /// A line to a unit, blocking.
 pub trait Transport: Send {
     /// Waits up to `timeout` for bytes and takes those that are there. 0 means that none came in time.
@@ -37,6 +39,8 @@ pub enum TransportError {
     Unplugged,
     /// The other end of the connection went away.
     Closed,
+    /// The GENI board, or the bus behind it.
+    Genius(GeniusError),
     /// Anything else.
     Io(io::Error),
 }
@@ -50,8 +54,15 @@ impl TransportError {
             TransportError::Closed => {
                 Some("is the program or the terminal server at the other end still running?")
             }
+            TransportError::Genius(error) => Some(error.hint()),
             TransportError::Io(_) => None,
         }
+    }
+}
+
+impl From<GeniusError> for TransportError {
+    fn from(error: GeniusError) -> TransportError {
+        TransportError::Genius(error)
     }
 }
 
@@ -73,6 +84,7 @@ impl fmt::Display for TransportError {
         match self {
             TransportError::Unplugged => write!(f, "the serial port is gone"),
             TransportError::Closed => write!(f, "the connection was closed by the other end"),
+            TransportError::Genius(error) => error.fmt(f),
             TransportError::Io(error) => write!(f, "the line failed: {error}"),
         }
     }
@@ -82,7 +94,7 @@ impl Error for TransportError {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
             TransportError::Io(error) => Some(error),
-            TransportError::Unplugged | TransportError::Closed => None,
+            TransportError::Unplugged | TransportError::Closed | TransportError::Genius(_) => None,
         }
     }
 }

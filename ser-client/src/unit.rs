@@ -2,12 +2,16 @@
 
 use std::time::{Duration, Instant};
 
-use ser_proto::{Code, Command, Configuration, Configure, LastBroadcast, Mode, ReadReply, Reply, TimeStamp};
+use ser_proto::{
+    Baud, Code, Command, Configuration, Configure, LastBroadcast, Mode, Model, ReadReply, Reply, TimeStamp,
+    encoded_len,
+};
 
+use crate::link::{Link, SerialLink};
 use crate::session::NoReply;
 use crate::{
-    Counters, Cursor, Delivery, LineRate, LogFollower, LogPosition, RangeReader, ReadRequest, RequestError,
-    Session, Summary, Timing, Transport, TransportError, Unsolicited,
+    Counters, Cursor, Delivery, Endpoint, LineRate, LogFollower, LogPosition, OpenError, RangeReader,
+    ReadRequest, RequestError, Session, Summary, Timing, Transport, Unsolicited, open,
 };
 
 /// How much is taken from the line before a request, at most: a peer that never stops must not keep us from asking.
@@ -15,6 +19,9 @@ const MAX_STALE_BYTES: usize = 64 * 1024;
 
 /// A unit changes its rate when the reply is out; what arrives in that moment it would not understand.
 const BAUD_SETTLING: Duration = Duration::from_millis(20);
+
+/// How long a unit may take to answer when its rate is looked for, on top of the time that the bytes are on the line.
+const SEARCH_TIMEOUT: Duration = Duration::from_millis(250);
 
 /// How patient to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +42,7 @@ impl Default for Options {
 
 /// A unit at the other end of a line.
 pub struct Unit {
-    transport: Box<dyn Transport>,
+    link: Box<dyn Link>,
     session: Session,
     /// The session's time zero.
     epoch: Instant,
@@ -50,7 +57,37 @@ impl Unit {
         let Options { timeout, retries } = options;
         let line_rate = LineRate::from(transport.bits_per_second());
         let session = Session::new(Timing { timeout, retries, line_rate });
-        Unit { transport, session, epoch: Instant::now(), last_position: None }
+        Unit { link: Box::new(SerialLink(transport)), session, epoch: Instant::now(), last_position: None }
+    }
+
+    #[cfg(unix)]
+    pub(crate) fn on_genius(host: crate::GeniHost, node: u8, options: Options) -> Unit {
+        let Options { timeout, retries } = options;
+        let session = Session::new(Timing { timeout, retries, line_rate: LineRate::Instant });
+        let link = Box::new(crate::genius::GeniusLink { host, node });
+        Unit { link, session, epoch: Instant::now(), last_position: None }
+    }
+
+    /// Opens the way to a unit. `baud` is the rate of a serial port in bits per second.
+    ///
+    /// # Errors
+    /// See [`OpenError`].
+    pub fn open(endpoint: &Endpoint, baud: u32, options: Options) -> Result<Unit, OpenError> {
+        match endpoint {
+            #[cfg(unix)]
+            Endpoint::Geni { file, node: Some(node) } => {
+                let host = crate::GeniHost::open(file, options.timeout)?;
+                host.find(*node).map_err(|error| OpenError::Genius { path: file.clone(), error })?;
+                Ok(host.unit(*node, options))
+            }
+            line => Ok(Unit::new(open(line, baud)?, options)),
+        }
+    }
+
+    /// This host's number on the Genius bus, if that is where the unit is: auto reports can be sent there.
+    #[must_use]
+    pub fn bus_address(&self) -> Option<u8> {
+        self.link.bus_address()
     }
 
     /// Sends a command and waits for the reply. A [`Command::SetClock`] is sent once, with the time that it has:
@@ -62,7 +99,7 @@ impl Unit {
         self.prepare()?;
         // Nothing else is under way now.
         let _ = self.session.request(*command);
-        self.converse(&mut |_| None)
+        self.converse(&mut |_| Err(unexpected(command.code())))
     }
 
     /// Whether the unit records, and its version. Original units do not answer this query.
@@ -108,8 +145,7 @@ impl Unit {
             return Err(unexpected(Code::Configure));
         };
         let rate = in_force.baud.bits_per_second();
-        if configure.baud == Some(in_force.baud)
-            && self.transport.bits_per_second().is_some_and(|now| now != rate)
+        if configure.baud == Some(in_force.baud) && self.link.bits_per_second().is_some_and(|now| now != rate)
         {
             self.set_baud(rate)?;
             self.listen_for(BAUD_SETTLING)?;
@@ -131,13 +167,14 @@ impl Unit {
         &mut self,
         mut time_at: impl FnMut(Duration) -> TimeStamp,
     ) -> Result<TimeStamp, RequestError> {
-        time_at(Duration::ZERO).check().map_err(RequestError::InvalidTime)?;
         self.prepare()?;
         let _ = self.session.request_set_clock();
         let mut sent = None;
         self.converse(&mut |delay| {
-            sent = Some(time_at(delay));
-            sent
+            let time = time_at(delay);
+            time.check().map_err(RequestError::InvalidTime)?;
+            sent = Some(time);
+            Ok(time)
         })?;
         sent.ok_or_else(|| unexpected(Code::SetClock))
     }
@@ -161,7 +198,8 @@ impl Unit {
         }
     }
 
-    /// Has entries printed. The lines come through [`wait_event`](Self::wait_event). Sent once.
+    /// Has entries printed. The lines come through [`wait_event`](Self::wait_event); those that came before the
+    /// unit's reply are dropped. Sent once.
     ///
     /// # Errors
     /// If no reply comes or the line fails.
@@ -242,15 +280,58 @@ impl Unit {
     /// # Errors
     /// If the port does not have this rate.
     pub fn set_baud(&mut self, bits_per_second: u32) -> Result<(), RequestError> {
-        self.transport.set_baud(bits_per_second).map_err(TransportError::from)?;
-        self.session.set_line_rate(LineRate::from(self.transport.bits_per_second()));
+        self.link.set_baud(bits_per_second)?;
+        self.session.set_line_rate(LineRate::from(self.link.bits_per_second()));
         Ok(())
+    }
+
+    /// Looks for a unit that does not answer: asks once at every other rate. `None` if it answers at none of them, or
+    /// the line has no rate. Takes six seconds at most, unless the line is noisy. Afterwards the rate is what it was.
+    ///
+    /// # Errors
+    /// If the line fails.
+    pub fn find_baud(&mut self) -> Result<Option<Baud>, RequestError> {
+        let Some(usual) = self.bits_per_second() else { return Ok(None) };
+        let Timing { timeout, retries, .. } = self.session.timing();
+        let others = Baud::ALL.into_iter().rev().filter(|baud| baud.bits_per_second() != usual);
+        let found = self.first_answering(others);
+        self.session.set_patience(timeout, retries);
+        self.set_baud(usual)?;
+        found
+    }
+
+    fn first_answering(&mut self, rates: impl Iterator<Item = Baud>) -> Result<Option<Baud>, RequestError> {
+        // Every unit, also an original one, answers a read.
+        let question = Command::Read { start: 1, count: 1 };
+        let bytes = encoded_len(question.to_body().len()) + encoded_len(Model::Ser320.read_reply_len(1));
+        for baud in rates {
+            // A port need not have every rate that units have.
+            if self.set_baud(baud.bits_per_second()).is_err() {
+                continue;
+            }
+            let line_rate = LineRate::BitsPerSecond(baud.bits_per_second());
+            // A session also waits for the longest message that the unit may just be sending; at 300 baud that is too
+            // long for a guess.
+            self.session.set_line_rate(LineRate::Instant);
+            self.session.set_patience(SEARCH_TIMEOUT + line_rate.time_for(bytes), 0);
+            match self.request(&question) {
+                Ok(_) => return Ok(Some(baud)),
+                Err(RequestError::NoReply { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Reckons with a line of this speed behind the transport, as behind a terminal server, which does not tell.
+    pub fn set_line_rate(&mut self, line_rate: LineRate) {
+        self.session.set_line_rate(line_rate);
     }
 
     /// The rate of the line, if it has one.
     #[must_use]
     pub fn bits_per_second(&self) -> Option<u32> {
-        self.transport.bits_per_second()
+        self.link.bits_per_second()
     }
 
     /// What has been seen on the line so far.
@@ -288,21 +369,23 @@ impl Unit {
 
     fn converse(
         &mut self,
-        time_at: &mut dyn FnMut(Duration) -> Option<TimeStamp>,
+        time_at: &mut dyn FnMut(Duration) -> Result<TimeStamp, RequestError>,
     ) -> Result<Reply, RequestError> {
         loop {
             let now = self.now();
             if let Some(mut attempt) = self.session.dispatch(now) {
-                if attempt.wants_time()
-                    && let Some(time) = time_at(attempt.duration())
-                {
-                    attempt.set_time(time);
+                if attempt.wants_time() {
+                    // Without a time nothing is sent; the next request forgets this one.
+                    attempt.set_time(time_at(self.link.delay(&attempt))?);
                 }
-                self.transport.write_all(attempt.frame()).map_err(TransportError::from)?;
+                self.link.send(&attempt)?;
             }
             match self.session.take_answer() {
                 Some(Ok(reply)) => return Ok(reply),
-                Some(Err(no_reply)) => return Err(no_reply.into()),
+                Some(Err(no_reply)) => {
+                    let diagnosis = self.link.diagnose(no_reply.diagnosis);
+                    return Err(NoReply { diagnosis, ..no_reply }.into());
+                }
                 None => {}
             }
             let left = self.session.poll_at().unwrap_or_default().saturating_sub(self.now());
@@ -322,11 +405,7 @@ impl Unit {
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<usize, RequestError> {
-        let mut buf = [0; 1024];
-        let count = self.transport.read(&mut buf, timeout).map_err(TransportError::from)?;
-        let now = self.now();
-        self.session.process(now, buf.get(..count).unwrap_or_default());
-        Ok(count)
+        Ok(self.link.receive(&mut self.session, self.epoch, timeout)?)
     }
 
     fn now(&self) -> Duration {

@@ -38,6 +38,11 @@ impl UnsolicitedQueue {
         self.messages.pop_front()
     }
 
+    /// Forgets lines, and keeps reports.
+    pub(crate) fn drop_lines(&mut self) {
+        self.messages.retain(|message| !matches!(message, Unsolicited::Line(_)));
+    }
+
     pub(crate) const fn dropped(&self) -> u64 {
         self.dropped
     }

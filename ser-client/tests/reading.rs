@@ -306,6 +306,25 @@ fn a_size_that_is_not_the_recorders_is_noticed() {
 }
 
 #[test]
+fn a_size_that_is_too_large_is_noticed_before_anything_is_called_lost() {
+    let anchored = |recorder: &Recorder| recorder.history.get(159).copied();
+    for (size, with_cursor) in [(101, false), (2048, false), (101, true), (2048, true)] {
+        let mut recorder = Recorder::new(100);
+        recorder.append_many(250);
+        let cursor = with_cursor.then(|| Cursor { total: 160, anchor: anchored(&recorder) });
+        let mut reader = LogReader::new(cursor, size);
+        let mut result = Ok(());
+        while let (Ok(()), Some(request)) = (result, reader.request()) {
+            let reply = recorder.read(request.start, request.count);
+            result = reader.take(&reply, &mut |delivery| assert!(!matches!(delivery, Delivery::Lost(_))));
+            // The ring goes on turning under the questions.
+            recorder.append();
+        }
+        assert_eq!(result, Err(Disturbed::WrongSize), "size {size}, with cursor {with_cursor}");
+    }
+}
+
+#[test]
 fn replies_that_make_no_sense_end_the_reading() {
     // Always the same reply, with a total and no entries.
     let recorder = Recorder::new(5);

@@ -94,6 +94,46 @@ fn a_wrong_baud_rate_shows_as_garbage() {
 }
 
 #[test]
+fn a_unit_at_another_rate_is_found_and_the_rate_is_left_as_it_was() {
+    let mut bench = Bench::serial(100);
+    bench.unit.set_baud(9600).unwrap();
+    assert_eq!(bench.unit.find_baud().unwrap(), Some(Baud::B19200));
+    assert_eq!(bench.unit.bits_per_second(), Some(9600));
+    bench.fake().commands.clear();
+    bench.unit.set_baud(19_200).unwrap();
+    assert!(bench.unit.mode().unwrap().recording);
+    assert_eq!(bench.fake().commands, [Command::QueryMode], "the right rate is not asked for twice");
+    // Nothing is sent where the rate is nothing that this side could change.
+    assert_eq!(Bench::new(100).unit.find_baud().unwrap(), None);
+}
+
+#[test]
+fn a_unit_that_is_silent_at_every_rate_is_not_found() {
+    let mut bench = Bench::serial(100);
+    bench.fake().unit_rate = 110;
+    assert_eq!(bench.unit.find_baud().unwrap(), None);
+    assert_eq!(bench.unit.bits_per_second(), Some(19_200));
+    bench.fake().broken = Some(ErrorKind::NotConnected);
+    assert!(matches!(bench.unit.find_baud(), Err(RequestError::Transport(TransportError::Unplugged))));
+}
+
+#[test]
+fn lines_from_before_the_reply_to_a_print_are_not_among_its_lines() {
+    let mut bench = Bench::new(100);
+    bench.fake().recorder.append();
+    let report = Unsolicited::Report(bench.fake().recorder.read(1, 1));
+    bench.fake().say(b"1 09:00:00.000 7 ON\r\n");
+    let copy = bench.fake().recorder.read(1, 1);
+    bench.fake().reply(&Reply::Read(copy));
+    bench.fake().say(b"2 09:00:");
+    bench.unit.print(1, 1).unwrap();
+    assert_eq!(bench.unit.wait_event(Duration::ZERO).unwrap(), Some(report));
+    let line = bench.unit.wait_event(Duration::ZERO).unwrap();
+    assert!(matches!(&line, Some(Unsolicited::Line(line)) if line.text == "1 10:00:00.000 1 ON"), "{line:?}");
+    assert_eq!(bench.unit.wait_event(Duration::ZERO).unwrap(), None);
+}
+
+#[test]
 fn an_erase_without_reply_is_not_repeated_and_says_that_it_may_have_been_done() {
     let mut bench = Bench::new(100);
     bench.fake().recorder.append();
@@ -132,11 +172,10 @@ fn the_clock_is_asked_for_the_time_of_each_attempt() {
             TimeStamp { second: u8::try_from(delays.len()).unwrap(), ..NOON }
         })
         .unwrap();
-    // Once to see that there is such a time, then for three attempts.
-    assert_eq!(set, TimeStamp { second: 4, ..NOON });
+    assert_eq!(set, TimeStamp { second: 3, ..NOON });
     let on_the_line = Duration::from_nanos(230 * 1_000_000_000 / 19_200);
-    assert_eq!(delays, [Duration::ZERO, on_the_line, on_the_line, on_the_line]);
-    let sent = [2, 3, 4].map(|second| Command::SetClock(TimeStamp { second, ..NOON }));
+    assert_eq!(delays, [on_the_line, on_the_line, on_the_line]);
+    let sent = [1, 2, 3].map(|second| Command::SetClock(TimeStamp { second, ..NOON }));
     assert_eq!(bench.fake().commands, sent);
 }
 

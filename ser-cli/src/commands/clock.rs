@@ -1,13 +1,14 @@
 //! `clock`: the unit's clock.
 
 use std::io::{self, Write};
+use std::time::Instant;
 
 use ser_proto::TimeStamp;
 
 use crate::cli::ConnectionArgs;
 use crate::connection;
 use crate::error::{Failure, Result};
-use crate::time::{local_time_in, parse_time};
+use crate::time::{local_time_in, parse_time, time_after};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -46,7 +47,15 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         })?;
     }
     let mut unit = connection::open(connection)?;
-    let sent = unit.set_clock(|ahead| at.or(local_time_in(ahead).ok()).unwrap_or(NO_TIME))?;
+    let mut asked_first = None;
+    let sent = unit.set_clock(|ahead| match at {
+        // An attempt that is repeated sets the time that it has become since the first one.
+        Some(at) => {
+            let now = Instant::now();
+            time_after(at, now.duration_since(*asked_first.get_or_insert(now)))
+        }
+        None => local_time_in(ahead).unwrap_or(NO_TIME),
+    })?;
     let mut out = io::stdout().lock();
     writeln!(out, "{sent}")?;
     out.flush()?;

@@ -90,7 +90,9 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     field(&mut out, "size", format_args!("{} entries", now.size))?;
     write_line_settings(&mut out, &now)?;
     out.flush()?;
-    connection::tell_new_baud(connection, &now);
+    if args.settings.line_baud.is_some() {
+        connection::tell_new_baud(connection, &now)?;
+    }
     Ok(())
 }
 

@@ -36,7 +36,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "SIDE")]
     from: Option<Side>,
 
-    /// What the input looks like; without it, an ESC byte (1Bh) in the first 64 KiB makes it raw.
+    /// What the input looks like; without it, it is hex text if its first line is and no ESC byte (1Bh) is in the first 64 KiB.
     #[arg(long)]
     format: Option<CaptureFormat>,
 
@@ -80,8 +80,8 @@ fn summarize(tally: Tally) {
 fn decode<W: Write>(args: &Args, input: impl Read, list: &mut Listing<W>) -> Result<Option<io::Error>> {
     let mut input = BufReader::with_capacity(SNIFF_LEN, input);
     let (start, mut read_error) = sniff(&mut input);
-    let has_esc = start.contains(&ESC) && !args.body;
-    let format = args.format.unwrap_or(if has_esc { CaptureFormat::Raw } else { CaptureFormat::Hex });
+    let is_hex = args.body || (!start.contains(&ESC) && begins_as_hex(&start));
+    let format = args.format.unwrap_or(if is_hex { CaptureFormat::Hex } else { CaptureFormat::Raw });
     let mut decoder = Decoder::new(args.from, args.body, format);
     decoder.take(&start, list)?;
     while read_error.is_none() {
@@ -98,6 +98,17 @@ fn decode<W: Write>(args: &Args, input: impl Read, list: &mut Listing<W>) -> Res
     }
     decoder.finish(list)?;
     Ok(read_error)
+}
+
+/// Whether the first line that is not empty consists of what hex text consists of, or is a comment.
+fn begins_as_hex(start: &[u8]) -> bool {
+    let first = start.trim_ascii_start().split(|&byte| byte == b'\n').next().unwrap_or_default();
+    let code = first.split(|&byte| byte == b'#').next().unwrap_or_default();
+    let mut words = code.split(|&byte| byte == b',' || byte.is_ascii_whitespace());
+    words.all(|word| {
+        let digits = word.strip_prefix(b"0x").or_else(|| word.strip_prefix(b"0X")).unwrap_or(word);
+        digits.iter().all(u8::is_ascii_hexdigit)
+    })
 }
 
 /// Reads until an ESC shows up, at most [`SNIFF_LEN`] bytes.
@@ -149,6 +160,24 @@ mod tests {
                 "2 messages, 2 lines of text, nothing damaged"
             ]
         );
+    }
+
+    #[test]
+    fn a_capture_of_nothing_but_text_is_raw() {
+        assert_eq!(
+            decoded(&args(), b"\r\n0001 2026-11-22 10:00:00.250  3 ON\r\n0002 ACE\r\n"),
+            [
+                "2  text    0001 2026-11-22 10:00:00.250  3 ON",
+                "38  text    0002 ACE",
+                "0 messages, 2 lines of text, nothing damaged"
+            ]
+        );
+        for hex in ["", "\n\n1B 30", "1b,30\nready", "0x1B, 0X30\r\n", "# ready\n1B", "1B3 # x"] {
+            assert!(begins_as_hex(hex.as_bytes()), "{hex}");
+        }
+        for raw in ["ready", "1B 30?", "\n0001 2026-11-22", "1B x30"] {
+            assert!(!begins_as_hex(raw.as_bytes()), "{raw}");
+        }
     }
 
     #[test]

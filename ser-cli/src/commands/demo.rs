@@ -37,7 +37,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut story = Story { out: io::stdout(), palette: Palette::of_stdout() };
     let trip = Trip::new(&Scenario::breaker_trip());
 
-    let simulator = Simulator::start(options(args))?;
+    let simulator = Simulator::start(options(args)?)?;
     let port = simulator.port().to_string();
     let recorder = match args.image {
         Some(_) => "A recorder with 32 inputs (the ARM image, in QEMU)",
@@ -70,11 +70,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     Ok(simulator.stop()?)
 }
 
-fn options(args: &Args) -> SimOptions {
+fn options(args: &Args) -> Result<SimOptions> {
     let port =
         if cfg!(unix) { Port::Pty { link: None } } else { Port::Tcp { address: "127.0.0.1:0".to_string() } };
-    let backend: Backend = sim::backend(args.image.as_deref(), None, LineRate::Real);
-    SimOptions { backend, ..SimOptions::new(Model::Ser320, port) }
+    let backend: Backend = sim::backend(args.image.as_deref(), None, LineRate::Real)?;
+    Ok(SimOptions { backend, ..SimOptions::new(Model::Ser320, port) })
 }
 
 fn connect(port: &str) -> Result<Unit> {

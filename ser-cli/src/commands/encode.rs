@@ -23,7 +23,7 @@ Examples:
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
     #[command(subcommand)]
-    what: What,
+    what: Message,
 
     /// The body alone, as it goes into a Genius datagram: without ESC, length and checksum.
     #[arg(long, global = true)]
@@ -34,8 +34,9 @@ pub(crate) struct Args {
     raw: bool,
 }
 
+/// A command to a unit, as the words of a command line.
 #[derive(Debug, clap::Subcommand)]
-enum What {
+pub(crate) enum Message {
     /// `C` alone: ask for the configuration (original units stay silent).
     QueryConfig,
     /// `C`: change the configuration; size and rate that are not given are kept, the rest becomes 0 or off.
@@ -88,25 +89,26 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-impl What {
-    fn command(&self) -> Command {
+impl Message {
+    /// The command as the unit gets it.
+    pub(crate) fn command(&self) -> Command {
         match *self {
-            What::QueryConfig => Command::QueryConfiguration,
-            What::Config(ref settings) => Command::Configure(settings.on_top_of(Configure {
+            Message::QueryConfig => Command::QueryConfiguration,
+            Message::Config(ref settings) => Command::Configure(settings.on_top_of(Configure {
                 size: None,
                 baud: None,
                 auto_report: ser_proto::AutoReport::Off,
                 report_address: 0,
                 auto_print: false,
             })),
-            What::Erase => Command::Erase,
-            What::LastBroadcast => Command::LastBroadcast,
-            What::QueryMode => Command::QueryMode,
-            What::Start => Command::SetMode { recording: true },
-            What::Stop => Command::SetMode { recording: false },
-            What::Print { from, count } => Command::Print { start: from, count },
-            What::Read { from, count } => Command::Read { start: from, count },
-            What::SetClock { time } => Command::SetClock(time),
+            Message::Erase => Command::Erase,
+            Message::LastBroadcast => Command::LastBroadcast,
+            Message::QueryMode => Command::QueryMode,
+            Message::Start => Command::SetMode { recording: true },
+            Message::Stop => Command::SetMode { recording: false },
+            Message::Print { from, count } => Command::Print { start: from, count },
+            Message::Read { from, count } => Command::Read { start: from, count },
+            Message::SetClock { time } => Command::SetClock(time),
         }
     }
 }

@@ -6,7 +6,9 @@ use crate::error::{Failure, Result, inform};
 
 const EXAMPLES: &str = "\
 Examples:
-  ser-cli read --all --format csv > events.csv && ser-cli erase --yes";
+  ser-cli read --all --format csv > events.csv && ser-cli erase --yes
+
+What is recorded between a read and the erase is erased, too. If that matters, stop first (ser-cli stop).";
 
 /// Erase all events in the unit. There is no way back.
 #[derive(Debug, clap::Args)]
@@ -24,7 +26,9 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             .hint("keep them first: ser-cli read --all --format csv > events.csv")
             .hint("then add --yes"));
     }
-    connection::open(connection)?.erase()?;
-    inform("event buffer erased");
+    let mut unit = connection::open(connection)?;
+    let total = unit.log_position()?.total;
+    unit.erase()?;
+    inform(format_args!("event buffer erased: {total} events since the last erase (modulo 65536)"));
     Ok(())
 }

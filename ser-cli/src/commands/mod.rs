@@ -1,12 +1,15 @@
 //! The subcommands, one file each: arguments, help and what is done.
 
 pub(crate) mod clock;
+pub(crate) mod comm_req;
 pub(crate) mod completions;
 pub(crate) mod config;
 pub(crate) mod decode;
 pub(crate) mod demo;
 pub(crate) mod encode;
 pub(crate) mod erase;
+#[cfg(unix)]
+pub(crate) mod genius;
 pub(crate) mod last_broadcast;
 pub(crate) mod ports;
 pub(crate) mod print;

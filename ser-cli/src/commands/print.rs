@@ -1,13 +1,14 @@
 //! `print`: the unit prints entries on its RS-232 port, which is the line we are on.
 
 use std::io::{self, Write};
-use std::time::Duration;
+use std::ops::Range;
+use std::time::{Duration, Instant};
 
-use ser_client::{LineRate, Unsolicited};
+use ser_client::{LineRate, TextLine, Unsolicited};
 
 use crate::cli::ConnectionArgs;
 use crate::connection;
-use crate::error::{Result, inform, warn};
+use crate::error::{Failure, Result, inform, warn};
 use crate::values;
 
 const EXAMPLES: &str = "\
@@ -36,26 +37,140 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let mut unit = connection::open(connection)?;
     unit.print(args.from, args.count)?;
+    if unit.bus_address().is_some() {
+        inform("the unit prints on its RS-232 port: no line comes over the Genius bus");
+        return Ok(());
+    }
     let patience = connection.timeout.unwrap_or(Duration::from_secs(1))
         + LineRate::from(unit.bits_per_second()).time_for(LONGEST_LINE);
     let mut out = io::stdout().lock();
-    let mut printed = 0;
-    while printed < args.count {
-        match unit.wait_event(patience)? {
+    let mut wanted = Wanted::new(args.from, args.count);
+    let mut until = Instant::now() + patience;
+    while !wanted.is_complete() {
+        match unit.wait_event(until.saturating_duration_since(Instant::now()))? {
             None => break,
             Some(Unsolicited::Report(_)) => {}
-            Some(Unsolicited::Line(line)) => {
+            Some(Unsolicited::Line(line)) if wanted.take(&line) => {
                 writeln!(out, "{}", line.text)?;
                 out.flush()?;
-                if line.noise > 0 || line.cut {
-                    warn("the line above arrived damaged");
-                }
-                printed += 1;
+                until = Instant::now() + patience;
             }
+            Some(Unsolicited::Line(line)) => tell_left_out(&line),
         }
     }
-    if printed < args.count {
-        inform(format_args!("{printed} of {} lines came; only entries that exist are printed", args.count));
+    if wanted.missing > 0 || (wanted.damaged > 0 && !wanted.is_complete()) {
+        return Err(Failure::new("lines that were asked for arrived damaged, or not at all")
+            .hint("repeat the command")
+            .hint("ser-cli read gets the same entries protected by checksums"));
+    }
+    if !wanted.is_complete() {
+        inform(format_args!(
+            "{} of {} lines came; only entries that exist are printed",
+            wanted.printed, args.count
+        ));
     }
     Ok(())
+}
+
+/// Damage, or lines that the unit prints by itself (auto print).
+fn tell_left_out(line: &TextLine) {
+    match is_damaged(line) {
+        true => warn(format_args!("a line arrived damaged and is left out: {}", line.text)),
+        false => inform(format_args!("not asked for, left out: {}", line.text)),
+    }
+}
+
+fn is_damaged(line: &TextLine) -> bool {
+    line.noise > 0 || line.cut
+}
+
+/// The lines that are to come. A unit with auto print on sends others in between.
+struct Wanted {
+    /// Entry numbers that have not come yet.
+    entries: Range<u32>,
+    printed: u16,
+    /// Lines that were left out before one that came.
+    missing: u32,
+    /// Lines that were damaged, ours or not: who can tell.
+    damaged: u32,
+}
+
+impl Wanted {
+    fn new(from: u16, count: u16) -> Wanted {
+        let from = u32::from(from);
+        Wanted { entries: from..from + u32::from(count), printed: 0, missing: 0, damaged: 0 }
+    }
+
+    fn is_complete(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// Whether the line is one of them.
+    fn take(&mut self, line: &TextLine) -> bool {
+        if is_damaged(line) {
+            self.damaged += 1;
+            return false;
+        }
+        let Some(number) = entry_number(&line.text).filter(|number| self.entries.contains(number)) else {
+            return false;
+        };
+        self.missing += number - self.entries.start;
+        self.entries.start = number + 1;
+        self.printed += 1;
+        true
+    }
+}
+
+/// The number that an entry's line begins with: four digits, or more, and a blank. What is left of a line whose
+/// beginning is missing has none.
+fn entry_number(line: &str) -> Option<u32> {
+    let (number, _) = line.split_once(' ')?;
+    let is_number = number.len() >= 4 && number.bytes().all(|byte| byte.is_ascii_digit());
+    number.parse().ok().filter(|_| is_number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(text: &str) -> TextLine {
+        TextLine { text: text.to_string(), ..TextLine::default() }
+    }
+
+    #[test]
+    fn a_line_belongs_to_the_entry_that_it_begins_with() {
+        assert_eq!(entry_number("0007 2026-11-22 10:00:00.250  3 ON"), Some(7));
+        assert_eq!(entry_number("2048 2026-11-22 10:00:00.250  3 ON"), Some(2048));
+        for fragment in [
+            "",
+            "0007",
+            "007 2026-11-22",
+            "2026-11-22 10:00:00.250",
+            "*** 3 EVENTS NOT PRINTED ***",
+            "+007 x",
+        ] {
+            assert_eq!(entry_number(fragment), None, "{fragment}");
+        }
+    }
+
+    #[test]
+    fn only_what_was_asked_for_is_printed_and_in_order() {
+        let mut wanted = Wanted::new(6, 3);
+        let mut take = |text: &str| wanted.take(&line(text));
+        assert!(!take("2026-11-22 10:00:00.250  3 ON"), "a fragment");
+        assert!(!take("0777 2026-11-22 10:00:00.250  3 ON"), "a new event");
+        assert!(take("0006 x") && !take("0006 x") && take("0007 x") && !take("0006 x"));
+        assert!(!take("0009 x") && take("0008 x") && !take("0008 x"));
+        assert!(wanted.is_complete() && wanted.printed == 3 && wanted.missing == 0 && wanted.damaged == 0);
+    }
+
+    #[test]
+    fn damaged_and_missing_lines_are_counted() {
+        let mut wanted = Wanted::new(1, 3);
+        assert!(!wanted.take(&TextLine { noise: 1, ..line("0001 x") }));
+        assert!(!wanted.take(&TextLine { cut: true, ..line("0001 x") }));
+        assert!(wanted.take(&line("0003 x")));
+        assert_eq!((wanted.printed, wanted.missing, wanted.damaged), (1, 2, 2));
+        assert!(wanted.is_complete());
+    }
 }

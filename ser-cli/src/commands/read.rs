@@ -1,6 +1,7 @@
 //! `read`: events from the unit's log.
 
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use ser_client::{Cursor, Delivery, LogFollower, RangeReader, RequestError, Unit};
 use ser_proto::{Code, Command, MAX_SIZE, Reply};
@@ -8,7 +9,8 @@ use ser_proto::{Code, Command, MAX_SIZE, Reply};
 use crate::cli::ConnectionArgs;
 use crate::connection;
 use crate::delivery::Outlet;
-use crate::error::{Result, advise, inform};
+use crate::error::{Failure, Result, advise, inform, warn};
+use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
 use crate::output::Format;
 use crate::values;
@@ -66,16 +68,18 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         true => Some(Keeper::load(&args.state, connection)?),
         false => None,
     };
+    let stop = interrupt::catch()?;
     let mut unit = connection::open(connection)?;
     let mut outlet = Outlet::new(args.format);
     if let (Some(from), Some(count)) = (args.from, args.count) {
-        return read_range(&mut unit, &mut outlet, (from, count), args.log_size);
+        return read_range(&mut unit, &mut outlet, (from, count), args.log_size, &stop);
     }
     let remembered = keeper.as_ref().and_then(Keeper::size);
     let size = connection::log_size(&mut unit, args.log_size, remembered)?;
-    let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), size);
-    // What did reach standard output is remembered also when the unit fell silent in the middle.
+    let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), size, &stop);
+    // What did reach standard output is remembered also when the unit fell silent in the middle, or after Ctrl-C.
     let saved = keeper.as_mut().map_or(Ok(()), Keeper::save);
+    drop(outlet);
     let delivered = result?;
     saved?;
     if delivered == 0 {
@@ -89,15 +93,16 @@ fn read_by_cursor(
     outlet: &mut Outlet,
     mut keeper: Option<&mut Keeper>,
     size: u16,
+    stop: &AtomicBool,
 ) -> Result<u32> {
     let cursor: Option<Cursor> = keeper.as_ref().and_then(|keeper| keeper.cursor());
     let mut follower = LogFollower::new(cursor, size);
     let summary = follower.read_new(unit, &mut |step| -> Result<()> {
         outlet.take(step.deliveries, step.pending)?;
-        match &mut keeper {
-            Some(keeper) => keeper.delivered(step.cursor, size),
-            None => Ok(()),
+        if let Some(keeper) = &mut keeper {
+            keeper.delivered(step.cursor, step.size)?;
         }
+        check_interrupt(stop)
     })?;
     outlet.finish()?;
     Ok(summary.delivered)
@@ -109,13 +114,21 @@ fn read_range(
     outlet: &mut Outlet,
     (from, count): (u16, u16),
     log_size: Option<u16>,
+    stop: &AtomicBool,
 ) -> Result<()> {
     let mut reader = RangeReader::new(from, count, log_size.unwrap_or(MAX_SIZE));
     while let ControlFlow::Continue(deliveries) = next_of_range(unit, &mut reader)? {
         let pending = u32::from(count - reader.delivered());
         outlet.take(&deliveries, pending)?;
+        check_interrupt(stop)?;
     }
     outlet.finish()?;
+    if reader.is_mixed() {
+        warn(
+            "events were recorded meanwhile and may have overwritten entries of this range: old and new are mixed",
+        );
+        advise("repeat the command, or stop recording first (ser-cli stop)");
+    }
     match reader.delivered() {
         0 => {
             inform(format_args!("entry {from} does not exist yet"));
@@ -125,6 +138,15 @@ fn read_range(
         _ => {}
     }
     Ok(())
+}
+
+/// An unfinished reading is a failure: `read … && erase` must not go on.
+fn check_interrupt(stop: &AtomicBool) -> Result<()> {
+    match stop.load(Ordering::Relaxed) {
+        false => Ok(()),
+        true => Err(Failure::new("interrupted before everything was read")
+            .hint("repeat the command; read --new goes on where it stopped")),
+    }
 }
 
 fn next_of_range(unit: &mut Unit, reader: &mut RangeReader) -> Result<ControlFlow<(), Vec<Delivery>>> {

@@ -1,12 +1,15 @@
 //! `sim`: a simulated unit.
 
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use ser_proto::Model;
+use ser_proto::genius::Device;
 use ser_sim::{
-    Backend, Contacts, EmulatorOptions, LineRate, NonVolatile, Notice, Port, SimError, SimOptions,
+    Backend, Contacts, EmulatorOptions, GeniusOptions, LineRate, MAX_NODES, NonVolatile, Notice, Port,
+    SimError, SimOptions,
 };
 
 use crate::error::{Failure, Result, inform, warn};
@@ -18,14 +21,17 @@ Examples:
   ser-cli sim --tcp 127.0.0.1:4000                 tcp://127.0.0.1:4000
   ser-cli sim --pty /tmp/ser --contacts trip.csv   with contacts that move
   ser-cli sim --pty /tmp/ser --image firmware.elf  the ARM image, in QEMU
+  ser-cli sim --genius /tmp/host --node 5 --node 9:ser160  a Genius bus
 
 Contacts are CSV: milliseconds from the start, input, 1 closed or 0 open.
   ms,input,state
   0,7,1
   250,7,0
+On a Genius bus a fourth column, node, says whose input it is.
 On standard input (--contacts -) an empty line ends a scenario; more may follow.
 
-When the unit answers, what to give to --port is written to standard output.";
+When the unit answers, what to give to --port is written to standard output,
+one line for each way to reach one.";
 
 /// Which recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -45,7 +51,14 @@ impl From<ModelName> for Model {
     }
 }
 
-/// Simulate a unit on a pseudo-terminal or a TCP port, until interrupted.
+/// A unit on the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct BusNode {
+    number: u8,
+    model: Option<ModelName>,
+}
+
+/// Simulate a unit on a pseudo-terminal or a TCP port, or units on a Genius bus, until interrupted.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -57,8 +70,18 @@ pub(crate) struct Args {
     #[arg(long, value_name = "LINK", conflicts_with = "tcp")]
     pty: Option<PathBuf>,
 
+    /// Put units on a Genius bus; this file becomes the window of the host's GENI board, and goes with the simulator.
+    ///
+    /// The first unit also has its RS-232 port, where --pty or --tcp say.
+    #[arg(long, value_name = "FILE", requires = "node", conflicts_with = "image")]
+    genius: Option<PathBuf>,
+
+    /// Number of a unit on the Genius bus, 0-31, and which recorder it is if not --model; may be repeated.
+    #[arg(long, value_name = "N[:MODEL]", requires = "genius", value_parser = bus_node)]
+    node: Vec<BusNode>,
+
     /// Listen on this address instead; port 0 takes a free one.
-    #[arg(long, value_name = "HOST:PORT")]
+    #[arg(long, value_name = "HOST:PORT", value_parser = tcp_address)]
     tcp: Option<String>,
 
     /// Move the unit's contacts as this CSV file says; `-` is standard input.
@@ -91,27 +114,77 @@ fn options(args: &Args) -> Result<SimOptions> {
     let model = args.model.into();
     let port = match &args.tcp {
         Some(address) => Port::Tcp { address: address.clone() },
+        None if args.genius.is_some() && args.pty.is_none() => Port::Unconnected,
         None => Port::Pty { link: args.pty.clone() },
     };
-    let contacts = match &args.contacts {
-        Some(path) => Contacts::from_path(path, model)?,
-        None => Contacts::None,
+    let genius = args.genius.as_deref().map(|window| genius(window, &args.node, model)).transpose()?;
+    let contacts = match (&args.contacts, &genius) {
+        (Some(path), Some(genius)) => contacts_failure(Contacts::from_path_on_bus(path, &genius.nodes))?,
+        (Some(path), None) => contacts_failure(Contacts::from_path(path, model))?,
+        (None, _) => Contacts::None,
     };
     let rate = if args.paced { LineRate::Real } else { LineRate::Unlimited };
     Ok(SimOptions {
         contacts,
         debounce_ms: args.debounce,
-        backend: backend(args.image.as_deref(), args.log.clone(), rate),
+        backend: backend(args.image.as_deref(), args.log.clone(), rate)?,
+        genius,
         notice: Some(Notice(Box::new(|text| warn(text)))),
         ..SimOptions::new(model, port)
     })
 }
 
 /// The emulated board if there is an image, the built-in node otherwise.
-pub(crate) fn backend(image: Option<&Path>, log: Option<PathBuf>, line_rate: LineRate) -> Backend {
-    match image {
-        Some(image) => Backend::Emulator(EmulatorOptions { log, ..EmulatorOptions::new(image) }),
-        None => Backend::Native { line_rate, non_volatile: NonVolatile::new() },
+pub(crate) fn backend(image: Option<&Path>, log: Option<PathBuf>, line_rate: LineRate) -> Result<Backend> {
+    let Some(image) = image else {
+        return Ok(Backend::Native { line_rate, non_volatile: NonVolatile::new() });
+    };
+    File::open(image).map_err(|error| {
+        Failure::new(format!("cannot open the image {}: {error}", image.display()))
+            .hint("cargo xtask firmware builds the images and says where they are")
+            .hint("or leave --image out: the built-in node needs none")
+    })?;
+    Ok(Backend::Emulator(EmulatorOptions { log, ..EmulatorOptions::new(image) }))
+}
+
+fn genius(window: &Path, nodes: &[BusNode], model: Model) -> Result<GeniusOptions> {
+    for (index, node) in nodes.iter().enumerate() {
+        if nodes.iter().take(index).any(|other| other.number == node.number) {
+            return Err(Failure::usage(format!("--node {} is given twice", node.number))
+                .hint("every device on a bus has a number of its own"));
+        }
+    }
+    if nodes.len() > MAX_NODES {
+        return Err(Failure::usage("a bus has 32 numbers, and the host needs one").hint("leave a node out"));
+    }
+    let nodes = nodes.iter().map(|node| (node.number, node.model.map_or(model, Model::from)));
+    Ok(GeniusOptions::new(window, nodes.collect()))
+}
+
+fn bus_node(text: &str) -> std::result::Result<BusNode, String> {
+    let (number, model) = match text.split_once(':') {
+        Some((number, model)) => (number, Some(ModelName::from_str(model, true)?)),
+        None => (text, None),
+    };
+    let number = number.parse().ok().and_then(Device::new).map(Device::number);
+    let number = number.ok_or_else(|| "not a bus address: 0 to 31, as in 5 or 5:ser160".to_string())?;
+    Ok(BusNode { number, model })
+}
+
+fn contacts_failure(contacts: std::result::Result<Contacts, SimError>) -> Result<Contacts> {
+    contacts.map_err(|error| match &error {
+        SimError::Io { .. } => Failure::new(&error)
+            .hint("--contacts names a CSV file; ser-cli sim --help shows what is in it")
+            .hint("or play contacts by hand: --contacts - reads standard input"),
+        _ => error.into(),
+    })
+}
+
+/// An address to listen on, as far as one can tell without asking the system.
+fn tcp_address(text: &str) -> std::result::Result<String, String> {
+    match text.rsplit_once(':') {
+        Some((host, port)) if !host.is_empty() && port.parse::<u16>().is_ok() => Ok(text.to_string()),
+        _ => Err("it has to be HOST:PORT, as in 127.0.0.1:4000".to_string()),
     }
 }
 
@@ -127,13 +200,22 @@ impl From<SimError> for Failure {
     fn from(error: SimError) -> Failure {
         Failure::new(&error).hint(match error {
             SimError::Scenario(_) => "see ser-cli sim --help for the format, and correct this line",
-            SimError::LinkTaken(_) => "choose a name that does not exist, as in --pty /tmp/ser",
+            SimError::LinkTaken(_) | SimError::LinkInUse(_) => {
+                "choose a name that does not exist, as in --pty /tmp/ser"
+            }
+            SimError::WindowTaken(_) => "choose a name that does not exist, as in --genius /tmp/host",
             SimError::EmulatorMissing { .. } => "or leave --image out: the built-in node needs no emulator",
             SimError::EmulatorEnded { .. } | SimError::NoAnswer { .. } => {
                 "is this an image for mps2-an385? Build it with cargo xtask firmware"
             }
             SimError::Unsupported(_) => "use --tcp 127.0.0.1:4000, without --image",
-            SimError::Io { .. } => "check names, rights, and that no other simulator runs there",
+            SimError::Io { ref source, .. } => match source.kind() {
+                io::ErrorKind::AddrInUse => "another program listens there: port 0 takes a free one",
+                io::ErrorKind::AddrNotAvailable => {
+                    "that is not this computer: 127.0.0.1 or 0.0.0.0 (from everywhere) are"
+                }
+                _ => "check names, rights, and that no other simulator runs there",
+            },
             SimError::Ended | SimError::StillPlaying => "try again; if it persists, report it as a bug",
         })
     }

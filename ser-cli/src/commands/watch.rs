@@ -67,8 +67,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let switched = match plan.restore {
         Some(found) => {
             inform("the unit reports by itself until Ctrl-C");
-            unit.configure(Configure { auto_report: AutoReport::Rs232, ..keep_size_and_rate(found) })
-                .map(drop)
+            interrupt::leaves_behind(Some(STILL_REPORTING));
+            unit.configure(reporting_here(&unit, found)).map(drop)
         }
         None => Ok(()),
     };
@@ -78,6 +78,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let result = switched.map_err(Failure::from).and_then(|()| watch.run());
     let saved = watch.keeper.save();
     let restored = plan.restore.map_or(Ok(()), |found| restore(&mut watch.unit, found));
+    interrupt::leaves_behind(None);
     match (result, restored) {
         (Err(Failure::Interrupted | Failure::OutputClosed) | Ok(()), restored) => saved.and(restored),
         // The first failure is the one to tell; most often the second has the same cause.
@@ -111,12 +112,29 @@ fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
     let reporting = |restore| Plan { size, restore, interval: args.interval.unwrap_or(CHECK_EVERY) };
     match found.auto_report {
         _ if args.poll => Ok(polling(size)),
+        auto_report if unit.bus_address().is_some() => match auto_report {
+            AutoReport::Genius if unit.bus_address() == Some(found.report_address) => Ok(reporting(None)),
+            AutoReport::Off => Ok(reporting(Some(found))),
+            AutoReport::Genius | AutoReport::Rs232 => {
+                inform("the unit reports elsewhere and goes on doing so: it is asked for events");
+                Ok(polling(size))
+            }
+        },
         AutoReport::Rs232 => Ok(reporting(None)),
         AutoReport::Off => Ok(reporting(Some(found))),
         AutoReport::Genius => {
             inform("the unit reports to the Genius bus and goes on doing so: it is asked for events");
             Ok(polling(size))
         }
+    }
+}
+
+/// The settings with auto reports to this computer, by the way by which it is connected.
+fn reporting_here(unit: &Unit, found: Configuration) -> Configure {
+    let keep = keep_size_and_rate(found);
+    match unit.bus_address() {
+        Some(report_address) => Configure { auto_report: AutoReport::Genius, report_address, ..keep },
+        None => Configure { auto_report: AutoReport::Rs232, ..keep },
     }
 }
 
@@ -182,10 +200,9 @@ impl Watch {
 
     fn read_new(&mut self) -> Result<()> {
         let Watch { unit, follower, outlet, keeper, stop, .. } = self;
-        let size = follower.size();
         follower.read_new(unit, &mut |step| -> Result<()> {
             outlet.take(step.deliveries, 0)?;
-            keeper.delivered(step.cursor, size)?;
+            keeper.delivered(step.cursor, step.size)?;
             if stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
         })?;
         Ok(())

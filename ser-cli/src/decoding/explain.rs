@@ -27,6 +27,13 @@ pub(crate) struct Explanation {
     pub(crate) details: Vec<String>,
 }
 
+impl Explanation {
+    /// Whether the body is no message.
+    pub(crate) fn is_damage(&self) -> bool {
+        self.kind == Kind::Damage
+    }
+}
+
 /// Puts a body into words; when `from` is not known and both sides could have sent it, both readings.
 pub(crate) fn explain(body: &[u8], from: Option<Side>) -> Explanation {
     let command = (from != Some(Side::Unit)).then(|| Command::parse(body));

@@ -1,9 +1,8 @@
 //! Text between frames, a line at a time.
 
-use super::{Kind, Place};
+use ser_client::MAX_LINE_LEN;
 
-/// Longer lines are cut, so that a capture without line ends takes no more memory than one with.
-const MAX_LINE_LEN: usize = 256;
+use super::{Kind, Place};
 
 /// A run of bytes between frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,6 +30,7 @@ impl LineAssembler {
         }
         self.start.get_or_insert(place);
         self.line.push(byte);
+        // A capture without line ends takes no more memory than one with.
         if self.line.len() >= MAX_LINE_LEN { self.finish() } else { None }
     }
 
@@ -70,6 +70,6 @@ mod tests {
     fn what_does_not_print_is_escaped_and_what_does_not_end_is_cut() {
         assert_eq!(lines(b"\x00\xFF'\"\\\t\x07\n"), ["Noise byte 0: \\x00\\xff'\"\\\\t\\x07"]);
         let cut: Vec<_> = lines(&[b'A'; 600]).iter().map(|line| line.matches('A').count()).collect();
-        assert_eq!(cut, [256, 256, 88]);
+        assert_eq!(cut, [320, 280]);
     }
 }

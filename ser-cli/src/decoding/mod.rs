@@ -7,10 +7,9 @@ mod lines;
 mod listing;
 
 pub(crate) use decoder::{CaptureFormat, Decoder};
-pub(crate) use explain::{Side, hex_text};
+pub(crate) use explain::{Explanation, Side, explain, hex_text};
 pub(crate) use listing::{Listing, Tally};
 
-use explain::explain;
 use hex::{HexText, HexToken};
 use lines::LineAssembler;
 use listing::{Kind, Place};

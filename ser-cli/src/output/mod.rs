@@ -7,6 +7,7 @@ mod palette;
 mod sequence;
 mod table;
 
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
 
 use clap::ValueEnum;
@@ -51,6 +52,31 @@ pub(crate) fn to_stdout(format: Format) -> Box<dyn EventWriter> {
         Format::Csv => Box::new(Csv::new(out)),
         Format::Jsonl => Box::new(JsonLines::new(out)),
     }
+}
+
+/// Sees to it that what was written to standard output is on the disk, if it is a file there.
+pub(crate) fn sync_stdout() {
+    if let Ok(file) = stdout_file() {
+        // Terminals and pipes cannot, and need not, do this.
+        let _ = file.sync_data();
+    }
+}
+
+#[cfg(unix)]
+fn stdout_file() -> io::Result<File> {
+    use std::os::fd::AsFd;
+    Ok(File::from(io::stdout().as_fd().try_clone_to_owned()?))
+}
+
+#[cfg(windows)]
+fn stdout_file() -> io::Result<File> {
+    use std::os::windows::io::AsHandle;
+    Ok(File::from(io::stdout().as_handle().try_clone_to_owned()?))
+}
+
+#[cfg(not(any(unix, windows)))]
+fn stdout_file() -> io::Result<File> {
+    Err(io::ErrorKind::Unsupported.into())
 }
 
 /// Writes `name` and what it is in two columns, as `status` and `config` do.

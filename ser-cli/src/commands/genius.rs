@@ -1,0 +1,114 @@
+//! `genius`: the bus as a whole.
+
+mod broadcast;
+mod devices;
+mod forces;
+mod globals;
+
+use clap::ValueEnum;
+use ser_client::BusDevice;
+use ser_proto::genius::{Device, ForceTable, GlobalData};
+
+use crate::cli::ConnectionArgs;
+use crate::error::Result;
+
+const EXAMPLES: &str = "\
+Examples:
+  ser-cli genius devices --port geni:/dev/shm/host
+  ser-cli genius globals --port geni:/dev/shm/host
+  ser-cli genius forces --node 5 --table input-values
+  ser-cli genius broadcast clock
+  ser-cli genius broadcast erase --yes
+
+The port is the window of this host's GENI board, without a node.";
+
+const FORCES_EXAMPLES: &str = "\
+Examples:
+  ser-cli genius forces --node 5 --table input-enable
+  ser-cli genius forces --node 5 --table output-values";
+
+const BROADCAST_EXAMPLES: &str = "\
+Examples:
+  ser-cli genius broadcast clock
+  ser-cli genius broadcast clock --at 2026-11-22T10:00:00.250
+  ser-cli genius broadcast erase --yes";
+
+/// Look at a Genius bus as a whole, and speak to all its recorders at once.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// List the devices that are logged in.
+    Devices,
+    /// Show the live inputs of every recorder, all of one and the same bus scan.
+    Globals,
+    /// Show which inputs or outputs of a device are forced, and to what.
+    #[command(after_help = FORCES_EXAMPLES)]
+    Forces {
+        /// The device's number, 0-31.
+        #[arg(long, value_name = "N", value_parser = device)]
+        node: Device,
+        /// Which table.
+        #[arg(long)]
+        table: TableName,
+    },
+    /// Tell all recorders something, and check by their last broadcast that each has received it.
+    ///
+    /// A broadcast is not answered, so every recorder that is logged in is asked afterwards. The exit code is 1 when
+    /// one of them has not received it.
+    #[command(after_help = BROADCAST_EXAMPLES)]
+    Broadcast {
+        #[command(subcommand)]
+        what: broadcast::What,
+    },
+}
+
+/// One of the four tables of a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum TableName {
+    /// Which inputs are forced.
+    InputEnable,
+    /// Which outputs are forced.
+    OutputEnable,
+    /// What the inputs are forced to.
+    InputValues,
+    /// What the outputs are forced to.
+    OutputValues,
+}
+
+impl From<TableName> for ForceTable {
+    fn from(name: TableName) -> ForceTable {
+        match name {
+            TableName::InputEnable => ForceTable::InputEnable,
+            TableName::OutputEnable => ForceTable::OutputEnable,
+            TableName::InputValues => ForceTable::InputValues,
+            TableName::OutputValues => ForceTable::OutputValues,
+        }
+    }
+}
+
+fn device(text: &str) -> std::result::Result<Device, String> {
+    let number = text.parse().ok().and_then(Device::new);
+    number.ok_or_else(|| "not a bus address: 0 to 31".to_string())
+}
+
+pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
+    match args.what {
+        What::Devices => devices::run(connection),
+        What::Globals => globals::run(connection),
+        What::Forces { node, table } => forces::run(connection, node.number(), table.into()),
+        What::Broadcast { what } => broadcast::run(connection, what),
+    }
+}
+
+/// The inputs of a recorder; `None` for other devices. A recorder shows itself by what it sends and takes in every
+/// scan: the state of its inputs, and nothing.
+fn recorder_inputs(device: &BusDevice) -> Option<GlobalData> {
+    let global = GlobalData::parse(&device.inputs).ok()?;
+    (device.device.output_len == 0).then_some(global)
+}

@@ -1,0 +1,313 @@
+//! The command line on a Genius bus: `ser-cli sim --genius` plays board, bus and recorders, and every command reaches
+//! them through the file that is the host's window.
+#![cfg(unix)]
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+/// How long anything may take: these tests run on machines that stall for seconds.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// For recorders that are there, on such a machine. A board also gets so long to give a sign of life.
+const PATIENT_TIMEOUT: &str = "10s";
+
+fn ser_cli() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ser-cli"));
+    command.env_remove("SER_PORT").env_remove("SER_STATE_DIR").env("NO_COLOR", "1");
+    command
+}
+
+/// A running `ser-cli`, ended with the test.
+struct Running(Child);
+
+impl Running {
+    /// Presses Ctrl-C and gives the exit code.
+    fn interrupt(&mut self) -> Option<i32> {
+        let id = self.0.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill runs").success());
+        let mut code = None;
+        wait_until("ser-cli ends", || {
+            code = self.0.try_wait().expect("a child");
+            code.is_some()
+        });
+        code.and_then(|status| status.code())
+    }
+
+    /// The lines of standard output, as they come.
+    fn lines(&mut self) -> Receiver<String> {
+        let output = BufReader::new(self.0.stdout.take().expect("piped"));
+        let (sender, lines) = channel();
+        thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+        lines
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
+    let deadline = Instant::now() + PATIENCE;
+    while !condition() {
+        assert!(Instant::now() < deadline, "waited in vain: {what}");
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// A bus made with `ser-cli sim`, whose contacts are moved through its standard input.
+struct Bench {
+    folder: TempDir,
+    sim: Running,
+    announced: Vec<String>,
+}
+
+impl Bench {
+    fn start(options: &str) -> Bench {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut command = ser_cli();
+        command.arg("sim").arg("--genius").arg(folder.path().join("host")).args(["--contacts", "-"]);
+        command.args(options.split_whitespace()).current_dir(folder.path());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
+        let mut sim = Running(command.spawn().expect("ser-cli runs"));
+        let lines = sim.lines();
+        let ports = options.split_whitespace().filter(|word| ["--node", "--pty"].contains(word)).count();
+        let announced =
+            (0..ports).map(|_| lines.recv_timeout(PATIENCE).expect("the simulator answers")).collect();
+        Bench { folder, sim, announced }
+    }
+
+    fn window(&self) -> PathBuf {
+        self.folder.path().join("host")
+    }
+
+    fn port(&self, node: u8) -> String {
+        format!("geni:{}?node={node}", self.window().display())
+    }
+
+    fn command(&self, port: &str, arguments: &str) -> Command {
+        let mut command = ser_cli();
+        command
+            .env("SER_PORT", port)
+            .env("SER_STATE_DIR", self.folder.path().join("state"))
+            .args(["--timeout", PATIENT_TIMEOUT])
+            .args(arguments.split_whitespace());
+        command
+    }
+
+    fn run(&self, node: u8, arguments: &str) -> Output {
+        self.command(&self.port(node), arguments).output().expect("ser-cli runs")
+    }
+
+    /// Standard output of a command to a recorder that works.
+    fn ok(&self, node: u8, arguments: &str) -> String {
+        succeeded(arguments, &self.run(node, arguments))
+    }
+
+    /// The same for a command to the bus.
+    fn on_bus(&self, arguments: &str) -> String {
+        let port = format!("geni:{}", self.window().display());
+        succeeded(arguments, &self.command(&port, arguments).output().expect("ser-cli runs"))
+    }
+
+    /// Moves contacts, and waits until a recorder has so many entries in all.
+    fn play(&mut self, csv: &str, node: u8, entries: usize) {
+        let input = self.sim.0.stdin.as_mut().expect("piped");
+        writeln!(input, "{csv}\n").expect("the simulator listens");
+        wait_until("the recorder has seen it", || {
+            self.ok(node, "read --all --format jsonl").lines().count() == entries
+        });
+    }
+}
+
+fn succeeded(arguments: &str, output: &Output) -> String {
+    assert!(output.status.success(), "{arguments}: {}", stderr(output));
+    String::from_utf8(output.stdout.clone()).expect("text")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The rows of a CSV without their times.
+fn without_times(csv: &str) -> Vec<String> {
+    csv.lines()
+        .map(|line| {
+            let fields: Vec<_> = line.split(',').collect();
+            fields
+                .iter()
+                .enumerate()
+                .filter(|(index, _)| *index != 1)
+                .map(|(_, field)| *field)
+                .collect::<Vec<_>>()
+                .join(",")
+        })
+        .collect()
+}
+
+#[test]
+fn every_command_works_over_the_bus() {
+    let mut bench = Bench::start("--node 5 --node 9:ser160");
+    assert_eq!(bench.announced, [bench.port(5), bench.port(9)]);
+    let taps =
+        (0..25).map(|tap| format!("{},1,{},5\n{},16,{},9", tap * 2, 1 - tap % 2, tap * 2, 1 - tap % 2));
+    let csv = std::iter::once("ms,input,state,node".to_string()).chain(taps).collect::<Vec<_>>().join("\n");
+    bench.play(&csv, 5, 25);
+
+    // Seven entries fit a datagram of the larger model and ten of the smaller: neither is lost or doubled.
+    for (node, input) in [(5, 1), (9, 16)] {
+        let rows = without_times(&bench.ok(node, "read --all --format csv"));
+        let expected = (1..=25).map(|entry| format!("{entry},{input},{}", entry % 2));
+        assert_eq!(rows[1..], expected.collect::<Vec<_>>(), "node {node}");
+        let range = without_times(&bench.ok(node, "read --from 3 --count 20 --format csv"));
+        assert_eq!(range[1..], rows[3..23], "node {node}");
+    }
+    assert!(bench.ok(5, "status").contains("inputs          32"));
+    assert!(bench.ok(9, "status").contains("inputs          16"));
+    assert!(bench.ok(5, "config --size 100").contains("size            100 entries"));
+    assert!(bench.ok(5, "config").contains("size            100 entries"));
+    assert_eq!(bench.ok(5, "clock set --at 2026-11-22T10:00:00.250"), "2026-11-22T10:00:00.250\n");
+    assert!(bench.ok(5, "stop").starts_with("stopped"));
+    assert!(bench.ok(5, "start").starts_with("recording"));
+    assert_eq!(bench.ok(5, "last-broadcast"), "none since power-up\n");
+    let printed = bench.run(5, "print --from 1 --count 1");
+    assert!(printed.status.success() && stderr(&printed).contains("RS-232"), "{}", stderr(&printed));
+    // What is new is delivered once, to each reader of its own recorder.
+    assert_eq!(bench.ok(9, "read --new --format jsonl").lines().count(), 25);
+    assert_eq!(bench.ok(9, "read --new --format jsonl"), "");
+    bench.ok(5, "erase --yes");
+    assert_eq!(bench.ok(5, "read --all --format jsonl"), "");
+    assert_eq!(bench.ok(9, "read --all --format jsonl").lines().count(), 25);
+
+    assert_eq!(bench.sim.interrupt(), Some(0));
+    assert!(!bench.window().exists(), "the window goes with the simulator");
+}
+
+#[test]
+fn the_bus_is_seen_and_spoken_to_as_a_whole() {
+    let mut bench = Bench::start("--node 5 --node 9:ser160");
+    bench.play("ms,input,state,node\n0,3,1,5\n0,17,1,5\n0,16,1,9", 5, 1);
+    assert_eq!(
+        bench.on_bus("genius devices"),
+        "node  model  in  out  reference  kind\n\
+         \u{20}  5      4   4    0       none  recorder, 32 inputs\n\
+         \u{20}  9      4   2    0       none  recorder, 16 inputs\n"
+    );
+    assert_eq!(bench.on_bus("genius globals"), "node  inputs  on\n   5      32  3 17\n   9      16  16\n");
+    assert_eq!(
+        bench.on_bus("genius forces --node 9 --table input-enable"),
+        "input enable: 00 00 (points none)\n"
+    );
+    assert_eq!(
+        bench.on_bus("genius forces --node 9 --table output-values"),
+        "output values: the device has no such points\n"
+    );
+
+    let clock = bench.on_bus("genius broadcast clock --at 2026-11-22T10:00:00");
+    let confirmed = "set clock at 10:00:00.000";
+    assert_eq!(
+        clock,
+        format!("node  received  last broadcast\n   5  yes       {confirmed}\n   9  yes       {confirmed}\n")
+    );
+    // The same edge of two recorders gets the same stamp, to the millisecond.
+    bench.play("ms,input,state,node\n0,1,1,5\n0,1,1,9", 5, 2);
+    let stamp = |node| {
+        let event = bench.ok(node, "read --from 2 --count 1 --format csv");
+        event.lines().nth(1).and_then(|row| row.split(',').nth(1)).map(str::to_string)
+    };
+    assert!(stamp(5).is_some_and(|stamp| stamp.starts_with("2026-11-22T10:")));
+    assert_eq!(stamp(5), stamp(9));
+
+    let port = format!("geni:{}", bench.window().display());
+    let refused = bench.command(&port, "genius broadcast erase").output().expect("ser-cli runs");
+    assert_eq!((refused.status.code(), stderr(&refused).contains("--yes")), (Some(2), true));
+    assert!(bench.on_bus("genius broadcast stop").matches("yes").count() == 2);
+    assert!(bench.ok(9, "status").contains("stopped"));
+    assert!(bench.on_bus("genius broadcast start").matches("yes").count() == 2);
+    assert!(bench.on_bus("genius broadcast erase --yes").matches("yes").count() == 2);
+    assert_eq!(bench.ok(9, "read --all --format jsonl"), "");
+}
+
+#[test]
+fn events_are_watched_over_the_bus_and_rs_232_works_beside_it() {
+    let mut bench = Bench::start("--node 5:ser160 --pty line");
+    let line = bench.folder.path().join("line");
+    assert_eq!(bench.announced, [line.file_name().unwrap().to_str().unwrap(), &bench.port(5)]);
+    let mut command = bench.command(&bench.port(5), "watch --format csv");
+    let mut watch =
+        Running(command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("ser-cli runs"));
+    let rows = watch.lines();
+    assert_eq!(rows.recv_timeout(PATIENCE).as_deref(), Ok("entry,time,input,state"));
+
+    // The window belongs to one program at a time; the serial line is another way.
+    let second = bench.run(5, "status");
+    assert_eq!(second.status.code(), Some(1));
+    assert!(stderr(&second).contains("is in use"), "{}", stderr(&second));
+    let on_line = |arguments: &str| {
+        let output = bench.command(line.to_str().unwrap(), arguments).output().expect("ser-cli runs");
+        succeeded(arguments, &output)
+    };
+    wait_until("reports go to the host", || {
+        let settings = on_line("config");
+        settings.contains("auto report     genius") && settings.contains("report to       31")
+    });
+    let input = bench.sim.0.stdin.as_mut().expect("piped");
+    writeln!(input, "ms,input,state\n0,7,1\n3,7,0\n").expect("the simulator listens");
+    for expected in ["1,7,1", "2,7,0"] {
+        let row = rows.recv_timeout(PATIENCE).expect("an event");
+        assert_eq!(without_times(&row), [expected]);
+    }
+    assert_eq!(watch.interrupt(), Some(0));
+    let line_port = line.to_str().unwrap().to_string();
+    let settings = bench.command(&line_port, "config").output().expect("ser-cli runs");
+    assert!(succeeded("config", &settings).contains("auto report     off"), "the unit's setting is back");
+}
+
+#[test]
+fn each_mistake_has_a_message_of_its_own() {
+    let bench = Bench::start("--node 5");
+    let folder = bench.folder.path().display().to_string();
+    fs::write(bench.folder.path().join("short"), b"no window").expect("written");
+    fs::write(bench.folder.path().join("silent"), [0; 0x4000]).expect("written");
+    let host = bench.window().display().to_string();
+    for (port, code, message) in [
+        (format!("geni:{folder}/none?node=5"), 1, "there is no GENI window"),
+        (format!("geni:{folder}?node=5"), 1, "cannot be a GENI window"),
+        ("geni:/dev/null?node=5".to_string(), 1, "cannot be a GENI window"),
+        (format!("geni:{folder}/short?node=5"), 1, "has 9 bytes and cannot be a GENI window"),
+        (format!("geni:{folder}/silent?node=5"), 1, "the GENI board is silent (no heartbeat)"),
+        (format!("geni:{host}?node=7"), 1, "device 7 is not on the bus"),
+        (format!("geni:{host}?node=31"), 1, "31 is the number of this host's own board"),
+        (format!("geni:{host}?node=32"), 2, "a unit's number on the bus is 0 to 31"),
+        (format!("geni:{host}"), 1, "no unit on the bus"),
+        ("geni:".to_string(), 2, "geni: needs the window of a GENI board"),
+    ] {
+        let output = bench.command(&port, "status").output().expect("ser-cli runs");
+        let told = stderr(&output);
+        assert_eq!(output.status.code(), Some(code), "{port}: {told}");
+        assert!(told.contains(message) && told.contains("hint: "), "{port}: {told}");
+    }
+    let output = bench.command("/dev/ttyS0", "genius devices").output().expect("ser-cli runs");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("is no Genius bus"), "{}", stderr(&output));
+
+    // Nobody's file is overwritten, and no number given twice.
+    for (arguments, message) in [
+        ("--genius short --node 5", "is no GENI window"),
+        ("--genius new --node 5 --node 5", "--node 5 is given twice"),
+    ] {
+        let mut sim = ser_cli();
+        sim.arg("sim").args(arguments.split_whitespace()).current_dir(bench.folder.path());
+        let output = sim.output().expect("ser-cli runs");
+        assert!(!output.status.success() && stderr(&output).contains(message), "{}", stderr(&output));
+    }
+}

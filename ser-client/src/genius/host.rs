@@ -1,0 +1,374 @@
+//! The host's side of a GENI board: who is on the bus, what they say, and what is said to them.
+
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use geni::{
+    Completion, Configuration, Data, Destination, Device, Driver, Event, Failure, FileRam, Identity,
+    MAX_DEVICE_NUMBER, Options, Priority, Received, SharedRam, Start, TableError, Transmission,
+    TransmitError, map,
+};
+use ser_proto::Command;
+use ser_proto::genius::{
+    Datagram, FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, IoForces, Message, SUBFUNCTION_SER, Subfunction,
+};
+
+use super::inboxes::Inboxes;
+use super::{GeniusError, window};
+use crate::{OpenError, Unit};
+
+/// Nothing tells when a file has changed, so it is looked at this often.
+const PACE: Duration = Duration::from_millis(1);
+
+/// What happens in one look is dealt with, up to so many events; more wait for the next.
+const EVENTS_PER_LOOK: usize = 16;
+
+/// A board has its heartbeat five times a second. One that runs in the time of a busy computer gets longer.
+const HEARTBEAT_PATIENCE: Duration = Duration::from_secs(3);
+
+/// From the heartbeat to the bus: the board starts up, or has just been configured.
+const BUS_PATIENCE: Duration = Duration::from_secs(5);
+
+/// A device that is on the bus is logged in within a few scans, which are not longer than 400 ms.
+const LOG_IN_PATIENCE: Duration = Duration::from_secs(2);
+
+/// The driver ends every datagram before that.
+const DATAGRAM_PATIENCE: Duration = Duration::from_secs(20);
+
+/// A device that is logged in.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BusDevice {
+    /// Its number.
+    pub number: u8,
+    /// What the board knows of it.
+    pub device: Device,
+    /// Its inputs or global data.
+    pub inputs: Vec<u8>,
+}
+
+/// A host on a Genius bus. Clones are the same host; each can be in another [`Unit`].
+#[derive(Clone)]
+pub struct GeniHost {
+    shared: Arc<Mutex<Host>>,
+}
+
+impl GeniHost {
+    /// Opens the window that is the file at `path`, and waits until the board in it is on the bus. `patience` is how
+    /// long the board may take to give a sign of life; it gets at least three seconds.
+    ///
+    /// # Errors
+    /// When there is no such window, or the board does not come onto the bus.
+    pub fn open(path: &str, patience: Duration) -> Result<GeniHost, OpenError> {
+        let mut host = Host::new(window::open(path)?, patience.max(HEARTBEAT_PATIENCE));
+        host.start().map_err(|error| OpenError::Genius { path: path.to_owned(), error })?;
+        Ok(GeniHost { shared: Arc::new(Mutex::new(host)) })
+    }
+
+    /// A recorder on the bus.
+    #[must_use]
+    pub fn unit(&self, node: u8, options: crate::Options) -> Unit {
+        Unit::on_genius(self.clone(), node, options)
+    }
+
+    /// The host's own number.
+    #[must_use]
+    pub fn number(&self) -> u8 {
+        self.lock().number()
+    }
+
+    /// Who the host's board is.
+    #[must_use]
+    pub fn identity(&self) -> Option<Identity> {
+        self.lock().identity
+    }
+
+    /// How long a bus scan takes.
+    #[must_use]
+    pub fn scan_time(&self) -> Option<Duration> {
+        self.lock().scan_time()
+    }
+
+    /// Waits until a device is logged in, as long as that takes for one that is there.
+    ///
+    /// # Errors
+    /// When it is not there, or the board fails.
+    pub fn find(&self, node: u8) -> Result<Device, GeniusError> {
+        self.lock().find(node)
+    }
+
+    /// All devices that are logged in, and what their inputs are in one and the same bus scan.
+    ///
+    /// # Errors
+    /// When the board fails.
+    pub fn devices(&self) -> Result<Vec<BusDevice>, GeniusError> {
+        self.lock().devices()
+    }
+
+    /// Says a command to all recorders. It is carried out and not answered; each of them remembers its last broadcast.
+    ///
+    /// # Errors
+    /// When it does not get out.
+    pub fn broadcast(&self, command: &Command) -> Result<(), GeniusError> {
+        self.lock().deliver(ser_message(Destination::Broadcast, command)?)
+    }
+
+    /// Asks a device for one of its force tables.
+    ///
+    /// # Errors
+    /// When the device is not there or does not answer.
+    pub fn read_forces(&self, node: u8, table: ForceTable) -> Result<IoForces, GeniusError> {
+        self.lock().read_forces(node, table)
+    }
+
+    /// How long it takes until a datagram that is sent now arrives, on the average: the next turn is half a scan away.
+    #[must_use]
+    pub fn delay(&self) -> Duration {
+        PACE + self.scan_time().unwrap_or_default() / 2
+    }
+
+    /// Datagrams that were no message of a recorder to this host, and messages that nobody took in time.
+    #[must_use]
+    pub fn lost(&self) -> (u64, u64) {
+        self.lock().inboxes.lost()
+    }
+
+    /// Begins to send a message to a recorder.
+    pub(crate) fn send(&self, node: u8, command: &Command) -> Result<(), GeniusError> {
+        let mut host = self.lock();
+        host.find(node)?;
+        host.transmit(ser_message(Destination::Device(node), command)?)
+    }
+
+    /// Waits for messages of a recorder.
+    pub(crate) fn receive(&self, node: u8, timeout: Duration) -> Result<Vec<Received>, GeniusError> {
+        let mut host = self.lock();
+        host.wait(timeout, |host| host.inboxes.has(node))?;
+        Ok(std::iter::from_fn(|| host.inboxes.take(node)).collect())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Host> {
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for GeniHost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("GeniHost").field("number", &self.number()).finish_non_exhaustive()
+    }
+}
+
+/// A message in a datagram whose acknowledgement is waited for. The reply comes as a datagram of its own: a board that
+/// is told to wait for it does nothing else meanwhile, and would take an auto report for it.
+fn ser_message(destination: Destination, command: &Command) -> Result<Transmission, GeniusError> {
+    let data = Data::from_slice(&command.to_body());
+    Ok(Transmission {
+        destination,
+        function: FUNCTION_HORNER,
+        subfunction: SUBFUNCTION_SER,
+        priority: Priority::Normal,
+        completion: Completion::Acknowledged,
+        // No command is as long as that.
+        data: data.map_err(|_| GeniusError::BoardBusy)?,
+    })
+}
+
+/// A datagram that has arrived, as the protocol knows it.
+fn bus_datagram(received: &Received, own_number: u8) -> Option<Datagram> {
+    let source = ser_proto::genius::Device::new(received.source)?;
+    let own_number = ser_proto::genius::Device::new(own_number)?;
+    Datagram::new(source, own_number.into(), received.function, received.subfunction, &received.data).ok()
+}
+
+/// The board, and what it has said.
+struct Host {
+    driver: Driver<FileRam>,
+    epoch: Instant,
+    patience: Duration,
+    identity: Option<Identity>,
+    failure: Option<Failure>,
+    inboxes: Inboxes,
+    sent: Option<Result<(), geni::CommandError>>,
+    replied: Option<Result<Received, geni::CommandError>>,
+    tables: Option<Vec<BusDevice>>,
+}
+
+impl Host {
+    fn new(ram: FileRam, patience: Duration) -> Host {
+        // A board that is starting up has anything in its tables; this flag has no such value then.
+        let is_set_up = ram.read(map::STATUS_OK) <= 1;
+        // The board serves other programs as well, one after the other: it stays as it is configured.
+        let configuration = Configuration::new(
+            ram.read_word(map::SETUP_REFERENCE),
+            ram.read(map::SETUP_BROADCAST_LEN),
+            ram.read(map::SETUP_DIRECTED_LEN),
+            ram.read(map::SETUP_BUFFER_LEN),
+        );
+        let options = Options {
+            start: Start::Running,
+            reset_line: false,
+            heartbeat_timeout_ms: u32::try_from(patience.as_millis()).unwrap_or(u32::MAX),
+            ..Options::new(configuration.ok().filter(|_| is_set_up).unwrap_or(Configuration::DEFAULT))
+        };
+        Host {
+            driver: Driver::new(ram, options),
+            epoch: Instant::now(),
+            patience,
+            identity: None,
+            failure: None,
+            inboxes: Inboxes::default(),
+            sent: None,
+            replied: None,
+            tables: None,
+        }
+    }
+
+    fn number(&self) -> u8 {
+        self.identity.map_or(MAX_DEVICE_NUMBER, |identity| identity.switches.device_number)
+    }
+
+    fn scan_time(&self) -> Option<Duration> {
+        self.driver.status()?.scan_ms.map(|ms| Duration::from_millis(ms.into()))
+    }
+
+    /// Waits until the board is on the bus.
+    fn start(&mut self) -> Result<(), GeniusError> {
+        if !self.wait(self.patience + PACE, |host| host.driver.is_ready())? {
+            return Err(GeniusError::BoardSilent);
+        }
+        if self.wait(BUS_PATIENCE, |host| host.scan_time().is_some())? {
+            Ok(())
+        } else {
+            Err(GeniusError::OffBus)
+        }
+    }
+
+    fn find(&mut self, node: u8) -> Result<Device, GeniusError> {
+        self.start()?;
+        if node == self.number() {
+            return Err(GeniusError::OwnNumber { node });
+        }
+        let not_there = GeniusError::NotOnBus { node };
+        if self.wait(LOG_IN_PATIENCE, |host| host.driver.device(node).is_ok())? {
+            self.driver.device(node).map_err(|_| not_there)
+        } else {
+            Err(not_there)
+        }
+    }
+
+    fn devices(&mut self) -> Result<Vec<BusDevice>, GeniusError> {
+        self.start()?;
+        self.tables = None;
+        self.driver.request_tables();
+        self.wait(DATAGRAM_PATIENCE, |host| host.tables.is_some())?;
+        self.tables.take().ok_or(GeniusError::BoardBusy)
+    }
+
+    fn read_forces(&mut self, node: u8, table: ForceTable) -> Result<IoForces, GeniusError> {
+        self.find(node)?;
+        let reply = Subfunction::ReadIoForcesReply;
+        let question = Transmission {
+            destination: Destination::Device(node),
+            function: FUNCTION_GENIUS,
+            subfunction: Subfunction::ReadIoForces.code(),
+            priority: Priority::Normal,
+            completion: Completion::Reply { subfunction: reply.code() },
+            data: Data::from_slice(&[table.code()]).unwrap_or_default(),
+        };
+        self.replied = None;
+        self.transmit(question)?;
+        self.wait(DATAGRAM_PATIENCE, |host| host.replied.is_some())?;
+        let received =
+            self.replied.take().ok_or(GeniusError::BoardBusy)?.map_err(GeniusError::Undelivered)?;
+        let datagram = bus_datagram(&received, self.number());
+        match datagram.as_ref().map(Message::parse) {
+            Some(Ok(Message::ReadIoForcesReply(forces))) if forces.table == table => Ok(forces),
+            _ => Err(GeniusError::OddReply { node }),
+        }
+    }
+
+    /// Sends a datagram and waits until it is out.
+    fn deliver(&mut self, transmission: Transmission) -> Result<(), GeniusError> {
+        self.start()?;
+        self.transmit(transmission)?;
+        self.wait(DATAGRAM_PATIENCE, |host| host.sent.is_some())?;
+        self.sent.take().ok_or(GeniusError::BoardBusy)?.map_err(GeniusError::Undelivered)
+    }
+
+    /// Hands a datagram to the board as soon as that is done with the last one.
+    fn transmit(&mut self, transmission: Transmission) -> Result<(), GeniusError> {
+        if !self.wait(DATAGRAM_PATIENCE, |host| host.driver.can_transmit())? {
+            return Err(GeniusError::BoardBusy);
+        }
+        self.sent = None;
+        self.driver.transmit(transmission).map_err(|error| match error {
+            TransmitError::NoSuchDevice(node) => GeniusError::NotOnBus { node },
+            _ => GeniusError::BoardBusy,
+        })
+    }
+
+    /// Looks at the board until `done`, or until the time is over. A board that fails ends it.
+    fn wait(&mut self, timeout: Duration, done: impl Fn(&Host) -> bool) -> Result<bool, GeniusError> {
+        let until = Instant::now() + timeout;
+        loop {
+            self.look()?;
+            if done(self) {
+                return Ok(true);
+            }
+            if Instant::now() >= until {
+                return Ok(false);
+            }
+            thread::sleep(PACE);
+        }
+    }
+
+    fn look(&mut self) -> Result<(), GeniusError> {
+        for _ in 0..EVENTS_PER_LOOK {
+            let now_ms = self.epoch.elapsed().as_millis();
+            #[expect(clippy::cast_possible_truncation, reason = "the count wraps")]
+            let Some(event) = self.driver.poll(now_ms as u32) else { break };
+            self.take(event);
+        }
+        if let Some(kind) = self.driver.ram().take_error() {
+            return Err(GeniusError::Window(kind));
+        }
+        match self.failure.take() {
+            None => Ok(()),
+            Some(Failure::NoHeartbeat) => Err(GeniusError::BoardSilent),
+            Some(failure) => Err(GeniusError::BoardFailed(failure)),
+        }
+    }
+
+    fn take(&mut self, event: Event) {
+        match event {
+            Event::Ready(identity) => self.identity = Some(identity),
+            Event::Failed(failure) => self.failure = Some(failure),
+            Event::Received(received) => self.inboxes.put(received),
+            Event::Sent(result) => self.sent = Some(result),
+            Event::Replied(result) => self.replied = Some(result),
+            Event::TablesLocked => self.tables = self.read_tables().ok(),
+            // The driver remembers these, or has dealt with them.
+            Event::Configured(_)
+            | Event::StatusChanged(_)
+            | Event::Device { .. }
+            | Event::Request(_)
+            | Event::RequestRefused(_)
+            | Event::OutputsSent => {}
+        }
+    }
+
+    fn read_tables(&mut self) -> Result<Vec<BusDevice>, TableError> {
+        let own_number = self.number();
+        let numbers = (0..=MAX_DEVICE_NUMBER).filter(|&number| number != own_number);
+        let present: Vec<_> =
+            numbers.filter_map(|number| Some((number, self.driver.device(number).ok()?))).collect();
+        let tables = self.driver.tables()?;
+        let mut buffer = [0; 128];
+        let read = present.into_iter().filter_map(|(number, device)| {
+            let len = tables.inputs(number, &mut buffer).ok()?;
+            Some(BusDevice { number, device, inputs: buffer.get(..len)?.to_vec() })
+        });
+        Ok(read.collect())
+    }
+}

@@ -1,0 +1,83 @@
+//! Messages of recorders that have arrived, each in the box of its sender.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use geni::Received;
+use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
+
+/// Messages that wait in one box; the oldest go when there are more.
+const CAPACITY: usize = 1024;
+
+/// A box for every sender.
+#[derive(Debug, Default)]
+pub(super) struct Inboxes {
+    boxes: BTreeMap<u8, VecDeque<Received>>,
+    dropped: u64,
+    ignored: u64,
+}
+
+impl Inboxes {
+    /// Keeps a message that a recorder has sent to this host. What is said to all, or is no message of a recorder,
+    /// answers nobody here.
+    pub(super) fn put(&mut self, received: Received) {
+        let of_recorder = (received.function, received.subfunction) == (FUNCTION_HORNER, SUBFUNCTION_SER);
+        if received.broadcast || !of_recorder {
+            self.ignored += 1;
+            return;
+        }
+        let inbox = self.boxes.entry(received.source).or_default();
+        if inbox.len() == CAPACITY {
+            inbox.pop_front();
+            self.dropped += 1;
+        }
+        inbox.push_back(received);
+    }
+
+    /// The oldest message of a device.
+    pub(super) fn take(&mut self, node: u8) -> Option<Received> {
+        self.boxes.get_mut(&node)?.pop_front()
+    }
+
+    /// Whether a device has said something.
+    pub(super) fn has(&self, node: u8) -> bool {
+        self.boxes.get(&node).is_some_and(|inbox| !inbox.is_empty())
+    }
+
+    /// Datagrams that were no message to this host, and messages that nobody took in time.
+    pub(super) const fn lost(&self) -> (u64, u64) {
+        (self.ignored, self.dropped)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn received(source: u8, broadcast: bool, subfunction: u8, data: u8) -> Received {
+        let data = geni::Data::from_slice(&[data]).unwrap();
+        Received { source, function: FUNCTION_HORNER, subfunction, broadcast, data }
+    }
+
+    #[test]
+    fn messages_wait_in_the_box_of_their_sender() {
+        let mut inboxes = Inboxes::default();
+        inboxes.put(received(5, false, SUBFUNCTION_SER, 1));
+        inboxes.put(received(6, false, SUBFUNCTION_SER, 2));
+        inboxes.put(received(5, true, SUBFUNCTION_SER, 3));
+        inboxes.put(received(5, false, 0x51, 4));
+        inboxes.put(received(5, false, SUBFUNCTION_SER, 5));
+        let data = |received: Option<Received>| received.map(|received| received.data[0]);
+        assert!(inboxes.has(5) && !inboxes.has(7));
+        assert_eq!([5, 5, 5, 6].map(|node| data(inboxes.take(node))), [Some(1), Some(5), None, Some(2)]);
+        assert_eq!(inboxes.lost(), (2, 0));
+    }
+
+    #[test]
+    fn a_box_that_nobody_empties_keeps_the_newest() {
+        let mut inboxes = Inboxes::default();
+        for _ in 0..=CAPACITY {
+            inboxes.put(received(5, false, SUBFUNCTION_SER, 0));
+        }
+        assert_eq!(inboxes.lost(), (0, 1));
+    }
+}

@@ -1,0 +1,56 @@
+//! A session's messages in datagrams.
+
+use std::time::{Duration, Instant};
+
+use super::GeniHost;
+use crate::link::Link;
+use crate::{Attempt, Diagnosis, Session, TransportError};
+
+/// The way to one recorder on the bus.
+pub(crate) struct GeniusLink {
+    pub(crate) host: GeniHost,
+    pub(crate) node: u8,
+}
+
+impl Link for GeniusLink {
+    fn send(&mut self, attempt: &Attempt<'_>) -> Result<(), TransportError> {
+        Ok(self.host.send(self.node, attempt.command())?)
+    }
+
+    fn receive(
+        &mut self,
+        session: &mut Session,
+        epoch: Instant,
+        timeout: Duration,
+    ) -> Result<usize, TransportError> {
+        let received = self.host.receive(self.node, timeout)?;
+        for datagram in &received {
+            session.process_body(epoch.elapsed(), &datagram.data);
+        }
+        Ok(received.iter().map(|datagram| datagram.data.len()).sum())
+    }
+
+    fn delay(&self, _attempt: &Attempt<'_>) -> Duration {
+        self.host.delay()
+    }
+
+    /// The bus has a rate, and nobody here can change it.
+    fn set_baud(&mut self, _bits_per_second: u32) -> Result<(), TransportError> {
+        Ok(())
+    }
+
+    fn bits_per_second(&self) -> Option<u32> {
+        None
+    }
+
+    fn diagnose(&self, diagnosis: Diagnosis) -> Diagnosis {
+        match diagnosis {
+            Diagnosis::Silent => Diagnosis::SilentOnBus { node: self.node },
+            other => other,
+        }
+    }
+
+    fn bus_address(&self) -> Option<u8> {
+        Some(self.host.number())
+    }
+}

@@ -1,0 +1,18 @@
+//! A host on a Genius bus, through the window that it shares with its GENI board.
+
+mod error;
+#[cfg(unix)]
+mod host;
+#[cfg(unix)]
+mod inboxes;
+#[cfg(unix)]
+mod link;
+#[cfg(unix)]
+mod window;
+
+pub use error::GeniusError;
+pub use geni::{BlockKind, Device as DeviceRecord};
+#[cfg(unix)]
+pub use host::{BusDevice, GeniHost};
+#[cfg(unix)]
+pub(crate) use link::GeniusLink;
