@@ -79,10 +79,8 @@ impl GeniusOptions {
             Model::Ser160 => 2,
             Model::Ser320 => 4,
         };
-        // Other devices' inputs are not looked at, but one that is longer than the buffers would not be logged in,
-        // and what is not logged in cannot be written to.
-        let configuration =
-            Configuration::new(self.reference, len, 0, geni::Configuration::DEFAULT.buffer_len());
+        // Nobody looks at other devices' inputs, but with shorter buffers the board would not log all of them in.
+        let configuration = Configuration::new(self.reference, len, 0, Configuration::DEFAULT.buffer_len());
         Options {
             start: self.start,
             reset_line: self.reset_line,
@@ -112,7 +110,8 @@ pub struct GeniusDiagnostics {
     pub datagrams_ignored: u32,
     /// Commands that came by broadcast and were carried out.
     pub broadcasts: u32,
-    /// Replies that the board could not send, or that went down with it.
+    /// Replies that the board could not send, or that went down with it before or after their commands were carried
+    /// out.
     pub replies_lost: u32,
     /// Auto reports that arrived.
     pub reports_sent: u32,

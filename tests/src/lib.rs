@@ -1,5 +1,6 @@
 //! Helpers of the end-to-end tests, which live in `tests/`.
 
+pub mod genius_world;
 #[cfg(unix)]
 pub mod recorder;
 pub mod vectors;

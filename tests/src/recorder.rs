@@ -34,6 +34,26 @@ pub enum Kind {
     Emulated,
 }
 
+/// Makes two tests of each function that takes a [`Kind`]: `native::…` and, for `cargo xtask test`, `emulated::…`.
+#[macro_export]
+macro_rules! with_both_kinds {
+    ($($test:ident),* $(,)?) => {
+        mod native {
+            $(#[test]
+            fn $test() {
+                super::$test($crate::recorder::Kind::Native);
+            })*
+        }
+        mod emulated {
+            $(#[test]
+            #[ignore = "needs the emulator and the image: cargo xtask test"]
+            fn $test() {
+                super::$test($crate::recorder::Kind::Emulated);
+            })*
+        }
+    };
+}
+
 /// A recorder that is switched on.
 pub struct Recorder {
     simulator: Simulator,

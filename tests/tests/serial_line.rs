@@ -6,25 +6,7 @@ use std::time::Duration;
 use ser_client::{Delivery, Endpoint, Lost, Unit, Unsolicited, open};
 use ser_proto::{AutoReport, Baud, Configuration, Entry, Inputs, Model, ReadReply, TimeStamp};
 use ser_tests::recorder::{Kind, PATIENCE, Recorder, assert_entries_are, listen, stamp_ms};
-
-/// Runs each test with both kinds of node.
-macro_rules! with_both_kinds {
-    ($($test:ident),* $(,)?) => {
-        mod native {
-            $(#[test]
-            fn $test() {
-                super::$test(super::Kind::Native);
-            })*
-        }
-        mod emulated {
-            $(#[test]
-            #[ignore = "needs the emulator and the image: cargo xtask test"]
-            fn $test() {
-                super::$test(super::Kind::Emulated);
-            })*
-        }
-    };
-}
+use ser_tests::with_both_kinds;
 
 with_both_kinds! {
     set_clock_start_and_read,

@@ -1,0 +1,252 @@
+//! Every command of a host over Genius, and what is no command.
+
+use geni::Destination::{Broadcast, Device};
+use ser_proto::{
+    AutoReport, Baud, Code, Command, Configure, Inputs, LastBroadcast, Mode, Model, Reply, TimeStamp,
+};
+use ser_tests::genius_world::{HOST, World};
+
+const UNIT: u8 = 5;
+
+const NOON: TimeStamp =
+    TimeStamp { year: 26, month: 11, day: 22, hour: 12, minute: 0, second: 0, millisecond: 250 };
+
+fn started(model: Model) -> World {
+    World::started(&[(UNIT, model)])
+}
+
+/// So many events on input 1, a millisecond apart.
+fn events(world: &mut World, count: u32) {
+    for event in 0..count {
+        world.recorders[0].contact(1, event % 2 == 0);
+        world.step();
+    }
+}
+
+fn read(world: &mut World, start: u16, count: u8) -> ser_proto::ReadReply {
+    match world.ask(UNIT, &Command::Read { start, count }) {
+        Reply::Read(reply) => reply,
+        other => panic!("{other:?}"),
+    }
+}
+
+const fn unchanged() -> Configure {
+    Configure { size: None, baud: None, auto_report: AutoReport::Off, report_address: 0, auto_print: false }
+}
+
+#[test]
+fn every_command_is_answered_over_genius() {
+    let mut world = started(Model::Ser160);
+    assert_eq!(world.ask(UNIT, &Command::SetClock(NOON)), Reply::ClockSet);
+    events(&mut world, 3);
+    let reply = read(&mut world, 1, 10);
+    assert_eq!((reply.start, reply.total, reply.next_slot, reply.entries.len()), (1, 3, 3, 3));
+    assert_eq!((reply.entries[1].changed, reply.entries[1].state), (Inputs(1), Inputs(0)));
+    assert_eq!(reply.entries[0].time.hour, 12);
+    let header = read(&mut world, 1, 0);
+    assert_eq!((header.total, header.entries.len()), (3, 0));
+
+    let Reply::Mode(Mode { recording: true, version }) = world.ask(UNIT, &Command::QueryMode) else {
+        panic!()
+    };
+    assert_eq!(version, ser_node::VERSION);
+    let stopped = world.ask(UNIT, &Command::SetMode { recording: false });
+    assert_eq!(stopped, Reply::Mode(Mode { recording: false, version }));
+    events(&mut world, 2);
+    assert_eq!(read(&mut world, 1, 0).total, 3);
+    world.ask(UNIT, &Command::SetMode { recording: true });
+
+    let Reply::Configuration(before) = world.ask(UNIT, &Command::QueryConfiguration) else { panic!() };
+    let configure = Configure { size: Some(100), ..unchanged() };
+    let Reply::Configuration(after) = world.ask(UNIT, &Command::Configure(configure)) else { panic!() };
+    assert_eq!((before.size, after.size), (2048, 100));
+
+    assert_eq!(world.ask(UNIT, &Command::LastBroadcast), Reply::LastBroadcast(None));
+    assert_eq!(world.ask(UNIT, &Command::Erase), Reply::Erased);
+    assert_eq!(read(&mut world, 1, 0).total, 0);
+    world.assert_lawful();
+}
+
+#[test]
+fn ten_entries_of_16_inputs_and_seven_of_32_come_in_one_datagram() {
+    for (model, entries, len) in [(Model::Ser160, 10, 128), (Model::Ser320, 7, 120)] {
+        let mut world = started(model);
+        events(&mut world, 12);
+        let bytes = world.ask_bytes(UNIT, &Command::Read { start: 1, count: 10 });
+        assert_eq!(bytes.len(), len);
+        let Ok(Reply::Read(reply)) = Reply::parse(&bytes) else { panic!() };
+        assert_eq!((reply.entries.len(), reply.model), (entries, Some(model)));
+        world.assert_lawful();
+    }
+}
+
+#[test]
+fn print_over_genius_prints_on_rs_232() {
+    let mut world = started(Model::Ser160);
+    events(&mut world, 2);
+    world.recorders[0].serial_said();
+    assert_eq!(world.ask(UNIT, &Command::Print { start: 1, count: 9 }), Reply::PrintAccepted);
+    world.step();
+    let (replies, text) = world.recorders[0].serial_said();
+    assert_eq!((replies.len(), text.lines().count()), (0, 2), "{text}");
+    world.assert_lawful();
+}
+
+#[test]
+fn a_baud_rate_set_over_genius_is_in_force_on_rs_232() {
+    let mut world = started(Model::Ser160);
+    let configure = Configure { baud: Some(Baud::B19200), ..unchanged() };
+    world.ask(UNIT, &Command::Configure(configure));
+    world.step();
+    assert_eq!(world.recorders[0].node.baud(), Baud::B19200);
+    let Reply::Configuration(now) = world.recorders[0].serial_ask(&Command::QueryConfiguration) else {
+        panic!()
+    };
+    assert_eq!(now.baud, Baud::B19200);
+}
+
+#[test]
+fn a_broadcast_is_carried_out_and_not_answered() {
+    let mut world = started(Model::Ser160);
+    events(&mut world, 2);
+    for (command, total) in [
+        (Command::SetClock(NOON), 2),
+        (Command::Read { start: 1, count: 1 }, 2),
+        (Command::Print { start: 1, count: 2 }, 2),
+        (Command::Erase, 0),
+    ] {
+        world.send(Broadcast, &command);
+        world.run(50);
+        assert_eq!(world.take_message(UNIT), None, "{command:?}");
+        assert_eq!(world.recorders[0].serial_said().1, "", "{command:?}");
+        let Reply::LastBroadcast(Some(last)) = world.ask(UNIT, &Command::LastBroadcast) else { panic!() };
+        assert_eq!((last.code, last.hour), (command.code().byte(), 12), "{command:?}");
+        assert_eq!(read(&mut world, 1, 0).total, total, "{command:?}");
+    }
+    // What is no command was not a broadcast.
+    world.transmit(Broadcast, 0x40, 0x50, &[0x53, 26, 2, 30, 0, 0, 0, 0, 0]);
+    world.transmit(Broadcast, 0x40, 0x50, &[0x99]);
+    world.run(50);
+    let Reply::LastBroadcast(Some(LastBroadcast { code, .. })) = world.ask(UNIT, &Command::LastBroadcast)
+    else {
+        panic!()
+    };
+    assert_eq!(code, Code::Erase.byte());
+    world.assert_lawful();
+}
+
+#[test]
+fn read_io_forces_shows_that_nothing_is_forced() {
+    let mut world = started(Model::Ser160);
+    world.recorders[0].contact(1, true);
+    world.recorders[0].contact(16, true);
+    world.run(10);
+    let expected: [&[u8]; 4] = [&[0, 0, 0], &[1], &[2, 0x01, 0x80], &[3]];
+    for (table, expected) in (0..).zip(expected) {
+        world.transmit(Device(UNIT), 0x20, 0x40, &[table]);
+        let reply = world.until("the reply", |world| world.host.inbox.pop_front()).1;
+        assert_eq!((reply.source, reply.function, reply.subfunction), (UNIT, 0x20, 0x41));
+        assert_eq!(&reply.data[..], expected);
+    }
+    world.transmit(Device(UNIT), 0x20, 0x40, &[4]);
+    world.run(50);
+    assert!(world.host.inbox.is_empty());
+    world.assert_lawful();
+}
+
+#[test]
+fn datagrams_of_any_content_and_length_are_counted_and_ignored() {
+    let mut world = started(Model::Ser160);
+    let before = world.recorders[0].node.diagnostics();
+    for len in [0, 1, 5, 128, 134] {
+        for (function, subfunction) in [(0x40, 0x50), (0x40, 0x51), (0x20, 0x40), (0x20, 0x13), (112, 255)] {
+            world.transmit(Device(UNIT), function, subfunction, &vec![0x99; len]);
+            world.transmit(Broadcast, function, subfunction, &vec![0x45; len]);
+            world.run(20);
+        }
+    }
+    let after = world.recorders[0].node.diagnostics();
+    // One broadcast of all these is a command: the one that is nothing but the erase byte.
+    assert_eq!(world.recorders[0].port.diagnostics().broadcasts, 1);
+    assert_eq!(after.frames_empty - before.frames_empty, 2);
+    assert_eq!(after.commands_unknown - before.commands_unknown, 4);
+    assert_eq!(after.commands_wrong_length - before.commands_wrong_length, 3);
+    assert!(world.recorders[0].port.diagnostics().datagrams_ignored >= 40);
+    assert_eq!(world.take_message(UNIT), None);
+    assert!(matches!(world.ask(UNIT, &Command::QueryMode), Reply::Mode(_)));
+    world.assert_lawful();
+}
+
+#[test]
+fn auto_reports_go_to_the_configured_address_once_each() {
+    let mut world = started(Model::Ser160);
+    events(&mut world, 4);
+    let configure = Configure { auto_report: AutoReport::Genius, report_address: HOST, ..unchanged() };
+    world.ask(UNIT, &Command::Configure(configure));
+    events(&mut world, 26);
+    world.run(300);
+    let mut entries = Vec::new();
+    while let Some((_, data)) = world.take_message(UNIT) {
+        let Ok(Reply::Read(report)) = Reply::parse(&data) else { panic!() };
+        entries.extend(report.entries);
+    }
+    assert_eq!(entries.len(), 26);
+    // Recorded while nobody is there to hear: reported when somebody is.
+    let fault = ser_sim::genius::Fault::Disconnect { device: world.host.board.id(), for_us: 5_000_000 };
+    world.bus.borrow_mut().inject(fault);
+    events(&mut world, 26);
+    world.run(5_000);
+    assert_eq!(world.take_message(UNIT), None);
+    world.run(5_000);
+    let mut late = 0;
+    while let Some((_, data)) = world.take_message(UNIT) {
+        let Ok(Reply::Read(report)) = Reply::parse(&data) else { panic!() };
+        late += report.entries.len();
+    }
+    assert_eq!(late, 26);
+    assert!(world.recorders[0].port.diagnostics().reports_failed > 0);
+    assert_eq!(world.recorders[0].node.diagnostics().events_unreported, 0);
+    world.assert_lawful();
+}
+
+#[test]
+fn what_one_port_configures_or_erases_holds_for_the_other() {
+    let mut world = started(Model::Ser160);
+    events(&mut world, 4);
+    // Auto report moves to RS-232 by a command over Genius, and begins with the next event.
+    world.ask(UNIT, &Command::Configure(Configure { auto_report: AutoReport::Rs232, ..unchanged() }));
+    world.step();
+    assert_eq!(world.recorders[0].serial_said().0, []);
+    events(&mut world, 2);
+    let reported = world.recorders[0].serial_said().0;
+    let starts: Vec<u16> = reported
+        .iter()
+        .map(|reply| if let Reply::Read(reply) = reply { reply.start } else { panic!("{reply:?}") })
+        .collect();
+    assert_eq!(starts, [5, 6]);
+
+    // Back to Genius, to somebody who is not there: what is erased over RS-232 is owed to nobody any more.
+    let configure = Configure { auto_report: AutoReport::Genius, report_address: 30, ..unchanged() };
+    let Reply::Configuration(_) = world.recorders[0].serial_ask(&Command::Configure(configure)) else {
+        panic!()
+    };
+    events(&mut world, 2);
+    world.run(100);
+    assert_eq!(world.recorders[0].serial_ask(&Command::Erase), Reply::Erased);
+    let configure = Configure { report_address: HOST, ..configure };
+    world.recorders[0].serial_ask(&Command::Configure(configure));
+    world.run(6_000);
+    assert_eq!(world.take_message(UNIT), None);
+    events(&mut world, 2);
+    let (_, data) = world.until("a report", |world| world.take_message(UNIT));
+    let Ok(Reply::Read(report)) = Reply::parse(&data) else { panic!() };
+    assert_eq!((report.start, report.total), (1, report.entries.len().try_into().expect("two")));
+
+    // Erased over Genius: nothing left to print.
+    world.ask(UNIT, &Command::Configure(Configure { auto_print: true, ..unchanged() }));
+    world.ask(UNIT, &Command::Erase);
+    events(&mut world, 2);
+    let (_, text) = world.recorders[0].serial_said();
+    assert_eq!(text.lines().count(), 2, "{text}");
+    world.assert_lawful();
+}
