@@ -9,17 +9,9 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use ser_tests::recorder::{Kind, PATIENCE, image};
+use ser_tests::with_both_kinds;
 use tempfile::TempDir;
-
-/// How long anything may take: these tests run on machines that stall for seconds.
-const PATIENCE: Duration = Duration::from_secs(120);
-
-/// What plays the unit.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Native,
-    Emulated,
-}
 
 fn ser_cli() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ser-cli"));
@@ -105,8 +97,7 @@ impl Bench {
             .args(["--contacts", "-"])
             .args(options);
         if kind == Kind::Emulated {
-            let image = std::env::var_os("SER_IMAGE_MPS2_AN385").expect("run `cargo xtask test`");
-            command.arg("--image").arg(image);
+            command.arg("--image").arg(image());
         }
         let sim = Running::start(command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()));
         let bench = Bench { folder, sim };
@@ -167,25 +158,6 @@ impl Bench {
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).expect("UTF-8")
-}
-
-/// Runs each test with both kinds of unit.
-macro_rules! with_both_kinds {
-    ($($test:ident),* $(,)?) => {
-        mod native {
-            $(#[test]
-            fn $test() {
-                super::$test(super::Kind::Native);
-            })*
-        }
-        mod emulated {
-            $(#[test]
-            #[ignore = "needs the emulator and the image: cargo xtask test"]
-            fn $test() {
-                super::$test(super::Kind::Emulated);
-            })*
-        }
-    };
 }
 
 with_both_kinds! {
@@ -603,8 +575,7 @@ fn the_demo_finds_the_first_out_and_loses_nothing() {
 #[test]
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn the_demo_does_the_same_with_the_image() {
-    let image = std::env::var("SER_IMAGE_MPS2_AN385").expect("run `cargo xtask test`");
-    demo(&["--image", &image]);
+    demo(&["--image", image().to_str().expect("UTF-8")]);
 }
 
 fn demo(options: &[&str]) {

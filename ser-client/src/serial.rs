@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use serialport::{DataBits, FlowControl, Parity, SerialPort, StopBits};
 
+use crate::transport::bytes_read;
 use crate::{OpenError, Transport};
 
 /// Far longer than the kernel needs to take one frame at 300 baud, so only a stuck port runs into it.
@@ -89,20 +90,9 @@ fn unplugged(error: io::Error) -> io::Error {
 impl Transport for SerialTransport {
     fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
         self.port.set_timeout(timeout)?;
-        match self.port.read(buf) {
-            // The port said that it has bytes, and has none: it was hung up.
-            Ok(0) if !buf.is_empty() => Err(ErrorKind::NotConnected.into()),
-            Ok(count) => Ok(count),
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
-                ) =>
-            {
-                Ok(0)
-            }
-            Err(error) => Err(unplugged(error)),
-        }
+        // A port that says that it has bytes, and has none, was hung up.
+        let read = self.port.read(buf);
+        bytes_read(read, buf.len(), ErrorKind::NotConnected).map_err(unplugged)
     }
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {

@@ -4,6 +4,7 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
+use crate::transport::bytes_read;
 use crate::{OpenError, Transport};
 
 /// For each address of the host.
@@ -65,19 +66,8 @@ impl Transport for TcpTransport {
         if !timeout.is_zero() {
             self.stream.set_read_timeout(Some(timeout.max(Duration::from_millis(1))))?;
         }
-        match self.stream.read(buf) {
-            Ok(0) if !buf.is_empty() => Err(ErrorKind::UnexpectedEof.into()),
-            Ok(count) => Ok(count),
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
-                ) =>
-            {
-                Ok(0)
-            }
-            Err(error) => Err(error),
-        }
+        let read = self.stream.read(buf);
+        bytes_read(read, buf.len(), ErrorKind::UnexpectedEof)
     }
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {

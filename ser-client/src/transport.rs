@@ -32,6 +32,23 @@ pub trait Transport: Send {
     fn bits_per_second(&self) -> Option<u32>;
 }
 
+/// What a blocking read came to: none in time is no error here, and the end of the line, of which `read` makes no
+/// error, is one of kind `ended`.
+pub(crate) fn bytes_read(read: io::Result<usize>, wanted: usize, ended: ErrorKind) -> io::Result<usize> {
+    match read {
+        Ok(0) if wanted > 0 => Err(ended.into()),
+        Err(error)
+            if matches!(
+                error.kind(),
+                ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
+            ) =>
+        {
+            Ok(0)
+        }
+        read => read,
+    }
+}
+
 /// How a line failed in the middle of a conversation.
 #[derive(Debug)]
 pub enum TransportError {

@@ -62,6 +62,23 @@ fn a_request_goes_out_at_once_and_its_answer_comes_back() {
 }
 
 #[test]
+fn a_body_without_a_frame_is_a_message_like_any_other() {
+    let mut session = session(0);
+    session.request(Command::Read { start: 1, count: 10 }).unwrap();
+    assert_eq!(session.dispatch(ms(0)).unwrap().command(), &Command::Read { start: 1, count: 10 });
+    // Over a Genius bus a unit with 32 inputs brings seven entries where ten were asked for.
+    let (report, reply) = (read_reply(5, 2), read_reply(1, 7));
+    session.process_body(ms(1), &Reply::Read(report.clone()).to_body());
+    session.process_body(ms(1), b"R");
+    session.process_body(ms(1), &[]);
+    assert_eq!(session.take_answer(), None);
+    session.process_body(ms(2), &Reply::Read(reply.clone()).to_body());
+    assert_eq!(session.take_answer(), Some(Ok(Reply::Read(reply))));
+    assert_eq!(session.take_unsolicited(), Some(Unsolicited::Report(report)));
+    assert_eq!((session.counters().frames, session.counters().not_understood), (4, 2));
+}
+
+#[test]
 fn one_request_at_a_time() {
     let mut session = session(0);
     session.request(Command::Erase).unwrap();

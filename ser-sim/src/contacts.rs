@@ -46,6 +46,22 @@ impl Contacts {
     }
 }
 
+impl Contacts {
+    /// The same for several nodes on a bus, which may be named in a fourth column.
+    ///
+    /// # Errors
+    /// As for [`from_path`](Self::from_path).
+    pub fn from_path_on_bus(path: &Path, nodes: &[(u8, Model)]) -> Result<Contacts, SimError> {
+        let model = nodes.first().map_or(Model::Ser160, |&(_, model)| model);
+        if path == Path::new("-") {
+            return Contacts::from_path(path, model);
+        }
+        let name = path.display().to_string();
+        let file = File::open(path).map_err(SimError::io(format!("open {name}")))?;
+        Ok(Contacts::Scenario(Scenario::from_csv_on_bus(&name, file, nodes)?))
+    }
+}
+
 impl fmt::Debug for Contacts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -63,15 +79,20 @@ impl fmt::Debug for Contacts {
 pub(crate) type Arrived = Result<Vec<Item>, ScenarioError>;
 
 /// Reads a stream in a thread of its own. The channel closes at the end of the stream and after an error.
-pub(crate) fn read_stream(name: String, source: Box<dyn Read + Send>, model: Model) -> Receiver<Arrived> {
+pub(crate) fn read_stream(
+    name: &str,
+    source: Box<dyn Read + Send>,
+    model: Model,
+    nodes: &[(u8, Model)],
+) -> Receiver<Arrived> {
     let (sender, receiver) = channel();
+    let lines = ScenarioLines::new(name, model, Scenarios::Many).on_bus(nodes);
     // Nobody waits for this thread: a read from a terminal cannot be cut short.
-    thread::spawn(move || forward(&name, source, model, &sender));
+    thread::spawn(move || forward(lines, source, &sender));
     receiver
 }
 
-fn forward(name: &str, mut source: Box<dyn Read + Send>, model: Model, sender: &Sender<Arrived>) {
-    let mut lines = ScenarioLines::new(name, model, Scenarios::Many);
+fn forward(mut lines: ScenarioLines, mut source: Box<dyn Read + Send>, sender: &Sender<Arrived>) {
     let mut chunk = [0; 65_536];
     loop {
         let mut items = Vec::new();

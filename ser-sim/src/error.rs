@@ -22,6 +22,8 @@ pub enum SimError {
     LinkTaken(PathBuf),
     /// Another simulator has the link.
     LinkInUse(PathBuf),
+    /// The file that is to be the GENI window is something else already.
+    WindowTaken(PathBuf),
     /// The emulator is not installed.
     EmulatorMissing {
         /// The program looked for.
@@ -70,6 +72,9 @@ impl fmt::Display for SimError {
                     "{} exists already and is no link to a terminal: remove it or name another",
                     path.display()
                 )
+            }
+            SimError::WindowTaken(path) => {
+                write!(f, "{} exists already and is no GENI window (16 KiB): name another", path.display())
             }
             SimError::EmulatorMissing { program } => write!(
                 f,

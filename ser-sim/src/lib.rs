@@ -16,6 +16,9 @@ mod error;
 #[cfg(unix)]
 mod external_bus;
 pub mod genius;
+#[cfg(unix)]
+mod genius_bench;
+mod genius_options;
 mod line;
 mod machine;
 mod native;
@@ -34,6 +37,7 @@ mod wire;
 
 pub use contacts::Contacts;
 pub use error::SimError;
+pub use genius_options::{GeniusOptions, MAX_NODES};
 pub use line::Port;
 pub use non_volatile::{MemoryStorage, NonVolatile, SimRtc};
 pub use player::{Played, STREAM_LEAD_MS};

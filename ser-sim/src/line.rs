@@ -17,6 +17,8 @@ pub enum Port {
         /// The symbolic link under which it is found; `None` makes one in a temporary directory.
         link: Option<PathBuf>,
     },
+    /// None: hosts reach it in another way.
+    Unconnected,
     /// A TCP port for one client at a time.
     Tcp {
         /// Address to listen on, as in `127.0.0.1:4000`; port 0 takes a free one.
@@ -56,7 +58,42 @@ pub(crate) fn open(port: &Port) -> Result<Box<dyn Line>, SimError> {
         Port::Pty { link } => Ok(Box::new(crate::pty::PtyLine::open(link.as_deref())?)),
         #[cfg(not(unix))]
         Port::Pty { .. } => Err(SimError::Unsupported("a pseudo-terminal")),
+        Port::Unconnected => Ok(Box::new(NoLine)),
         Port::Tcp { address } => Ok(Box::new(crate::tcp::TcpLine::listen(address)?)),
+    }
+}
+
+/// A connector without a cable.
+struct NoLine;
+
+impl Line for NoLine {
+    fn read(&mut self, _buffer: &mut [u8]) -> io::Result<usize> {
+        Ok(0)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        Ok(bytes.len())
+    }
+
+    fn host_bits_per_second(&self) -> Option<u32> {
+        None
+    }
+
+    fn take_host_change(&mut self) -> bool {
+        false
+    }
+
+    fn publish(&mut self) -> Result<(), SimError> {
+        Ok(())
+    }
+
+    fn name(&self) -> String {
+        String::new()
+    }
+
+    #[cfg(unix)]
+    fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
+        Vec::new()
     }
 }
 

@@ -46,6 +46,11 @@ pub(crate) trait Machine {
     /// By how much contacts have moved too late at most, since this was last asked.
     fn take_lateness_ms(&mut self) -> u64;
 
+    /// How a host reaches the nodes on the Genius bus.
+    fn bus_ports(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// How long it may be left alone.
     fn patience(&self) -> Duration;
 

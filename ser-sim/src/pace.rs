@@ -6,16 +6,23 @@ use std::time::Instant;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pace {
     began: Instant,
+    /// The millisecond that it was then.
+    ahead_ms: u64,
 }
 
 impl Pace {
     /// Millisecond 0 is now.
     pub(crate) fn new() -> Pace {
-        Pace { began: Instant::now() }
+        Pace::from(Instant::now(), 0)
+    }
+
+    /// Millisecond `ahead_ms` was at `began`.
+    pub(crate) fn from(began: Instant, ahead_ms: u64) -> Pace {
+        Pace { began, ahead_ms }
     }
 
     /// The millisecond that a node should have reached.
     pub(crate) fn now_ms(&self) -> u64 {
-        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+        self.ahead_ms.saturating_add(u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX))
     }
 }

@@ -89,7 +89,7 @@ impl Player {
         for (index, item) in items.iter().enumerate() {
             match *item {
                 Item::End => self.stream_start_ms = None,
-                Item::Step(step) => {
+                Item::Step(step) | Item::NodeStep(_, step) => {
                     let start_ms = self.stream_start_ms.unwrap_or_else(|| {
                         let complete = items[index..].contains(&Item::End);
                         let lead_ms = if complete { 1 } else { STREAM_LEAD_MS };
@@ -102,6 +102,21 @@ impl Player {
             }
         }
         late_ms
+    }
+
+    /// The first millisecond in which no scenario laid out so far moves anything.
+    pub(crate) fn free_from_ms(&self) -> u64 {
+        self.free_from_ms
+    }
+
+    /// Begins the next scenario not before this millisecond.
+    pub(crate) fn reserve_until(&mut self, ms: u64) {
+        self.free_from_ms = self.free_from_ms.max(ms);
+    }
+
+    /// Begins the stream's scenario in this millisecond, if none is under way.
+    pub(crate) fn begin_stream(&mut self, start_ms: u64) {
+        self.stream_start_ms.get_or_insert(start_ms);
     }
 
     fn add(&mut self, start_ms: u64, step: Step) -> u64 {

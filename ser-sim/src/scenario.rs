@@ -29,6 +29,8 @@ pub struct Step {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Scenario {
     steps: Vec<Step>,
+    /// The node of each step; empty when no nodes are named.
+    nodes: Vec<u8>,
     names: Vec<(u8, &'static str)>,
 }
 
@@ -38,7 +40,7 @@ impl Scenario {
     pub fn from_steps(steps: impl IntoIterator<Item = Step>) -> Scenario {
         let mut steps: Vec<Step> = steps.into_iter().collect();
         steps.sort_by_key(|step| step.at_ms);
-        Scenario { steps, names: Vec::new() }
+        Scenario { steps, ..Scenario::default() }
     }
 
     pub(crate) fn with_names(mut self, names: &[(u8, &'static str)]) -> Scenario {
@@ -54,8 +56,25 @@ impl Scenario {
     ///
     /// # Errors
     /// The first line that is wrong, or the failure to read.
-    pub fn from_csv(name: &str, mut reader: impl Read, model: Model) -> Result<Scenario, ScenarioError> {
-        let mut lines = ScenarioLines::new(name, model, Scenarios::One);
+    pub fn from_csv(name: &str, reader: impl Read, model: Model) -> Result<Scenario, ScenarioError> {
+        Scenario::read(ScenarioLines::new(name, model, Scenarios::One), reader)
+    }
+
+    /// The same for several nodes on a bus, the first of which is meant where none is named: under the header
+    /// `ms,input,state,node` each line names one.
+    ///
+    /// # Errors
+    /// As for [`from_csv`](Self::from_csv).
+    pub fn from_csv_on_bus(
+        name: &str,
+        reader: impl Read,
+        nodes: &[(u8, Model)],
+    ) -> Result<Scenario, ScenarioError> {
+        let model = nodes.first().map_or(Model::Ser160, |&(_, model)| model);
+        Scenario::read(ScenarioLines::new(name, model, Scenarios::One).on_bus(nodes), reader)
+    }
+
+    fn read(mut lines: ScenarioLines, mut reader: impl Read) -> Result<Scenario, ScenarioError> {
         let mut items = Vec::new();
         let mut chunk = [0; 8192];
         loop {
@@ -71,11 +90,26 @@ impl Scenario {
             }
         }
         lines.finish(&mut items)?;
-        let steps = items.into_iter().filter_map(|item| match item {
-            Item::Step(step) => Some(step),
-            Item::End => None,
-        });
-        Ok(Scenario { steps: steps.collect(), names: Vec::new() })
+        let mut scenario = Scenario::default();
+        for item in items {
+            match item {
+                Item::Step(step) => scenario.steps.push(step),
+                Item::NodeStep(node, step) => {
+                    scenario.steps.push(step);
+                    scenario.nodes.push(node);
+                }
+                Item::End => {}
+            }
+        }
+        Ok(scenario)
+    }
+
+    /// The steps of one node; those that name no node belong to the first one.
+    #[must_use]
+    pub fn for_node(&self, node: u8, is_first: bool) -> Scenario {
+        let belongs = |index: usize| self.nodes.get(index).map_or(is_first, |&of| of == node);
+        let steps = self.steps.iter().enumerate().filter(|&(index, _)| belongs(index));
+        Scenario { steps: steps.map(|(_, &step)| step).collect(), ..Scenario::default() }
     }
 
     /// The steps, in the order of their times.
@@ -115,6 +149,17 @@ pub enum ScenarioFault {
     NoHeader,
     /// There are more or fewer than three fields.
     Columns(usize),
+    /// There are more or fewer than four fields where nodes are named.
+    ColumnsOnBus(usize),
+    /// Nodes are named and there is no bus.
+    NoBus,
+    /// The node is no number.
+    NotANode(String),
+    /// There is no such node on the bus.
+    NoSuchNode {
+        /// The number given.
+        node: u64,
+    },
     /// The time is no whole number of milliseconds, or is too large.
     NotATime(String),
     /// The input is no number.
@@ -170,6 +215,13 @@ impl fmt::Display for ScenarioFault {
             ScenarioFault::Columns(count) => {
                 write!(f, "{count} fields where three are needed (ms,input,state)")
             }
+            ScenarioFault::ColumnsOnBus(count) => {
+                let plural = if *count == 1 { "" } else { "s" };
+                write!(f, "{count} field{plural} where four are needed (ms,input,state,node)")
+            }
+            ScenarioFault::NoBus => write!(f, "only a Genius bus has nodes: leave the fourth column out"),
+            ScenarioFault::NotANode(text) => write!(f, "{text:?} is no node number"),
+            ScenarioFault::NoSuchNode { node } => write!(f, "there is no node {node} on the bus"),
             ScenarioFault::NotATime(text) => {
                 write!(f, "{text:?} is no time: whole milliseconds from 0 to {} are needed", u32::MAX)
             }

@@ -3,6 +3,7 @@
 //! A file holds one scenario. A stream holds any number: an empty line ends one, and the next starts its
 //! milliseconds afresh.
 
+use std::collections::BTreeMap;
 use std::mem;
 
 use ser_proto::Model;
@@ -13,11 +14,14 @@ use crate::scenario::{ScenarioError, ScenarioFault, Step};
 const MAX_LINE_LEN: usize = 1024;
 
 const HEADER: [&str; 3] = ["ms", "input", "state"];
+const HEADER_ON_BUS: [&str; 4] = ["ms", "input", "state", "node"];
 
 /// What a line says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Item {
     Step(Step),
+    /// The contact of this node on the bus moves.
+    NodeStep(u8, Step),
     /// The scenario is complete.
     End,
 }
@@ -34,14 +38,18 @@ pub(crate) struct ScenarioLines {
     name: String,
     model: Model,
     scenarios: Scenarios,
+    /// The nodes on the bus, if there is one.
+    nodes: Vec<(u8, Model)>,
+    /// Whether the header has a column for the node.
+    names_nodes: bool,
     /// Number of the line being gathered, from 1.
     line: u64,
     gathered: Vec<u8>,
     expects: Expects,
     /// Time of the latest step of this scenario.
     latest_ms: u64,
-    /// Inputs that have moved in that millisecond.
-    moved: u32,
+    /// Inputs that have moved in that millisecond, by node.
+    moved: BTreeMap<Option<u8>, u32>,
 }
 
 /// What the next line that is neither comment nor empty may be.
@@ -60,12 +68,20 @@ impl ScenarioLines {
             name: name.to_owned(),
             model,
             scenarios,
+            nodes: Vec::new(),
+            names_nodes: false,
             line: 1,
             gathered: Vec::new(),
             expects: Expects::Header,
             latest_ms: 0,
-            moved: 0,
+            moved: BTreeMap::new(),
         }
+    }
+
+    /// Lets the lines name one of these nodes in a fourth column.
+    pub(crate) fn on_bus(mut self, nodes: &[(u8, Model)]) -> ScenarioLines {
+        self.nodes = nodes.to_vec();
+        self
     }
 
     /// An error at the present line.
@@ -118,7 +134,11 @@ impl ScenarioLines {
         }
         let fields: Vec<&str> = text.split(',').map(str::trim).collect();
         match self.expects {
-            Expects::Header | Expects::HeaderOrStep if fields == HEADER => {
+            Expects::Header | Expects::HeaderOrStep if fields == HEADER || fields == HEADER_ON_BUS => {
+                self.names_nodes = fields.len() == HEADER_ON_BUS.len();
+                if self.names_nodes && self.nodes.is_empty() {
+                    return Err(ScenarioFault::NoBus);
+                }
                 self.expects = Expects::Step;
                 Ok(None)
             }
@@ -126,7 +146,7 @@ impl ScenarioLines {
             Expects::Nothing => Err(ScenarioFault::EmptyLine),
             Expects::Step | Expects::HeaderOrStep => {
                 self.expects = Expects::Step;
-                self.step(&fields).map(|step| Some(Item::Step(step)))
+                self.item(&fields).map(Some)
             }
         }
     }
@@ -138,17 +158,37 @@ impl ScenarioLines {
             (_, Scenarios::Many) => Expects::HeaderOrStep,
         };
         self.latest_ms = 0;
-        self.moved = 0;
+        self.moved.clear();
         Some(Item::End)
     }
 
-    fn step(&mut self, fields: &[&str]) -> Result<Step, ScenarioFault> {
-        let &[at_ms, input, state] = fields else { return Err(ScenarioFault::Columns(fields.len())) };
+    fn item(&mut self, fields: &[&str]) -> Result<Item, ScenarioFault> {
+        match *fields {
+            [at_ms, input, state] if !self.names_nodes => {
+                self.step([at_ms, input, state], None, self.model).map(Item::Step)
+            }
+            [at_ms, input, state, node] if self.names_nodes => {
+                let (node, model) = self.node(node)?;
+                Ok(Item::NodeStep(node, self.step([at_ms, input, state], Some(node), model)?))
+            }
+            _ if self.names_nodes => Err(ScenarioFault::ColumnsOnBus(fields.len())),
+            _ => Err(ScenarioFault::Columns(fields.len())),
+        }
+    }
+
+    fn node(&self, text: &str) -> Result<(u8, Model), ScenarioFault> {
+        let number = number(text).ok_or_else(|| ScenarioFault::NotANode(text.to_owned()))?;
+        let found = self.nodes.iter().find(|(node, _)| u64::from(*node) == number);
+        found.copied().ok_or(ScenarioFault::NoSuchNode { node: number })
+    }
+
+    fn step(&mut self, fields: [&str; 3], node: Option<u8>, model: Model) -> Result<Step, ScenarioFault> {
+        let [at_ms, input, state] = fields;
         let at_ms = number(at_ms)
             .filter(|&at_ms| at_ms <= u64::from(u32::MAX))
             .ok_or_else(|| ScenarioFault::NotATime(at_ms.to_owned()))?;
         let input = number(input).ok_or_else(|| ScenarioFault::NotAnInput(input.to_owned()))?;
-        let inputs = self.model.inputs();
+        let inputs = model.inputs();
         let input = u8::try_from(input)
             .ok()
             .filter(|input| (1..=inputs).contains(input))
@@ -163,13 +203,14 @@ impl ScenarioLines {
         }
         if at_ms > self.latest_ms {
             self.latest_ms = at_ms;
-            self.moved = 0;
+            self.moved.clear();
         }
         let bit = 1 << (input - 1);
-        if self.moved & bit != 0 {
+        let moved = self.moved.entry(node).or_default();
+        if *moved & bit != 0 {
             return Err(ScenarioFault::Twice { input, at_ms });
         }
-        self.moved |= bit;
+        *moved |= bit;
         Ok(Step { at_ms, input, on })
     }
 }
@@ -213,6 +254,36 @@ mod tests {
         assert_eq!(read(csv).unwrap().steps(), [step(5, 2, true), step(9, 2, false)]);
         assert_eq!(read("ms,input,state\n7,3,1").unwrap().steps(), [step(7, 3, true)]);
         assert_eq!(read("ms,input,state\n").unwrap().steps(), []);
+    }
+
+    #[test]
+    fn a_fourth_column_names_the_node() {
+        let nodes = [(5, Model::Ser160), (9, Model::Ser320)];
+        let read = |csv: &str| {
+            let scenario = Scenario::from_csv_on_bus("trip.csv", csv.as_bytes(), &nodes);
+            scenario.map_err(|error| error.to_string())
+        };
+        let scenario = read("ms,input,state,node\n0,1,1,5\n0,1,1,9\n7,32,1,9\n").unwrap();
+        assert_eq!(scenario.steps(), [step(0, 1, true), step(0, 1, true), step(7, 32, true)]);
+        assert_eq!(scenario.for_node(5, true).steps(), [step(0, 1, true)]);
+        assert_eq!(scenario.for_node(9, false).steps(), [step(0, 1, true), step(7, 32, true)]);
+        let scenario = read("ms,input,state\n0,1,1\n").unwrap();
+        assert_eq!(scenario.for_node(5, true).steps(), [step(0, 1, true)]);
+        assert_eq!(scenario.for_node(9, false).steps(), []);
+        for (csv, expected) in [
+            ("ms,input,state,node\n0,1,1\n", "line 2: 3 fields where four are needed (ms,input,state,node)"),
+            ("ms,input,state,node\n0,1,1,x\n", "line 2: \"x\" is no node number"),
+            ("ms,input,state,node\n0,1,1,6\n", "line 2: there is no node 6 on the bus"),
+            (
+                "ms,input,state,node\n0,17,1,5\n",
+                "line 2: there is no input 17: this model has inputs 1 to 16",
+            ),
+            ("ms,input,state,node\n9,1,1,5\n9,1,0,5\n", "line 3: input 1 moves twice at 9 ms"),
+        ] {
+            let words = read(csv).unwrap_err();
+            assert!(words.contains(expected), "{csv:?}: {words}");
+        }
+        assert!(refusal("ms,input,state,node\n").contains("line 1: only a Genius bus has nodes"));
     }
 
     #[test]

@@ -176,6 +176,15 @@ impl<'a> SimNode<'a> {
         self.player.stream(self.now_ms, items)
     }
 
+    pub(crate) fn player_mut(&mut self) -> &mut Player {
+        &mut self.player
+    }
+
+    /// The node itself, for its Genius port.
+    pub(crate) fn node_mut(&mut self) -> &mut Node<'a, MemoryStorage, SimRtc> {
+        &mut self.node
+    }
+
     /// Whether no contact is going to move.
     #[must_use]
     pub fn is_idle(&self) -> bool {

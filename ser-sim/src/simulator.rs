@@ -13,6 +13,9 @@ use ser_proto::Model;
 
 use crate::contacts::{Contacts, read_stream};
 use crate::error::SimError;
+#[cfg(unix)]
+use crate::genius_bench::GeniusBench;
+use crate::genius_options::GeniusOptions;
 use crate::line::{self, Port};
 use crate::machine::Machine;
 use crate::native::Native;
@@ -40,6 +43,9 @@ pub struct SimOptions {
     pub debounce_ms: u8,
     /// What plays the node.
     pub backend: Backend,
+    /// The Genius bus, if the node is on one. Then `model` is of no account, and the node on the port is the bus's
+    /// first one.
+    pub genius: Option<GeniusOptions>,
     /// Called with a sentence for the user when something is not as it should be but goes on.
     pub notice: Option<Notice>,
 }
@@ -63,6 +69,7 @@ impl SimOptions {
             contacts: Contacts::None,
             debounce_ms: 0,
             backend: Backend::default(),
+            genius: None,
             notice: None,
         }
     }
@@ -132,7 +139,7 @@ impl Simulator {
         let (requests, request_receiver) = channel();
         let shared = Arc::new(Shared::default());
         let (ready_sender, ready) = channel();
-        let SimOptions { model, contacts, debounce_ms, backend, notice, port: _ } = options;
+        let SimOptions { model, contacts, debounce_ms, backend, genius, notice, port: _ } = options;
         let mut service = Service {
             line,
             wire: Wire::new(),
@@ -145,8 +152,17 @@ impl Simulator {
             .name("ser-sim".to_owned())
             .spawn(move || {
                 let shared = Arc::clone(&service.shared);
-                let start = Start { model, contacts, ready: ready_sender };
+                let nodes = genius.as_ref().map_or(Vec::new(), |genius| genius.nodes.clone());
+                let model = nodes.first().map_or(model, |&(_, model)| model);
+                let start = Start { model, nodes, contacts, ready: ready_sender };
                 let result = match backend {
+                    #[cfg(unix)]
+                    Backend::Native { line_rate, non_volatile } if genius.is_some() => {
+                        let debounce = Debounce::uniform(debounce_ms);
+                        let options = SimNodeOptions { model, debounce, line_rate, non_volatile };
+                        genius.map_or(Ok(()), |genius| run_on_bus(&mut service, &options, &genius, start))
+                    }
+                    _ if genius.is_some() => Err(SimError::Unsupported("this node on a Genius bus")),
                     Backend::Native { line_rate, non_volatile } => {
                         let debounce = Debounce::uniform(debounce_ms);
                         let options = SimNodeOptions { model, debounce, line_rate, non_volatile };
@@ -179,7 +195,12 @@ impl Simulator {
     /// How a host reaches the node: the path of a pseudo-terminal, or `tcp://ADDRESS:PORT`.
     #[must_use]
     pub fn port(&self) -> &str {
-        &self.port
+        self.port.lines().next().unwrap_or_default()
+    }
+
+    /// How a host reaches the nodes: the port of the first, if it has one, and then each of them on the bus.
+    pub fn ports(&self) -> impl Iterator<Item = &str> {
+        self.port.lines()
     }
 
     /// Plays a scenario from the next millisecond on, or after those before it. Says in which millisecond since the
@@ -263,14 +284,15 @@ impl fmt::Debug for Simulator {
     }
 }
 
-/// Simulates a node until `stop` is set. `ready` is told, when the node answers, how a host reaches it.
+/// Simulates a node until `stop` is set. `ready` is told, when the node answers, how a host reaches it; with several
+/// ways, one a line.
 ///
 /// # Errors
 /// As [`Simulator::start`] and [`Simulator::wait`]. Being stopped is none, at no time.
 pub fn run(options: SimOptions, stop: &AtomicBool, ready: impl FnOnce(&str)) -> Result<(), SimError> {
     match Simulator::start_unless(options, stop) {
         Ok(simulator) => {
-            ready(simulator.port());
+            ready(&simulator.port);
             simulator.wait(stop)
         }
         Err(SimError::Ended) if stop.load(Ordering::Relaxed) => Ok(()),
@@ -281,6 +303,8 @@ pub fn run(options: SimOptions, stop: &AtomicBool, ready: impl FnOnce(&str)) -> 
 /// What is done once, when the node answers for the first time.
 struct Start {
     model: Model,
+    /// The nodes on the bus, if there is one.
+    nodes: Vec<(u8, Model)>,
     contacts: Contacts,
     ready: Sender<String>,
 }
@@ -293,12 +317,51 @@ impl Start {
             Contacts::Scenario(scenario) => {
                 machine.play(&scenario);
             }
-            Contacts::Stream { name, source } => service.stream = Some(read_stream(name, source, self.model)),
+            Contacts::Stream { name, source } => {
+                service.stream = Some(read_stream(&name, source, self.model, &self.nodes));
+            }
         }
         service.report(machine);
         // The caller of `start` waits for this, unless it is gone.
-        let _ = self.ready.send(service.line.name());
+        let _ = self.ready.send(names(service.line.name(), machine));
         Ok(())
+    }
+}
+
+/// All the ways to reach the nodes, one a line.
+fn names(line: String, machine: &dyn Machine) -> String {
+    let line = Some(line).filter(|line| !line.is_empty());
+    line.into_iter().chain(machine.bus_ports()).collect::<Vec<_>>().join("\n")
+}
+
+#[cfg(unix)]
+fn run_on_bus(
+    service: &mut Service,
+    options: &SimNodeOptions,
+    genius: &GeniusOptions,
+    start: Start,
+) -> Result<(), SimError> {
+    let shared = Arc::clone(&service.shared);
+    let mut bench = GeniusBench::new(options, genius)?;
+    let mut rams = bench.rams();
+    let mut start = Some(start);
+    let mut cycled: Option<Sender<()>> = None;
+    loop {
+        let mut machine = bench.power_up(&mut rams);
+        if !machine.come_up(&shared.stop)? {
+            return Ok(());
+        }
+        if let Some(start) = start.take() {
+            start.go(service, &mut machine)?;
+        }
+        if let Some(reply) = cycled.take() {
+            let _ = reply.send(());
+        }
+        match service.serve(&mut machine)? {
+            Outcome::Stopped => return Ok(()),
+            Outcome::PowerCycle(reply) => cycled = Some(reply),
+        }
+        machine.power_off();
     }
 }
 

@@ -1,0 +1,91 @@
+//! Recorders on a Genius bus, in virtual time that keeps pace with real time, and a host in another process.
+
+mod bus_machine;
+mod host_window;
+mod shared_board;
+
+use ser_node::{GeniusOptions as PortOptions, GeniusPort};
+
+use crate::error::SimError;
+use crate::genius::{Board, BoardOptions, Bus, Handle};
+use crate::genius_options::GeniusOptions;
+use crate::non_volatile::NonVolatile;
+use crate::pace::Pace;
+use crate::sim_node::{PoweredOff, Ram, SimNodeOptions};
+
+use bus_machine::{BusMachine, Recorder};
+use host_window::HostWindow;
+use shared_board::{BoardRam, SharedBoard};
+
+/// A bus, its boards, and recorders that have no power.
+pub(crate) struct GeniusBench {
+    bus: Bus,
+    host: Handle<Board>,
+    window: HostWindow,
+    stations: Vec<Station>,
+    pace: Pace,
+    now_ms: u64,
+}
+
+/// A recorder's place on the bus.
+struct Station {
+    number: u8,
+    board: SharedBoard,
+    options: SimNodeOptions,
+    off: Option<PoweredOff>,
+}
+
+impl GeniusBench {
+    /// Connects everything. The first recorder is as `options` say; the others differ by their model, and have
+    /// memory of their own.
+    pub(crate) fn new(options: &SimNodeOptions, genius: &GeniusOptions) -> Result<GeniusBench, SimError> {
+        let window = HostWindow::create(&genius.window)?;
+        let mut bus = Bus::with_noise(genius.rate, genius.noise);
+        let board = |number| BoardOptions::at(number).rate(genius.rate);
+        let host = bus.connect(Board::powered(board(genius.host_number)));
+        let mut stations = Vec::new();
+        for (index, &(number, model)) in genius.nodes.iter().enumerate() {
+            let mut options = SimNodeOptions { model, ..options.clone() };
+            if index > 0 {
+                options.non_volatile = NonVolatile::new();
+            }
+            let board = SharedBoard::new(Board::powered(board(number)));
+            bus.connect(board.clone());
+            stations.push(Station { number, board, off: Some(PoweredOff::new(options.clone())), options });
+        }
+        Ok(GeniusBench { bus, host, window, stations, pace: Pace::new(), now_ms: 0 })
+    }
+
+    /// Memory for every recorder.
+    pub(crate) fn rams(&self) -> Vec<Ram> {
+        self.stations.iter().map(|_| Ram::new()).collect()
+    }
+
+    /// Switches all recorders on.
+    pub(crate) fn power_up<'a>(&'a mut self, rams: &'a mut [Ram]) -> BusMachine<'a> {
+        let mut recorders = Vec::new();
+        for (station, ram) in self.stations.iter_mut().zip(rams) {
+            let Some(off) = station.off.take() else { continue };
+            let node = off.power_up(ram);
+            let port =
+                PortOptions { start: geni::Start::Released, ..PortOptions::new(station.options.model) };
+            let port = GeniusPort::new(BoardRam(station.board.clone()), port);
+            recorders.push(Recorder::new(
+                station.number,
+                node,
+                port,
+                station.board.clone(),
+                &mut station.off,
+            ));
+        }
+        BusMachine {
+            recorders,
+            bus: &mut self.bus,
+            host: self.host,
+            window: &mut self.window,
+            pace: &mut self.pace,
+            now_ms: &mut self.now_ms,
+            stream_start_ms: None,
+        }
+    }
+}
