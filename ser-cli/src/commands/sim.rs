@@ -28,7 +28,9 @@ Contacts are CSV: milliseconds from the start, input, 1 closed or 0 open.
   0,7,1
   250,7,0
 On a Genius bus a fourth column, node, says whose input it is.
-On standard input (--contacts -) an empty line ends a scenario; more may follow.
+On standard input (--contacts -) times count from the arrival of the first
+line; an empty line ends a scenario, and more may follow. Lines that come one by
+one are given 100 ms, so that the first of them are not late.
 
 When the unit answers, what to give to --port is written to standard output,
 one line for each way to reach one.";
