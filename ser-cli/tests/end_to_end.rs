@@ -1,84 +1,18 @@
 //! The command line as a user types it, against simulated units: the native one and the ARM image.
 #![cfg(unix)]
 
+mod common;
+
 use std::fs;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::sync::mpsc::{Receiver, channel};
-use std::thread;
+use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use common::{Running, ser_cli, wait_until};
 use ser_tests::recorder::{Kind, PATIENCE, image};
 use ser_tests::with_both_kinds;
 use tempfile::TempDir;
-
-fn ser_cli() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ser-cli"));
-    command.env_remove("SER_PORT").env_remove("SER_STATE_DIR").env("NO_COLOR", "1");
-    command
-}
-
-/// A running `ser-cli`, ended with the test.
-struct Running(Child);
-
-impl Running {
-    fn start(command: &mut Command) -> Running {
-        Running(command.spawn().expect("ser-cli runs"))
-    }
-
-    fn signal(&self, name: &str) {
-        let id = self.0.id().to_string();
-        assert!(Command::new("kill").args([name, &id]).status().expect("kill runs").success());
-    }
-
-    /// Presses Ctrl-C and gives the exit code.
-    fn interrupt(&mut self) -> Option<i32> {
-        self.signal("-INT");
-        self.wait()
-    }
-
-    fn wait(&mut self) -> Option<i32> {
-        let mut code = None;
-        wait_until("ser-cli ends", || {
-            code = self.0.try_wait().expect("a child");
-            code.is_some()
-        });
-        code.and_then(|status| status.code())
-    }
-
-    /// The lines of standard output, as they come.
-    fn lines(&mut self) -> Receiver<String> {
-        let output = BufReader::new(self.0.stdout.take().expect("piped"));
-        let (sender, lines) = channel();
-        thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
-        lines
-    }
-}
-
-impl Drop for Running {
-    /// Politely first: a simulator that is killed outright leaves its emulator behind.
-    fn drop(&mut self) {
-        for signal in ["-TERM", "-CONT"] {
-            let _ =
-                Command::new("kill").args([signal, &self.0.id().to_string()]).stderr(Stdio::null()).status();
-        }
-        let deadline = Instant::now() + PATIENCE;
-        while matches!(self.0.try_wait(), Ok(None)) && Instant::now() < deadline {
-            thread::sleep(Duration::from_millis(5));
-        }
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
-    let deadline = Instant::now() + PATIENCE;
-    while !condition() {
-        assert!(Instant::now() < deadline, "waited in vain: {what}");
-        thread::sleep(Duration::from_millis(5));
-    }
-}
 
 /// A unit made with `ser-cli sim`, whose contacts are moved through its standard input.
 struct Bench {

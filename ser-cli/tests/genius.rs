@@ -2,67 +2,19 @@
 //! them through the file that is the host's window.
 #![cfg(unix)]
 
+mod common;
+
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
+use std::io::Write;
 use std::path::PathBuf;
-use std::process::{Child, Command, Output, Stdio};
-use std::sync::mpsc::{Receiver, channel};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::process::{Command, Output, Stdio};
 
+use common::{Running, ser_cli, wait_until};
+use ser_tests::recorder::PATIENCE;
 use tempfile::TempDir;
-
-/// How long anything may take: these tests run on machines that stall for seconds.
-const PATIENCE: Duration = Duration::from_secs(120);
 
 /// For recorders that are there, on such a machine. A board also gets so long to give a sign of life.
 const PATIENT_TIMEOUT: &str = "10s";
-
-fn ser_cli() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ser-cli"));
-    command.env_remove("SER_PORT").env_remove("SER_STATE_DIR").env("NO_COLOR", "1");
-    command
-}
-
-/// A running `ser-cli`, ended with the test.
-struct Running(Child);
-
-impl Running {
-    /// Presses Ctrl-C and gives the exit code.
-    fn interrupt(&mut self) -> Option<i32> {
-        let id = self.0.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill runs").success());
-        let mut code = None;
-        wait_until("ser-cli ends", || {
-            code = self.0.try_wait().expect("a child");
-            code.is_some()
-        });
-        code.and_then(|status| status.code())
-    }
-
-    /// The lines of standard output, as they come.
-    fn lines(&mut self) -> Receiver<String> {
-        let output = BufReader::new(self.0.stdout.take().expect("piped"));
-        let (sender, lines) = channel();
-        thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
-        lines
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
-    let deadline = Instant::now() + PATIENCE;
-    while !condition() {
-        assert!(Instant::now() < deadline, "waited in vain: {what}");
-        thread::sleep(Duration::from_millis(5));
-    }
-}
 
 /// A bus made with `ser-cli sim`, whose contacts are moved through its standard input.
 struct Bench {
@@ -78,7 +30,7 @@ impl Bench {
         command.arg("sim").arg("--genius").arg(folder.path().join("host")).args(["--contacts", "-"]);
         command.args(options.split_whitespace()).current_dir(folder.path());
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
-        let mut sim = Running(command.spawn().expect("ser-cli runs"));
+        let mut sim = Running::start(&mut command);
         let lines = sim.lines();
         let ports = options.split_whitespace().filter(|word| ["--node", "--pty"].contains(word)).count();
         let announced =
