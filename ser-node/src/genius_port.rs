@@ -248,7 +248,7 @@ impl<W: SharedRam> GeniusPort<W> {
             (FUNCTION_HORNER, SUBFUNCTION_SER) => {
                 if self.replies.is_full() {
                     count(&mut node.recorder.diagnostics.commands_overrun, 1);
-                } else if let Some(answer) = node.genius_command(Command::parse(&datagram.data), now_ms) {
+                } else if let Some(answer) = node.arrived(Command::parse(&datagram.data), now_ms) {
                     self.reply(datagram.source, What::Answer(answer));
                 }
             }

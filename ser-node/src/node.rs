@@ -149,11 +149,6 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         Inputs(self.capture.state())
     }
 
-    /// Takes a command that arrived over Genius at `tick_ms`; what is to be answered, if anything.
-    pub(crate) fn genius_command(&mut self, received: Received, tick_ms: u32) -> Option<Answer> {
-        self.arrived(received, tick_ms)
-    }
-
     /// Carries out a command that was meant for all recorders. Nobody is answered; reading and printing, which are
     /// requests of one host to one recorder, have no effect.
     pub(crate) fn genius_broadcast(&mut self, received: Received, tick_ms: u32) {
@@ -194,8 +189,9 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.serial.begin_unasked(&mut self.recorder, self.capture.edges_lost());
     }
 
-    /// What changed before a command arrived is recorded first, by the clock and mode of that time.
-    fn arrived(&mut self, received: Received, tick_ms: u32) -> Option<Answer> {
+    /// Takes a command that arrived at `tick_ms`; what is to be answered, if anything. What changed before is recorded
+    /// first, by the clock and mode of that time.
+    pub(crate) fn arrived(&mut self, received: Received, tick_ms: u32) -> Option<Answer> {
         let tick_ms = self.ticks.extend(tick_ms);
         self.record_until(tick_ms);
         match received {
