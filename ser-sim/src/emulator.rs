@@ -4,6 +4,8 @@
 //! QEMU's standard input and output are the RS-232 port. The contacts are a latch in the board's external memory, a
 //! file that both sides map, and there the board says which sample it took last.
 //!
+//! On a Genius bus the file also holds the shared RAM of the board's GENI, and whoever plays the bus plays the GENI too.
+//!
 //! A step is written when its time has come, and not before the board has sampled the step before: on a stalled
 //! machine contacts move late, but no two moves become one and none is lost. What was played is recorded with the
 //! samples around it.
@@ -17,6 +19,7 @@ use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command as Process, Stdio};
+use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -53,8 +56,9 @@ const PATIENCE_PLAYING: Duration = Duration::from_micros(100);
 pub(crate) struct Emulator {
     program: PathBuf,
     arguments: Vec<OsString>,
-    bus: ExternalBus,
+    bus: Rc<ExternalBus>,
     running: Option<Running>,
+    coming_up: Option<ComingUp>,
     player: Player,
     played: Vec<Played>,
     moving: Option<Moving>,
@@ -69,6 +73,14 @@ pub(crate) struct Emulator {
 struct Moving {
     moved: Move,
     tick_before: u32,
+}
+
+/// How far a board is that has been switched on.
+struct ComingUp {
+    began: Instant,
+    asked: Option<Instant>,
+    /// Whether the last question has been asked.
+    settled: bool,
 }
 
 /// QEMU at work.
@@ -92,10 +104,12 @@ impl Drop for Qemu {
 }
 
 impl Emulator {
+    /// A board without power. It has a GENI if it is to be on a Genius bus.
     pub(crate) fn new(
         options: &EmulatorOptions,
         model: Model,
         debounce_ms: u8,
+        geni: bool,
     ) -> Result<Emulator, SimError> {
         // QEMU's own words for a missing image are less clear.
         File::open(&options.image)
@@ -106,12 +120,14 @@ impl Emulator {
         let bus = ExternalBus::open(&memory)
             .map_err(SimError::io(format!("use {} as external memory", memory.display())))?;
         bus.set_straps(model, debounce_ms);
+        bus.fit_geni(geni);
         bus.set_inputs(0);
         Ok(Emulator {
             program: options.program.clone().unwrap_or_else(|| PROGRAM.into()),
             arguments: arguments(options, &memory),
-            bus,
+            bus: Rc::new(bus),
             running: None,
+            coming_up: None,
             player: Player::default(),
             played: Vec::new(),
             moving: None,
@@ -121,42 +137,82 @@ impl Emulator {
         })
     }
 
+    /// What the board sees besides its serial line.
+    pub(crate) fn external_bus(&self) -> Rc<ExternalBus> {
+        Rc::clone(&self.bus)
+    }
+
+    /// Counts time as somebody else does, from now on.
+    pub(crate) fn keep_pace(&mut self, pace: Pace) {
+        self.pace = pace;
+    }
+
+    /// Its contacts.
+    pub(crate) fn player_mut(&mut self) -> &mut Player {
+        &mut self.player
+    }
+
     /// Switches the board on, or off and on again, and waits until it answers. Returns early when told to stop.
     pub(crate) fn power_up(&mut self, stop: &AtomicBool) -> Result<(), SimError> {
+        self.switch_on()?;
+        while !stop.load(Ordering::Relaxed) && !self.is_up()? {
+            self.pause();
+        }
+        Ok(())
+    }
+
+    /// Cuts the power.
+    pub(crate) fn switch_off(&mut self) {
         self.running = None;
+        self.coming_up = None;
+    }
+
+    /// Switches the board on, or off and on again.
+    pub(crate) fn switch_on(&mut self) -> Result<(), SimError> {
+        self.switch_off();
         // Contacts that were about to be sampled move now: the board takes them as they are at power-up.
         self.moving = None;
         self.bus.clear_sample();
         self.running = Some(self.start()?);
-        let began = Instant::now();
-        let mut asked: Option<Instant> = None;
-        let mut settled = false;
-        while !stop.load(Ordering::Relaxed) {
-            self.look_after()?;
-            let waited = began.elapsed();
-            let Some(running) = &mut self.running else { break };
-            if running.from_board.told_mode && self.bus.is_sampled() {
-                running.forget_output();
-                return Ok(());
-            }
-            if waited > ANSWER_WITHIN {
-                return Err(SimError::NoAnswer { waited, printed: self.printed() });
-            }
-            if running.from_board.rate.is_none() {
-                if asked.is_none_or(|asked| asked.elapsed() > ASK_EVERY) {
-                    asked = Some(Instant::now());
-                    running.ask(&Command::QueryConfiguration);
-                }
-            } else if !settled {
-                // Answers come in order: after this one, none to the questions before is left to confuse a host.
-                settled = true;
-                running.ask(&Command::QueryMode);
-            }
-            let timeout = Timespec::try_from(PATIENCE).unwrap_or_default();
-            // Only a pause: whatever comes of it, the loop looks again.
-            let _ = poll(&mut [PollFd::new(&running.output, PollFlags::IN)], Some(&timeout));
-        }
+        self.coming_up = Some(ComingUp { began: Instant::now(), asked: None, settled: false });
         Ok(())
+    }
+
+    /// Whether the board that was switched on answers by now; to be asked again and again.
+    pub(crate) fn is_up(&mut self) -> Result<bool, SimError> {
+        self.look_after()?;
+        let (Some(running), Some(coming_up)) = (&mut self.running, &mut self.coming_up) else {
+            return Ok(true);
+        };
+        if running.from_board.told_mode && self.bus.is_sampled() {
+            running.forget_output();
+            self.coming_up = None;
+            return Ok(true);
+        }
+        let waited = coming_up.began.elapsed();
+        if waited > ANSWER_WITHIN {
+            return Err(SimError::NoAnswer { waited, printed: self.printed() });
+        }
+        if running.from_board.rate.is_none() {
+            if coming_up.asked.is_none_or(|asked| asked.elapsed() > ASK_EVERY) {
+                coming_up.asked = Some(Instant::now());
+                running.ask(&Command::QueryConfiguration);
+            }
+        } else if !coming_up.settled {
+            // Answers come in order: after this one, none to the questions before is left to confuse a host.
+            coming_up.settled = true;
+            running.ask(&Command::QueryMode);
+        }
+        Ok(false)
+    }
+
+    /// Waits a moment, or until the board says something.
+    pub(crate) fn pause(&self) {
+        let timeout = Timespec::try_from(PATIENCE).unwrap_or_default();
+        let mut output: Vec<PollFd<'_>> =
+            self.running.iter().map(|running| PollFd::new(&running.output, PollFlags::IN)).collect();
+        // Whatever comes of it, the caller looks again.
+        let _ = poll(&mut output, Some(&timeout));
     }
 
     fn start(&self) -> Result<Running, SimError> {
@@ -466,7 +522,7 @@ mod tests {
         let image = tempfile::NamedTempFile::new().unwrap();
         let mut options = EmulatorOptions::new(image.path());
         options.program = Some("/nonexistent/qemu-system-arm".into());
-        let mut emulator = Emulator::new(&options, Model::Ser160, 0).unwrap();
+        let mut emulator = Emulator::new(&options, Model::Ser160, 0, false).unwrap();
         let error = emulator.power_up(&AtomicBool::new(false)).unwrap_err().to_string();
         assert!(error.contains("not installed") && error.contains("package qemu-system-arm"), "{error}");
     }
@@ -477,7 +533,7 @@ mod tests {
         let mut options = EmulatorOptions::new(image.path());
         // The shell knows no option -M.
         options.program = Some("/bin/sh".into());
-        let mut emulator = Emulator::new(&options, Model::Ser160, 0).unwrap();
+        let mut emulator = Emulator::new(&options, Model::Ser160, 0, false).unwrap();
         let error = emulator.power_up(&AtomicBool::new(false)).unwrap_err().to_string();
         assert!(error.contains("exit status: 2") && error.contains("-M"), "{error}");
     }

@@ -51,6 +51,11 @@ pub(crate) trait Machine {
         Vec::new()
     }
 
+    /// Sentences for the user about what is not as it should be, since this was last asked.
+    fn take_complaints(&mut self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// How long it may be left alone.
     fn patience(&self) -> Duration;
 

@@ -129,8 +129,9 @@ impl Service {
         None
     }
 
-    /// Lets the owner see how far the contacts are.
+    /// Lets the owner see how far the contacts are, and what is wrong.
     pub(crate) fn report(&self, machine: &mut dyn Machine) {
+        machine.take_complaints().iter().for_each(|complaint| self.notify(complaint));
         let played = machine.take_played();
         let idle = machine.is_idle() && self.stream.is_none();
         let newly_idle = idle && !self.shared.status().idle;

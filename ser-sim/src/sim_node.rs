@@ -180,11 +180,6 @@ impl<'a> SimNode<'a> {
         &mut self.player
     }
 
-    /// The node itself, for its Genius port.
-    pub(crate) fn node_mut(&mut self) -> &mut Node<'a, MemoryStorage, SimRtc> {
-        &mut self.node
-    }
-
     /// Whether no contact is going to move.
     #[must_use]
     pub fn is_idle(&self) -> bool {

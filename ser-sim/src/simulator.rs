@@ -43,8 +43,8 @@ pub struct SimOptions {
     pub debounce_ms: u8,
     /// What plays the node.
     pub backend: Backend,
-    /// The Genius bus, if the node is on one. Then `model` is of no account, and the node on the port is the bus's
-    /// first one.
+    /// The Genius bus, if the node is on one. Then `model` is of no account, and the bus's first node is the one that is
+    /// played by `backend` and has the port; the others are built in.
     pub genius: Option<GeniusOptions>,
     /// Called with a sentence for the user when something is not as it should be but goes on.
     pub notice: Option<Notice>,
@@ -157,12 +157,11 @@ impl Simulator {
                 let start = Start { model, nodes, contacts, ready: ready_sender };
                 let result = match backend {
                     #[cfg(unix)]
-                    Backend::Native { line_rate, non_volatile } if genius.is_some() => {
-                        let debounce = Debounce::uniform(debounce_ms);
-                        let options = SimNodeOptions { model, debounce, line_rate, non_volatile };
-                        genius.map_or(Ok(()), |genius| run_on_bus(&mut service, &options, &genius, start))
+                    backend if let Some(genius) = &genius => {
+                        run_on_bus(&mut service, backend, debounce_ms, genius, start)
                     }
-                    _ if genius.is_some() => Err(SimError::Unsupported("this node on a Genius bus")),
+                    #[cfg(not(unix))]
+                    _ if genius.is_some() => Err(SimError::Unsupported("a Genius bus")),
                     Backend::Native { line_rate, non_volatile } => {
                         let debounce = Debounce::uniform(debounce_ms);
                         let options = SimNodeOptions { model, debounce, line_rate, non_volatile };
@@ -337,17 +336,29 @@ fn names(line: String, machine: &dyn Machine) -> String {
 #[cfg(unix)]
 fn run_on_bus(
     service: &mut Service,
-    options: &SimNodeOptions,
+    backend: Backend,
+    debounce_ms: u8,
     genius: &GeniusOptions,
     start: Start,
 ) -> Result<(), SimError> {
     let shared = Arc::clone(&service.shared);
-    let mut bench = GeniusBench::new(options, genius)?;
+    let mut options =
+        SimNodeOptions { debounce: Debounce::uniform(debounce_ms), ..SimNodeOptions::new(start.model) };
+    let image = match backend {
+        Backend::Native { line_rate, non_volatile } => {
+            options = SimNodeOptions { line_rate, non_volatile, ..options };
+            None
+        }
+        Backend::Emulator(image) => {
+            Some(crate::emulator::Emulator::new(&image, start.model, debounce_ms, true)?)
+        }
+    };
+    let mut bench = GeniusBench::new(&options, image, genius)?;
     let mut rams = bench.rams();
     let mut start = Some(start);
     let mut cycled: Option<Sender<()>> = None;
     loop {
-        let mut machine = bench.power_up(&mut rams);
+        let mut machine = bench.power_up(&mut rams)?;
         if !machine.come_up(&shared.stop)? {
             return Ok(());
         }
@@ -395,7 +406,7 @@ fn run_emulator(
     start: Start,
 ) -> Result<(), SimError> {
     let shared = Arc::clone(&service.shared);
-    let mut emulator = crate::emulator::Emulator::new(options, start.model, debounce_ms)?;
+    let mut emulator = crate::emulator::Emulator::new(options, start.model, debounce_ms, false)?;
     emulator.power_up(&shared.stop)?;
     start.go(service, &mut emulator)?;
     loop {

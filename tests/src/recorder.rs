@@ -1,12 +1,17 @@
 //! A recorder under test, native or as the ARM image, behind a pseudo-terminal.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use chrono::NaiveDateTime;
-use ser_client::{Endpoint, Options, Unit, Unsolicited, open};
+use ser_client::{Endpoint, GeniHost, Options, Unit, Unsolicited, open};
 use ser_proto::{Entry, Model};
-use ser_sim::{Backend, EmulatorOptions, Played, Port, Scenario, SimOptions, Simulator, Step};
+use ser_sim::genius::Noise;
+use ser_sim::{
+    Backend, EmulatorOptions, GeniusOptions, Notice, Played, Port, Scenario, SimOptions, Simulator, Step,
+};
+use tempfile::TempDir;
 
 /// How long anything may take: these tests run on machines that stall for seconds.
 pub const PATIENCE: Duration = Duration::from_secs(120);
@@ -25,6 +30,12 @@ pub fn image() -> PathBuf {
         .into()
 }
 
+/// The recorder's number, where it is on a bus.
+pub const NODE: u8 = 5;
+
+/// For a client on a machine that stalls.
+pub const PATIENT: Options = Options { timeout: Duration::from_secs(20), retries: 5 };
+
 /// What plays the node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -32,6 +43,15 @@ pub enum Kind {
     Native,
     /// The ARM image in the emulator.
     Emulated,
+}
+
+impl Kind {
+    fn backend(self) -> Backend {
+        match self {
+            Kind::Native => Backend::default(),
+            Kind::Emulated => Backend::Emulator(EmulatorOptions::new(image())),
+        }
+    }
 }
 
 /// Makes two tests of each function that takes a [`Kind`]: `native::…` and, for `cargo xtask test`, `emulated::…`.
@@ -57,6 +77,10 @@ macro_rules! with_both_kinds {
 /// A recorder that is switched on.
 pub struct Recorder {
     simulator: Simulator,
+    /// What the simulator finds not to be as it should be.
+    notices: Arc<Mutex<Vec<String>>>,
+    /// Holds the host's window, if it is on a bus.
+    _folder: Option<TempDir>,
 }
 
 impl Recorder {
@@ -66,11 +90,29 @@ impl Recorder {
     /// When it does not answer, or the image is not there.
     #[must_use]
     pub fn start(kind: Kind, model: Model) -> Recorder {
-        let backend = match kind {
-            Kind::Native => Backend::default(),
-            Kind::Emulated => Backend::Emulator(EmulatorOptions::new(image())),
-        };
-        Recorder::start_with(SimOptions { backend, ..SimOptions::new(model, Port::Pty { link: None }) })
+        Recorder::start_with(SimOptions { backend: kind.backend(), ..options(model) }, None)
+    }
+
+    /// Switches a recorder on that is on a Genius bus with a host; all contacts are open.
+    ///
+    /// # Panics
+    /// When it does not answer, or the image is not there.
+    #[must_use]
+    pub fn start_on_bus(kind: Kind, model: Model) -> Recorder {
+        Recorder::start_on_noisy_bus(kind, model, Noise::default())
+    }
+
+    /// The same on a bus on which messages are damaged and lost.
+    ///
+    /// # Panics
+    /// When it does not answer, or the image is not there.
+    #[must_use]
+    pub fn start_on_noisy_bus(kind: Kind, model: Model, noise: Noise) -> Recorder {
+        let folder = tempfile::tempdir().expect("a folder");
+        let genius = GeniusOptions::new(folder.path().join("host"), vec![(NODE, model)]);
+        let genius = GeniusOptions { noise, ..genius };
+        let options = SimOptions { backend: kind.backend(), genius: Some(genius), ..options(model) };
+        Recorder::start_with(options, Some(folder))
     }
 
     /// Switches on the ARM image, which writes its log to a file.
@@ -80,16 +122,20 @@ impl Recorder {
     #[must_use]
     pub fn start_logging(log: &Path) -> Recorder {
         let emulator = EmulatorOptions { log: Some(log.to_owned()), ..EmulatorOptions::new(image()) };
-        let options = SimOptions::new(Model::Ser320, Port::Pty { link: None });
-        Recorder::start_with(SimOptions { backend: Backend::Emulator(emulator), ..options })
+        let backend = Backend::Emulator(emulator);
+        Recorder::start_with(SimOptions { backend, ..options(Model::Ser320) }, None)
     }
 
-    fn start_with(options: SimOptions) -> Recorder {
-        let simulator = Simulator::start(options).unwrap_or_else(|error| panic!("{error}"));
-        Recorder { simulator }
+    fn start_with(options: SimOptions, folder: Option<TempDir>) -> Recorder {
+        let notices = Arc::new(Mutex::new(Vec::new()));
+        let noticed = Arc::clone(&notices);
+        let notice = Notice(Box::new(move |text| lock(&noticed).push(text.to_owned())));
+        let simulator = Simulator::start(SimOptions { notice: Some(notice), ..options });
+        let simulator = simulator.unwrap_or_else(|error| panic!("{error}"));
+        Recorder { simulator, notices, _folder: folder }
     }
 
-    /// What `--port` takes.
+    /// What `--port` takes for its serial line.
     #[must_use]
     pub fn port(&self) -> &str {
         self.simulator.port()
@@ -103,7 +149,28 @@ impl Recorder {
     pub fn unit(&self) -> Unit {
         let endpoint: Endpoint = self.port().parse().expect("the simulator names its port");
         let transport = open(&endpoint, 9600).unwrap_or_else(|error| panic!("{error}"));
-        Unit::new(transport, Options { timeout: Duration::from_secs(20), retries: 5 })
+        Unit::new(transport, PATIENT)
+    }
+
+    /// The host on the recorder's bus. There is one at a time.
+    ///
+    /// # Panics
+    /// When its board cannot be reached.
+    #[must_use]
+    pub fn host(&self) -> GeniHost {
+        let port = self.simulator.ports().last().expect("a port");
+        let window = port.strip_prefix("geni:").and_then(|port| port.split_once('?')).expect("a window").0;
+        GeniHost::open(window, PATIENCE).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// Checks that the recorder has kept to the rules of its GENI board.
+    ///
+    /// # Panics
+    /// When it has not.
+    pub fn assert_lawful(&self) {
+        let notices = lock(&self.notices);
+        let broken: Vec<_> = notices.iter().filter(|notice| notice.contains("rule")).collect();
+        assert!(broken.is_empty(), "{broken:#?}");
     }
 
     /// Moves contacts, `(ms, input, closed)`, and waits until the recorder has sampled them all.
@@ -145,6 +212,14 @@ impl Recorder {
     pub fn power_cycle(&self) {
         self.simulator.power_cycle().unwrap_or_else(|error| panic!("{error}"));
     }
+}
+
+fn options(model: Model) -> SimOptions {
+    SimOptions::new(model, Port::Pty { link: None })
+}
+
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Waits for what the recorder says unasked until `enough` has been seen.

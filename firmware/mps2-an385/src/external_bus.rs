@@ -1,8 +1,8 @@
-//! The external bus: field inputs, straps, marks for the bench, configuration memory.
+//! The external bus: GENI board, field inputs, straps, marks for the bench, configuration memory.
 //!
 //! | offset        | what                                                   | written by |
 //! |---------------|--------------------------------------------------------|------------|
-//! | 0000h–3FFFh   | shared RAM window of a GENI board; not used yet        | –          |
+//! | 0000h–3FFFh   | shared RAM window of the GENI board                    | both       |
 //! | 8000h         | input latch, input 1 in bit 0                          | bench      |
 //! | 8004h         | sample counter: tick of the latest sample, in ms       | recorder   |
 //! | 8008h         | model strap: 160 for SER160, anything else is SER320   | bench      |
@@ -10,7 +10,10 @@
 //! | 8010h         | boot count                                             | recorder   |
 //! | 8014h         | fault mark: why the recorder is about to reset itself  | recorder   |
 //! | 8018h         | the fault mark that the latest boot found              | recorder   |
+//! | 801Ch         | reset line of the GENI board: bit 0 is set as long as  | recorder   |
+//! |               | it is held; the bits above count how often it was held |            |
 //! | 8020h         | the inputs as the latest sample saw them               | recorder   |
+//! | 8024h         | GENI strap: 0 for no board, anything else for a board  | bench      |
 //! | 9000h, 9040h  | configuration memory, two blocks of 64 bytes           | recorder   |
 //!
 //! Words have 32 bits, little-endian. Fault marks: 0 none, 1 panic, 2 hard fault, 3 watchdog, 4 stack
@@ -19,8 +22,9 @@
 //! # Design
 //! Straps are read once, at boot. After each sample the recorder writes first its tick and then what it saw: whoever
 //! changes the latch and then finds the change at 8020h knows that it has been sampled, and not later than at the tick
-//! that stands at 8004h. It is what a trigger output is to a scope. Configuration memory stands for an FRAM: it needs no
-//! erasing, and the two blocks never share a write.
+//! that stands at 8004h. It is what a trigger output is to a scope. The reset line is counted because the bench looks at
+//! it now and then, and a GENI board misses no pulse. Configuration memory stands for an FRAM: it needs no erasing, and the
+//! two blocks never share a write.
 //!
 //! # Tradeoffs
 //! Everything sits on one bus, so one file on the desktop holds all there is to see and to set.
@@ -30,7 +34,9 @@
 //! the emulator, and so does the configuration. On the real board the memory there is a PSRAM.
 
 use core::convert::Infallible;
+use core::ptr::{self, NonNull};
 
+use geni::WindowRam;
 use ser_node::{CopyNumber, Debounce, RECORD_LEN, Storage};
 use ser_proto::Model;
 
@@ -59,8 +65,14 @@ const FAULT_MARK: Word = unsafe { word(0x8014) };
 // SAFETY: see the map.
 const FAULT_FOUND: Word = unsafe { word(0x8018) };
 // SAFETY: see the map.
+const GENI_RESET: Word = unsafe { word(0x801C) };
+// SAFETY: see the map.
 const SAMPLED_INPUTS: Word = unsafe { word(0x8020) };
 
+// SAFETY: see the map.
+const GENI_STRAP: Word = unsafe { word(0x8024) };
+
+const GENI_WINDOW: usize = 0x0000;
 const CONFIGURATION_MEMORY: usize = 0x9000;
 const COPY_DISTANCE: usize = 0x40;
 const WORD_LEN: usize = size_of::<u32>();
@@ -91,6 +103,38 @@ pub(crate) fn model() -> Model {
 pub(crate) fn debounce() -> Debounce {
     let [time_ms, ..] = DEBOUNCE_STRAP.read().to_le_bytes();
     Debounce::uniform(time_ms)
+}
+
+/// A GENI board that is fitted: its shared RAM and its reset line.
+pub(crate) struct GeniBoard {
+    reset_held: bool,
+}
+
+impl GeniBoard {
+    /// The board, if the strap says that there is one.
+    ///
+    /// # Safety
+    /// This is called once only: the window belongs to whoever has it.
+    pub(crate) unsafe fn find() -> Option<(GeniBoard, WindowRam)> {
+        if GENI_STRAP.read() == 0 {
+            return None;
+        }
+        let window = NonNull::new(ptr::with_exposed_provenance_mut(base::EXTERNAL_BUS + GENI_WINDOW))?;
+        // SAFETY: see the map; nothing else here reaches the window, and the caller has it once only.
+        let window = unsafe { WindowRam::new(window) };
+        // A run before this one may have ended while it held the line.
+        let board = GeniBoard { reset_held: GENI_RESET.read() & 1 != 0 };
+        Some((board, window))
+    }
+
+    /// Drives the reset line.
+    pub(crate) fn drive_reset(&mut self, held: bool) {
+        if held != self.reset_held {
+            self.reset_held = held;
+            // Bit 0 is the line; adding one to a line that is held carries into the count.
+            GENI_RESET.write(GENI_RESET.read().wrapping_add(1));
+        }
+    }
 }
 
 /// Why the recorder resets itself.

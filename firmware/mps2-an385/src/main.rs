@@ -1,7 +1,8 @@
 //! The recorder on ARM's MPS2 board with the AN385 image (Cortex-M3), as QEMU emulates it.
 //!
 //! Three interrupts and a main loop: capture (highest priority), RS-232 in, RS-232 out, and `idle`, which
-//! does all the rest. They share no resource, hence nobody ever locks anything, and capture waits for nobody.
+//! does all the rest, the GENI board included. They share no resource, hence nobody ever locks anything, and capture
+//! waits for nobody.
 #![no_std]
 #![no_main]
 
@@ -11,6 +12,7 @@ use cortex_m_rt as _;
 mod device;
 mod external_bus;
 mod fault;
+mod genius;
 mod log;
 mod mmio;
 mod report;
@@ -24,6 +26,7 @@ mod app {
     use ser_node::{Capture, CaptureChannel, Event, Liveness, NoRtc, Node, NodeParts, VERSION};
 
     use crate::external_bus::{self, ConfigurationMemory};
+    use crate::genius::Genius;
     use crate::report::Report;
     use crate::timer::{self, Timer};
     use crate::uart::{self, ReceiveInterrupt, Rings, SerialLine, TransmitInterrupt};
@@ -33,7 +36,7 @@ mod app {
     /// Events that the log holds: the largest size that can be configured.
     const LOG_LEN: usize = 2048;
 
-    type BoardNode = Node<'static, ConfigurationMemory, NoRtc>;
+    pub(crate) type BoardNode = Node<'static, ConfigurationMemory, NoRtc>;
 
     #[shared]
     struct Shared {}
@@ -47,6 +50,7 @@ mod app {
         transmit: TransmitInterrupt,
         serial: SerialLine,
         node: BoardNode,
+        genius: Option<Genius>,
         watchdog: Watchdog,
     }
 
@@ -74,11 +78,24 @@ mod app {
             rtc: NoRtc,
         });
         let (serial, receive, transmit) = uart::start(rings, node.baud());
+        // SAFETY: `init` runs once.
+        let genius = unsafe { external_bus::GeniBoard::find() };
+        let genius = genius.map(|(board, window)| Genius::new(board, window, model));
         let watchdog = Watchdog::start();
         let timer = Timer::start();
         (
             Shared {},
-            Local { timer, capture, input_mask: model.mask(), receive, transmit, serial, node, watchdog },
+            Local {
+                timer,
+                capture,
+                input_mask: model.mask(),
+                receive,
+                transmit,
+                serial,
+                node,
+                genius,
+                watchdog,
+            },
         )
     }
 
@@ -102,9 +119,9 @@ mod app {
         cx.local.transmit.on_interrupt();
     }
 
-    #[idle(local = [serial, node, watchdog])]
+    #[idle(local = [serial, node, genius, watchdog])]
     fn idle(cx: idle::Context) -> ! {
-        let idle::LocalResources { serial, node, watchdog, .. } = cx.local;
+        let idle::LocalResources { serial, node, genius, watchdog, .. } = cx.local;
         let mut liveness = Liveness::new();
         let mut report = Report::new(node.tick_ms());
         loop {
@@ -121,6 +138,9 @@ mod app {
                 }
             }
             node.poll(now_ms);
+            if let Some(genius) = genius {
+                genius.poll(node, now_ms);
+            }
             change_baud(node, serial, now_ms);
             hand_out(node, serial);
 
@@ -130,7 +150,7 @@ mod app {
                     defmt::warn!("watchdog: fed at the last moment");
                 }
             }
-            report.pass(now_ms, || node.diagnostics());
+            report.pass(now_ms, || (node.diagnostics(), genius.as_ref().map(Genius::diagnostics)));
 
             // A byte that arrives just now waits for the next interrupt, a millisecond at most. Looking with
             // interrupts off would spare it that, and delay the capture interrupt instead.

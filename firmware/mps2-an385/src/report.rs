@@ -1,6 +1,7 @@
 //! Tells the log what the counters say.
 
-use ser_node::Diagnostics;
+use geni::Counters;
+use ser_node::{Diagnostics, GeniusDiagnostics};
 
 use crate::stack;
 
@@ -11,24 +12,36 @@ const INTERVAL_MS: u32 = 1000;
 pub(crate) struct Report {
     looked_ms: u32,
     diagnostics: Diagnostics,
+    genius: GeniusDiagnostics,
     stack_bytes: usize,
 }
 
 impl Report {
     pub(crate) fn new(now_ms: u32) -> Report {
-        Report { looked_ms: now_ms, diagnostics: Diagnostics::default(), stack_bytes: 0 }
+        Report {
+            looked_ms: now_ms,
+            diagnostics: Diagnostics::default(),
+            genius: GeniusDiagnostics::default(),
+            stack_bytes: 0,
+        }
     }
 
     /// Logs what has changed, once a second at most.
-    pub(crate) fn pass(&mut self, now_ms: u32, diagnostics: impl FnOnce() -> Diagnostics) {
+    pub(crate) fn pass(
+        &mut self,
+        now_ms: u32,
+        diagnostics: impl FnOnce() -> (Diagnostics, Option<GeniusDiagnostics>),
+    ) {
         if now_ms.wrapping_sub(self.looked_ms) < INTERVAL_MS {
             return;
         }
         self.looked_ms = now_ms;
-        let diagnostics = diagnostics();
-        if diagnostics != self.diagnostics {
-            log_changed(&self.diagnostics, &diagnostics);
-            self.diagnostics = diagnostics;
+        let (diagnostics, genius) = diagnostics();
+        log_changed(&self.diagnostics, &diagnostics);
+        self.diagnostics = diagnostics;
+        if let Some(genius) = genius {
+            log_changed_genius(&self.genius, &genius);
+            self.genius = genius;
         }
         let stack_bytes = stack::high_water();
         if stack_bytes > self.stack_bytes {
@@ -38,34 +51,85 @@ impl Report {
     }
 }
 
-/// One line for each counter that has moved.
-fn log_changed(before: &Diagnostics, after: &Diagnostics) {
-    macro_rules! each {
-        ($($counter:ident),* $(,)?) => {
-            // Without `..`, so that a new counter is not forgotten here.
-            let Diagnostics { $($counter),* } = after;
-            for (name, before, after) in [$((stringify!($counter), before.$counter, *$counter)),*] {
-                if after != before {
-                    defmt::warn!("{=str}: {=u32}", name, after);
-                }
+/// One line for each counter of a structure that has moved. Every field is a counter or named as something else, so that
+/// a new one is not forgotten here.
+macro_rules! log_counters {
+    ($Type:ident, $before:expr, $after:expr, [$($counter:ident),* $(,)?] $(, other [$($other:ident),*])?) => {
+        let (before, after): (&$Type, &$Type) = ($before, $after);
+        let $Type { $($counter,)* $($($other: _,)*)? } = after;
+        for (name, before, after) in [$((stringify!($counter), before.$counter, *$counter)),*] {
+            if after != before {
+                defmt::warn!("{=str}: {=u32}", name, after);
             }
-        };
+        }
+    };
+}
+
+fn log_changed(before: &Diagnostics, after: &Diagnostics) {
+    log_counters!(
+        Diagnostics,
+        before,
+        after,
+        [
+            frames_interrupted,
+            frames_not_hex,
+            frames_checksum,
+            frames_too_long,
+            frames_empty,
+            line_errors,
+            commands_unknown,
+            commands_wrong_length,
+            parameters_refused,
+            commands_overrun,
+            edges_lost,
+            samples_missed,
+            events_unreported,
+            events_unprinted,
+            storage_errors,
+        ]
+    );
+}
+
+fn log_changed_genius(before: &GeniusDiagnostics, after: &GeniusDiagnostics) {
+    if let Some(failure) = after.last_failure
+        && before.board.failures != after.board.failures
+    {
+        defmt::warn!("{}", failure);
     }
-    each!(
-        frames_interrupted,
-        frames_not_hex,
-        frames_checksum,
-        frames_too_long,
-        frames_empty,
-        line_errors,
-        commands_unknown,
-        commands_wrong_length,
-        parameters_refused,
-        commands_overrun,
-        edges_lost,
-        samples_missed,
-        events_unreported,
-        events_unprinted,
-        storage_errors,
+    log_counters!(
+        Counters,
+        &before.board,
+        &after.board,
+        [
+            failures,
+            resets,
+            bus_losses,
+            bus_errors,
+            configurations_refused,
+            commands_timed_out,
+            commands_late,
+            commands_blocked,
+            commands_refused,
+            commands_failed,
+            commands_unknown,
+            datagrams_refused,
+            requests_refused,
+            requests_unanswered,
+            requests_malformed,
+            request_queue_full,
+            request_pointers_refused,
+            device_records_refused,
+            lockouts_foreign,
+            lockouts_lost,
+        ],
+        other[own_broadcasts]
+    );
+    // Broadcasts and reports that arrived are what is meant to happen.
+    log_counters!(
+        GeniusDiagnostics,
+        before,
+        after,
+        [datagrams_ignored, replies_lost, reports_failed],
+        other [board, last_failure, broadcasts, reports_sent]
     );
 }

@@ -5,11 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use chrono::Local;
-use ser_node::GeniusPort;
 use ser_proto::{Baud, Command, FrameEncoder, TimeStamp};
 
 use super::host_window::HostWindow;
-use super::shared_board::{BoardRam, SharedBoard};
+use super::recorder::Recorder;
 use crate::error::SimError;
 use crate::genius::{Board, Bus, Handle};
 use crate::machine::Machine;
@@ -17,12 +16,12 @@ use crate::pace::Pace;
 use crate::player::{Played, STREAM_LEAD_MS};
 use crate::scenario::Scenario;
 use crate::scenario_lines::Item;
-use crate::sim_node::{PoweredOff, SimNode};
+use crate::sim_node::SimNode;
 
 /// How soon the host's board sees what the host has written.
 const PATIENCE: Duration = Duration::from_millis(1);
 
-/// By then a host may as well see for itself who is on the bus.
+/// After that a host may as well see for itself who is on the bus.
 const LOG_IN_PATIENCE: Duration = Duration::from_secs(60);
 
 /// How often it is looked whether all are logged in.
@@ -30,43 +29,6 @@ const LOOK_EVERY_MS: u32 = 50;
 
 /// Where a board has whether a device is logged in: the third of eight bytes per device.
 const DEVICE_TABLE: usize = 0x1E00;
-
-/// A recorder under power, and its board.
-pub(super) struct Recorder<'a> {
-    number: u8,
-    node: SimNode<'a>,
-    port: GeniusPort<BoardRam>,
-    board: SharedBoard,
-    in_reset: bool,
-    off: &'a mut Option<PoweredOff>,
-}
-
-impl<'a> Recorder<'a> {
-    pub(super) fn new(
-        number: u8,
-        node: SimNode<'a>,
-        port: GeniusPort<BoardRam>,
-        board: SharedBoard,
-        off: &'a mut Option<PoweredOff>,
-    ) -> Recorder<'a> {
-        Recorder { number, node, port, board, in_reset: false, off }
-    }
-
-    fn advance_to(&mut self, ms: u64) {
-        self.node.advance_to(ms);
-        let tick = self.node.tick_at(ms);
-        if self.board.lock().take_interrupt() {
-            self.port.interrupt();
-        }
-        self.port.poll(self.node.node_mut(), tick);
-        let held = self.port.reset_held();
-        if held != self.in_reset {
-            self.in_reset = held;
-            let mut board = self.board.lock();
-            if held { board.hold_reset() } else { board.release_reset() }
-        }
-    }
-}
 
 /// The bus while its recorders are under power. The first of them has the serial line.
 pub(crate) struct BusMachine<'a> {
@@ -80,51 +42,86 @@ pub(crate) struct BusMachine<'a> {
     pub(super) stream_start_ms: Option<u64>,
 }
 
-impl BusMachine<'_> {
-    /// Lets time run ahead until the host's board has logged all recorders in, so that nobody has to wait for self-tests,
-    /// and for boards that ask each other who they are. False when it was cut short.
+impl<'a> BusMachine<'a> {
+    /// Returns when the host's board has logged all recorders in, or should have. False when it was cut short.
     pub(crate) fn come_up(&mut self, stop: &AtomicBool) -> Result<bool, SimError> {
-        let until = Instant::now() + LOG_IN_PATIENCE;
-        while !self.all_logged_in() && Instant::now() < until {
-            if stop.load(Ordering::Relaxed) {
-                return Ok(false);
-            }
-            (0..LOOK_EVERY_MS).for_each(|_| self.pass_ms());
+        let cut_short = if self.built_in_nodes().count() == self.recorders.len() {
+            self.run_ahead(stop)
+        } else {
+            self.wait_for_image(stop)?
+        };
+        if cut_short {
+            return Ok(false);
         }
-        *self.pace = Pace::from(Instant::now(), *self.now_ms);
+        self.keep_pace(Pace::from(Instant::now(), *self.now_ms));
         self.set_clocks();
         self.advance()?;
         Ok(true)
+    }
+
+    /// Lets time run ahead of real time, so that nobody has to wait for self-tests, and for boards that ask each other who
+    /// they are. True when it was cut short.
+    fn run_ahead(&mut self, stop: &AtomicBool) -> bool {
+        let until = Instant::now() + LOG_IN_PATIENCE;
+        while !self.all_logged_in() && Instant::now() < until {
+            if stop.load(Ordering::Relaxed) {
+                return true;
+            }
+            (0..LOOK_EVERY_MS).for_each(|_| self.pass_ms());
+        }
+        false
+    }
+
+    /// An emulated processor has no time but the real one. True when it was cut short.
+    fn wait_for_image(&mut self, stop: &AtomicBool) -> Result<bool, SimError> {
+        self.keep_pace(Pace::from(Instant::now(), *self.now_ms));
+        let mut log_in_by = None;
+        let patience_ends = || Instant::now() + LOG_IN_PATIENCE;
+        loop {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(true);
+            }
+            let mut up = true;
+            for recorder in &mut self.recorders {
+                up &= recorder.is_up()?;
+            }
+            self.advance()?;
+            if up && (self.all_logged_in() || *log_in_by.get_or_insert_with(patience_ends) < Instant::now()) {
+                return Ok(false);
+            }
+            self.recorders.iter().for_each(Recorder::pause);
+        }
+    }
+
+    fn keep_pace(&mut self, pace: Pace) {
+        *self.pace = pace;
+        for recorder in &mut self.recorders {
+            recorder.keep_pace(pace);
+        }
     }
 
     /// What ran ahead are also the recorders' clocks: they are set, as one would do it on their serial lines.
     fn set_clocks(&mut self) {
         let Ok(now) = TimeStamp::try_from(Local::now().naive_local()) else { return };
         let command: Vec<u8> = FrameEncoder::new(Command::SetClock(now).to_body()).collect();
-        for recorder in &mut self.recorders {
-            recorder.node.receive(&command);
-        }
+        self.built_in_nodes().for_each(|node| node.receive(&command));
         self.pass_ms();
-        for recorder in &mut self.recorders {
-            recorder.node.take_output();
-        }
+        self.built_in_nodes().for_each(|node| drop(node.take_output()));
+    }
+
+    fn built_in_nodes(&mut self) -> impl Iterator<Item = &mut SimNode<'a>> {
+        self.recorders.iter_mut().filter_map(Recorder::built_in_node)
     }
 
     /// Cuts the power of all recorders; their boards start anew with them.
     pub(crate) fn power_off(self) {
-        for recorder in self.recorders {
-            let mut board = recorder.board.lock();
-            board.hold_reset();
-            board.release_reset();
-            drop(board);
-            *recorder.off = Some(recorder.node.power_off());
-        }
+        self.recorders.into_iter().for_each(Recorder::power_off);
     }
 
     fn all_logged_in(&self) -> bool {
         let ram = self.bus.get(self.host).ram();
         // A board that starts up has patterns there, and never a plain 1.
-        self.recorders.iter().all(|recorder| ram[DEVICE_TABLE + 8 * usize::from(recorder.number) + 2] == 1)
+        self.recorders.iter().all(|recorder| ram[DEVICE_TABLE + 8 * usize::from(recorder.number()) + 2] == 1)
     }
 
     fn pass_ms(&mut self) {
@@ -133,14 +130,15 @@ impl BusMachine<'_> {
             recorder.advance_to(*self.now_ms);
         }
         self.bus.advance_to(*self.now_ms * 1000);
+        self.recorders.iter_mut().for_each(Recorder::bus_advanced);
     }
 
     /// Where scenarios of all recorders begin together.
     fn align(&mut self) -> u64 {
-        let free = self.recorders.iter_mut().map(|recorder| recorder.node.player_mut().free_from_ms());
+        let free = self.recorders.iter_mut().map(|recorder| recorder.player_mut().free_from_ms());
         let free_from_ms = free.max().unwrap_or(0);
         for recorder in &mut self.recorders {
-            recorder.node.player_mut().reserve_until(free_from_ms);
+            recorder.player_mut().reserve_until(free_from_ms);
         }
         free_from_ms
     }
@@ -153,7 +151,7 @@ impl BusMachine<'_> {
             let lead_ms = if complete { 1 } else { STREAM_LEAD_MS };
             let start_ms = *self.stream_start_ms.get_or_insert(free_from_ms.max(*self.now_ms + lead_ms));
             for recorder in &mut self.recorders {
-                recorder.node.player_mut().begin_stream(start_ms);
+                recorder.player_mut().begin_stream(start_ms);
             }
         }
         if items.contains(&Item::End) {
@@ -167,10 +165,10 @@ impl BusMachine<'_> {
                 .filter(|item| match *item {
                     Item::End => true,
                     Item::Step(_) => index == 0,
-                    Item::NodeStep(node, _) => node == recorder.number,
+                    Item::NodeStep(node, _) => node == recorder.number(),
                 })
                 .collect();
-            late_ms = late_ms.max(recorder.node.stream(&own));
+            late_ms = late_ms.max(recorder.unit_mut().stream(&own));
         }
         late_ms
     }
@@ -178,6 +176,9 @@ impl BusMachine<'_> {
 
 impl Machine for BusMachine<'_> {
     fn advance(&mut self) -> Result<(), SimError> {
+        for recorder in &mut self.recorders {
+            recorder.look_after()?;
+        }
         let board = self.bus.get_mut(self.host);
         self.window.read_into(board).map_err(SimError::io("read the GENI window"))?;
         let present_ms = self.pace.now_ms();
@@ -189,36 +190,35 @@ impl Machine for BusMachine<'_> {
     }
 
     fn room(&self) -> usize {
-        usize::MAX
+        self.recorders.first().map_or(usize::MAX, |first| first.unit().room())
     }
 
     fn receive(&mut self, bytes: &[u8]) {
         if let Some(first) = self.recorders.first_mut() {
-            first.node.receive(bytes);
+            first.unit_mut().receive(bytes);
         }
     }
 
     fn output(&mut self) -> &[u8] {
-        self.recorders.first_mut().map_or(&[], |first| first.node.output())
+        self.recorders.first_mut().map_or(&[], |first| first.unit_mut().output())
     }
 
     fn taken(&mut self, count: usize) {
         if let Some(first) = self.recorders.first_mut() {
-            first.node.taken(count);
+            first.unit_mut().taken(count);
         }
     }
 
     fn baud(&self) -> Baud {
-        self.recorders.first().map_or(Baud::default(), |first| first.node.baud())
+        self.recorders.first().map_or(Baud::default(), |first| first.unit().baud())
     }
 
     fn play(&mut self, scenario: &Scenario) -> u64 {
         self.align();
-        let starts = self
-            .recorders
-            .iter_mut()
-            .enumerate()
-            .map(|(index, recorder)| recorder.node.play(&scenario.for_node(recorder.number, index == 0)));
+        let starts = self.recorders.iter_mut().enumerate().map(|(index, recorder)| {
+            let scenario = scenario.for_node(recorder.number(), index == 0);
+            recorder.unit_mut().play(&scenario)
+        });
         starts.max().unwrap_or(0)
     }
 
@@ -228,28 +228,38 @@ impl Machine for BusMachine<'_> {
     }
 
     fn is_idle(&self) -> bool {
-        self.recorders.iter().all(|recorder| recorder.node.is_idle())
+        self.recorders.iter().all(|recorder| recorder.unit().is_idle())
     }
 
     fn take_played(&mut self) -> Vec<Played> {
-        self.recorders.iter_mut().flat_map(|recorder| recorder.node.take_played()).collect()
+        self.recorders.iter_mut().flat_map(|recorder| recorder.unit_mut().take_played()).collect()
     }
 
     fn take_lateness_ms(&mut self) -> u64 {
-        // Virtual time waits for no host, and no host for it.
-        0
+        self.recorders.iter_mut().map(|recorder| recorder.unit_mut().take_lateness_ms()).max().unwrap_or(0)
     }
 
     fn bus_ports(&self) -> Vec<String> {
         let window = self.window.path().display();
-        self.recorders.iter().map(|recorder| format!("geni:{window}?node={}", recorder.number)).collect()
+        self.recorders.iter().map(|recorder| format!("geni:{window}?node={}", recorder.number())).collect()
+    }
+
+    fn take_complaints(&mut self) -> Vec<String> {
+        let mut complaints = Vec::new();
+        for recorder in &mut self.recorders {
+            for violation in recorder.take_violations() {
+                let number = recorder.number();
+                complaints.push(format!("node {number} breaks a rule of its GENI board: {violation}"));
+            }
+        }
+        complaints
     }
 
     fn patience(&self) -> Duration {
-        PATIENCE
+        self.recorders.iter().map(|recorder| recorder.unit().patience()).fold(PATIENCE, Duration::min)
     }
 
     fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
-        Vec::new()
+        self.recorders.iter().flat_map(|recorder| recorder.unit().descriptors()).collect()
     }
 }

@@ -2,10 +2,12 @@
 
 mod bus_machine;
 mod host_window;
+mod recorder;
 mod shared_board;
 
 use ser_node::{GeniusOptions as PortOptions, GeniusPort};
 
+use crate::emulator::Emulator;
 use crate::error::SimError;
 use crate::genius::{Board, BoardOptions, Bus, Handle};
 use crate::genius_options::GeniusOptions;
@@ -13,8 +15,9 @@ use crate::non_volatile::NonVolatile;
 use crate::pace::Pace;
 use crate::sim_node::{PoweredOff, Ram, SimNodeOptions};
 
-use bus_machine::{BusMachine, Recorder};
+use bus_machine::BusMachine;
 use host_window::HostWindow;
+use recorder::Recorder;
 use shared_board::{BoardRam, SharedBoard};
 
 /// A bus, its boards, and recorders that have no power.
@@ -22,6 +25,8 @@ pub(crate) struct GeniusBench {
     bus: Bus,
     host: Handle<Board>,
     window: HostWindow,
+    /// What plays the first recorder, if it is not the built-in node.
+    image: Option<Emulator>,
     stations: Vec<Station>,
     pace: Pace,
     now_ms: u64,
@@ -32,13 +37,18 @@ struct Station {
     number: u8,
     board: SharedBoard,
     options: SimNodeOptions,
+    /// The built-in node, unless the image is here.
     off: Option<PoweredOff>,
 }
 
 impl GeniusBench {
-    /// Connects everything. The first recorder is as `options` say; the others differ by their model, and have
-    /// memory of their own.
-    pub(crate) fn new(options: &SimNodeOptions, genius: &GeniusOptions) -> Result<GeniusBench, SimError> {
+    /// Connects everything. The first recorder is the image, or else the built-in node as `options` say; the others differ
+    /// from that by their model, and have memory of their own.
+    pub(crate) fn new(
+        options: &SimNodeOptions,
+        image: Option<Emulator>,
+        genius: &GeniusOptions,
+    ) -> Result<GeniusBench, SimError> {
         let window = HostWindow::create(&genius.window)?;
         let mut bus = Bus::with_noise(genius.rate, genius.noise);
         let board = |number| BoardOptions::at(number).rate(genius.rate);
@@ -51,9 +61,11 @@ impl GeniusBench {
             }
             let board = SharedBoard::new(Board::powered(board(number)));
             bus.connect(board.clone());
-            stations.push(Station { number, board, off: Some(PoweredOff::new(options.clone())), options });
+            let built_in = index > 0 || image.is_none();
+            let off = built_in.then(|| PoweredOff::new(options.clone()));
+            stations.push(Station { number, board, off, options });
         }
-        Ok(GeniusBench { bus, host, window, stations, pace: Pace::new(), now_ms: 0 })
+        Ok(GeniusBench { bus, host, window, image, stations, pace: Pace::new(), now_ms: 0 })
     }
 
     /// Memory for every recorder.
@@ -62,23 +74,21 @@ impl GeniusBench {
     }
 
     /// Switches all recorders on.
-    pub(crate) fn power_up<'a>(&'a mut self, rams: &'a mut [Ram]) -> BusMachine<'a> {
+    pub(crate) fn power_up<'a>(&'a mut self, rams: &'a mut [Ram]) -> Result<BusMachine<'a>, SimError> {
+        let mut image = self.image.as_mut();
         let mut recorders = Vec::new();
         for (station, ram) in self.stations.iter_mut().zip(rams) {
-            let Some(off) = station.off.take() else { continue };
-            let node = off.power_up(ram);
-            let port =
-                PortOptions { start: geni::Start::Released, ..PortOptions::new(station.options.model) };
-            let port = GeniusPort::new(BoardRam(station.board.clone()), port);
-            recorders.push(Recorder::new(
-                station.number,
-                node,
-                port,
-                station.board.clone(),
-                &mut station.off,
-            ));
+            let board = station.board.clone();
+            if let Some(off) = station.off.take() {
+                let port = port(&board, &station.options);
+                let node = off.power_up(ram);
+                recorders.push(Recorder::new(station.number, board, node, port, &mut station.off));
+            } else if let Some(emulator) = image.take() {
+                emulator.switch_on()?;
+                recorders.push(Recorder::with_image(station.number, board, emulator));
+            }
         }
-        BusMachine {
+        Ok(BusMachine {
             recorders,
             bus: &mut self.bus,
             host: self.host,
@@ -86,6 +96,11 @@ impl GeniusBench {
             pace: &mut self.pace,
             now_ms: &mut self.now_ms,
             stream_start_ms: None,
-        }
+        })
     }
+}
+
+fn port(board: &SharedBoard, options: &SimNodeOptions) -> GeniusPort<BoardRam> {
+    let options = PortOptions { start: geni::Start::Released, ..PortOptions::new(options.model) };
+    GeniusPort::new(BoardRam(board.clone()), options)
 }

@@ -1,5 +1,7 @@
 //! What a host did although the manual forbids it.
 
+use std::fmt;
+
 /// Which rule was broken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ViolationKind {
@@ -29,6 +31,21 @@ pub struct Violation {
     pub kind: ViolationKind,
     /// Where in the shared RAM.
     pub offset: u16,
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let what = match self.kind {
+            ViolationKind::TooEarly => "access less than 1.7 s after reset",
+            ViolationKind::ReservedArea => "access to the reserved area",
+            ViolationKind::ReadOnly => "write to what only the board writes",
+            ViolationKind::Lockout => "lockout request that does not fit its state",
+            ViolationKind::CommandBusy => "command while another one was being carried out",
+            ViolationKind::TailPointer => "write to the tail pointer of the request queue",
+            ViolationKind::RequestQueue => "head pointer of the request queue beyond its tail, or no status",
+        };
+        write!(f, "{what} (at {:04X}h)", self.offset)
+    }
 }
 
 /// How many are kept; a host that breaks rules does it again and again.
