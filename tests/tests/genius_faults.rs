@@ -130,9 +130,9 @@ fn reports_outlive_a_board() {
 #[test]
 fn requests_for_memory_are_refused_and_never_fill_the_queue() {
     let mut world = started();
-    // Read Device: address, length.
+    // Read Device: length, address.
     for _ in 0..60 {
-        world.transmit(Device(UNIT), 0x20, 0x1E, &[0, 0, 0, 0, 0, 4]);
+        world.transmit(Device(UNIT), 0x20, 0x1E, &[4, 0, 0, 0]);
     }
     let events = live_on(&mut world, 2_000);
     let diagnostics = world.recorders[0].port.diagnostics().board;
@@ -149,7 +149,7 @@ fn a_recorder_that_was_away_finds_full_queues_and_empties_them() {
     for index in 0..20_u64 {
         let host = world.host.board;
         let mut bus = bus.borrow_mut();
-        let data: &[u8] = if index % 2 == 0 { &[0x4D] } else { &[0, 0, 0, 0, 0, 4] };
+        let data: &[u8] = if index % 2 == 0 { &[0x4D] } else { &[4, 0, 0, 0] };
         let (function, subfunction) = if index % 2 == 0 { (0x40, 0x50) } else { (0x20, 0x1E) };
         let board = bus.get_mut(host);
         board.host_write_from(0x08D2, data);

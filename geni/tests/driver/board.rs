@@ -78,6 +78,8 @@ pub(crate) struct Board {
     pub(crate) resets: u32,
     /// Host accesses since this was set to 0.
     pub(crate) accesses: usize,
+    /// Where the host has written, in order, since this was emptied.
+    pub(crate) written: Vec<usize>,
     pub(crate) first_access_ms: Option<u32>,
     pub(crate) released_ms: u32,
     /// Checks of what the host does can be left out for a RAM full of noise.
@@ -124,6 +126,7 @@ impl Board {
             lockouts: 0,
             resets: 0,
             accesses: 0,
+            written: Vec::new(),
             first_access_ms: None,
             released_ms: 0,
             checks_handshakes: true,
@@ -425,6 +428,7 @@ impl SharedRam for HostSide {
     fn write(&mut self, offset: u16, byte: u8) {
         let mut board = self.0.borrow_mut();
         board.check_write(offset.into(), byte);
+        board.written.push(offset.into());
         board.ram[usize::from(offset)] = byte;
     }
 }

@@ -246,3 +246,33 @@ fn what_the_board_would_refuse_is_refused_at_once() {
     assert_eq!(world.driver.transmit(last), Ok(()));
     assert_eq!(world.driver.transmit(good), Err(TransmitError::Busy));
 }
+
+#[test]
+fn the_status_byte_is_written_last() {
+    for completion in [Completion::Taken, Completion::Acknowledged, Completion::Reply { subfunction: 0x51 }] {
+        let mut world = World::ready(Configuration::DEFAULT);
+        world.board().reply = Some(vec![1]);
+        world.board().written.clear();
+        world.driver.transmit(transmission(completion)).expect("accepted");
+        world.until(100, is_end_of_transmission);
+        let board = world.board();
+        let written: Vec<_> = board.written.iter().filter(|at| (0x08C2..0x09C2).contains(*at)).collect();
+        // Block and buffer, the status byte once and at the end.
+        assert!(written.len() >= 7 && written.contains(&&0x08D2), "{written:X?}");
+        assert_eq!(written.iter().position(|at| **at == 0x08C2), Some(written.len() - 1), "{written:X?}");
+    }
+}
+
+#[test]
+fn a_read_that_fails_against_the_manual_is_tried_again_later() {
+    let mut world = World::ready(Configuration::DEFAULT);
+    let failed = world.driver.counters().commands_failed;
+    world.board().misbehaviour.command_status = Some(0x10);
+    world.board().flag(6);
+    assert!(world.run(50).is_empty());
+    // Not again and again: nothing says that there is something to read.
+    assert_eq!(world.driver.counters().commands_failed, failed + 1);
+    world.board().misbehaviour.command_status = None;
+    world.board().receive(30, 1, &[0x4D]);
+    world.until(100, |event| matches!(event, Event::Received(_)));
+}

@@ -133,3 +133,16 @@ fn a_lost_flag_leaves_no_request_behind() {
     world.board().request(&WRITE);
     world.until(1_100, |event| matches!(event, Event::RequestRefused(_)));
 }
+
+#[test]
+fn data_and_status_are_written_before_the_head_and_the_head_once() {
+    let mut world = asking();
+    while world.board().request(&READ) {}
+    for index in 0..15 {
+        world.until(10, is_request);
+        world.board().written.clear();
+        world.driver.answer_request(RequestAnswer::Data(&[1, 2, 3])).expect("three bytes");
+        let at = index * 136;
+        assert_eq!(world.board().written, [at + 8, at + 9, at + 10, at + 1, 0x0880]);
+    }
+}

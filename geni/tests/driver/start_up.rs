@@ -199,3 +199,20 @@ fn the_clock_may_wrap_at_any_moment_of_the_start() {
         assert!(ready_ms < 5_500, "{before_wrap_ms}: {ready_ms}");
     }
 }
+
+#[test]
+fn the_setup_table_is_written_before_the_command_that_makes_it_known() {
+    let mut world = World::ready(configuration(2, 0, 128));
+    world.board().written.clear();
+    world.driver.configure(Configuration::new(0x1234, 4, 8, 16).expect("lengths in range"));
+    world.until(100, |event| matches!(event, Event::Configured(_)));
+    let board = world.board();
+    let table = 0x0882..0x0892;
+    let written: Vec<_> = board
+        .written
+        .iter()
+        .copied()
+        .filter(|at| table.contains(at) || *at == 0x08C2 || *at == 0x08C3)
+        .collect();
+    assert_eq!(written, [0x0883, 0x0884, 0x0885, 0x0886, 0x0887, 0x08C3, 0x08C2]);
+}

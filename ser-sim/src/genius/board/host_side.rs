@@ -96,13 +96,11 @@ impl Board {
     /// data before the flags that announce them.
     pub fn publish(&mut self, mut write: impl FnMut(u16, u8)) {
         let (ram, image) = (self.ram.bytes(), &mut self.host_image);
-        for announcing in 0..=3 {
-            for at in (0..RAM_LEN).filter(|&at| rank(at) == announcing) {
-                if ram[at] != image[at] {
-                    image[at] = ram[at];
-                    write(low_bits(at), ram[at]);
-                }
-            }
+        let mut changed: Vec<usize> = (0..RAM_LEN).filter(|&at| ram[at] != image[at]).collect();
+        changed.sort_by_key(|&at| rank(at));
+        for at in changed {
+            image[at] = ram[at];
+            write(low_bits(at), ram[at]);
         }
     }
 

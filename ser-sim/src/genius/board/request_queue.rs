@@ -1,8 +1,8 @@
 //! Requests of other devices to read or write the host's memory (chapter 13).
 //!
-//! The header in front of a request's data on the bus is not described in the manual; here it is address,
-//! auxiliary source and length as in the queue, filled up to the 6 bytes that are left when 128 of a
-//! datagram's 134 are data.
+//! The header in front of a request's data on the bus is not described in the manual; here it is length and
+//! address as in the queue, which is also how `ser-proto` lays these datagrams out. It leaves no room for an
+//! auxiliary source address, so that is 0.
 
 use super::Board;
 use super::interrupts::Condition;
@@ -15,9 +15,7 @@ use crate::genius::map::{REQUEST_HEAD, REQUEST_LEN, REQUEST_QUEUE, REQUEST_TAIL,
 // Within a buffer:
 const STATUS: usize = 1;
 const LENGTH: usize = 2;
-const ADDRESS: usize = 3;
 const SOURCE: usize = 6;
-const AUXILIARY: usize = 7;
 const DATA: usize = 8;
 const DATA_LEN: usize = 128;
 
@@ -26,7 +24,7 @@ const BUSY: u8 = 2;
 const ERRORS: u8 = 4 | 8;
 
 /// Length of the header in front of a memory access datagram's data.
-const HEADER_LEN: usize = 6;
+const HEADER_LEN: usize = 4;
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RequestQueue {
@@ -52,13 +50,10 @@ impl Board {
         let mut header = [0; HEADER_LEN];
         let header_len = datagram.data.len().min(HEADER_LEN);
         header[..header_len].copy_from_slice(&datagram.data[..header_len]);
-        let [low, middle, high, auxiliary, length, _] = header;
         let mut buffer = [0; REQUEST_LEN];
         buffer[0] = datagram.subfunction;
-        buffer[LENGTH] = length;
-        buffer[ADDRESS..SOURCE].copy_from_slice(&[low, middle, high]);
+        buffer[LENGTH..SOURCE].copy_from_slice(&header);
         buffer[SOURCE] = from;
-        buffer[AUXILIARY] = auxiliary;
         let data = &datagram.data[header_len..];
         let data_len = data.len().min(DATA_LEN);
         buffer[DATA..DATA + data_len].copy_from_slice(&data[..data_len]);
@@ -119,10 +114,8 @@ impl Board {
     }
 
     fn send_read_device_reply(&mut self, buffer: &[u8; REQUEST_LEN]) {
-        let length = buffer[LENGTH];
-        let mut data = buffer[ADDRESS..SOURCE].to_vec();
-        data.extend([buffer[AUXILIARY], length, 0]);
-        data.extend(&buffer[DATA..DATA + usize::from(length).min(DATA_LEN)]);
+        let data_len = usize::from(buffer[LENGTH]).min(DATA_LEN);
+        let data = [&buffer[LENGTH..SOURCE], &buffer[DATA..DATA + data_len]].concat();
         let datagram = Datagram::standard(subfunction::READ_DEVICE_REPLY, data);
         let message = Message::Datagram { to: buffer[SOURCE], datagram };
         self.live.outbox.push(Priority::Normal, message, Reason::Reply);

@@ -138,3 +138,23 @@ fn devices_may_move_to_another_thread() {
     fn check<T: Send + Any>() {}
     check::<Bus>();
 }
+
+#[test]
+fn a_scan_is_the_sum_of_turns_and_of_a_bit_time_for_every_number_that_is_not_in_use() {
+    for (rate, bit_ns) in [
+        (BusRate::K153Standard, 6_510),
+        (BusRate::K153Extended, 2 * 6_510),
+        (BusRate::K76, 13_021),
+        (BusRate::K38, 26_042),
+    ] {
+        let mut bus = Bus::new(rate);
+        bus.connect(Board::powered(BoardOptions::at(31).rate(rate)));
+        let data = StationData { discrete_bytes: 64, channels: 0 };
+        for number in [1, 7] {
+            bus.connect(BusInterfaceUnit::new(number, rate, data, data));
+        }
+        bus.advance_to(10 * SECOND_US);
+        let turns_ns = 2 * rate.contribution_ns(128) + rate.contribution_ns(0);
+        assert_eq!(bus.scan_time_ns(), Some(turns_ns + 29 * bit_ns), "{rate:?}");
+    }
+}

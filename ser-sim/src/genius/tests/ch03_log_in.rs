@@ -3,6 +3,7 @@
 use super::rig::{PROCESS_ERROR, Rig, SECOND_US, lengths};
 use crate::genius::{
     BlockKind, Board, BoardOptions, BusInterfaceUnit, BusRate, Circuits, DiscreteBlock, Fault, StationData,
+    ViolationKind,
 };
 
 fn block(number: u8, circuits: Circuits) -> DiscreteBlock {
@@ -234,4 +235,50 @@ fn there_is_room_for_32_devices() {
     }
     // Nobody is there to answer on the board's own number.
     assert_eq!(rig.transmit(host, 31, [0x20, 0x13], 0, &[]), PROCESS_ERROR);
+}
+
+#[test]
+fn inputs_of_a_device_that_is_not_logged_in_stay_out_of_the_table() {
+    let (mut rig, [host]) = Rig::started([31]);
+    assert_eq!(rig.configure(host, lengths(0, 0, 2)), 4);
+    rig.advance_ms(1_600);
+    let device = rig.bus.connect(block(7, Circuits::ThirtyTwo));
+    rig.bus.get_mut(device).set_inputs(0x5A5A_5A5A);
+    rig.advance_ms(500);
+    assert_eq!(rig.device(host, 7)[2], 0);
+    assert_eq!(rig.read_array(host, 0x2000 + 2 * 7), [0; 4]);
+}
+
+#[test]
+fn outputs_go_to_devices_that_are_logged_in_and_to_nobody_else() {
+    let (mut rig, [host]) = Rig::started([31]);
+    let filler = StationData { discrete_bytes: 100, channels: 0 };
+    // Enough traffic that the shortest scan does not hide anything.
+    rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), filler, filler));
+    rig.write_all(host, 0x3000 + 128 * 9, &[0xFF; 64]);
+    rig.advance_ms(500);
+    let absent_ns = rig.bus.scan_time_ns();
+    let outputs = StationData { discrete_bytes: 64, channels: 0 };
+    let device = rig.bus.connect(BusInterfaceUnit::new(9, BusRate::default(), outputs, outputs));
+    rig.wait_for(host, 0x1E02 + 8 * 9, 1);
+    rig.advance_ms(200);
+    assert_eq!(rig.bus.get(device).outputs(), [0xFF; 64]);
+
+    rig.bus.inject(Fault::Disconnect { device: device.id(), for_us: 10 * SECOND_US });
+    rig.wait_for(host, 0x1E02 + 8 * 9, 0);
+    rig.advance_ms(200);
+    assert_eq!(rig.bus.scan_time_ns(), absent_ns, "nothing is sent to it any more");
+}
+
+#[test]
+fn in_the_device_table_only_the_outputs_flag_is_the_hosts() {
+    let (mut rig, [host]) = Rig::started([31]);
+    rig.write(host, 0x1E01 + 8 * 9, 1);
+    rig.assert_lawful(&[host]);
+    for byte in [0, 2, 3, 4, 5, 6, 7] {
+        rig.write(host, 0x1E00 + 8 * 9 + byte, 0);
+    }
+    let violations = rig.bus.get(host).violations();
+    assert_eq!(violations.len(), 7);
+    assert!(violations.iter().all(|violation| violation.kind == ViolationKind::ReadOnly));
 }

@@ -1,7 +1,10 @@
 //! Chapter 3, start-up and steady state; chapter 2, reset; chapter 14, lamps.
 
 use super::rig::{Rig, SECOND_US};
-use crate::genius::{Board, BoardOptions, DeviceFault, Fault, Led, Leds, ViolationKind};
+use crate::genius::{
+    BlockKind, Board, BoardOptions, BusRate, Circuits, DeviceFault, DiscreteBlock, Fault, Led, Leds,
+    ViolationKind,
+};
 
 #[test]
 fn the_host_waits_1_7_seconds_then_for_the_ok_flag_and_has_1_5_seconds_before_the_bus() {
@@ -125,4 +128,34 @@ fn the_lamps_follow_board_and_bus() {
     assert_eq!(lamps(&rig), [Led::On, Led::Off]);
     rig.advance_ms(2_000);
     assert_eq!(lamps(&rig), [Led::On, Led::On]);
+}
+
+#[test]
+fn nothing_is_taken_from_the_bus_before_the_board_is_on_it() {
+    let mut rig = Rig::new();
+    let [host] = rig.connect([31]);
+    let block = DiscreteBlock::new(4, BusRate::default(), Circuits::Eight, BlockKind::Combination);
+    let block = rig.bus.connect(block);
+    rig.bus.get_mut(block).set_inputs(0xA5);
+    rig.bus.advance_to(2 * SECOND_US);
+    rig.write(host, 0x3000 + 128 * 4, 0x3C);
+    rig.bus.advance_to(3 * SECOND_US);
+    assert_eq!((rig.device(host, 4)[2], rig.read(host, 0x2000 + 128 * 4)), (0, 0));
+    assert_eq!(rig.bus.get(block).outputs(), 0);
+    rig.bus.advance_to(4 * SECOND_US);
+    assert_eq!((rig.device(host, 4)[2], rig.read(host, 0x2000 + 128 * 4)), (1, 0xA5));
+    assert_eq!(rig.bus.get(block).outputs(), 0x3C);
+}
+
+#[test]
+fn the_reserved_area_is_not_the_hosts() {
+    let (mut rig, [host]) = Rig::started([31]);
+    rig.read(host, 0x0A49);
+    rig.read(host, 0x1E00);
+    rig.assert_lawful(&[host]);
+    rig.read(host, 0x0A4A);
+    rig.write(host, 0x1DFF, 1);
+    let violations = rig.bus.get(host).violations();
+    let seen: Vec<_> = violations.iter().map(|violation| (violation.kind, violation.offset)).collect();
+    assert_eq!(seen, [(ViolationKind::ReservedArea, 0x0A4A), (ViolationKind::ReservedArea, 0x1DFF)]);
 }

@@ -69,3 +69,22 @@ fn a_board_at_another_rate_than_the_bus_does_not_get_on_it() {
     assert_eq!(rig.read_word(right, 0x0898), 3);
     assert_eq!(rig.device(right, 30)[2], 0);
 }
+
+#[test]
+fn a_read_id_is_answered_with_high_priority() {
+    let (mut rig, [low, host, asker]) = Rig::started([1, 30, 31]);
+    for round in 0..5 {
+        // One that takes the only place in every scan, before the host's turn comes.
+        for _ in 0..15 {
+            rig.start_command(low, 0x82, &[31, 0x40, 0x50, 0, 0]);
+            rig.wait_for(low, 0x08C2, 0);
+        }
+        rig.start_command(asker, 3, &[30, 0x20, 0x00, 0x01, 1, 0, 0]);
+        let before = rig.bus.traffic().scans;
+        assert_eq!(rig.complete_command(asker), COMPLETE);
+        let scans = rig.bus.traffic().scans - before;
+        assert!(scans <= 2, "round {round}: {scans} scans");
+        rig.advance_ms(100);
+    }
+    rig.assert_lawful(&[low, host, asker]);
+}

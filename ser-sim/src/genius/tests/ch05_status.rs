@@ -1,7 +1,10 @@
 //! Chapter 5: the status table.
 
 use super::rig::{Rig, SECOND_US};
-use crate::genius::{BusInterfaceUnit, BusRate, DeviceFault, Fault, StationData};
+use crate::genius::{
+    BlockKind, BusInterfaceUnit, BusRate, Circuits, DeviceFault, DiscreteBlock, Fault, StationData,
+    ViolationKind,
+};
 
 #[test]
 fn the_board_sets_the_ok_flag_every_200_ms_so_that_the_host_can_watch_it() {
@@ -131,4 +134,41 @@ fn off_the_bus_the_scan_time_is_ffff() {
 fn the_revision_can_be_read() {
     let (mut rig, [host]) = Rig::started([31]);
     assert_eq!(rig.read(host, 0x0892), 0x21);
+}
+
+#[test]
+fn a_board_that_fails_sends_no_more_outputs() {
+    let (mut rig, [host]) = Rig::started([31]);
+    let block = DiscreteBlock::new(4, BusRate::default(), Circuits::Eight, BlockKind::Combination);
+    let block = rig.bus.connect(block);
+    rig.write(host, 0x3000 + 128 * 4, 0x3C);
+    assert!(rig.bus.advance_until(SECOND_US, |bus| bus.get(block).outputs() == 0x3C));
+    rig.bus.inject(Fault::Inside { device: host.id(), fault: DeviceFault::FailSelfTest(0x01) });
+    assert!(!rig.bus.get(host).is_on_bus());
+    assert!(rig.bus.advance_until(SECOND_US, |bus| bus.get(block).outputs() == 0));
+}
+
+#[test]
+fn a_monitor_is_no_change_of_status() {
+    let (mut rig, [host]) = Rig::started([31]);
+    rig.write(host, 0x08B6, 1);
+    rig.write_all(host, 0x08A2, &[0; 8]);
+    let pulses = rig.bus.get(host).interrupt_pulses();
+    rig.bus.get_mut(host).plug_monitor(true);
+    rig.advance_ms(500);
+    assert_eq!((rig.read(host, 0x08A2), rig.read(host, 0x08A4)), (0, 0));
+    assert_eq!(rig.bus.get(host).interrupt_pulses(), pulses);
+}
+
+#[test]
+fn in_the_status_table_only_the_ok_flag_is_the_hosts() {
+    let (mut rig, [host]) = Rig::started([31]);
+    rig.write(host, 0x0893, 0);
+    rig.assert_lawful(&[host]);
+    for offset in [0x0892, 0x0894, 0x0895, 0x0896, 0x0897, 0x0898, 0x0899] {
+        rig.write(host, offset, 0);
+    }
+    let violations = rig.bus.get(host).violations();
+    assert_eq!(violations.len(), 7);
+    assert!(violations.iter().all(|violation| violation.kind == ViolationKind::ReadOnly));
 }

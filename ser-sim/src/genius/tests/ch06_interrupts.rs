@@ -23,7 +23,7 @@ fn only(rig: &mut Rig, host: Host, index: u16) {
 fn provoke(rig: &mut Rig, host: Host, other: Host, index: u16) {
     match index {
         REQUEST_QUEUE => {
-            assert_eq!(rig.transmit(other, 30, [0x20, 0x20], 0, &[0, 0, 0, 0, 1, 0, 5]), COMPLETE);
+            assert_eq!(rig.transmit(other, 30, [0x20, 0x20], 0, &[1, 0, 0, 0, 5]), COMPLETE);
         }
         DEVICE_STATUS => {
             let rate = BusRate::default();

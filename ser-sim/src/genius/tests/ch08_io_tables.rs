@@ -81,3 +81,28 @@ fn forced_points_are_what_the_controller_sees_and_the_field_gets() {
     rig.advance_ms(20);
     assert_eq!(rig.read_array(host, 0x2000 + 128 * 3), [0b1100, 0x11, 0x22]);
 }
+
+/// The table of device types: bytes of inputs and outputs, and the shortest buffer that holds them.
+const DEVICE_TYPES: [(&str, usize, usize, u8); 7] = [
+    ("8 circuits", 1, 1, 1),
+    ("16 circuits", 2, 2, 2),
+    ("32 circuits", 4, 4, 4),
+    ("4 analog inputs, 2 outputs", 8, 4, 8),
+    ("6 analog inputs", 12, 0, 12),
+    ("high-speed counter", 30, 32, 32),
+    ("power monitor", 38, 2, 38),
+];
+
+#[test]
+fn every_type_of_device_has_its_shortest_buffer() {
+    for (name, inputs, outputs, shortest) in DEVICE_TYPES {
+        for buffer in [shortest, shortest - 1].into_iter().filter(|&buffer| buffer > 0) {
+            let (mut rig, [host]) = Rig::started([31]);
+            assert_eq!(rig.configure(host, lengths(0, 0, buffer)), COMPLETE);
+            let data = |discrete_bytes| StationData { discrete_bytes, channels: 0 };
+            rig.bus.connect(BusInterfaceUnit::new(5, BusRate::default(), data(inputs), data(outputs)));
+            rig.advance_ms(2_000);
+            assert_eq!(rig.device(host, 5)[2], u8::from(buffer == shortest), "{name}, {buffer}");
+        }
+    }
+}

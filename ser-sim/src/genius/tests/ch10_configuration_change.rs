@@ -68,3 +68,32 @@ fn the_setup_table_alone_changes_nothing() {
     rig.advance_ms(2_000);
     assert_eq!(rig.device(other, 30)[5], 0);
 }
+
+#[test]
+fn each_setting_but_the_buffer_length_takes_the_board_off_the_bus() {
+    for (setup, stays) in [
+        ([0x34, 0x12, 0, 0, 128], false),
+        (lengths(1, 0, 128), false),
+        (lengths(0, 1, 128), false),
+        (lengths(1, 0, 64), false),
+        (lengths(0, 0, 64), true),
+    ] {
+        let (mut rig, [host, other]) = Rig::started([30, 31]);
+        assert_eq!(rig.configure(host, setup), COMPLETE);
+        assert_eq!(rig.bus.get(host).is_on_bus(), stays, "{setup:?}");
+        assert_eq!(rig.device(host, 31)[2], 0, "{setup:?}");
+        rig.advance_ms(1_400);
+        assert_eq!(rig.device(host, 31)[2], 0, "{setup:?}");
+        assert_eq!(rig.device(other, 30)[2], u8::from(stays), "{setup:?}");
+        rig.wait_for(host, 0x1E02 + 8 * 31, 1);
+        assert_eq!(rig.read_array(host, 0x0883), setup);
+    }
+}
+
+#[test]
+fn the_options_do_not_matter() {
+    let (mut rig, [host]) = Rig::started([31]);
+    rig.write_all(host, 0x0883, &lengths(3, 0, 128));
+    assert_eq!(rig.command(host, 4, &[0xFF; 14]), COMPLETE);
+    assert_eq!(rig.read_array(host, 0x0883), lengths(3, 0, 128));
+}

@@ -1,6 +1,6 @@
 //! Chapter 10: the command block, and the Read Datagram command.
 
-use super::rig::{COMPLETE, Rig, SYNTAX_ERROR};
+use super::rig::{COMPLETE, PROCESS_ERROR, Rig, SYNTAX_ERROR, lengths};
 use crate::genius::ViolationKind;
 
 #[test]
@@ -89,4 +89,39 @@ fn a_command_while_one_is_in_progress_is_noticed_and_lost() {
     rig.write(host, 0x08C2, 1);
     assert_eq!(rig.complete_command(host), SYNTAX_ERROR);
     assert_eq!(rig.bus.get(host).violations()[0].kind, ViolationKind::CommandBusy);
+}
+
+#[test]
+fn the_command_is_in_the_low_six_bits() {
+    let (mut rig, [host, other]) = Rig::started([30, 31]);
+    assert_eq!(rig.transmit(other, 30, [0x40, 0x50], 0, &[7]), COMPLETE);
+    assert_eq!(rig.command(host, 0x41, &[]), COMPLETE);
+    assert_eq!(rig.read(host, 0x09C2), 7);
+}
+
+#[test]
+fn every_end_of_every_command_sets_the_flag_and_interrupts() {
+    let (mut rig, [host, other]) = Rig::started([30, 31]);
+    assert_eq!(rig.transmit(other, 30, [0x40, 0x50], 0, &[7]), COMPLETE);
+    rig.write_all(host, 0x0883, &lengths(0, 0, 128));
+    for index in [1, 2, 3, 4, 6, 7] {
+        rig.write(host, 0x08B2 + index, 1);
+    }
+    for (command, options, status) in [
+        (1, [0; 7], COMPLETE),
+        (1, [0; 7], SYNTAX_ERROR),
+        (2, [31, 0x40, 0x50, 0, 0, 0, 0], COMPLETE),
+        (2, [99, 0x40, 0x50, 0, 0, 0, 0], SYNTAX_ERROR),
+        (2, [5, 0x40, 0x50, 0, 0, 0, 0], PROCESS_ERROR),
+        (3, [31, 0x20, 0x00, 0x01, 0, 0, 0], COMPLETE),
+        (3, [255, 0x20, 0x00, 0x01, 0, 0, 0], SYNTAX_ERROR),
+        (3, [5, 0x20, 0x00, 0x01, 0, 0, 0], PROCESS_ERROR),
+        (4, [0; 7], PROCESS_ERROR),
+    ] {
+        rig.write_all(host, 0x08A2, &[0; 8]);
+        let pulses = rig.bus.get(host).interrupt_pulses();
+        assert_eq!(rig.command(host, command, &options), status, "{command} {options:?}");
+        assert_eq!((rig.read(host, 0x08A2), rig.read(host, 0x08A7)), (1, 1), "{command} {options:?}");
+        assert_eq!(rig.bus.get(host).interrupt_pulses(), pulses + 1, "{command} {options:?}");
+    }
 }

@@ -1,7 +1,9 @@
 //! Chapter 10: the Transmit Datagram command.
 
 use super::rig::{COMPLETE, PROCESS_ERROR, Rig, SYNTAX_ERROR};
-use crate::genius::{BlockKind, BusRate, Circuits, DeviceFault, DiscreteBlock, Fault};
+use crate::genius::{
+    BlockKind, BusInterfaceUnit, BusRate, Circuits, DeviceFault, DiscreteBlock, Fault, StationData,
+};
 
 #[test]
 fn a_directed_datagram_arrives_and_is_acknowledged() {
@@ -130,4 +132,38 @@ fn a_board_that_loses_the_bus_ends_the_command_with_a_process_error() {
     rig.bus.inject(Fault::Disconnect { device: a.id(), for_us: 5_000_000 });
     rig.advance_ms(100);
     assert_eq!(rig.transmit(a, 31, [0x40, 0x50], 0, &[1]), PROCESS_ERROR);
+}
+
+#[test]
+fn a_reply_to_a_datagram_without_reply_waits_in_the_receive_queue() {
+    let (mut rig, [host]) = Rig::started([31]);
+    let data = StationData { discrete_bytes: 2, channels: 0 };
+    rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, data));
+    rig.wait_for(host, 0x1E02 + 8 * 3, 1);
+    assert_eq!(rig.transmit(host, 3, [0x20, 0x40], 0, &[1]), COMPLETE);
+    rig.advance_ms(100);
+    assert_eq!(rig.read_datagram(host), Some(([3, 0x20, 0x41, 1], vec![1, 0, 0])));
+}
+
+#[test]
+fn a_datagram_lengthens_the_scan_in_which_it_is_sent() {
+    let (mut rig, [host, other]) = Rig::started([30, 31]);
+    let data = StationData { discrete_bytes: 64, channels: 0 };
+    rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, data));
+    rig.advance_ms(500);
+    for (priority, len) in [(0, 10), (1, 10), (0, 128), (1, 128)] {
+        let quiet_ns = rig.bus.scan_time_ns().unwrap();
+        rig.start_transmit(host, 31, [0x40, 0x50], priority, &vec![1; len]);
+        let mut longest_ns = 0;
+        while rig.read(host, 0x08C2) < 4 {
+            rig.advance_ms(1);
+            longest_ns = longest_ns.max(rig.bus.scan_time_ns().unwrap());
+        }
+        let end = rig.bus.traffic().scans + 1;
+        assert!(rig.bus.advance_until(1_000_000, |bus| bus.traffic().scans == end));
+        longest_ns = longest_ns.max(rig.bus.scan_time_ns().unwrap());
+        assert_eq!(longest_ns - quiet_ns, BusRate::default().datagram_ns(len), "{priority} {len}");
+        rig.advance_ms(100);
+        assert!(rig.read_datagram(other).is_some());
+    }
 }

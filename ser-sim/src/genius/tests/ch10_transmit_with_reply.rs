@@ -1,7 +1,7 @@
 //! Chapter 10: the Transmit Datagram with Reply command.
 
 use super::rig::{COMPLETE, PROCESS_ERROR, Rig, SECOND_US, SYNTAX_ERROR};
-use crate::genius::{BusInterfaceUnit, BusRate, Fault, Side, StationData};
+use crate::genius::{BusInterfaceUnit, BusRate, DeviceFault, Fault, Side, StationData};
 
 #[test]
 fn the_reply_comes_into_the_read_buffer_and_not_into_the_queue() {
@@ -83,4 +83,47 @@ fn a_lost_reply_is_the_same_as_none() {
     rig.advance_ms(2);
     rig.bus.inject(Fault::Deafen { device: host.id(), messages: 1 });
     assert_eq!(rig.complete_command(host), PROCESS_ERROR);
+}
+
+#[test]
+fn a_question_of_high_priority_does_not_wait() {
+    let (mut rig, [low, host, other]) = Rig::started([1, 30, 31]);
+    for (priority, waits) in [(0, true), (1, false)] {
+        // One that takes the only place of the next scans.
+        for _ in 0..10 {
+            rig.start_command(low, 0x82, &[31, 0x40, 0x50, 0, 0]);
+            rig.wait_for(low, 0x08C2, 0);
+        }
+        let before = rig.bus.traffic().scans;
+        assert_eq!(rig.command(host, 3, &[31, 0x20, 0x00, 0x01, priority, 0, 0]), COMPLETE);
+        let scans = rig.bus.traffic().scans - before;
+        assert_eq!(scans >= 9, waits, "priority {priority}: {scans} scans");
+        rig.advance_ms(100);
+        while rig.read_datagram(other).is_some() {}
+    }
+}
+
+#[test]
+fn without_memory_for_it_it_is_a_process_error_at_once() {
+    let (mut rig, [host, _]) = Rig::started([30, 31]);
+    let fault = DeviceFault::OutOfMemory { datagrams: 1 };
+    rig.bus.inject(Fault::Inside { device: host.id(), fault });
+    let before_us = rig.bus.now_us();
+    let ask = |rig: &mut Rig| rig.command(host, 3, &[31, 0x20, 0x00, 0x01, 0, 0, 0]);
+    assert_eq!(ask(&mut rig), PROCESS_ERROR);
+    assert!(rig.bus.now_us() - before_us < SECOND_US);
+    assert_eq!(ask(&mut rig), COMPLETE);
+}
+
+#[test]
+fn question_and_reply_have_up_to_134_bytes() {
+    let (mut rig, [a, b]) = Rig::started([30, 31]);
+    rig.write_all(a, 0x08D2, &[7; 134]);
+    rig.start_command(a, 3, &[31, 0x40, 0x50, 0x51, 0, 134, 0]);
+    assert!(rig.bus.advance_until(SECOND_US, |bus| bus.get(b).ram()[0x08A8] == 1));
+    assert_eq!(rig.read_datagram(b), Some(([30, 0x40, 0x50, 1], vec![7; 134])));
+    assert_eq!(rig.transmit(b, 30, [0x40, 0x51], 0, &[8; 134]), COMPLETE);
+    assert_eq!(rig.complete_command(a), COMPLETE);
+    assert_eq!((rig.read(a, 0x08CA), rig.read_array(a, 0x09C2)), (134, [8; 134]));
+    assert_eq!(rig.command(a, 3, &[31, 0x40, 0x50, 0x51, 0, 135, 0]), SYNTAX_ERROR);
 }

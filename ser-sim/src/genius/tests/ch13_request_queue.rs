@@ -1,16 +1,18 @@
 //! Chapter 13: memory access datagrams and the request queue.
 
+use ser_proto::genius::{MemoryAddress, MemoryContents, MemoryRange, Message, PointMask, WritePoint};
+
 use super::rig::{COMPLETE, Host, Rig, SECOND_US};
 use crate::genius::ViolationKind;
 
 const READ_DEVICE: u8 = 0x1E;
 const WRITE_DEVICE: u8 = 0x20;
 
-/// What the other host sends: address, auxiliary source, length, data.
+/// What the other host sends: length, address, data.
 fn access(address: u32, data: &[u8]) -> Vec<u8> {
     let [low, middle, high, _] = address.to_le_bytes();
     let length = u8::try_from(data.len()).unwrap();
-    [low, middle, high, 0, length, 0].into_iter().chain(data.iter().copied()).collect()
+    [length, low, middle, high].into_iter().chain(data.iter().copied()).collect()
 }
 
 /// The manual's example logic: the buffer at the head when head and tail differ.
@@ -48,16 +50,16 @@ fn a_write_device_waits_in_the_queue_with_its_header() {
 fn a_read_device_is_answered_with_what_the_host_puts_into_the_buffer() {
     let (mut rig, [host, other]) = Rig::started([30, 31]);
     let data = access(0x10, &[0; 4]);
-    rig.write_all(other, 0x08D2, &data[..6]);
-    rig.start_command(other, 3, &[30, 0x20, READ_DEVICE, 0x1F, 0, 6, 0]);
+    rig.write_all(other, 0x08D2, &data[..4]);
+    rig.start_command(other, 3, &[30, 0x20, READ_DEVICE, 0x1F, 0, 4, 0]);
     assert!(rig.bus.advance_until(SECOND_US, |bus| bus.get(host).ram()[0x0881] == 1));
     let at = next_request(&mut rig, host).unwrap();
     assert_eq!(rig.read_array(host, at), [READ_DEVICE, 0, 4, 0x10, 0, 0, 31, 0]);
     rig.write_all(host, at + 8, &[1, 2, 3, 4]);
     finish_request(&mut rig, host, at, 1);
     assert_eq!(rig.complete_command(other), COMPLETE);
-    assert_eq!(rig.read(other, 0x08CA), 10);
-    assert_eq!(rig.read_array(other, 0x09C2), [0x10, 0, 0, 0, 4, 0, 1, 2, 3, 4]);
+    assert_eq!(rig.read(other, 0x08CA), 8);
+    assert_eq!(rig.read_array(other, 0x09C2), [4, 0x10, 0, 0, 1, 2, 3, 4]);
 }
 
 #[test]
@@ -153,4 +155,61 @@ fn a_head_beyond_the_tail_or_a_missing_status_is_noticed() {
     finish_request(&mut rig, host, at, 0);
     let kinds: Vec<_> = rig.bus.get(host).violations().iter().map(|violation| violation.kind).collect();
     assert_eq!(kinds, [ViolationKind::RequestQueue; 2]);
+}
+
+const PLACE: MemoryAddress = MemoryAddress::new(0x03_0201).unwrap();
+
+#[test]
+fn the_datagrams_of_ser_proto_are_in_the_queue_as_they_are_meant() {
+    let (mut rig, [host, other]) = Rig::started([30, 31]);
+    let contents = MemoryContents { address: PLACE, contents: [10, 11, 12].into_iter().collect() };
+    let masks = [PointMask { and: 0xFE, or: 1 }, PointMask::KEEP];
+    for (message, header, data) in [
+        (Message::ReadDevice(MemoryRange { address: PLACE, length: 4 }), [0x1E, 4], [0, 0, 0, 0]),
+        (Message::WriteDevice(contents), [0x20, 3], [10, 11, 12, 0]),
+        (Message::WritePoint(WritePoint { address: PLACE, masks }), [0x0B, 4], [0xFE, 1, 0xFF, 0]),
+    ] {
+        let [command, length] = header;
+        assert_eq!(rig.transmit(other, 30, [0x20, command], 0, &message.to_data()), COMPLETE);
+        let at = next_request(&mut rig, host).unwrap();
+        assert_eq!(rig.read_array(host, at), [command, 0, length, 1, 2, 3, 31, 0], "{message}");
+        assert_eq!(rig.read_array(host, at + 8), data, "{message}");
+        finish_request(&mut rig, host, at, 4);
+    }
+}
+
+#[test]
+fn a_reply_from_the_queue_is_one_that_ser_proto_understands() {
+    let (mut rig, [host, other]) = Rig::started([30, 31]);
+    let question = Message::ReadDevice(MemoryRange { address: PLACE, length: 4 });
+    assert_eq!(rig.transmit(other, 30, [0x20, READ_DEVICE], 0, &question.to_data()), COMPLETE);
+    let at = next_request(&mut rig, host).unwrap();
+    rig.write_all(host, at + 8, &[1, 2, 3, 4]);
+    finish_request(&mut rig, host, at, 1);
+    rig.advance_ms(100);
+    let (header, data) = rig.read_datagram(other).unwrap();
+    assert_eq!(header, [30, 0x20, 0x1F, 1]);
+    let contents = MemoryContents { address: PLACE, contents: [1, 2, 3, 4].into_iter().collect() };
+    assert_eq!(data, Message::ReadDeviceReply(contents).to_data()[..]);
+}
+
+#[test]
+fn a_request_has_up_to_128_bytes_of_data_each_way() {
+    let (mut rig, [host, other]) = Rig::started([30, 31]);
+    let data: Vec<u8> = (1..=128).collect();
+    assert_eq!(rig.transmit(other, 30, [0x20, WRITE_DEVICE], 0, &access(0x10, &data)), COMPLETE);
+    let at = next_request(&mut rig, host).unwrap();
+    assert_eq!(rig.read(host, at + 2), 128);
+    assert_eq!(rig.read_array::<128>(host, at + 8), data[..]);
+    finish_request(&mut rig, host, at, 1);
+
+    let question = access(0x10, &data);
+    let head = &question[..question.len() - data.len()];
+    assert_eq!(rig.transmit(other, 30, [0x20, READ_DEVICE], 0, head), COMPLETE);
+    let at = next_request(&mut rig, host).unwrap();
+    rig.write_all(host, at + 8, &data);
+    finish_request(&mut rig, host, at, 1);
+    rig.advance_ms(100);
+    let (_, reply) = rig.read_datagram(other).unwrap();
+    assert_eq!(reply, question);
 }

@@ -69,7 +69,7 @@ fn data_is_published_before_what_announces_it() {
     rig.write_all(host, 0x08A2, &[0; 8]);
     rig.bus.get_mut(host).publish(|offset, byte| file.0[usize::from(offset)] = byte);
     assert_eq!(rig.transmit(other, 30, [0x40, 0x50], 0, &[9; 3]), COMPLETE);
-    assert_eq!(rig.transmit(other, 30, [0x20, 0x20], 0, &[0, 0, 0, 0, 1, 0, 5]), COMPLETE);
+    assert_eq!(rig.transmit(other, 30, [0x20, 0x20], 0, &[1, 0, 0, 0, 5]), COMPLETE);
     rig.read_datagram(host);
     let written = file.exchange(&mut rig, host, 1_000);
     let place =
@@ -94,4 +94,16 @@ fn what_hands_over_is_read_first_and_acted_on_last() {
     assert_eq!(order.len(), RAM_LEN);
     rig.bus.advance_by(SECOND_US);
     assert_eq!(rig.read(host, 0x08C2), 4, "no command was started");
+}
+
+#[test]
+fn the_lockout_state_is_published_before_its_grant() {
+    let (mut rig, [host]) = Rig::started([31]);
+    let mut file = File::new();
+    rig.write_all(host, 0x08A2, &[0; 8]);
+    rig.bus.get_mut(host).publish(|offset, byte| file.0[usize::from(offset)] = byte);
+    file.0[0x0A48] = 1;
+    let written = file.exchange(&mut rig, host, 1_000);
+    let place = |offset| written.iter().position(|&at| at == offset);
+    assert!(place(0x0A49).is_some() && place(0x0A49) < place(0x08A9));
 }
