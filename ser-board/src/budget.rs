@@ -1,0 +1,77 @@
+//! Ring lengths and interrupt priorities, each with the reckoning behind it. Both boards take them from here.
+//!
+//! The rule for lengths: whatever comes in while the main loop is away for [`MAIN_LOOP_STALL_MS`] has to find room.
+//! The rule for priorities: the less an interrupt can wait, the higher. A build that breaks a rule does not compile.
+
+use ser_node::capture::QUEUE_LEN;
+use ser_proto::Baud;
+
+use crate::serial_line::CHARACTER_BITS;
+
+/// How long the main loop may be away from the rings without a loss, in milliseconds.
+///
+/// What keeps it away while all is well, by far less than this: a log record of 2 ms, a frame's worth of entries, the
+/// programming of one configuration record (16 bytes of at most 100 µs each, `STM32F40x` data sheet, "Flash memory
+/// programming"). The rest is reserve for interrupts and for what is still to come. The erasing of a flash sector is
+/// *not* covered: it takes up to two seconds, is due once in a thousand configuration changes or less (see
+/// [`flash_log`](crate::flash_log)), and what it costs is counted.
+pub const MAIN_LOOP_STALL_MS: u32 = 100;
+
+/// Changes that capture can come up with in a millisecond: it samples once in each, and all inputs that changed in a
+/// sample go into one entry of the queue. 1000 per second for as long as one likes.
+pub const CHANGES_PER_MS: u32 = 1;
+
+/// Bits per second at the highest rate of the RS-232 line.
+pub const MAX_BITS_PER_SECOND: u32 = Baud::B19200.bits_per_second();
+
+/// Bytes that arrive, at most, in so many milliseconds: 1.92 each, rounded up.
+#[must_use]
+pub const fn bytes_in(ms: u32) -> usize {
+    (ms * MAX_BITS_PER_SECOND).div_ceil(CHARACTER_BITS * 1000) as usize
+}
+
+/// Received bytes that may wait: 192 arrive during a stall; the next power of two holds 133 ms.
+pub const RECEIVE_RING_LEN: usize = ring_len(bytes_in(MAIN_LOOP_STALL_MS));
+
+/// Bytes that may wait for the transmitter: 66 ms at the highest rate.
+///
+/// A stall makes the line pause, which loses nothing, so it need not be covered; a short ring has the advantage that
+/// little is in flight when the rate changes or a reset comes.
+pub const TRANSMIT_RING_LEN: usize = 128;
+
+/// Priority of the capture interrupt: above everything, for the millisecond of a sample is the product.
+pub const CAPTURE_PRIORITY: u8 = 3;
+
+/// Priority of the receive interrupt: it has one character's time, 520 µs at the highest rate, before a byte is lost.
+pub const RECEIVE_PRIORITY: u8 = 2;
+
+/// Priority of the transmit interrupt: being late makes a pause on the line and nothing else.
+pub const TRANSMIT_PRIORITY: u8 = 1;
+
+/// How long the watchdog waits, in milliseconds. Longer than the longest erasing of a 128 KiB sector (2 s,
+/// `STM32F40x` data sheet, 32 bits at a time), which stops everything that runs from the same flash.
+pub const WATCHDOG_MS: u32 = 4000;
+
+/// The length of a ring for so many items.
+const fn ring_len(items: usize) -> usize {
+    items.next_power_of_two()
+}
+
+const _: () = assert!(QUEUE_LEN >= (MAIN_LOOP_STALL_MS * CHANGES_PER_MS) as usize);
+const _: () = assert!(RECEIVE_RING_LEN >= bytes_in(MAIN_LOOP_STALL_MS));
+const _: () = assert!(CAPTURE_PRIORITY > RECEIVE_PRIORITY && RECEIVE_PRIORITY > TRANSMIT_PRIORITY);
+// Priority 0 is the main loop's.
+const _: () = assert!(TRANSMIT_PRIORITY > 0);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_numbers_in_the_text_are_the_ones_that_come_out() {
+        assert_eq!(bytes_in(MAIN_LOOP_STALL_MS), 192);
+        assert_eq!((RECEIVE_RING_LEN, bytes_in(133)), (256, 256));
+        assert_eq!(bytes_in(66), 127);
+        assert_eq!(CHARACTER_BITS * 1_000_000 / MAX_BITS_PER_SECOND, 520);
+    }
+}

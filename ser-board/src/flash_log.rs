@@ -1,0 +1,175 @@
+//! The configuration in flash memory: each of the two copies has a sector of its own, filled record by record.
+//!
+//! ```text
+//! slot   0         1         2         3
+//!     |  marker | record  | record  | erased … |      16 bytes each; the last one in use is the copy
+//! ```
+//!
+//! # Design
+//! Saving writes the next slot. Only when the sector is full it is erased, and then only that one: the newest
+//! configuration stands in the other sector. The marker is cleared before an erase and written after it, so a sector
+//! whose erasing was cut short is erased again before anything is trusted to it, whatever its cells seem to hold.
+//! That a record is whole, and which of the two is newer, is for `ser_node` to say: it checks and numbers them.
+//!
+//! # Tradeoffs
+//! A general store for keys and values, `sequential-storage`, needs two sectors for each copy, all four of one size
+//! (an STM32F407 has no more than its 128 KiB ones), reads every record of a sector to find the last, and brings
+//! panicking paths into the image. There is one value here, it has one length, and its check and number come with it:
+//! a log of slots will do. Two sectors of 16 KiB with 10 000 erasures each are good for 20 million changes.
+//!
+//! # Notes
+//! A sector of 16 KiB takes 1023 records, one of 128 KiB 8191. As the copies take turns, an erase is due once in as
+//! many changes, and with the very first change of each copy. It takes 250–500 ms for 16 KiB and 1–2 s for 128 KiB on
+//! an STM32F4 (data sheet, "Flash memory programming", 32 bits at a time), and until it is done nothing can be read
+//! from that bank: code that runs from it stands still, interrupts included. So either the capture interrupt, all
+//! that it calls and the vector table are in RAM, and capture goes on while the main loop waits (its queue takes 255
+//! changes), or the samples of that time are missed: `ser_node` counts them. The watchdog has to wait longer than the
+//! erase. Writing a record takes 16 bytes of at most 100 µs.
+
+use embedded_storage::nor_flash::MultiwriteNorFlash;
+use ser_node::{CopyNumber, RECORD_LEN, Storage};
+
+use crate::counter::Counter;
+
+/// What stands in slot 0 of a sector that has been erased to the end.
+const MARKER: [u8; RECORD_LEN] = *b"SER settings 1\r\n";
+const CLEARED: [u8; RECORD_LEN] = [0; RECORD_LEN];
+const ERASED: u8 = 0xFF;
+
+#[expect(clippy::cast_possible_truncation, reason = "16")]
+const SLOT_LEN: u32 = RECORD_LEN as u32;
+
+/// Counts that the storage shares with the board; belong into a static.
+#[derive(Debug, Default)]
+pub struct FlashHealth {
+    /// Records written.
+    pub writes: Counter,
+    /// Sectors erased.
+    pub erases: Counter,
+}
+
+impl FlashHealth {
+    /// Nothing has been written yet.
+    #[must_use]
+    pub const fn new() -> FlashHealth {
+        FlashHealth { writes: Counter::new(), erases: Counter::new() }
+    }
+}
+
+/// The sectors given cannot hold the two copies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct BadSectors;
+
+/// Two sectors of flash memory as the recorder's [`Storage`].
+pub struct FlashLog<'a, F> {
+    flash: F,
+    /// Where the sectors begin.
+    sectors: [u32; 2],
+    health: &'a FlashHealth,
+}
+
+impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
+    /// Slots of a sector, the marker's included.
+    const SLOTS: u32 = {
+        assert!(F::ERASE_SIZE.is_multiple_of(RECORD_LEN) && F::ERASE_SIZE >= 2 * RECORD_LEN);
+        assert!(RECORD_LEN.is_multiple_of(F::WRITE_SIZE) && RECORD_LEN.is_multiple_of(F::READ_SIZE));
+        assert!(F::ERASE_SIZE <= i32::MAX as usize);
+        #[expect(clippy::cast_possible_truncation, reason = "checked above")]
+        let sector_len = F::ERASE_SIZE as u32;
+        sector_len / SLOT_LEN
+    };
+
+    /// Configurations that one sector takes before it is erased.
+    pub const RECORDS_PER_SECTOR: u32 = Self::SLOTS - 1;
+
+    const SECTOR_LEN: u32 = Self::SLOTS * SLOT_LEN;
+
+    /// The first copy in the sector that begins at `sectors[0]`, the second one in that at `sectors[1]`. Nothing is
+    /// touched yet.
+    ///
+    /// # Errors
+    /// When an address is not the beginning of a sector of this memory, or both are the same.
+    pub fn new(flash: F, sectors: [u32; 2], health: &'a FlashHealth) -> Result<Self, BadSectors> {
+        let in_memory = |&sector: &u32| {
+            let end = sector.checked_add(Self::SECTOR_LEN).and_then(|end| usize::try_from(end).ok());
+            sector.is_multiple_of(Self::SECTOR_LEN) && end.is_some_and(|end| end <= flash.capacity())
+        };
+        let [first, second] = sectors;
+        if first == second || !sectors.iter().all(in_memory) {
+            return Err(BadSectors);
+        }
+        Ok(FlashLog { flash, sectors, health })
+    }
+
+    /// How many configurations find room in the sector of `copy` before it has to be erased: 0 when that is due.
+    ///
+    /// # Errors
+    /// When the memory cannot be read.
+    pub fn records_left(&mut self, copy: CopyNumber) -> Result<u32, F::Error> {
+        let used = self.slots_used(self.sector(copy))?;
+        Ok(used.map_or(0, |used| Self::SLOTS - used))
+    }
+
+    const fn sector(&self, copy: CopyNumber) -> u32 {
+        let [first, second] = self.sectors;
+        match copy {
+            CopyNumber::First => first,
+            CopyNumber::Second => second,
+        }
+    }
+
+    fn slot(&mut self, sector: u32, slot: u32) -> Result<[u8; RECORD_LEN], F::Error> {
+        let mut content = [0; RECORD_LEN];
+        self.flash.read(sector + slot * SLOT_LEN, &mut content)?;
+        Ok(content)
+    }
+
+    /// Slots up to the last one in use, the marker's included; `None` when the sector has to be erased first.
+    fn slots_used(&mut self, sector: u32) -> Result<Option<u32>, F::Error> {
+        if self.slot(sector, 0)? != MARKER {
+            return Ok(None);
+        }
+        // From the end: behind a record that was cut short there may be nothing, in front of it there are only
+        // records.
+        for slot in (1..Self::SLOTS).rev() {
+            if self.slot(sector, slot)?.iter().any(|&byte| byte != ERASED) {
+                return Ok(Some(slot + 1));
+            }
+        }
+        Ok(Some(1))
+    }
+
+    fn erase(&mut self, sector: u32) -> Result<(), F::Error> {
+        self.health.erases.count();
+        self.flash.write(sector, &CLEARED)?;
+        self.flash.erase(sector, sector + Self::SECTOR_LEN)?;
+        self.flash.write(sector, &MARKER)
+    }
+}
+
+impl<F: MultiwriteNorFlash> Storage for FlashLog<'_, F> {
+    type Error = F::Error;
+
+    fn read(&mut self, copy: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), F::Error> {
+        let sector = self.sector(copy);
+        *record = match self.slots_used(sector)? {
+            Some(used) if used > 1 => self.slot(sector, used - 1)?,
+            _ => [ERASED; RECORD_LEN],
+        };
+        Ok(())
+    }
+
+    fn write(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), F::Error> {
+        let sector = self.sector(copy);
+        let slot = match self.slots_used(sector)? {
+            Some(used) if used < Self::SLOTS => used,
+            _ => {
+                self.erase(sector)?;
+                1
+            }
+        };
+        self.health.writes.count();
+        self.flash.write(sector + slot * SLOT_LEN, record)
+    }
+}

@@ -1,0 +1,597 @@
+//! What a recorder keeps across a reset: why it was reset, what a panic had to say, how often it has started.
+//!
+//! It lives in memory that start-up code leaves alone. After a power cut such memory holds anything, so nothing in it
+//! is believed without its check; after any other reset it holds what was written.
+//!
+//! ```text
+//! word  0        1       2       3       4        5–27           28
+//!     | "SERb" | boots | check | "SERw" | cause, | text, UTF-8, | check |
+//!     |        |       | of 0–1|        | length | zeros behind | of 3–27 |
+//! ```
+//!
+//! # Design
+//! Two records, each with its own CRC-32: a fault that is cut short while it writes its words costs the words, never
+//! the count of boots. A fault's words are taken out at the next boot, so that they are told once.
+//!
+//! # Tradeoffs
+//! A panic's message is kept as far as it fits, 92 bytes; formatting it is up to the board, by [`Text`]'s
+//! `fmt::Write`.
+//!
+//! # Notes
+//! The board puts the array into a section that is neither zeroed nor loaded (`.uninit` of cortex-m-rt), reads it at
+//! start-up and writes it back; what is in it never has to be a valid value of any type but `u32`.
+
+use core::fmt;
+use core::panic::Location;
+
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+
+/// Length of the memory, in words of 32 bits.
+pub const WORDS: usize = BOOT_WORDS + FAULT_WORDS;
+
+/// The longest text that is kept, in bytes.
+pub const MAX_TEXT_LEN: usize = TEXT_WORDS * 4;
+
+const TEXT_WORDS: usize = 23;
+const BOOT_WORDS: usize = 3;
+const FAULT_WORDS: usize = 3 + TEXT_WORDS;
+
+const BOOT_MAGIC: u32 = u32::from_le_bytes(*b"SERb");
+const FAULT_MAGIC: u32 = u32::from_le_bytes(*b"SERw");
+
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+/// The memory itself. What it holds after power-up is anybody's guess.
+pub type Memory = [u32; WORDS];
+
+/// Why the recorder was about to reset itself. The numbers are those in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Fault {
+    /// The program found an impossible state.
+    Panic = 1,
+    /// The processor found an impossible access or instruction.
+    HardFault = 2,
+    /// The watchdog is about to bite: the main loop or capture stands still.
+    Watchdog = 3,
+    /// The stack has run out.
+    StackOverflow = 4,
+    /// A reset that was wanted, such as for an update.
+    Wanted = 5,
+}
+
+impl Fault {
+    const fn from_code(code: u8) -> Option<Fault> {
+        Some(match code {
+            1 => Fault::Panic,
+            2 => Fault::HardFault,
+            3 => Fault::Watchdog,
+            4 => Fault::StackOverflow,
+            5 => Fault::Wanted,
+            _ => return None,
+        })
+    }
+}
+
+/// What the chip's reset flags say. Where several are set, the board gives the first of them in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ResetFlag {
+    /// The power came.
+    PowerOn,
+    /// The power sagged.
+    BrownOut,
+    /// A watchdog.
+    Watchdog,
+    /// The program asked for it.
+    Software,
+    /// The reset pin, which most chips pull for all the others too.
+    Pin,
+    /// The chip does not tell.
+    Unknown,
+}
+
+/// Why the recorder starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ResetCause {
+    /// The power came.
+    PowerOn,
+    /// The power sagged.
+    BrownOut,
+    /// The reset pin.
+    Pin,
+    /// The program asked for it.
+    Software,
+    /// The watchdog bit.
+    Watchdog,
+    /// The processor found an impossible access or instruction.
+    HardFault,
+    /// The program found an impossible state.
+    Panic,
+    /// The stack had run out.
+    StackOverflow,
+    /// Nothing is known.
+    Unknown,
+}
+
+impl ResetCause {
+    /// Whether the run before ended in a fault of the recorder.
+    #[must_use]
+    pub const fn is_fault(self) -> bool {
+        matches!(
+            self,
+            ResetCause::Watchdog | ResetCause::HardFault | ResetCause::Panic | ResetCause::StackOverflow
+        )
+    }
+
+    /// A number for each, for memory that others read; it never changes. 0 is [`Unknown`](Self::Unknown), 1–4 are those
+    /// of [`Fault`].
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        match self {
+            ResetCause::Unknown => 0,
+            ResetCause::Panic => Fault::Panic as u8,
+            ResetCause::HardFault => Fault::HardFault as u8,
+            ResetCause::Watchdog => Fault::Watchdog as u8,
+            ResetCause::StackOverflow => Fault::StackOverflow as u8,
+            ResetCause::Software => Fault::Wanted as u8,
+            ResetCause::PowerOn => 6,
+            ResetCause::BrownOut => 7,
+            ResetCause::Pin => 8,
+        }
+    }
+
+    /// The cause with this number; `None` when there is none.
+    #[must_use]
+    pub const fn from_code(code: u8) -> Option<ResetCause> {
+        Some(match code {
+            0 => ResetCause::Unknown,
+            1 => ResetCause::Panic,
+            2 => ResetCause::HardFault,
+            3 => ResetCause::Watchdog,
+            4 => ResetCause::StackOverflow,
+            5 => ResetCause::Software,
+            6 => ResetCause::PowerOn,
+            7 => ResetCause::BrownOut,
+            8 => ResetCause::Pin,
+            _ => return None,
+        })
+    }
+
+    /// The flags know about the power; whatever the program wrote down before a sag is not why it starts now. In all
+    /// other cases the program knew better than the flags: a panic ends in a software reset, a locked-up processor in
+    /// the watchdog.
+    const fn new(flag: ResetFlag, fault: Option<Fault>) -> ResetCause {
+        match (flag, fault) {
+            (ResetFlag::PowerOn, _) => ResetCause::PowerOn,
+            (ResetFlag::BrownOut, _) => ResetCause::BrownOut,
+            (_, Some(Fault::Panic)) => ResetCause::Panic,
+            (_, Some(Fault::HardFault)) => ResetCause::HardFault,
+            (_, Some(Fault::StackOverflow)) => ResetCause::StackOverflow,
+            (_, Some(Fault::Watchdog)) | (ResetFlag::Watchdog, _) => ResetCause::Watchdog,
+            (_, Some(Fault::Wanted)) | (ResetFlag::Software, None) => ResetCause::Software,
+            (ResetFlag::Pin, None) => ResetCause::Pin,
+            (ResetFlag::Unknown, None) => ResetCause::Unknown,
+        }
+    }
+}
+
+/// A text of bounded length. What does not fit is left out, never half of a character.
+#[derive(Clone, Copy)]
+pub struct Text {
+    bytes: [u8; MAX_TEXT_LEN],
+    len: usize,
+    /// Something was left out; what comes later would not belong behind it.
+    full: bool,
+}
+
+impl Text {
+    /// No text.
+    pub const EMPTY: Text = Text { bytes: [0; MAX_TEXT_LEN], len: 0, full: false };
+
+    /// The text.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        let bytes = self.bytes.get(..self.len).unwrap_or_default();
+        // Always valid: only whole characters go in. Memory that claims otherwise gives what is valid of it.
+        match core::str::from_utf8(bytes) {
+            Ok(text) => text,
+            Err(error) => bytes
+                .get(..error.valid_up_to())
+                .and_then(|valid| core::str::from_utf8(valid).ok())
+                .unwrap_or_default(),
+        }
+    }
+
+    /// Adds as much of `text` as fits.
+    pub fn push_str(&mut self, text: &str) {
+        for character in text.chars() {
+            let mut utf8 = [0; 4];
+            let character = character.encode_utf8(&mut utf8).as_bytes();
+            let end = self.len + character.len();
+            match self.bytes.get_mut(self.len..end) {
+                Some(place) if !self.full => {
+                    for (place, &byte) in place.iter_mut().zip(character) {
+                        *place = byte;
+                    }
+                    self.len = end;
+                }
+                _ => {
+                    self.full = true;
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Adds a number.
+    pub fn push_decimal(&mut self, number: u32) {
+        let mut unit = 1_000_000_000;
+        while unit > 1 && number < unit {
+            unit /= 10;
+        }
+        while unit != 0 {
+            self.push_digit(number / unit % 10);
+            unit /= 10;
+        }
+    }
+
+    /// Adds a word in hexadecimal: eight digits.
+    pub fn push_hex(&mut self, word: u32) {
+        for shift in (0..u32::BITS).step_by(4).rev() {
+            self.push_digit(word >> shift & 0xF);
+        }
+    }
+
+    fn push_digit(&mut self, digit: u32) {
+        let digit = char::from_digit(digit, 16).unwrap_or('?');
+        self.push_str(digit.encode_utf8(&mut [0; 4]));
+    }
+
+    /// What a panic has to say: place and message, as in `node.rs:42: no room`.
+    ///
+    /// Messages with arguments would bring the formatting machinery with them: of these there is the place alone.
+    #[must_use]
+    pub fn of_panic(place: Option<&Location<'_>>, message: Option<&str>) -> Text {
+        let mut text = Text::EMPTY;
+        if let Some(place) = place {
+            text.push_str(place.file());
+            text.push_str(":");
+            text.push_decimal(place.line());
+            text.push_str(": ");
+        }
+        text.push_str(message.unwrap_or("panic"));
+        text
+    }
+
+    fn from_words(words: &[u32], len: usize) -> Text {
+        let mut text = Text { len: len.min(MAX_TEXT_LEN), ..Text::EMPTY };
+        for (place, word) in text.bytes.as_chunks_mut::<4>().0.iter_mut().zip(words) {
+            *place = word.to_le_bytes();
+        }
+        text
+    }
+}
+
+/// As texts, whether or not something was left out.
+impl PartialEq for Text {
+    fn eq(&self, other: &Text) -> bool {
+        self.as_str() == other.as_str()
+    }
+}
+
+impl Eq for Text {}
+
+impl From<&str> for Text {
+    fn from(text: &str) -> Text {
+        let mut kept = Text::EMPTY;
+        kept.push_str(text);
+        kept
+    }
+}
+
+impl fmt::Debug for Text {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.as_str().fmt(f)
+    }
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for Text {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        self.as_str().format(f);
+    }
+}
+
+/// Never fails: what does not fit is left out.
+impl fmt::Write for Text {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.push_str(text);
+        Ok(())
+    }
+}
+
+/// What is known at start-up about the run before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Boot {
+    /// How often the recorder has started since its memory was last lost, this time included.
+    pub count: u32,
+    /// Why it starts.
+    pub cause: ResetCause,
+    /// What the run before had to say; empty when it said nothing.
+    pub text: Text,
+}
+
+/// Whether the memory holds what an earlier run of the program left. Where the chip does not tell why it was reset, memory
+/// that does not has been without power.
+#[must_use]
+pub fn is_kept(memory: &Memory) -> bool {
+    let (boots, _) = memory.split_at(BOOT_WORDS);
+    matches!(open(boots), Some([BOOT_MAGIC, _]))
+}
+
+/// Reads what the run before left, counts the boot, and makes the memory ready for this run's last words.
+#[must_use = "the last words are taken out of the memory"]
+pub fn boot(memory: &mut Memory, flag: ResetFlag) -> Boot {
+    let (boots, words) = memory.split_at_mut(BOOT_WORDS);
+    let count = match open(boots) {
+        Some([BOOT_MAGIC, count]) => count.saturating_add(1),
+        _ => 1,
+    };
+    let (fault, text) = read_fault(words).map_or((None, Text::EMPTY), |(fault, text)| (Some(fault), text));
+    words.fill(0);
+    seal(boots, [BOOT_MAGIC, count].into_iter());
+    Boot { count, cause: ResetCause::new(flag, fault), text }
+}
+
+/// Writes the last words of this run. What was written before is forgotten.
+pub fn write(memory: &mut Memory, fault: Fault, text: &Text) {
+    let (_, words) = memory.split_at_mut(BOOT_WORDS);
+    let [len, ..] = text.len.to_le_bytes();
+    let head = u32::from_le_bytes([fault as u8, len, 0, 0]);
+    let text = text.bytes.as_chunks::<4>().0.iter().map(|&bytes| u32::from_le_bytes(bytes));
+    seal(words, [FAULT_MAGIC, head].into_iter().chain(text));
+}
+
+/// Takes the last words back: it did not come to a reset.
+pub fn withdraw(memory: &mut Memory) {
+    let (_, words) = memory.split_at_mut(BOOT_WORDS);
+    words.fill(0);
+}
+
+fn read_fault(words: &[u32]) -> Option<(Fault, Text)> {
+    let [FAULT_MAGIC, head, text @ ..] = content(words)? else { return None };
+    let [code, len, 0, 0] = head.to_le_bytes() else { return None };
+    Some((Fault::from_code(code)?, Text::from_words(text, len.into())))
+}
+
+/// The words in front of the check, if it is right.
+fn content(record: &[u32]) -> Option<&[u32]> {
+    let (&check, content) = record.split_last()?;
+    (checksum(content) == check).then_some(content)
+}
+
+fn open<const N: usize>(record: &[u32]) -> Option<[u32; N]> {
+    content(record)?.try_into().ok()
+}
+
+/// Fills a record and puts the check behind it.
+fn seal(record: &mut [u32], words: impl Iterator<Item = u32>) {
+    let Some((check, content)) = record.split_last_mut() else { return };
+    for (place, word) in content.iter_mut().zip(words) {
+        *place = word;
+    }
+    *check = checksum(content);
+}
+
+fn checksum(words: &[u32]) -> u32 {
+    let mut digest = CRC.digest();
+    for word in words {
+        digest.update(&word.to_le_bytes());
+    }
+    digest.finalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Memory as the very first power-up finds it.
+    fn random() -> Memory {
+        let mut noise = 0xDEAD_BEEF_u32;
+        [(); WORDS].map(|()| {
+            noise = noise.wrapping_mul(0x9E37_79B9).wrapping_add(1);
+            noise
+        })
+    }
+
+    #[test]
+    fn the_first_power_up_counts_one_and_has_nothing_to_tell() {
+        for mut memory in [random(), [0; WORDS], [u32::MAX; WORDS]] {
+            let first = Boot { count: 1, cause: ResetCause::PowerOn, text: Text::EMPTY };
+            assert_eq!(boot(&mut memory, ResetFlag::PowerOn), first);
+            let second = Boot { count: 2, cause: ResetCause::Pin, text: Text::EMPTY };
+            assert_eq!(boot(&mut memory, ResetFlag::Pin), second);
+        }
+    }
+
+    #[test]
+    fn a_panic_is_told_at_the_next_boot_and_only_then() {
+        let mut memory = random();
+        let _ = boot(&mut memory, ResetFlag::PowerOn);
+        let mut text = Text::EMPTY;
+        let (file, line) = ("node.rs", 42);
+        write!(text, "{file}:{line}: no room").unwrap();
+        write(&mut memory, Fault::Panic, &text);
+        let told = boot(&mut memory, ResetFlag::Software);
+        assert_eq!(
+            (told.count, told.cause, told.text.as_str()),
+            (2, ResetCause::Panic, "node.rs:42: no room")
+        );
+        assert!(told.cause.is_fault());
+        let after = boot(&mut memory, ResetFlag::Software);
+        assert_eq!((after.count, after.cause, after.text.as_str()), (3, ResetCause::Software, ""));
+        assert!(!after.cause.is_fault());
+    }
+
+    #[test]
+    fn the_cause_is_what_the_program_knew_unless_the_power_went() {
+        let causes = [
+            (ResetFlag::Software, Some(Fault::Panic), ResetCause::Panic),
+            (ResetFlag::Software, Some(Fault::HardFault), ResetCause::HardFault),
+            (ResetFlag::Watchdog, Some(Fault::StackOverflow), ResetCause::StackOverflow),
+            (ResetFlag::Watchdog, Some(Fault::Watchdog), ResetCause::Watchdog),
+            (ResetFlag::Software, Some(Fault::Wanted), ResetCause::Software),
+            (ResetFlag::Watchdog, Some(Fault::Wanted), ResetCause::Watchdog),
+            (ResetFlag::BrownOut, Some(Fault::Panic), ResetCause::BrownOut),
+            (ResetFlag::PowerOn, Some(Fault::Panic), ResetCause::PowerOn),
+            (ResetFlag::Watchdog, None, ResetCause::Watchdog),
+            (ResetFlag::Software, None, ResetCause::Software),
+            (ResetFlag::Pin, None, ResetCause::Pin),
+            (ResetFlag::Unknown, None, ResetCause::Unknown),
+        ];
+        for (flag, fault, cause) in causes {
+            let mut memory = [0; WORDS];
+            if let Some(fault) = fault {
+                write(&mut memory, fault, &Text::from("x"));
+            }
+            assert_eq!(boot(&mut memory, flag).cause, cause, "{flag:?} after {fault:?}");
+        }
+    }
+
+    #[test]
+    fn memory_that_no_run_has_written_is_known_by_it() {
+        for mut memory in [random(), [0; WORDS], [u32::MAX; WORDS]] {
+            assert!(!is_kept(&memory));
+            let _ = boot(&mut memory, ResetFlag::Unknown);
+            assert!(is_kept(&memory));
+            memory[1] ^= 1;
+            assert!(!is_kept(&memory));
+        }
+    }
+
+    #[test]
+    fn every_cause_comes_back_from_its_number() {
+        let causes: Vec<_> = (0..=u8::MAX).filter_map(ResetCause::from_code).collect();
+        assert_eq!(causes.len(), 9);
+        for (code, cause) in (0..).zip(causes) {
+            assert_eq!(cause.code(), code);
+        }
+        let faults = (0..=u8::MAX).filter_map(Fault::from_code);
+        let as_causes = faults.filter(|&fault| fault != Fault::Wanted).map(|fault| {
+            let cause = ResetCause::new(ResetFlag::Unknown, Some(fault));
+            assert_eq!(cause.code(), fault as u8);
+            cause.is_fault()
+        });
+        assert_eq!(as_causes.collect::<Vec<_>>(), [true; 4]);
+    }
+
+    #[test]
+    fn numbers_and_places_stand_in_a_text() {
+        let mut text = Text::EMPTY;
+        for number in [0, 7, 10, 4_294_967_295] {
+            text.push_decimal(number);
+            text.push_str(" ");
+        }
+        text.push_hex(0x0A0B_12FF);
+        assert_eq!(text.as_str(), "0 7 10 4294967295 0a0b12ff");
+        let place = Location::caller();
+        let expected = format!("{}:{}: no room", place.file(), place.line());
+        assert_eq!(Text::of_panic(Some(place), Some("no room")).as_str(), expected);
+        assert_eq!(Text::of_panic(None, None).as_str(), "panic");
+    }
+
+    #[test]
+    fn words_that_were_taken_back_are_not_told() {
+        let mut memory = random();
+        let _ = boot(&mut memory, ResetFlag::PowerOn);
+        write(&mut memory, Fault::Watchdog, &Text::EMPTY);
+        withdraw(&mut memory);
+        let told = boot(&mut memory, ResetFlag::Pin);
+        assert_eq!((told.count, told.cause), (2, ResetCause::Pin));
+    }
+
+    #[test]
+    fn a_reset_while_words_are_written_leaves_the_old_ones_or_none_and_the_count() {
+        let mut before = random();
+        for _ in 0..6 {
+            let _ = boot(&mut before, ResetFlag::Pin);
+        }
+        let mut after = before;
+        write(&mut after, Fault::Panic, &Text::from("a text that takes a few words"));
+        for cut in 0..WORDS {
+            let mut memory = before;
+            memory[..cut].copy_from_slice(&after[..cut]);
+            let told = boot(&mut memory, ResetFlag::Software);
+            assert_eq!(
+                (told.count, told.cause, told.text.as_str()),
+                (7, ResetCause::Software, ""),
+                "cut at {cut}"
+            );
+        }
+        let told = boot(&mut after, ResetFlag::Software);
+        assert_eq!((told.count, told.cause), (7, ResetCause::Panic));
+    }
+
+    #[test]
+    fn a_second_fault_has_the_last_word() {
+        let mut memory = [0; WORDS];
+        write(&mut memory, Fault::Panic, &Text::from("a long text in front of a short one"));
+        write(&mut memory, Fault::HardFault, &Text::from("pc 0"));
+        let told = boot(&mut memory, ResetFlag::Software);
+        assert_eq!((told.cause, told.text.as_str()), (ResetCause::HardFault, "pc 0"));
+    }
+
+    #[test]
+    fn a_long_text_ends_between_two_characters() {
+        assert_eq!(Text::from("x".repeat(93).as_str()).as_str(), "x".repeat(92));
+        // Two bytes each: one would be cut in half at an odd place.
+        let text = Text::from(format!("x{}", "é".repeat(50)).as_str());
+        assert_eq!(text.as_str(), format!("x{}", "é".repeat(45)));
+        // A short character behind one that did not fit would belong elsewhere.
+        let mut text = Text::from("y".repeat(90).as_str());
+        text.push_str("€z");
+        text.push_str("z");
+        assert_eq!(text.as_str(), "y".repeat(90));
+    }
+
+    proptest! {
+        #[test]
+        fn random_memory_is_never_taken_for_last_words(words: [u32; WORDS]) {
+            let mut memory = words;
+            let told = boot(&mut memory, ResetFlag::Pin);
+            prop_assert_eq!((told.count, told.cause, told.text.as_str()), (1, ResetCause::Pin, ""));
+        }
+
+        #[test]
+        fn a_flipped_bit_is_noticed(bit in 0..WORDS * 32, text in "\\PC{0,40}") {
+            let mut memory = [0; WORDS];
+            let _ = boot(&mut memory, ResetFlag::PowerOn);
+            write(&mut memory, Fault::Panic, &Text::from(text.as_str()));
+            memory[bit / 32] ^= 1 << (bit % 32);
+            let told = boot(&mut memory, ResetFlag::Software);
+            if bit / 32 < BOOT_WORDS {
+                prop_assert_eq!((told.count, told.cause), (1, ResetCause::Panic));
+                prop_assert_eq!(told.text, Text::from(text.as_str()));
+            } else {
+                prop_assert_eq!((told.count, told.cause, told.text.as_str()), (2, ResetCause::Software, ""));
+            }
+        }
+
+        #[test]
+        fn any_text_comes_back_as_far_as_it_fits(text in "\\PC{0,200}") {
+            let mut memory = [u32::MAX; WORDS];
+            write(&mut memory, Fault::Panic, &Text::from(text.as_str()));
+            let told = boot(&mut memory, ResetFlag::Software);
+            prop_assert!(text.starts_with(told.text.as_str()));
+            prop_assert!(told.text.as_str().len() + 3 >= text.len().min(MAX_TEXT_LEN));
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! What the recorder's boards share, apart from registers: everything here is tested on a desktop, with mocks.
+//!
+//! A board brings up its chip, says in its interrupts which byte came and which pin is up, and leaves the rest to
+//! `ser_node` (what a recorder does) and to this crate (what a board does):
+//!
+//! | module             | what it holds                                                                          |
+//! |--------------------|----------------------------------------------------------------------------------------|
+//! | [`budget`]         | ring lengths and interrupt priorities, each with its derivation                        |
+//! | [`ring`]           | a ring between an interrupt and the main loop that has no panicking path               |
+//! | [`serial_line`]    | the rings of the RS-232 line, and when the line is quiet enough for another rate       |
+//! | [`main_loop`]      | one pass of the main loop between the line and the node                                |
+//! | [`inputs`]         | the word of inputs: ports, wiring, and samples that could not be taken                 |
+//! | [`serialiser`]     | inputs behind industrial digital-input serialisers on SPI                              |
+//! | [`flash_log`]      | the configuration in flash memory                                                      |
+//! | [`clock_chip`]     | the battery-backed clock, with what it has to say against itself                       |
+//! | [`stm32_rtc`]      | the calendar registers of STM32 clocks as date and time                                |
+//! | [`leds`]           | what the four lamps mean                                                               |
+//! | [`last_words`]     | what outlives a reset: its cause, the panic's text, the number of boots                |
+//! | `report`           | tells the log which counters have moved (feature `defmt`)                             |
+//! | [`counter`]        | counts that one side keeps and another one reads                                       |
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
+)]
+
+pub mod budget;
+pub mod clock_chip;
+pub mod counter;
+pub mod flash_log;
+pub mod inputs;
+pub mod last_words;
+pub mod leds;
+pub mod main_loop;
+#[cfg(feature = "defmt")]
+pub mod report;
+pub mod ring;
+pub mod serial_line;
+pub mod serialiser;
+pub mod stm32_rtc;

@@ -1,0 +1,77 @@
+//! One pass of the main loop between the RS-232 line and the node, the same on every board.
+//!
+//! The board's part is a [`Line`]: its UART with the rings in front of it. A pass never waits and does no more than
+//! the rings hold, so a line that takes and gives bytes as fast as they come cannot keep the main loop.
+
+use ser_node::{Node, Rtc, Storage};
+use ser_proto::Baud;
+
+use crate::serial_line::Received;
+
+/// A board's RS-232 line as the main loop sees it.
+pub trait Line {
+    /// The most bytes taken, and the most given, in one pass: the longer ring's length.
+    const MAX_BYTES: usize;
+
+    /// The next byte that has arrived.
+    fn receive(&mut self) -> Option<Received>;
+
+    /// Whether another byte may be sent.
+    fn can_send(&self) -> bool;
+
+    /// Puts a byte in line for the transmitter. Called only when there is room.
+    fn send(&mut self, byte: u8);
+
+    /// Whether everything sent has left the transmitter. Asked in every pass, see
+    /// [`Quiet`](crate::serial_line::Quiet).
+    fn is_quiet(&mut self, now_ms: u32) -> bool;
+
+    /// Changes the rate. Called only when the line is quiet.
+    fn set_baud(&mut self, baud: Baud);
+}
+
+/// Hands over what has arrived, records what has changed, and takes what is to be sent. Gives the tick of the pass.
+pub fn pass<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L) -> u32 {
+    // Read first: see `Node::poll`.
+    let now_ms = node.tick_ms();
+    take_in(node, line);
+    node.poll(now_ms);
+    change_baud(node, line, now_ms);
+    hand_out(node, line);
+    now_ms
+}
+
+fn take_in<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L) {
+    for _ in 0..L::MAX_BYTES {
+        // Commands that find no room in the node wait in the ring.
+        if !node.serial_has_room() {
+            break;
+        }
+        let Some(received) = line.receive() else { break };
+        node.serial_receive(received.byte, received.tick_ms);
+        if received.overrun {
+            node.serial_line_error();
+        }
+    }
+}
+
+fn change_baud<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L, now_ms: u32) {
+    // Asked in every pass, so that it has seen when the transmitter fell idle.
+    let quiet = line.is_quiet(now_ms);
+    if let Some(baud) = node.baud_change()
+        && quiet
+    {
+        line.set_baud(baud);
+        node.baud_changed(baud);
+    }
+}
+
+fn hand_out<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L) {
+    for _ in 0..L::MAX_BYTES {
+        if !line.can_send() {
+            break;
+        }
+        let Some(byte) = node.serial_transmit() else { break };
+        line.send(byte);
+    }
+}

@@ -1,0 +1,139 @@
+//! Tells the log which counters have moved, and how far down the stack has been.
+//!
+//! The protocol has no place for any of this: the log is the only trace of what was dropped, refused or lost.
+
+use geni::Counters;
+use ser_node::{Diagnostics, GeniusDiagnostics};
+
+/// Counters that run all the time must not fill the log.
+const INTERVAL_MS: u32 = 1000;
+
+/// What the log knows already.
+pub struct Report {
+    looked_ms: u32,
+    diagnostics: Diagnostics,
+    genius: GeniusDiagnostics,
+    stack_bytes: usize,
+}
+
+impl Report {
+    /// The log knows nothing; it is told for the first time a second from `now_ms`.
+    #[must_use]
+    pub fn new(now_ms: u32) -> Report {
+        Report {
+            looked_ms: now_ms,
+            diagnostics: Diagnostics::default(),
+            genius: GeniusDiagnostics::default(),
+            stack_bytes: 0,
+        }
+    }
+
+    /// Logs what has changed, once a second at most. Called in every pass of the main loop; asks for the counters, and
+    /// for the most bytes of stack that have been in use, only when it is time.
+    pub fn pass(
+        &mut self,
+        now_ms: u32,
+        diagnostics: impl FnOnce() -> (Diagnostics, Option<GeniusDiagnostics>),
+        stack_bytes: impl FnOnce() -> usize,
+    ) {
+        if now_ms.wrapping_sub(self.looked_ms) < INTERVAL_MS {
+            return;
+        }
+        self.looked_ms = now_ms;
+        let (diagnostics, genius) = diagnostics();
+        log_changed(&self.diagnostics, &diagnostics);
+        self.diagnostics = diagnostics;
+        if let Some(genius) = genius {
+            log_changed_genius(&self.genius, &genius);
+            self.genius = genius;
+        }
+        let stack_bytes = stack_bytes();
+        if stack_bytes > self.stack_bytes {
+            self.stack_bytes = stack_bytes;
+            defmt::info!("stack: {=usize} bytes used at most", stack_bytes);
+        }
+    }
+}
+
+/// One line for each counter of a structure that has moved. Every field is a counter or named as something else, so that
+/// a new one is not forgotten here.
+macro_rules! log_counters {
+    ($Type:ident, $before:expr, $after:expr, [$($counter:ident),* $(,)?] $(, other [$($other:ident),*])?) => {
+        let (before, after): (&$Type, &$Type) = ($before, $after);
+        let $Type { $($counter,)* $($($other: _,)*)? } = after;
+        for (name, before, after) in [$((stringify!($counter), before.$counter, *$counter)),*] {
+            if after != before {
+                defmt::warn!("{=str}: {=u32}", name, after);
+            }
+        }
+    };
+}
+
+fn log_changed(before: &Diagnostics, after: &Diagnostics) {
+    log_counters!(
+        Diagnostics,
+        before,
+        after,
+        [
+            frames_interrupted,
+            frames_not_hex,
+            frames_checksum,
+            frames_too_long,
+            frames_empty,
+            line_errors,
+            commands_unknown,
+            commands_wrong_length,
+            parameters_refused,
+            commands_overrun,
+            edges_lost,
+            samples_missed,
+            events_unreported,
+            events_unprinted,
+            storage_errors,
+        ]
+    );
+}
+
+fn log_changed_genius(before: &GeniusDiagnostics, after: &GeniusDiagnostics) {
+    if let Some(failure) = after.last_failure
+        && before.board.failures != after.board.failures
+    {
+        defmt::warn!("{}", failure);
+    }
+    log_counters!(
+        Counters,
+        &before.board,
+        &after.board,
+        [
+            failures,
+            resets,
+            bus_losses,
+            bus_errors,
+            configurations_refused,
+            commands_timed_out,
+            commands_late,
+            commands_blocked,
+            commands_refused,
+            commands_failed,
+            commands_unknown,
+            datagrams_refused,
+            requests_refused,
+            requests_unanswered,
+            requests_malformed,
+            request_queue_full,
+            request_pointers_refused,
+            device_records_refused,
+            lockouts_foreign,
+            lockouts_lost,
+        ],
+        other[own_broadcasts]
+    );
+    // Broadcasts and reports that arrived are what is meant to happen.
+    log_counters!(
+        GeniusDiagnostics,
+        before,
+        after,
+        [datagrams_ignored, replies_lost, reports_failed],
+        other [board, last_failure, broadcasts, reports_sent]
+    );
+}

@@ -1,0 +1,208 @@
+//! Flash memory as on an STM32F4, whose power can fail at any single write.
+//!
+//! Bits go from 1 to 0 when written and back only by erasing a whole sector. Power is a budget of steps: each byte
+//! written is a step, and so is each part of an erase. When it runs out, the step under way is done in part,
+//! and nothing works any more until [`Flash::power_up`].
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use embedded_storage::nor_flash::{
+    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+};
+
+/// Steps of an erase: cells lose their contents little by little.
+const ERASE_STEPS: usize = 8;
+
+/// Memory of `SECTOR` bytes per erase and `WORD` bytes per write. Clones are the same memory.
+#[derive(Clone)]
+pub(crate) struct Flash<const SECTOR: usize, const WORD: usize>(Rc<RefCell<Cells>>);
+
+#[derive(Clone)]
+struct Cells {
+    bytes: Vec<u8>,
+    erased: Vec<u32>,
+    /// Sectors whose erasing was cut short. Whatever their cells seem to hold, nothing written there would stay.
+    weak: Vec<bool>,
+    /// Steps until the power fails; `None` when it does not.
+    power: Option<u64>,
+    steps: u64,
+    noise: u64,
+}
+
+/// The power has failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct PowerCut;
+
+impl NorFlashError for PowerCut {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
+    pub(crate) fn new(sectors: usize) -> Self {
+        Flash(Rc::new(RefCell::new(Cells {
+            bytes: vec![0xFF; sectors * SECTOR],
+            erased: vec![0; sectors],
+            weak: vec![false; sectors],
+            power: None,
+            steps: 0,
+            noise: 0x9E37_79B9_7F4A_7C15,
+        })))
+    }
+
+    /// A memory of its own with the same contents, and power.
+    pub(crate) fn copy(&self) -> Self {
+        let copy = Flash(Rc::new(RefCell::new(self.0.borrow().clone())));
+        copy.power_up();
+        copy
+    }
+
+    /// The power fails in the step after so many.
+    pub(crate) fn cut_after(&self, steps: u64, seed: u64) {
+        let mut cells = self.0.borrow_mut();
+        cells.power = Some(steps);
+        cells.sow(seed);
+    }
+
+    pub(crate) fn power_up(&self) {
+        self.0.borrow_mut().power = None;
+    }
+
+    /// Memory that has been used for something else.
+    pub(crate) fn fill_with_noise(&self, seed: u64) {
+        let mut cells = self.0.borrow_mut();
+        cells.sow(seed);
+        for at in 0..cells.bytes.len() {
+            cells.bytes[at] = cells.noise().to_le_bytes()[0];
+        }
+    }
+
+    /// Steps done so far.
+    pub(crate) fn steps(&self) -> u64 {
+        self.0.borrow().steps
+    }
+
+    /// How often each sector was erased.
+    pub(crate) fn erased(&self) -> Vec<u32> {
+        self.0.borrow().erased.clone()
+    }
+}
+
+impl Cells {
+    /// Makes what is left to chance depend on `seed`, and on nothing else.
+    fn sow(&mut self, seed: u64) {
+        self.noise = (seed + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    }
+
+    fn noise(&mut self) -> u64 {
+        self.noise ^= self.noise << 13;
+        self.noise ^= self.noise >> 7;
+        self.noise ^= self.noise << 17;
+        self.noise
+    }
+
+    /// Whether there is power for another step.
+    fn step(&mut self) -> bool {
+        match &mut self.power {
+            Some(0) => false,
+            Some(left) => {
+                *left -= 1;
+                self.steps += 1;
+                true
+            }
+            None => {
+                self.steps += 1;
+                true
+            }
+        }
+    }
+
+    fn has_power(&self) -> Result<(), PowerCut> {
+        if self.power == Some(0) { Err(PowerCut) } else { Ok(()) }
+    }
+
+    fn write(&mut self, at: usize, new: u8) -> Result<(), PowerCut> {
+        let old = self.bytes[at];
+        assert_eq!(new & !old, 0, "writing {new:02x} over {old:02x} at {at:x}h needs an erase");
+        if self.step() {
+            self.bytes[at] = new;
+            return Ok(());
+        }
+        // Some of the bits that were to become 0 have.
+        self.bytes[at] = old & (new | self.noise().to_le_bytes()[0]);
+        Err(PowerCut)
+    }
+
+    /// Takes all cells of a sector a part of the way to 1; the last step takes them there.
+    fn erase(&mut self, from: usize, to: usize) -> Result<(), PowerCut> {
+        for step in 1..=ERASE_STEPS {
+            if !self.step() {
+                return Err(PowerCut);
+            }
+            for at in from..to {
+                let risen = if step == ERASE_STEPS {
+                    0xFF
+                } else {
+                    self.noise().to_le_bytes()[0] & self.noise().to_le_bytes()[0]
+                };
+                self.bytes[at] |= risen;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<const SECTOR: usize, const WORD: usize> ErrorType for Flash<SECTOR, WORD> {
+    type Error = PowerCut;
+}
+
+impl<const SECTOR: usize, const WORD: usize> ReadNorFlash for Flash<SECTOR, WORD> {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), PowerCut> {
+        let cells = self.0.borrow();
+        cells.has_power()?;
+        let offset = offset as usize;
+        bytes.copy_from_slice(&cells.bytes[offset..offset + bytes.len()]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.borrow().bytes.len()
+    }
+}
+
+impl<const SECTOR: usize, const WORD: usize> NorFlash for Flash<SECTOR, WORD> {
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), PowerCut> {
+        let mut cells = self.0.borrow_mut();
+        let (from, to) = (from as usize, to as usize);
+        assert!(from.is_multiple_of(SECTOR) && to.is_multiple_of(SECTOR) && from < to, "not whole sectors");
+        for sector in from / SECTOR..to / SECTOR {
+            cells.has_power()?;
+            cells.erased[sector] += 1;
+            cells.weak[sector] = true;
+            cells.erase(sector * SECTOR, (sector + 1) * SECTOR)?;
+            cells.weak[sector] = false;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerCut> {
+        let mut cells = self.0.borrow_mut();
+        let offset = offset as usize;
+        assert!(offset.is_multiple_of(WORD) && bytes.len().is_multiple_of(WORD), "not whole words");
+        let is_weak = cells.weak[offset / SECTOR];
+        assert!(!is_weak || bytes.iter().all(|&byte| byte == 0), "writing to a sector that is not erased");
+        for (at, &byte) in (offset..).zip(bytes) {
+            cells.write(at, byte)?;
+        }
+        Ok(())
+    }
+}
+
+impl<const SECTOR: usize, const WORD: usize> MultiwriteNorFlash for Flash<SECTOR, WORD> {}

@@ -1,0 +1,295 @@
+//! The promise about configurations: after a power cut at any moment, the recorder comes up with the old one or the
+//! new one.
+//!
+//! A whole recorder is asked over its RS-232 line, as a host would; the power fails at every single write to the
+//! flash memory while it stores, through the erasing of sectors, and again while it recovers.
+
+mod flash;
+
+use std::ops::Range;
+
+use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
+use flash::{Flash, PowerCut};
+use ser_board::flash_log::{BadSectors, FlashHealth, FlashLog};
+use ser_node::{
+    Capture, CaptureChannel, CopyNumber, Debounce, Event, NoRtc, Node, NodeParts, RECORD_LEN, Storage,
+};
+use ser_proto::{
+    AutoReport, Baud, Command, Configuration, Configure, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN,
+    Model, Reply,
+};
+
+/// Sectors small enough for a walk through many erases; the layout does not depend on their size.
+const SMALL: usize = 128;
+/// Sectors 0–3 of an STM32F407.
+const REAL: usize = 16 * 1024;
+
+/// The n-th of many configurations, each unlike its neighbours in every field.
+fn configuration(number: u16) -> Configuration {
+    Configuration {
+        size: 1 + number % 2048,
+        baud: Baud::from_code(1 + (number % 7) as u8).unwrap(),
+        auto_report: [AutoReport::Off, AutoReport::Genius, AutoReport::Rs232][usize::from(number % 3)],
+        report_address: (number % 32) as u8,
+        auto_print: number.is_multiple_of(2),
+    }
+}
+
+/// Memory of a recorder that is on; made once, since there are thousands of power-ups.
+struct Ram {
+    channel: CaptureChannel,
+    log: Vec<Event>,
+}
+
+impl Ram {
+    fn new() -> Ram {
+        Ram { channel: CaptureChannel::new(), log: vec![Event::EMPTY; 2048] }
+    }
+
+    fn power_up<S: Storage>(&mut self, storage: S) -> Recorder<'_, S> {
+        self.channel = CaptureChannel::new();
+        let (mut capture, reader) = self.channel.split(Debounce::OFF);
+        capture.sample(1, 0);
+        let parts =
+            NodeParts { model: Model::Ser320, log: &mut self.log, capture: reader, storage, rtc: NoRtc };
+        Recorder { node: Node::new(parts), _capture: capture }
+    }
+}
+
+struct Recorder<'a, S> {
+    node: Node<'a, S, NoRtc>,
+    _capture: Capture<'a>,
+}
+
+impl<S: Storage> Recorder<'_, S> {
+    fn ask(&mut self, command: &Command) -> Configuration {
+        for byte in FrameEncoder::new(command.to_body()) {
+            self.node.serial_receive(byte, 1);
+        }
+        let mut decoder = FrameDecoder::<MAX_BODY_LEN>::new();
+        let mut answer = None;
+        while let Some(byte) = self.node.serial_transmit() {
+            if let Some(Decoded::Frame(body)) = decoder.push(byte) {
+                answer = Some(Reply::parse(body).unwrap());
+            }
+        }
+        if let Some(baud) = self.node.baud_change() {
+            self.node.baud_changed(baud);
+        }
+        match answer {
+            Some(Reply::Configuration(configuration)) => configuration,
+            other => panic!("{other:?} in answer to {command:?}"),
+        }
+    }
+
+    fn configure(&mut self, configuration: &Configuration) {
+        assert_eq!(self.ask(&Command::Configure(Configure::from(*configuration))), *configuration);
+    }
+
+    fn configuration(&mut self) -> Configuration {
+        self.ask(&Command::QueryConfiguration)
+    }
+}
+
+static HEALTH: FlashHealth = FlashHealth::new();
+
+fn log<const SECTOR: usize, const WORD: usize>(
+    flash: &Flash<SECTOR, WORD>,
+) -> impl Storage + use<SECTOR, WORD> {
+    let sectors = [SECTOR, 2 * SECTOR].map(|sector| sector.try_into().unwrap());
+    FlashLog::new(flash.clone(), sectors, &HEALTH).unwrap()
+}
+
+/// What must not be done: both copies in one sector, which is erased for every change and then written anew.
+struct OneSector(Flash<SMALL, 1>);
+
+impl Storage for OneSector {
+    type Error = PowerCut;
+
+    fn read(&mut self, copy: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), PowerCut> {
+        self.0.read([0, 16][copy as usize], record)
+    }
+
+    fn write(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), PowerCut> {
+        let mut both = [0; 2 * RECORD_LEN];
+        self.0.read(0, &mut both)?;
+        both[copy as usize * RECORD_LEN..][..RECORD_LEN].copy_from_slice(record);
+        self.0.erase(0, 128)?;
+        self.0.write(0, &both)
+    }
+}
+
+/// Memory in which the configurations of a range have been stored, one after the other.
+fn stored<const SECTOR: usize, const WORD: usize, S: Storage>(
+    open: fn(&Flash<SECTOR, WORD>) -> S,
+    numbers: Range<u16>,
+) -> Flash<SECTOR, WORD> {
+    let flash = Flash::new(4);
+    let mut ram = Ram::new();
+    let mut recorder = ram.power_up(open(&flash));
+    for number in numbers {
+        recorder.configure(&configuration(number));
+    }
+    assert_eq!(recorder.node.diagnostics().storage_errors, 0);
+    flash
+}
+
+/// Stores configuration after configuration; cuts the power at every step of each one and, after each power-up, at
+/// some steps of the next one. Gives how many cuts there were.
+fn cut_everywhere<const SECTOR: usize, const WORD: usize, S: Storage>(
+    open: fn(&Flash<SECTOR, WORD>) -> S,
+    changes: Range<u16>,
+) -> u64 {
+    let mut ram = Ram::new();
+    let flash = stored(open, 1..changes.start + 1);
+    let mut cuts = 0;
+    for number in changes {
+        let (old, new) = (configuration(number), configuration(number + 1));
+        for steps in 0.. {
+            let flash = flash.copy();
+            if !cut(&mut ram, &flash, open, steps, &old, &new) {
+                break;
+            }
+            cuts += 1;
+            cuts += cut_again(&mut ram, &flash, open, steps, number);
+        }
+        ram.power_up(open(&flash)).configure(&new);
+        assert_eq!(ram.power_up(open(&flash)).configuration(), new);
+    }
+    cuts
+}
+
+/// Cuts the power so many steps into a change. False when the change is done before that.
+fn cut<const SECTOR: usize, const WORD: usize, S: Storage>(
+    ram: &mut Ram,
+    flash: &Flash<SECTOR, WORD>,
+    open: fn(&Flash<SECTOR, WORD>) -> S,
+    steps: u64,
+    old: &Configuration,
+    new: &Configuration,
+) -> bool {
+    let mut recorder = ram.power_up(open(flash));
+    assert_eq!(recorder.configuration(), *old, "before the change to {new:?}");
+    let before = flash.steps();
+    flash.cut_after(steps, steps);
+    // Whether or not it could be stored, it is in force until the power goes.
+    recorder.configure(new);
+    let is_cut = flash.steps() - before == steps && recorder.node.diagnostics().storage_errors != 0;
+    flash.power_up();
+    let found = ram.power_up(open(flash)).configuration();
+    assert!(
+        found == *old || found == *new,
+        "cut after {steps} steps: {found:?} is neither {old:?} nor {new:?}"
+    );
+    if !is_cut {
+        assert_eq!(found, *new);
+    }
+    is_cut
+}
+
+/// Goes on with a memory that has seen a cut: the next changes hold, and a second cut does no more harm than the
+/// first.
+fn cut_again<const SECTOR: usize, const WORD: usize, S: Storage>(
+    ram: &mut Ram,
+    flash: &Flash<SECTOR, WORD>,
+    open: fn(&Flash<SECTOR, WORD>) -> S,
+    seed: u64,
+    number: u16,
+) -> u64 {
+    let found = ram.power_up(open(flash)).configuration();
+    let next = configuration(number + 1000);
+    let mut cuts = 0;
+    // Not every step again, but a different stride after each first cut.
+    for steps in (seed % 5..).step_by(5) {
+        let flash = flash.copy();
+        if !cut(ram, &flash, open, steps, &found, &next) {
+            break;
+        }
+        cuts += 1;
+    }
+    ram.power_up(open(flash)).configure(&next);
+    assert_eq!(ram.power_up(open(flash)).configuration(), next);
+    cuts
+}
+
+#[test]
+fn a_cut_at_any_write_leaves_the_old_or_the_new_configuration() {
+    // Seven records to a sector: eleven erases of sectors in use.
+    let cuts = cut_everywhere(log::<SMALL, 1>, 1..80) + cut_everywhere(log::<SMALL, 4>, 1..80);
+    assert!(cuts > 20_000, "{cuts}");
+}
+
+#[test]
+fn a_cut_around_the_erase_of_a_real_sector_leaves_the_old_or_the_new_configuration() {
+    // The changes that fill the two sectors, those that erase them, and those after.
+    let cuts = cut_everywhere(log::<REAL, 1>, 2044..2050);
+    assert!(cuts > 1000, "{cuts}");
+}
+
+/// The bench sees a configuration that is lost: this storage comes up with the default one.
+#[test]
+#[should_panic(expected = "is neither")]
+fn copies_that_share_a_sector_would_not_pass() {
+    cut_everywhere(|flash| OneSector(flash.clone()), 1..5);
+}
+
+#[test]
+fn memory_that_held_something_else_is_as_good_as_new() {
+    let mut ram = Ram::new();
+    for seed in 0..200 {
+        let flash = Flash::<SMALL, 1>::new(4);
+        flash.fill_with_noise(seed);
+        assert_eq!(ram.power_up(log(&flash)).configuration(), Configuration::default());
+        for number in 1..20 {
+            ram.power_up(log(&flash)).configure(&configuration(number));
+            assert_eq!(ram.power_up(log(&flash)).configuration(), configuration(number), "seed {seed}");
+        }
+    }
+}
+
+#[test]
+fn an_erase_is_as_rare_as_the_documentation_says() {
+    assert_eq!(FlashLog::<Flash<REAL, 1>>::RECORDS_PER_SECTOR, 1023);
+    assert_eq!(FlashLog::<Flash<{ 128 * 1024 }, 1>>::RECORDS_PER_SECTOR, 8191);
+    // One erase prepares each sector; after that the copies take turns.
+    let changes = [(1, [1, 0]), (2, [1, 1]), (2046, [1, 1]), (2047, [2, 1]), (2048, [2, 2]), (4092, [2, 2])];
+    for (last, [first, second]) in changes {
+        let flash = stored(log::<REAL, 1>, 1..last + 1);
+        assert_eq!(flash.erased(), [0, first, second, 0], "after {last} changes");
+    }
+}
+
+#[test]
+fn the_log_says_how_many_records_are_left() {
+    let flash = Flash::<SMALL, 1>::new(3);
+    let mut log = FlashLog::new(flash.clone(), [0, 256], &HEALTH).unwrap();
+    assert_eq!(log.records_left(CopyNumber::First), Ok(0));
+    for left in (0..7).rev() {
+        log.write(CopyNumber::First, &[left; RECORD_LEN]).unwrap();
+        assert_eq!(log.records_left(CopyNumber::First), Ok(left.into()));
+    }
+    assert_eq!(flash.erased(), [1, 0, 0]);
+    log.write(CopyNumber::First, &[7; RECORD_LEN]).unwrap();
+    assert_eq!((log.records_left(CopyNumber::First), flash.erased()), (Ok(6), vec![2, 0, 0]));
+    flash.cut_after(0, 0);
+    assert_eq!(log.records_left(CopyNumber::Second), Err(PowerCut));
+}
+
+#[test]
+fn writes_and_erases_are_counted() {
+    let health = FlashHealth::new();
+    let mut log = FlashLog::new(Flash::<SMALL, 4>::new(2), [0, 128], &health).unwrap();
+    for number in 0..8 {
+        log.write(CopyNumber::Second, &[number; RECORD_LEN]).unwrap();
+    }
+    assert_eq!((health.writes.get(), health.erases.get()), (8, 2));
+}
+
+#[test]
+fn sectors_that_cannot_hold_the_copies_are_refused() {
+    let flash = Flash::<SMALL, 1>::new(4);
+    for sectors in [[0, 0], [0, 64], [0, 512], [512, 0], [0, u32::MAX - 127]] {
+        assert_eq!(FlashLog::new(flash.clone(), sectors, &HEALTH).err(), Some(BadSectors), "{sectors:?}");
+    }
+    assert!(FlashLog::new(flash, [384, 0], &HEALTH).is_ok());
+}
