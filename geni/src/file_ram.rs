@@ -16,16 +16,13 @@ pub struct FileRam {
 }
 
 impl FileRam {
-    /// The window that begins `base` bytes into the file. The file is made long enough to hold it.
+    /// The window that begins `base` bytes into the file.
     ///
     /// # Errors
     ///
-    /// When the length of the file can neither be found nor changed.
+    /// When the file ends before the window does, or its length cannot be found.
     pub fn new(file: File, base: u64) -> io::Result<FileRam> {
-        let end = base.saturating_add(RAM_LEN as u64);
-        if file.metadata()?.len() < end {
-            file.set_len(end)?;
-        }
+        check_length(&file, base)?;
         Ok(FileRam { file, base, error: Cell::new(None) })
     }
 
@@ -74,13 +71,27 @@ impl SharedRam for FileRam {
     }
 }
 
+/// Whether there is room for a window from `base` on.
+pub(crate) fn check_length(file: &File, base: u64) -> io::Result<()> {
+    match base.checked_add(RAM_LEN as u64) {
+        Some(end) if end <= file.metadata()?.len() => Ok(()),
+        _ => Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the file ends before the window does")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn file(len: u64) -> File {
+        let file = tempfile::tempfile().expect("a temporary file");
+        file.set_len(len).expect("room");
+        file
+    }
+
     #[test]
     fn two_windows_of_one_file_see_the_same_bytes() {
-        let file = tempfile::tempfile().expect("a temporary file");
+        let file = file(0x4100);
         let other = file.try_clone().expect("a second handle");
         let mut host = FileRam::new(file, 0x100).expect("a window");
         let board = FileRam::new(other, 0x100).expect("a window");
@@ -97,12 +108,23 @@ mod tests {
 
     #[test]
     fn a_file_that_got_shorter_reads_as_ones() {
-        let file = tempfile::tempfile().expect("a temporary file");
+        let file = file(0x4000);
         let other = file.try_clone().expect("a second handle");
         let ram = FileRam::new(file, 0).expect("a window");
         other.set_len(0).expect("truncated");
         assert_eq!(ram.read(0), 0xFF);
         assert_eq!(ram.take_error(), Some(io::ErrorKind::UnexpectedEof));
         assert_eq!(ram.take_error(), None);
+    }
+
+    #[test]
+    fn a_file_that_is_too_short_is_no_window_and_stays_as_it_is() {
+        for (len, base) in [(0, 0), (0x3FFF, 0), (0x4000, 1), (0x4000, u64::MAX)] {
+            let file = file(len);
+            let other = file.try_clone().expect("a second handle");
+            let error = FileRam::new(file, base).expect_err("too short");
+            assert_eq!(error.kind(), io::ErrorKind::UnexpectedEof, "{len} {base}");
+            assert_eq!(other.metadata().expect("a file").len(), len);
+        }
     }
 }

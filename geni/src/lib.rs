@@ -4,9 +4,8 @@
 //! to say is found in that RAM, and everything the host wants is written there: settings, commands, datagrams,
 //! data that is repeated in every bus scan.
 //!
-//! - [`SharedRam`] is how the RAM is reached: [`WindowRam`] is a window in the memory of a processor,
-//!   `FileRam` a file
-//!   (feature `std`), [`ArrayRam`] an array for tests.
+//! - [`SharedRam`] is how the RAM is reached: [`WindowRam`] is a window in the memory of a processor, [`ArrayRam`] an
+//!   array for tests. With feature `std`, on Unix, `FileRam` is a file and `MappedRam` memory behind one.
 //! - [`map`] says where each table is; one module per table says what is in it.
 //! - [`Driver`] does the talking. The host calls [`Driver::poll`] as often as it can with its millisecond
 //!   count, sets the reset line to [`Driver::reset_held`] afterwards, and deals with the [`Event`] that comes back.
@@ -54,6 +53,8 @@ mod interrupts;
 mod io_tables;
 mod lockout;
 pub mod map;
+#[cfg(feature = "std")]
+mod mapped_ram;
 mod options;
 mod ram;
 mod request_queue;
@@ -75,6 +76,8 @@ pub use event::{CommandError, ConfigurationOutcome, DeviceChange, Event, Failure
 pub use file_ram::FileRam;
 pub use interrupts::Interrupts;
 pub use io_tables::{TableError, Tables};
+#[cfg(feature = "std")]
+pub use mapped_ram::MappedRam;
 pub use options::{Options, Requests, Start};
 pub use ram::{ArrayRam, RAM_LEN, SharedRam};
 pub use request_queue::{

@@ -42,7 +42,8 @@ pub(crate) struct Cli {
 pub(crate) struct ConnectionArgs {
     /// Serial port of the unit (/dev/ttyUSB0, COM3), tcp://HOST:PORT, or geni:FILE?node=N on a Genius bus.
     ///
-    /// FILE is the window that this computer shares with its GENI board, N the unit's number on the bus.
+    /// FILE is the window that this computer shares with its GENI board, N the unit's number on the bus. For a board in
+    /// this computer FILE is a device for memory; &offset=0x… says where in it the window begins.
     #[arg(short, long, global = true, env = "SER_PORT", value_name = "PORT")]
     pub(crate) port: Option<String>,
 
@@ -223,6 +224,15 @@ mod tests {
             "sim --node 5",
             "sim --genius /tmp/host --node 32",
             "sim --genius /tmp/host --node 5:ser640",
+            "sim --genius /tmp/host --node 5 --bus-rate 19200",
+            "sim --genius /tmp/host --node 5 --host-number 32",
+            "sim --genius /tmp/host --node 5 --bus-noise 101",
+            "sim --genius /tmp/host --node 5 --bus-noise -1",
+            "sim --genius /tmp/host --node 5 --bus-noise nan",
+            "sim --genius /tmp/host --node 5 --seed 1",
+            "sim --bus-rate 38.4K",
+            "sim --host-number 1",
+            "sim --bus-noise 1",
             "",
         ] {
             let words = std::iter::once("ser-cli").chain(line.split_whitespace());

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use ser_client::{Diagnosis, Endpoint, GeniusError, LineRate, OpenError, Options, RequestError, Unit};
+use ser_client::{
+    Diagnosis, Endpoint, GeniWindow, GeniusError, LineRate, OpenError, Options, RequestError, Unit,
+};
 use ser_proto::{Baud, Configuration};
 
 use crate::cli::ConnectionArgs;
@@ -14,9 +16,12 @@ pub(crate) fn port_text(connection: &ConnectionArgs) -> Result<&str> {
 }
 
 fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint> {
+    use ser_client::EndpointError::{GeniFile, GeniNode, GeniOffset, GeniQuery};
     port_text(connection)?.parse().map_err(|error| {
-        Failure::usage(format!("--port: {error}"))
-            .hint("ser-cli ports lists the serial ports of this computer")
+        Failure::usage(format!("--port: {error}")).hint(match error {
+            GeniFile | GeniNode | GeniOffset | GeniQuery => "ser-cli genius --help has examples",
+            _ => "ser-cli ports lists the serial ports of this computer",
+        })
     })
 }
 
@@ -26,11 +31,12 @@ pub(crate) fn unit_name(connection: &ConnectionArgs) -> Result<String> {
     let text = port_text(connection)?;
     // Elsewhere the names of ports are no paths.
     if cfg!(unix)
-        && let Endpoint::Geni { file, node } = endpoint(connection)?
-        && let Ok(path) = std::path::absolute(&file)
+        && let Endpoint::Geni { window, node } = endpoint(connection)?
+        && let Ok(path) = std::path::absolute(&window.file)
         && let Some(path) = path.to_str()
     {
-        return Ok(Endpoint::Geni { file: path.to_owned(), node }.to_string());
+        let window = GeniWindow { file: path.to_owned(), ..window };
+        return Ok(Endpoint::Geni { window, node }.to_string());
     }
     if cfg!(unix)
         && matches!(endpoint(connection)?, Endpoint::Serial { .. })
@@ -70,12 +76,12 @@ pub(crate) fn options(connection: &ConnectionArgs) -> Options {
 /// Joins the Genius bus, whichever unit on it is named.
 #[cfg(unix)]
 pub(crate) fn open_bus(connection: &ConnectionArgs) -> Result<ser_client::GeniHost> {
-    let Endpoint::Geni { file, .. } = endpoint(connection)? else {
+    let Endpoint::Geni { window, .. } = endpoint(connection)? else {
         return Err(Failure::usage(format!("{} is no Genius bus", port_text(connection)?))
             .hint("name the window of this host's GENI board, as in --port geni:/dev/shm/host")
             .hint("no board at hand? ser-cli sim --genius /dev/shm/host --node 5"));
     };
-    ser_client::GeniHost::open(&file, options(connection).timeout).map_err(|error| open_failure(&error))
+    ser_client::GeniHost::open(window, options(connection).timeout).map_err(|error| open_failure(&error))
 }
 
 fn no_port() -> Failure {
@@ -90,13 +96,18 @@ fn no_port() -> Failure {
 }
 
 fn open_failure(error: &OpenError) -> Failure {
-    let failure = Failure::new(error).hint(error.hint());
+    let failure = match error {
+        OpenError::NoNode { .. } => Failure::usage(error),
+        _ => Failure::new(error),
+    };
+    let failure = failure.hint(error.hint());
     match error {
         OpenError::NoSuchPort { .. } | OpenError::NotSerial { .. } => {
             failure.hint("ser-cli ports lists them")
         }
-        OpenError::Genius { error: GeniusError::NotOnBus { .. }, path } => {
-            failure.hint(format!("ser-cli genius devices --port geni:{path} lists them"))
+        OpenError::Genius { error: GeniusError::NotOnBus { .. }, path } | OpenError::NoNode { path } => {
+            failure
+                .hint(format!("ser-cli genius devices --port geni:{path} lists the devices that are there"))
         }
         _ => failure,
     }
@@ -143,7 +154,13 @@ pub(crate) fn explain_silence(failure: Failure, connection: &ConnectionArgs) -> 
 /// What went wrong on a Genius bus, with advice.
 impl From<GeniusError> for Failure {
     fn from(error: GeniusError) -> Failure {
-        Failure::new(error).hint(error.hint())
+        let failure = Failure::new(error).hint(error.hint());
+        match error {
+            GeniusError::NotOnBus { .. } => {
+                failure.hint("ser-cli genius devices lists the devices that are there")
+            }
+            _ => failure,
+        }
     }
 }
 

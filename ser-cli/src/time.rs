@@ -37,6 +37,11 @@ pub(crate) fn local_time_in(ahead: std::time::Duration) -> Result<TimeStamp, i32
     stamp((Local::now() + ahead).naive_local())
 }
 
+/// The local time, written as a stamp is.
+pub(crate) fn local_now() -> impl fmt::Display {
+    Local::now().format("%Y-%m-%dT%H:%M:%S%.3f")
+}
+
 /// The time `elapsed` after `time`, which is a date; past the year 2069 it stays the same.
 pub(crate) fn time_after(time: TimeStamp, elapsed: std::time::Duration) -> TimeStamp {
     let elapsed = TimeDelta::from_std(elapsed).unwrap_or_default();

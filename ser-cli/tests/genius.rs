@@ -16,6 +16,9 @@ use tempfile::TempDir;
 /// For recorders that are there, on such a machine. A board also gets so long to give a sign of life.
 const PATIENT_TIMEOUT: &str = "10s";
 
+/// On a noisy bus a question gets lost now and then.
+const RETRIES: &str = "10";
+
 /// A bus made with `ser-cli sim`, whose contacts are moved through its standard input.
 struct Bench {
     folder: TempDir,
@@ -51,7 +54,7 @@ impl Bench {
         command
             .env("SER_PORT", port)
             .env("SER_STATE_DIR", self.folder.path().join("state"))
-            .args(["--timeout", PATIENT_TIMEOUT])
+            .args(["--timeout", PATIENT_TIMEOUT, "--retries", RETRIES])
             .args(arguments.split_whitespace());
         command
     }
@@ -67,8 +70,12 @@ impl Bench {
 
     /// The same for a command to the bus.
     fn on_bus(&self, arguments: &str) -> String {
-        let port = format!("geni:{}", self.window().display());
-        succeeded(arguments, &self.command(&port, arguments).output().expect("ser-cli runs"))
+        succeeded(arguments, &self.command(&self.bus(), arguments).output().expect("ser-cli runs"))
+    }
+
+    /// The bus as a whole.
+    fn bus(&self) -> String {
+        format!("geni:{}", self.window().display())
     }
 
     /// Moves contacts, and waits until a recorder has so many entries in all.
@@ -181,8 +188,7 @@ fn the_bus_is_seen_and_spoken_to_as_a_whole() {
     assert!(stamp(5).is_some_and(|stamp| stamp.starts_with("2026-11-22T10:")));
     assert_eq!(stamp(5), stamp(9));
 
-    let port = format!("geni:{}", bench.window().display());
-    let refused = bench.command(&port, "genius broadcast erase").output().expect("ser-cli runs");
+    let refused = bench.command(&bench.bus(), "genius broadcast erase").output().expect("ser-cli runs");
     assert_eq!((refused.status.code(), stderr(&refused).contains("--yes")), (Some(2), true));
     assert!(bench.on_bus("genius broadcast stop").matches("yes").count() == 2);
     assert!(bench.ok(9, "status").contains("stopped"));
@@ -242,7 +248,10 @@ fn each_mistake_has_a_message_of_its_own() {
         (format!("geni:{host}?node=7"), 1, "device 7 is not on the bus"),
         (format!("geni:{host}?node=31"), 1, "31 is the number of this host's own board"),
         (format!("geni:{host}?node=32"), 2, "a unit's number on the bus is 0 to 31"),
-        (format!("geni:{host}"), 1, "no unit on the bus"),
+        (format!("geni:{host}?node=5&offset=1"), 1, "has 16384 bytes and cannot be a GENI window"),
+        (format!("geni:{host}?node=5&offset=x"), 2, "an offset is a number of bytes"),
+        (format!("geni:{host}?node=5&node=6"), 2, "each once"),
+        (format!("geni:{host}"), 2, "the window to a whole bus"),
         ("geni:".to_string(), 2, "geni: needs the window of a GENI board"),
     ] {
         let output = bench.command(&port, "status").output().expect("ser-cli runs");
@@ -255,13 +264,70 @@ fn each_mistake_has_a_message_of_its_own() {
     assert!(stderr(&output).contains("is no Genius bus"), "{}", stderr(&output));
 
     // Nobody's file is overwritten, and no number given twice.
-    for (arguments, message) in [
-        ("--genius short --node 5", "is no GENI window"),
-        ("--genius new --node 5 --node 5", "--node 5 is given twice"),
+    for (arguments, code, message) in [
+        ("--genius short --node 5", 1, "is no GENI window"),
+        ("--genius new --node 5 --node 5", 2, "--node 5 is given twice"),
+        (
+            "--genius new --node 5 --node 9 --host-number 9",
+            2,
+            "9 is the number of a --node, and the host's too",
+        ),
+        ("--genius new --node 5 --image none", 1, "cannot open the image none"),
     ] {
         let mut sim = ser_cli();
         sim.arg("sim").args(arguments.split_whitespace()).current_dir(bench.folder.path());
         let output = sim.output().expect("ser-cli runs");
-        assert!(!output.status.success() && stderr(&output).contains(message), "{}", stderr(&output));
+        let told = stderr(&output);
+        assert_eq!(output.status.code(), Some(code), "{arguments}: {told}");
+        assert!(told.contains(message) && told.contains("hint: "), "{arguments}: {told}");
+        assert!(!bench.folder.path().join("new").exists(), "{arguments}");
     }
+}
+
+#[test]
+fn a_bus_may_be_slow_and_noisy_and_its_host_have_any_number() {
+    let mut bench =
+        Bench::start("--node 5 --node 9:ser160 --bus-rate 38.4k --host-number 0 --bus-noise 0.5 --seed 3");
+    let taps = (0..30).map(|tap| format!("\n{},1,{},5", tap * 2, 1 - tap % 2));
+    let csv = std::iter::once("ms,input,state,node".to_string()).chain(taps).collect::<String>();
+    bench.play(&csv, 5, 30);
+    let rows = without_times(&bench.ok(5, "read --all --format csv"));
+    let expected = (1..=30).map(|entry| format!("{entry},1,{}", entry % 2));
+    assert_eq!(rows[1..], expected.collect::<Vec<_>>(), "neither lost nor doubled");
+    let devices = bench.command(&bench.bus(), "genius devices").output().expect("ser-cli runs");
+    let told = stderr(&devices);
+    // At the usual rate it takes 3 ms; with a datagram in it a little longer.
+    assert!(told.contains("this host is 0; a bus scan takes 1"), "{told}");
+    assert!(!told.contains("since its board started: 0"), "{told}");
+}
+
+#[test]
+fn inputs_are_followed_live_until_ctrl_c() {
+    let mut bench = Bench::start("--node 5 --node 9:ser160");
+    let mut command = bench.command(&bench.bus(), "genius globals --follow");
+    let mut follow =
+        Running(command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("ser-cli runs"));
+    let rows = follow.lines();
+    let shown = |expected: &str| {
+        let row = rows.recv_timeout(PATIENCE).expect("a row");
+        assert_eq!(row.get(23..), Some(expected));
+    };
+    shown("  node  inputs  on");
+    shown("     5      32  none");
+    shown("     9      16  none");
+    let input = bench.sim.0.stdin.as_mut().expect("piped");
+    writeln!(input, "ms,input,state,node\n0,3,1,5\n\n").expect("the simulator listens");
+    shown("     5      32  3");
+    let input = bench.sim.0.stdin.as_mut().expect("piped");
+    writeln!(input, "ms,input,state,node\n0,16,1,9\n\n").expect("the simulator listens");
+    shown("     9      16  16");
+    assert_eq!(follow.interrupt(), Some(0));
+}
+
+#[test]
+fn a_window_may_be_mapped_into_memory() {
+    let bench = Bench::start("--node 5");
+    let mapped = format!("{}&offset=0", bench.port(5));
+    let status = bench.command(&mapped, "status").output().expect("ser-cli runs");
+    assert!(succeeded("status", &status).contains("recording"));
 }

@@ -16,6 +16,11 @@ pub enum Diagnosis {
         /// Its number.
         node: u8,
     },
+    /// The unit is on the Genius bus, and what was sent to it last did not arrive.
+    Unacknowledged {
+        /// Its number.
+        node: u8,
+    },
     /// Bytes arrived and none of them made sense: most likely the wrong baud rate.
     Garbage {
         /// How many bytes.
@@ -67,7 +72,10 @@ impl Diagnosis {
                 "check power, port, cable (null modem?) and baud rate (units are delivered with 9600)"
             }
             Diagnosis::SilentOnBus { .. } => {
-                "is this device a recorder, and is the bus free of errors? Or wait longer for the answer"
+                "is this device a recorder, is it running, and is the bus free of errors? Or wait longer for the answer"
+            }
+            Diagnosis::Unacknowledged { .. } => {
+                "try again; if it persists, look for errors on the bus: cable, terminators, a second device of this number"
             }
             Diagnosis::Garbage { .. } => "try another baud rate; units are delivered with 9600",
             Diagnosis::Damaged { .. } => "check cable, shielding and ground, or choose a lower baud rate",
@@ -85,6 +93,9 @@ impl fmt::Display for Diagnosis {
             Diagnosis::Silent => write!(f, "not one byte came back"),
             Diagnosis::SilentOnBus { node } => {
                 write!(f, "device {node} is on the bus and does not reply")
+            }
+            Diagnosis::Unacknowledged { node } => {
+                write!(f, "device {node} is on the bus and the question did not get through to it")
             }
             Diagnosis::Garbage { bytes } => write!(f, "{bytes} bytes came back and none made sense"),
             Diagnosis::Damaged { frames } => write!(f, "{frames} damaged frames came back"),

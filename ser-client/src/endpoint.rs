@@ -8,9 +8,10 @@ use ser_proto::genius::Device;
 
 const TCP_PREFIX: &str = "tcp://";
 const GENI_PREFIX: &str = "geni:";
-const NODE_QUERY: &str = "?node=";
+const NODE: &str = "node";
+const OFFSET: &str = "offset";
 
-/// Where a unit is reached: `tcp://HOST:PORT`, `geni:FILE?node=N`, or the path or name of a serial port.
+/// Where a unit is reached: `tcp://HOST:PORT`, `geni:FILE?node=N&offset=X`, or the path or name of a serial port.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Endpoint {
@@ -26,11 +27,28 @@ pub enum Endpoint {
     },
     /// A Genius bus, through the window that this host shares with its GENI board.
     Geni {
-        /// The file that is the window.
-        file: String,
+        /// The window.
+        window: GeniWindow,
         /// The unit's number on the bus, 0-31; `None` for the bus as a whole.
         node: Option<u8>,
     },
+}
+
+/// The window that a host shares with its GENI board: 16 KiB, in a file or in memory.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct GeniWindow {
+    /// A file that is the window, a device that gives access to memory, or a file that stands for memory.
+    pub file: String,
+    /// Where in the memory the window begins, in bytes. `None` for a file that is the window and nothing else; for a
+    /// device it is the same as 0.
+    pub offset: Option<u64>,
+}
+
+/// A file that is the window, or a device with nothing before it.
+impl From<&str> for GeniWindow {
+    fn from(file: &str) -> GeniWindow {
+        GeniWindow { file: file.to_owned(), offset: None }
+    }
 }
 
 impl Endpoint {
@@ -50,8 +68,12 @@ pub enum EndpointError {
     TcpAddress,
     /// `geni:` is not followed by a file.
     GeniFile,
-    /// What follows `?node=` is no number of 0–31.
+    /// What follows `node=` is no number of 0–31.
     GeniNode,
+    /// What follows `offset=` is no number of bytes.
+    GeniOffset,
+    /// A node or an offset is given twice, or something else with them.
+    GeniQuery,
     /// Something like `udp://…`.
     UnknownScheme,
 }
@@ -85,16 +107,42 @@ impl FromStr for Endpoint {
 }
 
 fn geni(window: &str) -> Result<Endpoint, EndpointError> {
-    let (file, node) = match window.rsplit_once(NODE_QUERY) {
-        Some((file, number)) => (file, Some(number)),
-        None => (window, None),
+    let (file, query) = match window.rsplit_once('?') {
+        // A file may be called anything.
+        Some((file, query)) if [NODE, OFFSET].iter().any(|key| is_about(query, key)) => (file, query),
+        _ => (window, ""),
     };
     if file.is_empty() {
         return Err(EndpointError::GeniFile);
     }
-    let number = |text: &str| text.parse().ok().and_then(Device::new).map(Device::number);
-    let node = node.map(|text| number(text).ok_or(EndpointError::GeniNode)).transpose()?;
-    Ok(Endpoint::Geni { file: file.to_owned(), node })
+    let (mut node, mut offset) = (None, None);
+    for part in query.split('&').filter(|part| !part.is_empty()) {
+        let given_before = match part.split_once('=') {
+            Some((NODE, text)) => node.replace(node_number(text).ok_or(EndpointError::GeniNode)?).is_some(),
+            Some((OFFSET, text)) => offset.replace(bytes(text).ok_or(EndpointError::GeniOffset)?).is_some(),
+            _ => true,
+        };
+        if given_before {
+            return Err(EndpointError::GeniQuery);
+        }
+    }
+    Ok(Endpoint::Geni { window: GeniWindow { file: file.to_owned(), offset }, node })
+}
+
+fn is_about(query: &str, key: &str) -> bool {
+    query.strip_prefix(key).is_some_and(|rest| rest.starts_with('='))
+}
+
+fn node_number(text: &str) -> Option<u8> {
+    text.parse().ok().and_then(Device::new).map(Device::number)
+}
+
+/// In decimal, or in hex after `0x`.
+fn bytes(text: &str) -> Option<u64> {
+    match text.strip_prefix("0x") {
+        Some(hex) => u64::from_str_radix(hex, 16).ok(),
+        None => text.parse().ok(),
+    }
 }
 
 impl fmt::Display for Endpoint {
@@ -102,8 +150,17 @@ impl fmt::Display for Endpoint {
         match self {
             Endpoint::Serial { path } => f.write_str(path),
             Endpoint::Tcp { address } => write!(f, "{TCP_PREFIX}{address}"),
-            Endpoint::Geni { file, node: Some(node) } => write!(f, "{GENI_PREFIX}{file}{NODE_QUERY}{node}"),
-            Endpoint::Geni { file, node: None } => write!(f, "{GENI_PREFIX}{file}"),
+            Endpoint::Geni { window: GeniWindow { file, offset }, node } => {
+                write!(f, "{GENI_PREFIX}{file}")?;
+                if let Some(node) = node {
+                    write!(f, "?{NODE}={node}")?;
+                }
+                match (offset, node) {
+                    (Some(offset), Some(_)) => write!(f, "&{OFFSET}={offset:#X}"),
+                    (Some(offset), None) => write!(f, "?{OFFSET}={offset:#X}"),
+                    (None, _) => Ok(()),
+                }
+            }
         }
     }
 }
@@ -119,6 +176,12 @@ impl fmt::Display for EndpointError {
                 "geni: needs the window of a GENI board, as in geni:/dev/shm/host?node=5"
             }
             EndpointError::GeniNode => "a unit's number on the bus is 0 to 31, as in geni:FILE?node=5",
+            EndpointError::GeniOffset => {
+                "an offset is a number of bytes, as in geni:/dev/mem?node=5&offset=0xD0000"
+            }
+            EndpointError::GeniQuery => {
+                "after the file come node and offset, each once, as in geni:FILE?node=5&offset=0xD0000"
+            }
             EndpointError::UnknownScheme => {
                 "a port is tcp://HOST:PORT or the name of a serial port, as in /dev/ttyUSB0"
             }
@@ -149,18 +212,24 @@ mod tests {
     }
 
     #[test]
-    fn a_geni_window_may_name_a_node() {
-        for (text, file, node) in [
-            ("geni:/dev/shm/host?node=5", "/dev/shm/host", Some(5)),
-            ("geni:host?node=0", "host", Some(0)),
-            ("geni:a?node=1?node=31", "a?node=1", Some(31)),
-            ("geni:host", "host", None),
+    fn a_geni_window_may_name_a_node_and_an_offset() {
+        for (text, file, node, offset) in [
+            ("geni:/dev/shm/host?node=5", "/dev/shm/host", Some(5), None),
+            ("geni:host?node=0", "host", Some(0), None),
+            ("geni:a?node=1?node=31", "a?node=1", Some(31), None),
+            ("geni:host", "host", None, None),
+            ("geni:a?b", "a?b", None, None),
+            ("geni:/dev/mem?node=5&offset=0xD0000", "/dev/mem", Some(5), Some(0xD0000)),
+            ("geni:resource0?offset=0x0", "resource0", None, Some(0)),
         ] {
             let endpoint: Endpoint = text.parse().unwrap();
-            assert_eq!(endpoint, Endpoint::Geni { file: file.to_owned(), node });
+            let window = GeniWindow { offset, ..GeniWindow::from(file) };
+            assert_eq!(endpoint, Endpoint::Geni { window, node });
             assert_eq!(endpoint.to_string(), text);
             assert!(!endpoint.has_baud());
         }
+        let endpoint: Endpoint = "geni:/dev/uio0?offset=4096&node=5".parse().unwrap();
+        assert_eq!(endpoint.to_string(), "geni:/dev/uio0?node=5&offset=0x1000");
     }
 
     #[test]
@@ -179,6 +248,11 @@ mod tests {
             ("geni:host?node=", EndpointError::GeniNode),
             ("geni:host?node=32", EndpointError::GeniNode),
             ("geni:host?node=x", EndpointError::GeniNode),
+            ("geni:host?offset=", EndpointError::GeniOffset),
+            ("geni:host?offset=-1", EndpointError::GeniOffset),
+            ("geni:host?offset=0x10000000000000000", EndpointError::GeniOffset),
+            ("geni:host?node=5&node=5", EndpointError::GeniQuery),
+            ("geni:host?node=5&rate=1", EndpointError::GeniQuery),
             ("udp://host:1", EndpointError::UnknownScheme),
         ] {
             assert_eq!(text.parse::<Endpoint>(), Err(error), "{text:?}");

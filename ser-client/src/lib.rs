@@ -37,11 +37,11 @@ mod unsolicited;
 pub use counters::Counters;
 pub use cursor::{Cursor, Delivery, Lost};
 pub use diagnosis::Diagnosis;
-pub use endpoint::{Endpoint, EndpointError};
+pub use endpoint::{Endpoint, EndpointError, GeniWindow};
 pub use follower::{LogFollower, Step};
-pub use genius::{BlockKind, DeviceRecord, GeniusError};
+pub use genius::{BlockKind, BoardStatus, DeviceRecord, GeniusError};
 #[cfg(unix)]
-pub use genius::{BusDevice, GeniHost};
+pub use genius::{BusDevice, Clock, GeniHost, RealTime};
 pub use line_rate::LineRate;
 pub use log_position::LogPosition;
 pub use open::{OpenError, open};

@@ -9,14 +9,11 @@ pub(crate) trait Link: Send {
     /// Sends what the attempt is about.
     fn send(&mut self, attempt: &Attempt<'_>) -> Result<(), TransportError>;
 
-    /// Waits up to `timeout` and gives the session what arrived, which is so many bytes. `epoch` is the session's
-    /// time zero.
-    fn receive(
-        &mut self,
-        session: &mut Session,
-        epoch: Instant,
-        timeout: Duration,
-    ) -> Result<usize, TransportError>;
+    /// Waits up to `timeout` and gives the session what arrived, which is so many bytes.
+    fn receive(&mut self, session: &mut Session, timeout: Duration) -> Result<usize, TransportError>;
+
+    /// The time that a session on this link goes by.
+    fn now(&self) -> Duration;
 
     /// How long it takes from [`send`](Self::send) until the attempt's last byte arrives, about.
     fn delay(&self, attempt: &Attempt<'_>) -> Duration;
@@ -35,23 +32,31 @@ pub(crate) trait Link: Send {
 }
 
 /// A serial line, or TCP: frames between bytes of text.
-pub(crate) struct SerialLink(pub(crate) Box<dyn Transport>);
+pub(crate) struct SerialLink {
+    transport: Box<dyn Transport>,
+    epoch: Instant,
+}
+
+impl SerialLink {
+    pub(crate) fn new(transport: Box<dyn Transport>) -> SerialLink {
+        SerialLink { transport, epoch: Instant::now() }
+    }
+}
 
 impl Link for SerialLink {
     fn send(&mut self, attempt: &Attempt<'_>) -> Result<(), TransportError> {
-        Ok(self.0.write_all(attempt.frame())?)
+        Ok(self.transport.write_all(attempt.frame())?)
     }
 
-    fn receive(
-        &mut self,
-        session: &mut Session,
-        epoch: Instant,
-        timeout: Duration,
-    ) -> Result<usize, TransportError> {
+    fn receive(&mut self, session: &mut Session, timeout: Duration) -> Result<usize, TransportError> {
         let mut buf = [0; 1024];
-        let count = self.0.read(&mut buf, timeout)?;
-        session.process(epoch.elapsed(), buf.get(..count).unwrap_or_default());
+        let count = self.transport.read(&mut buf, timeout)?;
+        session.process(self.now(), buf.get(..count).unwrap_or_default());
         Ok(count)
+    }
+
+    fn now(&self) -> Duration {
+        self.epoch.elapsed()
     }
 
     fn delay(&self, attempt: &Attempt<'_>) -> Duration {
@@ -59,11 +64,11 @@ impl Link for SerialLink {
     }
 
     fn set_baud(&mut self, bits_per_second: u32) -> Result<(), TransportError> {
-        Ok(self.0.set_baud(bits_per_second)?)
+        Ok(self.transport.set_baud(bits_per_second)?)
     }
 
     fn bits_per_second(&self) -> Option<u32> {
-        self.0.bits_per_second()
+        self.transport.bits_per_second()
     }
 
     fn diagnose(&self, diagnosis: Diagnosis) -> Diagnosis {

@@ -13,7 +13,7 @@ pub fn open(endpoint: &Endpoint, baud: u32) -> Result<Box<dyn Transport>, OpenEr
     match endpoint {
         Endpoint::Serial { path } => Ok(Box::new(SerialTransport::open(path, baud)?)),
         Endpoint::Tcp { address } => Ok(Box::new(TcpTransport::connect(address)?)),
-        Endpoint::Geni { file, node } => Err(no_line(file, *node)),
+        Endpoint::Geni { window, node } => Err(no_line(&window.file, *node)),
     }
 }
 
@@ -80,7 +80,19 @@ pub enum OpenError {
         /// What was asked for.
         path: String,
     },
-    /// The file has another size than a GENI window.
+    /// The device, or the file, gives no access to memory that could be a GENI window.
+    NoMemory {
+        /// What was asked for.
+        path: String,
+        /// What the system says.
+        error: io::Error,
+    },
+    /// The user may not use the GENI window.
+    WindowDenied {
+        /// The file.
+        path: String,
+    },
+    /// The file has another size than a GENI window, or ends before the window does.
     WindowSize {
         /// The file.
         path: String,
@@ -139,7 +151,13 @@ impl OpenError {
                 "check the name; is the program that makes the window (ser-cli sim --genius FILE) running?"
             }
             OpenError::NotAWindow { .. } => "name the file that this host shares with its GENI board",
-            OpenError::WindowSize { .. } => "a GENI window has 16 KiB (16384 bytes): is this the right file?",
+            OpenError::NoMemory { .. } => {
+                "name a device for memory, and check the offset of the window in it"
+            }
+            OpenError::WindowDenied { .. } => "ask for the right to read and write it",
+            OpenError::WindowSize { .. } => {
+                "a GENI window is a file of 16384 bytes; in a file for memory, add where it begins: offset=0"
+            }
             OpenError::WindowInUse { .. } => "wait until the other program has ended, or end it",
             OpenError::NoNode { .. } => "say which unit on the bus, as in geni:FILE?node=5",
             OpenError::Genius { error, .. } => error.hint(),
@@ -164,8 +182,14 @@ impl fmt::Display for OpenError {
             OpenError::WindowSize { path, len } => {
                 write!(f, "{path} has {len} bytes and cannot be a GENI window")
             }
+            OpenError::NoMemory { path, error } => {
+                write!(f, "{path} cannot be a GENI window: it gives no access to memory ({error})")
+            }
+            OpenError::WindowDenied { path } => write!(f, "no permission to use the GENI window {path}"),
             OpenError::WindowInUse { path } => write!(f, "the GENI window {path} is in use"),
-            OpenError::NoNode { path } => write!(f, "no unit on the bus behind {path} is named"),
+            OpenError::NoNode { path } => {
+                write!(f, "{path} is the window to a whole bus, and no unit on it is named")
+            }
             OpenError::Genius { path, error } => write!(f, "{error} (GENI window {path})"),
             OpenError::Other { name, error } => write!(f, "cannot open {name}: {error}"),
         }
@@ -175,7 +199,7 @@ impl fmt::Display for OpenError {
 impl Error for OpenError {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
-            OpenError::Other { error, .. } => Some(error),
+            OpenError::Other { error, .. } | OpenError::NoMemory { error, .. } => Some(error),
             OpenError::Genius { error, .. } => Some(error),
             _ => None,
         }

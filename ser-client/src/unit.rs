@@ -1,6 +1,6 @@
 //! A unit behind a line: blocking calls, one per thing that a recorder can do.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use ser_proto::{
     Baud, Code, Command, Configuration, Configure, LastBroadcast, Mode, Model, ReadReply, Reply, TimeStamp,
@@ -44,8 +44,6 @@ impl Default for Options {
 pub struct Unit {
     link: Box<dyn Link>,
     session: Session,
-    /// The session's time zero.
-    epoch: Instant,
     /// Where the log stood at the end of the last reading by cursor.
     last_position: Option<LogPosition>,
 }
@@ -57,7 +55,7 @@ impl Unit {
         let Options { timeout, retries } = options;
         let line_rate = LineRate::from(transport.bits_per_second());
         let session = Session::new(Timing { timeout, retries, line_rate });
-        Unit { link: Box::new(SerialLink(transport)), session, epoch: Instant::now(), last_position: None }
+        Unit { link: Box::new(SerialLink::new(transport)), session, last_position: None }
     }
 
     #[cfg(unix)]
@@ -65,7 +63,7 @@ impl Unit {
         let Options { timeout, retries } = options;
         let session = Session::new(Timing { timeout, retries, line_rate: LineRate::Instant });
         let link = Box::new(crate::genius::GeniusLink { host, node });
-        Unit { link, session, epoch: Instant::now(), last_position: None }
+        Unit { link, session, last_position: None }
     }
 
     /// Opens the way to a unit. `baud` is the rate of a serial port in bits per second.
@@ -75,9 +73,10 @@ impl Unit {
     pub fn open(endpoint: &Endpoint, baud: u32, options: Options) -> Result<Unit, OpenError> {
         match endpoint {
             #[cfg(unix)]
-            Endpoint::Geni { file, node: Some(node) } => {
-                let host = crate::GeniHost::open(file, options.timeout)?;
-                host.find(*node).map_err(|error| OpenError::Genius { path: file.clone(), error })?;
+            Endpoint::Geni { window, node: Some(node) } => {
+                let host = crate::GeniHost::open(window.clone(), options.timeout)?;
+                let path = &window.file;
+                host.find(*node).map_err(|error| OpenError::Genius { path: path.clone(), error })?;
                 Ok(host.unit(*node, options))
             }
             line => Ok(Unit::new(open(line, baud)?, options)),
@@ -405,11 +404,11 @@ impl Unit {
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<usize, RequestError> {
-        Ok(self.link.receive(&mut self.session, self.epoch, timeout)?)
+        Ok(self.link.receive(&mut self.session, timeout)?)
     }
 
     fn now(&self) -> Duration {
-        self.epoch.elapsed()
+        self.link.now()
     }
 }
 

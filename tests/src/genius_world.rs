@@ -164,6 +164,18 @@ impl World {
 
     /// Lets a millisecond pass.
     pub fn step(&mut self) {
+        self.step_without_host();
+        match self.host.driver.poll(u32::try_from(self.now_ms).expect("less than 49 days")) {
+            Some(Event::Received(received)) => self.host.inbox.push_back((self.now_ms, received)),
+            Some(Event::Sent(result)) => self.host.sent.push_back(result),
+            _ => {}
+        }
+        let held = self.host.driver.reset_held();
+        self.host.driver.ram_mut().drive_reset(held);
+    }
+
+    /// Lets a millisecond pass in which the host is left alone: it may be another one.
+    pub fn step_without_host(&mut self) {
         self.now_ms += 1;
         self.bus.borrow_mut().advance_to(self.now_ms * 1000);
         for Recorder { node, port, .. } in &mut self.recorders {
@@ -172,13 +184,6 @@ impl World {
             let held = port.reset_held();
             port.window().drive_reset(held);
         }
-        match self.host.driver.poll(u32::try_from(self.now_ms).expect("less than 49 days")) {
-            Some(Event::Received(received)) => self.host.inbox.push_back((self.now_ms, received)),
-            Some(Event::Sent(result)) => self.host.sent.push_back(result),
-            _ => {}
-        }
-        let held = self.host.driver.reset_held();
-        self.host.driver.ram_mut().drive_reset(held);
     }
 
     /// Lets time pass.

@@ -16,11 +16,20 @@ const EXAMPLES: &str = "\
 Examples:
   ser-cli genius devices --port geni:/dev/shm/host
   ser-cli genius globals --port geni:/dev/shm/host
+  ser-cli genius globals --follow
   ser-cli genius forces --node 5 --table input-values
   ser-cli genius broadcast clock
   ser-cli genius broadcast erase --yes
 
 The port is the window of this host's GENI board, without a node.";
+
+const GLOBALS_EXAMPLES: &str = "\
+Examples:
+  ser-cli genius globals
+  ser-cli genius globals --follow
+
+With --follow the bus is looked at ten times a second, and the time is that of this computer. What comes and goes \
+in between is not seen here: ser-cli watch shows every event, stamped by the recorder.";
 
 const FORCES_EXAMPLES: &str = "\
 Examples:
@@ -46,7 +55,12 @@ enum What {
     /// List the devices that are logged in.
     Devices,
     /// Show the live inputs of every recorder, all of one and the same bus scan.
-    Globals,
+    #[command(after_help = GLOBALS_EXAMPLES)]
+    Globals {
+        /// Go on and show every recorder again whose inputs have changed, until Ctrl-C.
+        #[arg(long)]
+        follow: bool,
+    },
     /// Show which inputs or outputs of a device are forced, and to what.
     #[command(after_help = FORCES_EXAMPLES)]
     Forces {
@@ -100,7 +114,7 @@ fn device(text: &str) -> std::result::Result<Device, String> {
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     match args.what {
         What::Devices => devices::run(connection),
-        What::Globals => globals::run(connection),
+        What::Globals { follow } => globals::run(connection, follow),
         What::Forces { node, table } => forces::run(connection, node.number(), table.into()),
         What::Broadcast { what } => broadcast::run(connection, what),
     }

@@ -1,5 +1,7 @@
 //! `sim`: a simulated unit.
 
+mod bus;
+
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -22,6 +24,9 @@ Examples:
   ser-cli sim --pty /tmp/ser --contacts trip.csv   with contacts that move
   ser-cli sim --pty /tmp/ser --image firmware.elf  the ARM image, in QEMU
   ser-cli sim --genius /tmp/host --node 5 --node 9:ser160  a Genius bus
+  ser-cli sim --genius /tmp/host --node 5 --bus-rate 38.4K --host-number 0
+  ser-cli sim --genius /tmp/host --node 5 --bus-noise 2 --seed 7
+  ser-cli sim --genius /tmp/host --node 5 --node 9 --image firmware.elf
 
 Contacts are CSV: milliseconds from the start, input, 1 closed or 0 open.
   ms,input,state
@@ -75,12 +80,15 @@ pub(crate) struct Args {
     /// Put units on a Genius bus; this file becomes the window of the host's GENI board, and goes with the simulator.
     ///
     /// The first unit also has its RS-232 port, where --pty or --tcp say.
-    #[arg(long, value_name = "FILE", requires = "node", conflicts_with = "image")]
+    #[arg(long, value_name = "FILE", requires = "node", help_heading = bus::HEADING)]
     genius: Option<PathBuf>,
 
     /// Number of a unit on the Genius bus, 0-31, and which recorder it is if not --model; may be repeated.
-    #[arg(long, value_name = "N[:MODEL]", requires = "genius", value_parser = bus_node)]
+    #[arg(long, value_name = "N[:MODEL]", requires = "genius", value_parser = bus_node, help_heading = bus::HEADING)]
     node: Vec<BusNode>,
+
+    #[command(flatten)]
+    bus: bus::BusArgs,
 
     /// Listen on this address instead; port 0 takes a free one.
     #[arg(long, value_name = "HOST:PORT", value_parser = tcp_address)]
@@ -99,6 +107,8 @@ pub(crate) struct Args {
     paced: bool,
 
     /// Run this ARM image (mps2-an385) in QEMU instead of the built-in node.
+    ///
+    /// On a Genius bus the image is the first --node; the others are built in.
     #[arg(long, value_name = "ELF")]
     image: Option<PathBuf>,
 
@@ -119,7 +129,7 @@ fn options(args: &Args) -> Result<SimOptions> {
         None if args.genius.is_some() && args.pty.is_none() => Port::Unconnected,
         None => Port::Pty { link: args.pty.clone() },
     };
-    let genius = args.genius.as_deref().map(|window| genius(window, &args.node, model)).transpose()?;
+    let genius = args.genius.as_deref().map(|window| genius(args, window, model)).transpose()?;
     let contacts = match (&args.contacts, &genius) {
         (Some(path), Some(genius)) => contacts_failure(Contacts::from_path_on_bus(path, &genius.nodes))?,
         (Some(path), None) => contacts_failure(Contacts::from_path(path, model))?,
@@ -149,7 +159,8 @@ pub(crate) fn backend(image: Option<&Path>, log: Option<PathBuf>, line_rate: Lin
     Ok(Backend::Emulator(EmulatorOptions { log, ..EmulatorOptions::new(image) }))
 }
 
-fn genius(window: &Path, nodes: &[BusNode], model: Model) -> Result<GeniusOptions> {
+fn genius(args: &Args, window: &Path, model: Model) -> Result<GeniusOptions> {
+    let nodes = &args.node;
     for (index, node) in nodes.iter().enumerate() {
         if nodes.iter().take(index).any(|other| other.number == node.number) {
             return Err(Failure::usage(format!("--node {} is given twice", node.number))
@@ -160,7 +171,7 @@ fn genius(window: &Path, nodes: &[BusNode], model: Model) -> Result<GeniusOption
         return Err(Failure::usage("a bus has 32 numbers, and the host needs one").hint("leave a node out"));
     }
     let nodes = nodes.iter().map(|node| (node.number, node.model.map_or(model, Model::from)));
-    Ok(GeniusOptions::new(window, nodes.collect()))
+    args.bus.apply(GeniusOptions::new(window, nodes.collect()))
 }
 
 fn bus_node(text: &str) -> std::result::Result<BusNode, String> {
@@ -168,9 +179,13 @@ fn bus_node(text: &str) -> std::result::Result<BusNode, String> {
         Some((number, model)) => (number, Some(ModelName::from_str(model, true)?)),
         None => (text, None),
     };
-    let number = number.parse().ok().and_then(Device::new).map(Device::number);
-    let number = number.ok_or_else(|| "not a bus address: 0 to 31, as in 5 or 5:ser160".to_string())?;
+    let number =
+        device(number).ok_or_else(|| "not a bus address: 0 to 31, as in 5 or 5:ser160".to_string())?;
     Ok(BusNode { number, model })
+}
+
+fn device(text: &str) -> Option<u8> {
+    text.parse().ok().and_then(Device::new).map(Device::number)
 }
 
 fn contacts_failure(contacts: std::result::Result<Contacts, SimError>) -> Result<Contacts> {
@@ -212,6 +227,9 @@ impl From<SimError> for Failure {
             }
             SimError::Unsupported(_) => "use --tcp 127.0.0.1:4000, without --image",
             SimError::Io { ref source, .. } => match source.kind() {
+                io::ErrorKind::UnexpectedEof => {
+                    "the file has been cut short: leave it alone while it is in use"
+                }
                 io::ErrorKind::AddrInUse => "another program listens there: port 0 takes a free one",
                 io::ErrorKind::AddrNotAvailable => {
                     "that is not this computer: 127.0.0.1 or 0.0.0.0 (from everywhere) are"

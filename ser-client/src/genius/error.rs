@@ -43,15 +43,15 @@ impl GeniusError {
     pub const fn hint(&self) -> &'static str {
         match self {
             GeniusError::BoardSilent => {
-                "is this the window of a GENI board, and is the board (or the simulator) running?"
+                "is this the window of a GENI board? Then reset the board, or start the simulator"
             }
-            GeniusError::BoardFailed(_) => "reset the board; look at its lamps",
+            GeniusError::BoardFailed(_) => {
+                "try again in a few seconds; if it persists, reset the board and look at its lamps"
+            }
             GeniusError::OffBus => {
                 "check the bus cable and its terminators, the bus rate, and that no other device has this number"
             }
-            GeniusError::NotOnBus { .. } => {
-                "check number and bus rate on the device's switches; list the devices that are there"
-            }
+            GeniusError::NotOnBus { .. } => "check number and bus rate on the device's switches",
             GeniusError::OwnNumber { .. } => "name the number of the recorder, not that of the host",
             GeniusError::BoardBusy => "try again; does another program use the same window?",
             GeniusError::Undelivered(_) => "check the bus cable; is the device still there?",

@@ -2,12 +2,11 @@
 
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use geni::{
-    Completion, Configuration, Data, Destination, Device, Driver, Event, Failure, FileRam, Identity,
-    MAX_DEVICE_NUMBER, Options, Priority, Received, SharedRam, Start, TableError, Transmission,
+    Completion, Configuration, Data, Destination, Device, Driver, Event, Failure, Identity,
+    MAX_DEVICE_NUMBER, Options, Priority, Received, SharedRam, Start, Status, TableError, Transmission,
     TransmitError, map,
 };
 use ser_proto::Command;
@@ -16,14 +15,19 @@ use ser_proto::genius::{
 };
 
 use super::inboxes::Inboxes;
-use super::{GeniusError, window};
-use crate::{OpenError, Unit};
+use super::window::Window;
+use super::{Clock, GeniusError, RealTime};
+use crate::{GeniWindow, OpenError, Unit};
 
 /// Nothing tells when a file has changed, so it is looked at this often.
 const PACE: Duration = Duration::from_millis(1);
 
 /// What happens in one look is dealt with, up to so many events; more wait for the next.
 const EVENTS_PER_LOOK: usize = 16;
+
+/// From the host's turn on the bus to the recorder: about so long takes a set-clock datagram itself, with what the boards
+/// at both ends need to hand it over. Measured with the models of them.
+const HANDOVER: Duration = Duration::from_millis(3);
 
 /// A board has its heartbeat five times a second. One that runs in the time of a busy computer gets longer.
 const HEARTBEAT_PATIENCE: Duration = Duration::from_secs(3);
@@ -52,18 +56,33 @@ pub struct BusDevice {
 #[derive(Clone)]
 pub struct GeniHost {
     shared: Arc<Mutex<Host>>,
+    clock: Arc<dyn Clock>,
 }
 
 impl GeniHost {
-    /// Opens the window that is the file at `path`, and waits until the board in it is on the bus. `patience` is how
-    /// long the board may take to give a sign of life; it gets at least three seconds.
+    /// Opens a window, and waits until the board in it is on the bus. `patience` is how long the board may take to give
+    /// a sign of life; it gets at least three seconds.
     ///
     /// # Errors
     /// When there is no such window, or the board does not come onto the bus.
-    pub fn open(path: &str, patience: Duration) -> Result<GeniHost, OpenError> {
-        let mut host = Host::new(window::open(path)?, patience.max(HEARTBEAT_PATIENCE));
-        host.start().map_err(|error| OpenError::Genius { path: path.to_owned(), error })?;
-        Ok(GeniHost { shared: Arc::new(Mutex::new(host)) })
+    pub fn open(window: impl Into<GeniWindow>, patience: Duration) -> Result<GeniHost, OpenError> {
+        GeniHost::open_in(Arc::new(RealTime::new()), window, patience)
+    }
+
+    /// The same for a host in whose time board and bus live.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_in(
+        clock: Arc<dyn Clock>,
+        window: impl Into<GeniWindow>,
+        patience: Duration,
+    ) -> Result<GeniHost, OpenError> {
+        let place = window.into();
+        let patience = patience.max(HEARTBEAT_PATIENCE);
+        let mut host = Host::new(Window::open(&place)?, Arc::clone(&clock), patience);
+        host.start().map_err(|error| OpenError::Genius { path: place.file, error })?;
+        Ok(GeniHost { shared: Arc::new(Mutex::new(host)), clock })
     }
 
     /// A recorder on the bus.
@@ -88,6 +107,12 @@ impl GeniHost {
     #[must_use]
     pub fn scan_time(&self) -> Option<Duration> {
         self.lock().scan_time()
+    }
+
+    /// How board and bus are, by the board's own word; `None` before it has said anything.
+    #[must_use]
+    pub fn status(&self) -> Option<Status> {
+        self.lock().driver.status()
     }
 
     /// Waits until a device is logged in, as long as that takes for one that is there.
@@ -122,10 +147,11 @@ impl GeniHost {
         self.lock().read_forces(node, table)
     }
 
-    /// How long it takes until a datagram that is sent now arrives, on the average: the next turn is half a scan away.
+    /// How long it takes until a short datagram that is sent now arrives, on the average: the next turn is half a scan
+    /// away. On a busy bus it takes longer, as all devices together send one datagram per scan.
     #[must_use]
     pub fn delay(&self) -> Duration {
-        PACE + self.scan_time().unwrap_or_default() / 2
+        PACE + self.scan_time().unwrap_or_default() / 2 + HANDOVER
     }
 
     /// Datagrams that were no message of a recorder to this host, and messages that nobody took in time.
@@ -141,11 +167,30 @@ impl GeniHost {
         host.transmit(ser_message(Destination::Device(node), command)?)
     }
 
+    /// Whether the datagram that was sent last is known not to have arrived.
+    pub(crate) fn is_undelivered(&self) -> bool {
+        matches!(self.lock().sent, Some(Err(_)))
+    }
+
     /// Waits for messages of a recorder.
     pub(crate) fn receive(&self, node: u8, timeout: Duration) -> Result<Vec<Received>, GeniusError> {
-        let mut host = self.lock();
-        host.wait(timeout, |host| host.inboxes.has(node))?;
-        Ok(std::iter::from_fn(|| host.inboxes.take(node)).collect())
+        let until = self.clock.now() + timeout;
+        loop {
+            let mut host = self.lock();
+            host.look()?;
+            let received: Vec<_> = std::iter::from_fn(|| host.inboxes.take(node)).collect();
+            drop(host);
+            if !received.is_empty() || self.clock.now() >= until {
+                return Ok(received);
+            }
+            // Without the lock, so that other recorders can be asked meanwhile.
+            self.clock.wait(PACE);
+        }
+    }
+
+    /// The time that this host goes by.
+    pub(crate) fn now(&self) -> Duration {
+        self.clock.now()
     }
 
     fn lock(&self) -> MutexGuard<'_, Host> {
@@ -183,8 +228,8 @@ fn bus_datagram(received: &Received, own_number: u8) -> Option<Datagram> {
 
 /// The board, and what it has said.
 struct Host {
-    driver: Driver<FileRam>,
-    epoch: Instant,
+    driver: Driver<Window>,
+    clock: Arc<dyn Clock>,
     patience: Duration,
     identity: Option<Identity>,
     failure: Option<Failure>,
@@ -195,7 +240,7 @@ struct Host {
 }
 
 impl Host {
-    fn new(ram: FileRam, patience: Duration) -> Host {
+    fn new(ram: Window, clock: Arc<dyn Clock>, patience: Duration) -> Host {
         // A board that is starting up has anything in its tables; this flag has no such value then.
         let is_set_up = ram.read(map::STATUS_OK) <= 1;
         // The board serves other programs as well, one after the other: it stays as it is configured.
@@ -213,7 +258,7 @@ impl Host {
         };
         Host {
             driver: Driver::new(ram, options),
-            epoch: Instant::now(),
+            clock,
             patience,
             identity: None,
             failure: None,
@@ -310,22 +355,22 @@ impl Host {
 
     /// Looks at the board until `done`, or until the time is over. A board that fails ends it.
     fn wait(&mut self, timeout: Duration, done: impl Fn(&Host) -> bool) -> Result<bool, GeniusError> {
-        let until = Instant::now() + timeout;
+        let until = self.clock.now() + timeout;
         loop {
             self.look()?;
             if done(self) {
                 return Ok(true);
             }
-            if Instant::now() >= until {
+            if self.clock.now() >= until {
                 return Ok(false);
             }
-            thread::sleep(PACE);
+            self.clock.wait(PACE);
         }
     }
 
     fn look(&mut self) -> Result<(), GeniusError> {
         for _ in 0..EVENTS_PER_LOOK {
-            let now_ms = self.epoch.elapsed().as_millis();
+            let now_ms = self.clock.now().as_millis();
             #[expect(clippy::cast_possible_truncation, reason = "the count wraps")]
             let Some(event) = self.driver.poll(now_ms as u32) else { break };
             self.take(event);

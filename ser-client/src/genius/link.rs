@@ -1,6 +1,6 @@
 //! A session's messages in datagrams.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::GeniHost;
 use crate::link::Link;
@@ -17,17 +17,16 @@ impl Link for GeniusLink {
         Ok(self.host.send(self.node, attempt.command())?)
     }
 
-    fn receive(
-        &mut self,
-        session: &mut Session,
-        epoch: Instant,
-        timeout: Duration,
-    ) -> Result<usize, TransportError> {
+    fn receive(&mut self, session: &mut Session, timeout: Duration) -> Result<usize, TransportError> {
         let received = self.host.receive(self.node, timeout)?;
         for datagram in &received {
-            session.process_body(epoch.elapsed(), &datagram.data);
+            session.process_body(self.now(), &datagram.data);
         }
         Ok(received.iter().map(|datagram| datagram.data.len()).sum())
+    }
+
+    fn now(&self) -> Duration {
+        self.host.now()
     }
 
     fn delay(&self, _attempt: &Attempt<'_>) -> Duration {
@@ -45,6 +44,7 @@ impl Link for GeniusLink {
 
     fn diagnose(&self, diagnosis: Diagnosis) -> Diagnosis {
         match diagnosis {
+            Diagnosis::Silent if self.host.is_undelivered() => Diagnosis::Unacknowledged { node: self.node },
             Diagnosis::Silent => Diagnosis::SilentOnBus { node: self.node },
             other => other,
         }

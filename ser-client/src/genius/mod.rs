@@ -1,5 +1,7 @@
 //! A host on a Genius bus, through the window that it shares with its GENI board.
 
+#[cfg(unix)]
+mod clock;
 mod error;
 #[cfg(unix)]
 mod host;
@@ -10,8 +12,10 @@ mod link;
 #[cfg(unix)]
 mod window;
 
+#[cfg(unix)]
+pub use clock::{Clock, RealTime};
 pub use error::GeniusError;
-pub use geni::{BlockKind, Device as DeviceRecord};
+pub use geni::{BlockKind, Device as DeviceRecord, Status as BoardStatus};
 #[cfg(unix)]
 pub use host::{BusDevice, GeniHost};
 #[cfg(unix)]

@@ -3,12 +3,12 @@
 use std::fmt;
 use std::io::{self, Write};
 
-use ser_client::{BlockKind, BusDevice};
+use ser_client::{BlockKind, BusDevice, GeniHost};
 
 use super::recorder_inputs;
 use crate::cli::ConnectionArgs;
 use crate::connection;
-use crate::error::{Result, inform};
+use crate::error::{Result, advise, inform, warn};
 
 pub(super) fn run(connection: &ConnectionArgs) -> Result<()> {
     let host = connection::open_bus(connection)?;
@@ -19,10 +19,25 @@ pub(super) fn run(connection: &ConnectionArgs) -> Result<()> {
         writeln!(out, "{}", Row(device))?;
     }
     out.flush()?;
-    let scan =
-        host.scan_time().map_or(String::new(), |scan| format!("; a bus scan takes {} ms", scan.as_millis()));
-    inform(format_args!("this host is {}{scan}", host.number()));
+    tell_about_board(&host);
     Ok(())
+}
+
+fn tell_about_board(host: &GeniHost) {
+    let status = host.status();
+    let scan = status.and_then(|status| status.scan_ms);
+    let scan = scan.map_or(String::new(), |ms| format!("; a bus scan takes {ms} ms"));
+    let errors = status.map_or(0, |status| status.bus_errors);
+    inform(format_args!(
+        "this host is {}{scan}; bus errors since its board started: {errors}",
+        host.number()
+    ));
+    if status.is_some_and(|status| status.excessive_errors) {
+        warn("ten bus errors or more within the last 10 s");
+        advise(
+            "check the bus cable, its shield and its terminators, and that all devices have the same bus rate",
+        );
+    }
 }
 
 /// No reference address is assigned.

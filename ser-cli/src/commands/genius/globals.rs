@@ -1,25 +1,106 @@
 //! `genius globals`: the live inputs of every recorder.
 
+use std::collections::BTreeMap;
 use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use ser_client::GeniHost;
+use ser_proto::genius::GlobalData;
 
 use super::recorder_inputs;
 use crate::cli::ConnectionArgs;
 use crate::connection;
-use crate::error::{Result, advise};
+use crate::error::{Result, advise, inform};
+use crate::interrupt;
+use crate::time::local_now;
 
-pub(super) fn run(connection: &ConnectionArgs) -> Result<()> {
-    let devices = connection::open_bus(connection)?.devices()?;
-    let recorders: Vec<_> =
-        devices.iter().filter_map(|device| Some((device.number, recorder_inputs(device)?))).collect();
-    let mut out = io::stdout().lock();
-    writeln!(out, "node  inputs  on")?;
-    for (node, global) in &recorders {
-        let on = if global.state.is_empty() { "none".to_string() } else { global.to_string() };
-        writeln!(out, "{node:>4}  {:>6}  {on}", global.model.inputs())?;
-    }
-    out.flush()?;
-    if recorders.is_empty() {
+/// How often the bus is looked at.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+
+/// What the recorders say, by their numbers.
+type Globals = BTreeMap<u8, GlobalData>;
+
+pub(super) fn run(connection: &ConnectionArgs, follow: bool) -> Result<()> {
+    let stop = if follow { Some(interrupt::catch()?) } else { None };
+    let host = connection::open_bus(connection)?;
+    let globals = look(&host)?;
+    if globals.is_empty() {
         advise("no recorder is logged in; ser-cli genius devices lists what is");
     }
+    let mut out = io::stdout().lock();
+    match stop {
+        Some(stop) => {
+            inform("the bus is followed until Ctrl-C");
+            follow_from(globals, &host, &stop, &mut out)
+        }
+        None => {
+            writeln!(out, "{HEADER}")?;
+            globals.iter().try_for_each(|(&node, global)| writeln!(out, "{}", row(node, Some(global))))?;
+            Ok(out.flush()?)
+        }
+    }
+}
+
+fn look(host: &GeniHost) -> Result<Globals> {
+    let devices = host.devices()?;
+    Ok(devices.iter().filter_map(|device| Some((device.number, recorder_inputs(device)?))).collect())
+}
+
+/// Shows everything once, and then whoever differs from what was shown before.
+fn follow_from(mut now: Globals, host: &GeniHost, stop: &AtomicBool, out: &mut dyn Write) -> Result<()> {
+    writeln!(out, "{:<23}  {HEADER}", "time")?;
+    let mut shown = Globals::new();
+    while !stop.load(Ordering::Relaxed) {
+        let time = local_now();
+        for row in changes(&shown, &now) {
+            writeln!(out, "{time}  {row}")?;
+        }
+        out.flush()?;
+        shown = now;
+        thread::sleep(LOOK_EVERY);
+        now = look(host)?;
+    }
     Ok(())
+}
+
+fn changes(before: &Globals, now: &Globals) -> Vec<String> {
+    let mut numbers: Vec<u8> = before.keys().chain(now.keys()).copied().collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let changed = numbers.into_iter().filter(|number| before.get(number) != now.get(number));
+    changed.map(|number| row(number, now.get(&number))).collect()
+}
+
+const HEADER: &str = "node  inputs  on";
+
+/// A recorder as a row of the table; without inputs when it has left the bus.
+fn row(node: u8, global: Option<&GlobalData>) -> String {
+    match global {
+        None => format!("{node:>4}       -  not on the bus any more"),
+        Some(global) => {
+            let on = if global.state.is_empty() { "none".to_string() } else { global.to_string() };
+            format!("{node:>4}  {:>6}  {on}", global.model.inputs())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ser_proto::{Inputs, Model};
+
+    use super::*;
+
+    #[test]
+    fn only_what_has_changed_is_shown_again() {
+        let global = |state| GlobalData { model: Model::Ser160, state: Inputs(state) };
+        let before = Globals::from([(5, global(1)), (6, global(0)), (7, global(2))]);
+        let now = Globals::from([(5, global(5)), (6, global(0)), (9, global(0))]);
+        assert_eq!(
+            changes(&before, &now),
+            ["   5      16  1 3", "   7       -  not on the bus any more", "   9      16  none"]
+        );
+        assert_eq!(changes(&now, &now), Vec::<String>::new());
+    }
 }

@@ -1,0 +1,110 @@
+//! What a simulated Genius bus is like: how fast, how noisy, and which number the host has.
+
+use clap::ValueEnum;
+use ser_sim::GeniusOptions;
+use ser_sim::genius::{BusRate, Noise};
+
+use super::device;
+use crate::error::{Failure, Result};
+
+/// How fast a bus is, by the names that `docs/genius.md` uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum RateName {
+    /// The usual rate.
+    #[default]
+    #[value(name = "153.6K", alias = "153k6", alias = "153.6K-standard")]
+    Standard,
+    /// The same with longer pauses, for long cables.
+    #[value(name = "153.6K-extended", alias = "153k6e")]
+    Extended,
+    /// For longer cables.
+    #[value(name = "76.8K", alias = "76k8")]
+    Half,
+    /// For the longest cables.
+    #[value(name = "38.4K", alias = "38k4")]
+    Quarter,
+}
+
+impl From<RateName> for BusRate {
+    fn from(name: RateName) -> BusRate {
+        match name {
+            RateName::Standard => BusRate::K153Standard,
+            RateName::Extended => BusRate::K153Extended,
+            RateName::Half => BusRate::K76,
+            RateName::Quarter => BusRate::K38,
+        }
+    }
+}
+
+/// Where `sim --help` lists what is about the bus.
+pub(super) const HEADING: &str = "Genius bus";
+
+/// The options of `sim` that are about the bus alone.
+#[derive(Debug, clap::Args)]
+pub(super) struct BusArgs {
+    /// How fast the Genius bus is.
+    #[arg(long, value_name = "RATE", requires = "genius", default_value = "153.6K", ignore_case = true, help_heading = HEADING)]
+    bus_rate: RateName,
+
+    /// The host's number on the Genius bus, 0-31; the highest that is free if not given.
+    #[arg(long, value_name = "N", requires = "genius", value_parser = host_number, help_heading = HEADING)]
+    host_number: Option<u8>,
+
+    /// Disturb the Genius bus: of all messages so many percent are damaged, as many are missed by one receiver, and as
+    /// many arrive without the sender knowing.
+    #[arg(long, value_name = "PERCENT", requires = "genius", value_parser = ppm, help_heading = HEADING)]
+    bus_noise: Option<u32>,
+
+    /// Which messages suffer; the same number gives the same sequence of accidents.
+    #[arg(long, value_name = "N", requires = "bus_noise", default_value_t = 1, help_heading = HEADING)]
+    seed: u64,
+}
+
+impl BusArgs {
+    /// The same bus as the user wants it.
+    pub(super) fn apply(&self, bus: GeniusOptions) -> Result<GeniusOptions> {
+        let host_number = self.host_number.unwrap_or(bus.host_number);
+        if bus.nodes.iter().any(|&(node, _)| node == host_number) {
+            return Err(Failure::usage(format!(
+                "{host_number} is the number of a --node, and the host's too"
+            ))
+            .hint("every device on a bus has a number of its own")
+            .hint("leave --host-number out, and the host gets one that is free"));
+        }
+        let ppm = self.bus_noise.unwrap_or(0);
+        let noise = Noise { seed: self.seed, damaged_ppm: ppm, lost_ppm: ppm, unacknowledged_ppm: ppm };
+        Ok(GeniusOptions { host_number, rate: self.bus_rate.into(), noise, ..bus })
+    }
+}
+
+fn host_number(text: &str) -> std::result::Result<u8, String> {
+    device(text).ok_or_else(|| "not a bus address: 0 to 31".to_string())
+}
+
+/// Percent as millionths.
+fn ppm(text: &str) -> std::result::Result<u32, String> {
+    match text.parse() {
+        Ok(percent @ 0.0..=100.0) => {
+            let percent: f64 = percent;
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1000000")]
+            let ppm = (percent * 10_000.0).round() as u32;
+            Ok(ppm)
+        }
+        _ => Err("not a percentage: 0 to 100, as in 0.5".to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percent_are_millionths() {
+        for (text, millionths) in [("0", 0), ("0.5", 5_000), ("2", 20_000), ("100", 1_000_000)] {
+            assert_eq!(ppm(text), Ok(millionths));
+        }
+        for text in ["", "-1", "100.1", "nan", "2%"] {
+            assert!(ppm(text).is_err(), "{text}");
+        }
+    }
+}

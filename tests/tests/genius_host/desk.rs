@@ -1,0 +1,199 @@
+//! A host's desk: the file that is its window, and behind it boards, bus and recorders, whose time passes while the host
+//! waits for something.
+
+use std::fs::{File, OpenOptions};
+use std::os::unix::fs::FileExt;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use geni::SharedRam;
+use ser_client::{Clock, GeniHost, GeniWindow, OpenError, Options, Unit};
+use ser_proto::Model;
+use ser_sim::genius::{Noise, RAM_LEN};
+use ser_tests::genius_world::{Recorder, World};
+use tempfile::TempDir;
+
+/// Everybody is on the bus long before that.
+const START_LIMIT_MS: u64 = 60_000;
+
+/// Boards go on to assign themselves to each other when all are logged in.
+const SETTLING_MS: u64 = 500;
+
+type Order = Box<dyn FnOnce(&mut Bench) + Send>;
+
+/// What is behind the window. It stays in the thread that made it.
+pub(crate) struct Bench {
+    pub(crate) world: World,
+    window: File,
+    /// The host's board can be held in reset; the host at the window does not have that line.
+    pub(crate) in_reset: bool,
+    /// A recorder that does nothing, while its board does.
+    pub(crate) paused: Option<Recorder>,
+}
+
+impl Bench {
+    /// Lets a millisecond pass in which each side sees what the other has written before.
+    fn step(&mut self) {
+        let board = self.world.host.board;
+        let mut image = [0; RAM_LEN];
+        // A file that is not whole any more tells nobody anything.
+        let whole = self.window.read_exact_at(&mut image, 0).is_ok();
+        if whole {
+            self.world.bus.borrow_mut().get_mut(board).sync_from_host(&image);
+        }
+        self.world.step_without_host();
+        let in_reset = self.in_reset;
+        self.world.host.driver.ram_mut().drive_reset(in_reset);
+        if whole {
+            let window = &self.window;
+            self.world.bus.borrow_mut().get_mut(board).publish(|offset, byte| {
+                window.write_all_at(&[byte], offset.into()).expect("the window takes a byte");
+            });
+        }
+    }
+
+    pub(crate) fn run(&mut self, ms: u64) {
+        (0..ms).for_each(|_| self.step());
+    }
+
+    /// Lets time pass until the host's board has logged all recorders in.
+    fn start(&mut self) {
+        let numbers: Vec<u8> = self.world.recorders.iter().map(|recorder| recorder.number).collect();
+        while !numbers.iter().all(|&number| self.is_logged_in(number)) {
+            self.step();
+            assert!(self.world.now_ms < START_LIMIT_MS, "somebody is not on the bus");
+        }
+        self.run(SETTLING_MS);
+    }
+
+    fn is_logged_in(&self, number: u8) -> bool {
+        // The third byte of a device's entry in the device table.
+        let offset = 0x1E02 + 8 * u16::from(number);
+        let ready = self.world.recorders.iter().all(|recorder| recorder.port.is_ready());
+        ready && self.world.host.driver.ram().read(offset) == 1
+    }
+
+    /// The time of a bus scan, in milliseconds and not less.
+    pub(crate) fn scan_ms(&self) -> u64 {
+        self.world.bus.borrow().scan_time_ns().expect("a running bus").div_ceil(1_000_000)
+    }
+}
+
+/// A window in a folder of its own, and what is behind it.
+pub(crate) struct Desk {
+    folder: TempDir,
+    clock: Arc<BenchTime>,
+}
+
+impl Desk {
+    /// Recorders that are on the bus with the host's board.
+    pub(crate) fn new(recorders: &[(u8, Model)]) -> Desk {
+        Desk::with_noise(recorders, Noise::default())
+    }
+
+    /// The same on a noisy bus.
+    pub(crate) fn with_noise(recorders: &[(u8, Model)], noise: Noise) -> Desk {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (orders, received) = channel::<Order>();
+        let path = folder.path().join("host");
+        let recorders = recorders.to_vec();
+        thread::spawn(move || {
+            let world = World::with_noise(&recorders, noise);
+            let mut bench = Bench { world, window: window(&path), in_reset: false, paused: None };
+            bench.start();
+            received.into_iter().for_each(|order| order(&mut bench));
+        });
+        let clock = Arc::new(BenchTime { now_ms: AtomicU64::new(0), orders: Mutex::new(orders) });
+        // Until the bus is up.
+        clock.wait(Duration::ZERO);
+        Desk { folder, clock }
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub(crate) fn window(&self) -> GeniWindow {
+        GeniWindow::from(self.path("host").to_str().expect("text"))
+    }
+
+    /// A host at any window, in the time of this desk.
+    pub(crate) fn open(&self, window: GeniWindow) -> Result<GeniHost, OpenError> {
+        GeniHost::open_in(Arc::clone(&self.clock) as Arc<dyn Clock>, window, Duration::from_secs(1))
+    }
+
+    pub(crate) fn host(&self) -> GeniHost {
+        self.open(self.window()).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// Does something behind the window.
+    pub(crate) fn with<T: Send + 'static>(&self, order: impl FnOnce(&mut Bench) -> T + Send + 'static) -> T {
+        self.clock.with(order)
+    }
+
+    /// Moves the first contact of a recorder, by its index; says in which millisecond.
+    pub(crate) fn contact(&self, recorder: usize, closed: bool) -> u64 {
+        self.with(move |bench| {
+            bench.world.recorders[recorder].contact(1, closed);
+            bench.world.now_ms + 1
+        })
+    }
+
+    /// Lets time pass while the host does nothing.
+    pub(crate) fn run(&self, ms: u64) {
+        self.clock.wait(Duration::from_millis(ms));
+    }
+
+    /// The present, for everybody.
+    pub(crate) fn now_ms(&self) -> u64 {
+        self.clock.now_ms.load(Ordering::Relaxed)
+    }
+}
+
+/// The usual patience of a client; its time is the desk's.
+pub(crate) fn unit(host: &GeniHost, number: u8) -> Unit {
+    host.unit(number, Options::default())
+}
+
+fn window(path: &PathBuf) -> File {
+    let mut options = OpenOptions::new();
+    let file = options.read(true).write(true).create(true).truncate(true).open(path).expect("a file");
+    file.set_len(RAM_LEN as u64).expect("room");
+    file
+}
+
+/// The time behind the window.
+struct BenchTime {
+    now_ms: AtomicU64,
+    orders: Mutex<Sender<Order>>,
+}
+
+impl BenchTime {
+    fn with<T: Send + 'static>(&self, order: impl FnOnce(&mut Bench) -> T + Send + 'static) -> T {
+        let (sender, done) = channel();
+        let order: Order = Box::new(move |bench| {
+            let result = order(bench);
+            sender.send((result, bench.world.now_ms)).expect("somebody waits");
+        });
+        self.orders.lock().unwrap_or_else(PoisonError::into_inner).send(order).expect("the bench is there");
+        let (result, now_ms) = done.recv().expect("the bench is well");
+        // Several threads may wait for the same bench.
+        self.now_ms.fetch_max(now_ms, Ordering::Relaxed);
+        result
+    }
+}
+
+impl Clock for BenchTime {
+    fn now(&self) -> Duration {
+        Duration::from_millis(self.now_ms.load(Ordering::Relaxed))
+    }
+
+    fn wait(&self, time: Duration) {
+        let ms = u64::try_from(time.as_nanos().div_ceil(1_000_000)).expect("not for ever");
+        self.with(move |bench| bench.run(ms));
+    }
+}
