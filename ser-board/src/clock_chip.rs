@@ -20,9 +20,10 @@
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
-use chrono::{DateTime, NaiveDate, NaiveDateTime, TimeDelta};
+use chrono::{NaiveDate, NaiveDateTime};
 use rtcc::DateTimeAccess;
 use ser_node::Rtc;
+use ser_node::calendar::date_time;
 
 use crate::counter::Counter;
 
@@ -132,17 +133,14 @@ impl<'a, C: KeepsTime> ClockChip<'a, C> {
         if shown.date() < self.not_before || shown.date() >= beyond {
             return Err(ClockState::Implausible);
         }
-        shown.checked_add_signed(Self::half_a_step()).ok_or(ClockState::Implausible)
+        // What the time is ahead of what the chip shows, on average.
+        let half_a_step_ms = i64::from(C::RESOLUTION_MS / 2);
+        date_time(shown.and_utc().timestamp_millis() + half_a_step_ms).ok_or(ClockState::Implausible)
     }
 
     fn set(&mut self, now: NaiveDateTime) -> Result<(), C::Error> {
         self.chip.set_datetime(&rounded(now, C::RESOLUTION_MS))?;
         self.chip.time_is_good()
-    }
-
-    /// What the time is ahead of what the chip shows, on average.
-    fn half_a_step() -> TimeDelta {
-        TimeDelta::milliseconds(i64::from(C::RESOLUTION_MS / 2))
     }
 }
 
@@ -151,7 +149,7 @@ fn rounded(time: NaiveDateTime, resolution_ms: u16) -> NaiveDateTime {
     let resolution_ms = i64::from(resolution_ms);
     let steps = (time.and_utc().timestamp_millis() + resolution_ms / 2).div_euclid(resolution_ms);
     // Cannot fail within the years of the protocol; should it, the time itself is the next best.
-    DateTime::from_timestamp_millis(steps * resolution_ms).map_or(time, |rounded| rounded.naive_utc())
+    date_time(steps * resolution_ms).unwrap_or(time)
 }
 
 impl<C: KeepsTime> Rtc for ClockChip<'_, C> {
@@ -174,7 +172,7 @@ impl<C: KeepsTime> Rtc for ClockChip<'_, C> {
 
 #[cfg(test)]
 mod tests {
-    use chrono::DurationRound;
+    use chrono::{DurationRound, TimeDelta};
 
     use super::*;
 

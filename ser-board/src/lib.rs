@@ -35,7 +35,8 @@ pub mod leds;
 pub mod main_loop;
 #[cfg(feature = "defmt")]
 pub mod report;
-pub mod ring;
 pub mod serial_line;
 pub mod serialiser;
 pub mod stm32_rtc;
+
+pub use ser_node::ring;

@@ -130,10 +130,16 @@ impl Quiet {
         Quiet { since_ms: None }
     }
 
+    /// A byte has been put in line for the transmitter, which may have sent it before anybody looks again.
+    pub const fn sent(&mut self) {
+        self.since_ms = None;
+    }
+
     /// Looks at the transmitter. `idle` says that no byte waits in the ring or in the UART's data register.
     ///
     /// True two characters' time after the first look that found it idle: one character may be in the shift register.
-    /// Counts from looks and not from bytes, so however late it is asked, no character is cut short.
+    /// Counts from looks and not from bytes, so however late it is asked, no character is cut short; but it has to be told
+    /// of bytes that were [`sent`](Self::sent) in between.
     pub fn look(&mut self, idle: bool, now_ms: u32, baud: Baud) -> bool {
         if !idle {
             self.since_ms = None;
@@ -196,5 +202,14 @@ mod tests {
         assert!(!quiet.look(true, u32::MAX, Baud::B300));
         assert!(!quiet.look(true, 66, Baud::B300));
         assert!(quiet.look(true, 67, Baud::B300));
+    }
+
+    #[test]
+    fn a_byte_that_came_and_went_between_two_looks_may_still_be_in_the_shift_register() {
+        let mut quiet = Quiet::new();
+        assert!(!quiet.look(true, 1000, Baud::B19200));
+        quiet.sent();
+        assert!(!quiet.look(true, 1003, Baud::B19200));
+        assert!(quiet.look(true, 1006, Baud::B19200));
     }
 }

@@ -21,6 +21,7 @@
 //! says whether the calendar has been set since the backup domain had power.
 
 use chrono::{Datelike, NaiveDate, NaiveDateTime, Timelike};
+use ser_node::calendar::{Date, date_time};
 
 /// The registers that hold date and time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,21 +43,22 @@ pub struct Shift {
     pub subtract: u16,
 }
 
-const FIRST_YEAR: i32 = 2000;
+const FIRST_YEAR: u16 = 2000;
 const PM: u32 = 1 << 22;
-const NANOSECONDS: u64 = 1_000_000_000;
+const NANOSECONDS: i64 = 1_000_000_000;
 
 impl Calendar {
     /// The registers for a time, its fraction left out. `None` outside of 2000–2099.
     #[must_use]
     pub fn from_date_time(time: NaiveDateTime) -> Option<Calendar> {
-        let year = u32::try_from(time.year() - FIRST_YEAR).ok().filter(|&year| year <= 99)?;
+        let Date { year, month, day } = Date::of(time)?;
+        let year = year.checked_sub(FIRST_YEAR)?;
         Some(Calendar {
             tr: to_bcd(time.hour()) << 16 | to_bcd(time.minute()) << 8 | to_bcd(time.second()),
-            dr: to_bcd(year) << 16
+            dr: to_bcd(year.into()) << 16
                 | time.weekday().number_from_monday() << 13
-                | to_bcd(time.month()) << 8
-                | to_bcd(time.day()),
+                | to_bcd(month.into()) << 8
+                | to_bcd(day.into()),
         })
     }
 
@@ -69,11 +71,14 @@ impl Calendar {
         if self.tr & PM != 0 {
             return None;
         }
-        let year = FIRST_YEAR.checked_add_unsigned(from_bcd(self.dr >> 16, 0xFF)?)?;
+        let year = i32::from(FIRST_YEAR).checked_add_unsigned(from_bcd(self.dr >> 16, 0xFF)?)?;
         let date = NaiveDate::from_ymd_opt(year, from_bcd(self.dr >> 8, 0x1F)?, from_bcd(self.dr, 0x3F)?)?;
         let hour = from_bcd(self.tr >> 16, 0x3F)?;
         let second = date.and_hms_opt(hour, from_bcd(self.tr >> 8, 0x7F)?, from_bcd(self.tr, 0x7F)?)?;
-        second.checked_add_signed(fraction(ssr, prediv_s))
+        let nanoseconds = ahead_ns(ssr, prediv_s);
+        let second = second.and_utc().timestamp() + nanoseconds.div_euclid(NANOSECONDS);
+        let nanosecond = u32::try_from(nanoseconds.rem_euclid(NANOSECONDS)).ok()?;
+        date_time(second * 1000)?.with_nanosecond(nanosecond)
     }
 }
 
@@ -84,20 +89,20 @@ impl Shift {
     /// A clock can only be put back by less than a second, so it is put forward by a whole one first.
     #[must_use]
     pub fn to_fraction_of(time: NaiveDateTime, prediv_s: u16) -> Option<Shift> {
-        let steps = u64::from(prediv_s) + 1;
+        let steps = i64::from(prediv_s) + 1;
         // chrono shows a leap second as a second and more.
-        let nanoseconds = u64::from(time.nanosecond()).min(NANOSECONDS - 1);
+        let nanoseconds = i64::from(time.nanosecond()).min(NANOSECONDS - 1);
         let ahead = nanoseconds * steps / NANOSECONDS;
         let subtract = u16::try_from(steps - ahead).ok()?;
         (ahead != 0).then_some(Shift { add_second: true, subtract })
     }
 }
 
-/// What the clock is ahead of the full second; negative for up to a second after a shift.
-fn fraction(ssr: u16, prediv_s: u16) -> chrono::TimeDelta {
+/// What the clock is ahead of the full second, in nanoseconds; negative for up to a second after a shift.
+fn ahead_ns(ssr: u16, prediv_s: u16) -> i64 {
     let steps = i64::from(prediv_s) + 1;
     let ahead = i64::from(prediv_s) - i64::from(ssr);
-    chrono::TimeDelta::nanoseconds(ahead * 1_000_000_000 / steps)
+    ahead * NANOSECONDS / steps
 }
 
 fn to_bcd(number: u32) -> u32 {

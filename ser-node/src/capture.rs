@@ -6,14 +6,12 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use heapless::spsc::{Consumer, Producer, Queue};
-
 use crate::debounce::{Debounce, Filter};
+use crate::ring::{Reader, Ring, Slot, Writer};
 
-/// How many changes may wait for the main loop: a quarter of a second with a change every millisecond.
-///
-/// One less than a power of two: one slot of the queue stays free, and its index is then masked instead of divided.
-pub const QUEUE_LEN: usize = 255;
+/// How many changes may wait for the main loop: a quarter of a second with a change every millisecond. A power of two,
+/// as rings want it.
+pub const QUEUE_LEN: usize = 256;
 
 /// Inputs that changed in one sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,9 +25,30 @@ pub(crate) struct Sample {
     pub(crate) state: u32,
 }
 
+impl Slot for Sample {
+    type Cell = [AtomicU32; 3];
+    const EMPTY: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
+
+    #[inline]
+    fn store(self, [tick_ms, changed, state]: &[AtomicU32; 3]) {
+        tick_ms.store(self.tick_ms, Ordering::Relaxed);
+        changed.store(self.changed, Ordering::Relaxed);
+        state.store(self.state, Ordering::Relaxed);
+    }
+
+    #[inline]
+    fn load([tick_ms, changed, state]: &[AtomicU32; 3]) -> Sample {
+        Sample {
+            tick_ms: tick_ms.load(Ordering::Relaxed),
+            changed: changed.load(Ordering::Relaxed),
+            state: state.load(Ordering::Relaxed),
+        }
+    }
+}
+
 /// What the interrupt and the main loop share.
 pub struct CaptureChannel {
-    queue: Queue<Sample, { QUEUE_LEN + 1 }>,
+    queue: Ring<Sample, QUEUE_LEN>,
     shared: Shared,
 }
 
@@ -47,7 +66,7 @@ impl CaptureChannel {
     #[must_use]
     pub const fn new() -> CaptureChannel {
         CaptureChannel {
-            queue: Queue::new(),
+            queue: Ring::new(),
             shared: Shared {
                 tick_ms: AtomicU32::new(0),
                 state: AtomicU32::new(0),
@@ -59,10 +78,10 @@ impl CaptureChannel {
 
     /// The interrupt's end and the main loop's end.
     pub fn split(&mut self, debounce: Debounce) -> (Capture<'_>, CaptureReader<'_>) {
-        let (producer, consumer) = self.queue.split();
+        let (writer, reader) = self.queue.split();
         let capture =
-            Capture { queue: producer, shared: &self.shared, debounce, inputs: 0, tick_ms: 0, filter: None };
-        (capture, CaptureReader { queue: consumer, shared: &self.shared, debounce })
+            Capture { queue: writer, shared: &self.shared, debounce, inputs: 0, tick_ms: 0, filter: None };
+        (capture, CaptureReader { queue: reader, shared: &self.shared, debounce })
     }
 }
 
@@ -74,7 +93,7 @@ impl Default for CaptureChannel {
 
 /// The interrupt's end of the channel.
 pub struct Capture<'a> {
-    queue: Producer<'a, Sample>,
+    queue: Writer<'a, Sample, QUEUE_LEN>,
     shared: &'a Shared,
     debounce: Debounce,
     /// The latest sample as it was read, and its tick.
@@ -143,7 +162,7 @@ impl Capture<'_> {
     #[inline]
     fn push(&mut self, sample: Sample) {
         self.shared.state.store(sample.state, Ordering::Relaxed);
-        if self.queue.enqueue(sample).is_err() {
+        if !self.queue.push(sample) {
             let lost = &self.shared.edges_lost;
             let edges = sample.changed.count_ones();
             lost.store(lost.load(Ordering::Relaxed).saturating_add(edges), Ordering::Relaxed);
@@ -153,7 +172,7 @@ impl Capture<'_> {
 
 /// The main loop's end of the channel.
 pub struct CaptureReader<'a> {
-    queue: Consumer<'a, Sample>,
+    queue: Reader<'a, Sample, QUEUE_LEN>,
     shared: &'a Shared,
     debounce: Debounce,
 }
@@ -191,7 +210,7 @@ impl CaptureReader<'_> {
 
     /// The next change for which `due` says yes.
     pub(crate) fn next_if(&mut self, due: impl FnOnce(&Sample) -> bool) -> Option<Sample> {
-        if self.queue.peek().is_some_and(due) { self.queue.dequeue() } else { None }
+        if self.queue.peek().as_ref().is_some_and(due) { self.queue.pop() } else { None }
     }
 }
 
@@ -226,7 +245,7 @@ mod tests {
         }
         let read = drain(&mut reader);
         assert_eq!(read.len(), QUEUE_LEN);
-        assert_eq!(reader.edges_lost(), 2 * (300 - 255));
+        assert_eq!(reader.edges_lost(), 2 * (300 - 256));
         // The last change was dropped, and is in effect all the same.
         assert_eq!(reader.state(), 0b11);
     }

@@ -3,9 +3,10 @@
 //! Setting the clock moves the offset and never the tick. A change that happened before the clock was set but is
 //! recorded only afterwards, because debounce held it back, still gets the time of the setting of its moment.
 
-use chrono::{DateTime, NaiveDateTime};
+use chrono::NaiveDateTime;
 use ser_proto::TimeStamp;
 
+use crate::calendar::{self, Date};
 use crate::history::History;
 
 /// A battery-backed clock that keeps the time while the recorder is off.
@@ -74,16 +75,24 @@ fn to_calendar_ms(time: NaiveDateTime) -> i64 {
     time.and_utc().timestamp_millis()
 }
 
-/// The date and time `calendar_ms` milliseconds after 1970 began.
-pub(crate) fn to_date_time(calendar_ms: i64) -> NaiveDateTime {
-    DateTime::from_timestamp_millis(calendar_ms).unwrap_or_default().naive_utc()
-}
-
-/// The same as a time stamp of the protocol.
+/// The date and time `calendar_ms` milliseconds after 1970 began, within the hundred years of two-digit years.
 pub(crate) fn to_time_stamp(calendar_ms: i64) -> TimeStamp {
     const EPOCH: TimeStamp =
         TimeStamp { year: 70, month: 1, day: 1, hour: 0, minute: 0, second: 0, millisecond: 0 };
-    TimeStamp::try_from(to_date_time(calendar_ms)).unwrap_or(EPOCH)
+    time_stamp(calendar_ms.rem_euclid(CENTURY_MS)).unwrap_or(EPOCH)
+}
+
+fn time_stamp(calendar_ms: i64) -> Option<TimeStamp> {
+    let (Date { year, month, day }, ms) = calendar::split(calendar_ms)?;
+    Some(TimeStamp {
+        year: u8::try_from(year % 100).ok()?,
+        month,
+        day,
+        hour: u8::try_from(ms / 3_600_000).ok()?,
+        minute: u8::try_from(ms / 60_000 % 60).ok()?,
+        second: u8::try_from(ms / 1000 % 60).ok()?,
+        millisecond: u16::try_from(ms % 1000).ok()?,
+    })
 }
 
 #[cfg(test)]
@@ -120,5 +129,14 @@ mod tests {
         let clock = Clock::new(0, Some(time("2069-12-31T23:59:59.999")));
         assert_eq!(shows(&clock, 0), "2069-12-31T23:59:59.999");
         assert_eq!(shows(&clock, 1), "1970-01-01T00:00:00.000");
+    }
+
+    #[test]
+    fn a_stamp_is_what_the_calendar_library_makes_of_the_time() {
+        const STEP_MS: i64 = 7 * 60 * 60 * 1000 + 61_001;
+        for calendar_ms in (0..CENTURY_MS).step_by(usize::try_from(STEP_MS).unwrap()) {
+            let known = chrono::DateTime::from_timestamp_millis(calendar_ms).unwrap().naive_utc();
+            assert_eq!(to_time_stamp(calendar_ms), TimeStamp::try_from(known).unwrap());
+        }
     }
 }

@@ -103,17 +103,16 @@ impl<'a> EventLog<'a> {
     /// Changes the size (clamped to 1 … capacity) and keeps the newest events that fit, in order, from slot 0.
     /// The total stays.
     pub fn resize(&mut self, size: u16) {
-        let size = usize::from(size.clamp(1, self.capacity().max(1))).min(self.storage.len());
+        let size = usize::from(size.min(self.capacity()).max(1)).min(self.storage.len());
         if size == self.size {
             return;
         }
         let kept = self.len.min(size);
+        // In a ring that has wrapped, what is newer than the last slot goes on in slot 0.
+        let first = if self.len == self.size { self.next_slot + self.len - kept } else { self.len - kept };
+        let first = if first < self.size { first } else { first - self.size };
         if let Some(ring) = self.storage.get_mut(..self.size) {
-            // The oldest event comes first only after a rotation, and only once the ring has wrapped.
-            if self.len == self.size {
-                ring.rotate_left(self.next_slot);
-            }
-            ring.copy_within(self.len - kept..self.len, 0);
+            move_to_front(ring, first);
         }
         self.size = size;
         self.len = kept;
@@ -149,6 +148,16 @@ impl<'a> EventLog<'a> {
         let slot =
             if back <= self.next_slot { self.next_slot - back } else { self.next_slot + self.size - back };
         Some(narrow(slot + 1))
+    }
+}
+
+/// Turns a ring so that slot `first` becomes slot 0. Reversing both parts and then the whole does it without a path to
+/// a panic, which the library's rotation has.
+fn move_to_front(ring: &mut [Event], first: usize) {
+    if let Some((before, from_first)) = ring.split_at_mut_checked(first) {
+        before.reverse();
+        from_first.reverse();
+        ring.reverse();
     }
 }
 

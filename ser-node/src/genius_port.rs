@@ -341,8 +341,10 @@ impl<W: SharedRam> GeniusPort<W> {
 fn forces(table: ForceTable, inputs: GlobalData) -> Vec<u8, { ser_proto::genius::MAX_DATA }> {
     let mut forces = IoForces::none(table, inputs.model);
     if table == ForceTable::InputValues {
-        forces.contents.clear();
-        forces.contents.extend(inputs.to_bytes());
+        // The table is as long as the inputs are: both go by the model.
+        for (content, byte) in forces.contents.iter_mut().zip(inputs.to_bytes()) {
+            *content = byte;
+        }
     }
     ser_proto::genius::Message::ReadIoForcesReply(forces).to_data()
 }

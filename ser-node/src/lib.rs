@@ -19,6 +19,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
 )]
 
+pub mod calendar;
 pub mod capture;
 pub mod clock;
 pub mod debounce;
@@ -30,6 +31,7 @@ pub mod liveness;
 pub mod node;
 mod print_line;
 mod recorder;
+pub mod ring;
 pub mod sequencer;
 pub mod serial_port;
 pub mod settings;

@@ -49,6 +49,8 @@ pub struct Node<'a, S, R> {
     sequencer: Sequencer,
     pub(crate) recorder: Recorder<'a, S, R>,
     serial: SerialPort,
+    /// Commands that have arrived on any port, wrapping.
+    commands: u32,
 }
 
 impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
@@ -60,7 +62,7 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         let recorder = Recorder::new(model, log, storage, rtc, now_ms);
         let sequencer = Sequencer::new(*capture.debounce());
         let serial = SerialPort::new(recorder.configuration.baud);
-        Node { capture, ticks, sequencer, recorder, serial }
+        Node { capture, ticks, sequencer, recorder, serial, commands: 0 }
     }
 
     /// The tick of the latest sample: what a main loop reads first and passes to [`poll`](Self::poll) last.
@@ -144,6 +146,22 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         }
     }
 
+    /// Whether events are being recorded.
+    pub fn is_recording(&self) -> bool {
+        self.recorder.is_recording()
+    }
+
+    /// Events recorded since power-up, erased ones included; wraps.
+    pub fn events(&self) -> u32 {
+        let [a, b, c, d, ..] = self.recorder.log.next_sequence().to_le_bytes();
+        u32::from_le_bytes([a, b, c, d])
+    }
+
+    /// Commands that have arrived since power-up on any port, those included that were refused; wraps.
+    pub fn commands(&self) -> u32 {
+        self.commands
+    }
+
     /// The inputs that are on now, whether or not events are recorded.
     pub(crate) fn inputs(&self) -> Inputs {
         Inputs(self.capture.state())
@@ -192,6 +210,7 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
     /// Takes a command that arrived at `tick_ms`; what is to be answered, if anything. What changed before is recorded
     /// first, by the clock and mode of that time.
     pub(crate) fn arrived(&mut self, received: Received, tick_ms: u32) -> Option<Answer> {
+        self.commands = self.commands.wrapping_add(1);
         let tick_ms = self.ticks.extend(tick_ms);
         self.record_until(tick_ms);
         match received {

@@ -71,6 +71,11 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
+    /// Whether changes are recorded now.
+    pub(crate) fn is_recording(&self) -> bool {
+        self.recording.latest()
+    }
+
     /// Puts a change into the log, if recording was on when it happened.
     pub(crate) fn record(&mut self, change: Change) {
         if self.recording.at_sample(change.tick_ms) {

@@ -6,9 +6,14 @@
 //!
 //! On a Genius bus the file also holds the shared RAM of the board's GENI, and whoever plays the bus plays the GENI too.
 //!
+//! On the same bus the board finds its battery-backed clock: a count of milliseconds from here, written whenever the board
+//! is looked after, at least every 2 ms unless this computer is busy. It begins with this computer's time of day, so it goes
+//! on from one simulator to the next with the same memory.
+//!
 //! A step is written when its time has come, and not before the board has sampled the step before: on a stalled
 //! machine contacts move late, but no two moves become one and none is lost. What was played is recorded with the
-//! samples around it.
+//! samples around it. A board that starts anew by itself takes the contacts as it finds them; they move again when it
+//! samples them, and a move that it was caught in was none.
 
 use std::collections::VecDeque;
 use std::ffi::OsString;
@@ -19,9 +24,9 @@ use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command as Process, Stdio};
-use std::rc::Rc;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
@@ -56,7 +61,13 @@ const PATIENCE_PLAYING: Duration = Duration::from_micros(100);
 pub(crate) struct Emulator {
     program: PathBuf,
     arguments: Vec<OsString>,
-    bus: Rc<ExternalBus>,
+    bus: Arc<ExternalBus>,
+    /// The battery-backed clock's count.
+    clock: Pace,
+    /// How often the board had started when it was looked at last.
+    boots: u32,
+    /// Whether it has started and not yet sampled its contacts.
+    booting: bool,
     running: Option<Running>,
     coming_up: Option<ComingUp>,
     player: Player,
@@ -125,7 +136,10 @@ impl Emulator {
         Ok(Emulator {
             program: options.program.clone().unwrap_or_else(|| PROGRAM.into()),
             arguments: arguments(options, &memory),
-            bus: Rc::new(bus),
+            boots: bus.boots(),
+            bus: Arc::new(bus),
+            clock: Pace::from(Instant::now(), time_of_day_ms()),
+            booting: false,
             running: None,
             coming_up: None,
             player: Player::default(),
@@ -138,8 +152,8 @@ impl Emulator {
     }
 
     /// What the board sees besides its serial line.
-    pub(crate) fn external_bus(&self) -> Rc<ExternalBus> {
-        Rc::clone(&self.bus)
+    pub(crate) fn external_bus(&self) -> Arc<ExternalBus> {
+        Arc::clone(&self.bus)
     }
 
     /// Counts time as somebody else does, from now on.
@@ -170,9 +184,11 @@ impl Emulator {
     /// Switches the board on, or off and on again.
     pub(crate) fn switch_on(&mut self) -> Result<(), SimError> {
         self.switch_off();
-        // Contacts that were about to be sampled move now: the board takes them as they are at power-up.
-        self.moving = None;
         self.bus.clear_sample();
+        // Not for this run, and not the time of another one.
+        self.bus.force(0);
+        self.bus.set_clock(self.clock.now_ms());
+        self.begin_booting();
         self.running = Some(self.start()?);
         self.coming_up = Some(ComingUp { began: Instant::now(), asked: None, settled: false });
         Ok(())
@@ -238,8 +254,9 @@ impl Emulator {
         Ok(Running { qemu, input, output, to_board: VecDeque::new(), from_board: FromBoard::new() })
     }
 
-    /// Carries bytes to and from QEMU and sees that it is alive.
+    /// Turns the clock on, carries bytes to and from QEMU and sees that it is alive.
     fn look_after(&mut self) -> Result<(), SimError> {
+        self.bus.set_clock(self.clock.now_ms());
         let Some(running) = &mut self.running else { return Ok(()) };
         let ended = running.qemu.0.try_wait().map_err(SimError::io("look after the emulator"))?;
         if let Some(status) = ended {
@@ -248,7 +265,27 @@ impl Emulator {
         running.carry().map_err(SimError::io("talk to the emulator"))
     }
 
+    /// Contacts that were about to be sampled have moved: the board takes them as they are when it starts.
+    fn begin_booting(&mut self) {
+        self.booting = true;
+        self.moving = None;
+    }
+
+    /// Whether the board is about to start, by itself or because it was switched on.
+    fn is_booting(&mut self) -> bool {
+        let boots = self.bus.boots();
+        if boots != self.boots {
+            self.boots = boots;
+            self.begin_booting();
+        }
+        self.booting &= !self.bus.is_sampled();
+        self.booting
+    }
+
     fn move_contacts(&mut self) {
+        if self.is_booting() {
+            return;
+        }
         if let Some(moving) = self.moving.take_if(|moving| self.bus.sampled_inputs() == moving.moved.state) {
             self.played.push(moving.moved.played(moving.tick_before, self.bus.sample_counter()));
         }
@@ -463,6 +500,12 @@ fn arguments(options: &EmulatorOptions, memory: &Path) -> Vec<OsString> {
     .to_vec();
     arguments.extend([log, "-object".into(), backend, "-kernel".into(), options.image.clone().into()]);
     arguments
+}
+
+/// Milliseconds since 1970, as this computer has it.
+fn time_of_day_ms() -> u64 {
+    let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since_1970.as_millis()).unwrap_or_default()
 }
 
 /// A comma ends an option of QEMU unless it is doubled.

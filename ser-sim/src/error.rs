@@ -24,6 +24,8 @@ pub enum SimError {
     LinkInUse(PathBuf),
     /// The file that is to be the GENI window is something else already.
     WindowTaken(PathBuf),
+    /// Another simulator has the GENI window.
+    WindowInUse(PathBuf),
     /// The emulator is not installed.
     EmulatorMissing {
         /// The program looked for.
@@ -63,7 +65,7 @@ impl fmt::Display for SimError {
         match self {
             SimError::Scenario(error) => error.fmt(f),
             SimError::Io { doing, source } => write!(f, "cannot {doing}: {source}"),
-            SimError::LinkInUse(path) => {
+            SimError::LinkInUse(path) | SimError::WindowInUse(path) => {
                 write!(f, "another simulator has {}", path.display())
             }
             SimError::LinkTaken(path) => {
@@ -74,7 +76,7 @@ impl fmt::Display for SimError {
                 )
             }
             SimError::WindowTaken(path) => {
-                write!(f, "{} exists already and is no GENI window (16 KiB): name another", path.display())
+                write!(f, "{} exists already: remove it or name another", path.display())
             }
             SimError::EmulatorMissing { program } => write!(
                 f,

@@ -8,10 +8,11 @@
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::Path;
-use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 use geni::RAM_LEN;
 use memmap2::MmapRaw;
+use ser_board::last_words::MAX_TEXT_LEN;
 use ser_proto::Model;
 
 /// Bytes of the external memory; QEMU is told the same.
@@ -33,10 +34,29 @@ const SAMPLED_INPUTS: usize = 0x8020;
 const MODEL_STRAP: usize = 0x8008;
 /// Milliseconds for all inputs; read by the board at boot.
 const DEBOUNCE_STRAP: usize = 0x800C;
+/// How often the board has started, counted by the board.
+const BOOT_COUNT: usize = 0x8010;
+/// Bytes of its stack that it has used at most.
+const STACK_BYTES: usize = 0x8014;
+/// Why it started the last time.
+const RESET_CAUSE: usize = 0x8018;
+/// Its lamps, a bit each.
+const LAMPS: usize = 0x8028;
+/// The fault that it is to bring upon itself; it clears the word first.
+const FORCED_FAULT: usize = 0x802C;
+/// Its battery-backed clock's count: low word, high word, seal; written here.
+const CLOCK_COUNT_MS: usize = 0x8030;
+/// How long its last start took, in microseconds.
+const BOOT_TIME_US: usize = 0x803C;
+/// Length of what its run before the last start had to say, and then the text.
+const LAST_WORDS: usize = 0x8080;
 
 /// The mapped memory.
 pub(crate) struct ExternalBus {
     memory: MmapRaw,
+    /// When the clock's count was written last, and the longest time between two such moments; 0 for never.
+    clock_written_ms: AtomicU64,
+    clock_gap_ms: AtomicU64,
 }
 
 impl ExternalBus {
@@ -46,7 +66,11 @@ impl ExternalBus {
         if file.metadata()?.len() != MEMORY_LEN {
             file.set_len(MEMORY_LEN)?;
         }
-        Ok(ExternalBus { memory: MmapRaw::map_raw(&file)? })
+        Ok(ExternalBus {
+            memory: MmapRaw::map_raw(&file)?,
+            clock_written_ms: AtomicU64::new(0),
+            clock_gap_ms: AtomicU64::new(0),
+        })
     }
 
     pub(crate) fn set_straps(&self, model: Model, debounce_ms: u8) {
@@ -76,7 +100,7 @@ impl ExternalBus {
 
     /// The GENI board's reset line: bit 0 is set as long as it is held, and the rest changes with every pulse.
     pub(crate) fn geni_reset(&self) -> u32 {
-        u32::from_le(self.word(GENI_RESET).load(Ordering::SeqCst))
+        self.read(GENI_RESET)
     }
 
     /// Moves all contacts at once.
@@ -86,25 +110,83 @@ impl ExternalBus {
 
     /// The inputs as the board's latest sample saw them. Its tick is not later than the counter read after this.
     pub(crate) fn sampled_inputs(&self) -> u32 {
-        u32::from_le(self.word(SAMPLED_INPUTS).load(Ordering::SeqCst))
+        self.read(SAMPLED_INPUTS)
     }
 
     /// The tick of the board's latest sample.
     pub(crate) fn sample_counter(&self) -> u32 {
-        u32::from_le(self.word(SAMPLE_COUNTER).load(Ordering::SeqCst))
+        self.read(SAMPLE_COUNTER)
     }
 
     /// Puts the counter back to where it is before the first sample.
     pub(crate) fn clear_sample(&self) {
         self.write(SAMPLE_COUNTER, 0);
         // What no sample can have seen.
-        self.write(SAMPLED_INPUTS, !u32::from_le(self.word(INPUT_LATCH).load(Ordering::SeqCst)));
+        self.write(SAMPLED_INPUTS, !self.read(INPUT_LATCH));
     }
 
     /// Whether the board has taken a sample of the contacts as they are.
     pub(crate) fn is_sampled(&self) -> bool {
-        self.sample_counter() != 0
-            && self.sampled_inputs() == u32::from_le(self.word(INPUT_LATCH).load(Ordering::SeqCst))
+        self.sample_counter() != 0 && self.sampled_inputs() == self.read(INPUT_LATCH)
+    }
+
+    /// How often the board has started.
+    pub(crate) fn boots(&self) -> u32 {
+        self.read(BOOT_COUNT)
+    }
+
+    /// Why it started the last time, as a number.
+    pub(crate) fn reset_cause(&self) -> u32 {
+        self.read(RESET_CAUSE)
+    }
+
+    /// What its run before the last start had to say.
+    pub(crate) fn last_words(&self) -> Vec<u8> {
+        let len = usize::try_from(self.read(LAST_WORDS)).unwrap_or(usize::MAX).min(MAX_TEXT_LEN);
+        let words = (LAST_WORDS + 4..).step_by(4).map(|offset| self.read(offset).to_le_bytes());
+        words.take(MAX_TEXT_LEN / 4).flatten().take(len).collect()
+    }
+
+    /// How long its last start took, in microseconds.
+    pub(crate) fn boot_time_us(&self) -> u32 {
+        self.read(BOOT_TIME_US)
+    }
+
+    /// Its lamps, a bit each.
+    pub(crate) fn lamps(&self) -> u32 {
+        self.read(LAMPS)
+    }
+
+    /// Bytes of its stack that it has used at most.
+    pub(crate) fn stack_bytes(&self) -> u32 {
+        self.read(STACK_BYTES)
+    }
+
+    /// Has it bring a fault upon itself.
+    pub(crate) fn force(&self, fault: u32) {
+        self.write(FORCED_FAULT, fault);
+    }
+
+    /// Turns its battery-backed clock on to `count_ms`. Only one thread may.
+    pub(crate) fn set_clock(&self, count_ms: u64) {
+        let before_ms = self.clock_written_ms.swap(count_ms, Ordering::Relaxed);
+        if before_ms == count_ms {
+            return;
+        }
+        if before_ms != 0 {
+            self.clock_gap_ms.fetch_max(count_ms.saturating_sub(before_ms), Ordering::Relaxed);
+        }
+        let [a, b, c, d, e, f, g, h] = count_ms.to_le_bytes();
+        let (low, high) = (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]));
+        self.write(CLOCK_COUNT_MS, low);
+        self.write(CLOCK_COUNT_MS + 4, high);
+        // What the board finds half new, half old, does not fit its seal.
+        self.write(CLOCK_COUNT_MS + 8, !(low ^ high.rotate_left(16)));
+    }
+
+    /// The longest time for which the clock has not been turned on.
+    pub(crate) fn clock_gap_ms(&self) -> u64 {
+        self.clock_gap_ms.load(Ordering::Relaxed)
     }
 
     #[expect(unsafe_code, reason = "memory shared with the emulator")]
@@ -115,7 +197,11 @@ impl ExternalBus {
         unsafe { AtomicU8::from_ptr(self.memory.as_mut_ptr().add(GENI_WINDOW + offset)) }
     }
 
-    fn write(&self, offset: usize, value: u32) {
+    fn read(&self, offset: usize) -> u32 {
+        u32::from_le(self.word(offset).load(Ordering::SeqCst))
+    }
+
+    pub(crate) fn write(&self, offset: usize, value: u32) {
         self.word(offset).store(value.to_le(), Ordering::SeqCst);
     }
 
@@ -162,6 +248,28 @@ mod tests {
         assert!(file[..0x3FFF].iter().all(|&byte| byte == 0));
         assert_eq!((file[0x3FFF], file[0x4000], bus.read_geni(0x3FFF)), (7, 0, 7));
         assert_eq!(file[0x8024..0x8028], [1, 0, 0, 0]);
+    }
+
+    #[test]
+    fn the_clock_carries_a_seal_that_no_half_of_another_count_has() {
+        let directory = tempfile::tempdir().unwrap();
+        let bus = ExternalBus::open(&directory.path().join("memory")).unwrap();
+        let words = || [0x8030, 0x8034, 0x8038].map(|offset| bus.read(offset));
+        let is_sealed = |[low, high, seal]: [u32; 3]| seal == !(low ^ high.rotate_left(16));
+        assert!(!is_sealed(words()), "a new file has no clock");
+        // The low word begins anew in between.
+        let counts = [0x0000_0123_FFFF_FFFF, 0x0000_0124_0000_0000];
+        let [old, new] = counts.map(|count_ms| {
+            bus.set_clock(count_ms);
+            words()
+        });
+        assert_eq!(u64::from(new[1]) << 32 | u64::from(new[0]), counts[1]);
+        for mix in 0..8_u32 {
+            let mixed: [u32; 3] =
+                std::array::from_fn(|word| if mix >> word & 1 == 0 { old[word] } else { new[word] });
+            assert_eq!(is_sealed(mixed), mix == 0 || mix == 7, "{mix:03b}");
+        }
+        assert_eq!(bus.clock_gap_ms(), 1);
     }
 
     #[test]

@@ -46,4 +46,5 @@ pub use faults::{DeviceFault, Fault, Noise};
 pub use identity::{BlockKind, Identity};
 pub use map::RAM_LEN;
 pub use scan_time::{BusRate, MIN_SCAN_NS};
+pub use split_mix::SplitMix64;
 pub use window::BoardWindow;

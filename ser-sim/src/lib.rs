@@ -9,7 +9,11 @@
 //! - [`genius`] is the other way to a node: a GENI board, the Genius bus it sits on, and other devices there.
 
 mod breaker_trip;
+#[cfg(unix)]
+mod claim;
 mod contacts;
+#[cfg(unix)]
+mod emulated_board;
 #[cfg(unix)]
 mod emulator;
 mod error;
@@ -36,11 +40,17 @@ mod tcp;
 mod wire;
 
 pub use contacts::Contacts;
+#[cfg(unix)]
+pub use emulated_board::{EmulatedBoard, ForcedFault};
 pub use error::SimError;
 pub use genius_options::{GeniusOptions, MAX_NODES};
 pub use line::Port;
 pub use non_volatile::{MemoryStorage, NonVolatile, SimRtc};
 pub use player::{Played, STREAM_LEAD_MS};
 pub use scenario::{MAX_STEPS, Scenario, ScenarioError, ScenarioFault, Step};
+#[cfg(unix)]
+pub use ser_board::last_words::ResetCause;
+#[cfg(unix)]
+pub use ser_board::leds::Lamps;
 pub use sim_node::{LineRate, PoweredOff, Ram, SimNode, SimNodeOptions};
 pub use simulator::{Backend, EmulatorOptions, Notice, SimOptions, Simulator, run};

@@ -150,6 +150,11 @@ impl Player {
         None
     }
 
+    /// When the next of the steps laid out so far is due.
+    pub(crate) fn next_due_ms(&self) -> Option<u64> {
+        self.waiting.front().map(Waiting::due_ms)
+    }
+
     /// Whether every step laid out so far has been handed over and no scenario is half known.
     pub(crate) fn is_idle(&self) -> bool {
         self.waiting.is_empty() && self.stream_start_ms.is_none()

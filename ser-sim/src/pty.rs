@@ -8,7 +8,7 @@
 //! root could open the terminal again. The link is then moved to a fresh pseudo-terminal.
 
 use std::ffi::OsStr;
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
 use std::mem;
 use std::os::fd::{AsFd, BorrowedFd};
@@ -25,6 +25,7 @@ use rustix::termios::{OptionalActions, QueueSelector, Termios};
 use rustix::{fs as rfs, termios};
 use tempfile::TempDir;
 
+use crate::claim::Claim;
 use crate::error::SimError;
 use crate::line::Line;
 
@@ -45,34 +46,6 @@ pub(crate) struct PtyLine {
     _claim: Claim,
     /// Holds the link, where no place was given for it.
     _directory: Option<TempDir>,
-}
-
-/// A lock beside the link. A link alone does not tell whether the simulator that made it is still there.
-struct Claim {
-    path: PathBuf,
-    _locked: File,
-}
-
-impl Claim {
-    fn on(link: &Path) -> Result<Claim, SimError> {
-        let mut path = link.as_os_str().to_owned();
-        path.push(".lock");
-        let path = PathBuf::from(path);
-        let doing = || format!("make {}", path.display());
-        let locked = File::create(&path).map_err(SimError::io(doing()))?;
-        match locked.try_lock() {
-            Ok(()) => Ok(Claim { path, _locked: locked }),
-            Err(TryLockError::WouldBlock) => Err(SimError::LinkInUse(link.to_owned())),
-            Err(TryLockError::Error(error)) => Err(SimError::io(doing())(error)),
-        }
-    }
-}
-
-impl Drop for Claim {
-    fn drop(&mut self) {
-        // Unlocked when the file is closed, and of no use without the lock.
-        let _ = fs::remove_file(&self.path);
-    }
 }
 
 /// A pseudo-terminal: the open master and the name of its slave.
@@ -131,7 +104,7 @@ impl PtyLine {
                 (directory.path().join("port"), Some(directory))
             }
         };
-        let claim = Claim::on(&link)?;
+        let claim = Claim::on(&link, SimError::LinkInUse)?;
         check_replaceable(&link)?;
         let pair = Pair::new().map_err(SimError::io("open a pseudo-terminal"))?;
         Ok(PtyLine {

@@ -12,6 +12,8 @@ use ser_node::Debounce;
 use ser_proto::Model;
 
 use crate::contacts::{Contacts, read_stream};
+#[cfg(unix)]
+use crate::emulated_board::EmulatedBoard;
 use crate::error::SimError;
 #[cfg(unix)]
 use crate::genius_bench::GeniusBench;
@@ -100,8 +102,8 @@ impl Default for Backend {
 pub struct EmulatorOptions {
     /// The image, an ELF file for `mps2-an385`.
     pub image: PathBuf,
-    /// File behind the board's external memory. It holds the stored configuration, so a node that is given the same
-    /// file again remembers it. `None` makes a temporary one.
+    /// File behind the board's external memory. It holds the stored configuration and the time, so a node that is given
+    /// the same file again remembers them. `None` makes a temporary one.
     pub memory: Option<PathBuf>,
     /// File for what the image logs on its second serial port. `None` drops it.
     pub log: Option<PathBuf>,
@@ -120,6 +122,8 @@ impl EmulatorOptions {
 /// A node that runs, until this is dropped.
 pub struct Simulator {
     port: String,
+    #[cfg(unix)]
+    board: Option<EmulatedBoard>,
     requests: Sender<Request>,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<Result<(), SimError>>>,
@@ -154,7 +158,14 @@ impl Simulator {
                 let shared = Arc::clone(&service.shared);
                 let nodes = genius.as_ref().map_or(Vec::new(), |genius| genius.nodes.clone());
                 let model = nodes.first().map_or(model, |&(_, model)| model);
-                let start = Start { model, nodes, contacts, ready: ready_sender };
+                let start = Start {
+                    model,
+                    nodes,
+                    contacts,
+                    #[cfg(unix)]
+                    board: None,
+                    ready: ready_sender,
+                };
                 let result = match backend {
                     #[cfg(unix)]
                     backend if let Some(genius) = &genius => {
@@ -178,11 +189,22 @@ impl Simulator {
                 result
             })
             .map_err(SimError::io("start a thread"))?;
-        let mut simulator = Simulator { port: String::new(), requests, shared, thread: Some(thread) };
+        let mut simulator = Simulator {
+            port: String::new(),
+            #[cfg(unix)]
+            board: None,
+            requests,
+            shared,
+            thread: Some(thread),
+        };
         loop {
             match ready.recv_timeout(STOP_CHECK) {
-                Ok(port) => {
-                    simulator.port = port;
+                Ok(ready) => {
+                    simulator.port = ready.port;
+                    #[cfg(unix)]
+                    {
+                        simulator.board = ready.board;
+                    }
                     return Ok(simulator);
                 }
                 Err(RecvTimeoutError::Timeout) if !stop.load(Ordering::Relaxed) => {}
@@ -200,6 +222,13 @@ impl Simulator {
     /// How a host reaches the nodes: the port of the first, if it has one, and then each of them on the bus.
     pub fn ports(&self) -> impl Iterator<Item = &str> {
         self.port.lines()
+    }
+
+    /// The emulated board, if that plays the node (the first one, on a bus).
+    #[cfg(unix)]
+    #[must_use]
+    pub fn board(&self) -> Option<&EmulatedBoard> {
+        self.board.as_ref()
     }
 
     /// Plays a scenario from the next millisecond on, or after those before it. Says in which millisecond since the
@@ -305,7 +334,17 @@ struct Start {
     /// The nodes on the bus, if there is one.
     nodes: Vec<(u8, Model)>,
     contacts: Contacts,
-    ready: Sender<String>,
+    #[cfg(unix)]
+    board: Option<EmulatedBoard>,
+    ready: Sender<Ready>,
+}
+
+/// What the owner of a simulator gets when the node answers.
+struct Ready {
+    /// All ways to reach the nodes, one a line.
+    port: String,
+    #[cfg(unix)]
+    board: Option<EmulatedBoard>,
 }
 
 impl Start {
@@ -322,7 +361,11 @@ impl Start {
         }
         service.report(machine);
         // The caller of `start` waits for this, unless it is gone.
-        let _ = self.ready.send(names(service.line.name(), machine));
+        let _ = self.ready.send(Ready {
+            port: names(service.line.name(), machine),
+            #[cfg(unix)]
+            board: self.board,
+        });
         Ok(())
     }
 }
@@ -339,7 +382,7 @@ fn run_on_bus(
     backend: Backend,
     debounce_ms: u8,
     genius: &GeniusOptions,
-    start: Start,
+    mut start: Start,
 ) -> Result<(), SimError> {
     let shared = Arc::clone(&service.shared);
     let mut options =
@@ -353,6 +396,7 @@ fn run_on_bus(
             Some(crate::emulator::Emulator::new(&image, start.model, debounce_ms, true)?)
         }
     };
+    start.board = image.as_ref().map(|image| EmulatedBoard::new(image.external_bus()));
     let mut bench = GeniusBench::new(&options, image, genius)?;
     let mut rams = bench.rams();
     let mut start = Some(start);
@@ -403,10 +447,11 @@ fn run_emulator(
     service: &mut Service,
     options: &EmulatorOptions,
     debounce_ms: u8,
-    start: Start,
+    mut start: Start,
 ) -> Result<(), SimError> {
     let shared = Arc::clone(&service.shared);
     let mut emulator = crate::emulator::Emulator::new(options, start.model, debounce_ms, false)?;
+    start.board = Some(EmulatedBoard::new(emulator.external_bus()));
     emulator.power_up(&shared.stop)?;
     start.go(service, &mut emulator)?;
     loop {

@@ -9,7 +9,8 @@ use ser_client::{Endpoint, GeniHost, Options, Unit, Unsolicited, open};
 use ser_proto::{Entry, Model};
 use ser_sim::genius::Noise;
 use ser_sim::{
-    Backend, EmulatorOptions, GeniusOptions, Notice, Played, Port, Scenario, SimOptions, Simulator, Step,
+    Backend, EmulatedBoard, EmulatorOptions, GeniusOptions, Notice, Played, Port, Scenario, SimOptions,
+    Simulator, Step,
 };
 use tempfile::TempDir;
 
@@ -121,7 +122,22 @@ impl Recorder {
     /// When it does not answer, or the image is not there.
     #[must_use]
     pub fn start_logging(log: &Path) -> Recorder {
-        let emulator = EmulatorOptions { log: Some(log.to_owned()), ..EmulatorOptions::new(image()) };
+        Recorder::start_image(EmulatorOptions { log: Some(log.to_owned()), ..EmulatorOptions::new(image()) })
+    }
+
+    /// Switches on the ARM image with a memory that may have been in use before.
+    ///
+    /// # Panics
+    /// When it does not answer, or the image is not there.
+    #[must_use]
+    pub fn start_with_memory(memory: &Path) -> Recorder {
+        Recorder::start_image(EmulatorOptions {
+            memory: Some(memory.to_owned()),
+            ..EmulatorOptions::new(image())
+        })
+    }
+
+    fn start_image(emulator: EmulatorOptions) -> Recorder {
         let backend = Backend::Emulator(emulator);
         Recorder::start_with(SimOptions { backend, ..options(Model::Ser320) }, None)
     }
@@ -133,6 +149,15 @@ impl Recorder {
         let simulator = Simulator::start(SimOptions { notice: Some(notice), ..options });
         let simulator = simulator.unwrap_or_else(|error| panic!("{error}"));
         Recorder { simulator, notices, _folder: folder }
+    }
+
+    /// The emulated board.
+    ///
+    /// # Panics
+    /// When it is the recorder in this process.
+    #[must_use]
+    pub fn board(&self) -> &EmulatedBoard {
+        self.simulator.board().expect("an emulated recorder")
     }
 
     /// What `--port` takes for its serial line.

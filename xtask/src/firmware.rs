@@ -1,49 +1,75 @@
-//! `firmware`: builds the images and weighs them.
+//! `firmware`: builds the images and checks whether they may be flashed.
 
 use std::path::PathBuf;
 
-use crate::places;
+use crate::boards::{BOARDS, Board};
+use crate::checks::{self, Outcome};
+use crate::image::Image;
+use crate::image::calls::Calls;
 use crate::setup::cross::{self, CrossToolchain};
-use crate::sizes::Sizes;
-use crate::steps::{self, Failure, Result, heading};
+use crate::steps::{self, Failure, Result, heading, note};
+use crate::{stack_paths, table};
 
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask firmware
-  DEFMT_LOG=debug cargo xtask firmware    with more in the log";
+  cargo xtask firmware --board mps2-an385 --stack    and where the stack goes
+  DEFMT_LOG=debug cargo xtask firmware               with more in the log
 
-const KIB: u64 = 1024;
+What an image has to keep to, read off the image itself: its budgets of flash and variables;
+a stack that holds the worst case, and an overflow that ends in a fault; no way to a panic;
+nothing in flash that is wanted while the flash is being erased.";
 
-/// A board and what its image may weigh.
-pub(crate) struct Board {
-    name: &'static str,
-    package: &'static str,
-    /// Goals, below what the memory map has: an affordable controller with room for more.
-    flash_budget: u64,
-    /// Variables, with an event log of full size.
-    ram_budget: u64,
+/// Build the images for the boards and check whether they may be flashed.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Arguments {
+    /// Only for this board; by default for all.
+    #[arg(long, value_parser = board)]
+    board: Option<&'static Board>,
+
+    /// Show the deepest paths through the program.
+    #[arg(long)]
+    stack: bool,
 }
 
-/// The emulated board.
-pub(crate) const MPS2_AN385: Board =
-    Board { name: "mps2-an385", package: "ser-mps2-an385", flash_budget: 48 * KIB, ram_budget: 48 * KIB };
+/// A board by its name.
+pub(crate) fn board(name: &str) -> std::result::Result<&'static Board, String> {
+    let names: Vec<_> = BOARDS.iter().map(|board| board.name).collect();
+    Board::named(name).ok_or_else(|| format!("the boards are {}", names.join(", ")))
+}
 
-impl Board {
-    /// Where cargo puts the image.
-    pub(crate) fn image(&self) -> PathBuf {
-        places::firmware_target().join(cross::TARGET).join("release").join(self.package)
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let boards: Vec<&Board> = match arguments.board {
+        Some(board) => vec![board],
+        None => BOARDS.iter().collect(),
+    };
+    let (found, missing) = toolchains(&boards);
+    let checked = build_and_check(&found, arguments.stack);
+    // The other images have been built and checked all the same.
+    match (checked, missing.into_iter().next()) {
+        (Ok(()), Some(missing)) => Err(missing),
+        (checked, _) => checked,
     }
 }
 
-const BOARDS: [Board; 1] = [MPS2_AN385];
+/// Boards that can be built for, each with its toolchain; and why the others cannot, which has been said by then.
+pub(crate) type Toolchains<'a> = (Vec<(&'a Board, CrossToolchain)>, Vec<Failure>);
 
-/// Build the images for the boards and print their flash and RAM use against the budget.
-#[derive(Debug, clap::Args)]
-#[command(after_help = EXAMPLES)]
-pub(crate) struct Arguments {}
-
-pub(crate) fn run(_arguments: &Arguments) -> Result<()> {
-    build_and_weigh(&cross::find()?)
+/// Finds a toolchain for each board.
+pub(crate) fn toolchains<'a>(boards: &[&'a Board]) -> Toolchains<'a> {
+    let (mut found, mut missing) = (Vec::new(), Vec::new());
+    let targets: Vec<_> = boards.iter().map(|board| board.target).collect();
+    for (&board, toolchain) in boards.iter().zip(cross::find(&targets)) {
+        match toolchain {
+            Ok(toolchain) => found.push((board, toolchain)),
+            Err(failure) => {
+                note(&format!("left out: {}.{failure}", board.name));
+                missing.push(failure);
+            }
+        }
+    }
+    (found, missing)
 }
 
 /// Builds one image; gives its file.
@@ -52,48 +78,40 @@ pub(crate) fn build(toolchain: &CrossToolchain, board: &Board) -> Result<PathBuf
     Ok(board.image())
 }
 
-/// Builds all images and prints what they weigh. One that is over its budget is a failure.
-pub(crate) fn build_and_weigh(toolchain: &CrossToolchain) -> Result<()> {
-    heading("Firmware");
-    let mut images = Vec::new();
-    let mut over = Vec::new();
-    for board in &BOARDS {
-        let image = build(toolchain, board)?;
-        images.push((board, Sizes::of_image(&image)?, image));
+/// Builds images and checks them. One that may not be flashed is a failure.
+pub(crate) fn build_and_check(boards: &[(&Board, CrossToolchain)], stack: bool) -> Result<()> {
+    if boards.is_empty() {
+        return Ok(());
     }
-    println!("\n{:<12}  {:<26}  {:<26}  stack", "board", "flash", "variables");
-    for (board, sizes, _) in &images {
-        let flash = against(sizes.flash, board.flash_budget);
-        let ram = against(sizes.variables, board.ram_budget);
-        println!("{:<12}  {flash:<26}  {ram:<26}  {}", board.name, kib(sizes.stack));
-        if sizes.flash > board.flash_budget || sizes.variables > board.ram_budget {
-            over.push(board.name);
+    heading("Firmware");
+    let mut columns = Vec::new();
+    let mut paths = String::new();
+    for (board, toolchain) in boards {
+        let image = Image::read(&build(toolchain, board)?)?;
+        let calls = Calls::of(&image, &checks::forced(board, &image));
+        columns.push((*board, checks::all(board, &image, &calls)));
+        if stack {
+            paths += &stack_paths::shown(board, &image, &calls);
         }
     }
-    for (_, _, image) in &images {
-        println!("{}", image.display());
+    table::print(&columns);
+    print!("{paths}");
+    verdict(&columns)
+}
+
+fn verdict(columns: &[(&Board, Vec<Outcome>)]) -> Result<()> {
+    let broken = |(board, outcomes): &(&Board, Vec<Outcome>)| {
+        let broken: Vec<_> = outcomes.iter().filter(|outcome| !outcome.wrong.is_empty()).collect();
+        let names: Vec<_> = broken.iter().map(|outcome| outcome.what).collect();
+        (!names.is_empty()).then(|| format!("{} ({})", board.name, names.join(", ")))
+    };
+    let broken: Vec<_> = columns.iter().filter_map(broken).collect();
+    if broken.is_empty() {
+        return Ok(());
     }
-    if over.is_empty() { Ok(()) } else { Err(Failure::new(format!("over the budget: {}", over.join(", ")))) }
-}
-
-fn against(bytes: u64, budget: u64) -> String {
-    let verdict = if bytes > budget { "OVER" } else { "of" };
-    format!("{} {verdict} {} KiB ({} %)", kib(bytes), budget / KIB, bytes * 100 / budget)
-}
-
-/// With one decimal, rounded up: what is used is never shown as less.
-fn kib(bytes: u64) -> String {
-    let tenths = (bytes * 10).div_ceil(KIB);
-    format!("{}.{} KiB", tenths / 10, tenths % 10)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes_are_shown_against_the_budget() {
-        assert_eq!(against(22_193, 48 * KIB), "21.7 KiB of 48 KiB (45 %)");
-        assert_eq!(against(48 * KIB + 1, 48 * KIB), "48.1 KiB OVER 48 KiB (100 %)");
-    }
+    Err(Failure::new(format!(
+        "not to be flashed: {}\n  \
+         The lines above say why; llvm-addr2line -ife IMAGE ADDRESS shows the source of an address.",
+        broken.join("; ")
+    )))
 }

@@ -1,8 +1,10 @@
 //! `lint`: format, clippy and documentation.
 
+use crate::boards::{BOARDS, Board};
+use crate::firmware::toolchains;
 use crate::places;
 use crate::setup::components;
-use crate::setup::cross::{self, CrossToolchain};
+use crate::setup::cross::CrossToolchain;
 use crate::steps::{self, Result, heading, note};
 
 const EXAMPLES: &str = "\
@@ -17,13 +19,8 @@ pub(crate) struct Arguments {}
 
 pub(crate) fn run(_arguments: &Arguments) -> Result<()> {
     host()?;
-    match cross::find() {
-        Ok(toolchain) => firmware(&toolchain),
-        Err(missing) => {
-            note(&format!("left out: clippy on the firmware.{missing}"));
-            Ok(())
-        }
-    }
+    let (found, _) = toolchains(&BOARDS.each_ref());
+    firmware(&found)
 }
 
 /// All that needs no cross toolchain.
@@ -43,13 +40,16 @@ pub(crate) fn host() -> Result<()> {
 }
 
 /// What is flashed.
-pub(crate) fn firmware(toolchain: &CrossToolchain) -> Result<()> {
-    heading("Clippy on the firmware");
-    match toolchain.clippy() {
-        Some(mut clippy) => steps::run(clippy.args(["--release", "--", "-D", "warnings"])),
-        None => {
-            note("left out: this cross toolchain has no clippy");
-            Ok(())
+pub(crate) fn firmware(boards: &[(&Board, CrossToolchain)]) -> Result<()> {
+    for (board, toolchain) in boards {
+        heading(&format!("Clippy on the firmware for {}", board.name));
+        match toolchain.clippy() {
+            Some(mut clippy) => {
+                let package = ["--release", "--package", board.package];
+                steps::run(clippy.args(package).args(["--", "-D", "warnings"]))?;
+            }
+            None => note("left out: this cross toolchain has no clippy"),
         }
     }
+    Ok(())
 }

@@ -60,7 +60,7 @@ mod decoding {
     use defmt_decoder::{DecodeError, Table};
 
     use super::Arguments;
-    use crate::firmware::MPS2_AN385;
+    use crate::boards::MPS2_AN385;
     use crate::steps::{Failure, Result};
 
     const LOOK_EVERY: Duration = Duration::from_millis(100);

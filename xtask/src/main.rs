@@ -1,17 +1,24 @@
 //! Everything about the project that is one command: `cargo xtask --help`.
 //!
 //! A verb is a file. What verbs share: [`setup`] finds or installs tools, [`steps`] runs them and says how to repeat what
-//! failed.
+//! failed. [`boards`] says what there is to build, [`image`] reads what was built, [`checks`] says whether it may be flashed.
 
+mod boards;
+mod checks;
 mod demo;
 mod firmware;
+mod flash;
+mod fuzz;
+mod image;
 mod lint;
 mod log;
 mod places;
 mod qemu;
 mod setup;
-mod sizes;
+mod simulate;
+mod stack_paths;
 mod steps;
+mod table;
 mod test;
 
 use std::process::ExitCode;
@@ -32,8 +39,11 @@ enum Verb {
     Qemu(qemu::Arguments),
     Test(test::Arguments),
     Firmware(firmware::Arguments),
+    Flash(flash::Arguments),
+    Fuzz(fuzz::Arguments),
     Lint(lint::Arguments),
     Log(log::Arguments),
+    Simulate(simulate::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -42,8 +52,11 @@ fn main() -> ExitCode {
         Verb::Qemu(arguments) => qemu::run(&arguments),
         Verb::Test(arguments) => test::run(&arguments),
         Verb::Firmware(arguments) => firmware::run(&arguments),
+        Verb::Flash(arguments) => flash::run(&arguments),
+        Verb::Fuzz(arguments) => fuzz::run(&arguments),
         Verb::Lint(arguments) => lint::run(&arguments),
         Verb::Log(arguments) => log::run(&arguments),
+        Verb::Simulate(arguments) => simulate::run(&arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

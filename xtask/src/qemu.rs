@@ -1,8 +1,9 @@
-//! `qemu`: the ARM image in the emulator, on a pseudo-terminal or a TCP port.
+//! `qemu`: the ARM image in the emulator, on a pseudo-terminal, a TCP port or a Genius bus.
 
 use std::ffi::OsString;
 use std::process::Command;
 
+use crate::boards::MPS2_AN385;
 use crate::firmware;
 use crate::setup::{cross, emulator};
 use crate::steps::{self, Result, heading};
@@ -12,6 +13,7 @@ Examples:
   cargo xtask qemu --pty /tmp/ser                    then: ser-cli -p /tmp/ser status
   cargo xtask qemu --tcp 127.0.0.1:4000              then: ser-cli -p tcp://127.0.0.1:4000 status
   cargo xtask qemu --pty /tmp/ser --log ser.log      then: cargo xtask log --follow ser.log
+  cargo xtask qemu --genius /tmp/host --node 5       then: ser-cli -p 'geni:/tmp/host?node=5' status
 
 `ser-cli sim --help` lists all options.";
 
@@ -26,9 +28,9 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     emulator::find()?;
-    let toolchain = cross::find()?;
+    let toolchain = cross::find_one(MPS2_AN385.target)?;
     heading("Firmware");
-    let image = firmware::build(&toolchain, &firmware::MPS2_AN385)?;
+    let image = firmware::build(&toolchain, &MPS2_AN385)?;
     build_ser_cli()?;
     steps::become_program(ser_cli("sim").arg("--image").arg(image).args(&arguments.options))
 }

@@ -1,4 +1,4 @@
-//! The external bus: GENI board, field inputs, straps, marks for the bench, configuration memory.
+//! The external bus: GENI board, field inputs, straps, lamps, clock, marks for the bench, configuration memory.
 //!
 //! | offset        | what                                                   | written by |
 //! |---------------|--------------------------------------------------------|------------|
@@ -7,36 +7,52 @@
 //! | 8004h         | sample counter: tick of the latest sample, in ms       | recorder   |
 //! | 8008h         | model strap: 160 for SER160, anything else is SER320   | bench      |
 //! | 800Ch         | debounce strap: ms for every input, 0–255, low byte    | bench      |
-//! | 8010h         | boot count                                             | recorder   |
-//! | 8014h         | fault mark: why the recorder is about to reset itself  | recorder   |
-//! | 8018h         | the fault mark that the latest boot found              | recorder   |
+//! | 8010h         | boot count, since the file was made                    | recorder   |
+//! | 8014h         | bytes of the stack in use at most since the latest     | recorder   |
+//! |               | boot, looked at once a second                          |            |
+//! | 8018h         | cause of the latest boot                               | recorder   |
 //! | 801Ch         | reset line of the GENI board: bit 0 is set as long as  | recorder   |
 //! |               | it is held; the bits above count how often it was held |            |
 //! | 8020h         | the inputs as the latest sample saw them               | recorder   |
 //! | 8024h         | GENI strap: 0 for no board, anything else for a board  | bench      |
+//! | 8028h         | lamps: run, event, communication, fault in bits 0–3    | recorder   |
+//! | 802Ch         | fault that is forced, 0 for none                       | both       |
+//! | 8030h–8038h   | battery-backed clock, its count in ms: low, high, seal | bench      |
+//! | 803Ch         | how long the latest boot took: from reset until inputs | recorder   |
+//! |               | are sampled, in µs                                     |            |
+//! | 8040h–8048h   | what the clock shows in ms since 1970, less its count: | recorder   |
+//! |               | low, high, seal                                        |            |
+//! | 8080h         | length of the last words of the run before, in bytes   | recorder   |
+//! | 8084h–80DFh   | these words, UTF-8                                     | recorder   |
 //! | 9000h, 9040h  | configuration memory, two blocks of 64 bytes           | recorder   |
 //!
-//! Words have 32 bits, little-endian. Fault marks: 0 none, 1 panic, 2 hard fault, 3 watchdog, 4 stack
-//! overflow.
+//! Words have 32 bits, little-endian.
+//!
+//! - Causes: 0 unknown, 1 panic, 2 hard fault, 3 watchdog, 4 stack overflow, 5 the program asked for it, 6 power.
+//! - Faults that can be forced: 1 hard fault, 2 the main loop hangs, 3 panic, 4 stack overflow, 5 capture stops. The recorder
+//!   clears the word before it obeys.
+//! - Two words with a seal are good when the seal is the inverse of (low xor (high rotated by 16 bits)).
 //!
 //! # Design
 //! Straps are read once, at boot. After each sample the recorder writes first its tick and then what it saw: whoever
 //! changes the latch and then finds the change at 8020h knows that it has been sampled, and not later than at the tick
-//! that stands at 8004h. It is what a trigger output is to a scope. The reset line is counted because the bench looks at
-//! it now and then, and a GENI board misses no pulse. Configuration memory stands for an FRAM: it needs no erasing, and the
-//! two blocks never share a write.
+//! that stands at 8004h. It is what a trigger output is to a scope. Before a boot is counted, both are set to what no
+//! sample can have written, so that nobody takes the run before for this one. The reset line is counted because the bench
+//! looks at it now and then, and a GENI board misses no pulse. Configuration memory stands for an FRAM: it needs no
+//! erasing, and the two blocks never share a write.
 //!
 //! # Tradeoffs
 //! Everything sits on one bus, so one file on the desktop holds all there is to see and to set.
 //!
 //! # Notes
 //! QEMU backs the bus with a file; what is written on either side is seen on the other at once. The file outlives
-//! the emulator, and so does the configuration. On the real board the memory there is a PSRAM.
+//! the emulator, and so do the configuration and the clock. On the real board the memory there is a PSRAM.
 
 use core::convert::Infallible;
 use core::ptr::{self, NonNull};
 
 use geni::WindowRam;
+use ser_board::last_words::{MAX_TEXT_LEN, ResetCause, Text};
 use ser_node::{CopyNumber, Debounce, RECORD_LEN, Storage};
 use ser_proto::Model;
 
@@ -61,16 +77,30 @@ const DEBOUNCE_STRAP: Word = unsafe { word(0x800C) };
 // SAFETY: see the map.
 const BOOT_COUNT: Word = unsafe { word(0x8010) };
 // SAFETY: see the map.
-const FAULT_MARK: Word = unsafe { word(0x8014) };
+const STACK_BYTES: Word = unsafe { word(0x8014) };
 // SAFETY: see the map.
-const FAULT_FOUND: Word = unsafe { word(0x8018) };
+const RESET_CAUSE: Word = unsafe { word(0x8018) };
 // SAFETY: see the map.
 const GENI_RESET: Word = unsafe { word(0x801C) };
 // SAFETY: see the map.
 const SAMPLED_INPUTS: Word = unsafe { word(0x8020) };
-
 // SAFETY: see the map.
 const GENI_STRAP: Word = unsafe { word(0x8024) };
+// SAFETY: see the map.
+const LAMPS: Word = unsafe { word(0x8028) };
+// SAFETY: see the map.
+const FORCED_FAULT: Word = unsafe { word(0x802C) };
+// SAFETY: see the map.
+pub(crate) const CLOCK_COUNT_MS: SealedWords = unsafe { SealedWords::at(0x8030) };
+// SAFETY: see the map.
+const BOOT_TIME_US: Word = unsafe { word(0x803C) };
+// SAFETY: see the map.
+pub(crate) const CLOCK_OFFSET_MS: SealedWords = unsafe { SealedWords::at(0x8040) };
+// SAFETY: see the map.
+const LAST_WORDS_LEN: Word = unsafe { word(0x8080) };
+
+const LAST_WORDS: usize = 0x8084;
+const _: () = assert!(MAX_TEXT_LEN == 0x80E0 - LAST_WORDS);
 
 const GENI_WINDOW: usize = 0x0000;
 const CONFIGURATION_MEMORY: usize = 0x9000;
@@ -137,56 +167,101 @@ impl GeniBoard {
     }
 }
 
-/// Why the recorder resets itself.
-#[derive(Clone, Copy)]
-#[repr(u32)]
-pub(crate) enum Fault {
-    Panic = 1,
-    Exception = 2,
-    Watchdog = 3,
-    StackOverflow = 4,
+/// Lights lamps and puts them out. Only one context may.
+pub(crate) fn change_lamps(change: impl FnOnce(u32) -> u32) {
+    LAMPS.write(change(LAMPS.read()));
 }
 
-/// The words for a fault mark; `None` when there is none.
-pub(crate) fn fault_name(mark: u32) -> Option<&'static str> {
-    Some(match mark {
-        0 => return None,
-        1 => "panic",
-        2 => "hard fault",
-        3 => "watchdog",
-        4 => "stack overflow",
-        _ => "unknown fault mark",
-    })
+/// The fault that the bench wants, 0 for none; it is wanted once.
+#[inline]
+pub(crate) fn take_forced_fault() -> u32 {
+    let number = FORCED_FAULT.read();
+    if number != 0 {
+        FORCED_FAULT.write(0);
+    }
+    number
 }
 
-/// What was found at boot.
-#[derive(Clone, Copy)]
-pub(crate) struct Boot {
-    /// How often the recorder has booted, this time included.
-    pub(crate) count: u32,
-    /// The fault mark of the run before; 0 after power-up and after a reset from outside.
-    pub(crate) fault: u32,
+/// Shows how much of the stack has been in use at most.
+pub(crate) fn mark_stack(bytes: usize) {
+    STACK_BYTES.write(u32::try_from(bytes).unwrap_or(u32::MAX));
 }
 
-/// Counts the boot and moves the fault mark to where the bench can see it.
-pub(crate) fn boot() -> Boot {
+/// Shows how long the boot has taken.
+pub(crate) fn mark_boot_time(microseconds: u32) {
+    BOOT_TIME_US.write(microseconds);
+}
+
+/// Counts a boot and lays open what the run before had to say. Gives the count.
+pub(crate) fn mark_boot(cause: ResetCause, words: &Text) -> u32 {
+    SAMPLE_COUNTER.write(0);
+    SAMPLED_INPUTS.write(!INPUT_LATCH.read());
+    STACK_BYTES.write(0);
+    RESET_CAUSE.write(cause.code().into());
+    let bytes = words.as_str().as_bytes();
+    LAST_WORDS_LEN.write(u32::try_from(bytes.len()).unwrap_or(0));
+    for (offset, bytes) in (LAST_WORDS..).step_by(WORD_LEN).zip(bytes.chunks(WORD_LEN)) {
+        let mut whole = [0; WORD_LEN];
+        for (place, &byte) in whole.iter_mut().zip(bytes) {
+            *place = byte;
+        }
+        // SAFETY: see the map; a text has no more than `MAX_TEXT_LEN` bytes.
+        unsafe { word(offset) }.write(u32::from_le_bytes(whole));
+    }
+    // Last: who sees the new count finds all of it.
     let count = BOOT_COUNT.read().wrapping_add(1);
     BOOT_COUNT.write(count);
-    let fault = FAULT_MARK.read();
-    FAULT_FOUND.write(fault);
-    FAULT_MARK.write(0);
-    Boot { count, fault }
+    count
 }
 
-/// Leaves a mark for the next boot.
-#[inline]
-pub(crate) fn mark_fault(fault: Fault) {
-    FAULT_MARK.write(fault as u32);
+/// Two words for a large number, and a third that tells whether they belong together.
+#[derive(Clone, Copy)]
+pub(crate) struct SealedWords {
+    low: Word,
+    high: Word,
+    seal: Word,
 }
 
-/// Takes the mark back: it did not come to a reset.
-pub(crate) fn unmark_fault() {
-    FAULT_MARK.write(0);
+impl SealedWords {
+    /// # Safety
+    /// As for [`word`], and so for the two words behind.
+    const unsafe fn at(offset: usize) -> SealedWords {
+        // SAFETY: promised by the caller.
+        #[expect(clippy::multiple_unsafe_ops_per_block, reason = "one reason for all three")]
+        unsafe {
+            SealedWords {
+                low: word(offset),
+                high: word(offset + WORD_LEN),
+                seal: word(offset + 2 * WORD_LEN),
+            }
+        }
+    }
+
+    /// The number; `None` when the seal is broken.
+    pub(crate) fn read(self) -> Option<u64> {
+        let (low, high, seal) = (self.low.read(), self.high.read(), self.seal.read());
+        (seal == seal_of(low, high)).then_some(u64::from(high) << 32 | u64::from(low))
+    }
+
+    /// Writes a number, which stays without a good seal for now.
+    pub(crate) fn write_unsealed(self, number: u64) {
+        let [a, b, c, d, e, f, g, h] = number.to_le_bytes();
+        let (low, high) = (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]));
+        // Broken for the old number and for the new one.
+        self.seal.write(!seal_of(low, high));
+        self.low.write(low);
+        self.high.write(high);
+    }
+
+    /// Seals what was written.
+    pub(crate) fn seal(self) {
+        self.seal.write(seal_of(self.low.read(), self.high.read()));
+    }
+}
+
+/// A single changed word always breaks it, and so do zeros.
+const fn seal_of(low: u32, high: u32) -> u32 {
+    !(low ^ high.rotate_left(16))
 }
 
 /// The two blocks of configuration memory.

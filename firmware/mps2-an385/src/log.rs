@@ -6,7 +6,7 @@
 //!
 //! # Tradeoffs
 //! Polling holds up the main loop by the length of a record (2 ms at most), which is why events are not logged.
-//! The only ones to interrupt the main loop with a record are faults, and these take the log over.
+//! Only `init` and the main loop log: what a fault has to say is logged by the start that follows.
 //!
 //! # Notes
 //! `ser-cli sim` writes the frames into a file; `cargo xtask log` turns them into text with the ELF file's help.
@@ -39,13 +39,6 @@ const BAUD_DIVIDER: Word = unsafe { Word::at(base::UART1 + 0x10) };
 pub(crate) fn start() {
     BAUD_DIVIDER.write(device::CLOCK_HZ / BITS_PER_SECOND);
     CONTROL.write(TRANSMIT_ENABLE);
-}
-
-/// Takes the log away from a record that will never be completed.
-pub(crate) fn take_over() {
-    // SAFETY: called on the way to a reset, with interrupts off: nobody goes on with what was interrupted.
-    unsafe { *ENCODER.0.get() = defmt::Encoder::new() };
-    DEPTH.store(0, Ordering::Relaxed);
 }
 
 defmt::timestamp!("{=u32:ms}", timer::tick_ms());

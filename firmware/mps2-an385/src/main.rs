@@ -9,13 +9,18 @@
 // The start-up code and the vector table.
 use cortex_m_rt as _;
 
+mod boot;
 mod device;
 mod external_bus;
 mod fault;
+mod forced;
 mod genius;
+mod inputs;
+mod lamps;
+mod last_words;
 mod log;
 mod mmio;
-mod report;
+mod rtc;
 mod stack;
 mod timer;
 mod uart;
@@ -23,20 +28,40 @@ mod watchdog;
 
 #[rtic::app(device = crate::device, peripherals = false)]
 mod app {
-    use ser_node::{Capture, CaptureChannel, Event, Liveness, NoRtc, Node, NodeParts, VERSION};
+    use chrono::NaiveDate;
+    use ser_board::budget;
+    use ser_board::clock_chip::{ClockChip, ClockState};
+    use ser_board::inputs::{Sample, Sampler};
+    use ser_board::last_words::Boot;
+    use ser_board::leds::{self, Condition};
+    use ser_board::main_loop;
+    use ser_board::report::Report;
+    use ser_node::{Capture, CaptureChannel, Event, Liveness, Node, NodeParts, VERSION};
 
     use crate::external_bus::{self, ConfigurationMemory};
     use crate::genius::Genius;
-    use crate::report::Report;
+    use crate::inputs::{self, InputLatch};
+    use crate::lamps::Lamps;
+    use crate::rtc::{self, BenchClock};
     use crate::timer::{self, Timer};
     use crate::uart::{self, ReceiveInterrupt, Rings, SerialLine, TransmitInterrupt};
     use crate::watchdog::Watchdog;
-    use crate::{fault, log};
+    use crate::{fault, forced, last_words, log, stack};
 
     /// Events that the log holds: the largest size that can be configured.
     const LOG_LEN: usize = 2048;
 
-    pub(crate) type BoardNode = Node<'static, ConfigurationMemory, NoRtc>;
+    /// No clock can show an earlier day: there was no such recorder.
+    const NOT_BEFORE: NaiveDate = NaiveDate::from_ymd_opt(2026, 1, 1).unwrap();
+
+    // RTIC takes nothing but literals for priorities.
+    const _: () = {
+        assert!(budget::CAPTURE_PRIORITY == 3);
+        assert!(budget::RECEIVE_PRIORITY == 2);
+        assert!(budget::TRANSMIT_PRIORITY == 1);
+    };
+
+    pub(crate) type BoardNode = Node<'static, ConfigurationMemory, ClockChip<'static, BenchClock>>;
 
     #[shared]
     struct Shared {}
@@ -44,14 +69,16 @@ mod app {
     #[local]
     struct Local {
         timer: Timer,
+        sampler: Sampler<'static, InputLatch>,
         capture: Capture<'static>,
-        input_mask: u32,
         receive: ReceiveInterrupt,
         transmit: TransmitInterrupt,
         serial: SerialLine,
         node: BoardNode,
         genius: Option<Genius>,
+        lamps: Lamps,
         watchdog: Watchdog,
+        was_fault: bool,
     }
 
     #[init(local = [
@@ -62,49 +89,64 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let init::LocalResources { channel, events, rings, .. } = cx.local;
         log::start();
-        let boot = external_bus::boot();
+        let boot = last_words::boot();
+        let count = external_bus::mark_boot(boot.cause, &boot.text);
         let model = external_bus::model();
-        defmt::info!("version {=u8}, {}, boot {=u32}", VERSION, model, boot.count);
-        if let Some(fault) = external_bus::fault_name(boot.fault) {
-            defmt::error!("the run before ended with a reset: {=str}", fault);
-        }
+        log_start(&boot, count, model);
 
         let (capture, reader) = channel.split(external_bus::debounce());
+        // SAFETY: `init` runs once.
+        let clock = unsafe { BenchClock::open() };
         let node = Node::new(NodeParts {
             model,
             log: events,
             capture: reader,
             storage: ConfigurationMemory,
-            rtc: NoRtc,
+            rtc: ClockChip::new(clock, NOT_BEFORE, &rtc::HEALTH),
         });
         let (serial, receive, transmit) = uart::start(rings, node.baud());
-        // SAFETY: `init` runs once.
+        // SAFETY: as above.
         let genius = unsafe { external_bus::GeniBoard::find() };
         let genius = genius.map(|(board, window)| Genius::new(board, window, model));
+        let sampler = Sampler::new(InputLatch, inputs::wiring(model), &inputs::HEALTH);
         let watchdog = Watchdog::start();
         let timer = Timer::start();
+        external_bus::mark_boot_time(timer::since_reset_us());
+        let lamps = Lamps::new();
+        let was_fault = boot.cause.is_fault();
         (
             Shared {},
             Local {
                 timer,
+                sampler,
                 capture,
-                input_mask: model.mask(),
                 receive,
                 transmit,
                 serial,
                 node,
                 genius,
+                lamps,
                 watchdog,
+                was_fault,
             },
         )
     }
 
+    fn log_start(boot: &Boot, count: u32, model: ser_proto::Model) {
+        defmt::info!("version {=u8}, {}, boot {=u32}: {}", VERSION, model, count, boot.cause);
+        if boot.cause.is_fault() {
+            defmt::error!("the run before ended with a fault: {}: {=str}", boot.cause, boot.text.as_str());
+        }
+    }
+
     /// Takes a sample of all inputs.
-    #[task(binds = TIMER0, priority = 3, local = [timer, capture, input_mask])]
+    #[task(binds = TIMER0, priority = 3, local = [timer, sampler, capture])]
     fn capture(cx: capture::Context) {
-        if let Some(tick_ms) = cx.local.timer.on_interrupt() {
-            let inputs = external_bus::read_inputs();
-            cx.local.capture.sample(tick_ms, inputs & *cx.local.input_mask);
+        let capture::LocalResources { timer, sampler, capture, .. } = cx.local;
+        if let Some(tick_ms) = timer.on_interrupt()
+            && let Sample::Fresh(inputs) | Sample::Held(inputs) = sampler.sample()
+        {
+            capture.sample(tick_ms, inputs);
             external_bus::mark_sample(tick_ms, inputs);
         }
     }
@@ -119,38 +161,30 @@ mod app {
         cx.local.transmit.on_interrupt();
     }
 
-    #[idle(local = [serial, node, genius, watchdog])]
+    #[idle(local = [serial, node, genius, lamps, watchdog, was_fault])]
     fn idle(cx: idle::Context) -> ! {
-        let idle::LocalResources { serial, node, genius, watchdog, .. } = cx.local;
+        let idle::LocalResources { serial, node, genius, lamps, watchdog, was_fault, .. } = cx.local;
+        defmt::info!("battery-backed clock: {}", rtc::HEALTH.state());
         let mut liveness = Liveness::new();
         let mut report = Report::new(node.tick_ms());
         loop {
-            let now_ms = node.tick_ms();
-            for _ in 0..uart::RECEIVE_RING_LEN {
-                // Commands that find no room in the node wait in the ring.
-                if !node.serial_has_room() {
-                    break;
-                }
-                let Some(received) = serial.receive() else { break };
-                node.serial_receive(received.byte, received.tick_ms);
-                if received.overrun {
-                    node.serial_line_error();
-                }
-            }
-            node.poll(now_ms);
+            let now_ms = main_loop::pass(node, serial);
             if let Some(genius) = genius {
                 genius.poll(node, now_ms);
             }
-            change_baud(node, serial, now_ms);
-            hand_out(node, serial);
-
+            lamps.show(now_ms, &condition(node, serial, genius.as_ref(), *was_fault));
             if liveness.pass(now_ms) {
-                watchdog.feed();
+                watchdog.feed(now_ms);
                 if fault::watchdog_fed() {
                     defmt::warn!("watchdog: fed at the last moment");
                 }
             }
-            report.pass(now_ms, || (node.diagnostics(), genius.as_ref().map(Genius::diagnostics)));
+            report.pass(
+                now_ms,
+                || (node.diagnostics(), genius.as_ref().map(Genius::diagnostics)),
+                stack_bytes,
+            );
+            forced::obey();
 
             // A byte that arrives just now waits for the next interrupt, a millisecond at most. Looking with
             // interrupts off would spare it that, and delay the capture interrupt instead.
@@ -160,24 +194,28 @@ mod app {
         }
     }
 
-    /// Hands out no more than the ring holds: a line that takes bytes as fast as they come must not keep the main loop.
-    fn hand_out(node: &mut BoardNode, serial: &mut SerialLine) {
-        for _ in 0..uart::TRANSMIT_RING_LEN {
-            if !serial.can_send() {
-                break;
-            }
-            let Some(byte) = node.serial_transmit() else { break };
-            serial.send(byte);
+    /// What the lamps are to tell.
+    fn condition(
+        node: &BoardNode,
+        serial: &SerialLine,
+        genius: Option<&Genius>,
+        was_fault: bool,
+    ) -> Condition {
+        let reports = genius.map_or(0, |genius| genius.diagnostics().reports_sent);
+        Condition {
+            recording: node.is_recording(),
+            events: node.events(),
+            messages: serial.bytes().wrapping_add(node.commands()).wrapping_add(reports),
+            broken: rtc::HEALTH.state() == ClockState::Silent,
+            reset_by_fault: was_fault,
+            lost: leds::has_lost(&node.diagnostics()),
         }
     }
 
-    fn change_baud(node: &mut BoardNode, serial: &mut SerialLine, now_ms: u32) {
-        let quiet = serial.is_quiet(now_ms);
-        if let Some(baud) = node.baud_change()
-            && quiet
-        {
-            serial.set_baud(baud);
-            node.baud_changed(baud);
-        }
+    /// The most that has been in use of the stack; the bench sees it, too.
+    fn stack_bytes() -> usize {
+        let bytes = stack::high_water();
+        external_bus::mark_stack(bytes);
+        bytes
     }
 }

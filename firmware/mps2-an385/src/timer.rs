@@ -1,8 +1,8 @@
 //! The capture interrupt and the clock behind it.
 //!
 //! # Design
-//! Timer 0 interrupts every millisecond. Timer 1 counts without end, and the tick is read off it: the interrupt says
-//! *look now*, never *one more millisecond*.
+//! Timer 0 interrupts every millisecond. Timer 1 counts without end from reset on (see `boot`), and the tick is read off
+//! it: the interrupt says *look now*, never *one more millisecond*.
 //!
 //! # Tradeoffs
 //! Two timers instead of one. With a tick that counts interrupts, every interrupt that comes later than the next one is due
@@ -74,10 +74,14 @@ pub(crate) struct Timer {
     ticks: TickCounter,
 }
 
+/// Time since reset, in microseconds; good for the first 172 s.
+pub(crate) fn since_reset_us() -> u32 {
+    count_up() / (device::CLOCK_HZ / 1_000_000)
+}
+
 impl Timer {
-    /// Starts both timers.
+    /// Starts the interrupt; the tick begins at 0.
     pub(crate) fn start() -> Timer {
-        TIMER1.start(u32::MAX, ENABLE);
         TIMER0.start(COUNTS_PER_MS.get() - 1, ENABLE | INTERRUPT_ENABLE);
         Timer { ticks: TickCounter::new(COUNTS_PER_MS, count_up()) }
     }

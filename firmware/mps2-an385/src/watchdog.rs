@@ -1,20 +1,29 @@
 //! The watchdog.
 //!
 //! # Design
-//! The first time-out only leaves a mark (see `fault.rs`); the second one resets the board. A main loop that is late, but alive,
-//! feeds in between and goes on.
+//! The first time-out is the non-maskable interrupt, which only leaves the last words (see `fault`); the second one resets
+//! the board. A main loop that is late, but alive, feeds in between and goes on.
 //!
 //! # Tradeoffs
 //! Two seconds each: a recorder that hangs is back after four. Shorter times would reset an emulator whose host is busy.
 //!
 //! # Notes
-//! The first time-out is the non-maskable interrupt. Registers are locked except while feeding, so that a
-//! program gone wild is unlikely to switch the watchdog off.
+//! The interrupt is a level that stays until it is cleared, and whether a processor takes a non-maskable interrupt again
+//! while its level stays is not laid down: so it is cleared, and it is the second interrupt that resets. Clearing
+//! it begins a new period. A processor that takes no interrupt at all does not clear either; then the watchdog resets
+//! it at the second time-out by itself. (Cortex-M System Design Kit, "APB watchdog".) Registers are
+//! locked except while they are written, so that a program gone wild is unlikely to switch the watchdog off.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use ser_board::budget::WATCHDOG_MS;
 
 use crate::device::{self, base};
 use crate::mmio::Word;
+use crate::timer;
 
-const TIMEOUT_MS: u32 = 2000;
+/// The budget's time, in two parts.
+const TIMEOUT_MS: u32 = WATCHDOG_MS / 2;
 
 const UNLOCK: u32 = 0x1ACC_E551;
 const LOCK: u32 = 0;
@@ -29,6 +38,9 @@ const INTERRUPT_CLEAR: Word = unsafe { Word::at(base::WATCHDOG + 0xC) };
 // SAFETY: as above.
 const LOCKING: Word = unsafe { Word::at(base::WATCHDOG + 0xC00) };
 
+/// The tick at which the watchdog was fed last.
+static FED_MS: AtomicU32 = AtomicU32::new(0);
+
 /// The running watchdog.
 pub(crate) struct Watchdog(());
 
@@ -42,10 +54,26 @@ impl Watchdog {
         Watchdog(())
     }
 
-    /// Starts the time anew.
-    pub(crate) fn feed(&mut self) {
-        LOCKING.write(UNLOCK);
-        INTERRUPT_CLEAR.write(1);
-        LOCKING.write(LOCK);
+    /// Starts the time anew; `now_ms` is the tick of the latest sample.
+    pub(crate) fn feed(&mut self, now_ms: u32) {
+        FED_MS.store(now_ms, Ordering::Relaxed);
+        acknowledge();
+    }
+}
+
+/// Clears the interrupt, which also starts the time anew. One that comes in the middle of another has done what that
+/// was to do.
+pub(crate) fn acknowledge() {
+    LOCKING.write(UNLOCK);
+    INTERRUPT_CLEAR.write(1);
+    LOCKING.write(LOCK);
+}
+
+/// Which half of the recorder has made no progress since the watchdog was fed.
+pub(crate) fn what_stands_still() -> &'static str {
+    if timer::tick_ms() == FED_MS.load(Ordering::Relaxed) {
+        "capture stands still"
+    } else {
+        "the main loop stands still"
     }
 }

@@ -220,7 +220,9 @@ impl From<SimError> for Failure {
             SimError::LinkTaken(_) | SimError::LinkInUse(_) => {
                 "choose a name that does not exist, as in --pty /tmp/ser"
             }
-            SimError::WindowTaken(_) => "choose a name that does not exist, as in --genius /tmp/host",
+            SimError::WindowTaken(_) | SimError::WindowInUse(_) => {
+                "choose a name that does not exist, as in --genius /tmp/host"
+            }
             SimError::EmulatorMissing { .. } => "or leave --image out: the built-in node needs no emulator",
             SimError::EmulatorEnded { .. } | SimError::NoAnswer { .. } => {
                 "is this an image for mps2-an385? Build it with cargo xtask firmware"

@@ -3,14 +3,18 @@
 
 /// The generator; any seed is as good as any other.
 #[derive(Clone, Debug)]
-pub(super) struct SplitMix64(u64);
+pub struct SplitMix64(u64);
 
 impl SplitMix64 {
-    pub(super) fn new(seed: u64) -> SplitMix64 {
+    /// The sequence that begins with this seed.
+    #[must_use]
+    pub fn new(seed: u64) -> SplitMix64 {
         SplitMix64(seed)
     }
 
-    pub(super) fn next(&mut self) -> u64 {
+    /// The next number; all 64 bits are as good.
+    #[expect(clippy::should_implement_trait, reason = "the sequence has no end")]
+    pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut mixed = self.0;
         mixed = (mixed ^ mixed >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -19,7 +23,7 @@ impl SplitMix64 {
     }
 
     /// True this many times in a million. Draws nothing when that is never.
-    pub(super) fn happens(&mut self, per_million: u32) -> bool {
+    pub fn happens(&mut self, per_million: u32) -> bool {
         per_million > 0 && self.next() % 1_000_000 < u64::from(per_million)
     }
 }

@@ -8,7 +8,7 @@ use chrono::Local;
 use ser_proto::{Baud, Command, FrameEncoder, TimeStamp};
 
 use super::host_window::HostWindow;
-use super::recorder::Recorder;
+use super::recorder::{Recorder, as_seen_from_afar};
 use crate::error::SimError;
 use crate::genius::{Board, Bus, Handle};
 use crate::machine::Machine;
@@ -26,9 +26,6 @@ const LOG_IN_PATIENCE: Duration = Duration::from_secs(60);
 
 /// How often it is looked whether all are logged in.
 const LOOK_EVERY_MS: u32 = 50;
-
-/// Where a board has whether a device is logged in: the third of eight bytes per device.
-const DEVICE_TABLE: usize = 0x1E00;
 
 /// The bus while its recorders are under power. The first of them has the serial line.
 pub(crate) struct BusMachine<'a> {
@@ -119,9 +116,8 @@ impl<'a> BusMachine<'a> {
     }
 
     fn all_logged_in(&self) -> bool {
-        let ram = self.bus.get(self.host).ram();
-        // A board that starts up has patterns there, and never a plain 1.
-        self.recorders.iter().all(|recorder| ram[DEVICE_TABLE + 8 * usize::from(recorder.number()) + 2] == 1)
+        let host = self.bus.get(self.host);
+        self.recorders.iter().all(|recorder| host.has_logged_in(recorder.number()))
     }
 
     fn pass_ms(&mut self) {
@@ -245,11 +241,14 @@ impl Machine for BusMachine<'_> {
     }
 
     fn take_complaints(&mut self) -> Vec<String> {
-        let mut complaints = Vec::new();
+        let by_host = as_seen_from_afar(self.bus.get_mut(self.host).take_new_violations());
+        let by_host =
+            by_host.iter().map(|broken| format!("the host breaks a rule of its GENI board: {broken}"));
+        let mut complaints: Vec<String> = by_host.collect();
         for recorder in &mut self.recorders {
-            for violation in recorder.take_violations() {
-                let number = recorder.number();
-                complaints.push(format!("node {number} breaks a rule of its GENI board: {violation}"));
+            let number = recorder.number();
+            for broken in recorder.take_violations() {
+                complaints.push(format!("node {number} breaks a rule of its GENI board: {broken}"));
             }
         }
         complaints

@@ -5,6 +5,7 @@ use std::io;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
+use crate::claim::Claim;
 use crate::error::SimError;
 use crate::genius::{Board, RAM_LEN};
 
@@ -18,22 +19,26 @@ pub(super) struct HostWindow {
     image: Box<[u8; RAM_LEN]>,
     /// Whether the file is ours to remove.
     made: bool,
+    /// Keeps other simulators from taking the window.
+    _claim: Claim,
 }
 
 impl HostWindow {
-    /// Makes the file, or takes one that can be nothing else, and fills it with zeros.
+    /// Makes the file, or takes one that is empty or that a simulator has left behind, and fills it with zeros.
     pub(super) fn create(path: &Path) -> Result<HostWindow, SimError> {
         let doing = || format!("make the GENI window {}", path.display());
-        let made = !path.exists();
+        let claim = Claim::on(path, SimError::WindowInUse)?;
+        let made = !path.exists() || claim.was_left_behind();
         let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
         let file = file.map_err(SimError::io(doing()))?;
         let metadata = file.metadata().map_err(SimError::io(doing()))?;
-        if !metadata.is_file() || ![0, RAM_LEN as u64].contains(&metadata.len()) {
+        let ours = claim.was_left_behind() && metadata.len() == RAM_LEN as u64;
+        if !metadata.is_file() || !(ours || metadata.len() == 0) {
             return Err(SimError::WindowTaken(path.to_owned()));
         }
         let emptied = file.set_len(RAM_LEN as u64).and_then(|()| file.write_all_at(&[0; RAM_LEN], 0));
         emptied.map_err(SimError::io(doing()))?;
-        Ok(HostWindow { path: path.to_owned(), file, image: Box::new([0; RAM_LEN]), made })
+        Ok(HostWindow { path: path.to_owned(), file, image: Box::new([0; RAM_LEN]), made, _claim: claim })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -92,5 +97,49 @@ impl Drop for HostWindow {
             // It may be gone already.
             let _ = fs::remove_file(&self.path);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_goes_with_its_simulator() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("host");
+        let window = HostWindow::create(&path).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), [0; RAM_LEN]);
+        assert!(matches!(HostWindow::create(&path), Err(SimError::WindowInUse(_))));
+        drop(window);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn somebody_elses_file_is_left_alone_whatever_its_size() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("photo");
+        for len in [1, RAM_LEN] {
+            fs::write(&path, vec![0xA5; len]).unwrap();
+            assert!(matches!(HostWindow::create(&path), Err(SimError::WindowTaken(_))));
+            assert_eq!(fs::read(&path).unwrap(), vec![0xA5; len]);
+        }
+    }
+
+    #[test]
+    fn the_window_of_a_simulator_that_was_killed_is_taken_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("host");
+        fs::write(&path, [0xA5; RAM_LEN]).unwrap();
+        fs::write(folder.path().join("host.lock"), []).unwrap();
+        drop(HostWindow::create(&path).unwrap());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn an_empty_file_is_used_and_stays() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        drop(HostWindow::create(file.path()).unwrap());
+        assert_eq!(fs::read(file.path()).unwrap().len(), RAM_LEN);
     }
 }

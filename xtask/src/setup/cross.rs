@@ -1,7 +1,7 @@
 //! A Rust that builds for the boards.
 //!
-//! In this order: the toolchain in use, if it has the target's library; the same after `rustup target add`;
-//! Debian's own Rust, which comes with the library's source and builds that as well.
+//! For each target, in this order: the toolchain in use, if it has the target's library; the same after
+//! `rustup target add`; Debian's own Rust, which comes with the library's source and builds that as well.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -12,8 +12,13 @@ use crate::places;
 use crate::setup::apt;
 use crate::steps::{self, Failure, Result, heading, note, output, unrelated, works};
 
+/// What a board's processor is called by Rust.
+pub(crate) type Target = &'static str;
+
 /// Cortex-M3.
-pub(crate) const TARGET: &str = "thumbv7m-none-eabi";
+pub(crate) const CORTEX_M3: Target = "thumbv7m-none-eabi";
+/// Cortex-M4 with a floating-point unit.
+pub(crate) const CORTEX_M4F: Target = "thumbv7em-none-eabihf";
 
 /// What `Cargo.toml` asks for.
 const OLDEST_RUST: (u32, u32) = (1, 88);
@@ -30,9 +35,15 @@ const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 const DEBIAN_CARGO_CLIPPY: &str = "/usr/bin/cargo-clippy";
 
-/// A Rust that builds for the boards.
-#[derive(Debug)]
-pub(crate) enum CrossToolchain {
+/// A Rust that builds for a target.
+#[derive(Clone, Debug)]
+pub(crate) struct CrossToolchain {
+    target: Target,
+    rust: Rust,
+}
+
+#[derive(Clone, Debug)]
+enum Rust {
     /// The toolchain in use.
     InUse,
     /// Debian's Rust, with the linker that it is to use.
@@ -40,90 +51,121 @@ pub(crate) enum CrossToolchain {
 }
 
 impl CrossToolchain {
-    /// Cargo with this subcommand, for the firmware workspace.
+    /// Cargo with this subcommand, for the target and in the firmware workspace.
     pub(crate) fn cargo(&self, subcommand: &str) -> Command {
-        match self {
-            CrossToolchain::InUse => {
+        match &self.rust {
+            Rust::InUse => {
                 let mut cargo = steps::cargo();
                 cargo.arg(subcommand);
-                common(cargo)
+                self.common(cargo)
             }
-            CrossToolchain::Debian { linker } => debian(DEBIAN_CARGO, subcommand, linker),
+            Rust::Debian { linker } => self.debian(DEBIAN_CARGO, subcommand, linker),
         }
     }
 
     /// Clippy for the firmware workspace, if there is one.
     pub(crate) fn clippy(&self) -> Option<Command> {
-        match self {
-            CrossToolchain::InUse => Some(self.cargo("clippy")),
+        match &self.rust {
+            Rust::InUse => Some(self.cargo("clippy")),
             // Through /usr/bin/cargo, rustup's clippy would be found first.
-            CrossToolchain::Debian { linker } => {
-                Path::new(DEBIAN_CARGO_CLIPPY).exists().then(|| debian(DEBIAN_CARGO_CLIPPY, "clippy", linker))
+            Rust::Debian { linker } => {
+                let there = Path::new(DEBIAN_CARGO_CLIPPY).exists();
+                there.then(|| self.debian(DEBIAN_CARGO_CLIPPY, "clippy", linker))
             }
         }
     }
+
+    fn common(&self, mut cargo: Command) -> Command {
+        cargo.current_dir(places::firmware());
+        cargo.args(["--target", self.target, "--target-dir"]).arg(places::firmware_target());
+        cargo
+    }
+
+    fn debian(&self, program: &str, subcommand: &str, linker: &Path) -> Command {
+        let mut cargo = unrelated(program);
+        cargo.env("CARGO", DEBIAN_CARGO).env("RUSTC", DEBIAN_RUSTC);
+        // Building the library is not stable yet; the compiler and its source are of one version, so it works.
+        cargo.env("RUSTC_BOOTSTRAP", "1");
+        cargo.env(linker_variable(self.target), linker);
+        cargo.args([subcommand, "-Zbuild-std=core"]);
+        self.common(cargo)
+    }
 }
 
-fn common(mut cargo: Command) -> Command {
-    cargo.current_dir(places::firmware());
-    cargo.arg("--target-dir").arg(places::firmware_target());
-    cargo
+/// Where cargo looks for the linker of a target.
+fn linker_variable(target: Target) -> String {
+    format!("CARGO_TARGET_{}_LINKER", target.to_uppercase().replace('-', "_"))
 }
 
-fn debian(program: &str, subcommand: &str, linker: &Path) -> Command {
-    let mut cargo = unrelated(program);
-    cargo.env("CARGO", DEBIAN_CARGO).env("RUSTC", DEBIAN_RUSTC);
-    // Building the library is not stable yet; the compiler and its source are of one version, so it works.
-    cargo.env("RUSTC_BOOTSTRAP", "1");
-    cargo.env(format!("CARGO_TARGET_{}_LINKER", TARGET.to_uppercase().replace('-', "_")), linker);
-    cargo.args([subcommand, "-Zbuild-std=core"]);
-    common(cargo)
+/// Finds a toolchain for each target, or installs one.
+pub(crate) fn find(targets: &[Target]) -> Vec<Result<CrossToolchain>> {
+    let lacking: Vec<Target> = targets.iter().copied().filter(|target| !has_library(target)).collect();
+    let debian = if lacking.is_empty() || added(&lacking) { None } else { found_or_installed_debian() };
+    let toolchain = |&target: &Target| {
+        if has_library(target) {
+            return Ok(CrossToolchain { target, rust: Rust::InUse });
+        }
+        let linker = debian.clone().ok_or_else(|| missing(target))?;
+        Ok(CrossToolchain { target, rust: Rust::Debian { linker } })
+    };
+    targets.iter().map(toolchain).collect()
 }
 
-/// Finds a toolchain, or installs one.
-pub(crate) fn find() -> Result<CrossToolchain> {
-    if has_library() {
-        return Ok(CrossToolchain::InUse);
-    }
-    if works(unrelated("rustup").arg("--version")) {
-        heading(&format!("Adding {TARGET} to the toolchain"));
-        if add_target() && has_library() {
-            return Ok(CrossToolchain::InUse);
-        }
-        note("rustup cannot get it");
-    }
-    if apt::there() {
-        if let Some(toolchain) = debian_toolchain() {
-            return Ok(toolchain);
-        }
-        heading("Installing Debian's Rust for the firmware");
-        for packages in DEBIAN_RUST {
-            match apt::install(&packages) {
-                Ok(()) => break,
-                Err(why) => note(&why),
-            }
-        }
-        // Nothing depends on it but how much is checked.
-        let _ = DEBIAN_CLIPPY.into_iter().any(|package| apt::install(&[package]).is_ok());
-        if rust_lld().is_none() && !on_path("ld.lld") {
-            let _ = apt::install(&["lld"]).map_err(|why| note(&why));
-        }
-        if let Some(toolchain) = debian_toolchain() {
-            return Ok(toolchain);
-        }
-    }
-    Err(Failure::new(format!(
-        "there is no Rust for {TARGET}; get it with\n  rustup target add {TARGET}\n\
+/// A toolchain for one target.
+pub(crate) fn find_one(target: Target) -> Result<CrossToolchain> {
+    find(&[target]).pop().unwrap_or_else(|| Err(missing(target)))
+}
+
+fn missing(target: Target) -> Failure {
+    Failure::new(format!(
+        "there is no Rust for {target}; get it with\n  rustup target add {target}\n\
          or, on Debian 12 without access to static.rust-lang.org, with\n  \
          sudo apt-get install --no-install-recommends {} {} lld",
         DEBIAN_RUST[0].join(" "),
         DEBIAN_CLIPPY[0]
-    )))
+    ))
+}
+
+/// Adds targets to the toolchain in use, if rustup can get them. True when none is lacking any more.
+fn added(targets: &[Target]) -> bool {
+    if !works(unrelated("rustup").arg("--version")) {
+        return false;
+    }
+    heading(&format!("Adding {} to the toolchain", targets.join(" and ")));
+    let lacking: Vec<_> =
+        targets.iter().filter(|target| !(add_target(target) && has_library(target))).collect();
+    for target in &lacking {
+        note(&format!("rustup cannot get {target}"));
+    }
+    lacking.is_empty()
+}
+
+/// Debian's Rust, which builds for all targets; gives the linker that it is to use.
+fn found_or_installed_debian() -> Option<PathBuf> {
+    if !apt::there() {
+        return None;
+    }
+    if let Some(linker) = debian_rust() {
+        return Some(linker);
+    }
+    heading("Installing Debian's Rust for the firmware");
+    for packages in DEBIAN_RUST {
+        match apt::install(&packages) {
+            Ok(()) => break,
+            Err(why) => note(&why),
+        }
+    }
+    // Nothing depends on it but how much is checked.
+    let _ = DEBIAN_CLIPPY.into_iter().any(|package| apt::install(&[package]).is_ok());
+    if rust_lld().is_none() && !on_path("ld.lld") {
+        let _ = apt::install(&["lld"]).map_err(|why| note(&why));
+    }
+    debian_rust()
 }
 
 /// Whether the toolchain in use has the target's library.
-fn has_library() -> bool {
-    let library = output(steps::in_use("rustc").args(["--print", "target-libdir", "--target", TARGET]));
+fn has_library(target: Target) -> bool {
+    let library = output(steps::in_use("rustc").args(["--print", "target-libdir", "--target", target]));
     library.is_some_and(|library| {
         let mut files = Path::new(&library).read_dir().into_iter().flatten().flatten();
         files.any(|file| file.file_name().to_string_lossy().starts_with("libcore"))
@@ -131,9 +173,9 @@ fn has_library() -> bool {
 }
 
 /// `rustup target add`, silently, and not for long.
-fn add_target() -> bool {
+fn add_target(target: Target) -> bool {
     let mut rustup = steps::in_use("rustup");
-    rustup.args(["target", "add", TARGET]).env("RUSTUP_MAX_RETRIES", "0");
+    rustup.args(["target", "add", target]).env("RUSTUP_MAX_RETRIES", "0");
     rustup.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     let Ok(mut child) = rustup.spawn() else { return false };
     let began = Instant::now();
@@ -150,14 +192,14 @@ fn add_target() -> bool {
     false
 }
 
-/// Debian's Rust, if it is installed, new enough, and has source and linker.
-fn debian_toolchain() -> Option<CrossToolchain> {
+/// The linker for Debian's Rust, if that is installed, new enough, and has the library's source.
+fn debian_rust() -> Option<PathBuf> {
     let version = output(unrelated(DEBIAN_RUSTC).arg("--version"))?;
     let sysroot = PathBuf::from(output(unrelated(DEBIAN_RUSTC).args(["--print", "sysroot"]))?);
     let has_source = sysroot.join("lib/rustlib/src/rust/library/core").exists();
     let complete = parse_version(&version)? >= OLDEST_RUST && has_source && Path::new(DEBIAN_CARGO).exists();
     let linker = rust_lld().or_else(|| on_path("ld.lld").then(|| "ld.lld".into()))?;
-    complete.then_some(CrossToolchain::Debian { linker })
+    complete.then_some(linker)
 }
 
 /// The linker that comes with rustup's toolchain.
@@ -180,6 +222,12 @@ fn parse_version(text: &str) -> Option<(u32, u32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_target_has_its_own_variable_for_the_linker() {
+        assert_eq!(linker_variable(CORTEX_M3), "CARGO_TARGET_THUMBV7M_NONE_EABI_LINKER");
+        assert_eq!(linker_variable(CORTEX_M4F), "CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER");
+    }
 
     #[test]
     fn versions_are_compared_as_numbers() {

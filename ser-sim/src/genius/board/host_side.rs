@@ -62,6 +62,17 @@ impl Board {
         self.violations.kept()
     }
 
+    /// What the host did although it must not, since this was last asked.
+    pub(crate) fn take_new_violations(&mut self) -> Vec<Violation> {
+        self.violations.take_new()
+    }
+
+    /// Whether the board has logged a device in.
+    pub(crate) fn has_logged_in(&self, number: u8) -> bool {
+        // A board that starts up has patterns there, and never a plain 1.
+        self.ram().get(map::device(number) + map::DEVICE_PRESENT) == Some(&1)
+    }
+
     /// Takes over what another process has written to its image of the shared RAM since the latest
     /// [`publish`](Board::publish).
     ///

@@ -54,6 +54,8 @@ const KEPT: usize = 64;
 #[derive(Debug, Default)]
 pub(super) struct Violations {
     kept: Vec<Violation>,
+    /// How many of them have been taken as news.
+    told: usize,
 }
 
 impl Violations {
@@ -62,6 +64,12 @@ impl Violations {
             let offset = u16::try_from(offset).unwrap_or(u16::MAX);
             self.kept.push(Violation { at_us, kind, offset });
         }
+    }
+
+    pub(super) fn take_new(&mut self) -> Vec<Violation> {
+        let new = self.kept.get(self.told..).unwrap_or_default().to_vec();
+        self.told = self.kept.len();
+        new
     }
 
     pub(super) fn kept(&self) -> &[Violation] {

@@ -1,0 +1,54 @@
+//! Faults that the bench forces, to see what this very image does about them.
+//!
+//! A word of the external bus says which; it is cleared before it is obeyed, so that the next start is sane. Only the emulated
+//! board has such a word.
+
+use core::hint::black_box;
+
+use cortex_m::peripheral::NVIC;
+
+use crate::device::Interrupt;
+use crate::external_bus;
+use crate::mmio::Word;
+
+/// Where the chip has nothing: reading it is a bus fault.
+// SAFETY: a multiple of four, outside of all memory; what reading it does is wanted.
+const NOTHING: Word = unsafe { Word::at(0xA000_0000) };
+
+/// Does what the bench wants, if it wants anything. Called in every pass of the main loop.
+#[inline]
+pub(crate) fn obey() {
+    match external_bus::take_forced_fault() {
+        0 => {}
+        number => force(number),
+    }
+}
+
+/// In one piece, so that whoever looks for panics and recursion in the image knows where they are meant to be.
+#[cold]
+#[inline(never)]
+fn force(number: u32) {
+    match number {
+        1 => {
+            NOTHING.read();
+        }
+        2 => loop {
+            cortex_m::asm::wfi();
+        },
+        3 => panic!("forced by the bench"),
+        4 => {
+            recurse(0);
+        }
+        5 => NVIC::mask(Interrupt::TIMER0),
+        _ => {}
+    }
+}
+
+/// Gets as deep as the stack allows.
+#[expect(unconditional_recursion, reason = "it is meant to run out of stack")]
+#[inline(never)]
+fn recurse(depth: u32) -> u32 {
+    // Used after the call, so that this does not become a loop.
+    let kept = black_box(depth);
+    recurse(kept.wrapping_add(1)).wrapping_add(kept)
+}

@@ -1,0 +1,76 @@
+//! What runs from flash: until everything else is in RAM.
+//!
+//! Out of reset the processor takes stack and entry from the first two words of the flash. cortex-m-rt's start-up code
+//! then copies the image into RAM, vector table included, and calls `main` there; see `ram-image.x`.
+
+use core::arch::naked_asm;
+
+/// One place of the vector table.
+#[repr(C)]
+union Vector {
+    handler: unsafe extern "C" fn() -> !,
+    stack: *const u32,
+    reserved: usize,
+}
+
+// SAFETY: never written, and what it points to is code and the end of the stack.
+unsafe impl Sync for Vector {}
+
+unsafe extern "C" {
+    static _stack_start: u32;
+    fn Reset() -> !;
+}
+
+const NONE: Vector = Vector { reserved: 0 };
+const FAULT: Vector = Vector { handler: boot_fault };
+
+/// The vector table of the first milliseconds. Interrupts are off then; whatever happens all the same is a reset.
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".boot_vectors")]
+static BOOT_VECTORS: [Vector; 16] = [
+    Vector { stack: &raw const _stack_start },
+    Vector { handler: Reset },
+    FAULT,
+    FAULT,
+    FAULT,
+    FAULT,
+    FAULT,
+    NONE,
+    NONE,
+    NONE,
+    NONE,
+    FAULT,
+    FAULT,
+    NONE,
+    FAULT,
+    FAULT,
+];
+
+/// The very first step: the watchdog, with the 0.5 s that it has by itself (4096 steps of 4 periods of some 32 kHz). From
+/// here on, a start that gets stuck, be it at a crystal that does not swing, is tried again.
+///
+/// # Safety
+/// Called by the start-up code, before there are variables.
+#[unsafe(naked)]
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".boot")]
+unsafe extern "C" fn __pre_init() {
+    // KR of the watchdog, key "start".
+    naked_asm!("movw r0, #0x3000", "movt r0, #0x4000", "movw r1, #0xCCCC", "str r1, [r0]", "bx lr")
+}
+
+/// # Safety
+/// For the vector table.
+#[unsafe(naked)]
+#[unsafe(link_section = ".boot")]
+unsafe extern "C" fn boot_fault() -> ! {
+    // AIRCR, key and SYSRESETREQ.
+    naked_asm!(
+        "movw r0, #0xED0C",
+        "movt r0, #0xE000",
+        "movw r1, #0x0004",
+        "movt r1, #0x05FA",
+        "str r1, [r0]",
+        "0: b 0b",
+    )
+}

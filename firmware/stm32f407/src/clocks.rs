@@ -1,0 +1,113 @@
+//! The clocks: 168 MHz out of the 8 MHz crystal.
+//!
+//! ```text
+//! 8 MHz crystal ÷4 ─┐
+//!                   ├─ 2 MHz ×168 = 336 MHz ÷2 = 168 MHz ─┬─ HCLK (÷1) processor, memories, FSMC
+//! 16 MHz RC ÷8 ─────┘                                     ├─ PCLK1 (÷16) 10.5 MHz serial line; its timers 21 MHz
+//!                                                         └─ PCLK2 (÷2) 84 MHz
+//! ```
+//!
+//! # Design
+//! A crystal that does not swing, or stops later, leaves the recorder with the chip's RC oscillator in its place: the same
+//! clocks, 1 % off. It goes on recording, and the fault lamp is lit for as long.
+//!
+//! # Tradeoffs
+//! PCLK1 is a quarter of what it could be, because the serial line's divider has 16 bits: at 42 MHz it ends at
+//! 641 bit/s, and the protocol has 300.
+//!
+//! # Notes
+//! The flash is read by the start-up code and for the configuration only; its wait states are set all the same, its
+//! caches stay off. (RM0090, chapters "Reset and clock control" and "Embedded flash memory interface".)
+
+use stm32f4::stm32f407::{FLASH, PWR, RCC};
+
+const CRYSTAL_HZ: u32 = 8_000_000;
+const RC_HZ: u32 = 16_000_000;
+
+const CRYSTAL_DIVIDER: u8 = 4;
+const RC_DIVIDER: u8 = 8;
+const MULTIPLIER: u16 = 168;
+/// As the register has it: 0 stands for 2.
+const OUTPUT_DIVIDER: u32 = 2;
+/// For the 48 MHz of USB, which is not in use; 0 and 1 are not allowed.
+const USB_DIVIDER: u8 = 7;
+
+/// Clock of the processor and of the external bus.
+pub(crate) const HCLK_HZ: u32 = CRYSTAL_HZ / CRYSTAL_DIVIDER as u32 * MULTIPLIER as u32 / OUTPUT_DIVIDER;
+/// Clock of the serial line.
+pub(crate) const PCLK1_HZ: u32 = HCLK_HZ / 16;
+/// Clock of the timers: twice that of their bus, which is divided.
+pub(crate) const TIMER_HZ: u32 = 2 * PCLK1_HZ;
+
+/// Wait states of the flash at 168 MHz and 2.7–3.6 V.
+const FLASH_WAIT_STATES: u8 = 5;
+
+const _: () = {
+    assert!(HCLK_HZ == 168_000_000);
+    // The PLL's input should be 2 MHz, its oscillator has to stay within 100–432 MHz.
+    assert!(CRYSTAL_HZ / CRYSTAL_DIVIDER as u32 == 2_000_000 && RC_HZ / RC_DIVIDER as u32 == 2_000_000);
+    assert!(2 * MULTIPLIER >= 100 && 2 * MULTIPLIER <= 432);
+    // The slowest rate has to fit into the divider of the serial line.
+    assert!(PCLK1_HZ / 300 < 1 << 16);
+};
+
+/// Looks at the crystal before it is given up, some 10 clocks of 16 MHz each: 125 ms, where 2 ms are typical.
+const CRYSTAL_LOOKS: u32 = 200_000;
+
+/// What the clocks are made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Source {
+    Crystal,
+    /// The crystal does not swing.
+    RcOscillator,
+}
+
+/// Brings the clocks up. Whatever takes forever here ends with the watchdog.
+pub(crate) fn start(rcc: &RCC, pwr: &PWR, flash: &FLASH) -> Source {
+    rcc.apb1enr().modify(|_, w| w.pwren().set_bit());
+    // Full speed needs the regulator's full voltage.
+    pwr.cr().modify(|_, w| w.vos().set_bit());
+    // SAFETY: more wait states than needed are safe at any speed.
+    flash.acr().modify(|_, w| unsafe { w.latency().bits(FLASH_WAIT_STATES) });
+    while flash.acr().read().latency().bits() != FLASH_WAIT_STATES {}
+
+    let source = start_crystal(rcc);
+    let (divider, from_crystal) = match source {
+        Source::Crystal => (CRYSTAL_DIVIDER, true),
+        Source::RcOscillator => (RC_DIVIDER, false),
+    };
+    // SAFETY: the values are within their fields and checked above.
+    #[expect(clippy::multiple_unsafe_ops_per_block, reason = "one reason for all three")]
+    rcc.pllcfgr().write(|w| unsafe {
+        w.pllsrc()
+            .bit(from_crystal)
+            .pllm()
+            .bits(divider)
+            .plln()
+            .bits(MULTIPLIER)
+            .pllp()
+            .div2()
+            .pllq()
+            .bits(USB_DIVIDER)
+    });
+    rcc.cr().modify(|_, w| w.pllon().set_bit());
+    while rcc.cr().read().pllrdy().bit_is_clear() {}
+
+    rcc.cfgr().modify(|_, w| w.hpre().div1().ppre1().div16().ppre2().div2());
+    rcc.cfgr().modify(|_, w| w.sw().pll());
+    while !rcc.cfgr().read().sws().is_pll() {}
+    if from_crystal {
+        // A crystal that stops is a non-maskable interrupt.
+        rcc.cr().modify(|_, w| w.csson().set_bit());
+    }
+    source
+}
+
+fn start_crystal(rcc: &RCC) -> Source {
+    rcc.cr().modify(|_, w| w.hseon().set_bit());
+    if (0..CRYSTAL_LOOKS).any(|_| rcc.cr().read().hserdy().bit_is_set()) {
+        return Source::Crystal;
+    }
+    rcc.cr().modify(|_, w| w.hseon().clear_bit());
+    Source::RcOscillator
+}

@@ -1,0 +1,210 @@
+//! The configuration's flash: sectors 2 and 3, 16 KiB each.
+//!
+//! # Design
+//! Everything runs from RAM, so erasing and writing stop nobody: capture and the serial interrupts go on, and the main loop
+//! waits here. While it waits for an erase it feeds the watchdog, as long as capture makes progress and the erase takes no
+//! longer than it may.
+//!
+//! # Notes
+//! 32 bits at a time, which wants 2.7 V at least: the brown-out reset has to be at its highest level, which
+//! `reset` tells the log if it is not. Times (data sheet, "Flash memory programming"): 250–500 ms to erase a sector of
+//! 16 KiB, 16–100 µs to write a word.
+
+use core::ptr;
+
+use cortex_m::asm;
+use embedded_storage::nor_flash::{
+    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase,
+    check_read, check_write,
+};
+use ser_board::flash_log::{FlashHealth, FlashLog};
+use ser_node::{CopyNumber, Liveness, RECORD_LEN, Storage};
+use stm32f4::stm32f407::FLASH;
+
+use crate::timer;
+use crate::watchdog::Watchdog;
+
+/// Where sector 2 begins; ram-image.x keeps the image away from it.
+pub(crate) const BASE: u32 = 0x0800_8000;
+/// Sectors 2 and 3.
+pub(crate) const LEN: u32 = 2 * SECTOR_LEN;
+
+const SECTOR_LEN: u32 = 0x4000;
+const FIRST_SECTOR: u8 = 2;
+
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+
+/// 32 bits at a time.
+const WORD_LEN: usize = 4;
+
+/// Twice what the data sheet grants an erase.
+const ERASE_MAX_MS: u32 = 1000;
+/// Looks at a write before it is given up: some ten clocks each, a millisecond.
+const WRITE_LOOKS: u32 = 17_000;
+
+pub(crate) static HEALTH: FlashHealth = FlashHealth::new();
+
+/// What went wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FlashError {
+    /// Outside of the memory, or not a multiple of what can be done at once.
+    Range(NorFlashErrorKind),
+    /// It has not ended in time.
+    TimedOut,
+    /// The controller has refused or given up.
+    Refused,
+    /// The log of configurations does not accept the sectors, which would be a mistake of this module.
+    NoSectors,
+}
+
+impl NorFlashError for FlashError {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            FlashError::Range(kind) => *kind,
+            FlashError::TimedOut | FlashError::Refused | FlashError::NoSectors => NorFlashErrorKind::Other,
+        }
+    }
+}
+
+/// The configuration, as the recorder wants it. Without sectors it records all the same, by the default configuration.
+pub(crate) struct Configuration(Option<FlashLog<'static, ConfigurationFlash>>);
+
+impl Configuration {
+    /// The two copies that the sectors hold.
+    pub(crate) fn new(registers: FLASH, watchdog: Watchdog) -> Configuration {
+        let flash = ConfigurationFlash { registers, watchdog };
+        Configuration(FlashLog::new(flash, [0, SECTOR_LEN], &HEALTH).ok())
+    }
+
+    fn log(&mut self) -> Result<&mut FlashLog<'static, ConfigurationFlash>, FlashError> {
+        self.0.as_mut().ok_or(FlashError::NoSectors)
+    }
+}
+
+impl Storage for Configuration {
+    type Error = FlashError;
+
+    fn read(&mut self, copy: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), FlashError> {
+        self.log()?.read(copy, record)
+    }
+
+    fn write(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), FlashError> {
+        self.log()?.write(copy, record)
+    }
+}
+
+/// Both sectors as one memory.
+pub(crate) struct ConfigurationFlash {
+    registers: FLASH,
+    watchdog: Watchdog,
+}
+
+impl ConfigurationFlash {
+    /// Takes the lock off for as long as `change` takes, and sees whether it went well.
+    fn change(&mut self, change: impl FnOnce(&mut Self) -> Result<(), FlashError>) -> Result<(), FlashError> {
+        for key in KEYS {
+            // SAFETY: the key register takes any value.
+            self.registers.keyr().write(|w| unsafe { w.bits(key) });
+        }
+        // Whatever went wrong before must not count as this time's.
+        self.registers.sr().write(|w| {
+            w.pgserr().clear_bit_by_one().pgperr().clear_bit_by_one().pgaerr().clear_bit_by_one();
+            w.wrperr().clear_bit_by_one().operr().clear_bit_by_one().eop().clear_bit_by_one()
+        });
+        let changed = change(self);
+        let status = self.registers.sr().read();
+        let refused = status.pgserr().bit_is_set()
+            || status.pgperr().bit_is_set()
+            || status.pgaerr().bit_is_set()
+            || status.wrperr().bit_is_set();
+        // Ends what was begun, too: all else in the register becomes zero.
+        self.registers.cr().write(|w| w.lock().set_bit());
+        changed.and(if refused { Err(FlashError::Refused) } else { Ok(()) })
+    }
+
+    fn is_busy(&self) -> bool {
+        self.registers.sr().read().bsy().bit_is_set()
+    }
+
+    fn erase_sector(&mut self, number: u8) -> Result<(), FlashError> {
+        // SAFETY: the sector is one of the configuration's.
+        self.registers.cr().modify(|_, w| unsafe { w.psize().psize32().ser().set_bit().snb().bits(number) });
+        self.registers.cr().modify(|_, w| w.strt().set_bit());
+        let started_ms = timer::tick_ms();
+        let mut liveness = Liveness::new();
+        while self.is_busy() {
+            let now_ms = timer::tick_ms();
+            if now_ms.wrapping_sub(started_ms) > ERASE_MAX_MS {
+                return Err(FlashError::TimedOut);
+            }
+            if liveness.pass(now_ms) {
+                self.watchdog.feed();
+            }
+        }
+        Ok(())
+    }
+
+    fn write_word(&mut self, offset: u32, word: u32) -> Result<(), FlashError> {
+        self.registers.cr().modify(|_, w| w.psize().psize32().pg().set_bit());
+        // SAFETY: inside of the memory and aligned, as the caller has checked; unlocked flash takes a word that way.
+        unsafe { ptr::write_volatile(address(offset).cast(), word) };
+        asm::dsb();
+        if (0..WRITE_LOOKS).any(|_| !self.is_busy()) { Ok(()) } else { Err(FlashError::TimedOut) }
+    }
+}
+
+/// Where the byte at `offset` is.
+fn address(offset: u32) -> *mut u8 {
+    ptr::with_exposed_provenance_mut((BASE + offset) as usize)
+}
+
+impl ErrorType for ConfigurationFlash {
+    type Error = FlashError;
+}
+
+impl ReadNorFlash for ConfigurationFlash {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+        check_read(self, offset, bytes.len()).map_err(FlashError::Range)?;
+        for (offset, byte) in (offset..).zip(bytes) {
+            // SAFETY: inside of the memory, as just checked.
+            *byte = unsafe { ptr::read_volatile(address(offset)) };
+        }
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        LEN as usize
+    }
+}
+
+impl NorFlash for ConfigurationFlash {
+    const WRITE_SIZE: usize = WORD_LEN;
+    const ERASE_SIZE: usize = SECTOR_LEN as usize;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        check_erase(self, from, to).map_err(FlashError::Range)?;
+        let mut sector = from;
+        while sector < to {
+            #[expect(clippy::cast_possible_truncation, reason = "there are two")]
+            let number = FIRST_SECTOR + (sector / SECTOR_LEN) as u8;
+            self.change(|flash| flash.erase_sector(number))?;
+            sector += SECTOR_LEN;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        check_write(self, offset, bytes.len()).map_err(FlashError::Range)?;
+        self.change(|flash| {
+            for (offset, bytes) in (offset..).step_by(WORD_LEN).zip(bytes.as_chunks().0) {
+                flash.write_word(offset, u32::from_le_bytes(*bytes))?;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// A bit that is 0 stays 0 and the others may follow, one write after the other: there is no check word beside the data.
+impl MultiwriteNorFlash for ConfigurationFlash {}

@@ -1,0 +1,175 @@
+//! The GENI board on the external bus: the 16 KiB window, its timing, reset and interrupt.
+//!
+//! # Timing
+//! From the GENI board's manual, chapter 2, for reading and writing alike; a clock of the bus is 1/168 MHz = 5.95 ns.
+//!
+//! | what                       | board asks for    | set up as                              | gives            |
+//! |----------------------------|-------------------|----------------------------------------|------------------|
+//! | address and select setup   | 0 ns at least     | ADDSET 15 + ADDHLD 15 clocks           | 179 ns           |
+//! | strobe, until ready        | 937 ns at most    | DATAST 168 clocks: 937 + 60 ns         | 1000 ns          |
+//! | data valid before ready    | 96 ns at least    | read at the end of the strobe          | is there         |
+//! | data hold when writing     | 0 ns at least     | one clock after the strobe             | 6 ns             |
+//! | strobe high between cycles | 136 ns at least   | ADDSET + ADDHLD of the next cycle      | 179 ns           |
+//! | cycle                      | 615 ns at least   | the sum                                | 1179 ns          |
+//! | data bus free after select | 32 ns at most     | BUSTURN 15 clocks                      | 89 ns            |
+//!
+//! The 60 ns are for the buffers between board and controller, 15 ns each way, for 10 ns of wire, and for what the
+//! controller wants to see before it reads (data sheet, "Asynchronous … read timings": a clock and 4 ns).
+//!
+//! # Design
+//! Mode D of the controller's asynchronous accesses is the one in which both strobes are high for the whole of
+//! address setup *and* hold, so that the board's recovery time is kept without the program's help.
+//!
+//! `/RST` is driven low from the moment in which the pins are set up, and a pull-down holds it low before that: a
+//! recorder that is not running must not leave a board on the bus that goes on telling old inputs. Hence it is
+//! push-pull.
+//!
+//! # Tradeoffs
+//! The board's `/GENRDY` could end the strobe earlier, by half of it at best (ASYNCWAIT with WAITPOL high, since the line is
+//! high while the board is busy; DATAST then is 4 clocks and 30 ns at least). It is not used: the manual says that the
+//! line may stay high for ever after a reset, a broken board may hold it, and an access that waits on the bus can
+//! be interrupted by nothing. Capture would stand still, and the watchdog would reset a recorder that is well, over and
+//! over. With a strobe of fixed length the worst that a GENI board can do is to hand over wrong bytes, which its driver
+//! deals with. A pass of the main loop with 128 bytes of a datagram takes 0.15 ms for them.
+//!
+//! # Notes
+//! `/INT` pulses for 5.44 µs; its edge is latched by the interrupt controller. During the 0.5 ms after `/RST`, in which
+//! the board must be left alone, a false pulse is to be expected: the driver looks at the flags, not at the pulse.
+
+use core::ptr::{self, NonNull};
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use geni::WindowRam;
+use stm32f4::stm32f407::{EXTI, FSMC, GPIOG, RCC, SYSCFG};
+
+use crate::{clocks, pins};
+
+/// Where the controller has the bank of select line 1.
+pub(crate) const BANK: u32 = 0x6000_0000;
+/// The board's shared RAM.
+pub(crate) const WINDOW_LEN: u32 = 1 << 14;
+
+/// Nanoseconds of so many clocks of the bus.
+const fn ns(clocks: u32) -> u32 {
+    clocks * 1_000_000 / (clocks::HCLK_HZ / 1000)
+}
+
+/// Clocks of the bus that take at least so long.
+const fn clocks_for(ns: u32) -> u32 {
+    (ns * (clocks::HCLK_HZ / 1_000_000)).div_ceil(1000)
+}
+
+const ADDRESS_SETUP: u32 = 15;
+const ADDRESS_HOLD: u32 = 15;
+const TURNAROUND: u32 = 15;
+const STROBE: u32 = clocks_for(READY_DELAY_MAX_NS + MARGIN_NS);
+const MODE_D: u32 = 3;
+
+/// CLKDIV and DATLAT mean nothing without a clock on the bus; they stay as they are out of reset.
+const UNUSED: u32 = 0xFF << 20;
+
+/// The timing register: ADDSET, ADDHLD, DATAST, BUSTURN, ACCMOD.
+const TIMING: u32 =
+    ADDRESS_SETUP | ADDRESS_HOLD << 4 | STROBE << 8 | TURNAROUND << 16 | UNUSED | MODE_D << 28;
+
+const READY_DELAY_MAX_NS: u32 = 937;
+const MARGIN_NS: u32 = 60;
+const RECOVERY_MIN_NS: u32 = 136;
+const CYCLE_MIN_NS: u32 = 615;
+const RELEASE_MAX_NS: u32 = 32;
+
+const _: () = {
+    assert!(ns(STROBE) >= READY_DELAY_MAX_NS + MARGIN_NS);
+    assert!(ns(ADDRESS_SETUP + ADDRESS_HOLD) >= RECOVERY_MIN_NS);
+    assert!(ns(ADDRESS_SETUP + ADDRESS_HOLD + STROBE) >= CYCLE_MIN_NS);
+    assert!(ns(TURNAROUND) >= RELEASE_MAX_NS);
+    // The fields have four bits, that of the strobe eight.
+    assert!(ADDRESS_SETUP < 16 && ADDRESS_HOLD < 16 && TURNAROUND < 16 && STROBE < 256);
+};
+
+/// `/INT` was pulsed and the main loop does not know yet.
+static PULSED: AtomicBool = AtomicBool::new(false);
+
+/// The edge of `/INT`.
+pub(crate) struct InterruptLine {
+    edges: EXTI,
+}
+
+impl InterruptLine {
+    /// Listens to falling edges on pin 5 of port G.
+    pub(crate) fn start(rcc: &RCC, routing: &SYSCFG, edges: EXTI) -> InterruptLine {
+        const PORT_G: u8 = 6;
+        rcc.apb2enr().modify(|_, w| w.syscfgen().set_bit());
+        // SAFETY: the port exists.
+        routing.exticr2().modify(|_, w| unsafe { w.exti5().bits(PORT_G) });
+        edges.ftsr().modify(|_, w| w.tr5().set_bit());
+        edges.imr().modify(|_, w| w.mr5().set_bit());
+        InterruptLine { edges }
+    }
+
+    pub(crate) fn on_interrupt(&mut self) {
+        // Written ones are cleared, the others stay.
+        self.edges.pr().write(|w| w.pr5().clear_bit_by_one());
+        PULSED.store(true, Ordering::Relaxed);
+    }
+}
+
+/// A GENI board that is fitted: its reset and interrupt lines.
+pub(crate) struct GeniBoard {
+    port: GPIOG,
+}
+
+impl GeniBoard {
+    /// Opens the window.
+    ///
+    /// # Safety
+    /// This is called once only: the window belongs to whoever has it.
+    pub(crate) unsafe fn open(rcc: &RCC, bus: &FSMC) -> Option<(GeniBoard, WindowRam)> {
+        rcc.ahb3enr().modify(|_, w| w.fsmcen().set_bit());
+        // SAFETY: the values fit into their fields, see there.
+        bus.btr1().write(|w| unsafe { w.bits(TIMING) });
+        // SAFETY: as above; the register for writing has its fields in the same places.
+        bus.bwtr1().write(|w| unsafe { w.bits(TIMING) });
+        // An SRAM of 8 bits without bursts, multiplexing and wait line.
+        bus.bcr1().write(|w| {
+            w.faccen()
+                .disabled()
+                .mwid()
+                .bits8()
+                .mtyp()
+                .sram()
+                .muxen()
+                .disabled()
+                .bursten()
+                .disabled()
+                .waiten()
+                .disabled();
+            w.wren().enabled().extmod().enabled().asyncwait().disabled().mbken().enabled()
+        });
+        let window = NonNull::new(ptr::with_exposed_provenance_mut(BANK as usize))?;
+        // SAFETY: the bank is open and as long as the window, nothing else here reaches it, and the caller has it once
+        // only.
+        let window = unsafe { WindowRam::new(window) };
+        // SAFETY: its set and reset register is all that is used, for one pin.
+        let port = unsafe { GPIOG::steal() };
+        Some((GeniBoard { port }, window))
+    }
+
+    /// Drives the reset line.
+    pub(crate) fn drive_reset(&mut self, held: bool) {
+        let set = 1 << pins::GENI_RESET;
+        let bits = if held { set << 16 } else { set };
+        // SAFETY: the register takes any value; the bit is that of the line.
+        self.port.bsrr().write(|w| unsafe { w.bits(bits) });
+    }
+
+    /// Whether the interrupt line was pulsed since this was asked last.
+    pub(crate) fn was_pulsed(&mut self) -> bool {
+        // A pulse between the two steps finds the flags read after it; nothing is lost.
+        let pulsed = PULSED.load(Ordering::Relaxed);
+        if pulsed {
+            PULSED.store(false, Ordering::Relaxed);
+        }
+        pulsed
+    }
+}

@@ -1,0 +1,33 @@
+//! The Genius port: the node's, on the GENI board of the external bus.
+
+use geni::WindowRam;
+use ser_node::{GeniusDiagnostics, GeniusOptions, GeniusPort};
+use ser_proto::Model;
+
+use crate::app::BoardNode;
+use crate::geni_bus::GeniBoard;
+
+/// The port with its board.
+pub(crate) struct Genius {
+    port: GeniusPort<WindowRam>,
+    board: GeniBoard,
+}
+
+impl Genius {
+    pub(crate) fn new(board: GeniBoard, window: WindowRam, model: Model) -> Genius {
+        Genius { port: GeniusPort::new(window, GeniusOptions::new(model)), board }
+    }
+
+    /// Does what is due; `now_ms` is what the node has just been polled with.
+    pub(crate) fn poll(&mut self, node: &mut BoardNode, now_ms: u32) {
+        if self.board.was_pulsed() {
+            self.port.interrupt();
+        }
+        self.port.poll(node, now_ms);
+        self.board.drive_reset(self.port.reset_held());
+    }
+
+    pub(crate) fn diagnostics(&self) -> GeniusDiagnostics {
+        self.port.diagnostics()
+    }
+}

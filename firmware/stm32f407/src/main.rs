@@ -1,0 +1,240 @@
+//! The recorder on an STM32F407 (Cortex-M4F at 168 MHz), 144 pins: the board to flash. `docs/hardware.md` says how it is
+//! wired.
+//!
+//! Three interrupts and a main loop: capture (highest priority), RS-232 in both directions, the GENI board's line, and
+//! `idle`, which does all the rest. They share no resource, hence nobody ever locks anything, and capture waits for
+//! nobody, not even for the flash: everything runs from RAM (`ram-image.x`).
+#![no_std]
+#![no_main]
+
+// The start-up code.
+use cortex_m_rt as _;
+
+mod boot;
+mod clocks;
+mod fault;
+mod flash;
+mod geni_bus;
+mod genius;
+mod inputs;
+mod lamps;
+mod last_words;
+mod log;
+mod pins;
+mod protection;
+mod rtc;
+mod rtt;
+// The same on every board that paints its stack.
+#[path = "../../mps2-an385/src/stack.rs"]
+mod stack;
+mod straps;
+mod timer;
+mod uart;
+mod watchdog;
+
+#[rtic::app(device = stm32f4::stm32f407, peripherals = true)]
+mod app {
+    use chrono::NaiveDate;
+    use ser_board::budget;
+    use ser_board::clock_chip::{ClockChip, ClockState};
+    use ser_board::inputs::{InputHealth, Sample, Sampler};
+    use ser_board::last_words::Boot;
+    use ser_board::leds::{self, Condition};
+    use ser_board::main_loop;
+    use ser_board::report::Report;
+    use ser_node::{Capture, CaptureChannel, Event, Liveness, Node, NodeParts, VERSION};
+
+    use crate::clocks::{self, Source};
+    use crate::flash::Configuration;
+    use crate::geni_bus::{GeniBoard, InterruptLine};
+    use crate::genius::Genius;
+    use crate::inputs::{self, InputPins};
+    use crate::lamps::Lamps;
+    use crate::rtc::{self, ChipClock};
+    use crate::straps::Straps;
+    use crate::timer::{self, Timer};
+    use crate::uart::{self, Rings, SerialInterrupt, SerialLine};
+    use crate::watchdog::Watchdog;
+    use crate::{last_words, log, pins, protection, stack};
+
+    /// Events that the log holds: the largest size that can be configured.
+    const LOG_LEN: usize = 2048;
+
+    /// No clock can show an earlier day: there was no such recorder.
+    const NOT_BEFORE: NaiveDate = NaiveDate::from_ymd_opt(2026, 1, 1).unwrap();
+
+    // RTIC takes nothing but literals for priorities.
+    const _: () = {
+        assert!(budget::CAPTURE_PRIORITY == 3);
+        assert!(budget::RECEIVE_PRIORITY == 2);
+        assert!(budget::TRANSMIT_PRIORITY == 1);
+    };
+
+    pub(crate) type BoardNode = Node<'static, Configuration, ClockChip<'static, ChipClock>>;
+
+    #[shared]
+    struct Shared {}
+
+    #[local]
+    struct Local {
+        timer: Timer,
+        sampler: Sampler<'static, InputPins>,
+        capture: Capture<'static>,
+        serial_interrupt: SerialInterrupt,
+        geni_line: InterruptLine,
+        serial: SerialLine,
+        node: BoardNode,
+        genius: Option<Genius>,
+        lamps: Lamps,
+        watchdog: Watchdog,
+        start: Start,
+    }
+
+    /// What start-up found and the lamps tell.
+    pub(crate) struct Start {
+        clock_source: Source,
+        was_fault: bool,
+    }
+
+    static INPUT_HEALTH: InputHealth = InputHealth::new();
+
+    #[init(local = [
+        channel: CaptureChannel = CaptureChannel::new(),
+        events: [Event; LOG_LEN] = [Event::EMPTY; LOG_LEN],
+        rings: Rings = Rings::new(),
+    ])]
+    fn init(cx: init::Context) -> (Shared, Local) {
+        let init::LocalResources { channel, events, rings, .. } = cx.local;
+        let device = cx.device;
+        let ports = pins::Ports {
+            a: device.GPIOA,
+            b: device.GPIOB,
+            c: device.GPIOC,
+            d: device.GPIOD,
+            e: device.GPIOE,
+            f: device.GPIOF,
+            g: device.GPIOG,
+        };
+        pins::set_up(&device.RCC, &ports);
+        let watchdog = Watchdog::start(&device.IWDG, &device.DBGMCU);
+        let clock_source = clocks::start(&device.RCC, &device.PWR, &device.FLASH);
+        protection::enable(&cx.core.MPU);
+        log::start(&device.DBGMCU);
+        let boot = last_words::boot(&device.RCC);
+        let straps = Straps::read(&ports.e);
+        let model = straps.model();
+        defmt::info!("version {=u8}, {}, start {=u32}: {}", VERSION, model, boot.count, boot.cause);
+        log_start(&boot, clock_source, last_words::guards_brown_out(&device.FLASH));
+
+        let (capture, reader) = channel.split(straps.debounce());
+        let clock = ChipClock::start(&device.RCC, &device.PWR, device.RTC);
+        let node = Node::new(NodeParts {
+            model,
+            log: events,
+            capture: reader,
+            storage: Configuration::new(device.FLASH, watchdog),
+            rtc: ClockChip::new(clock, NOT_BEFORE, &rtc::HEALTH),
+        });
+        let (serial, serial_interrupt) = uart::start(&device.RCC, device.USART2, rings, node.baud());
+        let geni_line = InterruptLine::start(&device.RCC, &device.SYSCFG, device.EXTI);
+        let genius = if straps.has_geni() {
+            // SAFETY: `init` runs once.
+            unsafe { GeniBoard::open(&device.RCC, &device.FSMC) }
+        } else {
+            None
+        };
+        let genius = genius.map(|(board, window)| Genius::new(board, window, model));
+        let contacts = InputPins { low: ports.b, middle: ports.c, high: ports.g };
+        let sampler = Sampler::new(contacts, inputs::wiring(model), &INPUT_HEALTH);
+        let timer = Timer::start(&device.RCC, device.TIM2, device.TIM3);
+        (
+            Shared {},
+            Local {
+                timer,
+                sampler,
+                capture,
+                serial_interrupt,
+                geni_line,
+                serial,
+                node,
+                genius,
+                lamps: Lamps::new(ports.d),
+                watchdog,
+                start: Start { clock_source, was_fault: boot.cause.is_fault() },
+            },
+        )
+    }
+
+    fn log_start(boot: &Boot, clock_source: Source, guards_brown_out: bool) {
+        if boot.cause.is_fault() {
+            defmt::error!("the run before ended with a fault: {}: {=str}", boot.cause, boot.text.as_str());
+        }
+        if clock_source == Source::RcOscillator {
+            defmt::error!("the crystal does not swing: time runs by the RC oscillator, 1 % off");
+        }
+        if !guards_brown_out {
+            defmt::warn!("the brown-out level of the option bytes is not 3 (2.7 V)");
+        }
+    }
+
+    /// Takes a sample of all inputs.
+    #[task(binds = TIM3, priority = 3, local = [timer, sampler, capture])]
+    fn capture(cx: capture::Context) {
+        let capture::LocalResources { timer, sampler, capture, .. } = cx.local;
+        if let Some(tick_ms) = timer.on_interrupt()
+            && let Sample::Fresh(inputs) | Sample::Held(inputs) = sampler.sample()
+        {
+            capture.sample(tick_ms, inputs);
+        }
+    }
+
+    #[task(binds = USART2, priority = 2, local = [serial_interrupt])]
+    fn serial(cx: serial::Context) {
+        cx.local.serial_interrupt.on_interrupt(timer::tick_ms());
+    }
+
+    /// The GENI board has something to say. Wakes the main loop.
+    #[task(binds = EXTI9_5, priority = 1, local = [geni_line])]
+    fn geni(cx: geni::Context) {
+        cx.local.geni_line.on_interrupt();
+    }
+
+    #[idle(local = [serial, node, genius, lamps, watchdog, start])]
+    fn idle(cx: idle::Context) -> ! {
+        let idle::LocalResources { serial, node, genius, lamps, watchdog, start, .. } = cx.local;
+        defmt::info!("battery-backed clock: {}", rtc::HEALTH.state());
+        let mut liveness = Liveness::new();
+        let mut report = Report::new(node.tick_ms());
+        loop {
+            let now_ms = main_loop::pass(node, serial);
+            if let Some(genius) = genius {
+                genius.poll(node, now_ms);
+            }
+            lamps.show(now_ms, &condition(node, serial, genius.as_ref(), start));
+            if liveness.pass(now_ms) {
+                watchdog.feed();
+            }
+            let diagnostics = || (node.diagnostics(), genius.as_ref().map(Genius::diagnostics));
+            report.pass(now_ms, diagnostics, stack::high_water);
+
+            // A byte that arrives just now waits for the next interrupt, a millisecond at most. Looking with
+            // interrupts off would spare it that, and delay the capture interrupt instead.
+            if !serial.has_received() {
+                cortex_m::asm::wfi();
+            }
+        }
+    }
+
+    /// What the lamps are to tell.
+    fn condition(node: &BoardNode, serial: &SerialLine, genius: Option<&Genius>, start: &Start) -> Condition {
+        let reports = genius.map_or(0, |genius| genius.diagnostics().reports_sent);
+        Condition {
+            recording: node.is_recording(),
+            events: node.events(),
+            messages: serial.bytes().wrapping_add(node.commands()).wrapping_add(reports),
+            broken: start.clock_source != Source::Crystal || rtc::HEALTH.state() == ClockState::Silent,
+            reset_by_fault: start.was_fault,
+            lost: leds::has_lost(&node.diagnostics()),
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! The chip's battery-backed clock, on its 32 kHz crystal.
+//!
+//! # Design
+//! The crystal takes up to seconds to start when the battery is new, and recording waits for no clock: it is switched on
+//! at start-up and looked at again when the clock is set. Every wait is bounded.
+//!
+//! # Tradeoffs
+//! All 15 bits of the divider are synchronous: the clock is read back in steps of 31 µs instead of 4 ms, and the battery
+//! gives a little more current.
+//!
+//! # Notes
+//! Date and time are read around the sub-seconds until nothing has carried over in between. That the clock was never
+//! set, or has lost battery *and* supply, shows in INITS; a crystal that stood still while the battery held does not
+//! show, the chip has no flag for that. (RM0090, chapter "Real-time clock".)
+
+use chrono::NaiveDateTime;
+use rtcc::DateTimeAccess;
+use ser_board::clock_chip::{ClockHealth, KeepsTime};
+use ser_board::stm32_rtc::{Calendar, Shift};
+use stm32f4::stm32f407::{PWR, RCC, RTC};
+
+/// 32768 Hz in one step.
+const PREDIV_S: u16 = 0x7FFF;
+
+const KEYS: [u8; 2] = [0xCA, 0x53];
+
+/// Looks at a flag before it is given up: 10 ms, where two periods of the crystal are due.
+const MAX_LOOKS: u32 = 100_000;
+
+/// Reads of date and time until two agree; a carry in between happens once a second.
+const MAX_READS: u32 = 4;
+
+pub(crate) static HEALTH: ClockHealth = ClockHealth::new();
+
+/// What went wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RtcError {
+    /// The crystal does not swing.
+    NoCrystal,
+    /// The clock does not do as it is told.
+    TimedOut,
+    /// The registers hold no date, or cannot hold this one.
+    NoDate,
+}
+
+/// The clock.
+pub(crate) struct ChipClock {
+    clocks: RCC,
+    registers: RTC,
+}
+
+impl ChipClock {
+    /// Starts the clock, or finds it running.
+    pub(crate) fn start(clocks: &RCC, power: &PWR, registers: RTC) -> ChipClock {
+        // The battery-backed registers are locked out of reset.
+        power.cr().modify(|_, w| w.dbp().set_bit());
+        if !clocks.bdcr().read().rtcsel().is_lse() {
+            // A choice that another program has made holds until all of this part is reset; without a choice there is
+            // nothing to lose.
+            clocks.bdcr().modify(|_, w| w.bdrst().set_bit());
+            clocks.bdcr().modify(|_, w| w.bdrst().clear_bit());
+            clocks.bdcr().modify(|_, w| w.rtcsel().lse());
+        }
+        clocks.bdcr().modify(|_, w| w.lseon().set_bit());
+        clocks.bdcr().modify(|_, w| w.rtcen().set_bit());
+        // SAFETY: from here on its register of the battery-backed part is all that is used, and that is only read.
+        ChipClock { clocks: unsafe { RCC::steal() }, registers }
+    }
+
+    fn has_crystal(&self) -> bool {
+        let control = self.clocks.bdcr().read();
+        control.lserdy().bit_is_set() && control.rtcsel().is_lse()
+    }
+
+    fn read_once(&self) -> (u16, Calendar) {
+        let ssr = self.registers.ssr().read().ss().bits();
+        let tr = self.registers.tr().read().bits();
+        let dr = self.registers.dr().read().bits();
+        (ssr, Calendar { tr, dr })
+    }
+
+    /// Does `change` with the clock stopped and its registers open.
+    fn initialise(&mut self, change: impl FnOnce(&RTC)) -> Result<(), RtcError> {
+        self.registers.isr().modify(|_, w| w.init().set_bit());
+        let open = wait_for(|| self.registers.isr().read().initf().bit_is_set());
+        if open.is_ok() {
+            change(&self.registers);
+        }
+        self.registers.isr().modify(|_, w| w.init().clear_bit());
+        open
+    }
+
+    fn set(&mut self, calendar: Calendar, shift: Option<Shift>) -> Result<(), RtcError> {
+        self.initialise(|registers| {
+            registers.cr().modify(|_, w| w.fmt().twenty_four_hour().bypshad().set_bit());
+            // The divider takes two writes, the synchronous part first.
+            // SAFETY: both fields take any value; date and time are what `Calendar` says they are.
+            #[expect(clippy::multiple_unsafe_ops_per_block, reason = "one reason for all four")]
+            unsafe {
+                registers.prer().modify(|_, w| w.prediv_s().bits(PREDIV_S));
+                registers.prer().modify(|_, w| w.prediv_a().bits(0));
+                registers.tr().write(|w| w.bits(calendar.tr));
+                registers.dr().write(|w| w.bits(calendar.dr));
+            }
+        })?;
+        let Some(Shift { add_second, subtract }) = shift else { return Ok(()) };
+        wait_for(|| self.registers.isr().read().shpf().bit_is_clear())?;
+        // SAFETY: the field takes any value; a second is added at the same time, so the clock is not put back.
+        self.registers.shiftr().write(|w| unsafe { w.add1s().bit(add_second).subfs().bits(subtract) });
+        wait_for(|| self.registers.isr().read().shpf().bit_is_clear())
+    }
+
+    fn unlock(&self) {
+        for key in KEYS {
+            // SAFETY: the key register takes any value.
+            self.registers.wpr().write(|w| unsafe { w.key().bits(key) });
+        }
+    }
+
+    fn lock(&self) {
+        // SAFETY: as above; anything but the keys locks.
+        self.registers.wpr().write(|w| unsafe { w.key().bits(0xFF) });
+    }
+}
+
+fn wait_for(mut condition: impl FnMut() -> bool) -> Result<(), RtcError> {
+    if (0..MAX_LOOKS).any(|_| condition()) { Ok(()) } else { Err(RtcError::TimedOut) }
+}
+
+impl DateTimeAccess for ChipClock {
+    type Error = RtcError;
+
+    fn datetime(&mut self) -> Result<NaiveDateTime, RtcError> {
+        let mut before = self.read_once();
+        for _ in 0..MAX_READS {
+            let now = self.read_once();
+            if now.1 == before.1 && now.0 <= before.0 {
+                return now.1.to_date_time(now.0, PREDIV_S).ok_or(RtcError::NoDate);
+            }
+            before = now;
+        }
+        Err(RtcError::TimedOut)
+    }
+
+    fn set_datetime(&mut self, datetime: &NaiveDateTime) -> Result<(), RtcError> {
+        let calendar = Calendar::from_date_time(*datetime).ok_or(RtcError::NoDate)?;
+        if !self.has_crystal() {
+            return Err(RtcError::NoCrystal);
+        }
+        self.unlock();
+        let set = self.set(calendar, Shift::to_fraction_of(*datetime, PREDIV_S));
+        self.lock();
+        set
+    }
+}
+
+impl KeepsTime for ChipClock {
+    const RESOLUTION_MS: u16 = 1;
+
+    fn has_lost_time(&mut self) -> Result<bool, RtcError> {
+        let is_set = self.registers.isr().read().inits().bit_is_set();
+        // Set with another divider by another program: its sub-seconds mean something else.
+        let is_ours = self.registers.prer().read().prediv_s().bits() == PREDIV_S;
+        Ok(!(is_set && is_ours && self.has_crystal()))
+    }
+
+    /// INITS has no bit to clear: it follows from the year that was set.
+    fn time_is_good(&mut self) -> Result<(), RtcError> {
+        Ok(())
+    }
+}

@@ -1,0 +1,70 @@
+//! The capture interrupt and the clock behind it.
+//!
+//! # Design
+//! Timer 3 interrupts every millisecond. Timer 2 counts microseconds without end, and the tick is read off it: the interrupt
+//! says *look now*, never *one more millisecond*. Both have the same clock, so they do not drift apart.
+//!
+//! # Notes
+//! Timer 2 goes round after 71 minutes, which is how long the interrupt may stay away unnoticed. The watchdog acts
+//! long before that.
+
+use core::num::NonZeroU32;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use ser_node::TickCounter;
+use stm32f4::stm32f407::{RCC, TIM2, TIM3};
+
+use crate::clocks;
+
+const COUNTS_PER_SECOND: u32 = 1_000_000;
+const COUNTS_PER_MS: NonZeroU32 = NonZeroU32::new(COUNTS_PER_SECOND / 1000).unwrap();
+
+const PRESCALER: u16 = (clocks::TIMER_HZ / COUNTS_PER_SECOND) as u16;
+const _: () = assert!(PRESCALER as u32 * COUNTS_PER_SECOND == clocks::TIMER_HZ);
+
+static TICK_MS: AtomicU32 = AtomicU32::new(0);
+
+/// Milliseconds since boot, wrapping. The same tick as that of the latest sample, for those who have no part in capture.
+pub(crate) fn tick_ms() -> u32 {
+    TICK_MS.load(Ordering::Relaxed)
+}
+
+/// Both timers, running.
+pub(crate) struct Timer {
+    interval: TIM3,
+    counter: TIM2,
+    ticks: TickCounter,
+}
+
+impl Timer {
+    /// Starts both timers.
+    pub(crate) fn start(rcc: &RCC, counter: TIM2, interval: TIM3) -> Timer {
+        rcc.apb1enr().modify(|_, w| w.tim2en().set_bit().tim3en().set_bit());
+        // The update event takes the prescaler over; its flag must not count as an interrupt.
+        counter.psc().write(|w| w.psc().set(PRESCALER - 1));
+        counter.arr().write(|w| w.arr().set(u32::MAX));
+        counter.egr().write(|w| w.ug().set_bit());
+        counter.cr1().write(|w| w.cen().set_bit());
+
+        interval.psc().write(|w| w.psc().set(PRESCALER - 1));
+        #[expect(clippy::cast_possible_truncation, reason = "999")]
+        interval.arr().write(|w| w.arr().set((COUNTS_PER_MS.get() - 1) as u16));
+        interval.egr().write(|w| w.ug().set_bit());
+        interval.sr().write(|w| w.uif().clear_bit());
+        interval.dier().write(|w| w.uie().set_bit());
+        interval.cr1().write(|w| w.cen().set_bit());
+
+        let ticks = TickCounter::new(COUNTS_PER_MS, counter.cnt().read().bits());
+        Timer { interval, counter, ticks }
+    }
+
+    /// Takes the interrupt back; gives the tick, or `None` when the one before has already counted this
+    /// millisecond.
+    #[inline]
+    pub(crate) fn on_interrupt(&mut self) -> Option<u32> {
+        self.interval.sr().write(|w| w.uif().clear_bit());
+        let tick_ms = self.ticks.advance(self.counter.cnt().read().bits())?;
+        TICK_MS.store(tick_ms, Ordering::Relaxed);
+        Some(tick_ms)
+    }
+}

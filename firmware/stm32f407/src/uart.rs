@@ -1,0 +1,131 @@
+//! RS-232 on USART 2: 8 data bits, no parity, 1 stop bit.
+//!
+//! # Design
+//! The rings of `ser_board` lie between the interrupt and the main loop. Both directions share one interrupt, at the
+//! priority of the receiver, which has one character's time; the transmitter's part of it is a byte and a half dozen
+//! instructions.
+//!
+//! # Notes
+//! Transmission complete is set when the last stop bit has left, so the line is known to be quiet and not guessed.
+//! A framing or noise error marks its byte in the same way as an overrun does: the byte is not what was sent.
+
+use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
+use ser_board::main_loop::Line;
+use ser_board::serial_line::{Received, Receiver, SerialEnds, SerialRings};
+use ser_node::ring::{Reader, Writer};
+use ser_proto::Baud;
+use stm32f4::stm32f407::{RCC, USART2};
+
+use crate::clocks;
+
+/// Memory of both rings.
+pub(crate) type Rings = SerialRings<RECEIVE_RING_LEN, TRANSMIT_RING_LEN>;
+
+/// Starts the serial port; gives the main loop's end and the interrupt's end.
+pub(crate) fn start(
+    rcc: &RCC,
+    uart: USART2,
+    rings: &'static mut Rings,
+    baud: Baud,
+) -> (SerialLine, SerialInterrupt) {
+    rcc.apb1enr().modify(|_, w| w.usart2en().set_bit());
+    set_divider(&uart, baud);
+    uart.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
+    let SerialEnds { receiver, received, to_send, transmitter } = rings.split();
+    // SAFETY: the two ends share the registers. The interrupt alone touches the data register, the main loop alone the
+    // divider; for the one bit that both change see `SerialLine::send`.
+    let shared = unsafe { USART2::steal() };
+    (
+        SerialLine { uart: shared, received, to_send, bytes: 0 },
+        SerialInterrupt { uart, receiver, transmitter },
+    )
+}
+
+fn set_divider(uart: &USART2, baud: Baud) {
+    let bits_per_second = baud.bits_per_second();
+    #[expect(clippy::cast_possible_truncation, reason = "see `clocks`: 35 000 at 300 bit/s")]
+    let divider = ((clocks::PCLK1_HZ + bits_per_second / 2) / bits_per_second) as u16;
+    // SAFETY: with 16 samples per bit the register is the divider as it is.
+    uart.brr().write(|w| unsafe { w.bits(divider) });
+}
+
+/// The interrupt's end.
+pub(crate) struct SerialInterrupt {
+    uart: USART2,
+    receiver: Receiver<'static, RECEIVE_RING_LEN>,
+    transmitter: Reader<'static, u8, TRANSMIT_RING_LEN>,
+}
+
+impl SerialInterrupt {
+    /// Takes the byte that has arrived, and gives one for which there is room.
+    pub(crate) fn on_interrupt(&mut self, tick_ms: u32) {
+        // Reading status and then data clears the error flags.
+        let status = self.uart.sr().read();
+        if status.rxne().bit_is_set() || status.ore().bit_is_set() {
+            let [byte, ..] = self.uart.dr().read().bits().to_le_bytes();
+            let overrun = status.ore().bit_is_set() || status.fe().bit_is_set() || status.nf().bit_is_set();
+            self.receiver.push(Received { byte, tick_ms, overrun });
+        }
+        if status.txe().bit_is_set() {
+            match self.transmitter.pop() {
+                Some(byte) => {
+                    self.uart.dr().write(|w| w.dr().set(byte.into()));
+                }
+                None => {
+                    self.uart.cr1().modify(|_, w| w.txeie().clear_bit());
+                }
+            }
+        }
+    }
+}
+
+/// The main loop's end.
+pub(crate) struct SerialLine {
+    uart: USART2,
+    received: Reader<'static, Received, RECEIVE_RING_LEN>,
+    to_send: Writer<'static, u8, TRANSMIT_RING_LEN>,
+    bytes: u32,
+}
+
+impl SerialLine {
+    /// Whether bytes are waiting to be taken.
+    pub(crate) fn has_received(&self) -> bool {
+        !self.received.is_empty()
+    }
+
+    /// Bytes that have come and gone, wrapping.
+    pub(crate) fn bytes(&self) -> u32 {
+        self.bytes
+    }
+}
+
+impl Line for SerialLine {
+    const MAX_BYTES: usize = RECEIVE_RING_LEN;
+
+    fn receive(&mut self) -> Option<Received> {
+        let received = self.received.pop();
+        self.bytes = self.bytes.wrapping_add(u32::from(received.is_some()));
+        received
+    }
+
+    fn can_send(&self) -> bool {
+        self.to_send.has_room()
+    }
+
+    fn send(&mut self, byte: u8) {
+        self.bytes = self.bytes.wrapping_add(1);
+        // There is room, the main loop has asked.
+        let _ = self.to_send.push(byte);
+        // The interrupt may clear this bit between reading and writing, because it has found the ring empty just before.
+        // Then it is set here, where it belongs; nothing else in the register ever changes.
+        self.uart.cr1().modify(|_, w| w.txeie().set_bit());
+    }
+
+    fn is_quiet(&mut self, _now_ms: u32) -> bool {
+        self.to_send.is_empty() && self.uart.sr().read().tc().bit_is_set()
+    }
+
+    fn set_baud(&mut self, baud: Baud) {
+        set_divider(&self.uart, baud);
+    }
+}

@@ -1,0 +1,88 @@
+//! How much of its stack the ARM image needs when everything happens at once.
+#![cfg(unix)]
+
+use std::thread;
+
+use ser_client::{Delivery, Endpoint, Unit, open};
+use ser_proto::{AutoReport, Configuration, Model, TimeStamp};
+use ser_tests::recorder::{Kind, NODE, PATIENCE, PATIENT, Recorder};
+
+/// As the image's memory map has it.
+const STACK_LEN: u32 = 8 * 1024;
+
+/// Every so often the image looks at its stack.
+const LOOK_EVERY_MS: u32 = 1000;
+
+/// Longer than is waited for, in milliseconds, so that contacts move to the end.
+const MOVING_MS: u64 = 20_000;
+
+/// All 32 contacts, once a millisecond, one after the other and all together in turns.
+fn everything_moves(milliseconds: u64) -> Vec<(u64, u8, bool)> {
+    (0..milliseconds)
+        .flat_map(|ms| {
+            let on = ms.is_multiple_of(2);
+            let together = ms % 64 < 32;
+            (1..=32)
+                .filter(move |&input| together || u64::from(input) == ms % 32 + 1)
+                .map(move |input| (ms, input, on))
+        })
+        .collect()
+}
+
+/// Everything that a host can ask for and have answered at once.
+fn ask_for_everything(unit: &mut Unit, cursor: &mut Option<ser_client::Cursor>) {
+    let time = TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 0 };
+    unit.set_clock(|_| time).expect("the clock is set");
+    unit.mode().expect("the mode");
+    unit.last_broadcast().expect("a reply");
+    let configuration = unit.configuration().expect("a reply");
+    unit.configure(configuration.into()).expect("configured");
+    let mut deliver = |_: Delivery| {};
+    unit.read_new(cursor, 2048, &mut deliver).expect("the log is read");
+}
+
+#[test]
+#[ignore = "needs the emulator and the image: cargo xtask test"]
+fn a_quarter_of_the_stack_is_never_in_use() {
+    let recorder = Recorder::start_on_bus(Kind::Emulated, Model::Ser320);
+    let (host, board, port) = (recorder.host(), recorder.board(), recorder.port().to_owned());
+    let mut on_bus = host.unit(NODE, PATIENT);
+    let everything = Configuration {
+        auto_report: AutoReport::Genius,
+        report_address: host.number(),
+        auto_print: true,
+        ..Configuration::default()
+    };
+    recorder.play(&everything_moves(300));
+    // As many as may wait, of lines enough to last to the end.
+    for _ in 0..4 {
+        on_bus.print(1, 2048).expect("accepted");
+    }
+    on_bus.configure(everything.into()).expect("configured");
+    recorder.start_playing(&everything_moves(MOVING_MS));
+
+    let enough = || recorder.played().len() > 2000;
+    thread::scope(|scope| {
+        scope.spawn(|| {
+            let endpoint: Endpoint = port.parse().expect("the simulator names its port");
+            let mut on_line = Unit::new(open(&endpoint, 9600).expect("the line"), PATIENT);
+            let mut cursor = None;
+            while !enough() {
+                ask_for_everything(&mut on_line, &mut cursor);
+            }
+        });
+        let mut cursor = None;
+        while !enough() {
+            ask_for_everything(&mut on_bus, &mut cursor);
+        }
+    });
+    let now_ms = board.tick_ms();
+    assert!(board.wait(PATIENCE, |board| board.tick_ms() - now_ms > 2 * LOOK_EVERY_MS));
+
+    let used = board.stack_bytes();
+    println!("{used} of {STACK_LEN} bytes of the stack have been in use ({} %)", used * 100 / STACK_LEN);
+    assert!(used > 0, "the image has not looked");
+    assert!(used <= STACK_LEN / 4 * 3, "{used} of {STACK_LEN} bytes");
+    assert_eq!(board.boots(), 1);
+    recorder.assert_lawful();
+}

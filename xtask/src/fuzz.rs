@@ -1,0 +1,166 @@
+//! `fuzz`: lets libFuzzer look for input that breaks a property.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+
+use crate::places;
+use crate::steps::{self, Failure, Result, heading};
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask fuzz --list
+  cargo xtask fuzz                         every target, a minute each
+  cargo xtask fuzz --seconds 600 node      one target, ten minutes
+  cargo test -p ser-tests --test fuzz_seeds    what is known already: needs no fuzzer
+
+Needs the nightly toolchain, cargo-fuzz and a C++ compiler. What was found on the way is kept in tests/fuzz/corpus and used
+again the next time; see tests/fuzz/README.md.";
+
+/// The toolchain that knows how to instrument.
+const TOOLCHAIN: &str = "nightly";
+
+/// One input may take so long, in seconds; the slowest take a tenth of one.
+const INPUT_SECONDS: u32 = 20;
+
+/// Memory that a target may take, in megabytes.
+const MEMORY_MB: u32 = 1024;
+
+/// Look for input that breaks the protocol, the recorder or its host, one target after the other.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Arguments {
+    /// Only these targets.
+    #[arg(value_name = "TARGET")]
+    targets: Vec<String>,
+
+    /// How long to look, for each target.
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
+    seconds: u32,
+
+    /// Name the targets and do nothing else.
+    #[arg(long)]
+    list: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let all = targets()?;
+    if arguments.list {
+        all.iter().for_each(|target| println!("{target}"));
+        return Ok(());
+    }
+    let chosen = if arguments.targets.is_empty() { &all } else { &arguments.targets };
+    if let Some(unknown) = chosen.iter().find(|target| !all.contains(target)) {
+        return Err(Failure::new(format!("there is no target {unknown}; there are {}", all.join(", "))));
+    }
+    check_tools()?;
+    let mut broken = Vec::new();
+    for target in chosen {
+        heading(&format!("{target}, {} s", arguments.seconds));
+        plant_seeds(target)?;
+        let known = artifacts(target);
+        if let Err(failure) = steps::run(&mut fuzzer(target, arguments.seconds)) {
+            let found: Vec<PathBuf> = artifacts(target).difference(&known).cloned().collect();
+            if found.is_empty() {
+                return Err(failure);
+            }
+            broken.push(describe(target, &found));
+        }
+    }
+    if broken.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::new(format!("input was found that breaks a property.\n{}", broken.concat())))
+}
+
+fn folder() -> PathBuf {
+    places::root().join("tests/fuzz")
+}
+
+/// The names of the programs.
+fn targets() -> Result<Vec<String>> {
+    let programs = folder().join("fuzz_targets");
+    let files = fs::read_dir(&programs)
+        .map_err(|error| Failure::new(format!("cannot read {}: {error}", programs.display())))?;
+    let names = files.filter_map(|file| Some(file.ok()?.path().file_stem()?.to_str()?.to_owned()));
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    Ok(names)
+}
+
+fn check_tools() -> Result<()> {
+    let mut missing = String::new();
+    if !steps::works(nightly("rustc").arg("--version")) {
+        missing += &format!("\n  rustup toolchain install {TOOLCHAIN} --profile minimal");
+    }
+    if !steps::works(nightly("cargo").args(["fuzz", "--version"])) {
+        missing += "\n  cargo install cargo-fuzz --locked";
+    }
+    if missing.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::new(format!(
+        "the fuzzer cannot run yet. Install what is missing and try again:{missing}\n\
+         It also needs a C++ compiler, and Linux or macOS. What is known already is checked without all that:\n  \
+         cargo test -p ser-tests --test fuzz_seeds"
+    )))
+}
+
+/// A program of the toolchain that instruments.
+fn nightly(program: &str) -> Command {
+    let mut command = steps::unrelated(program);
+    command.env("RUSTUP_TOOLCHAIN", TOOLCHAIN).current_dir(places::root());
+    command
+}
+
+/// Writes the seeds to where the fuzzer looks for input to begin with.
+fn plant_seeds(target: &str) -> Result<()> {
+    let mut plant = helper("plant", target);
+    steps::run(plant.arg(folder().join("corpus").join(target)))
+}
+
+/// The program that knows the targets without a fuzzer.
+fn helper(verb: &str, target: &str) -> Command {
+    let mut cargo = steps::cargo();
+    cargo.args(["run", "--quiet", "-p", "ser-tests", "--example", "fuzzing", "--", verb, target]);
+    cargo
+}
+
+fn fuzzer(target: &str, seconds: u32) -> Command {
+    let mut cargo = nightly("cargo");
+    // Nothing here is unsafe but the windows of boards, so what sanitizers look for cannot be found, and it is twice as fast.
+    cargo.args(["fuzz", "run", "--fuzz-dir", "tests/fuzz", "--sanitizer", "none", "--target-dir"]);
+    cargo.arg(target_folder()).args([target, "--"]);
+    cargo.arg(format!("-max_total_time={seconds}")).arg(format!("-timeout={INPUT_SECONDS}"));
+    cargo.arg(format!("-rss_limit_mb={MEMORY_MB}")).arg("-print_final_stats=1");
+    cargo
+}
+
+/// Where the programs are built: apart from everything else, for they have another compiler.
+fn target_folder() -> PathBuf {
+    match std::env::var_os("CARGO_TARGET_DIR") {
+        Some(target) => places::root().join(target).join("fuzz"),
+        None => folder().join("target"),
+    }
+}
+
+/// What has been found to break the target, this time or before.
+fn artifacts(target: &str) -> BTreeSet<PathBuf> {
+    let files = fs::read_dir(folder().join("artifacts").join(target));
+    files.into_iter().flatten().filter_map(|file| Some(file.ok()?.path())).collect()
+}
+
+/// How to go on from what was found.
+fn describe(target: &str, found: &[PathBuf]) -> String {
+    let mut text = format!("\n{target}:\n");
+    for file in found {
+        let file = file.strip_prefix(places::root()).unwrap_or(file).display();
+        text += &format!(
+            "  {file}\n    \
+             to repeat it:    cargo run -p ser-tests --example fuzzing -- replay {target} {file}\n    \
+             to shorten it:   cargo +{TOOLCHAIN} fuzz tmin --fuzz-dir tests/fuzz --sanitizer none {target} {file}\n"
+        );
+    }
+    text + "  Once it is understood, a test in the crate and a seed with a telling name keep it from coming back.\n"
+}

@@ -1,0 +1,282 @@
+//! All functions that can be reached, and how deep the stack gets below each.
+//!
+//! # Design
+//! A call counts with the depth at which it stands, so the deepest path is the sum of what is really in use at each call
+//! of it and not of whole frames.
+//!
+//! # Tradeoffs
+//! A call through a pointer is taken to lead to any function whose address the image holds somewhere: too many, and never
+//! too few. Recursion has no bound that could be found here, and fails.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::image::walk::{Call, Callee, Walk, walk};
+use crate::image::{Image, VECTOR_TABLE};
+
+/// Functions that call each other.
+pub(crate) struct Calls<'a> {
+    image: &'a Image,
+    walks: BTreeMap<u32, Walk>,
+    /// Functions that a pointer may lead to.
+    pointed_to: BTreeSet<u32>,
+}
+
+/// The deepest path from a function.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Deepest {
+    /// Bytes of stack.
+    pub(crate) bytes: u32,
+    /// The functions on the way, the first one included.
+    pub(crate) path: Vec<u32>,
+    /// Where the stack begins that the first function changes to; none when all is on the stack that it found.
+    pub(crate) other_stack: Option<u32>,
+}
+
+/// Why no depth can be given.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Unbounded {
+    /// The functions of a ring of calls.
+    Recursion(Vec<u32>),
+    /// An instruction that could not be followed; what it does is in the walk of its function.
+    NotFollowed(u32),
+}
+
+impl<'a> Calls<'a> {
+    /// Walks all functions of an image. Calls of those in `without` are left out.
+    pub(crate) fn of(image: &'a Image, without: &BTreeSet<u32>) -> Calls<'a> {
+        let mut calls = Calls { image, walks: BTreeMap::new(), pointed_to: BTreeSet::new() };
+        let mut begun = BTreeSet::new();
+        for &function in image.functions.keys() {
+            calls.returns(function, &mut begun);
+        }
+        calls.pointed_to = pointers(image, &calls.walks);
+        let left_out =
+            |call: &Call| matches!(call.callee, Callee::Function(target) if without.contains(&target));
+        calls.walks.values_mut().for_each(|walk| walk.calls.retain(|call| !left_out(call)));
+        calls
+    }
+
+    /// Walks a function, unless that has been done; says whether it comes back.
+    fn returns(&mut self, function: u32, begun: &mut BTreeSet<u32>) -> bool {
+        if begun.insert(function) {
+            let walk = walk(self.image, function, &mut |callee| self.returns(callee, begun));
+            self.walks.insert(function, walk);
+        }
+        // One whose walk is not over yet takes part in a recursion, which fails anyway.
+        self.walks.get(&function).is_none_or(|walk| walk.returns)
+    }
+
+    /// What is known of a function.
+    pub(crate) fn walk(&self, function: u32) -> Option<&Walk> {
+        self.walks.get(&function)
+    }
+
+    /// All functions and what is known of them.
+    pub(crate) fn walks(&self) -> impl Iterator<Item = (u32, &Walk)> {
+        self.walks.iter().map(|(&function, walk)| (function, walk))
+    }
+
+    /// Where a call may lead.
+    pub(crate) fn targets(&self, call: &Call) -> impl Iterator<Item = u32> {
+        let (one, any) = match call.callee {
+            Callee::Function(function) => (Some(function), None),
+            Callee::Computed => (None, Some(self.pointed_to.iter().copied())),
+        };
+        one.into_iter().chain(any.into_iter().flatten())
+    }
+
+    /// The functions that can be reached from some, these included.
+    pub(crate) fn reachable(&self, from: impl IntoIterator<Item = u32>) -> BTreeSet<u32> {
+        let mut reached = BTreeSet::new();
+        let mut due: Vec<u32> = from.into_iter().collect();
+        while let Some(function) = due.pop() {
+            if reached.insert(function) {
+                let calls = self.walks.get(&function).into_iter().flat_map(|walk| &walk.calls);
+                due.extend(calls.flat_map(|call| self.targets(call)));
+            }
+        }
+        reached
+    }
+
+    /// The calls that lead to a function, each with the function that it stands in.
+    pub(crate) fn calls_of(&self, function: u32) -> impl Iterator<Item = &Call> {
+        let calls = self.walks.values().flat_map(|walk| &walk.calls);
+        calls.filter(move |call| call.callee == Callee::Function(function))
+    }
+
+    /// The deepest path from a function.
+    ///
+    /// # Errors
+    /// There is a recursion on some path, or an instruction that could not be followed.
+    pub(crate) fn deepest(&self, from: u32) -> Result<Deepest, Unbounded> {
+        self.deepest_from(from, &mut BTreeMap::new(), &mut Vec::new())
+    }
+
+    fn deepest_from(
+        &self,
+        function: u32,
+        known: &mut BTreeMap<u32, Deepest>,
+        on_the_way: &mut Vec<u32>,
+    ) -> Result<Deepest, Unbounded> {
+        if let Some(deepest) = known.get(&function) {
+            return Ok(deepest.clone());
+        }
+        if let Some(begin) = on_the_way.iter().position(|&caller| caller == function) {
+            return Err(Unbounded::Recursion(on_the_way.split_off(begin)));
+        }
+        let walk = self.walks.get(&function).ok_or(Unbounded::NotFollowed(function))?;
+        if let Some(&(at, _)) = walk.troubles.first() {
+            return Err(Unbounded::NotFollowed(at));
+        }
+        if walk.other_stack.is_some() && !on_the_way.is_empty() {
+            return Err(Unbounded::NotFollowed(function));
+        }
+        on_the_way.push(function);
+        let mut deepest = Deepest { bytes: walk.depth, path: vec![function], other_stack: walk.other_stack };
+        for call in &walk.calls {
+            for target in self.targets(call) {
+                let below = self.deepest_from(target, known, on_the_way)?;
+                if call.depth + below.bytes > deepest.bytes {
+                    deepest.bytes = call.depth + below.bytes;
+                    deepest.path.truncate(1);
+                    deepest.path.extend(below.path);
+                }
+            }
+        }
+        on_the_way.pop();
+        known.insert(function, deepest.clone());
+        Ok(deepest)
+    }
+
+    /// For people: why no depth can be given.
+    pub(crate) fn explain(&self, unbounded: &Unbounded) -> String {
+        match unbounded {
+            Unbounded::Recursion(ring) => {
+                let names: Vec<_> =
+                    ring.iter().chain(ring.first()).map(|&at| self.image.name_of(at)).collect();
+                format!("recursion: {}", names.join(" → "))
+            }
+            Unbounded::NotFollowed(at) => {
+                let troubles = self.walks.values().flat_map(|walk| &walk.troubles);
+                let what = troubles.into_iter().find(|(place, _)| place == at);
+                let what = what
+                    .map_or("is no function, or one that changes the stack".to_owned(), |(_, trouble)| {
+                        trouble.to_string()
+                    });
+                format!("{} ({at:#x}) {what}", self.image.name_of(*at))
+            }
+        }
+    }
+}
+
+/// Functions whose address stands in data or is put into a register. What the vector table holds is for the processor.
+fn pointers(image: &Image, walks: &BTreeMap<u32, Walk>) -> BTreeSet<u32> {
+    let mut values: BTreeSet<u32> = walks.values().flat_map(|walk| walk.constants.iter().copied()).collect();
+    for piece in image.pieces.iter().filter(|piece| piece.name != VECTOR_TABLE) {
+        let places = piece.addresses().filter(|address| address % 4 == 0 && !image.is_code(*address));
+        values.extend(places.filter_map(|address| image.word(address)));
+    }
+    let entry = |value: u32| Some(value & !1).filter(|_| value & 1 == 1);
+    values.into_iter().filter_map(entry).filter(|entry| image.functions.contains_key(entry)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AT: u32 = 0x100;
+    const PUSH: u16 = 0xB510; // {r4, lr}
+    const POP: u16 = 0xBD10; // {r4, pc}
+    const BX_LR: u16 = 0x4770;
+    const SUB_SP_64: u16 = 0xB090;
+    const ADD_SP_64: u16 = 0xB010;
+
+    /// Second halfword of a `bl` over this many halfwords from its end.
+    const fn bl(halfwords: u16) -> u16 {
+        0xF800 | halfwords
+    }
+
+    fn bytes_and_names(calls: &Calls<'_>, from: u32) -> (u32, Vec<String>) {
+        let deepest = calls.deepest(from).unwrap();
+        (deepest.bytes, deepest.path.iter().map(|&at| calls.image.name_of(at)).collect())
+    }
+
+    #[test]
+    fn the_deepest_path_adds_what_is_in_use_at_each_call() {
+        // main: push; bl shallow; sub; bl leaf; add; pop. shallow: push; bl leaf; pop.
+        let image = Image::of_functions(
+            AT,
+            &[
+                ("main", &[PUSH, 0xF000, bl(5), SUB_SP_64, 0xF000, bl(6), ADD_SP_64, POP]),
+                ("shallow", &[PUSH, 0xF000, bl(1), POP]),
+                ("leaf", &[PUSH, POP]),
+            ],
+        );
+        let calls = Calls::of(&image, &BTreeSet::new());
+        let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+        assert_eq!(bytes_and_names(&calls, AT), (80, names(&["main", "leaf"])));
+        assert_eq!(bytes_and_names(&calls, 0x110), (16, names(&["shallow", "leaf"])));
+        assert_eq!(calls.reachable([0x110]), BTreeSet::from([0x110, 0x118]));
+        assert_eq!(calls.calls_of(0x118).map(|call| call.at).collect::<Vec<_>>(), [0x108, 0x112]);
+    }
+
+    #[test]
+    fn recursion_has_no_bound_and_is_told() {
+        // f: push; bl g; pop. g: push; bl f; pop.
+        let image = Image::of_functions(
+            AT,
+            &[("f", &[PUSH, 0xF000, bl(1), POP]), ("g", &[PUSH, 0xF7FF, 0xFFF9, POP])],
+        );
+        let calls = Calls::of(&image, &BTreeSet::new());
+        let unbounded = calls.deepest(AT).unwrap_err();
+        assert_eq!(unbounded, Unbounded::Recursion(vec![0x100, 0x108]));
+        assert_eq!(calls.explain(&unbounded), "recursion: f → g → f");
+    }
+
+    #[test]
+    fn a_call_through_a_pointer_may_lead_to_every_function_that_is_pointed_to() {
+        // f: push; blx r0; pop; nop; addresses of `deep` and, even and thus no function's, of `other`.
+        let image = Image::of_functions(
+            AT,
+            &[
+                ("f", &[PUSH, 0x4780, POP, 0xBF00, 0x0111, 0, 0x0118, 0]),
+                ("deep", &[SUB_SP_64, ADD_SP_64, BX_LR, 0xBF00]),
+                ("other", &[SUB_SP_64, SUB_SP_64, ADD_SP_64, ADD_SP_64, BX_LR]),
+            ],
+        );
+        let image = image.with_data(0x108, 0x110);
+        let calls = Calls::of(&image, &BTreeSet::new());
+        assert_eq!(bytes_and_names(&calls, AT), (72, vec!["f".to_owned(), "deep".to_owned()]));
+    }
+
+    #[test]
+    fn what_cannot_be_followed_has_no_depth_either() {
+        // f: push; bl g; pop. g: mov sp, r7; bx lr.
+        let image = Image::of_functions(AT, &[("f", &[PUSH, 0xF000, bl(1), POP]), ("g", &[0x46BD, BX_LR])]);
+        let calls = Calls::of(&image, &BTreeSet::new());
+        let unbounded = calls.deepest(AT).unwrap_err();
+        assert_eq!(unbounded, Unbounded::NotFollowed(0x108));
+        assert_eq!(calls.explain(&unbounded), "g (0x108) sets the stack pointer from a register");
+    }
+
+    #[test]
+    fn a_call_into_what_never_comes_back_is_the_end_of_its_caller() {
+        // f: push; bl stop. stop: udf.
+        let image = Image::of_functions(AT, &[("f", &[PUSH, 0xF000, bl(0)]), ("stop", &[0xDE00])]);
+        let calls = Calls::of(&image, &BTreeSet::new());
+        assert_eq!(bytes_and_names(&calls, AT).0, 8);
+        assert!(!calls.walk(AT).unwrap().returns);
+    }
+
+    #[test]
+    fn calls_that_are_left_out_count_for_nothing() {
+        // f: push; bl f; pop
+        let image = Image::of_functions(
+            AT,
+            &[("main", &[0xF000, bl(2), BX_LR, 0xBF00]), ("f", &[PUSH, 0xF7FF, 0xFFFD, POP])],
+        );
+        let f = image.function("f").unwrap();
+        let calls = Calls::of(&image, &BTreeSet::from([f]));
+        assert_eq!(calls.deepest(AT), Ok(Deepest { bytes: 0, path: vec![AT], other_stack: None }));
+    }
+}

@@ -1,0 +1,36 @@
+//! Where the stack goes: the deepest paths through an image.
+
+use std::fmt::Write as _;
+
+use crate::boards::Board;
+use crate::checks::{Share, shares};
+use crate::image::Image;
+use crate::image::calls::Calls;
+use crate::image::walk::Callee;
+
+/// The deepest path of the main program and of each handler, the deepest handler first.
+pub(crate) fn shown(board: &Board, image: &Image, calls: &Calls<'_>) -> String {
+    let mut text = format!("\n{}, the stack at its deepest, in bytes:\n", board.name);
+    let Ok(mut shares) = shares(image, calls) else { return text + "  no bound\n" };
+    shares.sort_by_key(|share| (share.saved > 0, std::cmp::Reverse(share.deepest.bytes)));
+    let mut saved = 0;
+    for share in &shares {
+        let names: Vec<_> = share.deepest.path.iter().map(|&function| image.name_of(function)).collect();
+        let own = if share.deepest.other_stack.is_some() { ", on a stack of its own" } else { "" };
+        _ = writeln!(text, "{:7}  {}{own}", share.deepest.bytes, names.join(" → "));
+        saved += share.saved;
+    }
+    _ = writeln!(text, "{saved:7}  registers that the processor saves for {} handlers", shares.len() - 1);
+    _ = writeln!(text, "{:7}  together", shares.iter().map(Share::bytes).sum::<u32>());
+    text + &computed(image, calls)
+}
+
+/// Calls whose target only the running program knows.
+fn computed(image: &Image, calls: &Calls<'_>) -> String {
+    let computed =
+        calls.walks().flat_map(|(_, walk)| &walk.calls).filter(|call| call.callee == Callee::Computed);
+    computed.fold(String::new(), |text, call| {
+        let targets: Vec<_> = calls.targets(call).map(|function| image.name_of(function)).collect();
+        format!("{text}  {} calls one of: {}\n", image.name_of(call.at), targets.join(", "))
+    })
+}
