@@ -15,10 +15,10 @@ pub enum Event {
     /// The board has dealt with the configuration.
     Configured(ConfigurationOutcome),
     /// The board is free to join the bus: datagrams are accepted, tables can be locked. Whether it has joined
-    /// is told next, by
-    /// [`Event::StatusChanged`].
+    /// is told next, by [`Event::StatusChanged`].
     Ready(Identity),
-    /// The board has failed and will be reset, if it has a reset line, and started again. All devices are gone.
+    /// The board has failed and will be reset, if it has a reset line, and started again. All devices are
+    /// gone.
     Failed(Failure),
     /// The board came onto the bus or left it, or a monitor or excessive errors came or went. Also once after
     /// [`Event::Ready`].
@@ -36,7 +36,8 @@ pub enum Event {
     Sent(Result<(), CommandError>),
     /// The reply to the datagram that was sent, or the lack of it.
     Replied(Result<Received, CommandError>),
-    /// Another device asks for this host's memory: see [`Driver::answer_request`](crate::Driver::answer_request).
+    /// Another device asks for this host's memory: see
+    /// [`Driver::answer_request`](crate::Driver::answer_request).
     Request(MemoryRequest),
     /// A request for this host's memory was refused.
     RequestRefused(RequestHeader),
@@ -151,7 +152,7 @@ impl fmt::Display for CommandError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             CommandError::Refused => f.write_str("the GENI board refused the datagram"),
-            CommandError::Failed => f.write_str("the datagram was not acknowledged or not answered"),
+            CommandError::Failed => f.write_str("the datagram did not get through, or was not answered"),
             CommandError::Cleared => f.write_str("the GENI board dropped the command"),
             CommandError::UnknownStatus(status) => {
                 write!(f, "the GENI board gave the unknown status {status:02X}h")

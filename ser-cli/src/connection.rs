@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use ser_client::{
-    Diagnosis, Endpoint, GeniWindow, GeniusError, LineRate, OpenError, Options, RequestError, Unit,
+    Diagnosis, Endpoint, GeniWindow, GeniusError, LineRate, OpenError, Options, RequestError, TransportError,
+    Unit,
 };
 use ser_proto::{Baud, Configuration};
 
@@ -123,6 +124,11 @@ impl From<RequestError> for Failure {
                 diagnosis: Diagnosis::Silent | Diagnosis::Garbage { .. } | Diagnosis::Damaged { .. },
                 ..
             } => failure.unanswered(),
+            RequestError::NoReply {
+                diagnosis: Diagnosis::SilentOnBus { .. } | Diagnosis::Unacknowledged { .. },
+                ..
+            } => failure.passing(true),
+            RequestError::Transport(TransportError::Genius(error)) => failure.passing(error.may_pass()),
             _ => failure,
         }
     }
@@ -154,7 +160,7 @@ pub(crate) fn explain_silence(failure: Failure, connection: &ConnectionArgs) -> 
 /// What went wrong on a Genius bus, with advice.
 impl From<GeniusError> for Failure {
     fn from(error: GeniusError) -> Failure {
-        let failure = Failure::new(error).hint(error.hint());
+        let failure = Failure::new(error).hint(error.hint()).passing(error.may_pass());
         match error {
             GeniusError::NotOnBus { .. } => {
                 failure.hint("ser-cli genius devices lists the devices that are there")

@@ -34,6 +34,8 @@ pub(crate) struct Report {
     exit: u8,
     /// Nothing that the unit said was understood, if it said anything.
     unanswered: bool,
+    /// It may work again without anybody doing anything here.
+    may_pass: bool,
 }
 
 impl Failure {
@@ -53,6 +55,7 @@ impl Failure {
             hints: Vec::new(),
             exit,
             unanswered: false,
+            may_pass: false,
         }))
     }
 
@@ -75,6 +78,26 @@ impl Failure {
     /// Whether nothing was understood of the unit.
     pub(crate) fn is_unanswered(&self) -> bool {
         matches!(self, Failure::Told(report) if report.unanswered)
+    }
+
+    /// Notes whether it may work again if one waits.
+    pub(crate) fn passing(mut self, may_pass: bool) -> Failure {
+        if let Failure::Told(report) = &mut self {
+            report.may_pass = may_pass;
+        }
+        self
+    }
+
+    /// Whether it may work again if one waits.
+    pub(crate) fn may_pass(&self) -> bool {
+        matches!(self, Failure::Told(report) if report.may_pass)
+    }
+
+    /// Tells the user, who need not do anything about it yet.
+    pub(crate) fn warn(&self) {
+        if let Failure::Told(report) = self {
+            warn(&report.message);
+        }
     }
 
     /// The failure to write to `what` (a file, standard output).

@@ -8,6 +8,7 @@ mod delivery;
 mod error;
 mod interrupt;
 mod keeper;
+mod outage;
 mod output;
 mod progress;
 mod state;

@@ -75,7 +75,7 @@ impl Diagnosis {
                 "is this device a recorder, is it running, and is the bus free of errors? Or wait longer for the answer"
             }
             Diagnosis::Unacknowledged { .. } => {
-                "try again; if it persists, look for errors on the bus: cable, terminators, a second device of this number"
+                "try again; if it persists, look for errors on the bus: cable, terminators, a number given twice"
             }
             Diagnosis::Garbage { .. } => "try another baud rate; units are delivered with 9600",
             Diagnosis::Damaged { .. } => "check cable, shielding and ground, or choose a lower baud rate",
@@ -95,7 +95,7 @@ impl fmt::Display for Diagnosis {
                 write!(f, "device {node} is on the bus and does not reply")
             }
             Diagnosis::Unacknowledged { node } => {
-                write!(f, "device {node} is on the bus and the question did not get through to it")
+                write!(f, "device {node} is on the bus and the datagram did not get through to it")
             }
             Diagnosis::Garbage { bytes } => write!(f, "{bytes} bytes came back and none made sense"),
             Diagnosis::Damaged { frames } => write!(f, "{frames} damaged frames came back"),

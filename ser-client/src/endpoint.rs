@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::fmt;
+use std::path::Path;
 use std::str::FromStr;
 
 use ser_proto::genius::Device;
@@ -110,6 +111,10 @@ fn geni(window: &str) -> Result<Endpoint, EndpointError> {
     let (file, query) = match window.rsplit_once('?') {
         // A file may be called anything.
         Some((file, query)) if [NODE, OFFSET].iter().any(|key| is_about(query, key)) => (file, query),
+        // Unless it is one that is there, and something misspelled after it.
+        Some((file, query)) if is_assignment(query) && exists(file) && !exists(window) => {
+            return Err(EndpointError::GeniQuery);
+        }
         _ => (window, ""),
     };
     if file.is_empty() {
@@ -131,6 +136,16 @@ fn geni(window: &str) -> Result<Endpoint, EndpointError> {
 
 fn is_about(query: &str, key: &str) -> bool {
     query.strip_prefix(key).is_some_and(|rest| rest.starts_with('='))
+}
+
+/// Whether this looks like `word=value`.
+fn is_assignment(text: &str) -> bool {
+    text.split_once('=')
+        .is_some_and(|(word, _)| !word.is_empty() && word.chars().all(|letter| letter.is_ascii_alphabetic()))
+}
+
+fn exists(file: &str) -> bool {
+    !file.is_empty() && Path::new(file).exists()
 }
 
 fn node_number(text: &str) -> Option<u8> {
@@ -230,6 +245,18 @@ mod tests {
         }
         let endpoint: Endpoint = "geni:/dev/uio0?offset=4096&node=5".parse().unwrap();
         assert_eq!(endpoint.to_string(), "geni:/dev/uio0?node=5&offset=0x1000");
+    }
+
+    #[test]
+    fn a_misspelled_word_after_a_file_that_is_there_is_no_part_of_its_name() {
+        let here = file!().rsplit('/').next().map_or(String::new(), |name| format!("src/{name}"));
+        for query in ["nod=5", "Node=5", "nod=5&offset=0"] {
+            assert_eq!(format!("geni:{here}?{query}").parse::<Endpoint>(), Err(EndpointError::GeniQuery));
+        }
+        for name in ["none?nod=5".to_string(), format!("{here}?5"), format!("{here}?=5")] {
+            let window = GeniWindow::from(&*name);
+            assert_eq!(format!("geni:{name}").parse(), Ok(Endpoint::Geni { window, node: None }));
+        }
     }
 
     #[test]

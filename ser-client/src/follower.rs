@@ -61,7 +61,7 @@ impl LogFollower {
     }
 
     /// Reads what is new and hands it to `take`, reply by reply; each event comes once and in order, and what was lost is
-    /// told. When `take` fails, the reading ends with its error, and the next one begins before what it was given.
+    /// told. Auto reports that came before the first reply are forgotten: the reading brings what they have to tell. When `take` fails, the reading ends with its error, and the next one begins before what it was given.
     ///
     /// # Errors
     /// Those of `take`; no reply, a line that fails, or a log that is changed again and again while it is read.
@@ -99,8 +99,14 @@ impl LogFollower {
             reader = reader.starting_near(position);
         }
         let mut deliveries = Vec::new();
+        let mut first = true;
         while let Some(request) = reader.request() {
             let reply = unit.read(request)?;
+            if first {
+                // What they tell is in the log that is read now, or was erased since.
+                unit.forget_earlier_reports();
+                first = false;
+            }
             deliveries.clear();
             let taken = reader.take(&reply, &mut |delivery| deliveries.push(delivery));
             let (cursor, pending) = (reader.cursor(), reader.pending());
@@ -159,7 +165,10 @@ impl LogFollower {
 
 fn numbered(report: &ReadReply) -> impl Iterator<Item = (u16, Entry, Model)> {
     let model = report.model;
-    (report.start..).zip(&report.entries).filter_map(move |(number, entry)| Some((number, *entry, model?)))
+    // Inclusive: a report can begin with the largest number that there is.
+    (report.start..=u16::MAX)
+        .zip(&report.entries)
+        .filter_map(move |(number, entry)| Some((number, *entry, model?)))
 }
 
 #[cfg(test)]
@@ -209,6 +218,7 @@ mod tests {
             ("no events", follower(4, 8).continue_with(&report(5, 4, 4, 0))),
             ("another size", follower(4, 5).continue_with(&report(5, 6, 6, 2))),
             ("no cursor", LogFollower::new(None, 8).continue_with(&report(1, 1, 1, 1))),
+            ("numbers that no log has", follower(4, 8).continue_with(&report(u16::MAX, 5, 5, 10))),
         ] {
             assert_eq!(numbers(taken), None, "{what}");
         }

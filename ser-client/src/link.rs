@@ -4,6 +4,9 @@ use std::time::{Duration, Instant};
 
 use crate::{Attempt, Diagnosis, Session, Transport, TransportError};
 
+/// How much is taken from a line in one go, at most: a peer that never stops must not keep us from asking.
+const MAX_WAITING_BYTES: usize = 64 * 1024;
+
 /// Carries a session's messages.
 pub(crate) trait Link: Send {
     /// Sends what the attempt is about.
@@ -11,6 +14,9 @@ pub(crate) trait Link: Send {
 
     /// Waits up to `timeout` and gives the session what arrived, which is so many bytes.
     fn receive(&mut self, session: &mut Session, timeout: Duration) -> Result<usize, TransportError>;
+
+    /// Gives the session what has arrived before now, wherever it waits.
+    fn receive_waiting(&mut self, session: &mut Session) -> Result<(), TransportError>;
 
     /// The time that a session on this link goes by.
     fn now(&self) -> Duration;
@@ -53,6 +59,17 @@ impl Link for SerialLink {
         let count = self.transport.read(&mut buf, timeout)?;
         session.process(self.now(), buf.get(..count).unwrap_or_default());
         Ok(count)
+    }
+
+    fn receive_waiting(&mut self, session: &mut Session) -> Result<(), TransportError> {
+        let mut taken = 0;
+        while taken < MAX_WAITING_BYTES {
+            match self.receive(session, Duration::ZERO)? {
+                0 => break,
+                count => taken += count,
+            }
+        }
+        Ok(())
     }
 
     fn now(&self) -> Duration {

@@ -25,6 +25,10 @@ fn no_line(file: &str, node: Option<u8>) -> OpenError {
     }
 }
 
+fn file_name(path: &str) -> &str {
+    path.rsplit('/').next().unwrap_or(path)
+}
+
 /// Why the line could not be opened.
 #[derive(Debug)]
 pub enum OpenError {
@@ -128,7 +132,7 @@ pub enum OpenError {
 impl OpenError {
     /// What a person can try next.
     #[must_use]
-    pub const fn hint(&self) -> &'static str {
+    pub fn hint(&self) -> &'static str {
         match self {
             OpenError::NoSuchPort { .. } => {
                 "list the serial ports of this computer; is the adapter plugged in?"
@@ -155,9 +159,11 @@ impl OpenError {
                 "name a device for memory, and check the offset of the window in it"
             }
             OpenError::WindowDenied { .. } => "ask for the right to read and write it",
-            OpenError::WindowSize { .. } => {
-                "a GENI window is a file of 16384 bytes; in a file for memory, add where it begins: offset=0"
+            // A file of this name is how a system shows the memory of a PCI device; others are written to at one's peril.
+            OpenError::WindowSize { path, .. } if file_name(path).starts_with("resource") => {
+                "a GENI window has 16384 bytes: add where in this memory it begins, as in offset=0"
             }
+            OpenError::WindowSize { .. } => "is this the right file? A GENI window is a file of 16384 bytes",
             OpenError::WindowInUse { .. } => "wait until the other program has ended, or end it",
             OpenError::NoNode { .. } => "say which unit on the bus, as in geni:FILE?node=5",
             OpenError::Genius { error, .. } => error.hint(),
@@ -202,6 +208,20 @@ impl Error for OpenError {
             OpenError::Other { error, .. } | OpenError::NoMemory { error, .. } => Some(error),
             OpenError::Genius { error, .. } => Some(error),
             _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nobody_is_led_to_write_into_a_foreign_file() {
+        let hint = |path: &str| OpenError::WindowSize { path: path.to_string(), len: 40_000 }.hint();
+        assert!(hint("/sys/bus/pci/devices/0000:01:00.0/resource2").contains("offset=0"));
+        for path in ["big", "/home/resource0/big", ""] {
+            assert!(hint(path).starts_with("is this the right file?"), "{path}");
         }
     }
 }

@@ -11,6 +11,10 @@
 //! a read reply must also begin at the entry that was asked for and hold no more entries than that. Every other
 //! read reply is an auto report ([`Unsolicited::Report`]), every other reply is counted and forgotten.
 //!
+//! An auto report that is made after the question and begins at the same entry cannot be told from the answer. It need
+//! not be: it says how the log stands now, and whoever reads goes on behind an answer that is short. A report from
+//! before the question would be another matter, so [`Unit`](crate::Unit) takes what has arrived before it asks.
+//!
 //! A request that was repeated or given up may be answered after all, later. To a repeated read that does no harm:
 //! each reply says where the log stood when it was made. But a *new* request of the same kind could take the old
 //! answer for its own, and the next one the answer after that, and so on. Such a request is therefore held back until
@@ -408,6 +412,7 @@ impl Session {
                 self.lines.clear();
             }
             self.answer = Some(Ok(reply));
+            self.unsolicited.mark();
             return;
         }
         if let Some(owed) = &mut self.owed
@@ -461,6 +466,12 @@ impl Session {
     /// The oldest message that answers no request.
     pub fn take_unsolicited(&mut self) -> Option<Unsolicited> {
         self.unsolicited.pop()
+    }
+
+    /// Forgets the reports that came before the last answer. Messages come in the order in which the unit sent them, so
+    /// these tell of a log that has changed since: the answer knows better.
+    pub fn forget_earlier_reports(&mut self) {
+        self.unsolicited.drop_reports_before_mark();
     }
 
     /// How many messages were dropped because nobody took them; 4096 are kept.

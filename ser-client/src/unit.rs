@@ -14,9 +14,6 @@ use crate::{
     ReadRequest, RequestError, Session, Summary, Timing, Transport, Unsolicited, open,
 };
 
-/// How much is taken from the line before a request, at most: a peer that never stops must not keep us from asking.
-const MAX_STALE_BYTES: usize = 64 * 1024;
-
 /// A unit changes its rate when the reply is out; what arrives in that moment it would not understand.
 const BAUD_SETTLING: Duration = Duration::from_millis(20);
 
@@ -257,7 +254,8 @@ impl Unit {
     }
 
     /// Waits for the next message that answers no request: an auto report or a line of text. Those that came during
-    /// requests come first. `None` when nothing comes in time.
+    /// requests come first, except that a reading by cursor takes the place of all reports before it. `None` when
+    /// nothing comes in time.
     ///
     /// # Errors
     /// If the line fails.
@@ -345,6 +343,11 @@ impl Unit {
         self.session.unsolicited_dropped()
     }
 
+    /// Forgets the auto reports that came before the last answer.
+    pub(crate) fn forget_earlier_reports(&mut self) {
+        self.session.forget_earlier_reports();
+    }
+
     pub(crate) fn read(&mut self, request: ReadRequest) -> Result<ReadReply, RequestError> {
         match self.request(&request.into())? {
             Reply::Read(reply) => Ok(reply),
@@ -356,14 +359,7 @@ impl Unit {
     /// of the line has cut short is forgotten.
     fn prepare(&mut self) -> Result<(), RequestError> {
         self.session.cancel(self.now());
-        let mut taken = 0;
-        while taken < MAX_STALE_BYTES {
-            match self.receive(Duration::ZERO)? {
-                0 => break,
-                count => taken += count,
-            }
-        }
-        Ok(())
+        Ok(self.link.receive_waiting(&mut self.session)?)
     }
 
     fn converse(

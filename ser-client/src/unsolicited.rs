@@ -20,6 +20,8 @@ pub enum Unsolicited {
 #[derive(Debug, Default)]
 pub(crate) struct UnsolicitedQueue {
     messages: VecDeque<Unsolicited>,
+    /// So many of them came before a moment that was marked.
+    before_mark: usize,
     dropped: u64,
 }
 
@@ -28,19 +30,34 @@ impl UnsolicitedQueue {
 
     pub(crate) fn push(&mut self, message: Unsolicited) {
         if self.messages.len() == Self::CAPACITY {
-            self.messages.pop_front();
+            self.pop();
             self.dropped += 1;
         }
         self.messages.push_back(message);
     }
 
     pub(crate) fn pop(&mut self) -> Option<Unsolicited> {
+        self.before_mark = self.before_mark.saturating_sub(1);
         self.messages.pop_front()
     }
 
     /// Forgets lines, and keeps reports.
     pub(crate) fn drop_lines(&mut self) {
         self.messages.retain(|message| !matches!(message, Unsolicited::Line(_)));
+        self.before_mark = self.before_mark.min(self.messages.len());
+    }
+
+    /// Marks the moment: what is there now came before it.
+    pub(crate) fn mark(&mut self) {
+        self.before_mark = self.messages.len();
+    }
+
+    /// Forgets reports that came before the mark, and keeps lines.
+    pub(crate) fn drop_reports_before_mark(&mut self) {
+        let later = self.messages.split_off(self.before_mark.min(self.messages.len()));
+        self.messages.retain(|message| matches!(message, Unsolicited::Line(_)));
+        self.before_mark = self.messages.len();
+        self.messages.extend(later);
     }
 
     pub(crate) const fn dropped(&self) -> u64 {

@@ -140,27 +140,30 @@ fn requests_for_memory_are_refused_and_never_fill_the_queue() {
     assert_recovered(&mut world, events);
 }
 
+/// Sends datagrams (destination, function, subfunction, data) while nobody polls the recorder's port: its board keeps them.
+fn send_while_away(world: &mut World, datagrams: &[(u8, u8, u8, &[u8])]) {
+    const MS_PER_DATAGRAM: u64 = 20;
+    let bus = std::rc::Rc::clone(&world.bus);
+    for &(destination, function, subfunction, data) in datagrams {
+        let mut bus = bus.borrow_mut();
+        let board = bus.get_mut(world.host.board);
+        board.host_write_from(0x08D2, data);
+        let len = u8::try_from(data.len()).expect("short");
+        board.host_write_from(0x08C4, &[destination, function, subfunction, 0, len]);
+        board.host_write(0x08C3, 2);
+        board.host_write(0x08C2, 1);
+        // The node's time goes on in one big step, as after a long interrupt.
+        world.now_ms += MS_PER_DATAGRAM;
+        bus.advance_to(world.now_ms * 1000);
+    }
+}
+
 #[test]
 fn a_recorder_that_was_away_finds_full_queues_and_empties_them() {
     let mut world = started();
-    // Nobody polls the recorder's port: its board fills up with commands and requests.
-    let start = world.now_ms;
-    let bus = std::rc::Rc::clone(&world.bus);
-    for index in 0..20_u64 {
-        let host = world.host.board;
-        let mut bus = bus.borrow_mut();
-        let data: &[u8] = if index % 2 == 0 { &[0x4D] } else { &[4, 0, 0, 0] };
-        let (function, subfunction) = if index % 2 == 0 { (0x40, 0x50) } else { (0x20, 0x1E) };
-        let board = bus.get_mut(host);
-        board.host_write_from(0x08D2, data);
-        let len = u8::try_from(data.len()).expect("short");
-        board.host_write_from(0x08C4, &[UNIT, function, subfunction, 0, len]);
-        board.host_write(0x08C3, 2);
-        board.host_write(0x08C2, 1);
-        bus.advance_to((start + (index + 1) * 20) * 1000);
-    }
-    // The node's time goes on in big steps, as after a long interrupt.
-    world.now_ms = start + 400;
+    let query: (u8, u8, u8, &[u8]) = (UNIT, 0x40, 0x50, &[0x4D]);
+    let read_device: (u8, u8, u8, &[u8]) = (UNIT, 0x20, 0x1E, &[4, 0, 0, 0]);
+    send_while_away(&mut world, &[query, read_device].repeat(10));
     world.run(1_000);
     let mut replies = 0;
     while world.take_message(UNIT).is_some() {
@@ -171,4 +174,30 @@ fn a_recorder_that_was_away_finds_full_queues_and_empties_them() {
     assert!(world.recorders[0].port.window().read(0x0893) <= 1);
     let events = live_on(&mut world, 1_000);
     assert_recovered(&mut world, events);
+}
+
+#[test]
+fn a_broadcast_does_not_overtake_the_commands_before_it() {
+    let mut world = started();
+    for event in 0..3 {
+        world.recorders[0].contact(1, event % 2 == 0);
+        world.step();
+    }
+    let read = Command::Read { start: 1, count: 10 }.to_body();
+    let erase = Command::Erase.to_body();
+    send_while_away(
+        &mut world,
+        &[(UNIT, 0x40, 0x50, &read), (UNIT, 0x40, 0x50, &read), (255, 0x40, 0x50, &erase)],
+    );
+    world.run(1_000);
+    for _ in 0..2 {
+        let (_, reply) = world.take_message(UNIT).expect("a reply");
+        let Ok(Reply::Read(read)) = Reply::parse(&reply) else { panic!("{reply:?}") };
+        assert_eq!((read.total, read.entries.len()), (3, 3), "read before it was erased");
+    }
+    let Reply::Read(after) = world.ask(UNIT, &Command::Read { start: 1, count: 0 }) else { panic!() };
+    assert_eq!(after.total, 0);
+    let Reply::LastBroadcast(Some(last)) = world.ask(UNIT, &Command::LastBroadcast) else { panic!() };
+    assert_eq!(last.code, erase[0]);
+    world.assert_lawful();
 }

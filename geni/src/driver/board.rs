@@ -28,7 +28,7 @@ pub(super) enum Phase {
     SelfTest { since_ms: u32 },
     /// A board that should be running: its OK flag has been cleared and should come back.
     Attaching { since_ms: u32 },
-    /// The OK flag is there. `window_since_ms` says since when when the board is not on the bus yet.
+    /// The OK flag is there. `window_since_ms` says since when, where the board is not on the bus yet.
     Configuring { window_since_ms: Option<u32>, futile: u8 },
     /// The board stays off the bus for a while. When it is `silent`, its tables need no lock.
     Joining { since_ms: Option<u32>, silent: bool },
@@ -51,73 +51,77 @@ impl<R: SharedRam> Driver<R> {
     pub(super) fn step(&mut self, now_ms: u32) -> Result<Option<Event>, Failure> {
         match self.phase {
             Phase::Begin => {
-                self.phase = match self.options.start {
-                    Start::Reset { hold_ms } if self.options.reset_line => {
-                        Phase::Reset { since_ms: now_ms, hold_ms }
-                    }
-                    Start::Reset { .. } | Start::Released => Phase::SelfTest { since_ms: now_ms },
-                    Start::Running => self.attach(now_ms),
-                };
-                Ok(None)
+                let phase = self.first_phase(now_ms);
+                self.go(phase)
             }
-            Phase::Reset { since_ms, hold_ms } => {
-                if elapsed_ms(now_ms, since_ms) >= hold_ms {
-                    self.phase = Phase::Released;
-                }
-                Ok(None)
-            }
-            Phase::Released => {
-                self.phase = Phase::SelfTest { since_ms: now_ms };
-                Ok(None)
-            }
+            Phase::Reset { since_ms, hold_ms } if elapsed_ms(now_ms, since_ms) < hold_ms => Ok(None),
+            Phase::Reset { .. } => self.go(Phase::Released),
+            Phase::Released => self.go(Phase::SelfTest { since_ms: now_ms }),
             Phase::SelfTest { since_ms } => self.await_self_test(now_ms, since_ms),
-            Phase::Attaching { since_ms } => {
-                if self.ram.read(map::STATUS_OK) == 1 {
-                    self.enter_configuring(now_ms, None);
-                    Ok(None)
-                } else if elapsed_ms(now_ms, since_ms) >= self.options.heartbeat_timeout_ms {
-                    Err(Failure::NoHeartbeat)
-                } else {
-                    Ok(None)
-                }
-            }
+            Phase::Attaching { since_ms } => self.await_heartbeat(now_ms, since_ms),
             Phase::Configuring { window_since_ms, futile } => {
                 self.watch_heart(now_ms, timing::OFF_BUS_MS)?;
                 self.configuring(now_ms, window_since_ms, futile)
             }
             Phase::Joining { since_ms, silent } => {
                 self.watch_heart(now_ms, timing::OFF_BUS_MS)?;
-                if silent {
-                    // What the board says first on the bus is not to be what its memory happened to hold.
-                    self.global.write(&mut self.ram, self.in_force.broadcast_len());
-                }
-                let joined =
-                    since_ms.is_none_or(|since_ms| elapsed_ms(now_ms, since_ms) >= timing::OFF_BUS_MS);
-                Ok(joined.then(|| self.ready(now_ms)))
+                Ok(self.joining(now_ms, since_ms, silent))
             }
             Phase::Running => {
                 self.locker.end_hold(&mut self.ram, now_ms, &mut self.counters);
                 self.watch_heart(now_ms, 0)?;
                 self.serve(now_ms)
             }
-            Phase::Failed { since_ms, pause_ms } => {
-                if elapsed_ms(now_ms, since_ms) >= pause_ms {
-                    self.phase = if self.options.reset_line {
-                        count(&mut self.counters.resets);
-                        Phase::Reset { since_ms: now_ms, hold_ms: timing::RESET_MS }
-                    } else {
-                        self.attach(now_ms)
-                    };
-                }
-                Ok(None)
+            Phase::Failed { since_ms, pause_ms } if elapsed_ms(now_ms, since_ms) < pause_ms => Ok(None),
+            Phase::Failed { .. } => {
+                let phase = self.phase_after_failure(now_ms);
+                self.go(phase)
             }
         }
     }
 
-    /// The flag may be a relic, so it is cleared first.
-    fn attach(&mut self, now_ms: u32) -> Phase {
-        self.ram.write(map::STATUS_OK, 0);
-        Phase::Attaching { since_ms: now_ms }
+    fn go(&mut self, phase: Phase) -> Result<Option<Event>, Failure> {
+        if let Phase::Attaching { .. } = phase {
+            // The flag may be a relic.
+            self.ram.write(map::STATUS_OK, 0);
+        }
+        self.phase = phase;
+        Ok(None)
+    }
+
+    fn first_phase(&self, now_ms: u32) -> Phase {
+        match self.options.start {
+            Start::Reset { hold_ms } if self.options.reset_line => Phase::Reset { since_ms: now_ms, hold_ms },
+            Start::Reset { .. } | Start::Released => Phase::SelfTest { since_ms: now_ms },
+            Start::Running => Phase::Attaching { since_ms: now_ms },
+        }
+    }
+
+    fn phase_after_failure(&mut self, now_ms: u32) -> Phase {
+        if self.options.reset_line {
+            count(&mut self.counters.resets);
+            Phase::Reset { since_ms: now_ms, hold_ms: timing::RESET_MS }
+        } else {
+            Phase::Attaching { since_ms: now_ms }
+        }
+    }
+
+    fn await_heartbeat(&mut self, now_ms: u32, since_ms: u32) -> Result<Option<Event>, Failure> {
+        if self.ram.read(map::STATUS_OK) == 1 {
+            self.enter_configuring(now_ms, None);
+        } else if elapsed_ms(now_ms, since_ms) >= self.options.heartbeat_timeout_ms {
+            return Err(Failure::NoHeartbeat);
+        }
+        Ok(None)
+    }
+
+    fn joining(&mut self, now_ms: u32, since_ms: Option<u32>, silent: bool) -> Option<Event> {
+        if silent {
+            // What the board says first on the bus is not to be what its memory happened to hold.
+            self.global.write(&mut self.ram, self.in_force.broadcast_len());
+        }
+        let joined = since_ms.is_none_or(|since_ms| elapsed_ms(now_ms, since_ms) >= timing::OFF_BUS_MS);
+        joined.then(|| self.ready(now_ms))
     }
 
     fn await_self_test(&mut self, now_ms: u32, since_ms: u32) -> Result<Option<Event>, Failure> {
@@ -143,7 +147,8 @@ impl<R: SharedRam> Driver<R> {
         self.phase = Phase::Configuring { window_since_ms, futile: 0 };
     }
 
-    /// With some more patience while the board starts up or changes its configuration: it may have no time for beats.
+    /// With some more patience while the board starts up or changes its configuration: it may have no time
+    /// for beats.
     fn watch_heart(&mut self, now_ms: u32, more_ms: u32) -> Result<(), Failure> {
         let patience_ms = self.options.heartbeat_timeout_ms.saturating_add(more_ms);
         if self.heart.watch(&mut self.ram, now_ms, patience_ms)? {
@@ -153,8 +158,7 @@ impl<R: SharedRam> Driver<R> {
     }
 
     /// The command is sent even when the setup table already holds what is wanted: somebody may have written
-    /// it without
-    /// making it known. It costs nothing, the board says that nothing has changed.
+    /// it without making it known. It costs nothing, the board says that nothing has changed.
     fn configuring(
         &mut self,
         now_ms: u32,
@@ -190,6 +194,16 @@ impl<R: SharedRam> Driver<R> {
                 return Ok(None);
             }
         };
+        self.take_configuration(now_ms, window_since_ms, accepted).map(Some)
+    }
+
+    /// The board has answered; what is in force is what its table says now.
+    fn take_configuration(
+        &mut self,
+        now_ms: u32,
+        window_since_ms: Option<u32>,
+        accepted: ConfigurationOutcome,
+    ) -> Result<Event, Failure> {
         let before = self.in_force;
         self.in_force = Configuration::read(&self.ram).map_err(|_| Failure::Configuration)?;
         let outcome = if self.in_force == self.commander.configured() {
@@ -203,7 +217,7 @@ impl<R: SharedRam> Driver<R> {
             silent: window_since_ms.is_some() || (changed && self.in_force.silences_the_bus(before)),
         };
         self.global.due();
-        Ok(Some(self.configured(outcome)))
+        Ok(self.configured(outcome))
     }
 }
 

@@ -64,19 +64,26 @@ enum State {
 #[derive(Debug)]
 pub(super) struct Commander {
     state: State,
+    /// How long the board may take for anything, at least.
+    patience_ms: u32,
     outbox: Option<Transmission>,
+    /// Something may have arrived since the last Read Datagram was started.
     read_due: bool,
+    /// The last Read Datagram found nothing, and nobody has asked for another one since it was started.
+    queue_empty: bool,
     /// Whether a datagram was read last: then it is the outbox's turn.
     read_last: bool,
     configured: Configuration,
 }
 
 impl Commander {
-    pub(super) const fn new() -> Commander {
+    pub(super) const fn new(patience_ms: u32) -> Commander {
         Commander {
             state: State::Idle,
+            patience_ms,
             outbox: None,
             read_due: false,
+            queue_empty: false,
             read_last: false,
             configured: Configuration::DEFAULT,
         }
@@ -85,6 +92,11 @@ impl Commander {
     /// There may be datagrams to be read.
     pub(super) fn read_due(&mut self) {
         self.read_due = true;
+        self.queue_empty = false;
+    }
+
+    pub(super) fn queue_is_empty(&self) -> bool {
+        self.queue_empty
     }
 
     pub(super) fn is_idle(&self) -> bool {
@@ -111,6 +123,7 @@ impl Commander {
     /// The board has been started anew: nothing is going on.
     pub(super) fn forget(&mut self) {
         self.state = State::Idle;
+        self.queue_empty = false;
     }
 
     /// The board has failed. Gives what was to be known about the datagram that went down with it.
@@ -167,7 +180,7 @@ impl Commander {
             State::Reading { since_ms }
             | State::Configuring { since_ms }
             | State::Occupied { since_ms, .. } => {
-                if elapsed_ms(now_ms, since_ms) < timing::COMMAND_STUCK_MS {
+                if elapsed_ms(now_ms, since_ms) < timing::COMMAND_STUCK_MS.max(self.patience_ms) {
                     return Ok(None);
                 }
                 count(&mut counters.commands_timed_out);
@@ -187,25 +200,25 @@ impl Commander {
     fn read<R: SharedRam>(&mut self, ram: &R, status: CommandStatus, counters: &mut Counters) -> Done {
         match status {
             CommandStatus::Complete => {
+                // There may be more.
+                self.read_due();
                 let Some(received) = read_datagram(ram) else {
                     count(&mut counters.datagrams_refused);
                     return Done::NothingRead;
                 };
                 Done::Read(received)
             }
-            // The receive queue is empty.
+            // The receive queue is empty, or was: something may have arrived while the answer was on its way.
             CommandStatus::SyntaxError => {
-                self.read_due = false;
+                self.queue_empty = !self.read_due;
                 Done::NothingRead
             }
             // "Should not occur": leave it until the next flag or the next look around.
             CommandStatus::ProcessError => {
-                self.read_due = false;
                 count(&mut counters.commands_failed);
                 Done::NothingRead
             }
             CommandStatus::Cleared | CommandStatus::Pending | CommandStatus::Unknown(_) => {
-                self.read_due = false;
                 count(&mut counters.commands_unknown);
                 Done::NothingRead
             }
@@ -225,6 +238,7 @@ impl Commander {
         }
         if self.read_due && (self.outbox.is_none() || !self.read_last) {
             self.read_last = true;
+            self.read_due = false;
             self.state = State::Reading { since_ms: now_ms };
             start_read(ram);
         } else if let Some(transmission) = self.outbox.take() {
@@ -234,7 +248,8 @@ impl Commander {
                 Completion::Taken | Completion::Acknowledged => {
                     timing::TRANSMIT_TIMEOUT_MS.max(scan_ms.saturating_mul(5))
                 }
-            };
+            }
+            .max(self.patience_ms);
             let sending = Sending {
                 destination: transmission.destination.to_byte(),
                 function: transmission.function,

@@ -23,11 +23,13 @@ pub(super) struct Locker {
     /// Look at the bytes even when nothing is wanted: a host that died may have left them set.
     due: bool,
     released_ms: Option<u32>,
+    /// How long the board may take to answer, at least.
+    patience_ms: u32,
 }
 
 impl Locker {
-    pub(super) const fn new() -> Locker {
-        Locker { state: State::Free, due: true, released_ms: None }
+    pub(super) const fn new(patience_ms: u32) -> Locker {
+        Locker { state: State::Free, due: true, released_ms: None, patience_ms }
     }
 
     pub(super) fn due(&mut self) {
@@ -44,8 +46,8 @@ impl Locker {
 
     /// True when the board has just been locked out.
     ///
-    /// Between two lockouts there are at least `gap_ms`, so that a host that always wants the tables
-    /// leaves the board a bus scan to exchange them.
+    /// Between two lockouts there are at least `gap_ms`, so that a host that always wants the tables leaves
+    /// the board a bus scan to exchange them.
     pub(super) fn poll<R: SharedRam>(
         &mut self,
         ram: &mut R,
@@ -69,7 +71,7 @@ impl Locker {
                     self.state = State::Held;
                     return Ok(true);
                 }
-                Lockout::Requested => stuck(now_ms, since_ms)?,
+                Lockout::Requested => self.wait(now_ms, since_ms)?,
                 Lockout::Free => self.lose(counters),
                 Lockout::Releasing => {
                     count(&mut counters.lockouts_lost);
@@ -82,7 +84,7 @@ impl Locker {
                     self.state = State::Free;
                     self.released_ms = Some(now_ms);
                 }
-                Lockout::Releasing => stuck(now_ms, since_ms)?,
+                Lockout::Releasing => self.wait(now_ms, since_ms)?,
                 Lockout::Requested | Lockout::Locked => {
                     count(&mut counters.lockouts_foreign);
                     self.state = State::Requested { since_ms: now_ms };
@@ -93,8 +95,7 @@ impl Locker {
     }
 
     /// A request must not be made over another one, and one that is not granted yet must not be withdrawn:
-    /// what somebody
-    /// else has left behind is seen through to its end first.
+    /// what somebody else has left behind is seen through to its end first.
     fn begin<R: SharedRam>(&mut self, ram: &mut R, now_ms: u32, wanted: bool, counters: &mut Counters) {
         self.state = match Lockout::read(ram) {
             Lockout::Free if wanted => {
@@ -141,8 +142,12 @@ impl Locker {
         count(&mut counters.lockouts_lost);
         self.state = State::Free;
     }
-}
 
-fn stuck(now_ms: u32, since_ms: u32) -> Result<(), Failure> {
-    if elapsed_ms(now_ms, since_ms) < timing::LOCKOUT_STUCK_MS { Ok(()) } else { Err(Failure::LockoutStuck) }
+    fn wait(&self, now_ms: u32, since_ms: u32) -> Result<(), Failure> {
+        if elapsed_ms(now_ms, since_ms) < timing::LOCKOUT_STUCK_MS.max(self.patience_ms) {
+            Ok(())
+        } else {
+            Err(Failure::LockoutStuck)
+        }
+    }
 }

@@ -54,21 +54,20 @@ enum Task {
 /// # What the host has to do
 ///
 /// - Call [`poll`](Driver::poll) in every turn of its main loop. The board tolerates slow hosts, but holds no
-///   more than 15
-///   datagrams and 15 memory requests for them, and answers come as fast as this is called.
+///   more than 15 datagrams and 15 memory requests for them, and answers come as fast as this is called.
 /// - After each call, hold the reset line low if [`reset_held`](Driver::reset_held) says so, and release it
 ///   otherwise.
 /// - Call [`interrupt`](Driver::interrupt) when the interrupt line was pulsed, if it is connected at all.
 ///
 /// # What happens when
 ///
-/// Reset, no access for 1.7 s, OK flag, configuration, 1.5 s off the bus, [`Event::Ready`]. Then traffic, until
-/// [`Event::Failed`], and all over again; the pauses between futile attempts grow up to a minute.
+/// Reset, no access for 1.7 s, OK flag, configuration, 1.5 s off the bus, [`Event::Ready`]. Then traffic,
+/// until [`Event::Failed`], and all over again; the pauses between futile attempts grow up to a minute.
 ///
 /// # Heartbeat and commands
 ///
-/// The manual wants the OK flag seen before each command. As the flag is cleared to watch the heartbeat, it is the
-/// heartbeat that is checked instead: nothing is asked of a board whose heartbeat is overdue.
+/// The manual wants the OK flag seen before each command. As the flag is cleared to watch the heartbeat, it
+/// is the heartbeat that is checked instead: nothing is asked of a board whose heartbeat is overdue.
 #[derive(Debug)]
 pub struct Driver<R> {
     ram: R,
@@ -108,8 +107,8 @@ impl<R: SharedRam> Driver<R> {
             in_force: Configuration::DEFAULT,
             configure_due: false,
             heart: Heart::new(),
-            commander: Commander::new(),
-            locker: Locker::new(),
+            commander: Commander::new(options.patience_ms()),
+            locker: Locker::new(options.patience_ms()),
             requests: RequestServer::new(),
             devices: DeviceWatch::new(),
             status: StatusWatch::new(),
@@ -167,8 +166,8 @@ impl<R: SharedRam> Driver<R> {
         self.in_force
     }
 
-    /// Changes the configuration, now or as soon as the board is ready for it. Ends in [`Event::Configured`] and
-    /// [`Event::Ready`]. When it is not the one in force, all devices are logged out for 1.5 s.
+    /// Changes the configuration, now or as soon as the board is ready for it. Ends in [`Event::Configured`]
+    /// and [`Event::Ready`]. When it is not the one in force, all devices are logged out for 1.5 s.
     pub fn configure(&mut self, configuration: Configuration) {
         self.options.configuration = configuration;
         self.configure_due = true;
@@ -194,6 +193,20 @@ impl<R: SharedRam> Driver<R> {
         self.is_ready() && self.commander.can_transmit()
     }
 
+    /// Has the receive queue read until it is empty. It is read also without this, when the board says that
+    /// something has arrived; this is for a host that has to know where it stands: see
+    /// [`receive_queue_is_empty`](Driver::receive_queue_is_empty).
+    pub fn check_receive_queue(&mut self) {
+        self.commander.read_due();
+    }
+
+    /// Whether a Read Datagram that was started after the last
+    /// [`check_receive_queue`](Driver::check_receive_queue), and after the last sign of the board that
+    /// something has arrived, has found nothing: what was in the queue then has become [`Event::Received`].
+    pub fn receive_queue_is_empty(&self) -> bool {
+        self.is_ready() && self.commander.queue_is_empty()
+    }
+
     /// Sets what is sent to everybody in every bus scan, from the next scan on that allows it. It survives a
     /// failure of the board.
     ///
@@ -217,8 +230,7 @@ impl<R: SharedRam> Driver<R> {
     }
 
     /// The input and output tables, from [`Event::TablesLocked`] to the next call of [`poll`](Driver::poll).
-    /// Meanwhile the
-    /// board neither takes new inputs nor sends new outputs.
+    /// Meanwhile the board neither takes new inputs nor sends new outputs.
     ///
     /// # Errors
     ///
@@ -465,7 +477,7 @@ impl<R: SharedRam> Driver<R> {
     fn fail(&mut self, now_ms: u32) {
         count(&mut self.counters.failures);
         self.lost = self.commander.abandon();
-        self.locker = Locker::new();
+        self.locker = Locker::new(self.options.patience_ms());
         self.requests = RequestServer::new();
         self.devices = DeviceWatch::new();
         self.status = StatusWatch::new();

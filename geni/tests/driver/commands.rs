@@ -276,3 +276,62 @@ fn a_read_that_fails_against_the_manual_is_tried_again_later() {
     world.board().receive(30, 1, &[0x4D]);
     world.until(100, |event| matches!(event, Event::Received(_)));
 }
+
+#[test]
+fn the_host_is_told_when_the_receive_queue_is_empty() {
+    let mut world = World::ready(Configuration::DEFAULT);
+    assert!(world.driver.receive_queue_is_empty());
+    // The board does not say that something has come: the host asks.
+    world.board().misbehaviour.no_flags = true;
+    for number in 0..3 {
+        world.board().receive(30, 1, &[number]);
+    }
+    world.driver.check_receive_queue();
+    assert!(!world.driver.receive_queue_is_empty());
+    let mut received = 0;
+    while !world.driver.receive_queue_is_empty() {
+        received += world.step().into_iter().filter(|event| matches!(event, Event::Received(_))).count();
+        assert!(world.now_ms < 5_000, "the queue is never empty");
+    }
+    assert_eq!(received, 3);
+}
+
+#[test]
+fn what_arrives_while_the_queue_is_found_empty_is_read_at_once() {
+    let mut world = World::ready(Configuration::DEFAULT);
+    world.board().misbehaviour.command_ms = Some(50);
+    world.driver.check_receive_queue();
+    world.run(49);
+    // The board has looked and says so in a moment; its flag comes before that.
+    world.board().receive(30, 1, &[7]);
+    let (after_ms, _) = world.until(500, |event| matches!(event, Event::Received(_)));
+    assert!(after_ms <= 110, "after {after_ms} ms");
+}
+
+#[test]
+fn a_board_in_the_time_of_a_busy_computer_gets_longer_for_everything() {
+    let options = Options {
+        start: Start::Running,
+        heartbeat_timeout_ms: 30_000,
+        ..Options::new(configuration(4, 0, 128))
+    };
+    let mut world = World::ready_with(options);
+    world.board().misbehaviour.command_ms = Some(29_000);
+    world.driver.transmit(transmission(Completion::Acknowledged)).expect("accepted");
+    let (_, events) = world.until(30_000, is_end_of_transmission);
+    assert_eq!(events, [Event::Sent(Ok(()))]);
+    world.driver.transmit(transmission(Completion::Reply { subfunction: 0x51 })).expect("accepted");
+    world.board().reply = Some(vec![1]);
+    // Before each of them the board may be looking into its receive queue.
+    world.until(60_000, |event| matches!(event, Event::Replied(Ok(_))));
+    world.board().receive(30, 1, &[7]);
+    world.until(60_000, |event| matches!(event, Event::Received(_)));
+
+    world.board().misbehaviour.command_ms = None;
+    world.board().misbehaviour.ignores_lockout = true;
+    world.run(100);
+    world.driver.set_global_data(&[1, 2, 3, 4]).expect("four bytes");
+    assert_eq!(world.run(29_000), []);
+    let (_, events) = world.until(2_000, |event| matches!(event, Event::Failed(_)));
+    assert_eq!(events, [Event::Failed(Failure::LockoutStuck)]);
+}

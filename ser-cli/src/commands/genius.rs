@@ -6,11 +6,11 @@ mod forces;
 mod globals;
 
 use clap::ValueEnum;
-use ser_client::BusDevice;
+use ser_client::GeniHost;
 use ser_proto::genius::{Device, ForceTable, GlobalData};
 
 use crate::cli::ConnectionArgs;
-use crate::error::Result;
+use crate::error::{Failure, Result};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -54,7 +54,7 @@ pub(crate) struct Args {
 enum What {
     /// List the devices that are logged in.
     Devices,
-    /// Show the live inputs of every recorder, all of one and the same bus scan.
+    /// Show the live inputs of every recorder, all of one and the same bus scan. The exit code is 1 when there is none.
     #[command(after_help = GLOBALS_EXAMPLES)]
     Globals {
         /// Go on and show every recorder again whose inputs have changed, until Ctrl-C.
@@ -73,8 +73,8 @@ enum What {
     },
     /// Tell all recorders something, and check by their last broadcast that each has received it.
     ///
-    /// A broadcast is not answered, so every recorder that is logged in is asked afterwards. The exit code is 1 when
-    /// one of them has not received it.
+    /// A broadcast is not answered, so every recorder that is logged in is asked before and afterwards. The exit code is
+    /// 0 when all of them are known to have received it, and 1 otherwise, also when there is none.
     #[command(after_help = BROADCAST_EXAMPLES)]
     Broadcast {
         #[command(subcommand)]
@@ -120,9 +120,13 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
 }
 
-/// The inputs of a recorder; `None` for other devices. A recorder shows itself by what it sends and takes in every
-/// scan: the state of its inputs, and nothing.
-fn recorder_inputs(device: &BusDevice) -> Option<GlobalData> {
-    let global = GlobalData::parse(&device.inputs).ok()?;
-    (device.device.output_len == 0).then_some(global)
+/// All recorders that are logged in, and what their inputs are.
+fn recorders(host: &GeniHost) -> Result<Vec<(u8, GlobalData)>> {
+    let devices = host.devices()?;
+    Ok(devices.iter().filter_map(|device| Some((device.number, device.recorder_inputs()?))).collect())
+}
+
+fn no_recorder() -> Failure {
+    Failure::new("no recorder is logged in")
+        .hint("ser-cli genius devices lists what is; check numbers and bus rate")
 }

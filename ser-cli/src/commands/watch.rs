@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use ser_client::{LogFollower, Unit, Unsolicited};
@@ -13,6 +14,7 @@ use crate::delivery::Outlet;
 use crate::error::{Failure, Result, inform};
 use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
+use crate::outage::Outage;
 use crate::output::Format;
 use crate::values;
 
@@ -26,7 +28,8 @@ Examples:
 First comes what has not been delivered yet (as read --new), then every event as it happens. The unit is told to \
 report by itself (auto report on RS-232); on the way out, also after Ctrl-C or an error, it gets back the setting \
 it had. Units that report to the Genius bus keep doing so and are asked every second instead, and so are original \
-units. Every now and then the log itself is looked at, so that a report lost on the line is an event late, not lost.";
+units. Every now and then the log itself is looked at, so that a report lost on the line is an event late, not lost.
+On a Genius bus a board or a unit that fails is waited for, a minute or as long as --timeout says.";
 
 /// How often the unit is asked when it does not report by itself.
 const POLL_EVERY: Duration = Duration::from_secs(1);
@@ -73,8 +76,9 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         None => Ok(()),
     };
     let follower = LogFollower::new(keeper.cursor(), plan.size);
-    let mut watch =
-        Watch { unit, follower, outlet: Outlet::endless(args.format), keeper, stop, interval: plan.interval };
+    let outlet = Outlet::endless(args.format);
+    let outage = Outage::new(connection::options(connection).timeout);
+    let mut watch = Watch { unit, follower, outlet, keeper, stop, interval: plan.interval, outage };
     let result = switched.map_err(Failure::from).and_then(|()| watch.run());
     let saved = watch.keeper.save();
     let restored = plan.restore.map_or(Ok(()), |found| restore(&mut watch.unit, found));
@@ -156,20 +160,39 @@ struct Watch {
     keeper: Keeper,
     stop: Arc<AtomicBool>,
     interval: Duration,
+    outage: Outage,
 }
 
 impl Watch {
-    /// Goes on until an interrupt or a failure.
+    /// Goes on until an interrupt, or a failure that does not pass.
     fn run(&mut self) -> Result<()> {
         self.read_new()?;
         self.outlet.finish()?;
         loop {
-            match self.wait()? {
-                Some(report) => self.take(&report)?,
-                None => self.read_new()?,
+            if let Err(failure) = self.look() {
+                self.outage.bear(failure, Instant::now())?;
+                self.come_back()?;
             }
             self.keeper.save_if_due()?;
         }
+    }
+
+    fn look(&mut self) -> Result<()> {
+        match self.wait()? {
+            Some(report) => self.take(&report),
+            None => self.read_new(),
+        }
+    }
+
+    /// Tries until the log can be read again, with all that has happened meanwhile.
+    fn come_back(&mut self) -> Result<()> {
+        while let Err(failure) = self.read_new() {
+            self.outage.bear(failure, Instant::now())?;
+            self.check_interrupt()?;
+            thread::sleep(HEARTBEAT);
+        }
+        self.outage.end();
+        Ok(())
     }
 
     /// Waits for a report, or for the time to look at the log.
@@ -190,8 +213,7 @@ impl Watch {
 
     fn take(&mut self, report: &ReadReply) -> Result<()> {
         let Some((deliveries, cursor)) = self.follower.continue_with(report) else {
-            // One reading answers all reports that are waiting.
-            while self.unit.wait_event(Duration::ZERO)?.is_some() {}
+            // One reading takes the place of all reports that are waiting.
             return self.read_new();
         };
         self.outlet.take(&deliveries, 0)?;

@@ -1,7 +1,7 @@
 //! A running `ser-cli`, for the tests that use it as a user does.
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread;
@@ -49,11 +49,20 @@ impl Running {
 
     /// The lines of standard output, as they come.
     pub(crate) fn lines(&mut self) -> Receiver<String> {
-        let output = BufReader::new(self.0.stdout.take().expect("piped"));
-        let (sender, lines) = channel();
-        thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
-        lines
+        lines_of(self.0.stdout.take().expect("piped"))
     }
+
+    /// The lines of standard error, as they come.
+    pub(crate) fn told(&mut self) -> Receiver<String> {
+        lines_of(self.0.stderr.take().expect("piped"))
+    }
+}
+
+fn lines_of(output: impl Read + Send + 'static) -> Receiver<String> {
+    let output = BufReader::new(output);
+    let (sender, lines) = channel();
+    thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+    lines
 }
 
 impl Drop for Running {

@@ -26,8 +26,10 @@ pub enum GeniusError {
     },
     /// The board did not deal with a datagram in time.
     BoardBusy,
-    /// A datagram did not get out.
+    /// A datagram to a device did not get through, or was not answered.
     Undelivered(CommandError),
+    /// A broadcast did not get out. Nobody acknowledges one: it is this host's own board that could not send it.
+    BroadcastFailed(CommandError),
     /// A device answers something that does not belong to the question.
     OddReply {
         /// The device.
@@ -38,6 +40,21 @@ pub enum GeniusError {
 }
 
 impl GeniusError {
+    /// Whether this may pass while one waits: the driver starts its board again and again, and devices come back.
+    #[must_use]
+    pub const fn may_pass(&self) -> bool {
+        match self {
+            GeniusError::BoardSilent
+            | GeniusError::BoardFailed(_)
+            | GeniusError::OffBus
+            | GeniusError::NotOnBus { .. }
+            | GeniusError::BoardBusy
+            | GeniusError::Undelivered(_)
+            | GeniusError::BroadcastFailed(_) => true,
+            GeniusError::OwnNumber { .. } | GeniusError::OddReply { .. } | GeniusError::Window(_) => false,
+        }
+    }
+
     /// What a person can try next.
     #[must_use]
     pub const fn hint(&self) -> &'static str {
@@ -54,7 +71,12 @@ impl GeniusError {
             GeniusError::NotOnBus { .. } => "check number and bus rate on the device's switches",
             GeniusError::OwnNumber { .. } => "name the number of the recorder, not that of the host",
             GeniusError::BoardBusy => "try again; does another program use the same window?",
-            GeniusError::Undelivered(_) => "check the bus cable; is the device still there?",
+            GeniusError::Undelivered(_) => {
+                "try again; if it persists, look for errors on the bus: cable, terminators, a number given twice"
+            }
+            GeniusError::BroadcastFailed(_) => {
+                "try again in a minute: after a start on a large bus the board is busy with itself for so long"
+            }
             GeniusError::OddReply { .. } => "does this kind of device know the question?",
             GeniusError::Window(_) => "is the file still there, and as long as it was?",
         }
@@ -71,6 +93,7 @@ impl fmt::Display for GeniusError {
             GeniusError::OwnNumber { node } => write!(f, "{node} is the number of this host's own board"),
             GeniusError::BoardBusy => f.write_str("the GENI board does not deal with the datagram"),
             GeniusError::Undelivered(error) => error.fmt(f),
+            GeniusError::BroadcastFailed(error) => write!(f, "the broadcast did not get out: {error}"),
             GeniusError::OddReply { node } => write!(f, "the reply of device {node} makes no sense"),
             GeniusError::Window(kind) => write!(f, "the window of the GENI board cannot be used: {kind}"),
         }

@@ -5,13 +5,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use geni::{
-    Completion, Configuration, Data, Destination, Device, Driver, Event, Failure, Identity,
-    MAX_DEVICE_NUMBER, Options, Priority, Received, SharedRam, Start, Status, TableError, Transmission,
-    TransmitError, map,
+    BlockKind, Completion, Configuration, Data, Destination, Device, DeviceChange, Driver, Event, Failure,
+    Identity, MAX_DEVICE_NUMBER, Options, Priority, Received, SharedRam, Start, Status, TableError,
+    Transmission, TransmitError, map,
 };
 use ser_proto::Command;
 use ser_proto::genius::{
-    Datagram, FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, IoForces, Message, SUBFUNCTION_SER, Subfunction,
+    Datagram, FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, GlobalData, IoForces, Message, SUBFUNCTION_SER,
+    Subfunction,
 };
 
 use super::inboxes::Inboxes;
@@ -32,13 +33,16 @@ const HANDOVER: Duration = Duration::from_millis(3);
 /// A board has its heartbeat five times a second. One that runs in the time of a busy computer gets longer.
 const HEARTBEAT_PATIENCE: Duration = Duration::from_secs(3);
 
-/// From the heartbeat to the bus: the board starts up, or has just been configured.
+/// From the heartbeat to the bus, at least: the board starts up, or has just been configured.
 const BUS_PATIENCE: Duration = Duration::from_secs(5);
 
 /// A device that is on the bus is logged in within a few scans, which are not longer than 400 ms.
 const LOG_IN_PATIENCE: Duration = Duration::from_secs(2);
 
-/// The driver ends every datagram before that.
+/// When nobody has logged in or out for so many scans, everybody who is there is known.
+const QUIET_SCANS: u32 = 10;
+
+/// The driver ends every datagram before that, unless it has to be more patient itself.
 const DATAGRAM_PATIENCE: Duration = Duration::from_secs(20);
 
 /// A device that is logged in.
@@ -52,6 +56,22 @@ pub struct BusDevice {
     pub inputs: Vec<u8>,
 }
 
+/// The model number of a GENI board, which is what the bus sees of a recorder. The manuals at hand do not print it; it
+/// is that of the simulated board, and blocks have others.
+const GENI_MODEL: u8 = 4;
+
+impl BusDevice {
+    /// The inputs of a recorder; `None` for other devices. A recorder is a GENI board that sends the state of its inputs
+    /// in every scan, and takes nothing.
+    #[must_use]
+    pub fn recorder_inputs(&self) -> Option<GlobalData> {
+        let sends_only =
+            self.device.output_len == 0 && matches!(self.device.kind, BlockKind::Inputs | BlockKind::Unknown);
+        let inputs = GlobalData::parse(&self.inputs).ok();
+        inputs.filter(|_| self.device.model == GENI_MODEL && sends_only)
+    }
+}
+
 /// A host on a Genius bus. Clones are the same host; each can be in another [`Unit`].
 #[derive(Clone)]
 pub struct GeniHost {
@@ -60,8 +80,8 @@ pub struct GeniHost {
 }
 
 impl GeniHost {
-    /// Opens a window, and waits until the board in it is on the bus. `patience` is how long the board may take to give
-    /// a sign of life; it gets at least three seconds.
+    /// Opens a window, and waits until the board in it is on the bus. `patience` is how long the board may stand still;
+    /// it gets at least three seconds. What recorders have sent while nobody had the window open is thrown away.
     ///
     /// # Errors
     /// When there is no such window, or the board does not come onto the bus.
@@ -81,7 +101,7 @@ impl GeniHost {
         let place = window.into();
         let patience = patience.max(HEARTBEAT_PATIENCE);
         let mut host = Host::new(Window::open(&place)?, Arc::clone(&clock), patience);
-        host.start().map_err(|error| OpenError::Genius { path: place.file, error })?;
+        host.begin().map_err(|error| OpenError::Genius { path: place.file, error })?;
         Ok(GeniHost { shared: Arc::new(Mutex::new(host)), clock })
     }
 
@@ -123,7 +143,8 @@ impl GeniHost {
         self.lock().find(node)
     }
 
-    /// All devices that are logged in, and what their inputs are in one and the same bus scan.
+    /// All devices that are logged in, and what their inputs are in one and the same bus scan. While devices come and
+    /// go, as when the bus has just been started, this waits until that is over, two seconds at most.
     ///
     /// # Errors
     /// When the board fails.
@@ -136,7 +157,10 @@ impl GeniHost {
     /// # Errors
     /// When it does not get out.
     pub fn broadcast(&self, command: &Command) -> Result<(), GeniusError> {
-        self.lock().deliver(ser_message(Destination::Broadcast, command)?)
+        self.lock().deliver(ser_message(Destination::Broadcast, command)?).map_err(|error| match error {
+            GeniusError::Undelivered(error) => GeniusError::BroadcastFailed(error),
+            other => other,
+        })
     }
 
     /// Asks a device for one of its force tables.
@@ -154,7 +178,8 @@ impl GeniHost {
         PACE + self.scan_time().unwrap_or_default() / 2 + HANDOVER
     }
 
-    /// Datagrams that were no message of a recorder to this host, and messages that nobody took in time.
+    /// Datagrams that were no message of a recorder to this host, and messages that nobody took in time. Among the
+    /// latter are those that were there before this host.
     #[must_use]
     pub fn lost(&self) -> (u64, u64) {
         self.lock().inboxes.lost()
@@ -170,6 +195,13 @@ impl GeniHost {
     /// Whether the datagram that was sent last is known not to have arrived.
     pub(crate) fn is_undelivered(&self) -> bool {
         matches!(self.lock().sent, Some(Err(_)))
+    }
+
+    /// What a recorder has sent before now. The board holds some of it back until it is asked, so a look will not do.
+    pub(crate) fn take_waiting(&self, node: u8) -> Result<Vec<Received>, GeniusError> {
+        let mut host = self.lock();
+        host.empty_receive_queue()?;
+        Ok(std::iter::from_fn(|| host.inboxes.take(node)).collect())
     }
 
     /// Waits for messages of a recorder.
@@ -226,6 +258,10 @@ fn bus_datagram(received: &Received, own_number: u8) -> Option<Datagram> {
     Datagram::new(source, own_number.into(), received.function, received.subfunction, &received.data).ok()
 }
 
+const fn bit(number: u8) -> u32 {
+    1 << (number & MAX_DEVICE_NUMBER)
+}
+
 /// The board, and what it has said.
 struct Host {
     driver: Driver<Window>,
@@ -237,6 +273,10 @@ struct Host {
     sent: Option<Result<(), geni::CommandError>>,
     replied: Option<Result<Received, geni::CommandError>>,
     tables: Option<Vec<BusDevice>>,
+    /// Who is logged in by the driver's word, a bit for each.
+    known: u32,
+    /// When that changed last.
+    devices_changed: Duration,
 }
 
 impl Host {
@@ -258,6 +298,8 @@ impl Host {
         };
         Host {
             driver: Driver::new(ram, options),
+            known: 0,
+            devices_changed: clock.now(),
             clock,
             patience,
             identity: None,
@@ -282,11 +324,35 @@ impl Host {
         if !self.wait(self.patience + PACE, |host| host.driver.is_ready())? {
             return Err(GeniusError::BoardSilent);
         }
-        if self.wait(BUS_PATIENCE, |host| host.scan_time().is_some())? {
+        if self.wait(BUS_PATIENCE.max(self.patience), |host| host.scan_time().is_some())? {
             Ok(())
         } else {
             Err(GeniusError::OffBus)
         }
+    }
+
+    /// The same for the first time. Auto reports may have come while no program ran, and the recorder's log may have
+    /// become another one since: they are neither news nor answers.
+    fn begin(&mut self) -> Result<(), GeniusError> {
+        self.start()?;
+        self.empty_receive_queue()?;
+        self.inboxes.throw_away();
+        Ok(())
+    }
+
+    /// Takes everything that the board has received so far.
+    fn empty_receive_queue(&mut self) -> Result<(), GeniusError> {
+        self.start()?;
+        self.driver.check_receive_queue();
+        match self.wait(self.datagram_patience(), |host| host.driver.receive_queue_is_empty())? {
+            true => Ok(()),
+            false => Err(GeniusError::BoardBusy),
+        }
+    }
+
+    /// The driver takes the patience once for the datagram before, once for this one, and knows within it.
+    fn datagram_patience(&self) -> Duration {
+        DATAGRAM_PATIENCE.max(self.patience.saturating_mul(2))
     }
 
     fn find(&mut self, node: u8) -> Result<Device, GeniusError> {
@@ -304,10 +370,24 @@ impl Host {
 
     fn devices(&mut self) -> Result<Vec<BusDevice>, GeniusError> {
         self.start()?;
-        self.tables = None;
-        self.driver.request_tables();
-        self.wait(DATAGRAM_PATIENCE, |host| host.tables.is_some())?;
-        self.tables.take().ok_or(GeniusError::BoardBusy)
+        let until = self.clock.now() + LOG_IN_PATIENCE;
+        loop {
+            let left = until.saturating_sub(self.clock.now());
+            self.wait(left, Host::knows_everybody)?;
+            self.tables = None;
+            self.driver.request_tables();
+            self.wait(self.datagram_patience(), |host| host.tables.is_some())?;
+            let devices = self.tables.take().ok_or(GeniusError::BoardBusy)?;
+            // Somebody may have come meanwhile, and others with him.
+            if self.knows_everybody() || left.is_zero() {
+                return Ok(devices);
+            }
+        }
+    }
+
+    fn knows_everybody(&self) -> bool {
+        let quiet = self.clock.now().saturating_sub(self.devices_changed);
+        self.scan_time().is_some_and(|scan| quiet >= scan * QUIET_SCANS)
     }
 
     fn read_forces(&mut self, node: u8, table: ForceTable) -> Result<IoForces, GeniusError> {
@@ -323,7 +403,7 @@ impl Host {
         };
         self.replied = None;
         self.transmit(question)?;
-        self.wait(DATAGRAM_PATIENCE, |host| host.replied.is_some())?;
+        self.wait(self.datagram_patience(), |host| host.replied.is_some())?;
         let received =
             self.replied.take().ok_or(GeniusError::BoardBusy)?.map_err(GeniusError::Undelivered)?;
         let datagram = bus_datagram(&received, self.number());
@@ -337,13 +417,13 @@ impl Host {
     fn deliver(&mut self, transmission: Transmission) -> Result<(), GeniusError> {
         self.start()?;
         self.transmit(transmission)?;
-        self.wait(DATAGRAM_PATIENCE, |host| host.sent.is_some())?;
+        self.wait(self.datagram_patience(), |host| host.sent.is_some())?;
         self.sent.take().ok_or(GeniusError::BoardBusy)?.map_err(GeniusError::Undelivered)
     }
 
     /// Hands a datagram to the board as soon as that is done with the last one.
     fn transmit(&mut self, transmission: Transmission) -> Result<(), GeniusError> {
-        if !self.wait(DATAGRAM_PATIENCE, |host| host.driver.can_transmit())? {
+        if !self.wait(self.datagram_patience(), |host| host.driver.can_transmit())? {
             return Err(GeniusError::BoardBusy);
         }
         self.sent = None;
@@ -387,7 +467,12 @@ impl Host {
 
     fn take(&mut self, event: Event) {
         match event {
-            Event::Ready(identity) => self.identity = Some(identity),
+            Event::Ready(identity) => {
+                self.identity = Some(identity);
+                self.know(0);
+            }
+            Event::Device { number, change: DeviceChange::LoggedOut } => self.know(self.known & !bit(number)),
+            Event::Device { number, .. } => self.know(self.known | bit(number)),
             Event::Failed(failure) => self.failure = Some(failure),
             Event::Received(received) => self.inboxes.put(received),
             Event::Sent(result) => self.sent = Some(result),
@@ -396,11 +481,15 @@ impl Host {
             // The driver remembers these, or has dealt with them.
             Event::Configured(_)
             | Event::StatusChanged(_)
-            | Event::Device { .. }
             | Event::Request(_)
             | Event::RequestRefused(_)
             | Event::OutputsSent => {}
         }
+    }
+
+    fn know(&mut self, devices: u32) {
+        self.known = devices;
+        self.devices_changed = self.clock.now();
     }
 
     fn read_tables(&mut self) -> Result<Vec<BusDevice>, TableError> {
@@ -408,6 +497,10 @@ impl Host {
         let numbers = (0..=MAX_DEVICE_NUMBER).filter(|&number| number != own_number);
         let present: Vec<_> =
             numbers.filter_map(|number| Some((number, self.driver.device(number).ok()?))).collect();
+        if present.iter().fold(0, |devices, (number, _)| devices | bit(*number)) != self.known {
+            // The driver is about to say who.
+            self.devices_changed = self.clock.now();
+        }
         let tables = self.driver.tables()?;
         let mut buffer = [0; 128];
         let read = present.into_iter().filter_map(|(number, device)| {

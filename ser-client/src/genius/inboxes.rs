@@ -38,6 +38,13 @@ impl Inboxes {
         self.boxes.get_mut(&node)?.pop_front()
     }
 
+    /// Empties all boxes.
+    pub(super) fn throw_away(&mut self) {
+        let thrown_away: usize = self.boxes.values().map(VecDeque::len).sum();
+        self.boxes.clear();
+        self.dropped += thrown_away as u64;
+    }
+
     /// Datagrams that were no message to this host, and messages that nobody took in time.
     pub(super) const fn lost(&self) -> (u64, u64) {
         (self.ignored, self.dropped)
@@ -74,5 +81,16 @@ mod tests {
             inboxes.put(received(5, false, SUBFUNCTION_SER, 0));
         }
         assert_eq!(inboxes.lost(), (0, 1));
+    }
+
+    #[test]
+    fn what_is_thrown_away_is_counted() {
+        let mut inboxes = Inboxes::default();
+        for source in [5, 5, 9] {
+            inboxes.put(received(source, false, SUBFUNCTION_SER, 0));
+        }
+        inboxes.throw_away();
+        assert!(inboxes.take(5).is_none() && inboxes.take(9).is_none());
+        assert_eq!(inboxes.lost(), (0, 3));
     }
 }

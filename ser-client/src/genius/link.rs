@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use geni::Received;
+
 use super::GeniHost;
 use crate::link::Link;
 use crate::{Attempt, Diagnosis, Session, TransportError};
@@ -12,6 +14,16 @@ pub(crate) struct GeniusLink {
     pub(crate) node: u8,
 }
 
+impl GeniusLink {
+    /// Gives the session its messages, which are so many bytes.
+    fn hand_over(&self, received: &[Received], session: &mut Session) -> usize {
+        for datagram in received {
+            session.process_body(self.now(), &datagram.data);
+        }
+        received.iter().map(|datagram| datagram.data.len()).sum()
+    }
+}
+
 impl Link for GeniusLink {
     fn send(&mut self, attempt: &Attempt<'_>) -> Result<(), TransportError> {
         Ok(self.host.send(self.node, attempt.command())?)
@@ -19,10 +31,13 @@ impl Link for GeniusLink {
 
     fn receive(&mut self, session: &mut Session, timeout: Duration) -> Result<usize, TransportError> {
         let received = self.host.receive(self.node, timeout)?;
-        for datagram in &received {
-            session.process_body(self.now(), &datagram.data);
-        }
-        Ok(received.iter().map(|datagram| datagram.data.len()).sum())
+        Ok(self.hand_over(&received, session))
+    }
+
+    fn receive_waiting(&mut self, session: &mut Session) -> Result<(), TransportError> {
+        let received = self.host.take_waiting(self.node)?;
+        self.hand_over(&received, session);
+        Ok(())
     }
 
     fn now(&self) -> Duration {

@@ -25,6 +25,28 @@ const SETTLING_MS: u64 = 500;
 
 type Order = Box<dyn FnOnce(&mut Bench) + Send>;
 
+/// A time in which nothing moves.
+#[derive(Clone, Copy)]
+pub(crate) struct Stall {
+    /// From now to its beginning.
+    pub(crate) in_ms: u64,
+    /// How long it lasts.
+    pub(crate) for_ms: u64,
+}
+
+impl Stall {
+    /// Whether this millisecond is one of them.
+    fn step(&mut self) -> bool {
+        if self.in_ms > 0 {
+            self.in_ms -= 1;
+            return false;
+        }
+        let stalls = self.for_ms > 0;
+        self.for_ms = self.for_ms.saturating_sub(1);
+        stalls
+    }
+}
+
 /// What is behind the window. It stays in the thread that made it.
 pub(crate) struct Bench {
     pub(crate) world: World,
@@ -33,11 +55,19 @@ pub(crate) struct Bench {
     pub(crate) in_reset: bool,
     /// A recorder that does nothing, while its board does.
     pub(crate) paused: Option<Recorder>,
+    /// Soon, nothing behind the window moves for a while, as on a computer that is busy with other things.
+    pub(crate) stall: Option<Stall>,
+    /// So long it has not moved in all.
+    stalled_ms: u64,
 }
 
 impl Bench {
     /// Lets a millisecond pass in which each side sees what the other has written before.
     fn step(&mut self) {
+        if self.stall.as_mut().is_some_and(Stall::step) {
+            self.stalled_ms += 1;
+            return;
+        }
         let board = self.world.host.board;
         let mut image = [0; RAM_LEN];
         // A file that is not whole any more tells nobody anything.
@@ -103,7 +133,9 @@ impl Desk {
         let recorders = recorders.to_vec();
         thread::spawn(move || {
             let world = World::with_noise(&recorders, noise);
-            let mut bench = Bench { world, window: window(&path), in_reset: false, paused: None };
+            let window = window(&path);
+            let mut bench =
+                Bench { world, window, in_reset: false, paused: None, stall: None, stalled_ms: 0 };
             bench.start();
             received.into_iter().for_each(|order| order(&mut bench));
         });
@@ -123,7 +155,16 @@ impl Desk {
 
     /// A host at any window, in the time of this desk.
     pub(crate) fn open(&self, window: GeniWindow) -> Result<GeniHost, OpenError> {
-        GeniHost::open_in(Arc::clone(&self.clock) as Arc<dyn Clock>, window, Duration::from_secs(1))
+        self.open_patiently(window, Duration::from_secs(1))
+    }
+
+    /// The same with more patience, or less.
+    pub(crate) fn open_patiently(
+        &self,
+        window: GeniWindow,
+        patience: Duration,
+    ) -> Result<GeniHost, OpenError> {
+        GeniHost::open_in(Arc::clone(&self.clock) as Arc<dyn Clock>, window, patience)
     }
 
     pub(crate) fn host(&self) -> GeniHost {
@@ -177,7 +218,7 @@ impl BenchTime {
         let (sender, done) = channel();
         let order: Order = Box::new(move |bench| {
             let result = order(bench);
-            sender.send((result, bench.world.now_ms)).expect("somebody waits");
+            sender.send((result, bench.world.now_ms + bench.stalled_ms)).expect("somebody waits");
         });
         self.orders.lock().unwrap_or_else(PoisonError::into_inner).send(order).expect("the bench is there");
         let (result, now_ms) = done.recv().expect("the bench is well");

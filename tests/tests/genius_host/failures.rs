@@ -1,13 +1,16 @@
 //! What a host is told when board, bus or recorder fail, and that it goes on where it was when they are back.
 
+use std::time::Duration;
+
 use ser_client::{
-    Cursor, Delivery, Diagnosis, GeniHost, GeniusError, OpenError, RequestError, TransportError, Unit,
+    Cursor, Delivery, Diagnosis, GeniHost, GeniusError, OpenError, Options, RequestError, TransportError,
+    Unit,
 };
 use ser_proto::genius::ForceTable;
 use ser_proto::{Command, Model};
 use ser_sim::genius::{DeviceFault, DeviceId, Fault, Noise};
 
-use crate::desk::{Bench, Desk, unit};
+use crate::desk::{Bench, Desk, Stall, unit};
 
 const NODE: u8 = 5;
 const EVENTS: u16 = 40;
@@ -201,6 +204,35 @@ fn a_board_that_fails_in_the_middle_of_a_command_is_the_reason_given() {
         }
         assert!(failed >= 5, "{fault:?} was noticed {failed} times");
     }
+}
+
+#[test]
+fn a_board_may_stand_still_for_as_long_as_the_host_is_patient() {
+    const STALL_MS: u64 = 9_000;
+    let desk = desk();
+    let patience = Duration::from_secs(10);
+    let patient = Options { timeout: Duration::from_secs(60), retries: 0 };
+    let host = desk.open_patiently(desk.window(), patience).unwrap_or_else(|error| panic!("{error}"));
+    let mut unit = host.unit(NODE, patient);
+    // In every part of an exchange: a look into the queue, a datagram, its reply; and of a lockout.
+    for after_ms in [0, 1, 2, 3, 5, 8, 13] {
+        stall(&desk, after_ms, STALL_MS);
+        unit.mode().unwrap_or_else(|error| panic!("after {after_ms} ms: {error}"));
+        desk.run(STALL_MS + 1_000);
+        stall(&desk, after_ms, STALL_MS);
+        assert_eq!(host.devices().map(|devices| devices.len()), Ok(2), "after {after_ms} ms");
+        desk.run(STALL_MS + 1_000);
+    }
+    drop((unit, host));
+
+    let host = desk.host();
+    stall(&desk, 0, STALL_MS);
+    assert_eq!(of_genius(host.unit(NODE, patient).mode()), GeniusError::BoardSilent);
+}
+
+/// All that is behind the window stands still, so long from now.
+fn stall(desk: &Desk, in_ms: u64, for_ms: u64) {
+    desk.with(move |bench| bench.stall = Some(Stall { in_ms, for_ms }));
 }
 
 #[test]

@@ -4,5 +4,6 @@
 
 mod desk;
 mod failures;
+mod stale;
 mod timing;
 mod windows;

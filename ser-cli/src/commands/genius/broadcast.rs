@@ -1,11 +1,12 @@
 //! `genius broadcast`: one command to all recorders, and whether each has received it.
 
+use std::fmt;
 use std::io::{self, Write};
 
 use ser_client::GeniHost;
 use ser_proto::{Command, LastBroadcast, TimeStamp};
 
-use super::recorder_inputs;
+use super::{no_recorder, recorders};
 use crate::cli::ConnectionArgs;
 use crate::connection;
 use crate::error::{Failure, Result, inform};
@@ -38,53 +39,30 @@ pub(super) fn run(connection: &ConnectionArgs, what: What) -> Result<()> {
             .hint("then add --yes"));
     }
     let host = connection::open_bus(connection)?;
-    let recorders: Vec<u8> = host
-        .devices()?
+    let nodes: Vec<u8> = recorders(&host)?.into_iter().map(|(node, _)| node).collect();
+    if nodes.is_empty() {
+        return Err(no_recorder());
+    }
+    let ask = || nodes.iter().map(|&node| last_broadcast(&host, node, connection)).collect::<Vec<_>>();
+    // The same command may have come before.
+    let before = ask();
+    let command = send(what, &host)?;
+    let checks: Vec<_> = nodes
         .iter()
-        .filter(|device| recorder_inputs(device).is_some())
-        .map(|device| device.number)
+        .zip(before)
+        .zip(ask())
+        .map(|((&node, before), after)| Check { node, heard: Heard::of(&command, &before, &after), after })
         .collect();
-    if recorders.is_empty() {
-        return Err(Failure::new("no recorder is logged in")
-            .hint("ser-cli genius devices lists what is; check numbers and bus rate"));
-    }
-    // The same broadcast may have come before: what tells the two apart is the time.
-    let before: Vec<_> = recorders.iter().map(|&node| last_broadcast(&host, node, connection)).collect();
-    let command = command(what, &host)?;
-    host.broadcast(&command)?;
-    if let Command::SetClock(time) = command {
-        inform(format_args!("sent {time}"));
-    }
     let mut out = io::stdout().lock();
-    writeln!(out, "node  received  last broadcast")?;
-    let mut missing = Vec::new();
-    for (&node, before) in recorders.iter().zip(before) {
-        let after = last_broadcast(&host, node, connection);
-        let received = has_received(
-            &command,
-            before.as_ref().ok().copied().flatten(),
-            after.as_ref().ok().copied().flatten(),
-        );
-        if !received {
-            missing.push(node.to_string());
-        }
-        let text = match after {
-            Ok(Some(last)) => last.to_string(),
-            Ok(None) => "none since power-up".to_string(),
-            Err(why) => why,
-        };
-        writeln!(out, "{node:>4}  {:<8}  {text}", if received { "yes" } else { "no" })?;
-    }
+    writeln!(out, "node  received   last broadcast")?;
+    checks.iter().try_for_each(|check| writeln!(out, "{check}"))?;
     out.flush()?;
-    if missing.is_empty() {
-        return Ok(());
-    }
-    Err(Failure::new(format!("not received, as far as is known, by {}", missing.join(", ")))
-        .hint("send it again; if it persists, look for bus errors and at the devices"))
+    conclude(&checks)
 }
 
-fn command(what: What, host: &GeniHost) -> Result<Command> {
-    Ok(match what {
+/// Sends the command, and says which time it has if it has one.
+fn send(what: What, host: &GeniHost) -> Result<Command> {
+    let command = match what {
         What::Clock { at: Some(time) } => Command::SetClock(time),
         What::Clock { at: None } => Command::SetClock(local_time_in(host.delay()).map_err(|year| {
             Failure::new(format!("a unit's clock runs from 1970 to 2069; this computer's says {year}"))
@@ -93,37 +71,156 @@ fn command(what: What, host: &GeniHost) -> Result<Command> {
         What::Start => Command::SetMode { recording: true },
         What::Stop => Command::SetMode { recording: false },
         What::Erase { .. } => Command::Erase,
-    })
+    };
+    host.broadcast(&command)?;
+    if let Command::SetClock(time) = command {
+        inform(format_args!("sent {time}"));
+    }
+    Ok(command)
 }
 
 /// What a recorder last received as a broadcast, or why that is not known.
-fn last_broadcast(
-    host: &GeniHost,
-    node: u8,
-    connection: &ConnectionArgs,
-) -> std::result::Result<Option<LastBroadcast>, String> {
+type Answer = std::result::Result<Option<LastBroadcast>, String>;
+
+fn last_broadcast(host: &GeniHost, node: u8, connection: &ConnectionArgs) -> Answer {
     host.unit(node, connection::options(connection)).last_broadcast().map_err(|error| error.to_string())
 }
 
-fn has_received(command: &Command, before: Option<LastBroadcast>, after: Option<LastBroadcast>) -> bool {
-    after.is_some_and(|last| last.code == command.code().byte()) && after != before
+/// Whether a recorder has heard a broadcast.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Heard {
+    Yes,
+    No,
+    /// It did not say what it heard, before or after, or had heard the very same before.
+    NotKnown,
+}
+
+impl Heard {
+    /// Judges by what the recorder heard last before it and after it.
+    fn of(command: &Command, before: &Answer, after: &Answer) -> Heard {
+        let Ok(after) = after else { return Heard::NotKnown };
+        let Some(last) = after.filter(|last| last.code == command.code().byte()) else { return Heard::No };
+        match before {
+            Err(_) => Heard::NotKnown,
+            Ok(before) if *before != Some(last) => Heard::Yes,
+            // It shows the time that was set, not the time at which it was: twice the same looks like once.
+            Ok(_) if matches!(command, Command::SetClock(_)) => Heard::NotKnown,
+            Ok(_) => Heard::No,
+        }
+    }
+}
+
+/// What became of the broadcast at one recorder: a row of the table.
+struct Check {
+    node: u8,
+    heard: Heard,
+    after: Answer,
+}
+
+impl fmt::Display for Check {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let heard = match self.heard {
+            Heard::Yes => "yes",
+            Heard::No => "no",
+            Heard::NotKnown => "not known",
+        };
+        write!(f, "{:>4}  {heard:<9}  ", self.node)?;
+        match &self.after {
+            Ok(Some(last)) => last.fmt(f)?,
+            Ok(None) => f.write_str("none since power-up")?,
+            Err(why) => return f.write_str(why),
+        }
+        if self.heard == Heard::NotKnown {
+            f.write_str(" (cannot be told from one before)")?;
+        }
+        Ok(())
+    }
+}
+
+/// A failure unless everybody is known to have heard it.
+fn conclude(checks: &[Check]) -> Result<()> {
+    let those = |heard: Heard| {
+        let nodes = checks.iter().filter(move |check| check.heard == heard);
+        nodes.map(|check| check.node.to_string()).collect::<Vec<_>>()
+    };
+    inform(format_args!("{} of {} recorders heard it", those(Heard::Yes).len(), checks.len()));
+    let (deaf, unknown) = (those(Heard::No).join(", "), those(Heard::NotKnown).join(", "));
+    let message = match (deaf.is_empty(), unknown.is_empty()) {
+        (true, true) => return Ok(()),
+        (false, true) => format!("not received by {deaf}"),
+        (true, false) => format!("not known whether it was received by {unknown}"),
+        (false, false) => {
+            format!("not received by {deaf}, and not known whether it was received by {unknown}")
+        }
+    };
+    Err(Failure::new(message).hint(
+        "send it again (a clock with another time); if it persists, look for bus errors and at the devices",
+    ))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const NOON: TimeStamp =
+        TimeStamp { year: 26, month: 11, day: 22, hour: 12, minute: 0, second: 0, millisecond: 0 };
+
+    fn last(code: u8, second: u8) -> Answer {
+        Ok(Some(LastBroadcast { code, hour: 12, minute: 0, second, millisecond: 0 }))
+    }
+
+    fn silent() -> Answer {
+        Err("no answer".to_string())
+    }
+
     #[test]
     fn only_a_new_broadcast_of_this_command_counts() {
-        let last = |code, second| Some(LastBroadcast { code, hour: 10, minute: 0, second, millisecond: 0 });
-        for (before, after, received) in [
-            (None, last(0x45, 1), true),
-            (last(0x45, 1), last(0x45, 2), true),
-            (last(0x45, 1), last(0x45, 1), false),
-            (None, last(0x53, 1), false),
-            (last(0x45, 1), None, false),
+        for (before, after, heard) in [
+            (Ok(None), last(0x45, 1), Heard::Yes),
+            (last(0x45, 1), last(0x45, 2), Heard::Yes),
+            (last(0x53, 1), last(0x45, 1), Heard::Yes),
+            (last(0x45, 1), last(0x45, 1), Heard::No),
+            (Ok(None), last(0x53, 1), Heard::No),
+            (last(0x45, 1), Ok(None), Heard::No),
+            (silent(), Ok(None), Heard::No),
         ] {
-            assert_eq!(has_received(&Command::Erase, before, after), received, "{before:?} {after:?}");
+            assert_eq!(Heard::of(&Command::Erase, &before, &after), heard, "{before:?} {after:?}");
         }
+    }
+
+    #[test]
+    fn without_an_answer_before_or_after_nothing_is_known() {
+        for (before, after) in
+            [(silent(), last(0x45, 1)), (last(0x45, 1), silent()), (silent(), silent()), (Ok(None), silent())]
+        {
+            assert_eq!(Heard::of(&Command::Erase, &before, &after), Heard::NotKnown, "{before:?} {after:?}");
+        }
+    }
+
+    #[test]
+    fn the_same_time_set_twice_cannot_be_told_from_once() {
+        let clock = Command::SetClock(NOON);
+        let code = clock.code().byte();
+        for (before, after, heard) in [
+            (last(code, 0), last(code, 0), Heard::NotKnown),
+            (last(code, 1), last(code, 0), Heard::Yes),
+            (last(0x45, 0), last(code, 0), Heard::Yes),
+            (last(code, 0), last(0x45, 0), Heard::No),
+        ] {
+            assert_eq!(Heard::of(&clock, &before, &after), heard, "{before:?} {after:?}");
+        }
+    }
+
+    #[test]
+    fn who_is_not_known_to_have_heard_is_named() {
+        let check = |node, heard| Check { node, heard, after: last(0x45, 1) };
+        assert!(conclude(&[check(5, Heard::Yes), check(9, Heard::Yes)]).is_ok());
+        let failure = conclude(&[check(5, Heard::No), check(7, Heard::Yes), check(9, Heard::NotKnown)]);
+        let text = failure.expect_err("two are missing").text();
+        assert!(
+            text.starts_with("not received by 5, and not known whether it was received by 9\n"),
+            "{text}"
+        );
+        assert!(check(9, Heard::NotKnown).to_string().starts_with("   9  not known  "));
     }
 }

@@ -5,7 +5,6 @@ use std::io::{self, Write};
 
 use ser_client::{BlockKind, BusDevice, GeniHost};
 
-use super::recorder_inputs;
 use crate::cli::ConnectionArgs;
 use crate::connection;
 use crate::error::{Result, advise, inform, warn};
@@ -55,7 +54,7 @@ impl fmt::Display for Row<'_> {
         };
         let (model, inputs, outputs) = (device.model, device.input_len, device.output_len);
         write!(f, "{number:>4}  {model:>5}  {inputs:>2}  {outputs:>3}  {reference:>9}  ")?;
-        match (recorder_inputs(self.0), device.kind) {
+        match (self.0.recorder_inputs(), device.kind) {
             (Some(global), _) => write!(f, "recorder, {} inputs", global.model.inputs()),
             (None, BlockKind::Unknown) => f.write_str("not told"),
             (None, BlockKind::Inputs) => f.write_str("inputs"),

@@ -2,18 +2,20 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ser_client::GeniHost;
 use ser_proto::genius::GlobalData;
 
-use super::recorder_inputs;
+use super::{no_recorder, recorders};
 use crate::cli::ConnectionArgs;
 use crate::connection;
 use crate::error::{Result, advise, inform};
 use crate::interrupt;
+use crate::outage::Outage;
 use crate::time::local_now;
 
 /// How often the bus is looked at.
@@ -26,15 +28,17 @@ pub(super) fn run(connection: &ConnectionArgs, follow: bool) -> Result<()> {
     let stop = if follow { Some(interrupt::catch()?) } else { None };
     let host = connection::open_bus(connection)?;
     let globals = look(&host)?;
-    if globals.is_empty() {
-        advise("no recorder is logged in; ser-cli genius devices lists what is");
-    }
     let mut out = io::stdout().lock();
     match stop {
         Some(stop) => {
+            if globals.is_empty() {
+                advise("no recorder is logged in yet; ser-cli genius devices lists what is");
+            }
             inform("the bus is followed until Ctrl-C");
-            follow_from(globals, &host, &stop, &mut out)
+            let outage = Outage::new(connection::options(connection).timeout);
+            Follow { host, stop, outage }.run(globals, &mut out)
         }
+        None if globals.is_empty() => Err(no_recorder()),
         None => {
             writeln!(out, "{HEADER}")?;
             globals.iter().try_for_each(|(&node, global)| writeln!(out, "{}", row(node, Some(global))))?;
@@ -44,25 +48,49 @@ pub(super) fn run(connection: &ConnectionArgs, follow: bool) -> Result<()> {
 }
 
 fn look(host: &GeniHost) -> Result<Globals> {
-    let devices = host.devices()?;
-    Ok(devices.iter().filter_map(|device| Some((device.number, recorder_inputs(device)?))).collect())
+    Ok(recorders(host)?.into_iter().collect())
 }
 
-/// Shows everything once, and then whoever differs from what was shown before.
-fn follow_from(mut now: Globals, host: &GeniHost, stop: &AtomicBool, out: &mut dyn Write) -> Result<()> {
-    writeln!(out, "{:<23}  {HEADER}", "time")?;
-    let mut shown = Globals::new();
-    while !stop.load(Ordering::Relaxed) {
-        let time = local_now();
-        for row in changes(&shown, &now) {
-            writeln!(out, "{time}  {row}")?;
+/// A bus that is followed.
+struct Follow {
+    host: GeniHost,
+    stop: Arc<AtomicBool>,
+    outage: Outage,
+}
+
+impl Follow {
+    /// Shows everything once, and then whoever differs from what was shown before.
+    fn run(&mut self, mut now: Globals, out: &mut dyn Write) -> Result<()> {
+        writeln!(out, "{:<23}  {HEADER}", "time")?;
+        let mut shown = Globals::new();
+        loop {
+            let time = local_now();
+            for row in changes(&shown, &now) {
+                writeln!(out, "{time}  {row}")?;
+            }
+            out.flush()?;
+            shown = now;
+            match self.next()? {
+                Some(next) => now = next,
+                None => return Ok(()),
+            }
         }
-        out.flush()?;
-        shown = now;
-        thread::sleep(LOOK_EVERY);
-        now = look(host)?;
     }
-    Ok(())
+
+    /// What the recorders say a moment later, or when what is wrong has passed; `None` at an interrupt.
+    fn next(&mut self) -> Result<Option<Globals>> {
+        while !self.stop.load(Ordering::Relaxed) {
+            thread::sleep(LOOK_EVERY);
+            match look(&self.host) {
+                Ok(globals) => {
+                    self.outage.end();
+                    return Ok(Some(globals));
+                }
+                Err(failure) => self.outage.bear(failure, Instant::now())?,
+            }
+        }
+        Ok(None)
+    }
 }
 
 fn changes(before: &Globals, now: &Globals) -> Vec<String> {
