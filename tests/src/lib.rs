@@ -1,6 +1,8 @@
 //! Helpers of the end-to-end tests, which live in `tests/`.
 
+pub mod fuzzing;
 pub mod genius_world;
 #[cfg(unix)]
 pub mod recorder;
+pub mod simulation;
 pub mod vectors;

@@ -1,0 +1,97 @@
+//! Files that a user writes: contact scenarios.
+
+use std::collections::BTreeSet;
+use std::io::{self, Read};
+
+use ser_proto::Model;
+use ser_sim::{Scenario, ScenarioError, ScenarioFault};
+
+/// What errors call the file.
+const NAME: &str = "contacts.csv";
+
+/// The nodes of the bus on which the file is tried, too.
+const NODES: [(u8, Model); 2] = [(5, Model::Ser160), (9, Model::Ser320)];
+
+/// The file is `data`. For both models, and for nodes on a bus:
+///
+/// - it is read or refused, however slowly it comes, always with the same result;
+/// - an error names the file and one of its lines;
+/// - steps are in order, of inputs that there are, none twice in a millisecond, and not more than there are lines;
+/// - steps that are written down again are read as the same steps.
+///
+/// # Panics
+/// When one of these does not hold.
+pub fn cli_files(data: &[u8]) {
+    for model in [Model::Ser160, Model::Ser320] {
+        let read = |source: &mut dyn Read| Scenario::from_csv(NAME, source, model);
+        if let Some(scenario) = check(data, &read) {
+            assert_in_order(&scenario, model);
+            let written = read(&mut csv(&scenario).as_bytes());
+            assert_eq!(written.map(|scenario| scenario.steps().to_vec()), Ok(scenario.steps().to_vec()));
+        }
+    }
+    let read = |source: &mut dyn Read| Scenario::from_csv_on_bus(NAME, source, &NODES);
+    if let Some(scenario) = check(data, &read) {
+        let mut steps = 0;
+        for (index, (node, model)) in NODES.into_iter().enumerate() {
+            let own = scenario.for_node(node, index == 0);
+            assert_in_order(&own, model);
+            steps += own.steps().len();
+        }
+        assert_eq!(steps, scenario.steps().len(), "each step belongs to one node");
+    }
+}
+
+type Reading<'a> = &'a dyn Fn(&mut dyn Read) -> Result<Scenario, ScenarioError>;
+
+fn check(data: &[u8], read: Reading<'_>) -> Option<Scenario> {
+    let lines = data.split(|&byte| byte == b'\n').count();
+    let result = read(&mut &data[..]);
+    assert_eq!(read(&mut Dribble { data }), result);
+    match result {
+        Ok(scenario) => {
+            assert!(scenario.steps().len() < lines.max(1));
+            Some(scenario)
+        }
+        Err(error) => {
+            assert_eq!(error.file, NAME);
+            // A header that is missing is missing behind the last line.
+            let places = lines as u64 + u64::from(error.reason == ScenarioFault::NoHeader);
+            assert!((1..=places).contains(&error.line), "line {} of {lines}", error.line);
+            assert!(error.to_string().starts_with(&format!("{NAME}, line {}: ", error.line)));
+            None
+        }
+    }
+}
+
+fn assert_in_order(scenario: &Scenario, model: Model) {
+    let steps = scenario.steps();
+    assert!(steps.is_sorted_by_key(|step| step.at_ms));
+    assert!(steps.iter().all(|step| (1..=model.inputs()).contains(&step.input)));
+    let moves: BTreeSet<_> = steps.iter().map(|step| (step.at_ms, step.input)).collect();
+    assert_eq!(moves.len(), steps.len(), "an input moves twice in a millisecond");
+    assert_eq!(scenario.duration_ms(), steps.last().map_or(0, |step| step.at_ms));
+}
+
+fn csv(scenario: &Scenario) -> String {
+    let mut text = String::from("ms,input,state\n");
+    for step in scenario.steps() {
+        text += &format!("{},{},{}\n", step.at_ms, step.input, u8::from(step.on));
+    }
+    text
+}
+
+/// Hands out a few bytes at a time.
+struct Dribble<'a> {
+    data: &'a [u8],
+}
+
+impl Read for Dribble<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.data.first().map_or(0, |&byte| 1 + usize::from(byte) % 5).min(self.data.len());
+        let (now, later) = self.data.split_at(count);
+        buffer[..count].copy_from_slice(now);
+        self.data = later;
+        Ok(count)
+    }
+}

@@ -1,0 +1,208 @@
+//! A unit that says anything.
+
+use std::time::Duration;
+
+use ser_client::{
+    Cursor, Delivery, LineRate, LogFollower, LogPosition, LogReader, MAX_LINE_LEN, RangeReader, Session,
+    Timing, Unsolicited,
+};
+use ser_proto::{Command, MAX_ENTRIES, ReadReply, Reply};
+
+use crate::fuzzing::framing::frame_of;
+use crate::fuzzing::script::Script;
+
+/// Messages that nobody asked for and that are kept.
+const MAX_KEPT: u32 = 4096;
+
+const TIMEOUT: Duration = Duration::from_millis(300);
+
+/// A session and readers that take whatever comes.
+struct Talk {
+    session: Session,
+    now: Duration,
+    asked: Option<Command>,
+    readers: Readers,
+}
+
+pub(super) fn talk(mut script: Script<'_>) {
+    let rate = match script.byte() {
+        0 => LineRate::Instant,
+        hundreds => LineRate::BitsPerSecond(u32::from(hundreds) * 100),
+    };
+    let timing = Timing { timeout: TIMEOUT, retries: script.byte().into(), line_rate: rate };
+    let readers = Readers::new(&mut script);
+    let mut talk = Talk { session: Session::new(timing), now: Duration::ZERO, asked: None, readers };
+    while !script.is_over() {
+        talk.act(&mut script);
+        talk.check();
+    }
+}
+
+impl Talk {
+    fn act(&mut self, script: &mut Script<'_>) {
+        match script.byte() % 8 {
+            0 => self.hear(script.run()),
+            1 => {
+                let len = usize::from(script.byte());
+                self.hear(&frame_of(script.take(len)));
+            }
+            2 => self.session.process_body(self.now, script.run()),
+            3 => self.ask(script),
+            4 => self.now += Duration::from_millis(script.word().into()),
+            5 => {
+                self.session.cancel(self.now);
+                self.asked = None;
+            }
+            6 => self.session.set_line_rate(LineRate::BitsPerSecond(script.word().into())),
+            _ => {
+                let body = script.run();
+                if let Ok(Reply::Read(reply)) = Reply::parse(body) {
+                    self.readers.take(reply);
+                }
+            }
+        }
+    }
+
+    fn hear(&mut self, bytes: &[u8]) {
+        self.session.process(self.now, bytes);
+    }
+
+    fn ask(&mut self, script: &mut Script<'_>) {
+        let Ok(command) = Command::parse(script.run()) else { return };
+        let is_free = self.asked.is_none();
+        let begun = match command {
+            Command::SetClock(_) => self.session.request_set_clock(),
+            command => self.session.request(command),
+        };
+        assert_eq!(begun.is_ok(), is_free, "one request at a time");
+        if is_free {
+            self.asked = Some(command);
+        }
+    }
+
+    /// Does what is due, and takes what there is.
+    fn check(&mut self) {
+        if let Some(attempt) = self.session.dispatch(self.now) {
+            assert!(self.asked.is_some());
+            assert_eq!(Some(attempt.command().code()), self.asked.map(|asked| asked.code()));
+            assert!(attempt.number() >= 1 && attempt.frame().len() >= 7);
+        }
+        match self.session.take_answer() {
+            Some(Ok(reply)) => {
+                let asked = self.asked.take().expect("a request");
+                assert_eq!(reply.code(), asked.code());
+                if let (Reply::Read(reply), Command::Read { start, count }) = (reply, asked) {
+                    assert_eq!(reply.start, start);
+                    assert!(reply.entries.len() <= usize::from(count));
+                    self.readers.take(reply);
+                }
+            }
+            Some(Err(no_reply)) => {
+                let asked = self.asked.take().expect("a request");
+                assert_eq!(no_reply.command, asked.code());
+                assert!(no_reply.attempts >= 1 && !no_reply.diagnosis.to_string().is_empty());
+            }
+            None => {}
+        }
+        assert_eq!(
+            self.session.poll_at().is_some(),
+            self.asked.is_some(),
+            "somebody waits for a request only"
+        );
+        self.take_unasked();
+    }
+
+    fn take_unasked(&mut self) {
+        for _ in 0..=MAX_KEPT {
+            match self.session.take_unsolicited() {
+                None => return,
+                Some(Unsolicited::Line(line)) => assert!(line.text.len() <= MAX_LINE_LEN),
+                Some(Unsolicited::Report(report)) => self.readers.take(report),
+            }
+        }
+        panic!("more than {MAX_KEPT} messages were kept");
+    }
+}
+
+/// Readers of a log of a size that may be right.
+struct Readers {
+    size: u16,
+    reader: LogReader,
+    range: RangeReader,
+    follower: LogFollower,
+}
+
+impl Readers {
+    fn new(script: &mut Script<'_>) -> Readers {
+        let size = script.word() % 2100;
+        let cursor = Cursor { total: script.word(), anchor: None };
+        let cursor = (script.byte() % 2 == 1).then_some(cursor);
+        let position = LogPosition { total: script.word(), next_slot: script.word() % 2048 };
+        Readers {
+            size,
+            reader: LogReader::new(cursor, size).starting_near(position),
+            range: RangeReader::new(script.word(), script.word(), size),
+            follower: LogFollower::new(cursor, size),
+        }
+    }
+
+    /// Takes a reply as it is, and as the answer to what was asked for.
+    fn take(&mut self, reply: ReadReply) {
+        self.follow(&reply);
+        let fitting = self.range.request().map_or(reply.start, |request| request.start);
+        self.take_range(&ReadReply { start: fitting, ..reply.clone() });
+        let fitting = self.reader.request().map_or(reply.start, |request| request.start);
+        self.take_new(&reply);
+        self.take_new(&ReadReply { start: fitting, ..reply });
+    }
+
+    fn take_new(&mut self, reply: &ReadReply) {
+        let before = self.reader.cursor();
+        let mut last = None;
+        let mut delivered = 0;
+        let result = self.reader.take(reply, &mut |delivery| {
+            if let Delivery::Event { entry_number, entry, .. } = delivery {
+                assert!((1..=self.size.clamp(1, 2048)).contains(&entry_number));
+                assert!(reply.entries.contains(&entry), "an event that nobody told of");
+                last = Some(entry);
+                delivered += 1;
+            }
+        });
+        assert!(delivered <= MAX_ENTRIES);
+        match self.reader.cursor() {
+            Some(cursor) if delivered > 0 => assert_eq!(cursor.anchor, last),
+            // An empty log is the only one in which a cursor can stand without an event.
+            cursor => assert!(cursor == before || cursor.is_some_and(|cursor| cursor.anchor.is_none())),
+        }
+        let summary = self.reader.summary();
+        assert!(
+            self.reader.pending() <= 2048
+                && u32::try_from(delivered).is_ok_and(|now| now <= summary.delivered)
+        );
+        if result.is_err() || self.reader.request().is_none() {
+            // As a program does: on from where this reading stopped.
+            self.reader = LogReader::new(self.reader.cursor(), self.size).starting_near(summary.position);
+        }
+    }
+
+    fn take_range(&mut self, reply: &ReadReply) {
+        let before = self.range.delivered();
+        let mut delivered = 0;
+        self.range.take(reply, &mut |_| delivered += 1);
+        assert_eq!(self.range.delivered(), before + delivered);
+        let _ = self.range.is_mixed();
+    }
+
+    fn follow(&mut self, report: &ReadReply) {
+        let before = self.follower.cursor();
+        match self.follower.continue_with(report) {
+            Some((deliveries, cursor)) => {
+                assert_eq!(self.follower.cursor(), Some(cursor));
+                assert!((1..=MAX_ENTRIES).contains(&deliveries.len()));
+                let moved = cursor.total.wrapping_sub(before.expect("a cursor to go on from").total);
+                assert_eq!(usize::from(moved), deliveries.len());
+            }
+            None => assert_eq!(self.follower.cursor(), before),
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! The host's side: a session and readers of the log, against a line that brings anything, and against a recorder that
+//! tells the truth over a line that does not always.
+
+mod anything;
+mod truth;
+mod truthful_unit;
+
+use super::script::Script;
+
+/// The first byte of `data` says which it is.
+///
+/// Against anything:
+/// - an answer belongs to the request; what nobody asked for is kept up to a limit; lines have an end;
+/// - readers take any reply to any request, and their cursors move as far as they deliver.
+///
+/// Against a recorder that tells the truth, on a line that loses, cuts and damages messages and brings some late:
+/// - no event is delivered twice, out of order, or other than it was;
+/// - while nobody erases the log, what is delivered and what is told to be lost are all events that there were.
+///
+/// # Panics
+/// When one of these does not hold.
+pub fn client(data: &[u8]) {
+    let mut script = Script::new(data);
+    if script.byte().is_multiple_of(2) {
+        anything::talk(script);
+    } else {
+        truth::follow(script);
+    }
+}

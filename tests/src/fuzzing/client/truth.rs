@@ -1,0 +1,264 @@
+//! Following a log over a line that loses, cuts and damages messages and brings some of them late.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use ser_client::{
+    Cursor, Delivery, Disturbed, LineRate, LogFollower, LogPosition, LogReader, Lost, Session, Timing,
+    Unsolicited,
+};
+use ser_proto::{Command, Decoded, FrameDecoder, Reply};
+
+use super::truthful_unit::{TruthfulUnit, number_of};
+use crate::fuzzing::framing::frame_of;
+use crate::fuzzing::script::Script;
+
+const TIMEOUT: Duration = Duration::from_millis(100);
+
+/// Attempts of one request.
+const RETRIES: u32 = 2;
+
+/// Readings that begin anew because the log was changed under them, in a row.
+const MAX_RESYNCS: u32 = 4;
+
+/// Messages are at most so late: a request may be repeated before the first answer has come.
+const LATEST: Duration = Duration::from_millis(150);
+
+/// Events between two readings of which the total can tell how many there were.
+const MAX_UNREAD: u32 = u16::MAX as u32;
+
+/// What has come to the host, in order.
+struct Received {
+    /// The event that must come next, unless some are lost.
+    next: u32,
+    /// Whether it must be exact how many are lost: nobody has erased the log, and the total has not gone round unseen.
+    exact: bool,
+    /// Whether the first reading has told how much it cannot know.
+    began: bool,
+}
+
+struct World {
+    unit: TruthfulUnit,
+    session: Session,
+    now: Duration,
+    /// What the unit has said and the line has not brought yet.
+    under_way: VecDeque<(Duration, Vec<u8>)>,
+    to_unit: FrameDecoder<16>,
+    received: Received,
+    size: u16,
+    cursor: Option<Cursor>,
+    position: Option<LogPosition>,
+    /// How many events had happened when the log was last read to its end.
+    read_to: u32,
+}
+
+pub(super) fn follow(mut script: Script<'_>) {
+    let size = [1, 2, 3, 7, 10, 11, 40, 300][usize::from(script.byte() % 8)];
+    let unit = TruthfulUnit::new(size, script.word());
+    let timing = Timing { timeout: TIMEOUT, retries: RETRIES, line_rate: LineRate::Instant };
+    let mut world = World {
+        unit,
+        session: Session::new(timing),
+        now: Duration::ZERO,
+        under_way: VecDeque::new(),
+        to_unit: FrameDecoder::new(),
+        received: Received { next: 0, exact: true, began: false },
+        size,
+        cursor: None,
+        position: None,
+        read_to: 0,
+    };
+    while !script.is_over() && world.unit.happened() < 200_000 {
+        match script.byte() % 8 {
+            0 => world.record(script.byte().into()),
+            1 => world.record(u32::from(script.word()) >> 6),
+            // Now and then enough to turn the total, which has 16 bits.
+            2 if script.byte() == 7 => world.record(0xFF00),
+            2 if script.byte().is_multiple_of(4) => world.erase(),
+            3 => world.report(&mut script),
+            _ => world.read_new(&mut script),
+        }
+    }
+    // On a line without faults the rest comes, too.
+    world.bring_all();
+    world.read_new(&mut Script::new(&[]));
+    world.received.assert_complete(&world.unit);
+}
+
+impl World {
+    fn record(&mut self, count: u32) {
+        self.unit.record(count);
+        self.received.exact &= self.unit.happened() - self.read_to <= MAX_UNREAD;
+    }
+
+    /// Somebody erases the log, when nothing is under way: what an older log said could be taken for news of the new one.
+    fn erase(&mut self) {
+        self.bring_all();
+        self.take_reports();
+        self.unit.erase();
+        self.received.exact = false;
+    }
+
+    /// Readings from the cursor on, until one comes to its end or the line is too bad.
+    fn read_new(&mut self, script: &mut Script<'_>) {
+        for _ in 0..=MAX_RESYNCS {
+            let mut reader = LogReader::new(self.cursor, self.size);
+            if let Some(position) = self.position.take() {
+                reader = reader.starting_near(position);
+            }
+            let end = self.read_once(&mut reader, script);
+            self.cursor = reader.cursor();
+            match end {
+                Some(Ok(())) => {
+                    self.position = Some(reader.summary().position);
+                    self.read_to = self.unit.happened();
+                    return;
+                }
+                None | Some(Err(Disturbed::NoProgress)) => return,
+                Some(Err(Disturbed::Changed | Disturbed::WrongSize)) => {}
+            }
+        }
+    }
+
+    /// One reading; `None` when there was no reply.
+    fn read_once(
+        &mut self,
+        reader: &mut LogReader,
+        script: &mut Script<'_>,
+    ) -> Option<Result<(), Disturbed>> {
+        while let Some(request) = reader.request() {
+            let Some(Reply::Read(reply)) = self.ask(request.into(), script) else { return None };
+            let received = &mut self.received;
+            if let Err(disturbed) = reader.take(&reply, &mut |delivery| received.take(delivery)) {
+                return Some(Err(disturbed));
+            }
+        }
+        Some(Ok(()))
+    }
+
+    /// A request over the line, with everything that may happen to it.
+    fn ask(&mut self, command: Command, script: &mut Script<'_>) -> Option<Reply> {
+        self.session.cancel(self.now);
+        self.session.request(command).expect("nothing else is under way");
+        loop {
+            let sent = self.session.dispatch(self.now).map(|attempt| attempt.frame().to_vec());
+            if let Some(frame) = sent {
+                self.arrive_at_unit(&frame, script);
+            }
+            self.bring();
+            match self.session.take_answer() {
+                Some(Ok(reply)) => return Some(reply),
+                Some(Err(_)) => return None,
+                None => {}
+            }
+            let due = self.under_way.front().map(|(at, _)| *at);
+            let next = due.into_iter().chain(self.session.poll_at()).min().expect("a request has a deadline");
+            self.now = self.now.max(next);
+        }
+    }
+
+    fn arrive_at_unit(&mut self, frame: &[u8], script: &mut Script<'_>) {
+        if script.byte() % 16 == 15 {
+            return;
+        }
+        for &byte in frame {
+            let command = match self.to_unit.push(byte) {
+                Some(Decoded::Frame(body)) => Command::parse(body).expect("a session sends commands"),
+                _ => continue,
+            };
+            // Events come meanwhile.
+            let meanwhile = script.byte();
+            self.record(if meanwhile < 0xE0 { 0 } else { u32::from(meanwhile - 0xE0) });
+            let reply = self.unit.answer(&command);
+            self.say(&frame_of(&reply.to_body()), script);
+        }
+    }
+
+    /// Lets the line do what it does to a message.
+    fn say(&mut self, frame: &[u8], script: &mut Script<'_>) {
+        let mut frame = frame.to_vec();
+        let delay = match script.byte() {
+            0..=0xBF => Duration::ZERO,
+            late => LATEST * u32::from(late - 0xC0) / 63,
+        };
+        let at = usize::from(script.byte()) * frame.len() / 256;
+        match script.byte() {
+            0xF8.. => frame.clear(),
+            0xF0.. => frame.truncate(at),
+            0xE8.. => frame.insert(at, b'~'),
+            0xE0.. => {
+                frame.splice(0..0, *b"\x1B12 noise\r\n");
+            }
+            // One wrong digit is always seen, except in the length.
+            0xD8.. if at > 2 => frame[at] = if frame[at] == b'7' { b'8' } else { b'7' },
+            0xD0.. if at > 0 => frame[at] = 0x80,
+            _ => {}
+        }
+        self.under_way.push_back((self.now + delay, frame));
+    }
+
+    /// The line brings what is due. A serial line keeps the order.
+    fn bring(&mut self) {
+        while self.under_way.front().is_some_and(|(at, _)| *at <= self.now)
+            && let Some((_, frame)) = self.under_way.pop_front()
+        {
+            self.session.process(self.now, &frame);
+        }
+    }
+
+    fn bring_all(&mut self) {
+        self.now += LATEST;
+        self.bring();
+    }
+
+    fn report(&mut self, script: &mut Script<'_>) {
+        if let Some(report) = self.unit.report(script.byte()) {
+            self.say(&frame_of(&Reply::Read(report).to_body()), script);
+            self.bring_all();
+            self.take_reports();
+        }
+    }
+
+    /// Takes events out of auto reports, between two readings.
+    fn take_reports(&mut self) {
+        while let Some(unasked) = self.session.take_unsolicited() {
+            let Unsolicited::Report(report) = unasked else { continue };
+            let mut follower = LogFollower::new(self.cursor, self.size).starting_near(self.position);
+            if let Some((deliveries, cursor)) = follower.continue_with(&report) {
+                deliveries.into_iter().for_each(|delivery| self.received.take(delivery));
+                self.cursor = Some(cursor);
+                self.position = follower.position();
+            }
+        }
+    }
+}
+
+impl Received {
+    fn take(&mut self, delivery: Delivery) {
+        match delivery {
+            Delivery::Event { entry, .. } => {
+                let number = number_of(&entry);
+                if self.exact {
+                    assert_eq!(number, self.next, "events are told to be lost");
+                } else {
+                    assert!(number >= self.next, "{number} after {}", self.next);
+                }
+                self.began = true;
+                self.next = number + 1;
+            }
+            Delivery::Lost(Lost::OverwrittenAtLeast { count }) => {
+                assert!(!self.exact || !self.began, "what was read once is known");
+                self.next += count;
+            }
+            Delivery::Lost(Lost::Overwritten { count }) if self.exact => self.next += count,
+            Delivery::Lost(Lost::LogRestarted) => assert!(!self.exact, "nobody has erased the log"),
+            Delivery::Lost(Lost::Overwritten { .. }) => {}
+        }
+    }
+
+    fn assert_complete(&self, unit: &TruthfulUnit) {
+        if self.exact {
+            assert_eq!(self.next, unit.happened(), "all that happened was delivered or told to be lost");
+        }
+    }
+}

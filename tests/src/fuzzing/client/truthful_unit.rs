@@ -1,0 +1,85 @@
+//! A recorder whose events can be told apart: each carries its running number.
+
+use ser_proto::{Command, Entry, Inputs, Model, ReadReply, Reply, TimeStamp};
+
+/// A log that remembers everything.
+pub(super) struct TruthfulUnit {
+    /// Running numbers of the events in their slots.
+    slots: Vec<u32>,
+    size: u16,
+    next_slot: usize,
+    total: u16,
+    happened: u32,
+}
+
+impl TruthfulUnit {
+    /// A unit with a log of `size` entries that has counted to `total` already.
+    pub(super) fn new(size: u16, total: u16) -> TruthfulUnit {
+        let mut unit = TruthfulUnit { slots: Vec::new(), size, next_slot: 0, total: 0, happened: 0 };
+        unit.record(total.into());
+        unit
+    }
+
+    pub(super) fn happened(&self) -> u32 {
+        self.happened
+    }
+
+    /// So many events happen.
+    pub(super) fn record(&mut self, count: u32) {
+        for _ in 0..count {
+            let number = self.happened;
+            match self.slots.get_mut(self.next_slot) {
+                Some(slot) => *slot = number,
+                None => self.slots.push(number),
+            }
+            self.next_slot = (self.next_slot + 1) % usize::from(self.size);
+            self.total = self.total.wrapping_add(1);
+            self.happened += 1;
+        }
+    }
+
+    pub(super) fn erase(&mut self) {
+        self.slots.clear();
+        (self.next_slot, self.total) = (0, 0);
+    }
+
+    pub(super) fn answer(&self, command: &Command) -> Reply {
+        match *command {
+            Command::Read { start, count } => Reply::Read(self.read(start, count)),
+            ref other => panic!("nobody asks {other:?} here"),
+        }
+    }
+
+    pub(super) fn read(&self, start: u16, count: u8) -> ReadReply {
+        let slot = usize::from(start).wrapping_sub(1);
+        let existing = self.slots.get(slot..).unwrap_or_default();
+        let entries: Vec<u32> = existing.iter().copied().take(usize::from(count).min(10)).collect();
+        ReadReply {
+            start,
+            total: self.total,
+            next_slot: u16::try_from(self.next_slot).expect("below the size"),
+            model: (!entries.is_empty()).then_some(Model::Ser320),
+            entries: entries.into_iter().map(entry).collect(),
+        }
+    }
+
+    /// An auto report of the newest events, as far as they do not go around the end of the ring.
+    pub(super) fn report(&self, count: u8) -> Option<ReadReply> {
+        let newest = self.next_slot.checked_sub(1).unwrap_or(usize::from(self.size) - 1);
+        let first = newest.saturating_sub(usize::from(count % 10));
+        let count = u8::try_from(newest - first + 1).expect("at most ten");
+        (newest < self.slots.len()).then(|| self.read(u16::try_from(first + 1).expect("an entry"), count))
+    }
+}
+
+/// The event with that running number.
+fn entry(number: u32) -> Entry {
+    let time = TimeStamp { year: 26, month: 1, day: 1, hour: 0, minute: 0, second: 0, millisecond: 0 };
+    Entry { changed: Inputs(1), state: Inputs(number), time }
+}
+
+/// The running number of an event.
+pub(super) fn number_of(event: &Entry) -> u32 {
+    assert_eq!(*event, entry(event.state.0), "an event that never was");
+    event.state.0
+}

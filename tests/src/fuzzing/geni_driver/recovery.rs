@@ -1,0 +1,129 @@
+//! After the hostility: a board that works, on a bus of its own.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use geni::{Completion, Configuration, Data, Destination, Event, Priority, Transmission};
+use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusRate, Handle};
+
+use super::bench::Bench;
+use super::ram::BoardHolder;
+
+/// A main loop that is in no hurry.
+const PACE_MS: u32 = 10;
+
+/// The longest pause between two attempts to start a board, all that a board may take before it counts as failed, and
+/// one start.
+const LIMIT_MS: u32 = 150_000;
+
+/// Whatever the driver still waits for from before the change is given up in this time.
+const SETTLED_MS: u32 = 5_500;
+
+/// Where the setup table and this host's global data are.
+const SETUP_TABLE: usize = 0x0882;
+const BROADCAST_OUTPUT: usize = 0x1F80;
+
+struct Recovery {
+    bench: Bench,
+    bus: Rc<RefCell<Bus>>,
+    board: Handle<Board>,
+    window: BoardWindow,
+}
+
+/// Checks that the driver brings a board onto the bus that takes the place of the hostile RAM now: one that has just been
+/// switched on or, if it is `warm`, one that has been running for a while.
+pub(super) fn assert_recovers(bench: Bench, warm: bool) {
+    let mut recovery = Recovery::begin(bench, warm);
+    recovery.settle();
+    let violations = recovery.violations();
+    recovery.assert_configured();
+    recovery.assert_sends();
+    recovery.assert_global_data();
+    assert_eq!(
+        recovery.violations(),
+        violations,
+        "{:?}",
+        recovery.bus.borrow().get(recovery.board).violations()
+    );
+}
+
+impl Recovery {
+    fn begin(bench: Bench, warm: bool) -> Recovery {
+        // The slowest bus has the fewest scans to go through.
+        let rate = BusRate::K38;
+        let bus = Rc::new(RefCell::new(Bus::new(rate)));
+        let board = bus.borrow_mut().connect(Board::new(BoardOptions::at(5).rate(rate)));
+        let window = BoardWindow::new(Rc::clone(&bus), board);
+        window.drive_reset(bench.driver.reset_held());
+        if warm {
+            bus.borrow_mut().advance_by(5_000_000);
+        }
+        bench.ram().board = Some(BoardHolder(window.clone()));
+        Recovery { bench, bus, board, window }
+    }
+
+    fn step(&mut self) -> Option<Event> {
+        self.bench.pass(PACE_MS);
+        if std::mem::take(&mut self.bench.was_refused) {
+            // The driver leaves it to its host to try again.
+            self.bench.configure(self.bench.wanted);
+        }
+        self.bus.borrow_mut().advance_by(u64::from(PACE_MS) * 1000);
+        let event = self.bench.poll_now();
+        self.window.drive_reset(self.bench.driver.reset_held());
+        event
+    }
+
+    /// Until the driver has been on the bus for a while.
+    fn settle(&mut self) {
+        let (mut waited_ms, mut settled_ms) = (0, 0);
+        while settled_ms < SETTLED_MS {
+            let failed = matches!(self.step(), Some(Event::Failed(_)));
+            let on_bus = self.bench.driver.status().is_some_and(|status| status.on_bus());
+            let ready = !failed && self.bench.driver.is_ready() && on_bus;
+            settled_ms = if ready { settled_ms + PACE_MS } else { 0 };
+            waited_ms += PACE_MS;
+            assert!(waited_ms < LIMIT_MS, "not on the bus again: {:?}", self.bench.driver);
+        }
+    }
+
+    fn ram(&self, start: usize, len: usize) -> Vec<u8> {
+        self.bus.borrow().get(self.board).ram()[start..start + len].to_vec()
+    }
+
+    fn violations(&self) -> usize {
+        self.bus.borrow().get(self.board).violations().len()
+    }
+
+    fn assert_configured(&self) {
+        let wanted: Configuration = self.bench.wanted;
+        assert_eq!(self.bench.driver.configuration(), wanted);
+        let [low, high] = wanted.reference().to_le_bytes();
+        let table = [low, high, wanted.broadcast_len(), wanted.directed_len(), wanted.buffer_len()];
+        assert_eq!(self.ram(SETUP_TABLE + 1, table.len()), table);
+        assert!(self.bus.borrow().get(self.board).is_on_bus());
+    }
+
+    fn assert_sends(&mut self) {
+        let transmission = Transmission {
+            destination: Destination::Device(9),
+            function: 0x40,
+            subfunction: 0x50,
+            priority: Priority::Normal,
+            completion: Completion::Taken,
+            data: Data::from_slice(b"L").expect("one byte fits"),
+        };
+        assert!(self.bench.driver.can_transmit());
+        self.bench.transmit(transmission);
+        assert!(self.bench.is_sending());
+        let sent = (0..1_000).find_map(|_| self.step().filter(|event| matches!(event, Event::Sent(_))));
+        assert_eq!(sent, Some(Event::Sent(Ok(()))));
+    }
+
+    fn assert_global_data(&mut self) {
+        let data = vec![0xA5; self.bench.wanted.broadcast_len().into()];
+        self.bench.set_global_data(&data);
+        (0..100).for_each(|_| drop(self.step()));
+        assert_eq!(self.ram(BROADCAST_OUTPUT, data.len()), data);
+    }
+}

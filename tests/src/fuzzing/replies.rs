@@ -1,0 +1,68 @@
+//! Replies: bodies that come from a recorder.
+
+use ser_proto::{MAX_BODY_LEN, MAX_ENTRIES, Reply};
+
+use super::body_rules::{Fault, Rules, above, assert_emitted, settings_fault, word};
+
+const RULES: Rules = Rules { has_length, fault };
+
+/// The body is `data`.
+///
+/// - It is understood, or refused with the very cause, as the tables of `docs/protocol.md` have it.
+/// - What was understood goes out in its canonical form, and means the same then.
+/// - The entries of a read reply are as many as it says, and of a model that has their size.
+///
+/// # Panics
+/// When one of these does not hold.
+pub fn replies(data: &[u8]) {
+    let parsed = Reply::parse(data);
+    RULES.assert_agree(data, &parsed);
+    let Ok(reply) = parsed else { return };
+    assert_eq!(reply.code().byte(), data[0]);
+    assert_emitted(reply.to_body(), &canonical(data));
+    if let Reply::Read(read) = &reply {
+        assert_eq!(read.entries.len(), usize::from(data[3]));
+        assert!(read.entries.len() <= MAX_ENTRIES && data.len() <= MAX_BODY_LEN);
+        assert_eq!(read.model.map(|model| model.read_reply_len(read.entries.len())).unwrap_or(8), data.len());
+    }
+    assert_eq!(Reply::parse(&reply.to_body()), Ok(reply));
+}
+
+fn has_length(code: u8, length: usize) -> bool {
+    match code {
+        b'C' | b'L' => length == 7,
+        b'E' | b'S' => length == 1,
+        b'M' => length == 3,
+        b'P' => [1, 3, 5].contains(&length),
+        // The entries are looked at when the header is in order.
+        b'R' => length >= 8,
+        _ => false,
+    }
+}
+
+fn fault(body: &[u8]) -> Fault {
+    match body {
+        [b'C', ..] => settings_fault(body)
+            .or((word(body, 1) == 0).then_some((1, 0)))
+            .or((body[3] == 0).then_some((3, 0))),
+        [b'L', ..] => {
+            let millisecond = word(body, 5);
+            above(body, 2, &[23, 59, 59]).or((millisecond > 999).then_some((5, millisecond)))
+        }
+        [b'M', ..] => above(body, 1, &[1]),
+        [b'R', ..] => {
+            let next_slot = word(body, 6);
+            above(body, 3, &[10]).or((next_slot > 2047).then_some((6, next_slot)))
+        }
+        _ => None,
+    }
+}
+
+/// Of several ways to say the same, the one that we use.
+fn canonical(body: &[u8]) -> Vec<u8> {
+    match *body {
+        [b'C', a, b, baud, 1, address, print] => vec![b'C', a, b, baud, 0, address, print],
+        [b'P', ..] => vec![b'P'],
+        _ => body.to_vec(),
+    }
+}

@@ -1,0 +1,270 @@
+//! What one reader was told, held against the ledger: each event once and in order, and each loss for what it was.
+
+use ser_client::{Delivery, Lost};
+use ser_proto::Entry;
+
+use super::ledger::{Erase, Ledger};
+
+/// The recorder's total counts modulo this, so that a reader may miss a multiple of it without a trace.
+const TOTAL_WRAPS_AT: usize = 65_536;
+
+/// A reader that events come too fast for gives up some of the oldest that are still there, by what came during its
+/// requests: so long they take, with repeats and where the line takes no time.
+const HASTE_MS: u64 = 10_000;
+
+/// What became of the events of a recorder, for one reader; each is in one of these.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Delivered, once and in order.
+    pub delivered: u64,
+    /// Reported as overwritten, with the right count.
+    pub overwritten: u64,
+    /// Went unread with an erase or the power, and that was reported.
+    pub gone: u64,
+    /// Recorded while this reader's port was not connected.
+    pub unwatched: u64,
+    /// Restarts of the log that were reported.
+    pub restarts: u64,
+    /// Restarts of the log that left no trace which a reader could have found.
+    pub traceless: u64,
+    /// Losses whose count was too low by a multiple of 65536.
+    pub wrapped: u64,
+}
+
+/// A reader's place in the ledger.
+#[derive(Clone, Debug)]
+pub struct Account {
+    name: &'static str,
+    life: u64,
+    /// Index of the next event to be delivered.
+    next: usize,
+    /// So many erases of this life, from the first one on, are behind the reader.
+    erases_behind: usize,
+    /// Whether the log began anew with the power and the reader has not got past that.
+    new_life: bool,
+    /// What was told and belongs before the next event.
+    restart_told: bool,
+    lost_told: usize,
+    haste_ms: u64,
+    tally: Tally,
+}
+
+impl Account {
+    /// A reader that has read nothing.
+    #[must_use]
+    pub fn new(name: &'static str) -> Account {
+        Account {
+            name,
+            life: 0,
+            next: 0,
+            erases_behind: 0,
+            new_life: true,
+            restart_told: false,
+            lost_told: 0,
+            haste_ms: HASTE_MS,
+            tally: Tally::default(),
+        }
+    }
+
+    /// Who it is.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// A request takes so much longer because of the line.
+    pub fn set_request_ms(&mut self, request_ms: u64) {
+        self.haste_ms = HASTE_MS + 4 * request_ms;
+    }
+
+    /// What became of all events up to the reader's place.
+    #[must_use]
+    pub fn tally(&self) -> Tally {
+        self.tally
+    }
+
+    /// The next event to be delivered, if the reader has read in this life.
+    #[must_use]
+    pub fn place(&self, ledger: &Ledger) -> Option<usize> {
+        (self.life == ledger.life()).then_some(self.next)
+    }
+
+    /// The power goes. What is unread is gone, with notice if this reader was connected.
+    pub fn power_goes(&mut self, ledger: &Ledger, connected: bool) {
+        let place = self.place(ledger).unwrap_or(0);
+        let unread = (ledger.len() - place) as u64;
+        *(if connected { &mut self.tally.gone } else { &mut self.tally.unwatched }) += unread;
+        self.life = ledger.life() + 1;
+        self.next = 0;
+        self.erases_behind = 0;
+        self.new_life = true;
+        self.lost_told = 0;
+    }
+
+    /// The reader is told something.
+    ///
+    /// # Errors
+    /// When that is not so.
+    pub fn take(&mut self, delivery: &Delivery, ledger: &Ledger) -> Result<(), String> {
+        self.life = ledger.life();
+        match *delivery {
+            Delivery::Event { entry, .. } => self.take_event(&entry, ledger),
+            Delivery::Lost(Lost::LogRestarted) => self.take_restart(ledger),
+            Delivery::Lost(lost) => {
+                self.lost_told += lost.known_count() as usize;
+                Ok(())
+            }
+        }
+    }
+
+    fn take_restart(&mut self, ledger: &Ledger) -> Result<(), String> {
+        if !self.new_life && !self.restart_told && self.erases_ahead(ledger).next().is_none() {
+            return Err(format!(
+                "{}: a restart of the log is reported after event {} of {} and there was none; erases: {:?}",
+                self.name,
+                self.next,
+                ledger.len(),
+                ledger.erases(),
+            ));
+        }
+        self.restart_told = true;
+        self.lost_told = 0;
+        Ok(())
+    }
+
+    /// Erases that the reader may not have got past: of some it is not known exactly where they were.
+    fn erases_ahead(&self, ledger: &Ledger) -> impl DoubleEndedIterator<Item = Erase> {
+        let next = self.next;
+        ledger.erases()[self.erases_behind..].iter().copied().filter(move |erase| erase.to >= next)
+    }
+
+    fn take_event(&mut self, entry: &Entry, ledger: &Ledger) -> Result<(), String> {
+        let lost = std::mem::take(&mut self.lost_told);
+        let is = |index: usize| ledger.event(index).is_some_and(|event| event.is(entry));
+        if !self.restart_told || self.new_life {
+            // The log goes on, or has just begun.
+            let straight = self.next + lost;
+            if let Some(wraps) = self.wraps_until(straight, ledger, is) {
+                return self.go_on(straight + wraps * TOTAL_WRAPS_AT, wraps, lost, ledger);
+            }
+        }
+        // Power-up is as good as an erase.
+        let power_up = self.new_life.then_some(Erase { from: 0, to: 0 });
+        let erases = self.erases_ahead(ledger).rev().chain(power_up);
+        let after_erase = { erases }.find_map(|erase| {
+            let last = erase.to.min(ledger.len());
+            let wraps = (ledger.len() - erase.from) / TOTAL_WRAPS_AT;
+            let exact = (0..=wraps).find_map(|wraps| {
+                let lost = lost + wraps * TOTAL_WRAPS_AT;
+                (erase.from + lost..=last + lost).find(|&index| is(index))
+            });
+            // Without a word of the restart, the count is that of totals that have nothing to do with each other.
+            exact.or_else(|| {
+                (!self.restart_told).then(|| (erase.from..ledger.len()).find(|&index| is(index)))?
+            })
+        });
+        match after_erase.filter(|&index| index >= self.next) {
+            Some(index) => {
+                self.restarted_at(index, lost, ledger);
+                Ok(())
+            }
+            None => Err(self.explain(entry, lost, ledger)),
+        }
+    }
+
+    /// How many times the total has wrapped unseen before the event at `index` or so many rings further on.
+    fn wraps_until(&self, index: usize, ledger: &Ledger, is: impl Fn(usize) -> bool) -> Option<usize> {
+        let wraps = ledger.len().saturating_sub(index) / TOTAL_WRAPS_AT;
+        (0..=wraps).find(|wraps| is(index + wraps * TOTAL_WRAPS_AT))
+    }
+
+    /// Delivers an event of the same log, after so many that were reported as lost.
+    fn go_on(&mut self, index: usize, wraps: usize, lost: usize, ledger: &Ledger) -> Result<(), String> {
+        let missing = index - self.next;
+        if missing > 0 {
+            let recent = ledger.len() - ledger.len_at(self.now_ms(ledger).saturating_sub(self.haste_ms));
+            let may_be_lost = ledger.overwritten_before() + 4 * recent;
+            if index > may_be_lost {
+                return Err(format!(
+                    "{}: {lost} events before number {index} are reported as lost and are still there",
+                    self.name
+                ));
+            }
+        }
+        self.tally.wrapped += u64::from(wraps > 0);
+        self.tally.overwritten += missing as u64;
+        self.deliver(index, ledger);
+        Ok(())
+    }
+
+    /// Delivers the first event after an erase.
+    fn restarted_at(&mut self, index: usize, lost: usize, ledger: &Ledger) {
+        let overwritten = if self.restart_told { lost.min(index - self.next) } else { 0 };
+        self.tally.overwritten += overwritten as u64;
+        self.tally.gone += (index - self.next - overwritten) as u64;
+        self.deliver(index, ledger);
+    }
+
+    fn deliver(&mut self, index: usize, ledger: &Ledger) {
+        let passed = self.erases_ahead(ledger).filter(|erase| erase.to <= index).count();
+        self.tally.traceless += passed.saturating_sub(self.restart_told.into()) as u64;
+        self.tally.restarts += u64::from(self.restart_told);
+        let rest = &ledger.erases()[self.erases_behind..];
+        self.erases_behind += rest.iter().take_while(|erase| erase.to <= index).count();
+        self.restart_told = false;
+        self.new_life = false;
+        self.tally.delivered += 1;
+        self.next = index + 1;
+    }
+
+    fn now_ms(&self, ledger: &Ledger) -> u64 {
+        ledger.len().checked_sub(1).and_then(|last| ledger.event(last)).map_or(0, |event| event.at_ms)
+    }
+
+    fn explain(&self, entry: &Entry, lost: usize, ledger: &Ledger) -> String {
+        let found =
+            (0..ledger.len()).rev().find(|&index| ledger.event(index).is_some_and(|event| event.is(entry)));
+        let what = match found {
+            Some(index) if index < self.next => format!("event {index} comes twice or too late"),
+            Some(index) => format!("event {index} comes too early"),
+            None => "this event has never been".to_owned(),
+        };
+        format!(
+            "{}: {what}: {entry:?}; after {lost} lost, event {} of {} was due: {:?}; restart told: {}, new life: {}, \
+             erases ahead: {:?}",
+            self.name,
+            self.next + lost,
+            ledger.len(),
+            ledger.event(self.next + lost),
+            self.restart_told,
+            self.new_life,
+            self.erases_ahead(ledger).collect::<Vec<_>>(),
+        )
+    }
+
+    /// Checks that a reader that has read to the end has been told of everything.
+    ///
+    /// # Errors
+    /// When it has not.
+    pub fn finish_reading(&mut self, ledger: &Ledger) -> Result<(), String> {
+        let len = ledger.len();
+        let place = self.place(ledger).unwrap_or(0);
+        if place == len {
+            return Ok(());
+        }
+        // An erase with nothing after it.
+        let emptied = self.erases_ahead(ledger).last().is_some_and(|erase| erase.to >= len);
+        if emptied {
+            self.life = ledger.life();
+            self.tally.gone += (len - place) as u64;
+            self.next = len;
+            return Ok(());
+        }
+        Err(format!(
+            "{}: events {place} to {len} have not been delivered; the last one: {:?}; erases ahead: {:?}",
+            self.name,
+            ledger.event(len - 1),
+            self.erases_ahead(ledger).collect::<Vec<_>>(),
+        ))
+    }
+}

@@ -1,0 +1,334 @@
+//! The Genius bus of one life: recorders and the host with their boards, other devices, and what goes wrong.
+//!
+//! A bus is lived through in full, event by event, as its devices have something to do in every scan.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+use std::time::Duration;
+
+use geni::{
+    Completion, Configuration, Data, Destination, Driver, Event, Options, Priority, Start, Transmission,
+};
+use ser_node::{GeniusOptions, GeniusPort};
+use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
+use ser_proto::{Command, Model, Reply};
+use ser_sim::SimNode;
+use ser_sim::genius::{
+    BlockKind, Board, BoardOptions, BoardWindow, Bus, BusRate, Circuits, DeviceFault, DeviceId,
+    DiscreteBlock, Fault, Handle, Noise, Traffic, ViolationKind,
+};
+
+use super::chance::Chance;
+use super::conversation::{Conversation, Order};
+use super::ledger::{Ledger, Port};
+use super::line_host::Errand;
+use super::orders::{self, Way};
+use super::taps::{BusTap, Expected, TappedWindow};
+use super::trail::Trail;
+
+/// Device numbers.
+pub(super) const HOST: u8 = 31;
+const DEAF: u8 = 20;
+const FIRST_UNIT: u8 = 5;
+
+/// Reset line at power-up, as short as the boards allow.
+const RESET: Start = Start::Reset { hold_ms: 20 };
+
+/// By then a recorder's board has sent a reply, or the reply has been given up.
+const REPLIED_WITHIN_MS: u64 = 20_000;
+
+/// A recorder's connection to the bus.
+struct UnitPort {
+    number: u8,
+    port: GeniusPort<TappedWindow>,
+    board: Handle<Board>,
+    tap: BusTap,
+    /// Whether its board has started anew without the recorder's doing, so that it was looked at too early.
+    restarted: bool,
+}
+
+/// The host's conversations, over all lives.
+pub struct BusHost {
+    /// One with each recorder.
+    pub talks: Vec<Conversation>,
+    next_order_ms: Vec<u64>,
+    next_broadcast_ms: u64,
+    outgoing: VecDeque<Transmission>,
+    chance: Chance,
+}
+
+impl BusHost {
+    /// A host that has not said anything yet to so many recorders.
+    #[must_use]
+    pub fn new(chance: Chance, units: usize) -> BusHost {
+        const NAMES: [&str; 2] = ["bus, first", "bus, second"];
+        let talk = |index: usize| Conversation::new(NAMES[index], ser_client::LineRate::Instant);
+        BusHost {
+            talks: (0..units).map(talk).collect(),
+            next_order_ms: vec![0; units],
+            next_broadcast_ms: 0,
+            outgoing: VecDeque::new(),
+            chance,
+        }
+    }
+
+    /// The bus is gone, and what was under way.
+    pub fn power_cycled(&mut self, now_ms: u64) {
+        self.outgoing.clear();
+        self.talks.iter_mut().for_each(|talk| talk.give_up(now_ms));
+    }
+
+    fn begin_next(&mut self, now_ms: u64, errand: Errand, trail: &Trail) {
+        for (index, talk) in self.talks.iter_mut().enumerate().filter(|(_, talk)| talk.is_resting()) {
+            let order = match errand {
+                Errand::CatchUp { since_ms } if talk.has_read_since(since_ms) => continue,
+                Errand::CatchUp { .. } => Order::Read,
+                Errand::Any if talk.is_behind() => Order::Read,
+                Errand::Any if now_ms >= self.next_order_ms[index] => {
+                    self.next_order_ms[index] = now_ms + self.chance.spread(1..=4_000);
+                    orders::next_order(&mut self.chance, Way::Bus)
+                }
+                Errand::Any => continue,
+            };
+            if !matches!(order, Order::Read) {
+                trail.note(format_args!("{}: {order:?}", talk.account().name()));
+            }
+            talk.begin(order, now_ms);
+        }
+        if errand == Errand::Any && now_ms >= self.next_broadcast_ms {
+            self.next_broadcast_ms = now_ms + self.chance.spread(1_000..=60_000);
+            let command = orders::next_broadcast(&mut self.chance);
+            trail.note(format_args!("broadcast: {command:?}"));
+            self.outgoing.push_back(message(Destination::Broadcast, &command));
+        }
+    }
+}
+
+fn message(destination: Destination, command: &Command) -> Transmission {
+    Transmission {
+        destination,
+        function: FUNCTION_HORNER,
+        subfunction: SUBFUNCTION_SER,
+        priority: Priority::Normal,
+        completion: Completion::Acknowledged,
+        // No command is longer than a datagram.
+        data: Data::from_slice(&command.to_body()).unwrap_or_default(),
+    }
+}
+
+/// How bad a bus is: good, or with up to a few per cent of all messages lost.
+pub fn any_noise(chance: &mut Chance) -> Noise {
+    let ppm = |chance: &mut Chance| chance.pick(&[0_u32, 0, 100, 5_000, 30_000]);
+    Noise {
+        seed: chance.below(u64::MAX),
+        damaged_ppm: ppm(chance),
+        lost_ppm: ppm(chance),
+        unacknowledged_ppm: ppm(chance),
+    }
+}
+
+/// The bus while everything on it has power.
+pub struct BusLife {
+    bus: Rc<RefCell<Bus>>,
+    units: Vec<UnitPort>,
+    driver: Driver<BoardWindow>,
+    host: Handle<Board>,
+    host_restarted: bool,
+    others: Vec<DeviceId>,
+    chance: Chance,
+    next_fault_ms: u64,
+    /// The first millisecond of its time.
+    begin_ms: u64,
+}
+
+impl BusLife {
+    /// Switches everything on.
+    #[must_use]
+    pub fn new(mut chance: Chance, models: &[Model], begin_ms: u64, noise: Noise) -> BusLife {
+        let bus = Rc::new(RefCell::new(Bus::with_noise(BusRate::default(), noise)));
+        let connect = |number| {
+            let board = bus.borrow_mut().connect(Board::new(BoardOptions::at(number)));
+            (board, BoardWindow::new(Rc::clone(&bus), board))
+        };
+        let units = models.iter().zip(FIRST_UNIT..).map(|(&model, number)| {
+            let (board, window) = connect(number);
+            let tap = BusTap::default();
+            let options = GeniusOptions { start: RESET, ..GeniusOptions::new(model) };
+            let port = GeniusPort::new(TappedWindow::new(window, Rc::clone(&tap)), options);
+            UnitPort { number, port, board, tap, restarted: false }
+        });
+        let units = units.collect();
+        let (host, window) = connect(HOST);
+        let driver = Driver::new(window, Options { start: RESET, ..Options::new(Configuration::DEFAULT) });
+        let deaf = bus.borrow_mut().connect(Board::powered(BoardOptions::at(DEAF))).id();
+        let block = DiscreteBlock::new(2, BusRate::default(), Circuits::Sixteen, BlockKind::Inputs);
+        let block = bus.borrow_mut().connect(block).id();
+        let next_fault_ms = begin_ms + chance.within(5_000..=60_000);
+        BusLife {
+            bus,
+            units,
+            driver,
+            host,
+            host_restarted: false,
+            others: vec![deaf, block],
+            chance,
+            next_fault_ms,
+            begin_ms,
+        }
+    }
+
+    /// What has happened on the bus.
+    #[must_use]
+    pub fn traffic(&self) -> Traffic {
+        self.bus.borrow().traffic()
+    }
+
+    /// Lets the bus live up to the present.
+    pub fn advance(&mut self, now_ms: u64) {
+        self.bus.borrow_mut().advance_to((now_ms - self.begin_ms) * 1000);
+    }
+
+    /// Lets the port of a recorder live, whose node has come to the present.
+    pub fn serve(
+        &mut self,
+        index: usize,
+        now_ms: u64,
+        node: &mut SimNode<'_>,
+        ledger: &mut Ledger,
+        expected: &mut Expected,
+    ) {
+        let UnitPort { port, tap, .. } = &mut self.units[index];
+        let overrun = node.diagnostics().commands_overrun;
+        node.serve(port);
+        let held = port.reset_held();
+        port.window().inner().drive_reset(held);
+        let refused = node.diagnostics().commands_overrun > overrun;
+        for taken in tap.borrow_mut().drain(..) {
+            match taken.received {
+                Err(error) => expected.parse_error(error),
+                Ok(_) if refused && !taken.broadcast => {}
+                Ok(Command::SetClock(time)) => ledger.set_clock(now_ms, time),
+                Ok(Command::SetMode { recording }) => ledger.set_recording(now_ms, recording),
+                Ok(command) if taken.broadcast => ledger.command_done(&command),
+                Ok(command) => ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS),
+            }
+        }
+    }
+
+    /// Lets the host look at its board and do what it wants to do now.
+    ///
+    /// # Errors
+    /// When a recorder's log is not what it must be.
+    pub fn act(
+        &mut self,
+        now_ms: u64,
+        errand: Errand,
+        host: &mut BusHost,
+        ledgers: &mut [&mut Ledger],
+        trail: &Trail,
+    ) -> Result<(), String> {
+        #[expect(clippy::cast_possible_truncation, reason = "the count wraps")]
+        let event = self.driver.poll(now_ms as u32);
+        if let Some(Event::Received(received)) = event
+            && (received.function, received.subfunction, received.broadcast)
+                == (FUNCTION_HORNER, SUBFUNCTION_SER, false)
+            && let Some(index) = self.units.iter().position(|unit| unit.number == received.source)
+        {
+            trail.mark(&received.data);
+            if let Ok(reply) = Reply::parse(&received.data) {
+                ledgers[index].replied(Port::Bus, &reply);
+            }
+            host.talks[index].session().process_body(Duration::from_millis(now_ms), &received.data);
+        }
+        let held = self.driver.reset_held();
+        self.driver.ram_mut().drive_reset(held);
+        host.begin_next(now_ms, errand, trail);
+        for (index, talk) in host.talks.iter_mut().enumerate() {
+            if let Some(outgoing) = talk.poll(now_ms, ledgers[index])? {
+                let number = self.units[index].number;
+                host.outgoing.push_back(message(Destination::Device(number), &outgoing.command));
+            }
+        }
+        if self.driver.can_transmit()
+            && let Some(next) = host.outgoing.pop_front()
+        {
+            // Who is not there does not answer, and is asked again.
+            let _ = self.driver.transmit(next);
+        }
+        Ok(())
+    }
+
+    /// Lets something go wrong, if it is time.
+    pub fn suffer(&mut self, now_ms: u64, trail: &Trail) {
+        if now_ms < self.next_fault_ms {
+            return;
+        }
+        self.next_fault_ms = now_ms + self.chance.spread(500..=60_000);
+        let fault = self.any_fault();
+        trail.note(format_args!("bus: {fault:?}"));
+        if let Fault::Inside { device, fault: DeviceFault::Reset } = fault {
+            self.host_restarted |= device == self.host.id();
+            for unit in &mut self.units {
+                unit.restarted |= device == unit.board.id();
+            }
+        }
+        self.bus.borrow_mut().inject(fault);
+    }
+
+    fn any_fault(&mut self) -> Fault {
+        let chance = &mut self.chance;
+        let boards: Vec<DeviceId> =
+            self.units.iter().map(|unit| unit.board.id()).chain([self.host.id()]).collect();
+        let everybody: Vec<DeviceId> = boards.iter().chain(&self.others).copied().collect();
+        let few = |chance: &mut Chance, most| u32::try_from(chance.spread(1..=most)).unwrap_or(1);
+        let inside = match chance.below(10) {
+            0 => return Fault::Damage { messages: few(chance, 50) },
+            1 => return Fault::Deafen { device: chance.pick(&boards), messages: few(chance, 300) },
+            2 => {
+                let for_us = chance.spread(1_000..=10_000_000);
+                return Fault::Disconnect { device: chance.pick(&everybody), for_us };
+            }
+            3 => {
+                // Somebody turns the switches of another device to a recorder's number, and back.
+                let number = chance.pick(&[FIRST_UNIT, DEAF]);
+                return Fault::Inside { device: self.others[0], fault: DeviceFault::ChangeAddress(number) };
+            }
+            4 => DeviceFault::Hang,
+            5 => DeviceFault::Reset,
+            6 => DeviceFault::FailSelfTest(1 << chance.below(4)),
+            7 => DeviceFault::FailNextStart(1 << chance.below(4)),
+            8 => DeviceFault::AnswerLate { by_us: chance.below(40_000) },
+            _ => DeviceFault::OutOfMemory { datagrams: few(chance, 10) },
+        };
+        Fault::Inside { device: chance.pick(&boards), fault: inside }
+    }
+
+    /// Nothing goes wrong from now on by anybody's doing.
+    pub fn mend(&mut self, trail: &Trail) {
+        trail.note("bus: mended");
+        let mut bus = self.bus.borrow_mut();
+        bus.inject(Fault::Inside { device: self.others[0], fault: DeviceFault::ChangeAddress(DEAF) });
+        for device in self.units.iter().map(|unit| unit.board.id()).chain([self.host.id()]) {
+            bus.inject(Fault::Inside { device, fault: DeviceFault::AnswerLate { by_us: 0 } });
+        }
+    }
+
+    /// Checks that all hosts have kept to the rules of their boards.
+    ///
+    /// # Errors
+    /// When one has not.
+    pub fn check(&self) -> Result<(), String> {
+        let bus = self.bus.borrow();
+        let boards = self.units.iter().map(|unit| (unit.number, unit.board, unit.restarted));
+        for (number, board, restarted) in boards.chain([(HOST, self.host, self.host_restarted)]) {
+            // Nobody tells a host that its board has started anew by itself: it finds out by looking.
+            let allowed = |kind| restarted && kind == ViolationKind::TooEarly;
+            let broken = bus.get(board).violations().iter().find(|violation| !allowed(violation.kind));
+            if let Some(violation) = broken {
+                return Err(format!("device {number} breaks a rule of its board: {violation}"));
+            }
+        }
+        Ok(())
+    }
+}

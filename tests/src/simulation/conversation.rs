@@ -1,0 +1,358 @@
+//! A host's conversation with one recorder: the client's own session and log reader, driven in virtual time.
+
+use std::time::Duration;
+
+use ser_client::{
+    Cursor, Disturbed, LineRate, LogFollower, LogPosition, LogReader, Session, Timing, Unsolicited,
+};
+use ser_proto::{Command, Configuration, ReadReply, Reply, TimeStamp};
+
+use super::account::Account;
+use super::ledger::Ledger;
+
+/// How often a reading begins anew because the log was changed under it, as the client has it.
+const MAX_RESYNCS: u32 = 4;
+
+/// What a host wants from a recorder.
+#[derive(Clone, Copy, Debug)]
+pub enum Order {
+    /// Everything that is new in the log.
+    Read,
+    /// The answer to a command.
+    Ask(Command),
+    /// The clock to be set, with a time of its own for every attempt: this much later than the first.
+    SetClock(TimeStamp),
+}
+
+/// What the host is about.
+enum Job {
+    Rest,
+    Read { reader: Box<LogReader>, resyncs: u32 },
+    LearnSize { resyncs: u32 },
+    Ask,
+    SetClock(TimeStamp),
+}
+
+/// What there was to be counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Talk {
+    /// Requests that were answered.
+    pub answered: u64,
+    /// Requests that were given up.
+    pub unanswered: u64,
+    /// Readings to the end of the log.
+    pub readings: u64,
+    /// Readings that met with a log that was erased or resized under them.
+    pub disturbed: u64,
+    /// Read replies that nobody was waiting for: auto reports, answers that came too late.
+    pub reports: u64,
+    /// Those of them that brought the very next events.
+    pub reports_followed: u64,
+    /// Lines of text.
+    pub lines: u64,
+}
+
+/// The conversation.
+pub struct Conversation {
+    session: Session,
+    job: Job,
+    cursor: Option<Cursor>,
+    position: Option<LogPosition>,
+    size: u16,
+    account: Account,
+    /// The settings in force, by the latest answer, until somebody asks.
+    in_force: Option<Configuration>,
+    /// Requests in a row that were not answered.
+    failures: u32,
+    /// When the latest order was given.
+    began_ms: u64,
+    /// Whether the latest reading came to the end of the log.
+    at_end: bool,
+    /// Whether a report has shown that there is more to read than it brought.
+    behind: bool,
+    talk: Talk,
+}
+
+/// A message that wants to go out.
+pub struct Outgoing {
+    /// For a bus.
+    pub command: Command,
+    /// For a line.
+    pub frame: Vec<u8>,
+}
+
+impl Conversation {
+    /// A host that has never talked to the recorder.
+    #[must_use]
+    pub fn new(name: &'static str, line_rate: LineRate) -> Conversation {
+        let timing = Timing { timeout: Duration::from_secs(1), retries: 2, line_rate };
+        Conversation {
+            session: Session::new(timing),
+            job: Job::Rest,
+            cursor: None,
+            position: None,
+            size: 2048,
+            account: Account::new(name),
+            in_force: None,
+            failures: 0,
+            began_ms: 0,
+            at_end: false,
+            behind: false,
+            talk: Talk::default(),
+        }
+    }
+
+    /// The session, where the line changes.
+    pub fn session(&mut self) -> &mut Session {
+        &mut self.session
+    }
+
+    /// What the reader was told.
+    #[must_use]
+    pub fn account(&self) -> &Account {
+        &self.account
+    }
+
+    /// The same, to be changed.
+    pub fn account_mut(&mut self) -> &mut Account {
+        &mut self.account
+    }
+
+    /// What there was to be counted.
+    #[must_use]
+    pub fn talk(&self) -> Talk {
+        self.talk
+    }
+
+    /// Whether nothing is under way.
+    #[must_use]
+    pub fn is_resting(&self) -> bool {
+        matches!(self.job, Job::Rest)
+    }
+
+    /// Requests in a row that were not answered.
+    #[must_use]
+    pub fn failures(&self) -> u32 {
+        self.failures
+    }
+
+    /// Whether there is something that a report could not bring.
+    #[must_use]
+    pub fn is_behind(&self) -> bool {
+        self.behind
+    }
+
+    /// The settings in force, if an answer has told them since this was last asked.
+    pub fn take_in_force(&mut self) -> Option<Configuration> {
+        self.in_force.take()
+    }
+
+    /// Whether the latest order was a reading that began at this time or later and came to the end of the log.
+    #[must_use]
+    pub fn has_read_since(&self, ms: u64) -> bool {
+        self.at_end && self.began_ms >= ms
+    }
+
+    /// Where the host is, for people.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let job = match &self.job {
+            Job::Rest => "resting",
+            Job::Read { .. } => "reading",
+            Job::LearnSize { .. } => "asking for the size",
+            Job::Ask => "asking",
+            Job::SetClock(_) => "setting the clock",
+        };
+        let Conversation { account, failures, size, cursor, talk, .. } = self;
+        let (name, cursor) = (account.name(), cursor.map(|cursor| cursor.total));
+        format!("{name} ({job}; {failures} failures, size {size}, total at cursor {cursor:?}, {talk:?})")
+    }
+
+    /// Begins something. The host must be resting.
+    pub fn begin(&mut self, order: Order, now_ms: u64) {
+        self.at_end = false;
+        self.began_ms = now_ms;
+        match order {
+            Order::Read => {
+                self.behind = false;
+                // Another host may have changed it, and a reading is only as good as the size that it goes by.
+                self.job = Job::LearnSize { resyncs: 0 };
+                self.request(Command::QueryConfiguration, now_ms);
+            }
+            Order::Ask(command) => {
+                self.job = Job::Ask;
+                self.request(command, now_ms);
+            }
+            Order::SetClock(time) => {
+                self.job = Job::SetClock(time);
+                self.session.cancel(duration(now_ms));
+                let _ = self.session.request_set_clock();
+            }
+        }
+    }
+
+    /// Forgets what is under way, as a program that is ended.
+    pub fn give_up(&mut self, now_ms: u64) {
+        self.session.cancel(duration(now_ms));
+        self.job = Job::Rest;
+    }
+
+    fn request(&mut self, command: Command, now_ms: u64) {
+        self.session.cancel(duration(now_ms));
+        // Nothing else is under way now.
+        let _ = self.session.request(command);
+    }
+
+    fn begin_reading(&mut self, resyncs: u32, now_ms: u64) {
+        let mut reader = LogReader::new(self.cursor, self.size);
+        if let Some(position) = self.position.take() {
+            reader = reader.starting_near(position);
+        }
+        self.go_on_reading(Box::new(reader), resyncs, now_ms);
+    }
+
+    fn go_on_reading(&mut self, reader: Box<LogReader>, resyncs: u32, now_ms: u64) {
+        match reader.request() {
+            Some(request) => {
+                self.job = Job::Read { reader, resyncs };
+                self.request(request.into(), now_ms);
+            }
+            None => {
+                self.position = Some(reader.summary().position);
+                self.at_end = true;
+                self.talk.readings += 1;
+                self.job = Job::Rest;
+            }
+        }
+    }
+
+    /// When there is something to be done, if nothing arrives before.
+    #[must_use]
+    pub fn wake_ms(&self) -> Option<u64> {
+        let at = self.session.poll_at()?;
+        Some(u64::try_from(at.as_nanos().div_ceil(1_000_000)).unwrap_or(u64::MAX))
+    }
+
+    /// Does what is due, and gives what wants to go out.
+    ///
+    /// # Errors
+    /// When the recorder's log is not what it must be.
+    pub fn poll(&mut self, now_ms: u64, ledger: &Ledger) -> Result<Option<Outgoing>, String> {
+        self.take_unsolicited(ledger)?;
+        loop {
+            if let Some(outgoing) = self.dispatch(now_ms) {
+                return Ok(Some(outgoing));
+            }
+            // The session may just have given the request up.
+            match self.session.take_answer() {
+                None => return Ok(None),
+                Some(Ok(reply)) => {
+                    self.failures = 0;
+                    self.talk.answered += 1;
+                    self.answered(&reply, now_ms, ledger)?;
+                }
+                Some(Err(_)) => self.unanswered(now_ms),
+            }
+        }
+    }
+
+    fn unanswered(&mut self, now_ms: u64) {
+        self.failures += 1;
+        self.talk.unanswered += 1;
+        match self.job {
+            // As an original unit, which does not know the question: the size stays what it was.
+            Job::LearnSize { resyncs } if resyncs > 0 => self.begin_reading(resyncs, now_ms),
+            _ => self.job = Job::Rest,
+        }
+    }
+
+    fn dispatch(&mut self, now_ms: u64) -> Option<Outgoing> {
+        let Job::SetClock(time) = self.job else {
+            let attempt = self.session.dispatch(duration(now_ms))?;
+            return Some(Outgoing { command: *attempt.command(), frame: attempt.frame().to_vec() });
+        };
+        let mut attempt = self.session.dispatch(duration(now_ms))?;
+        // Each attempt has a time of its own, so that one sees which of them it was.
+        let millisecond = (u32::from(time.millisecond) + attempt.number()) % 1000;
+        attempt.set_time(TimeStamp { millisecond: u16::try_from(millisecond).unwrap_or(0), ..time });
+        Some(Outgoing { command: *attempt.command(), frame: attempt.frame().to_vec() })
+    }
+
+    fn answered(&mut self, reply: &Reply, now_ms: u64, ledger: &Ledger) -> Result<(), String> {
+        if let Reply::Configuration(configuration) = reply {
+            self.size = configuration.size;
+            self.in_force = Some(*configuration);
+        }
+        match (std::mem::replace(&mut self.job, Job::Rest), reply) {
+            (Job::Read { reader, resyncs }, Reply::Read(reply)) => {
+                self.take_read(reader, resyncs, reply, now_ms, ledger)?;
+            }
+            (Job::LearnSize { resyncs }, _) => self.begin_reading(resyncs, now_ms),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn take_read(
+        &mut self,
+        mut reader: Box<LogReader>,
+        resyncs: u32,
+        reply: &ReadReply,
+        now_ms: u64,
+        ledger: &Ledger,
+    ) -> Result<(), String> {
+        let mut deliveries = Vec::new();
+        let taken = reader.take(reply, &mut |delivery| deliveries.push(delivery));
+        for delivery in &deliveries {
+            self.account.take(delivery, ledger)?;
+        }
+        self.cursor = reader.cursor();
+        match taken {
+            Ok(()) => self.go_on_reading(reader, resyncs, now_ms),
+            Err(Disturbed::Changed | Disturbed::WrongSize) if resyncs < MAX_RESYNCS => {
+                self.talk.disturbed += 1;
+                self.job = Job::LearnSize { resyncs: resyncs + 1 };
+                self.request(Command::QueryConfiguration, now_ms);
+            }
+            Err(_) => self.talk.disturbed += 1,
+        }
+        Ok(())
+    }
+
+    fn take_unsolicited(&mut self, ledger: &Ledger) -> Result<(), String> {
+        while let Some(message) = self.session.take_unsolicited() {
+            match message {
+                Unsolicited::Line(_) => self.talk.lines += 1,
+                Unsolicited::Report(report) => {
+                    self.talk.reports += 1;
+                    // Who is reading gets to these events anyway.
+                    if self.is_resting() {
+                        self.follow(&report, ledger)?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn follow(&mut self, report: &ReadReply, ledger: &Ledger) -> Result<(), String> {
+        let mut follower = LogFollower::new(self.cursor, self.size).starting_near(self.position);
+        let Some((deliveries, cursor)) = follower.continue_with(report) else {
+            self.behind = true;
+            return Ok(());
+        };
+        self.talk.reports_followed += 1;
+        for delivery in &deliveries {
+            self.account.take(delivery, ledger)?;
+        }
+        self.cursor = Some(cursor);
+        self.position = follower.position();
+        Ok(())
+    }
+}
+
+/// A moment in the time of the session.
+#[must_use]
+pub fn duration(now_ms: u64) -> Duration {
+    Duration::from_millis(now_ms)
+}

@@ -1,0 +1,412 @@
+//! What a recorder must have recorded, worked out from what was done to it and from nothing that it says.
+//!
+//! Every edge of every contact goes through here: filtered by debounce, stamped by the clock as it was set at that
+//! moment, recorded or not as the mode was. The result is a list of events that is never erased nor overwritten; erases
+//! are marks in it, between the events that they can have come between.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use chrono::NaiveDateTime;
+use ser_node::Debounce;
+use ser_node::capture::QUEUE_LEN;
+use ser_proto::{Command, Entry, MAX_SIZE, Reply, TimeStamp};
+
+use super::debounce_model::{Accepted, DebounceModel};
+
+/// A hundred years, 1970–2069: what two-digit years can tell apart.
+const CENTURY_MS: i64 = 36_525 * 86_400_000;
+
+/// An event that must be recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Recorded {
+    /// Its stamp, in milliseconds since 1970.
+    pub stamp_ms: i64,
+    /// The inputs that changed.
+    pub changed: u32,
+    /// The inputs that are on.
+    pub state: u32,
+    /// When it happened.
+    pub at_ms: u64,
+}
+
+impl Recorded {
+    /// Whether this is what an entry says.
+    #[must_use]
+    pub fn is(&self, entry: &Entry) -> bool {
+        (self.changed, self.state) == (entry.changed.0, entry.state.0)
+            && stamp_ms(entry.time) == Some(self.stamp_ms)
+    }
+}
+
+fn stamp_ms(time: TimeStamp) -> Option<i64> {
+    NaiveDateTime::try_from(time).ok().map(|time| time.and_utc().timestamp_millis())
+}
+
+/// What became of edges; each is in one of these.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Edges {
+    /// All that contacts did.
+    pub applied: u64,
+    /// In events.
+    pub recorded: u64,
+    /// While recording was stopped.
+    pub stopped: u64,
+    /// Too short for debounce.
+    pub filtered: u64,
+    /// Beyond the capture queue, while the main loop was held up.
+    pub queue_full: u64,
+    /// Not dealt with when the power was cut.
+    pub cut_off: u64,
+    /// Not dealt with yet.
+    pub undecided: u64,
+}
+
+/// An erase, between two events: `from` is the index of the first event that may be after it, `to` of the last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Erase {
+    /// The earliest it can have been.
+    pub from: usize,
+    /// The latest it can have been; grows until its reply has been seen.
+    pub to: usize,
+}
+
+/// The port that a command came by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Port {
+    /// RS-232.
+    Line,
+    /// Genius.
+    Bus,
+}
+
+/// A change of the log that has been asked for and of which it is not known yet when it is done.
+#[derive(Clone, Copy, Debug)]
+enum Due {
+    /// The erase of this number.
+    Erase(usize),
+    /// A configuration; `None` if it leaves the size alone.
+    Size(Option<u16>),
+}
+
+/// The books of one recorder, from power-up to power-up.
+#[derive(Clone, Debug)]
+pub struct Ledger {
+    mask: u32,
+    hold_ms: u64,
+    debounce: DebounceModel,
+    /// Accepted changes that an earlier one may still come before.
+    waiting: BTreeMap<u64, u32>,
+    /// Contacts, and inputs as the latest event has them.
+    contacts: u32,
+    state: u32,
+    /// From which millisecond on the clock shows that much more than the simulation's time.
+    clock: Vec<(u64, i64)>,
+    recording: Vec<(u64, bool)>,
+    events: VecDeque<Recorded>,
+    /// Events that nobody can be told any more, at the beginning of the list.
+    forgotten: usize,
+    erases: Vec<Erase>,
+    /// With the time by which it will have been done, or never will be.
+    due: VecDeque<(Port, u64, Due)>,
+    size: u16,
+    /// Events before this one can have been overwritten.
+    overwritten_before: usize,
+    life: u64,
+    edges: Edges,
+    /// In earlier lives.
+    filtered_before: u64,
+    accepted: Vec<Accepted>,
+}
+
+impl Ledger {
+    /// A recorder without power, whose contacts are open.
+    #[must_use]
+    pub fn new(mask: u32) -> Ledger {
+        Ledger {
+            mask,
+            hold_ms: 0,
+            debounce: DebounceModel::new(Debounce::OFF, 0),
+            waiting: BTreeMap::new(),
+            contacts: 0,
+            state: 0,
+            clock: Vec::new(),
+            recording: Vec::new(),
+            events: VecDeque::new(),
+            forgotten: 0,
+            erases: Vec::new(),
+            due: VecDeque::new(),
+            size: 0,
+            overwritten_before: 0,
+            life: 0,
+            edges: Edges::default(),
+            filtered_before: 0,
+            accepted: Vec::new(),
+        }
+    }
+
+    /// The power comes on; the clock shows this.
+    pub fn power_up(&mut self, now_ms: u64, time_ms: i64, size: u16, debounce: Debounce) {
+        self.edges.cut_off += self.undecided();
+        self.filtered_before += self.debounce.filtered();
+        self.hold_ms = debounce.longest_ms().into();
+        self.debounce = DebounceModel::new(debounce, self.contacts);
+        self.waiting.clear();
+        self.state = self.contacts & self.mask;
+        self.clock = vec![(0, time_ms - signed(now_ms))];
+        self.recording = vec![(0, true)];
+        self.events.clear();
+        self.forgotten = 0;
+        self.erases.clear();
+        self.due.clear();
+        self.size = size;
+        self.overwritten_before = 0;
+        self.life += 1;
+    }
+
+    /// The recorder has been on for that much longer, and its clock has gone on.
+    pub fn grow_older(&mut self, by_ms: u64) {
+        for (_, ahead_ms) in &mut self.clock {
+            *ahead_ms += signed(by_ms);
+        }
+    }
+
+    /// Edges that are not decided upon.
+    fn undecided(&self) -> u64 {
+        let waiting: u64 = self.waiting.values().map(|changed| u64::from(changed.count_ones())).sum();
+        waiting + self.debounce.unsettled()
+    }
+
+    /// Contacts move in this millisecond.
+    pub fn contacts_moved(&mut self, at_ms: u64, changed: u32) {
+        self.contacts ^= changed;
+        let changed = changed & self.mask;
+        self.edges.applied += u64::from(changed.count_ones());
+        let mut accepted = std::mem::take(&mut self.accepted);
+        self.debounce.change(at_ms, changed, &mut accepted);
+        self.take_accepted(&mut accepted);
+        self.accepted = accepted;
+    }
+
+    /// Contacts move, one move per millisecond, while the main loop is held up. For recorders without debounce.
+    pub fn contacts_moved_unseen(&mut self, moves: impl Iterator<Item = (u64, u32)>) {
+        for (count, (at_ms, changed)) in moves.enumerate() {
+            if count < QUEUE_LEN {
+                self.contacts_moved(at_ms, changed);
+                self.settle(at_ms);
+                continue;
+            }
+            // In effect, and in no event.
+            self.contacts ^= changed;
+            let changed = changed & self.mask;
+            self.state ^= changed;
+            self.debounce.follow(changed);
+            self.edges.applied += u64::from(changed.count_ones());
+            self.edges.queue_full += u64::from(changed.count_ones());
+        }
+    }
+
+    /// The sample of this millisecond has been taken.
+    pub fn settle(&mut self, now_ms: u64) {
+        let mut accepted = std::mem::take(&mut self.accepted);
+        self.debounce.settle(now_ms, &mut accepted);
+        self.take_accepted(&mut accepted);
+        self.accepted = accepted;
+        while let Some(first) =
+            self.waiting.first_entry().filter(|first| first.key() + self.hold_ms <= now_ms)
+        {
+            let (at_ms, changed) = first.remove_entry();
+            self.record(at_ms, changed);
+        }
+    }
+
+    fn take_accepted(&mut self, accepted: &mut Vec<Accepted>) {
+        for (bit, at_ms) in accepted.drain(..) {
+            *self.waiting.entry(at_ms).or_default() |= 1 << bit;
+        }
+    }
+
+    fn record(&mut self, at_ms: u64, changed: u32) {
+        self.state ^= changed;
+        let edges = u64::from(changed.count_ones());
+        if !in_force(&self.recording, at_ms) {
+            self.edges.stopped += edges;
+            return;
+        }
+        self.edges.recorded += edges;
+        let stamp_ms = (in_force(&self.clock, at_ms) + signed(at_ms)).rem_euclid(CENTURY_MS);
+        self.events.push_back(Recorded { stamp_ms, changed, state: self.state, at_ms });
+        self.note_overwritten();
+    }
+
+    /// What is in the smallest log that there may be now.
+    fn note_overwritten(&mut self) {
+        let size = usize::from(self.smallest_size());
+        self.overwritten_before = self.overwritten_before.max(self.len().saturating_sub(size));
+    }
+
+    /// The smallest size that the log can have.
+    #[must_use]
+    pub fn smallest_size(&self) -> u16 {
+        let sizes = self.due.iter().filter_map(|(_, _, due)| match due {
+            Due::Size(size) => *size,
+            Due::Erase(_) => None,
+        });
+        sizes.fold(self.size, u16::min)
+    }
+
+    /// The clock is set in this millisecond; samples after it have the new time.
+    pub fn set_clock(&mut self, now_ms: u64, time: TimeStamp) {
+        if let Some(time_ms) = stamp_ms(time) {
+            self.clock.push((now_ms, time_ms - signed(now_ms)));
+        }
+    }
+
+    /// Recording starts or stops in this millisecond, behind its sample.
+    pub fn set_recording(&mut self, now_ms: u64, recording: bool) {
+        self.recording.push((now_ms, recording));
+    }
+
+    /// The time that the clock shows.
+    #[must_use]
+    pub fn time_ms(&self, now_ms: u64) -> i64 {
+        let ahead_ms = self.clock.last().map_or(0, |&(_, ahead_ms)| ahead_ms);
+        (ahead_ms + signed(now_ms)).rem_euclid(CENTURY_MS)
+    }
+
+    /// A command has arrived that waits for its turn; what it changes is done by this time, or never.
+    pub fn command_arrived(&mut self, port: Port, command: &Command, until_ms: u64) {
+        match command {
+            Command::Erase => {
+                self.erases.push(Erase { from: self.len(), to: usize::MAX });
+                self.due.push_back((port, until_ms, Due::Erase(self.erases.len() - 1)));
+            }
+            Command::Configure(configure) => {
+                self.due.push_back((port, until_ms, Due::Size(configure.size)));
+                self.note_overwritten();
+            }
+            _ => {}
+        }
+    }
+
+    /// A command has arrived and been carried out at once.
+    pub fn command_done(&mut self, command: &Command) {
+        match command {
+            Command::Erase => self.erases.push(Erase { from: self.len(), to: self.len() }),
+            Command::Configure(configure) => {
+                self.size = configure.size.unwrap_or(self.size);
+                self.note_overwritten();
+            }
+            _ => {}
+        }
+    }
+
+    /// A reply has been seen.
+    pub fn replied(&mut self, port: Port, reply: &Reply) {
+        match reply {
+            Reply::Erased => self.finish(|of, _, due| of == port && matches!(due, Due::Erase(_))),
+            Reply::Configuration(configuration) => {
+                self.finish(|of, _, due| of == port && matches!(due, Due::Size(_)));
+                self.size = configuration.size;
+                self.note_overwritten();
+            }
+            _ => {}
+        }
+    }
+
+    /// What was to be done by now has been done, or never will be.
+    pub fn expire(&mut self, now_ms: u64) {
+        while self.due.iter().any(|&(_, until_ms, _)| until_ms <= now_ms) {
+            self.finish(|_, until_ms, _| until_ms <= now_ms);
+        }
+    }
+
+    /// The oldest of these has been done.
+    fn finish(&mut self, is: impl Fn(Port, u64, &Due) -> bool) {
+        let Some(index) = self.due.iter().position(|(of, until_ms, due)| is(*of, *until_ms, due)) else {
+            return;
+        };
+        match self.due.remove(index) {
+            Some((_, _, Due::Erase(number))) => self.erases[number].to = self.len(),
+            Some((_, _, Due::Size(Some(size)))) => {
+                // Which of the two it is, the next configuration tells.
+                self.size = self.size.min(size);
+            }
+            Some((_, _, Due::Size(None))) | None => {}
+        }
+        self.note_overwritten();
+    }
+
+    /// How many events there were since power-up.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.forgotten + self.events.len()
+    }
+
+    /// Whether there were none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The event of this index.
+    #[must_use]
+    pub fn event(&self, index: usize) -> Option<&Recorded> {
+        self.events.get(index.checked_sub(self.forgotten)?)
+    }
+
+    /// The events that are remembered, from the newest on.
+    pub fn latest(&self) -> impl Iterator<Item = &Recorded> {
+        self.events.iter().rev()
+    }
+
+    /// How many events there were up to this time, of those that are remembered.
+    #[must_use]
+    pub fn len_at(&self, at_ms: u64) -> usize {
+        self.forgotten + self.events.partition_point(|event| event.at_ms <= at_ms)
+    }
+
+    /// The erases since power-up.
+    #[must_use]
+    pub fn erases(&self) -> &[Erase] {
+        &self.erases
+    }
+
+    /// Events before this one can have been overwritten.
+    #[must_use]
+    pub fn overwritten_before(&self) -> usize {
+        self.overwritten_before
+    }
+
+    /// Which life this is, from 1.
+    #[must_use]
+    pub fn life(&self) -> u64 {
+        self.life
+    }
+
+    /// Forgets the events before this one that no log can hold any more.
+    pub fn forget_before(&mut self, index: usize) {
+        let held = self.len().saturating_sub(MAX_SIZE.into());
+        let count = index.min(held).saturating_sub(self.forgotten);
+        self.events.drain(..count);
+        self.forgotten += count;
+    }
+
+    /// What became of all edges.
+    #[must_use]
+    pub fn edges(&self) -> Edges {
+        let undecided = self.undecided();
+        // Where a contact has come back before its change was accepted, both its edges are nothing.
+        let filtered = self.debounce.filtered() + self.filtered_before;
+        Edges { filtered, undecided, ..self.edges }
+    }
+}
+
+/// What was set last before the sample of a millisecond was taken.
+fn in_force<T: Copy + Default>(settings: &[(u64, T)], at_ms: u64) -> T {
+    let before = settings.iter().rev().find(|(from_ms, _)| *from_ms < at_ms);
+    before.or(settings.first()).map_or(T::default(), |&(_, value)| value)
+}
+
+fn signed(ms: u64) -> i64 {
+    i64::try_from(ms).unwrap_or(i64::MAX)
+}

@@ -1,0 +1,110 @@
+//! What hosts want from recorders.
+
+use ser_proto::{AutoReport, Baud, Command, Configure, TimeStamp};
+
+use super::chance::Chance;
+use super::conversation::Order;
+
+/// Where reports can be sent on the bus: the host, a board that nobody looks after, and nobody.
+pub const ADDRESSES: [u8; 3] = [31, 20, 29];
+
+/// The way that orders go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// RS-232: its rate can be changed.
+    Line,
+    /// To one recorder on the bus.
+    Bus,
+}
+
+/// What a host asks for next. Most often it is the log.
+pub fn next_order(chance: &mut Chance, way: Way) -> Order {
+    match chance.below(100) {
+        0..60 => Order::Read,
+        60..67 => set_clock(chance),
+        67..77 => Order::Ask(Command::Configure(configure(chance, way))),
+        77..80 => Order::Ask(Command::Erase),
+        80..82 => Order::Ask(Command::SetMode { recording: false }),
+        82..90 => Order::Ask(Command::SetMode { recording: true }),
+        90..92 => Order::Ask(print(chance)),
+        92..94 => Order::Ask(Command::QueryConfiguration),
+        94..96 => Order::Ask(Command::LastBroadcast),
+        96..98 => Order::Ask(odd_read(chance)),
+        _ => Order::Ask(Command::QueryMode),
+    }
+}
+
+/// What is said to all recorders.
+pub fn next_broadcast(chance: &mut Chance) -> Command {
+    match chance.below(10) {
+        0..5 => Command::SetClock(valid_time(chance)),
+        5 => Command::Erase,
+        6 => Command::SetMode { recording: false },
+        7..9 => Command::SetMode { recording: true },
+        _ => Command::Configure(configure(chance, Way::Bus)),
+    }
+}
+
+fn set_clock(chance: &mut Chance) -> Order {
+    if chance.one_in(8) {
+        // There is no such day: refused by silence.
+        return Order::Ask(Command::SetClock(TimeStamp { month: 2, day: 30, ..valid_time(chance) }));
+    }
+    Order::SetClock(valid_time(chance))
+}
+
+/// Often a few seconds before midnight, before a New Year, a leap day or the end of the hundred years.
+fn valid_time(chance: &mut Chance) -> TimeStamp {
+    let eve =
+        |year, month, day| TimeStamp { year, month, day, hour: 23, minute: 59, second: 50, millisecond: 0 };
+    let time = match chance.below(6) {
+        0 => eve(26, 12, 31),
+        1 => eve(69, 12, 31),
+        2 => eve(28, 2, 28),
+        3 => eve(99, 12, 31),
+        _ => TimeStamp {
+            year: small(chance, 0, 99),
+            month: small(chance, 1, 12),
+            day: small(chance, 1, 28),
+            hour: small(chance, 0, 23),
+            minute: small(chance, 0, 59),
+            second: small(chance, 0, 49),
+            millisecond: 0,
+        },
+    };
+    let millisecond = u16::try_from(chance.below(1000)).unwrap_or(0);
+    TimeStamp { second: time.second + small(chance, 0, 9), millisecond, ..time }
+}
+
+fn small(chance: &mut Chance, from: u64, to: u64) -> u8 {
+    u8::try_from(chance.within(from..=to)).unwrap_or(0)
+}
+
+fn configure(chance: &mut Chance, way: Way) -> Configure {
+    // The slowest rates take minutes for what others do in seconds; a plant would not choose them either.
+    let rates = [Baud::B300, Baud::B1200, Baud::B2400, Baud::B4800, Baud::B9600, Baud::B9600, Baud::B19200];
+    let rate = chance.pick(&rates);
+    let size = match chance.below(8) {
+        0 => Some(u16::from(small(chance, 1, 40))),
+        1 | 2 => Some(u16::try_from(chance.within(41..=2048)).unwrap_or(2048)),
+        _ => None,
+    };
+    Configure {
+        size,
+        baud: (way == Way::Line && chance.one_in(3) || chance.one_in(40)).then_some(rate),
+        auto_report: chance.pick(&[AutoReport::Off, AutoReport::Genius, AutoReport::Rs232]),
+        report_address: chance.pick(&ADDRESSES),
+        auto_print: chance.one_in(4),
+    }
+}
+
+fn print(chance: &mut Chance) -> Command {
+    let start = u16::try_from(chance.spread(1..=2048)).unwrap_or(1);
+    Command::Print { start, count: u16::from(small(chance, 0, 60)) }
+}
+
+/// Outside of the log, or more than there can be.
+fn odd_read(chance: &mut Chance) -> Command {
+    let start = chance.pick(&[0, 1, 2047, 2048, 2049, u16::MAX]);
+    Command::Read { start, count: small(chance, 0, 255) }
+}

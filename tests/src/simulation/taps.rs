@@ -1,0 +1,200 @@
+//! What a recorder has been given: the bytes of its line, and the datagrams that it has taken from its board.
+//!
+//! The ledger lives on this. Each side is decoded here once more, next to the recorder and not by it.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use geni::{SharedRam, map};
+use ser_node::Diagnostics;
+use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
+use ser_proto::{Command, Decoded, FrameDecoder, FrameError, MAX_BODY_LEN, ParseError, Reply};
+use ser_sim::genius::BoardWindow;
+
+use super::ledger::Ledger;
+use super::printout::Printout;
+
+/// What a body says.
+pub type Received = Result<Command, ParseError>;
+
+/// Bytes of the longest command that a recorder has room for.
+const MAX_COMMAND_LEN: usize = 16;
+
+/// What the recorder must have counted by now. Some counts are least ones: see [`Expected::check`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Expected(pub Diagnostics);
+
+impl Expected {
+    fn frame_error(&mut self, cause: FrameError) {
+        let counts = &mut self.0;
+        *match cause {
+            FrameError::Interrupted | FrameError::Incomplete => &mut counts.frames_interrupted,
+            FrameError::NotHex { .. } => &mut counts.frames_not_hex,
+            FrameError::Checksum { .. } => &mut counts.frames_checksum,
+            FrameError::TooLong { .. } => &mut counts.frames_too_long,
+            FrameError::Empty => &mut counts.frames_empty,
+        } += 1;
+    }
+
+    /// A body that is no command.
+    pub fn parse_error(&mut self, error: ParseError) {
+        let counts = &mut self.0;
+        *match error {
+            ParseError::Empty => &mut counts.frames_empty,
+            ParseError::UnknownCode { .. } => &mut counts.commands_unknown,
+            ParseError::WrongLength { .. } | ParseError::EntrySize { .. } => {
+                &mut counts.commands_wrong_length
+            }
+            ParseError::BadValue { .. } => &mut counts.parameters_refused,
+        } += 1;
+    }
+
+    /// Checks what a recorder has counted.
+    ///
+    /// # Errors
+    /// The first difference.
+    pub fn check(&self, counted: &Diagnostics) -> Result<(), String> {
+        let expected = &self.0;
+        let exact = [
+            ("interrupted frames", expected.frames_interrupted, counted.frames_interrupted),
+            ("frames with a wrong digit", expected.frames_not_hex, counted.frames_not_hex),
+            ("frames with a wrong checksum", expected.frames_checksum, counted.frames_checksum),
+            ("frames too long", expected.frames_too_long, counted.frames_too_long),
+            ("empty frames", expected.frames_empty, counted.frames_empty),
+            ("line errors", expected.line_errors, counted.line_errors),
+            ("unknown commands", expected.commands_unknown, counted.commands_unknown),
+            ("commands of a wrong length", expected.commands_wrong_length, counted.commands_wrong_length),
+            ("lost edges", expected.edges_lost, counted.edges_lost),
+            ("missed samples", 0, counted.samples_missed),
+            ("storage errors", 0, counted.storage_errors),
+        ];
+        for (what, expected, counted) in exact {
+            if expected != counted {
+                return Err(format!("{expected} {what}, and the recorder has counted {counted}"));
+            }
+        }
+        // A read behind the end is refused too, and a print job that finds no place is one more overrun.
+        let least = [
+            ("refused parameters", expected.parameters_refused, counted.parameters_refused),
+            ("overruns", expected.commands_overrun, counted.commands_overrun),
+        ];
+        for (what, expected, counted) in least {
+            if expected > counted {
+                return Err(format!("at least {expected} {what}, and the recorder has counted {counted}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What goes into a recorder's RS-232 port, and what comes out.
+pub struct LineTap {
+    commands: FrameDecoder<MAX_COMMAND_LEN>,
+    replies: FrameDecoder<MAX_BODY_LEN>,
+    /// What comes out besides.
+    pub printout: Printout,
+}
+
+impl LineTap {
+    /// At power-up.
+    #[must_use]
+    pub fn new() -> LineTap {
+        LineTap { commands: FrameDecoder::new(), replies: FrameDecoder::new(), printout: Printout::default() }
+    }
+
+    /// A byte goes in. Gives the command that it completes, if the recorder has room for it.
+    pub fn goes_in(&mut self, byte: u8, has_room: bool, expected: &mut Expected) -> Option<Command> {
+        match self.commands.push(byte)? {
+            Decoded::Text(_) => None,
+            Decoded::Dropped(dropped) => {
+                expected.frame_error(dropped.cause);
+                None
+            }
+            Decoded::Frame(body) => match Command::parse(body) {
+                Ok(_) if !has_room => {
+                    expected.0.commands_overrun += 1;
+                    None
+                }
+                Ok(command) => Some(command),
+                Err(error) => {
+                    expected.parse_error(error);
+                    None
+                }
+            },
+        }
+    }
+
+    /// A byte comes out. Gives the reply that it completes.
+    ///
+    /// # Errors
+    /// When the recorder says what is no reply, or prints what is no event.
+    pub fn comes_out(&mut self, byte: u8, ledger: &Ledger) -> Result<Option<Reply>, String> {
+        match self.replies.push(byte) {
+            Some(Decoded::Frame(body)) => Reply::parse(body)
+                .map(Some)
+                .map_err(|error| format!("the recorder sends {body:02X?}: {error:?}")),
+            Some(Decoded::Dropped(dropped)) => Err(format!("the recorder sends a broken frame: {dropped:?}")),
+            Some(Decoded::Text(byte)) => self.printout.take(byte, ledger).map(|()| None),
+            None => Ok(None),
+        }
+    }
+}
+
+impl Default for LineTap {
+    fn default() -> LineTap {
+        LineTap::new()
+    }
+}
+
+/// A message for a recorder that it has taken from its board.
+#[derive(Clone, Copy, Debug)]
+pub struct Taken {
+    /// What it says.
+    pub received: Received,
+    /// Whether it was meant for all.
+    pub broadcast: bool,
+}
+
+/// Messages that have been taken and not been looked at.
+pub type BusTap = Rc<RefCell<Vec<Taken>>>;
+
+/// A board's window that tells what is taken through it.
+pub struct TappedWindow {
+    inner: BoardWindow,
+    tap: BusTap,
+}
+
+impl TappedWindow {
+    /// Tells `tap` what is taken through `inner`.
+    #[must_use]
+    pub fn new(inner: BoardWindow, tap: BusTap) -> TappedWindow {
+        TappedWindow { inner, tap }
+    }
+
+    /// The window itself.
+    #[must_use]
+    pub fn inner(&self) -> &BoardWindow {
+        &self.inner
+    }
+}
+
+impl SharedRam for TappedWindow {
+    fn read(&self, offset: u16) -> u8 {
+        self.inner.read(offset)
+    }
+
+    fn write(&mut self, offset: u16, byte: u8) {
+        self.inner.write(offset, byte);
+    }
+
+    fn read_bytes(&self, offset: u16, bytes: &mut [u8]) {
+        self.inner.read_bytes(offset, bytes);
+        let is_message = offset == map::READ_BUFFER.start
+            && self.inner.read(map::READ_FUNCTION) == FUNCTION_HORNER
+            && self.inner.read(map::READ_SUBFUNCTION) == SUBFUNCTION_SER;
+        if is_message {
+            let broadcast = self.inner.read(map::READ_DIRECTED) != 1;
+            self.tap.borrow_mut().push(Taken { received: Command::parse(bytes), broadcast });
+        }
+    }
+}

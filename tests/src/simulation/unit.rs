@@ -1,0 +1,129 @@
+//! One recorder with everything that outlives a power cut: its contacts, its books, what it keeps.
+
+use chrono::{DateTime, NaiveDateTime};
+use ser_node::{Debounce, Diagnostics, Rtc};
+use ser_proto::{MAX_SIZE, Model};
+use ser_sim::{LineRate, MemoryStorage, NonVolatile, SimNode, SimNodeOptions, SimRtc};
+
+use super::activity::{Activity, Tempo};
+use super::chance::Chance;
+use super::ledger::Ledger;
+use super::taps::Expected;
+
+/// 2000-01-01 00:00, where a recorder without a battery-backed clock begins.
+const NEVER_SET_MS: i64 = 946_684_800_000;
+
+/// 2026-11-22 10:00.
+const FIRST_DAY_MS: i64 = 1_795_341_600_000;
+
+/// A recorder with debounce holds a change back for so long at most, twice.
+pub const SETTLING_MS: u64 = 2 * 256;
+
+/// A recorder.
+pub struct Unit {
+    /// Which one.
+    pub model: Model,
+    /// Its debounce times, which are part of the image.
+    pub debounce: Debounce,
+    /// Its books.
+    pub ledger: Ledger,
+    /// What it must have counted.
+    pub expected: Expected,
+    /// Its contacts.
+    pub activity: Activity,
+    non_volatile: NonVolatile,
+    has_clock: bool,
+    /// Edges lost in earlier lives: the recorder's own count begins anew.
+    lost_before: u64,
+}
+
+impl Unit {
+    /// A recorder fresh from the factory.
+    #[must_use]
+    pub fn new(mut chance: Chance, model: Model) -> Unit {
+        let debounce = match chance.below(3) {
+            0 => Debounce::uniform(u8::try_from(chance.spread(1..=255)).unwrap_or(1)),
+            1 => (1..=32).fold(Debounce::OFF, |times, input| {
+                let time_ms = if chance.one_in(2) { 0 } else { chance.spread(1..=255) };
+                times.with(input, u8::try_from(time_ms).unwrap_or(0))
+            }),
+            _ => Debounce::OFF,
+        };
+        let has_clock = !chance.one_in(4);
+        let rtc = if has_clock { SimRtc::held_at(date_time(FIRST_DAY_MS)) } else { SimRtc::absent() };
+        Unit {
+            model,
+            debounce,
+            ledger: Ledger::new(model.mask()),
+            expected: Expected::default(),
+            activity: Activity::new(chance.branch(), model.inputs()),
+            non_volatile: NonVolatile { storage: MemoryStorage::default(), rtc },
+            has_clock,
+            lost_before: 0,
+        }
+    }
+
+    /// How its node is built.
+    #[must_use]
+    pub fn options(&self) -> SimNodeOptions {
+        SimNodeOptions {
+            model: self.model,
+            debounce: self.debounce,
+            line_rate: LineRate::Real,
+            non_volatile: self.non_volatile.clone(),
+        }
+    }
+
+    /// The power will come on after so long: the battery-backed clock has gone on.
+    pub fn power_comes_on(&mut self, now_ms: u64, off_ms: u64) {
+        let first = self.ledger.life() == 0;
+        let shows_ms = if first { FIRST_DAY_MS } else { self.ledger.time_ms(now_ms) };
+        let shows_ms = shows_ms.saturating_add_unsigned(off_ms);
+        let (time_ms, size) = match (self.has_clock, first) {
+            (true, true) => (shows_ms, MAX_SIZE),
+            (true, false) => (shows_ms, self.ledger.smallest_size()),
+            (false, true) => (NEVER_SET_MS, MAX_SIZE),
+            (false, false) => (NEVER_SET_MS, self.ledger.smallest_size()),
+        };
+        if self.has_clock {
+            self.non_volatile.rtc.write(date_time(time_ms));
+        }
+        self.ledger.power_up(now_ms, time_ms, size, self.debounce);
+        self.expected = Expected::default();
+        self.lost_before = self.ledger.edges().queue_full;
+    }
+
+    /// The node has come to the present: takes down what its contacts have done on the way.
+    pub fn follow(&mut self, node: &mut SimNode<'_>, now_ms: u64, held_up: bool) {
+        let moves = node.take_played();
+        let moves = moves.iter().map(|played| (played.start_ms + played.at_ms, played.changed.0));
+        if held_up && self.debounce == Debounce::OFF {
+            self.ledger.contacts_moved_unseen(moves);
+        } else {
+            moves.for_each(|(at_ms, changed)| self.ledger.contacts_moved(at_ms, changed));
+        }
+        self.ledger.settle(now_ms);
+        self.ledger.expire(now_ms);
+    }
+
+    /// Lets contacts begin what they do next, if it is time.
+    pub fn play(&mut self, node: &mut SimNode<'_>, now_ms: u64, tempo: Tempo) {
+        if now_ms >= self.activity.next_ms() {
+            node.play(&self.activity.next_scene(now_ms, tempo));
+        }
+    }
+
+    /// Checks what the recorder has counted since power-up.
+    ///
+    /// # Errors
+    /// When it is not what it must be.
+    pub fn check(&mut self, counted: &Diagnostics) -> Result<(), String> {
+        let lost = self.ledger.edges().queue_full - self.lost_before;
+        self.expected.0.edges_lost = u32::try_from(lost).unwrap_or(u32::MAX);
+        self.expected.check(counted)
+    }
+}
+
+fn date_time(ms: i64) -> NaiveDateTime {
+    DateTime::from_timestamp_millis(ms).unwrap_or_default().naive_utc()
+}

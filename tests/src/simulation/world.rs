@@ -1,0 +1,391 @@
+//! Recorders, hosts, lines and bus in one virtual time, life after life: a life is what lies between power-up and power cut.
+
+use ser_node::Debounce;
+use ser_proto::{AutoReport, Baud, Command, Configure, Model};
+use ser_sim::genius::Noise;
+use ser_sim::{PoweredOff, Ram, SimNode};
+
+use super::activity::Tempo;
+use super::bus::{BusHost, BusLife, HOST, any_noise};
+use super::chance::Chance;
+use super::conversation::{Conversation, Order};
+use super::line_host::{Errand, LineHost};
+use super::report::{Hours, Report};
+use super::trail::Trail;
+use super::unit::{SETTLING_MS, Unit};
+
+/// Readers are at the end of the log by then, even at the lowest rate.
+const CATCH_UP_MS: u64 = 8 * 3_600_000;
+
+/// Everything that a recorder can do unasked, at the highest rate.
+const PRINT_AND_REPORT: Configure = Configure {
+    size: None,
+    baud: Some(Baud::B19200),
+    auto_report: AutoReport::Genius,
+    report_address: HOST,
+    auto_print: true,
+};
+
+/// The tick wraps here.
+const TICKS: u64 = 1 << 32;
+
+/// Events that all readers are past are forgotten this often.
+const FORGET_EVERY: u64 = 1 << 14;
+
+/// What a run is like.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Everything follows from this.
+    pub seed: u64,
+    /// How long it lasts, in virtual time; the last life is lived to its end.
+    pub duration_ms: u64,
+    /// One life in so many is on a bus.
+    pub bus_one_in: u64,
+}
+
+/// Everything that outlives a power cut.
+pub struct World {
+    options: Options,
+    chance: Chance,
+    trail: Trail,
+    units: Vec<Unit>,
+    line: LineHost,
+    bus_host: BusHost,
+    now_ms: u64,
+    hours: Hours,
+    /// Events of all earlier lives, per unit.
+    recorded: Vec<u64>,
+}
+
+/// Everything that is under power.
+struct Life<'r> {
+    nodes: Vec<SimNode<'r>>,
+    bus: Option<BusLife>,
+    tempo: Tempo,
+    next_fault_ms: u64,
+    end_ms: u64,
+}
+
+impl World {
+    /// A cabinet that has never been switched on.
+    #[must_use]
+    pub fn new(options: Options, trail: Trail) -> World {
+        let mut chance = Chance::new(options.seed);
+        let models =
+            [chance.pick(&[Model::Ser160, Model::Ser320]), chance.pick(&[Model::Ser160, Model::Ser320])];
+        let units: Vec<Unit> = models.into_iter().map(|model| Unit::new(chance.branch(), model)).collect();
+        let line = LineHost::new(chance.branch());
+        let bus_host = BusHost::new(chance.branch(), units.len());
+        let recorded = vec![0; units.len()];
+        World { options, chance, trail, units, line, bus_host, now_ms: 0, hours: Hours::default(), recorded }
+    }
+
+    /// Lives as long as the options say.
+    ///
+    /// # Errors
+    /// The first thing that is not as it must be.
+    pub fn run(mut self) -> Result<Report, String> {
+        let mut off: Vec<PoweredOff> =
+            self.units.iter().map(|unit| PoweredOff::new(unit.options())).collect();
+        while self.now_ms < self.options.duration_ms {
+            let mut rams: Vec<Ram> = self.units.iter().map(|_| Ram::new()).collect();
+            off = self.live(off, &mut rams)?;
+        }
+        self.report()
+    }
+
+    /// Lives one life on a bus in which all inputs toggle in every millisecond, and all hosts read as fast as they can while the
+    /// first recorder prints and reports everything.
+    ///
+    /// # Errors
+    /// The first thing that is not as it must be.
+    pub fn run_flat_out(mut self) -> Result<Report, String> {
+        self.units.iter_mut().for_each(|unit| unit.debounce = Debounce::OFF);
+        let off: Vec<PoweredOff> = self.units.iter().map(|unit| PoweredOff::new(unit.options())).collect();
+        let mut rams: Vec<Ram> = self.units.iter().map(|_| Ram::new()).collect();
+        let mut life = self.power_up(off, &mut rams);
+        let models: Vec<Model> = self.units.iter().map(|unit| unit.model).collect();
+        life.bus = Some(BusLife::new(self.chance.branch(), &models, self.now_ms, Noise::default()));
+        self.line.talk.begin(Order::Ask(Command::Configure(PRINT_AND_REPORT)), self.now_ms);
+        while self.now_ms < self.options.duration_ms {
+            for (unit, node) in self.units.iter_mut().zip(&mut life.nodes) {
+                unit.play(node, self.now_ms, Tempo::Flat);
+            }
+            self.step(&mut life, Errand::CatchUp { since_ms: u64::MAX })?;
+        }
+        self.settle(&mut life)?;
+        self.power_cut(life)?;
+        self.report()
+    }
+
+    fn report(self) -> Result<Report, String> {
+        let World { trail, units, line, bus_host, hours, recorded, .. } = self;
+        let accounts =
+            [line.talk.account()].into_iter().chain(bus_host.talks.iter().map(Conversation::account));
+        // The line is the first recorder's, and then each has its conversation on the bus.
+        for (account, unit) in accounts.clone().zip([0, 0, 1]) {
+            let tally = account.tally();
+            let accounted = tally.delivered + tally.overwritten + tally.gone + tally.unwatched;
+            if accounted != recorded[unit] {
+                return Err(format!("{}: {} events, and {tally:?}", account.name(), recorded[unit]));
+            }
+        }
+        for (unit, recorded) in units.iter().zip(&recorded) {
+            trail.mark(format!("{:?} {recorded}", unit.ledger.edges()).as_bytes());
+        }
+        Ok(Report {
+            seed: self.options.seed,
+            digest: trail.digest(),
+            operations: trail.operations(),
+            hours,
+            edges: units.iter().map(|unit| unit.ledger.edges()).collect(),
+            recorded,
+            tallies: accounts.map(|account| (account.name(), account.tally())).collect(),
+            line: line.talk.talk(),
+            bus: bus_host.talks.iter().map(Conversation::talk).collect(),
+            printed: line.printed(),
+            forged: line.forged(),
+        })
+    }
+
+    fn live(&mut self, off: Vec<PoweredOff>, rams: &mut [Ram]) -> Result<Vec<PoweredOff>, String> {
+        let mut life = self.power_up(off, rams);
+        while self.now_ms < life.end_ms {
+            self.step(&mut life, Errand::Any)?;
+            self.suffer(&mut life);
+        }
+        let is_last = self.now_ms >= self.options.duration_ms;
+        if is_last || self.chance.one_in(2) {
+            self.settle(&mut life)?;
+        }
+        self.power_cut(life)
+    }
+
+    fn power_up<'r>(&mut self, off: Vec<PoweredOff>, rams: &'r mut [Ram]) -> Life<'r> {
+        let on_bus = self.chance.one_in(self.options.bus_one_in);
+        let busy = on_bus || self.chance.one_in(8);
+        let duration_ms = match (on_bus, busy) {
+            (true, _) => self.chance.spread(20_000..=400_000),
+            (false, true) => self.chance.spread(60_000..=2 * 3_600_000),
+            (false, false) => self.chance.spread(60_000..=3 * 86_400_000),
+        };
+        self.trail.note(format_args!("power up, {}", if on_bus { "on a bus" } else { "without a bus" }));
+        let off_ms = self.chance.spread(1..=3_600_000);
+        let mut nodes = Vec::new();
+        for ((unit, off), ram) in self.units.iter_mut().zip(off).zip(rams) {
+            unit.power_comes_on(self.now_ms, off_ms);
+            nodes.push(off.power_up(ram));
+        }
+        if self.chance.one_in(3) {
+            self.grow_older(&mut nodes);
+        }
+        let models: Vec<Model> = self.units.iter().map(|unit| unit.model).collect();
+        let noise = any_noise(&mut self.chance);
+        let bus = on_bus.then(|| BusLife::new(self.chance.branch(), &models, self.now_ms, noise));
+        let tempo = if busy { Tempo::Busy } else { Tempo::Plant };
+        self.line.power_comes_on(self.now_ms, tempo);
+        Life {
+            nodes,
+            bus,
+            tempo,
+            next_fault_ms: self.now_ms + self.chance.spread(1_000..=3_600_000),
+            end_ms: (self.now_ms + duration_ms).min(self.now_ms.max(self.options.duration_ms)),
+        }
+    }
+
+    /// The recorders have been on for 49 days already: their ticks are about to wrap.
+    fn grow_older(&mut self, nodes: &mut [SimNode<'_>]) {
+        let by_ms = TICKS - self.chance.spread(1_000..=1_000_000);
+        self.trail.note(format_args!("{by_ms} ms older"));
+        for (unit, node) in self.units.iter_mut().zip(nodes) {
+            node.grow_older(by_ms);
+            unit.ledger.grow_older(by_ms);
+        }
+    }
+
+    /// When something happens next.
+    fn next_ms(&self, life: &Life<'_>, errand: Errand) -> u64 {
+        let soon_ms = self.now_ms + 1;
+        if life.bus.is_some() || life.nodes.iter().any(|node| !node.is_at_rest()) {
+            return soon_ms;
+        }
+        let moves = life.nodes.iter().filter_map(SimNode::next_move_ms);
+        let scenes = self.units.iter().map(|unit| unit.activity.next_ms());
+        let scenes = scenes.filter(|_| errand == Errand::Any);
+        let next_ms = moves.chain(scenes).fold(self.line.next_ms(self.now_ms, errand), u64::min);
+        let end_ms = if errand == Errand::Any { life.end_ms.min(life.next_fault_ms) } else { u64::MAX };
+        // Nobody waits longer than that for nothing.
+        next_ms.min(end_ms).clamp(soon_ms, self.now_ms + CATCH_UP_MS)
+    }
+
+    /// Lets time pass up to the next thing that happens, and lets it happen.
+    fn step(&mut self, life: &mut Life<'_>, errand: Errand) -> Result<(), String> {
+        let to_ms = self.next_ms(life, errand);
+        self.hours.count(to_ms - self.now_ms, life.bus.is_some());
+        self.now_ms = to_ms;
+        self.trail.set_now(to_ms);
+        if let Some(bus) = &mut life.bus {
+            bus.advance(to_ms);
+        }
+        for (unit, node) in self.units.iter_mut().zip(&mut life.nodes) {
+            node.leap_to(to_ms);
+            unit.follow(node, to_ms, false);
+        }
+        self.pass_on(life, errand)?;
+        if errand == Errand::Any {
+            for (unit, node) in self.units.iter_mut().zip(&mut life.nodes) {
+                unit.play(node, to_ms, life.tempo);
+            }
+        }
+        if self.hours.steps.is_multiple_of(FORGET_EVERY) {
+            self.forget(life.bus.is_some());
+        }
+        Ok(())
+    }
+
+    /// Lets bytes and datagrams arrive that are there now.
+    fn pass_on(&mut self, life: &mut Life<'_>, errand: Errand) -> Result<(), String> {
+        let World { units, line, bus_host, now_ms, trail, .. } = self;
+        let [first, second] = &mut units[..] else { return Err("two recorders".to_owned()) };
+        let [node, other] = &mut life.nodes[..] else { return Err("two nodes".to_owned()) };
+        line.deliver(*now_ms, node, &mut first.ledger, &mut first.expected);
+        if let Some(bus) = &mut life.bus {
+            bus.serve(0, *now_ms, node, &mut first.ledger, &mut first.expected);
+            bus.serve(1, *now_ms, other, &mut second.ledger, &mut second.expected);
+        }
+        line.listen(*now_ms, node, &mut first.ledger, trail)?;
+        line.act(*now_ms, errand, &first.ledger, trail)?;
+        if let Some(bus) = &mut life.bus {
+            let mut ledgers = [&mut first.ledger, &mut second.ledger];
+            bus.act(*now_ms, errand, bus_host, &mut ledgers, trail)?;
+        }
+        // Nobody listens to the second recorder's line.
+        let said = other.output().len();
+        other.taken(said);
+        Ok(())
+    }
+
+    /// Lets something go wrong, if it is time.
+    fn suffer(&mut self, life: &mut Life<'_>) {
+        if let Some(bus) = &mut life.bus {
+            bus.suffer(self.now_ms, &self.trail);
+        }
+        if self.now_ms < life.next_fault_ms {
+            return;
+        }
+        let pause_ms = match life.tempo {
+            Tempo::Busy | Tempo::Flat => self.chance.spread(500..=60_000),
+            Tempo::Plant => self.chance.spread(1_000..=2 * 3_600_000),
+        };
+        let until_ms = self.now_ms + self.chance.spread(500..=60_000);
+        match self.chance.below(5) {
+            0 => {
+                let one_in = self.chance.spread(3..=1_000);
+                self.trail.note(format_args!("line: one byte in {one_in} is disturbed"));
+                self.line.disturb(until_ms, one_in);
+            }
+            1 => {
+                self.trail.note(format_args!("line: the host is stuck for {} ms", until_ms - self.now_ms));
+                self.line.get_stuck(until_ms);
+            }
+            2 => {
+                self.trail.note("line: stray bytes");
+                self.line.stray_bytes(self.now_ms);
+            }
+            3 => {
+                self.trail.note("line: many commands at once");
+                self.line.flood(self.now_ms);
+            }
+            _ => self.hold_up(life),
+        }
+        life.next_fault_ms = self.now_ms + pause_ms;
+    }
+
+    /// Something keeps the main loops of the recorders busy.
+    fn hold_up(&mut self, life: &mut Life<'_>) {
+        let debounced = self.units.iter().any(|unit| unit.debounce != Debounce::OFF);
+        // With debounce, what a full queue drops is more than the ledger can tell.
+        let for_ms = self.chance.spread(1..=if debounced { 120 } else { 2_000 });
+        self.trail.note(format_args!("main loops held up for {for_ms} ms"));
+        self.hours.count(for_ms, life.bus.is_some());
+        self.now_ms += for_ms;
+        self.trail.set_now(self.now_ms);
+        for (unit, node) in self.units.iter_mut().zip(&mut life.nodes) {
+            node.hold_up_to(self.now_ms);
+            unit.follow(node, self.now_ms, true);
+        }
+    }
+
+    /// Lets everything come to rest and all hosts read everything, and checks that it is all there.
+    fn settle(&mut self, life: &mut Life<'_>) -> Result<(), String> {
+        self.trail.note("everything calms down");
+        self.line.mend();
+        if let Some(bus) = &mut life.bus {
+            bus.mend(&self.trail);
+        }
+        let deadline_ms = self.now_ms + CATCH_UP_MS;
+        let mut quiet_ms = self.now_ms + SETTLING_MS;
+        while !self.has_settled(life, quiet_ms) {
+            if self.now_ms > deadline_ms {
+                let talks = [&self.line.talk].into_iter().chain(&self.bus_host.talks);
+                let behind = talks.filter(|talk| !talk.has_read_since(quiet_ms)).map(Conversation::describe);
+                let behind: Vec<String> = behind.collect();
+                return Err(format!("hosts have not read the log to its end: {}", behind.join(", ")));
+            }
+            let moving = life.nodes.iter().any(|node| node.next_move_ms().is_some());
+            self.step(life, Errand::CatchUp { since_ms: quiet_ms })?;
+            if moving {
+                quiet_ms = self.now_ms + SETTLING_MS;
+            }
+        }
+        let ledger = &self.units[0].ledger;
+        self.line.talk.account_mut().finish_reading(ledger)?;
+        if let Some(bus) = &life.bus {
+            for (talk, unit) in self.bus_host.talks.iter_mut().zip(&self.units) {
+                talk.account_mut().finish_reading(&unit.ledger)?;
+            }
+            bus.check()?;
+        }
+        for (unit, node) in self.units.iter_mut().zip(&life.nodes) {
+            unit.check(&node.diagnostics())?;
+        }
+        Ok(())
+    }
+
+    fn has_settled(&self, life: &Life<'_>, quiet_ms: u64) -> bool {
+        let on_bus = life.bus.is_some();
+        let bus = self.bus_host.talks.iter().filter(|_| on_bus).all(|talk| talk.has_read_since(quiet_ms));
+        bus && self.line.talk.has_read_since(quiet_ms)
+    }
+
+    fn power_cut(&mut self, life: Life<'_>) -> Result<Vec<PoweredOff>, String> {
+        self.trail.note("power cut");
+        let on_bus = life.bus.is_some();
+        if let Some(bus) = &life.bus {
+            bus.check()?;
+        }
+        for ((unit, node), recorded) in self.units.iter_mut().zip(&life.nodes).zip(&mut self.recorded) {
+            unit.check(&node.diagnostics())?;
+            *recorded += unit.ledger.len() as u64;
+        }
+        self.line.talk.account_mut().power_goes(&self.units[0].ledger, true);
+        for (talk, unit) in self.bus_host.talks.iter_mut().zip(&self.units) {
+            talk.account_mut().power_goes(&unit.ledger, on_bus);
+        }
+        self.line.power_cycled();
+        self.bus_host.power_cycled(self.now_ms);
+        Ok(life.nodes.into_iter().map(SimNode::power_off).collect())
+    }
+
+    /// Forgets events that all readers are past.
+    fn forget(&mut self, on_bus: bool) {
+        let line = self.line.talk.account();
+        for (index, unit) in self.units.iter_mut().enumerate() {
+            let ledger = &unit.ledger;
+            let line = (index == 0).then(|| line.place(ledger).unwrap_or(0));
+            let bus = on_bus.then(|| self.bus_host.talks[index].account().place(ledger).unwrap_or(0));
+            let all_past = line.into_iter().chain(bus).min().unwrap_or(ledger.len());
+            unit.ledger.forget_before(all_past);
+        }
+    }
+}

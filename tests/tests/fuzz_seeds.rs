@@ -1,0 +1,47 @@
+//! Everything that fuzzing checks, for the seeds that are kept. The fuzzer itself is `cargo xtask fuzz`.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use ser_tests::fuzzing::{TARGETS, seeds};
+
+/// Makes a test of each target.
+macro_rules! targets {
+    ($($name:ident)*) => {
+        $(#[test]
+        fn $name() {
+            replay(stringify!($name));
+        })*
+
+        const TESTED: &[&str] = &[$(stringify!($name)),*];
+    };
+}
+
+targets! { frames commands replies datagrams comm_req geni_driver node client cli_files }
+
+fn replay(name: &str) {
+    let target = TARGETS.iter().find(|target| target.name == name).expect("a target");
+    let seeds = seeds::of(name).unwrap_or_else(|error| panic!("{error}"));
+    assert!(!seeds.is_empty(), "{name} has no seeds");
+    for seed in seeds {
+        // Shown when it fails.
+        println!("{name}/{}", seed.name);
+        (target.run)(&seed.bytes);
+    }
+}
+
+/// The names in a folder, without what follows the dot.
+fn names(folder: &Path) -> BTreeSet<String> {
+    let files = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    files.map(|file| stem(&file.expect("a file").path())).collect()
+}
+
+#[test]
+fn every_target_has_a_program_seeds_and_a_test() {
+    let targets: BTreeSet<String> = TARGETS.iter().map(|target| target.name.to_owned()).collect();
+    assert_eq!(names(&seeds::folder()), targets);
+    assert_eq!(names(&seeds::folder().with_file_name("fuzz_targets")), targets);
+    assert_eq!(TESTED.iter().map(|&name| name.to_owned()).collect::<BTreeSet<_>>(), targets);
+}

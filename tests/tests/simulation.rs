@@ -1,0 +1,97 @@
+//! Some virtual time of the whole system, left to chance: every event is read once, or reported as lost.
+//!
+//! `cargo xtask simulate` goes on for as long as one likes.
+
+use ser_tests::simulation::account::Tally;
+use ser_tests::simulation::{Options, Report, run, run_flat_out};
+
+const HOUR_MS: u64 = 3_600_000;
+const MINUTE_MS: u64 = 60_000;
+
+fn lived(seed: u64, duration_ms: u64, bus_one_in: u64) -> Report {
+    run(Options { seed, duration_ms, bus_one_in }).unwrap_or_else(|failure| panic!("{failure}"))
+}
+
+/// Checks that nothing is left over: each edge and each event is in one of the columns.
+fn assert_accounted(report: &Report) {
+    for edges in &report.edges {
+        let in_columns = edges.recorded
+            + edges.stopped
+            + edges.filtered
+            + edges.queue_full
+            + edges.cut_off
+            + edges.undecided;
+        assert_eq!(edges.applied, in_columns, "{report}");
+    }
+    for (tally, recorder) in report.tallies.iter().map(|(_, tally)| tally).zip([0, 0, 1]) {
+        let in_columns = tally.delivered + tally.overwritten + tally.gone + tally.unwatched;
+        assert_eq!(report.recorded[recorder], in_columns, "{report}");
+    }
+}
+
+/// What became of the events of all these runs, for one of the readers.
+fn sum(reports: &[Report], reader: usize) -> Tally {
+    let add = |sum: Tally, report: &Report| {
+        let tally = report.tallies[reader].1;
+        Tally {
+            delivered: sum.delivered + tally.delivered,
+            overwritten: sum.overwritten + tally.overwritten,
+            gone: sum.gone + tally.gone,
+            restarts: sum.restarts + tally.restarts,
+            ..sum
+        }
+    };
+    reports.iter().fold(Tally::default(), add)
+}
+
+#[test]
+fn days_without_a_bus() {
+    let reports: Vec<Report> = (1..=6).map(|seed| lived(seed, 24 * HOUR_MS, u64::MAX)).collect();
+    for report in &reports {
+        assert_accounted(report);
+        assert_eq!(report.hours.bus_ms, 0);
+        assert!(report.hours.steps < report.hours.total_ms / 2, "{report}");
+    }
+    // There was something to be accounted for.
+    let tally = sum(&reports, 0);
+    assert!(
+        tally.delivered > 1000 && tally.overwritten > 0 && tally.gone > 0 && tally.restarts > 0,
+        "{tally:?}"
+    );
+    let edges = || reports.iter().flat_map(|report| &report.edges);
+    assert!(edges().any(|edges| edges.filtered > 0) && edges().any(|edges| edges.stopped > 0));
+}
+
+#[test]
+fn minutes_on_a_bus() {
+    let reports: Vec<Report> = (101..=106).map(|seed| lived(seed, 4 * MINUTE_MS, 1)).collect();
+    for report in &reports {
+        assert_accounted(report);
+        assert_eq!(report.hours.bus_ms, report.hours.total_ms);
+    }
+    for reader in 0..3 {
+        let tally = sum(&reports, reader);
+        assert!(tally.delivered > 1000 && tally.overwritten > 0 && tally.restarts > 0, "{reader}: {tally:?}");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_run() {
+    for (seed, duration_ms, bus_one_in) in [(7, 12 * HOUR_MS, u64::MAX), (107, 2 * MINUTE_MS, 1)] {
+        let report = lived(seed, duration_ms, bus_one_in);
+        assert_eq!(report, lived(seed, duration_ms, bus_one_in));
+        assert_ne!(report.digest, lived(seed + 1, duration_ms, bus_one_in).digest);
+    }
+}
+
+#[test]
+fn all_inputs_toggle_in_every_millisecond_and_all_edges_are_counted() {
+    const DURATION_MS: u64 = 2 * MINUTE_MS;
+    let options = Options { seed: 1, duration_ms: DURATION_MS, bus_one_in: 1 };
+    let report = run_flat_out(options).unwrap_or_else(|failure| panic!("{failure}"));
+    assert_accounted(&report);
+    for (edges, &events) in report.edges.iter().zip(&report.recorded) {
+        assert_eq!(events, DURATION_MS, "{report}");
+        assert!(edges.recorded == edges.applied && (edges.applied / events).is_multiple_of(16), "{report}");
+    }
+}
