@@ -12,10 +12,11 @@
 //! That a record is whole, and which of the two is newer, is for `ser_node` to say: it checks and numbers them.
 //!
 //! # Tradeoffs
-//! A general store for keys and values, `sequential-storage`, needs two sectors for each copy, all four of one size
-//! (an STM32F407 has no more than its 128 KiB ones), reads every record of a sector to find the last, and brings
-//! panicking paths into the image. There is one value here, it has one length, and its check and number come with it:
-//! a log of slots will do. Two sectors of 16 KiB with 10 000 erasures each are good for 20 million changes.
+//! A general store for keys and values, `sequential-storage`, reads every record of a sector to find the last, takes six
+//! times the code, brings panicking paths into the image, and needs two sectors of one size for each copy that is to have
+//! sectors of its own (of the four of 16 KiB on an STM32F407, the first has to hold the vector table). There is one value
+//! here, it has one length, and its check and number come with it: a log of slots will do. Two sectors of 16 KiB with
+//! 10 000 erasures each are good for 20 million changes.
 //!
 //! # Notes
 //! A sector of 16 KiB takes 1023 records, one of 128 KiB 8191. As the copies take turns, an erase is due once in as
@@ -23,8 +24,8 @@
 //! an STM32F4 (data sheet, "Flash memory programming", 32 bits at a time), and until it is done nothing can be read
 //! from that bank: code that runs from it stands still, interrupts included. So either the capture interrupt, all
 //! that it calls and the vector table are in RAM, and capture goes on while the main loop waits (its queue takes 255
-//! changes), or the samples of that time are missed: `ser_node` counts them. The watchdog has to wait longer than the
-//! erase. Writing a record takes 16 bytes of at most 100 µs.
+//! changes), or the samples of that time are missed: `ser_node` counts them. The board sees to
+//! its watchdog meanwhile. Writing a record takes 16 bytes of at most 100 µs.
 
 use embedded_storage::nor_flash::MultiwriteNorFlash;
 use ser_node::{CopyNumber, RECORD_LEN, Storage};

@@ -19,6 +19,7 @@
 //! The flash is read by the start-up code and for the configuration only; its wait states are set all the same, its
 //! caches stay off. (RM0090, chapters "Reset and clock control" and "Embedded flash memory interface".)
 
+use cortex_m::asm;
 use stm32f4::stm32f407::{FLASH, PWR, RCC};
 
 const CRYSTAL_HZ: u32 = 8_000_000;
@@ -35,7 +36,7 @@ const USB_DIVIDER: u8 = 7;
 /// Clock of the processor and of the external bus.
 pub(crate) const HCLK_HZ: u32 = CRYSTAL_HZ / CRYSTAL_DIVIDER as u32 * MULTIPLIER as u32 / OUTPUT_DIVIDER;
 /// Clock of the serial line.
-pub(crate) const PCLK1_HZ: u32 = HCLK_HZ / 16;
+pub(crate) const PCLK1_HZ: u32 = HCLK_HZ / PCLK1_DIVIDER;
 /// Clock of the timers: twice that of their bus, which is divided.
 pub(crate) const TIMER_HZ: u32 = 2 * PCLK1_HZ;
 
@@ -51,6 +52,9 @@ const _: () = {
     assert!(PCLK1_HZ / 300 < 1 << 16);
 };
 
+/// What PCLK1 is divided by.
+const PCLK1_DIVIDER: u32 = 16;
+
 /// Looks at the crystal before it is given up, some 10 clocks of 16 MHz each: 125 ms, where 2 ms are typical.
 const CRYSTAL_LOOKS: u32 = 200_000;
 
@@ -65,6 +69,7 @@ pub(crate) enum Source {
 /// Brings the clocks up. Whatever takes forever here ends with the watchdog.
 pub(crate) fn start(rcc: &RCC, pwr: &PWR, flash: &FLASH) -> Source {
     rcc.apb1enr().modify(|_, w| w.pwren().set_bit());
+    settle();
     // Full speed needs the regulator's full voltage.
     pwr.cr().modify(|_, w| w.vos().set_bit());
     // SAFETY: more wait states than needed are safe at any speed.
@@ -101,6 +106,13 @@ pub(crate) fn start(rcc: &RCC, pwr: &PWR, flash: &FLASH) -> Source {
         rcc.cr().modify(|_, w| w.csson().set_bit());
     }
     source
+}
+
+/// Waits until a part whose clock has just been switched on can be written to: a clock of its bus, and one more (device
+/// errata, "Delay after an RCC peripheral clock enabling"). What is written earlier may be lost.
+pub(crate) fn settle() {
+    asm::dsb();
+    asm::delay(2 * PCLK1_DIVIDER + 2);
 }
 
 fn start_crystal(rcc: &RCC) -> Source {

@@ -7,7 +7,7 @@
 //!
 //! # Notes
 //! 32 bits at a time, which wants 2.7 V at least: the brown-out reset has to be at its highest level, which
-//! `reset` tells the log if it is not. Times (data sheet, "Flash memory programming"): 250–500 ms to erase a sector of
+//! `last_words` tells the log if it is not. Times (data sheet, "Flash memory programming"): 250–500 ms to erase a sector of
 //! 16 KiB, 16–100 µs to write a word.
 
 use core::ptr;
@@ -102,6 +102,12 @@ pub(crate) struct ConfigurationFlash {
 impl ConfigurationFlash {
     /// Takes the lock off for as long as `change` takes, and sees whether it went well.
     fn change(&mut self, change: impl FnOnce(&mut Self) -> Result<(), FlashError>) -> Result<(), FlashError> {
+        // While the flash is at work a write to its registers stalls the bus, and capture with it.
+        if self.is_busy() {
+            return Err(FlashError::TimedOut);
+        }
+        // A change that was not done in time has left it as it was.
+        self.registers.cr().write(|w| w.lock().set_bit());
         for key in KEYS {
             // SAFETY: the key register takes any value.
             self.registers.keyr().write(|w| unsafe { w.bits(key) });
@@ -112,6 +118,9 @@ impl ConfigurationFlash {
             w.wrperr().clear_bit_by_one().operr().clear_bit_by_one().eop().clear_bit_by_one()
         });
         let changed = change(self);
+        if self.is_busy() {
+            return changed;
+        }
         let status = self.registers.sr().read();
         let refused = status.pgserr().bit_is_set()
             || status.pgperr().bit_is_set()

@@ -100,6 +100,7 @@ impl InterruptLine {
     pub(crate) fn start(rcc: &RCC, routing: &SYSCFG, edges: EXTI) -> InterruptLine {
         const PORT_G: u8 = 6;
         rcc.apb2enr().modify(|_, w| w.syscfgen().set_bit());
+        clocks::settle();
         // SAFETY: the port exists.
         routing.exticr2().modify(|_, w| unsafe { w.exti5().bits(PORT_G) });
         edges.ftsr().modify(|_, w| w.tr5().set_bit());
@@ -126,6 +127,7 @@ impl GeniBoard {
     /// This is called once only: the window belongs to whoever has it.
     pub(crate) unsafe fn open(rcc: &RCC, bus: &FSMC) -> Option<(GeniBoard, WindowRam)> {
         rcc.ahb3enr().modify(|_, w| w.fsmcen().set_bit());
+        clocks::settle();
         // SAFETY: the values fit into their fields, see there.
         bus.btr1().write(|w| unsafe { w.bits(TIMING) });
         // SAFETY: as above; the register for writing has its fields in the same places.

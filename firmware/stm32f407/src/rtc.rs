@@ -27,8 +27,9 @@ const KEYS: [u8; 2] = [0xCA, 0x53];
 /// Looks at a flag before it is given up: 10 ms, where two periods of the crystal are due.
 const MAX_LOOKS: u32 = 100_000;
 
-/// Reads of date and time until two agree; a carry in between happens once a second.
-const MAX_READS: u32 = 4;
+/// Reads of date and time until two in a row are equal. A register that is read while it changes may show anything; the
+/// fastest of them changes every 30 µs, and two reads take a few.
+const MAX_READS: u32 = 16;
 
 pub(crate) static HEALTH: ClockHealth = ClockHealth::new();
 
@@ -134,7 +135,7 @@ impl DateTimeAccess for ChipClock {
         let mut before = self.read_once();
         for _ in 0..MAX_READS {
             let now = self.read_once();
-            if now.1 == before.1 && now.0 <= before.0 {
+            if now == before {
                 return now.1.to_date_time(now.0, PREDIV_S).ok_or(RtcError::NoDate);
             }
             before = now;

@@ -40,6 +40,7 @@ impl Timer {
     /// Starts both timers.
     pub(crate) fn start(rcc: &RCC, counter: TIM2, interval: TIM3) -> Timer {
         rcc.apb1enr().modify(|_, w| w.tim2en().set_bit().tim3en().set_bit());
+        clocks::settle();
         // The update event takes the prescaler over; its flag must not count as an interrupt.
         counter.psc().write(|w| w.psc().set(PRESCALER - 1));
         counter.arr().write(|w| w.arr().set(u32::MAX));

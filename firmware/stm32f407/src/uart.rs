@@ -29,6 +29,7 @@ pub(crate) fn start(
     baud: Baud,
 ) -> (SerialLine, SerialInterrupt) {
     rcc.apb1enr().modify(|_, w| w.usart2en().set_bit());
+    clocks::settle();
     set_divider(&uart, baud);
     uart.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
     let SerialEnds { receiver, received, to_send, transmitter } = rings.split();
