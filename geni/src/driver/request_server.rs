@@ -18,6 +18,13 @@ struct Waiting {
     since_ms: u32,
 }
 
+impl Waiting {
+    /// The head is ours: somewhere else, or in an empty queue, it means that the board has started anew.
+    fn is_still_there<R: SharedRam>(self, ram: &R) -> bool {
+        Pointers::read(ram).is_ok_and(|pointers| pointers.head == self.index && !pointers.is_empty())
+    }
+}
+
 /// Takes requests one at a time.
 #[derive(Debug)]
 pub(super) struct RequestServer {
@@ -47,7 +54,7 @@ impl RequestServer {
             }
             self.waiting = None;
             count(&mut counters.requests_unanswered);
-            return Some(refuse(ram, waiting.index, counters));
+            return waiting.is_still_there(ram).then(|| refuse(ram, waiting.index, counters));
         }
         if !self.due {
             return None;
@@ -82,10 +89,7 @@ impl RequestServer {
         answer: RequestAnswer<'_>,
     ) -> Result<(), AnswerError> {
         let waiting = self.waiting.ok_or(AnswerError::NoRequest)?;
-        // The head is ours: somewhere else, or in an empty queue, it means that the board has started anew.
-        let still_there =
-            Pointers::read(ram).is_ok_and(|pointers| pointers.head == waiting.index && !pointers.is_empty());
-        if !still_there {
+        if !waiting.is_still_there(ram) {
             self.waiting = None;
             return Err(AnswerError::NoRequest);
         }

@@ -109,6 +109,19 @@ fn an_answer_to_a_request_of_a_former_life_goes_nowhere() {
 }
 
 #[test]
+fn nobody_refuses_a_request_of_a_former_life() {
+    let mut world = asking();
+    world.board().request(&READ);
+    world.until(10, is_request);
+    world.board().restart();
+    let events = world.run(2_100);
+    assert!(!events.iter().any(|event| matches!(event, Event::RequestRefused(_))), "{events:?}");
+    assert_eq!(world.peek(0x0880), 0);
+    let counters = world.driver.counters();
+    assert_eq!((counters.requests_unanswered, counters.requests_refused), (1, 0));
+}
+
+#[test]
 fn an_impossible_length_is_refused() {
     let mut world = asking();
     world.board().request(&[READ_DEVICE, 0, 129, 0, 0, 0, 30, 0]);
