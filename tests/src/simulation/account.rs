@@ -8,9 +8,9 @@ use super::ledger::{Erase, Ledger};
 /// The recorder's total counts modulo this, so that a reader may miss a multiple of it without a trace.
 const TOTAL_WRAPS_AT: usize = 65_536;
 
-/// A reader that events come too fast for gives up some of the oldest that are still there, by what came during its
-/// requests: so long they take, with repeats and where the line takes no time.
-const HASTE_MS: u64 = 10_000;
+/// A reader that events come too fast for gives up some of the oldest that are still there: as many as came during one of its
+/// requests, and as many again.
+const HASTE: usize = 2;
 
 /// What became of the events of a recorder, for one reader; each is in one of these.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,7 +45,10 @@ pub struct Account {
     /// What was told and belongs before the next event.
     restart_told: bool,
     lost_told: usize,
-    haste_ms: u64,
+    /// How many events there were when its reading began.
+    read_from: usize,
+    /// Whether the reader knows the last event that it was given, and so would miss it.
+    anchored: bool,
     tally: Tally,
 }
 
@@ -61,7 +64,8 @@ impl Account {
             new_life: true,
             restart_told: false,
             lost_told: 0,
-            haste_ms: HASTE_MS,
+            read_from: 0,
+            anchored: false,
             tally: Tally::default(),
         }
     }
@@ -72,9 +76,14 @@ impl Account {
         self.name
     }
 
-    /// A request takes so much longer because of the line.
-    pub fn set_request_ms(&mut self, request_ms: u64) {
-        self.haste_ms = HASTE_MS + 4 * request_ms;
+    /// Whether the reader knows the last event that it was given, or found an empty log.
+    pub fn set_anchored(&mut self, anchored: bool) {
+        self.anchored = anchored;
+    }
+
+    /// A reading begins.
+    pub fn begin_reading(&mut self, ledger: &Ledger) {
+        self.read_from = ledger.len();
     }
 
     /// What became of all events up to the reader's place.
@@ -158,10 +167,7 @@ impl Account {
                 let lost = lost + wraps * TOTAL_WRAPS_AT;
                 (erase.from + lost..=last + lost).find(|&index| is(index))
             });
-            // Without a word of the restart, the count is that of totals that have nothing to do with each other.
-            exact.or_else(|| {
-                (!self.restart_told).then(|| (erase.from..ledger.len()).find(|&index| is(index)))?
-            })
+            exact.or_else(|| self.after_traceless(erase, ledger, is))
         });
         match after_erase.filter(|&index| index >= self.next) {
             Some(index) => {
@@ -170,6 +176,17 @@ impl Account {
             }
             None => Err(self.explain(entry, lost, ledger)),
         }
+    }
+
+    /// The event after an erase of which there is no word. It leaves no trace where the log was empty before, and where it is
+    /// full again; the count of what is lost is then that of two totals that have nothing to do with each other.
+    fn after_traceless(&self, erase: Erase, ledger: &Ledger, is: impl Fn(usize) -> bool) -> Option<usize> {
+        let full_again = ledger.overwritten_before() > erase.from
+            || ledger.len() - erase.from >= ledger.smallest_size().into();
+        if self.restart_told || self.anchored && !full_again {
+            return None;
+        }
+        (erase.from..ledger.len()).find(|&index| is(index))
     }
 
     /// How many times the total has wrapped unseen before the event at `index` or so many rings further on.
@@ -182,8 +199,8 @@ impl Account {
     fn go_on(&mut self, index: usize, wraps: usize, lost: usize, ledger: &Ledger) -> Result<(), String> {
         let missing = index - self.next;
         if missing > 0 {
-            let recent = ledger.len() - ledger.len_at(self.now_ms(ledger).saturating_sub(self.haste_ms));
-            let may_be_lost = ledger.overwritten_before() + 4 * recent;
+            let since = ledger.len().saturating_sub(self.read_from);
+            let may_be_lost = ledger.overwritten_before() + HASTE * since;
             if index > may_be_lost {
                 return Err(format!(
                     "{}: {lost} events before number {index} are reported as lost and are still there",
@@ -215,10 +232,6 @@ impl Account {
         self.new_life = false;
         self.tally.delivered += 1;
         self.next = index + 1;
-    }
-
-    fn now_ms(&self, ledger: &Ledger) -> u64 {
-        ledger.len().checked_sub(1).and_then(|last| ledger.event(last)).map_or(0, |event| event.at_ms)
     }
 
     fn explain(&self, entry: &Entry, lost: usize, ledger: &Ledger) -> String {

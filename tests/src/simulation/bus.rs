@@ -24,7 +24,7 @@ use super::conversation::{Conversation, Order};
 use super::ledger::{Ledger, Port};
 use super::line_host::Errand;
 use super::orders::{self, Way};
-use super::taps::{BusTap, Expected, TappedWindow};
+use super::taps::{BusTap, Expected, TappedWindow, answered_as};
 use super::trail::Trail;
 
 /// Device numbers.
@@ -199,15 +199,17 @@ impl BusLife {
         expected: &mut Expected,
     ) {
         let UnitPort { port, tap, .. } = &mut self.units[index];
-        let overrun = node.diagnostics().commands_overrun;
         node.serve(port);
         let held = port.reset_held();
         port.window().inner().drive_reset(held);
-        let refused = node.diagnostics().commands_overrun > overrun;
         for taken in tap.borrow_mut().drain(..) {
             match taken.received {
-                Err(error) => expected.parse_error(error),
-                Ok(_) if refused && !taken.broadcast => {}
+                Err(error) => {
+                    expected.parse_error(error);
+                    if let Some(command) = answered_as(error).filter(|_| !taken.broadcast) {
+                        ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS);
+                    }
+                }
                 Ok(Command::SetClock(time)) => ledger.set_clock(now_ms, time),
                 Ok(Command::SetMode { recording }) => ledger.set_recording(now_ms, recording),
                 Ok(command) if taken.broadcast => ledger.command_done(&command),
@@ -237,7 +239,7 @@ impl BusLife {
         {
             trail.mark(&received.data);
             if let Ok(reply) = Reply::parse(&received.data) {
-                ledgers[index].replied(Port::Bus, &reply);
+                ledgers[index].replied(Port::Bus, &reply)?;
             }
             host.talks[index].session().process_body(Duration::from_millis(now_ms), &received.data);
         }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ser_client::{
-    Cursor, Disturbed, LineRate, LogFollower, LogPosition, LogReader, Session, Timing, Unsolicited,
+    Cursor, Delivery, Disturbed, LineRate, LogFollower, LogPosition, LogReader, Session, Timing, Unsolicited,
 };
 use ser_proto::{Command, Configuration, ReadReply, Reply, TimeStamp};
 
@@ -203,7 +203,8 @@ impl Conversation {
         let _ = self.session.request(command);
     }
 
-    fn begin_reading(&mut self, resyncs: u32, now_ms: u64) {
+    fn begin_reading(&mut self, resyncs: u32, now_ms: u64, ledger: &Ledger) {
+        self.account.begin_reading(ledger);
         let mut reader = LogReader::new(self.cursor, self.size);
         if let Some(position) = self.position.take() {
             reader = reader.starting_near(position);
@@ -251,17 +252,17 @@ impl Conversation {
                     self.talk.answered += 1;
                     self.answered(&reply, now_ms, ledger)?;
                 }
-                Some(Err(_)) => self.unanswered(now_ms),
+                Some(Err(_)) => self.unanswered(now_ms, ledger),
             }
         }
     }
 
-    fn unanswered(&mut self, now_ms: u64) {
+    fn unanswered(&mut self, now_ms: u64, ledger: &Ledger) {
         self.failures += 1;
         self.talk.unanswered += 1;
         match self.job {
             // As an original unit, which does not know the question: the size stays what it was.
-            Job::LearnSize { resyncs } if resyncs > 0 => self.begin_reading(resyncs, now_ms),
+            Job::LearnSize { resyncs } if resyncs > 0 => self.begin_reading(resyncs, now_ms, ledger),
             _ => self.job = Job::Rest,
         }
     }
@@ -287,7 +288,7 @@ impl Conversation {
             (Job::Read { reader, resyncs }, Reply::Read(reply)) => {
                 self.take_read(reader, resyncs, reply, now_ms, ledger)?;
             }
-            (Job::LearnSize { resyncs }, _) => self.begin_reading(resyncs, now_ms),
+            (Job::LearnSize { resyncs }, _) => self.begin_reading(resyncs, now_ms, ledger),
             _ => {}
         }
         Ok(())
@@ -303,9 +304,7 @@ impl Conversation {
     ) -> Result<(), String> {
         let mut deliveries = Vec::new();
         let taken = reader.take(reply, &mut |delivery| deliveries.push(delivery));
-        for delivery in &deliveries {
-            self.account.take(delivery, ledger)?;
-        }
+        self.deliver(&deliveries, ledger)?;
         self.cursor = reader.cursor();
         match taken {
             Ok(()) => self.go_on_reading(reader, resyncs, now_ms),
@@ -317,6 +316,11 @@ impl Conversation {
             Err(_) => self.talk.disturbed += 1,
         }
         Ok(())
+    }
+
+    fn deliver(&mut self, deliveries: &[Delivery], ledger: &Ledger) -> Result<(), String> {
+        self.account.set_anchored(self.cursor.is_some_and(|cursor| cursor.anchor.is_some()));
+        deliveries.iter().try_for_each(|delivery| self.account.take(delivery, ledger))
     }
 
     fn take_unsolicited(&mut self, ledger: &Ledger) -> Result<(), String> {
@@ -342,9 +346,7 @@ impl Conversation {
             return Ok(());
         };
         self.talk.reports_followed += 1;
-        for delivery in &deliveries {
-            self.account.take(delivery, ledger)?;
-        }
+        self.deliver(&deliveries, ledger)?;
         self.cursor = Some(cursor);
         self.position = follower.position();
         Ok(())

@@ -9,12 +9,19 @@ use std::collections::{BTreeMap, VecDeque};
 use chrono::NaiveDateTime;
 use ser_node::Debounce;
 use ser_node::capture::QUEUE_LEN;
-use ser_proto::{Command, Entry, MAX_SIZE, Reply, TimeStamp};
+use ser_proto::{Command, Configuration, Entry, Reply, TimeStamp};
 
 use super::debounce_model::{Accepted, DebounceModel};
 
 /// A hundred years, 1970–2069: what two-digit years can tell apart.
 const CENTURY_MS: i64 = 36_525 * 86_400_000;
+
+/// So many events are kept at least: more than a log holds and a plant does while a printed line waits for a host that is
+/// stuck.
+const KEPT: usize = 1 << 17;
+
+/// For so long a reply may be on its way that tells older settings.
+const SETTINGS_SETTLE_MS: u64 = 120_000;
 
 /// An event that must be recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,6 +116,11 @@ pub struct Ledger {
     /// With the time by which it will have been done, or never will be.
     due: VecDeque<(Port, u64, Due)>,
     size: u16,
+    /// The settings in force, where they are known; the power does not change them.
+    configuration: Option<Configuration>,
+    /// They are known again from then on: on a bus, one does not see when a reply is made.
+    known_from_ms: u64,
+    now_ms: u64,
     /// Events before this one can have been overwritten.
     overwritten_before: usize,
     life: u64,
@@ -136,6 +148,9 @@ impl Ledger {
             erases: Vec::new(),
             due: VecDeque::new(),
             size: 0,
+            configuration: None,
+            known_from_ms: 0,
+            now_ms: 0,
             overwritten_before: 0,
             life: 0,
             edges: Edges::default(),
@@ -207,6 +222,7 @@ impl Ledger {
 
     /// The sample of this millisecond has been taken.
     pub fn settle(&mut self, now_ms: u64) {
+        self.now_ms = now_ms;
         let mut accepted = std::mem::take(&mut self.accepted);
         self.debounce.settle(now_ms, &mut accepted);
         self.take_accepted(&mut accepted);
@@ -280,7 +296,10 @@ impl Ledger {
                 self.erases.push(Erase { from: self.len(), to: usize::MAX });
                 self.due.push_back((port, until_ms, Due::Erase(self.erases.len() - 1)));
             }
+            // Its answer looks the same.
+            Command::QueryConfiguration => self.due.push_back((port, until_ms, Due::Size(None))),
             Command::Configure(configure) => {
+                self.forget_configuration(port);
                 self.due.push_back((port, until_ms, Due::Size(configure.size)));
                 self.note_overwritten();
             }
@@ -293,6 +312,7 @@ impl Ledger {
         match command {
             Command::Erase => self.erases.push(Erase { from: self.len(), to: self.len() }),
             Command::Configure(configure) => {
+                self.forget_configuration(Port::Bus);
                 self.size = configure.size.unwrap_or(self.size);
                 self.note_overwritten();
             }
@@ -300,17 +320,41 @@ impl Ledger {
         }
     }
 
-    /// A reply has been seen.
-    pub fn replied(&mut self, port: Port, reply: &Reply) {
+    fn forget_configuration(&mut self, port: Port) {
+        self.configuration = None;
+        if port == Port::Bus {
+            self.known_from_ms = self.now_ms + SETTINGS_SETTLE_MS;
+        }
+    }
+
+    /// A reply has been seen: on the line when it goes out, on the bus when it arrives.
+    ///
+    /// # Errors
+    /// When it tells other settings than those in force.
+    pub fn replied(&mut self, port: Port, reply: &Reply) -> Result<(), String> {
         match reply {
             Reply::Erased => self.finish(|of, _, due| of == port && matches!(due, Due::Erase(_))),
             Reply::Configuration(configuration) => {
                 self.finish(|of, _, due| of == port && matches!(due, Due::Size(_)));
                 self.size = configuration.size;
                 self.note_overwritten();
+                if port == Port::Line {
+                    self.see_configuration(*configuration)?;
+                }
             }
             _ => {}
         }
+        Ok(())
+    }
+
+    fn see_configuration(&mut self, configuration: Configuration) -> Result<(), String> {
+        if let Some(known) = self.configuration.filter(|known| *known != configuration) {
+            return Err(format!("the recorder tells {configuration:?}, and {known:?} was set last"));
+        }
+        let others_due = self.due.iter().any(|(_, _, due)| matches!(due, Due::Size(_)));
+        let settled = !others_due && self.now_ms >= self.known_from_ms;
+        self.configuration = settled.then_some(configuration);
+        Ok(())
     }
 
     /// What was to be done by now has been done, or never will be.
@@ -359,12 +403,6 @@ impl Ledger {
         self.events.iter().rev()
     }
 
-    /// How many events there were up to this time, of those that are remembered.
-    #[must_use]
-    pub fn len_at(&self, at_ms: u64) -> usize {
-        self.forgotten + self.events.partition_point(|event| event.at_ms <= at_ms)
-    }
-
     /// The erases since power-up.
     #[must_use]
     pub fn erases(&self) -> &[Erase] {
@@ -383,9 +421,9 @@ impl Ledger {
         self.life
     }
 
-    /// Forgets the events before this one that no log can hold any more.
+    /// Forgets the events before this one that nobody can read or print any more.
     pub fn forget_before(&mut self, index: usize) {
-        let held = self.len().saturating_sub(MAX_SIZE.into());
+        let held = self.len().saturating_sub(KEPT);
         let count = index.min(held).saturating_sub(self.forgotten);
         self.events.drain(..count);
         self.forgotten += count;

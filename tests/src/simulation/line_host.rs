@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use ser_client::LineRate;
-use ser_proto::{Baud, Command, FrameEncoder, MAX_BODY_LEN, Model, encoded_len};
+use ser_proto::{Baud, Command, FrameEncoder, Model, encoded_len};
 use ser_sim::SimNode;
 
 use super::activity::Tempo;
@@ -176,8 +176,6 @@ impl LineHost {
         self.guard.forget();
         let rate = self.line_rate();
         self.talk.session().set_line_rate(rate);
-        let request = rate.time_for(encoded_len(MAX_BODY_LEN));
-        self.talk.account_mut().set_request_ms(u64::try_from(request.as_millis()).unwrap_or(u64::MAX));
     }
 
     fn send(&mut self, now_ms: u64, bytes: &[u8]) {
@@ -278,7 +276,7 @@ impl LineHost {
         let mut heard = std::mem::take(&mut self.heard);
         for byte in &bytes {
             if let Some(reply) = self.tap.comes_out(*byte, ledger)? {
-                ledger.replied(Port::Line, &reply);
+                ledger.replied(Port::Line, &reply)?;
             }
             self.guard.said(*byte);
             travel(*byte, one_in, baud != self.baud, &mut self.chance, &mut heard);

@@ -8,7 +8,7 @@ use std::rc::Rc;
 use geni::{SharedRam, map};
 use ser_node::Diagnostics;
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
-use ser_proto::{Command, Decoded, FrameDecoder, FrameError, MAX_BODY_LEN, ParseError, Reply};
+use ser_proto::{Code, Command, Decoded, FrameDecoder, FrameError, MAX_BODY_LEN, ParseError, Reply};
 use ser_sim::genius::BoardWindow;
 
 use super::ledger::Ledger;
@@ -102,7 +102,8 @@ impl LineTap {
         LineTap { commands: FrameDecoder::new(), replies: FrameDecoder::new(), printout: Printout::default() }
     }
 
-    /// A byte goes in. Gives the command that it completes, if the recorder has room for it.
+    /// A byte goes in. Gives the command that it completes, if the recorder has room for it; a configuration that is refused is
+    /// as good as a question.
     pub fn goes_in(&mut self, byte: u8, has_room: bool, expected: &mut Expected) -> Option<Command> {
         match self.commands.push(byte)? {
             Decoded::Text(_) => None,
@@ -118,7 +119,7 @@ impl LineTap {
                 Ok(command) => Some(command),
                 Err(error) => {
                     expected.parse_error(error);
-                    None
+                    answered_as(error).filter(|_| has_room)
                 }
             },
         }
@@ -137,6 +138,17 @@ impl LineTap {
             Some(Decoded::Text(byte)) => self.printout.take(byte, ledger).map(|()| None),
             None => Ok(None),
         }
+    }
+}
+
+/// The question whose answer a recorder gives to this.
+#[must_use]
+pub fn answered_as(error: ParseError) -> Option<Command> {
+    match error {
+        ParseError::BadValue { code, .. } if code == Code::Configure.byte() => {
+            Some(Command::QueryConfiguration)
+        }
+        _ => None,
     }
 }
 

@@ -106,9 +106,10 @@ impl Unit {
         self.ledger.expire(now_ms);
     }
 
-    /// Lets contacts begin what they do next, if it is time.
+    /// Lets contacts begin what they do next, if it is time, or all at once if nothing else is under way.
     pub fn play(&mut self, node: &mut SimNode<'_>, now_ms: u64, tempo: Tempo) {
-        if now_ms >= self.activity.next_ms() {
+        let may_begin = tempo == Tempo::Flat && node.next_move_ms().is_none();
+        if may_begin || now_ms >= self.activity.next_ms() {
             node.play(&self.activity.next_scene(now_ms, tempo));
         }
     }

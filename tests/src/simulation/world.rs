@@ -26,6 +26,9 @@ const PRINT_AND_REPORT: Configure = Configure {
     auto_print: true,
 };
 
+/// In this time a capture queue does not fill, whatever the inputs do.
+const MAX_DEBOUNCED_HOLD_UP_MS: u64 = 200;
+
 /// The tick wraps here.
 const TICKS: u64 = 1 << 32;
 
@@ -303,17 +306,26 @@ impl World {
 
     /// Something keeps the main loops of the recorders busy.
     fn hold_up(&mut self, life: &mut Life<'_>) {
-        let debounced = self.units.iter().any(|unit| unit.debounce != Debounce::OFF);
-        // With debounce, what a full queue drops is more than the ledger can tell.
-        let for_ms = self.chance.spread(1..=if debounced { 120 } else { 2_000 });
+        let for_ms = self.chance.spread(1..=2_000);
         self.trail.note(format_args!("main loops held up for {for_ms} ms"));
         self.hours.count(for_ms, life.bus.is_some());
+        let all_toggle = self.chance.one_in(2);
+        for (unit, node) in self.units.iter_mut().zip(&mut life.nodes) {
+            if all_toggle {
+                unit.play(node, self.now_ms, Tempo::Flat);
+            }
+            // With debounce, what a full queue drops is more than the ledger can tell.
+            let held_up = unit.debounce == Debounce::OFF || for_ms <= MAX_DEBOUNCED_HOLD_UP_MS;
+            let until_ms = self.now_ms + for_ms;
+            if held_up {
+                node.hold_up_to(until_ms);
+            } else {
+                node.leap_to(until_ms);
+            }
+            unit.follow(node, until_ms, held_up);
+        }
         self.now_ms += for_ms;
         self.trail.set_now(self.now_ms);
-        for (unit, node) in self.units.iter_mut().zip(&mut life.nodes) {
-            node.hold_up_to(self.now_ms);
-            unit.follow(node, self.now_ms, true);
-        }
     }
 
     /// Lets everything come to rest and all hosts read everything, and checks that it is all there.
