@@ -127,7 +127,8 @@ impl Account {
     }
 
     fn take_restart(&mut self, ledger: &Ledger) -> Result<(), String> {
-        if !self.new_life && !self.restart_told && self.erases_ahead(ledger).next().is_none() {
+        let explained = self.new_life || self.restart_told || self.has_wrapped(ledger);
+        if !explained && self.erases_ahead(ledger).next().is_none() {
             return Err(format!(
                 "{}: a restart of the log is reported after event {} of {} and there was none; erases: {:?}",
                 self.name,
@@ -159,7 +160,7 @@ impl Account {
         }
         // Power-up is as good as an erase.
         let power_up = self.new_life.then_some(Erase { from: 0, to: 0 });
-        let erases = self.erases_ahead(ledger).rev().chain(power_up);
+        let erases = self.erases_ahead(ledger).rev().chain(power_up).chain(self.looks_erased(ledger));
         let after_erase = { erases }.find_map(|erase| {
             let last = erase.to.min(ledger.len());
             let wraps = (ledger.len() - erase.from) / TOTAL_WRAPS_AT;
@@ -176,6 +177,19 @@ impl Account {
             }
             None => Err(self.explain(entry, lost, ledger)),
         }
+    }
+
+    /// Whether so much has happened since the latest delivery that the total tells little of it. It can look as if the event
+    /// delivered last must still be there, and then its absence looks like an erase.
+    fn has_wrapped(&self, ledger: &Ledger) -> bool {
+        ledger.len() - self.next >= TOTAL_WRAPS_AT
+    }
+
+    /// The erase from which on the total counts, where there seems to have been another one since.
+    fn looks_erased(&self, ledger: &Ledger) -> Option<Erase> {
+        let power_up = Erase { from: 0, to: 0 };
+        let latest = ledger.erases()[..self.erases_behind].last().copied().unwrap_or(power_up);
+        (self.restart_told && self.has_wrapped(ledger)).then_some(latest)
     }
 
     /// The event after an erase of which there is no word. It leaves no trace where the log was empty before, and where it is
