@@ -45,8 +45,9 @@ pub struct Account {
     /// What was told and belongs before the next event.
     restart_told: bool,
     lost_told: usize,
-    /// How many events there were when its reading began.
-    read_from: usize,
+    /// The total in the first reply of its reading, and how far it has gone on since.
+    read_from: Option<u16>,
+    came_meanwhile: u16,
     /// Whether the reader knows the last event that it was given, and so would miss it.
     anchored: bool,
     tally: Tally,
@@ -64,7 +65,8 @@ impl Account {
             new_life: true,
             restart_told: false,
             lost_told: 0,
-            read_from: 0,
+            read_from: None,
+            came_meanwhile: 0,
             anchored: false,
             tally: Tally::default(),
         }
@@ -82,8 +84,14 @@ impl Account {
     }
 
     /// A reading begins.
-    pub fn begin_reading(&mut self, ledger: &Ledger) {
-        self.read_from = ledger.len();
+    pub fn begin_reading(&mut self) {
+        self.read_from = None;
+    }
+
+    /// A reply of the reading says that the log has had so many events. Replies may be late, so how many there are by now is not
+    /// what the reader goes by.
+    pub fn see_total(&mut self, total: u16) {
+        self.came_meanwhile = total.wrapping_sub(*self.read_from.get_or_insert(total));
     }
 
     /// What became of all events up to the reader's place.
@@ -213,12 +221,15 @@ impl Account {
     fn go_on(&mut self, index: usize, wraps: usize, lost: usize, ledger: &Ledger) -> Result<(), String> {
         let missing = index - self.next;
         if missing > 0 {
-            let since = ledger.len().saturating_sub(self.read_from);
-            let may_be_lost = ledger.overwritten_before() + HASTE * since;
+            let came = self.came_meanwhile;
+            let may_be_lost = ledger.overwritten_before() + HASTE * usize::from(came);
             if index > may_be_lost {
                 return Err(format!(
-                    "{}: {lost} events before number {index} are reported as lost and are still there",
-                    self.name
+                    "{}: {lost} events before number {index} are reported as lost and are still there: of {}, those \
+                     before {} may be overwritten, and {came} came during the reading",
+                    self.name,
+                    ledger.len(),
+                    ledger.overwritten_before(),
                 ));
             }
         }

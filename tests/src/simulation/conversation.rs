@@ -203,8 +203,8 @@ impl Conversation {
         let _ = self.session.request(command);
     }
 
-    fn begin_reading(&mut self, resyncs: u32, now_ms: u64, ledger: &Ledger) {
-        self.account.begin_reading(ledger);
+    fn begin_reading(&mut self, resyncs: u32, now_ms: u64) {
+        self.account.begin_reading();
         let mut reader = LogReader::new(self.cursor, self.size);
         if let Some(position) = self.position.take() {
             reader = reader.starting_near(position);
@@ -252,17 +252,17 @@ impl Conversation {
                     self.talk.answered += 1;
                     self.answered(&reply, now_ms, ledger)?;
                 }
-                Some(Err(_)) => self.unanswered(now_ms, ledger),
+                Some(Err(_)) => self.unanswered(now_ms),
             }
         }
     }
 
-    fn unanswered(&mut self, now_ms: u64, ledger: &Ledger) {
+    fn unanswered(&mut self, now_ms: u64) {
         self.failures += 1;
         self.talk.unanswered += 1;
         match self.job {
             // As an original unit, which does not know the question: the size stays what it was.
-            Job::LearnSize { resyncs } if resyncs > 0 => self.begin_reading(resyncs, now_ms, ledger),
+            Job::LearnSize { resyncs } if resyncs > 0 => self.begin_reading(resyncs, now_ms),
             _ => self.job = Job::Rest,
         }
     }
@@ -288,7 +288,7 @@ impl Conversation {
             (Job::Read { reader, resyncs }, Reply::Read(reply)) => {
                 self.take_read(reader, resyncs, reply, now_ms, ledger)?;
             }
-            (Job::LearnSize { resyncs }, _) => self.begin_reading(resyncs, now_ms, ledger),
+            (Job::LearnSize { resyncs }, _) => self.begin_reading(resyncs, now_ms),
             _ => {}
         }
         Ok(())
@@ -302,6 +302,7 @@ impl Conversation {
         now_ms: u64,
         ledger: &Ledger,
     ) -> Result<(), String> {
+        self.account.see_total(reply.total);
         let mut deliveries = Vec::new();
         let taken = reader.take(reply, &mut |delivery| deliveries.push(delivery));
         self.deliver(&deliveries, ledger)?;
