@@ -1,5 +1,7 @@
 //! What has been delivered already, kept in the user's state directory between two runs: one file per unit.
 
+use std::error::Error;
+use std::fmt;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -14,13 +16,51 @@ const VERSION: u32 = 1;
 
 /// Where a unit's log had been read to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Delivered {
+pub struct Delivered {
     /// The unit's total after the last delivered event.
-    pub(crate) total: u16,
+    pub total: u16,
     /// The last delivered event itself, to tell the log from another one with the same total.
-    pub(crate) last: Option<Entry>,
+    pub last: Option<Entry>,
     /// Entries that the log could hold then.
-    pub(crate) size: u16,
+    pub size: u16,
+}
+
+/// A text that does not say what was delivered, and why.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NotDelivered(String);
+
+impl fmt::Display for NotDelivered {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl Error for NotDelivered {}
+
+impl Delivered {
+    /// Reads what [`to_text`](Self::to_text) has written.
+    ///
+    /// # Errors
+    /// When it has not: the text is damaged, or of another version.
+    pub fn from_text(text: &[u8]) -> std::result::Result<Delivered, NotDelivered> {
+        let content: Content =
+            serde_json::from_slice(text).map_err(|error| NotDelivered(error.to_string()))?;
+        if content.version != VERSION {
+            return Err(NotDelivered(format!("version {} is not {VERSION}", content.version)));
+        }
+        Ok(Delivered { total: content.total, last: content.last.map(Entry::from), size: content.size })
+    }
+
+    /// The content of the state file of this unit.
+    ///
+    /// # Errors
+    /// None that is known: there is nothing here that JSON does not have.
+    pub fn to_text(&self, unit: &str) -> io::Result<String> {
+        let Delivered { total, last, size } = *self;
+        let last = last.as_ref().map(LastEntry::from);
+        let content = Content { version: VERSION, unit: unit.to_owned(), total, size, last };
+        Ok(serde_json::to_string(&content)? + "\n")
+    }
 }
 
 /// The file of one unit.
@@ -98,11 +138,7 @@ impl StateFile {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(Failure::reading(self.path.display(), &error)),
         };
-        let content: Content = serde_json::from_slice(&text).map_err(|error| self.damaged(&error))?;
-        if content.version != VERSION {
-            return Err(self.damaged(&format_args!("version {} is not {VERSION}", content.version)));
-        }
-        Ok(Some(Delivered { total: content.total, last: content.last.map(Entry::from), size: content.size }))
+        Delivered::from_text(&text).map(Some).map_err(|why| self.damaged(&why))
     }
 
     /// Remembers what has been delivered. After a crash the file holds either the old or the new content.
@@ -115,18 +151,12 @@ impl StateFile {
     }
 
     fn try_save(&self, delivered: &Delivered) -> io::Result<()> {
-        let content = Content {
-            version: VERSION,
-            unit: self.unit.clone(),
-            total: delivered.total,
-            size: delivered.size,
-            last: delivered.last.as_ref().map(LastEntry::from),
-        };
+        let text = delivered.to_text(&self.unit)?;
         if let Some(directory) = self.path.parent() {
             fs::create_dir_all(directory)?;
         }
         let temporary = self.path.with_extension("tmp");
-        let result = write_whole(&temporary, &content).and_then(|()| fs::rename(&temporary, &self.path));
+        let result = write_whole(&temporary, &text).and_then(|()| fs::rename(&temporary, &self.path));
         if result.is_err() {
             // The first error is the one to tell.
             let _ = fs::remove_file(&temporary);
@@ -134,17 +164,16 @@ impl StateFile {
         result
     }
 
-    fn damaged(&self, why: &dyn std::fmt::Display) -> Failure {
+    fn damaged(&self, why: &NotDelivered) -> Failure {
         Failure::new(format!("{} does not say what was delivered: {why}", self.path.display()))
             .hint("read --all delivers everything the unit has and needs no state")
             .hint("delete the file to begin anew: the next --new then delivers everything")
     }
 }
 
-fn write_whole(path: &Path, content: &Content) -> io::Result<()> {
+fn write_whole(path: &Path, text: &str) -> io::Result<()> {
     let mut file = fs::File::create(path)?;
-    serde_json::to_writer(&mut file, content)?;
-    writeln!(file)?;
+    file.write_all(text.as_bytes())?;
     file.sync_all()
 }
 

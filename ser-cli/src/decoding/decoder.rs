@@ -12,7 +12,7 @@ const MAX_BODY: usize = 255;
 
 /// What a capture looks like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum CaptureFormat {
+pub enum CaptureFormat {
     /// The bytes as they are.
     Raw,
     /// Text like `1B 30 31`; blanks, commas, 0x and # comments are allowed.

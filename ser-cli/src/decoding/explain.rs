@@ -11,7 +11,7 @@ use crate::values::on_off;
 
 /// Who sent a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Side {
+pub enum Side {
     /// Commands.
     Host,
     /// Replies and auto reports.

@@ -57,20 +57,30 @@ pub(crate) enum Kind {
 
 /// How many there were of what.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Tally {
-    messages: u64,
-    lines: u64,
-    damages: u64,
+pub struct Tally {
+    /// Messages in frames that are whole, or bodies.
+    pub messages: u64,
+    /// Lines of text between frames.
+    pub lines: u64,
+    /// Places where something is broken.
+    pub damages: u64,
 }
 
 /// Writes the list and keeps count.
-pub(crate) struct Listing<W> {
+#[derive(Debug)]
+pub struct Listing<W> {
     out: W,
     palette: Palette,
     tally: Tally,
 }
 
 impl<W: Write> Listing<W> {
+    /// A list without colours.
+    #[must_use]
+    pub fn plain(out: W) -> Listing<W> {
+        Listing::new(out, Palette::plain())
+    }
+
     pub(crate) fn new(out: W, palette: Palette) -> Listing<W> {
         Listing { out, palette, tally: Tally::default() }
     }
@@ -104,7 +114,8 @@ impl<W: Write> Listing<W> {
     }
 
     /// What has been counted.
-    pub(crate) fn tally(&self) -> Tally {
+    #[must_use]
+    pub fn tally(&self) -> Tally {
         self.tally
     }
 }

@@ -1,15 +1,19 @@
 //! From a capture of the line back to messages: the reading behind `ser-cli decode`.
 
+mod capture;
 mod decoder;
 mod explain;
 mod hex;
 mod lines;
 mod listing;
 
-pub(crate) use decoder::{CaptureFormat, Decoder};
-pub(crate) use explain::{Explanation, Side, explain, hex_text};
-pub(crate) use listing::{Listing, Tally};
+pub use capture::CaptureOptions;
+pub use decoder::CaptureFormat;
+pub use explain::Side;
+pub(crate) use explain::{Explanation, explain, hex_text};
+pub use listing::{Listing, Tally};
 
+use decoder::Decoder;
 use hex::{HexText, HexToken};
 use lines::LineAssembler;
 use listing::{Kind, Place};

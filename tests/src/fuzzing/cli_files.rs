@@ -1,10 +1,12 @@
 //! Files that a user writes: contact scenarios.
 
 use std::collections::BTreeSet;
-use std::io::{self, Read};
+use std::io::Read;
 
 use ser_proto::Model;
 use ser_sim::{Scenario, ScenarioError, ScenarioFault};
+
+use super::dribble::Dribble;
 
 /// What errors call the file.
 const NAME: &str = "contacts.csv";
@@ -79,19 +81,4 @@ fn csv(scenario: &Scenario) -> String {
         text += &format!("{},{},{}\n", step.at_ms, step.input, u8::from(step.on));
     }
     text
-}
-
-/// Hands out a few bytes at a time.
-struct Dribble<'a> {
-    data: &'a [u8],
-}
-
-impl Read for Dribble<'_> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let count = self.data.first().map_or(0, |&byte| 1 + usize::from(byte) % 5).min(self.data.len());
-        let (now, later) = self.data.split_at(count);
-        buffer[..count].copy_from_slice(now);
-        self.data = later;
-        Ok(count)
-    }
 }

@@ -5,11 +5,13 @@
 //! those that are kept as seeds. Nothing here reads a clock or waits, so the same bytes always do the same.
 
 mod body_rules;
+mod captures;
 mod cli_files;
 mod client;
 mod comm_req;
 mod commands;
 mod datagrams;
+mod dribble;
 mod frames;
 mod framing;
 mod geni_driver;
@@ -17,7 +19,9 @@ mod node;
 mod replies;
 mod script;
 pub mod seeds;
+mod state_files;
 
+pub use captures::captures;
 pub use cli_files::cli_files;
 pub use client::client;
 pub use comm_req::comm_req;
@@ -27,6 +31,7 @@ pub use frames::frames;
 pub use geni_driver::geni_driver;
 pub use node::node;
 pub use replies::replies;
+pub use state_files::state_files;
 
 /// A function that takes any bytes and panics when something does not hold.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +43,7 @@ pub struct Target {
 }
 
 /// All of them.
-pub const TARGETS: [Target; 9] = [
+pub const TARGETS: [Target; 11] = [
     Target { name: "frames", run: frames },
     Target { name: "commands", run: commands },
     Target { name: "replies", run: replies },
@@ -48,4 +53,6 @@ pub const TARGETS: [Target; 9] = [
     Target { name: "node", run: node },
     Target { name: "client", run: client },
     Target { name: "cli_files", run: cli_files },
+    Target { name: "captures", run: captures },
+    Target { name: "state_files", run: state_files },
 ];

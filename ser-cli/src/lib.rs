@@ -1,0 +1,33 @@
+//! The recorder's command line, as a library: the program is [`run`] and nothing else.
+//!
+//! What reads files of any origin can be used by itself, so that tests and fuzzers reach it: captures of a line
+//! ([`CaptureOptions`]), and what a run before has noted down ([`Delivered`]).
+
+mod cli;
+mod commands;
+mod connection;
+mod decoding;
+mod delivery;
+mod error;
+mod interrupt;
+mod keeper;
+mod outage;
+mod output;
+mod progress;
+mod state;
+mod time;
+mod values;
+
+use std::process::ExitCode;
+
+pub use decoding::{CaptureFormat, CaptureOptions, Listing, Side, Tally};
+pub use state::{Delivered, NotDelivered};
+
+/// Does what the command line says.
+#[must_use]
+pub fn run() -> ExitCode {
+    match cli::Cli::from_command_line().run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}
