@@ -15,6 +15,7 @@
 //! | [`clock_chip`]     | the battery-backed clock, with what it has to say against itself                       |
 //! | [`stm32_rtc`]      | the calendar registers of STM32 clocks as date and time                                |
 //! | [`leds`]           | what the four lamps mean                                                               |
+//! | [`fault`]          | what a hard fault was, by what the processor shows of it                               |
 //! | [`last_words`]     | what outlives a reset: its cause, the panic's text, the number of boots                |
 //! | `report`           | tells the log which counters have moved (feature `defmt`)                             |
 //! | [`counter`]        | counts that one side keeps and another one reads                                       |
@@ -28,6 +29,7 @@
 pub mod budget;
 pub mod clock_chip;
 pub mod counter;
+pub mod fault;
 pub mod flash_log;
 pub mod inputs;
 pub mod last_words;

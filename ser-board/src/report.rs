@@ -1,12 +1,34 @@
-//! Tells the log which counters have moved, and how far down the stack has been.
+//! Tells the log how the runs before ended, which counters have moved, and how far down the stack has been.
 //!
 //! The protocol has no place for any of this: the log is the only trace of what was dropped, refused or lost.
 
 use geni::Counters;
 use ser_node::{Diagnostics, GeniusDiagnostics};
 
+use crate::last_words::Boot;
+
 /// Counters that run all the time must not fill the log.
 const INTERVAL_MS: u32 = 1000;
+
+/// Logs how the run before ended, if it was a fault, or else what the latest fault had to say. Called once, at start-up.
+pub fn last_words(boot: &Boot) {
+    let told = boot.last_words.as_ref().filter(|words| words.starts_ago == 1);
+    if boot.cause.is_fault() {
+        let text = told.map_or("", |words| words.text.as_str());
+        defmt::error!("the run before ended with a fault: {}: {=str}", boot.cause, text);
+    }
+    if let Some(words) = &boot.last_words
+        && !(boot.cause.is_fault() && told.is_some())
+    {
+        let text = words.text.as_str();
+        defmt::warn!(
+            "the latest fault was {=u32} starts ago: {}: {=str}",
+            words.starts_ago,
+            words.fault,
+            text
+        );
+    }
+}
 
 /// What the log knows already.
 pub struct Report {

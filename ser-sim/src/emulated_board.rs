@@ -2,6 +2,7 @@
 //! the bench.
 
 use std::fmt;
+use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -28,6 +29,10 @@ pub enum ForcedFault {
     StackOverflow = 4,
     /// Its capture interrupt comes no more.
     CaptureStops = 5,
+    /// A store of its main program gets below the stack, in which the processor finds room to save registers.
+    StackOverflowByStore = 6,
+    /// It resets, and says nothing about it.
+    SilentReset = 7,
 }
 
 /// The emulated board; clones are the same board.
@@ -78,10 +83,17 @@ impl EmulatedBoard {
         self.bus.reset_cause().try_into().ok().and_then(ResetCause::from_code)
     }
 
-    /// What the run before the last start had to say.
+    /// What its latest fault had to say; empty when it said nothing, or there was none.
     #[must_use]
     pub fn last_words(&self) -> String {
         String::from_utf8_lossy(&self.bus.last_words()).into_owned()
+    }
+
+    /// How many starts ago its latest fault was: 1 when its last start was the first one after it. None when there was
+    /// none since it had no power.
+    #[must_use]
+    pub fn fault_starts_ago(&self) -> Option<NonZeroU32> {
+        NonZeroU32::new(self.bus.last_words_age())
     }
 
     /// Which of its lamps are lit.
@@ -139,10 +151,12 @@ mod tests {
 
     #[test]
     fn last_words_are_read_as_the_board_lays_them_out() {
-        let words = [(0x8018, 1), (0x8080, 5), (0x8084, u32::from_le_bytes(*b"pani")), (0x8088, 0x63)];
+        let text = [(0x8080, 5), (0x8084, u32::from_le_bytes(*b"pani")), (0x8088, 0x63)];
+        let words = [&[(0x8018, 1), (0x80E0, 3)], &text[..]].concat();
         let panicked = board(&words);
         assert_eq!(panicked.reset_cause(), Some(ResetCause::Panic));
         assert_eq!(panicked.last_words(), "panic");
+        assert_eq!(panicked.fault_starts_ago(), NonZeroU32::new(3));
         // Whatever stands there, no more is taken than there is room for.
         let garbled = board(&[(0x8018, 0x0001_0001), (0x8080, u32::MAX)]);
         assert_eq!((garbled.reset_cause(), garbled.last_words().len()), (None, 92));

@@ -48,8 +48,10 @@ const FORCED_FAULT: usize = 0x802C;
 const CLOCK_COUNT_MS: usize = 0x8030;
 /// How long its last start took, in microseconds.
 const BOOT_TIME_US: usize = 0x803C;
-/// Length of what its run before the last start had to say, and then the text.
+/// Length of what its latest fault had to say, and then the text.
 const LAST_WORDS: usize = 0x8080;
+/// How many starts ago that was; 0 for never.
+const LAST_WORDS_AGE: usize = 0x80E0;
 
 /// The mapped memory.
 pub(crate) struct ExternalBus {
@@ -140,11 +142,16 @@ impl ExternalBus {
         self.read(RESET_CAUSE)
     }
 
-    /// What its run before the last start had to say.
+    /// What its latest fault had to say.
     pub(crate) fn last_words(&self) -> Vec<u8> {
         let len = usize::try_from(self.read(LAST_WORDS)).unwrap_or(usize::MAX).min(MAX_TEXT_LEN);
         let words = (LAST_WORDS + 4..).step_by(4).map(|offset| self.read(offset).to_le_bytes());
         words.take(MAX_TEXT_LEN / 4).flatten().take(len).collect()
+    }
+
+    /// How many starts ago its latest fault was; 0 for never.
+    pub(crate) fn last_words_age(&self) -> u32 {
+        self.read(LAST_WORDS_AGE)
     }
 
     /// How long its last start took, in microseconds.

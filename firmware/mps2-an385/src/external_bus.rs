@@ -22,15 +22,16 @@
 //! |               | are sampled, in µs                                     |            |
 //! | 8040h–8048h   | what the clock shows in ms since 1970, less its count: | recorder   |
 //! |               | low, high, seal                                        |            |
-//! | 8080h         | length of the last words of the run before, in bytes   | recorder   |
+//! | 8080h         | length of the latest fault's last words, in bytes      | recorder   |
 //! | 8084h–80DFh   | these words, UTF-8                                     | recorder   |
+//! | 80E0h         | how many starts ago that was; 0 for never              | recorder   |
 //! | 9000h, 9040h  | configuration memory, two blocks of 64 bytes           | recorder   |
 //!
 //! Words have 32 bits, little-endian.
 //!
 //! - Causes: 0 unknown, 1 panic, 2 hard fault, 3 watchdog, 4 stack overflow, 5 the program asked for it, 6 power.
-//! - Faults that can be forced: 1 hard fault, 2 the main loop hangs, 3 panic, 4 stack overflow, 5 capture stops. The recorder
-//!   clears the word before it obeys.
+//! - Faults that can be forced: 1 hard fault, 2 the main loop hangs, 3 panic, 4 stack overflow, 5 capture stops, 6 stack
+//!   overflow by a store, 7 reset without a word. The recorder clears the word before it obeys.
 //! - Two words with a seal are good when the seal is the inverse of (low xor (high rotated by 16 bits)).
 //!
 //! # Design
@@ -52,7 +53,7 @@ use core::convert::Infallible;
 use core::ptr::{self, NonNull};
 
 use geni::WindowRam;
-use ser_board::last_words::{MAX_TEXT_LEN, ResetCause, Text};
+use ser_board::last_words::{Boot, MAX_TEXT_LEN, Text};
 use ser_node::{CopyNumber, Debounce, RECORD_LEN, Storage};
 use ser_proto::Model;
 
@@ -98,6 +99,9 @@ const BOOT_TIME_US: Word = unsafe { word(0x803C) };
 pub(crate) const CLOCK_OFFSET_MS: SealedWords = unsafe { SealedWords::at(0x8040) };
 // SAFETY: see the map.
 const LAST_WORDS_LEN: Word = unsafe { word(0x8080) };
+
+// SAFETY: see the map.
+const LAST_WORDS_AGE: Word = unsafe { word(0x80E0) };
 
 const LAST_WORDS: usize = 0x8084;
 const _: () = assert!(MAX_TEXT_LEN == 0x80E0 - LAST_WORDS);
@@ -192,13 +196,16 @@ pub(crate) fn mark_boot_time(microseconds: u32) {
     BOOT_TIME_US.write(microseconds);
 }
 
-/// Counts a boot and lays open what the run before had to say. Gives the count.
-pub(crate) fn mark_boot(cause: ResetCause, words: &Text) -> u32 {
+/// Counts a boot and lays open what the latest fault had to say. Gives the count.
+pub(crate) fn mark_boot(boot: &Boot) -> u32 {
     SAMPLE_COUNTER.write(0);
     SAMPLED_INPUTS.write(!INPUT_LATCH.read());
     STACK_BYTES.write(0);
-    RESET_CAUSE.write(cause.code().into());
-    let bytes = words.as_str().as_bytes();
+    RESET_CAUSE.write(boot.cause.code().into());
+    let (text, starts_ago) =
+        boot.last_words.as_ref().map_or((&Text::EMPTY, 0), |words| (&words.text, words.starts_ago));
+    LAST_WORDS_AGE.write(starts_ago);
+    let bytes = text.as_str().as_bytes();
     LAST_WORDS_LEN.write(u32::try_from(bytes.len()).unwrap_or(0));
     for (offset, bytes) in (LAST_WORDS..).step_by(WORD_LEN).zip(bytes.chunks(WORD_LEN)) {
         let mut whole = [0; WORD_LEN];

@@ -17,11 +17,9 @@ mod forced;
 mod genius;
 mod inputs;
 mod lamps;
-mod last_words;
 mod log;
 mod mmio;
 mod rtc;
-mod stack;
 mod timer;
 mod uart;
 mod watchdog;
@@ -35,7 +33,9 @@ mod app {
     use ser_board::last_words::Boot;
     use ser_board::leds::{self, Condition};
     use ser_board::main_loop;
-    use ser_board::report::Report;
+    use ser_board::report::{self, Report};
+    use ser_cortex_m::protection::{self, Region};
+    use ser_cortex_m::stack;
     use ser_node::{Capture, CaptureChannel, Event, Liveness, Node, NodeParts, VERSION};
 
     use crate::external_bus::{self, ConfigurationMemory};
@@ -46,13 +46,16 @@ mod app {
     use crate::timer::{self, Timer};
     use crate::uart::{self, ReceiveInterrupt, Rings, SerialLine, TransmitInterrupt};
     use crate::watchdog::Watchdog;
-    use crate::{fault, forced, last_words, log, stack};
+    use crate::{fault, forced, log};
 
     /// Events that the log holds: the largest size that can be configured.
     const LOG_LEN: usize = 2048;
 
     /// No clock can show an earlier day: there was no such recorder.
     const NOT_BEFORE: NaiveDate = NaiveDate::from_ymd_opt(2026, 1, 1).unwrap();
+
+    /// There is nothing below the stack, and nobody says so: QEMU swallows what is written there.
+    const BELOW_STACK: Region = Region::nothing(0x1000_0000, 0x1000_0000);
 
     // RTIC takes nothing but literals for priorities.
     const _: () = {
@@ -89,8 +92,11 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let init::LocalResources { channel, events, rings, .. } = cx.local;
         log::start();
-        let boot = last_words::boot();
-        let count = external_bus::mark_boot(boot.cause, &boot.text);
+        // SAFETY: the program uses nothing in that region.
+        unsafe { protection::enable(&cx.core.MPU, [BELOW_STACK]) };
+        // SAFETY: `init` runs once, with interrupts off.
+        let boot = unsafe { fault::boot() };
+        let count = external_bus::mark_boot(&boot);
         let model = external_bus::model();
         log_start(&boot, count, model);
 
@@ -134,9 +140,7 @@ mod app {
 
     fn log_start(boot: &Boot, count: u32, model: ser_proto::Model) {
         defmt::info!("version {=u8}, {}, boot {=u32}: {}", VERSION, model, count, boot.cause);
-        if boot.cause.is_fault() {
-            defmt::error!("the run before ended with a fault: {}: {=str}", boot.cause, boot.text.as_str());
-        }
+        report::last_words(boot);
     }
 
     /// Takes a sample of all inputs.

@@ -1,8 +1,8 @@
 //! The watchdog.
 //!
 //! # Design
-//! The first time-out is the non-maskable interrupt, which only leaves the last words (see `fault`); the second one resets
-//! the board. A main loop that is late, but alive, feeds in between and goes on.
+//! The first time-out is the non-maskable interrupt, which only takes note of it (see `fault`); the second one leaves the
+//! last words and resets the board. A main loop that is late, but alive, feeds in between and goes on.
 //!
 //! # Tradeoffs
 //! Two seconds each: a recorder that hangs is back after four. Shorter times would reset an emulator whose host is busy.

@@ -7,7 +7,7 @@
 //!
 //! # Notes
 //! 32 bits at a time, which wants 2.7 V at least: the brown-out reset has to be at its highest level, which
-//! `last_words` tells the log if it is not. Times (data sheet, "Flash memory programming"): 250–500 ms to erase a sector of
+//! `reset` tells the log if it is not. Times (data sheet, "Flash memory programming"): 250–500 ms to erase a sector of
 //! 16 KiB, 16–100 µs to write a word.
 
 use core::ptr;

@@ -24,15 +24,12 @@ mod geni_bus;
 mod genius;
 mod inputs;
 mod lamps;
-mod last_words;
 mod log;
 mod pins;
 mod protection;
+mod reset;
 mod rtc;
 mod rtt;
-// The same on every board that paints its stack.
-#[path = "../../mps2-an385/src/stack.rs"]
-mod stack;
 mod straps;
 mod timer;
 mod uart;
@@ -47,7 +44,8 @@ mod app {
     use ser_board::last_words::Boot;
     use ser_board::leds::{self, Condition};
     use ser_board::main_loop;
-    use ser_board::report::Report;
+    use ser_board::report::{self, Report};
+    use ser_cortex_m::{last_words, stack};
     use ser_node::{Capture, CaptureChannel, Event, Liveness, Node, NodeParts, VERSION};
 
     use crate::clocks::{self, Source};
@@ -61,7 +59,7 @@ mod app {
     use crate::timer::{self, Timer};
     use crate::uart::{self, Rings, SerialInterrupt, SerialLine};
     use crate::watchdog::Watchdog;
-    use crate::{last_words, log, pins, protection, stack};
+    use crate::{log, pins, protection, reset};
 
     /// Events that the log holds: the largest size that can be configured.
     const LOG_LEN: usize = 2048;
@@ -126,11 +124,12 @@ mod app {
         let clock_source = clocks::start(&device.RCC, &device.PWR, &device.FLASH);
         protection::enable(&cx.core.MPU);
         log::start(&device.DBGMCU);
-        let boot = last_words::boot(&device.RCC);
+        // SAFETY: `init` runs once, with interrupts off.
+        let boot = unsafe { last_words::boot(|_| reset::take_flag(&device.RCC)) };
         let straps = Straps::read(&ports.e);
         let model = straps.model();
         defmt::info!("version {=u8}, {}, start {=u32}: {}", VERSION, model, boot.count, boot.cause);
-        log_start(&boot, clock_source, last_words::guards_brown_out(&device.FLASH));
+        log_start(&boot, clock_source, reset::guards_brown_out(&device.FLASH));
 
         let (capture, reader) = channel.split(straps.debounce());
         let clock = ChipClock::start(&device.RCC, &device.PWR, device.RTC);
@@ -172,9 +171,7 @@ mod app {
     }
 
     fn log_start(boot: &Boot, clock_source: Source, guards_brown_out: bool) {
-        if boot.cause.is_fault() {
-            defmt::error!("the run before ended with a fault: {}: {=str}", boot.cause, boot.text.as_str());
-        }
+        report::last_words(boot);
         if clock_source == Source::RcOscillator {
             defmt::error!("the crystal does not swing: time runs by the RC oscillator, 1 % off");
         }

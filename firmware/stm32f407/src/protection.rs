@@ -14,73 +14,23 @@
 //!
 //! # Notes
 //! By itself the processor takes the external bus for ordinary memory, whose accesses may be repeated, joined
-//! and put off. Device memory has every access done once, in order and as it was written. Everything that is not listed
-//! keeps the processor's own map. Faults end in the hard fault handler, for which the unit is off.
-//! (ARMv7-M architecture, B3.5.)
+//! and put off. Device memory has every access done once, in order and as it was written.
 
-use cortex_m::asm;
 use cortex_m::peripheral::MPU;
+use ser_cortex_m::protection::{self, Region};
 
 use crate::{flash, geni_bus};
 
-/// No access, and nothing runs from there.
-const NOTHING: u32 = NEVER_EXECUTE;
-/// Device memory for reading and writing.
-const DEVICE: u32 = NEVER_EXECUTE | FULL_ACCESS | SHAREABLE | BUFFERABLE;
-
-const NEVER_EXECUTE: u32 = 1 << 28;
-const FULL_ACCESS: u32 = 0b011 << 24;
-const SHAREABLE: u32 = 1 << 18;
-const BUFFERABLE: u32 = 1 << 16;
-const ENABLE: u32 = 1 << 0;
-
-/// The unit is on, outside of fault handlers; what is in no region has the processor's own map.
-const CONTROL: u32 = 1 << 2 | ENABLE;
-
-struct Region {
-    base: u32,
-    len: u32,
-    attributes: u32,
-}
-
-/// Where regions overlap, the later one holds.
 const REGIONS: [Region; 4] = [
-    Region { base: 0, len: 0x1000_0000, attributes: NOTHING },
-    Region { base: flash::BASE, len: flash::LEN, attributes: DEVICE },
-    Region { base: geni_bus::BANK, len: 0x2000_0000, attributes: NOTHING },
-    Region { base: geni_bus::BANK, len: geni_bus::WINDOW_LEN, attributes: DEVICE },
+    Region::nothing(0, 0x1000_0000),
+    Region::device(flash::BASE, flash::LEN),
+    Region::nothing(geni_bus::BANK, 0x2000_0000),
+    Region::device(geni_bus::BANK, geni_bus::WINDOW_LEN),
 ];
-
-impl Region {
-    const fn size_and_attributes(&self) -> u32 {
-        assert!(self.len.is_power_of_two() && self.len >= 32 && self.base.is_multiple_of(self.len));
-        // The size is a power of two, given as its exponent less one.
-        self.attributes | (self.len.ilog2() - 1) << 1 | ENABLE
-    }
-}
 
 /// Switches the protection on, for good.
 pub(crate) fn enable(mpu: &MPU) {
-    const SIZES_AND_ATTRIBUTES: [u32; REGIONS.len()] = {
-        let mut registers = [0; REGIONS.len()];
-        let mut number = 0;
-        while number < REGIONS.len() {
-            registers[number] = REGIONS[number].size_and_attributes();
-            number += 1;
-        }
-        registers
-    };
-    for (number, (region, register)) in (0..).zip(REGIONS.iter().zip(SIZES_AND_ATTRIBUTES)) {
-        // SAFETY: the regions forbid only what this program never does, and take nothing from what it uses.
-        #[expect(clippy::multiple_unsafe_ops_per_block, reason = "one reason for all three")]
-        unsafe {
-            mpu.rnr.write(number);
-            mpu.rbar.write(region.base);
-            mpu.rasr.write(register);
-        }
-    }
-    // SAFETY: as above.
-    unsafe { mpu.ctrl.write(CONTROL) };
-    asm::dsb();
-    asm::isb();
+    // SAFETY: the regions forbid only what this program never does; the configuration and the shared RAM are reached by
+    // volatile accesses of their drivers and by nothing else.
+    unsafe { protection::enable(mpu, REGIONS) };
 }

@@ -1,21 +1,21 @@
-//! What outlives a reset.
+//! The memory that outlives a reset, and the only way to write to it: on the way there.
 //!
 //! # Notes
-//! The memory is read and written word by word and volatile: nobody gave it a first value. QEMU tells no cause of a
-//! reset, and its memory keeps what it holds until the emulator ends: memory that no run has written has been without
-//! power.
+//! It is read and written word by word and volatile: nobody gave it a first value, and after a power cut it holds
+//! anything. `ser_board` checks what it finds. A power cut that was short may leave it whole.
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 use core::ptr;
 
+use cortex_m::peripheral::SCB;
 use ser_board::last_words::{self, Boot, Fault, Memory, ResetFlag, Text, WORDS};
 
 #[repr(transparent)]
 struct Kept(UnsafeCell<MaybeUninit<Memory>>);
 
-// SAFETY: `init` uses it before there are interrupts; after that, whoever is on the way to a reset, or the watchdog's
-// interrupt and the main loop, never one inside the other: see `fault`.
+// SAFETY: used by `boot`, which runs once and before there are interrupts, and by `end`, which does not return: whoever
+// is interrupted by it does not go on, so no two of them are ever at work.
 unsafe impl Sync for Kept {}
 
 #[unsafe(link_section = ".uninit.LAST_WORDS")]
@@ -37,20 +37,20 @@ fn with_memory<T>(change: impl FnOnce(&mut Memory) -> T) -> T {
     result
 }
 
-/// What is known about the run before. Called once, by `init`.
-pub(crate) fn boot() -> Boot {
+/// What is known about the runs before; counts the start. `flag` says why the chip was reset, by the chip's own flags or by
+/// what is in the memory.
+///
+/// # Safety
+/// This is called once only, before there are interrupts.
+pub unsafe fn boot(flag: impl FnOnce(&Memory) -> ResetFlag) -> Boot {
     with_memory(|memory| {
-        let flag = if last_words::is_kept(memory) { ResetFlag::Unknown } else { ResetFlag::PowerOn };
+        let flag = flag(memory);
         last_words::boot(memory, flag)
     })
 }
 
-/// Writes the last words.
-pub(crate) fn write(fault: Fault, text: &Text) {
+/// Writes the last words and resets the board.
+pub fn end(fault: Fault, text: &Text) -> ! {
     with_memory(|memory| last_words::write(memory, fault, text));
-}
-
-/// Takes them back: it did not come to a reset.
-pub(crate) fn withdraw() {
-    with_memory(last_words::withdraw);
+    SCB::sys_reset()
 }
