@@ -16,6 +16,9 @@ pub trait Line {
     /// The next byte that has arrived.
     fn receive(&mut self) -> Option<Received>;
 
+    /// How many bytes were lost or misread since this was asked last.
+    fn errors(&mut self) -> u32;
+
     /// Whether another byte may be sent.
     fn can_send(&self) -> bool;
 
@@ -42,6 +45,7 @@ pub fn pass<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L
 }
 
 fn take_in<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L) {
+    node.serial_line_errors(line.errors());
     for _ in 0..L::MAX_BYTES {
         // Commands that find no room in the node wait in the ring.
         if !node.serial_has_room() {
@@ -49,9 +53,6 @@ fn take_in<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L)
         }
         let Some(received) = line.receive() else { break };
         node.serial_receive(received.byte, received.tick_ms);
-        if received.overrun {
-            node.serial_line_error();
-        }
     }
 }
 

@@ -1,13 +1,14 @@
 //! The RS-232 line between the UART's interrupts and the main loop.
 //!
 //! A received byte keeps the tick at which it arrived, because the moment at which a command arrives matters to the
-//! recorder (it may set the clock), however late the main loop looks. A byte that is lost leaves a mark on the next
-//! one.
+//! recorder (it may set the clock), however late the main loop looks. A byte that is lost or misread is counted at once, by
+//! a count of its own: it is told even if no other byte ever comes, and when the ring has no room for anything.
 
-use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
 use ser_proto::Baud;
 
+use crate::counter::Counter;
 use crate::ring::{Reader, Ring, Slot, Writer};
 
 /// Bits of a character with start and stop bit.
@@ -21,35 +22,27 @@ pub struct Received {
     pub byte: u8,
     /// When, in milliseconds since power-up, wrapping.
     pub tick_ms: u32,
-    /// At least one byte was lost around this one, before or after it: which of two a UART keeps is up to the UART.
-    pub overrun: bool,
 }
 
 /// One received byte in a ring.
 pub struct ReceivedCell {
     tick_ms: AtomicU32,
-    /// The byte, and above it the overrun mark.
-    byte: AtomicU16,
+    byte: AtomicU8,
 }
-
-const OVERRUN: u16 = 1 << 8;
 
 impl Slot for Received {
     type Cell = ReceivedCell;
-    const EMPTY: ReceivedCell = ReceivedCell { tick_ms: AtomicU32::new(0), byte: AtomicU16::new(0) };
+    const EMPTY: ReceivedCell = ReceivedCell { tick_ms: AtomicU32::new(0), byte: AtomicU8::new(0) };
 
     #[inline]
     fn store(self, cell: &ReceivedCell) {
         cell.tick_ms.store(self.tick_ms, Ordering::Relaxed);
-        let mark = if self.overrun { OVERRUN } else { 0 };
-        cell.byte.store(u16::from(self.byte) | mark, Ordering::Relaxed);
+        cell.byte.store(self.byte, Ordering::Relaxed);
     }
 
     #[inline]
     fn load(cell: &ReceivedCell) -> Received {
-        let word = cell.byte.load(Ordering::Relaxed);
-        let [byte, _] = word.to_le_bytes();
-        Received { byte, tick_ms: cell.tick_ms.load(Ordering::Relaxed), overrun: word & OVERRUN != 0 }
+        Received { byte: cell.byte.load(Ordering::Relaxed), tick_ms: cell.tick_ms.load(Ordering::Relaxed) }
     }
 }
 
@@ -57,14 +50,17 @@ impl Slot for Received {
 pub struct SerialRings<const RECEIVE: usize, const TRANSMIT: usize> {
     receive: Ring<Received, RECEIVE>,
     transmit: Ring<u8, TRANSMIT>,
+    errors: Counter,
 }
 
-/// The four ends of [`SerialRings`].
+/// The ends of [`SerialRings`].
 pub struct SerialEnds<'a, const RECEIVE: usize, const TRANSMIT: usize> {
     /// The receive interrupt's.
     pub receiver: Receiver<'a, RECEIVE>,
     /// The main loop's end of what was received.
     pub received: Reader<'a, Received, RECEIVE>,
+    /// The main loop's end of what was not received as it was sent.
+    pub errors: LineErrors<'a>,
     /// The main loop's end of what is to be sent.
     pub to_send: Writer<'a, u8, TRANSMIT>,
     /// The transmit interrupt's.
@@ -75,14 +71,16 @@ impl<const RECEIVE: usize, const TRANSMIT: usize> SerialRings<RECEIVE, TRANSMIT>
     /// Empty rings.
     #[must_use]
     pub const fn new() -> Self {
-        SerialRings { receive: Ring::new(), transmit: Ring::new() }
+        SerialRings { receive: Ring::new(), transmit: Ring::new(), errors: Counter::new() }
     }
 
     /// The ends of both rings.
     pub fn split(&mut self) -> SerialEnds<'_, RECEIVE, TRANSMIT> {
         let (receiver, received) = self.receive.split();
         let (to_send, transmitter) = self.transmit.split();
-        SerialEnds { receiver: Receiver { ring: receiver, lost: false }, received, to_send, transmitter }
+        let receiver = Receiver { ring: receiver, errors: &self.errors };
+        let errors = LineErrors { errors: &self.errors, told: self.errors.get() };
+        SerialEnds { receiver, received, errors, to_send, transmitter }
     }
 }
 
@@ -92,11 +90,21 @@ impl<const RECEIVE: usize, const TRANSMIT: usize> Default for SerialRings<RECEIV
     }
 }
 
+/// What a UART shows that keeps one received byte, such as those of STM32: SR's RXNE, ORE, and FE or NF.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReceiveStatus {
+    /// The data register holds a byte that was not taken yet.
+    pub has_byte: bool,
+    /// A byte came that found the data register full, and is lost; what is in the data register stays there.
+    pub overrun: bool,
+    /// The byte in the data register is not what was sent: its stop bit is missing, or noise was seen.
+    pub misread: bool,
+}
+
 /// The receive interrupt's end.
 pub struct Receiver<'a, const N: usize> {
     ring: Writer<'a, Received, N>,
-    /// A byte found no room; the next one that does carries the mark.
-    lost: bool,
+    errors: &'a Counter,
 }
 
 impl<const N: usize> Receiver<'_, N> {
@@ -108,11 +116,53 @@ impl<const N: usize> Receiver<'_, N> {
         self.ring.has_room()
     }
 
-    /// Takes a byte that the UART has. Without room it is lost, and the next one that finds room tells.
+    /// Takes a byte that the UART has. Without room it is lost.
     #[inline]
     pub fn push(&mut self, received: Received) {
-        let overrun = received.overrun | self.lost;
-        self.lost = !self.ring.push(Received { overrun, ..received });
+        if !self.ring.push(received) {
+            self.count_error();
+        }
+    }
+
+    /// A byte was lost or misread.
+    #[inline]
+    pub fn count_error(&mut self) {
+        self.errors.count();
+    }
+
+    /// Takes what a UART has by what it has shown. `read` reads the data register, which clears all that was shown.
+    ///
+    /// A byte may come between looking and reading. The UART then shows an overrun and no byte the next time, while its
+    /// data register still holds the byte that was read: reading it again has no other use than to clear the overrun.
+    #[inline]
+    pub fn take(&mut self, shown: ReceiveStatus, read: impl FnOnce() -> u8, tick_ms: u32) {
+        let ReceiveStatus { has_byte, overrun, misread } = shown;
+        if !has_byte && !overrun {
+            return;
+        }
+        let byte = read();
+        if has_byte {
+            self.push(Received { byte, tick_ms });
+        }
+        for _ in 0..u32::from(has_byte && misread) + u32::from(overrun) {
+            self.count_error();
+        }
+    }
+}
+
+/// The main loop's end of the count of bytes that were lost or misread.
+pub struct LineErrors<'a> {
+    errors: &'a Counter,
+    told: u32,
+}
+
+impl LineErrors<'_> {
+    /// How many there were since this was asked last.
+    pub fn take(&mut self) -> u32 {
+        let errors = self.errors.get();
+        let new = errors.wrapping_sub(self.told);
+        self.told = errors;
+        new
     }
 }
 
@@ -161,33 +211,140 @@ mod tests {
     use super::*;
 
     fn byte(byte: u8, tick_ms: u32) -> Received {
-        Received { byte, tick_ms, overrun: false }
+        Received { byte, tick_ms }
     }
 
     #[test]
-    fn a_byte_keeps_its_tick_and_its_mark() {
+    fn a_byte_keeps_its_tick() {
         let mut rings = SerialRings::<4, 4>::new();
         let mut ends = rings.split();
-        let bytes = [byte(0x00, 0), byte(0xFF, u32::MAX), Received { overrun: true, ..byte(0xA5, 70_000) }];
+        let bytes = [byte(0x00, 0), byte(0xFF, u32::MAX), byte(0xA5, 70_000)];
         for received in bytes {
             ends.receiver.push(received);
         }
         assert_eq!(std::iter::from_fn(|| ends.received.pop()).collect::<Vec<_>>(), bytes);
+        assert_eq!(ends.errors.take(), 0);
     }
 
     #[test]
-    fn the_byte_after_lost_ones_tells() {
+    fn bytes_that_find_no_room_are_counted_at_once_and_once() {
         let mut rings = SerialRings::<2, 2>::new();
         let mut ends = rings.split();
-        for tick_ms in 1..=4 {
+        for tick_ms in 1..=5 {
             ends.receiver.push(byte(b'x', tick_ms));
         }
         assert!(!ends.receiver.has_room());
+        assert_eq!((ends.errors.take(), ends.errors.take()), (3, 0));
         assert_eq!((ends.received.pop(), ends.received.pop()), (Some(byte(b'x', 1)), Some(byte(b'x', 2))));
-        ends.receiver.push(byte(b'y', 5));
-        ends.receiver.push(byte(b'z', 6));
-        assert_eq!(ends.received.pop(), Some(Received { overrun: true, ..byte(b'y', 5) }));
-        assert_eq!(ends.received.pop(), Some(byte(b'z', 6)));
+        ends.receiver.push(byte(b'y', 6));
+        assert_eq!((ends.received.pop(), ends.errors.take()), (Some(byte(b'y', 6)), 0));
+        // Whoever splits the rings again has nothing to do with what was counted before.
+        ends.receiver.count_error();
+        assert_eq!(rings.split().errors.take(), 0);
+    }
+
+    /// A UART as the reference manual of the STM32F4 describes it (RM0090, "Overrun error"): reading the data register
+    /// takes the byte, and clears the flags that the latest look at the status has shown.
+    #[derive(Default)]
+    struct Uart {
+        data: u8,
+        rxne: bool,
+        ore: bool,
+        fe: bool,
+        ore_shown: bool,
+        reads: u32,
+    }
+
+    impl Uart {
+        fn arrive(&mut self, byte: u8) {
+            if self.rxne {
+                self.ore = true;
+            } else {
+                (self.data, self.rxne) = (byte, true);
+            }
+        }
+
+        fn status(&mut self) -> ReceiveStatus {
+            self.ore_shown = self.ore;
+            ReceiveStatus { has_byte: self.rxne, overrun: self.ore, misread: self.fe }
+        }
+
+        fn read(&mut self) -> u8 {
+            self.reads += 1;
+            (self.rxne, self.fe) = (false, false);
+            self.ore &= !self.ore_shown;
+            self.data
+        }
+    }
+
+    /// Takes interrupts until there are none; bytes arrive between looking and reading.
+    fn interrupts(uart: &mut Uart, receiver: &mut Receiver<'_, 8>, mut between: &[u8]) {
+        for _ in 0..10 {
+            if !uart.rxne && !uart.ore {
+                return;
+            }
+            let status = uart.status();
+            if let [first, rest @ ..] = between {
+                uart.arrive(*first);
+                between = rest;
+            }
+            receiver.take(status, || uart.read(), 7);
+        }
+        panic!("the interrupt never ends");
+    }
+
+    fn received_by(uart: &mut Uart, between: &[u8]) -> (Vec<u8>, u32) {
+        let mut rings = SerialRings::<8, 2>::new();
+        let mut ends = rings.split();
+        interrupts(uart, &mut ends.receiver, between);
+        (
+            std::iter::from_fn(|| ends.received.pop()).map(|received| received.byte).collect(),
+            ends.errors.take(),
+        )
+    }
+
+    #[test]
+    fn an_overrun_without_a_byte_hands_over_nothing_and_counts_one() {
+        let mut uart = Uart::default();
+        uart.arrive(b'a');
+        // The second byte comes after the look and before the read, which leaves its overrun without a byte.
+        assert_eq!(received_by(&mut uart, b"b"), (b"a".to_vec(), 1));
+        assert_eq!(uart.reads, 2, "the second one clears the overrun");
+        uart.arrive(b'c');
+        assert_eq!(received_by(&mut uart, b""), (b"c".to_vec(), 0));
+    }
+
+    #[test]
+    fn an_overrun_with_a_byte_hands_it_over_and_counts_the_other_one() {
+        let mut uart = Uart::default();
+        uart.arrive(b'a');
+        uart.arrive(b'b');
+        assert_eq!(received_by(&mut uart, b""), (b"a".to_vec(), 1));
+        // A third one between look and read is lost as well, under the same flag.
+        uart.arrive(b'c');
+        uart.arrive(b'd');
+        assert_eq!(received_by(&mut uart, b"e"), (b"c".to_vec(), 1));
+    }
+
+    #[test]
+    fn a_misread_byte_is_handed_over_and_counted() {
+        let mut uart = Uart::default();
+        uart.arrive(b'a');
+        uart.fe = true;
+        assert_eq!(received_by(&mut uart, b""), (b"a".to_vec(), 1));
+        uart.arrive(b'b');
+        uart.arrive(b'c');
+        uart.fe = true;
+        assert_eq!(received_by(&mut uart, b""), (b"b".to_vec(), 2));
+    }
+
+    #[test]
+    fn an_interrupt_of_the_transmitter_reads_nothing() {
+        let mut uart = Uart { data: b'z', ..Uart::default() };
+        let mut rings = SerialRings::<8, 2>::new();
+        let mut ends = rings.split();
+        ends.receiver.take(uart.status(), || unreachable!("there is nothing to read"), 0);
+        assert_eq!((ends.received.pop(), ends.errors.take()), (None, 0));
     }
 
     #[test]

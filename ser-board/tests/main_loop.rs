@@ -3,7 +3,7 @@
 use ser_board::budget;
 use ser_board::main_loop::{self, Line};
 use ser_board::ring::{Reader, Writer};
-use ser_board::serial_line::{Quiet, Received, Receiver, SerialEnds, SerialRings};
+use ser_board::serial_line::{LineErrors, Quiet, Received, Receiver, SerialEnds, SerialRings};
 use ser_node::{
     Capture, CaptureChannel, CopyNumber, Debounce, Event, NoRtc, Node, NodeParts, RECORD_LEN, Storage,
 };
@@ -32,6 +32,7 @@ impl Storage for NoStorage {
 /// The main loop's end of a UART.
 struct Uart<'a> {
     received: Reader<'a, Received, RECEIVE>,
+    errors: LineErrors<'a>,
     to_send: Writer<'a, u8, TRANSMIT>,
     quiet: Quiet,
     baud: Baud,
@@ -44,6 +45,10 @@ impl Line for Uart<'_> {
 
     fn receive(&mut self) -> Option<Received> {
         self.received.pop()
+    }
+
+    fn errors(&mut self) -> u32 {
+        self.errors.take()
     }
 
     fn can_send(&self) -> bool {
@@ -96,8 +101,9 @@ impl Memory {
             storage: NoStorage,
             rtc: NoRtc,
         });
-        let SerialEnds { receiver, received, to_send, transmitter } = self.rings.split();
-        let uart = Uart { received, to_send, quiet: Quiet::new(), baud: node.baud(), is_sending: false };
+        let SerialEnds { receiver, received, errors, to_send, transmitter } = self.rings.split();
+        let uart =
+            Uart { received, errors, to_send, quiet: Quiet::new(), baud: node.baud(), is_sending: false };
         Board { node, capture, uart, receiver, transmitter, tick_ms: 0, sent: Vec::new() }
     }
 }
@@ -125,7 +131,7 @@ impl Board<'_> {
 
     fn arrive(&mut self, command: &Command) {
         for byte in FrameEncoder::new(command.to_body()) {
-            self.receiver.push(Received { byte, tick_ms: self.tick_ms, overrun: false });
+            self.receiver.push(Received { byte, tick_ms: self.tick_ms });
         }
     }
 
@@ -183,7 +189,7 @@ fn what_arrives_during_the_longest_stall_is_not_lost() {
         board.stall_ms(if ms.is_multiple_of(2) { 0 } else { u32::MAX });
         while arrived < budget::bytes_in(ms) {
             let byte = line.next().unwrap();
-            board.receiver.push(Received { byte, tick_ms: board.tick_ms, overrun: false });
+            board.receiver.push(Received { byte, tick_ms: board.tick_ms });
             arrived += 1;
         }
     }
@@ -199,12 +205,14 @@ fn bytes_beyond_the_ring_are_counted_as_line_errors() {
     let mut memory = Memory::new();
     let mut board = memory.power_up();
     for _ in 0..RECEIVE + 10 {
-        board.receiver.push(Received { byte: b'.', tick_ms: 0, overrun: false });
+        board.receiver.push(Received { byte: b'.', tick_ms: 0 });
     }
+    board.receiver.count_error();
+    // At once: no byte may ever follow.
     board.pass_ms(1);
-    assert_eq!(board.node.diagnostics().line_errors, 0);
+    assert_eq!(board.node.diagnostics().line_errors, 11);
     board.arrive(&Command::QueryMode);
     board.pass_ms(100);
-    assert_eq!(board.node.diagnostics().line_errors, 1);
+    assert_eq!(board.node.diagnostics().line_errors, 11);
     assert_eq!(board.replies().len(), 1);
 }

@@ -103,9 +103,9 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.serial.has_room()
     }
 
-    /// The UART lost or misread a byte.
-    pub fn serial_line_error(&mut self) {
-        count(&mut self.recorder.diagnostics.line_errors, 1);
+    /// The UART lost or misread so many more bytes.
+    pub fn serial_line_errors(&mut self, bytes: u32) {
+        count(&mut self.recorder.diagnostics.line_errors, bytes.into());
     }
 
     /// The next byte for the RS-232 line; `None` when there is nothing to send, or the rate must change first.

@@ -789,6 +789,7 @@ fn a_wrong_length_is_ignored_whatever_the_values_are() {
 #[test]
 fn bytes_that_the_line_lost_are_counted() {
     let mut bench = Bench::new(Model::Ser160);
-    bench.node.serial_line_error();
-    assert_eq!(bench.diagnostics().line_errors, 1);
+    bench.node.serial_line_errors(1);
+    bench.node.serial_line_errors(2);
+    assert_eq!(bench.diagnostics().line_errors, 3);
 }

@@ -306,7 +306,7 @@ impl<'a> SimNode<'a> {
 
     /// The node's UART meets a byte that it cannot read.
     pub fn line_error(&mut self) {
-        self.node.serial_line_error();
+        self.node.serial_line_errors(1);
     }
 
     /// Bytes that the node has sent and nobody has taken.

@@ -18,7 +18,7 @@ use cortex_m::peripheral::NVIC;
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
 use ser_board::main_loop::Line;
 use ser_board::ring::{Reader, Writer};
-use ser_board::serial_line::{Quiet, Received, Receiver, SerialEnds, SerialRings};
+use ser_board::serial_line::{LineErrors, Quiet, Received, Receiver, SerialEnds, SerialRings};
 use ser_proto::Baud;
 
 use crate::device::{self, Interrupt, base};
@@ -55,14 +55,14 @@ pub(crate) fn start(
     rings: &'static mut Rings,
     baud: Baud,
 ) -> (SerialLine, ReceiveInterrupt, TransmitInterrupt) {
-    let SerialEnds { receiver, received, to_send, transmitter } = rings.split();
+    let SerialEnds { receiver, received, errors, to_send, transmitter } = rings.split();
     CONTROL.write(0);
     BAUD_DIVIDER.write(divider(baud));
     STATE.write(RECEIVE_OVERRUN);
     INTERRUPT_CLEAR.write(TRANSMIT_INTERRUPT | RECEIVE_INTERRUPT);
     CONTROL.write(TRANSMIT_ENABLE | RECEIVE_ENABLE | TRANSMIT_INTERRUPT_ENABLE | RECEIVE_INTERRUPT_ENABLE);
     (
-        SerialLine { received, to_send, baud, quiet: Quiet::new(), bytes: 0 },
+        SerialLine { received, errors, to_send, baud, quiet: Quiet::new(), bytes: 0 },
         ReceiveInterrupt { receiver },
         TransmitInterrupt { transmitter },
     )
@@ -88,11 +88,11 @@ impl ReceiveInterrupt {
             }
             INTERRUPT_CLEAR.write(RECEIVE_INTERRUPT);
             let [byte, ..] = DATA.read().to_le_bytes();
-            let overrun = STATE.read() & RECEIVE_OVERRUN != 0;
-            if overrun {
+            if STATE.read() & RECEIVE_OVERRUN != 0 {
                 STATE.write(RECEIVE_OVERRUN);
+                self.receiver.count_error();
             }
-            self.receiver.push(Received { byte, tick_ms, overrun });
+            self.receiver.push(Received { byte, tick_ms });
         }
     }
 }
@@ -116,6 +116,7 @@ impl TransmitInterrupt {
 /// The main loop's end.
 pub(crate) struct SerialLine {
     received: Reader<'static, Received, RECEIVE_RING_LEN>,
+    errors: LineErrors<'static>,
     to_send: Writer<'static, u8, TRANSMIT_RING_LEN>,
     baud: Baud,
     quiet: Quiet,
@@ -146,6 +147,10 @@ impl Line for SerialLine {
             unsafe { NVIC::unmask(Interrupt::UART0_RX) };
         }
         received
+    }
+
+    fn errors(&mut self) -> u32 {
+        self.errors.take()
     }
 
     fn can_send(&self) -> bool {

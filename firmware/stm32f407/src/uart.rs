@@ -7,11 +7,11 @@
 //!
 //! # Notes
 //! Transmission complete is set when the last stop bit has left, so the line is known to be quiet and not guessed.
-//! A framing or noise error marks its byte in the same way as an overrun does: the byte is not what was sent.
+//! What an overrun or a framing error leaves in the data register, `ser_board` knows; both are counted as line errors.
 
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
 use ser_board::main_loop::Line;
-use ser_board::serial_line::{Received, Receiver, SerialEnds, SerialRings};
+use ser_board::serial_line::{LineErrors, ReceiveStatus, Received, Receiver, SerialEnds, SerialRings};
 use ser_node::ring::{Reader, Writer};
 use ser_proto::Baud;
 use stm32f4::stm32f407::{RCC, USART2};
@@ -32,12 +32,12 @@ pub(crate) fn start(
     clocks::settle();
     set_divider(&uart, baud);
     uart.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
-    let SerialEnds { receiver, received, to_send, transmitter } = rings.split();
+    let SerialEnds { receiver, received, errors, to_send, transmitter } = rings.split();
     // SAFETY: the two ends share the registers. The interrupt alone touches the data register, the main loop alone the
     // divider; for the one bit that both change see `SerialLine::send`.
     let shared = unsafe { USART2::steal() };
     (
-        SerialLine { uart: shared, received, to_send, bytes: 0 },
+        SerialLine { uart: shared, received, errors, to_send, bytes: 0 },
         SerialInterrupt { uart, receiver, transmitter },
     )
 }
@@ -62,11 +62,16 @@ impl SerialInterrupt {
     pub(crate) fn on_interrupt(&mut self, tick_ms: u32) {
         // Reading status and then data clears the error flags.
         let status = self.uart.sr().read();
-        if status.rxne().bit_is_set() || status.ore().bit_is_set() {
+        let shown = ReceiveStatus {
+            has_byte: status.rxne().bit_is_set(),
+            overrun: status.ore().bit_is_set(),
+            misread: status.fe().bit_is_set() || status.nf().bit_is_set(),
+        };
+        let data = || {
             let [byte, ..] = self.uart.dr().read().bits().to_le_bytes();
-            let overrun = status.ore().bit_is_set() || status.fe().bit_is_set() || status.nf().bit_is_set();
-            self.receiver.push(Received { byte, tick_ms, overrun });
-        }
+            byte
+        };
+        self.receiver.take(shown, data, tick_ms);
         if status.txe().bit_is_set() {
             match self.transmitter.pop() {
                 Some(byte) => {
@@ -84,6 +89,7 @@ impl SerialInterrupt {
 pub(crate) struct SerialLine {
     uart: USART2,
     received: Reader<'static, Received, RECEIVE_RING_LEN>,
+    errors: LineErrors<'static>,
     to_send: Writer<'static, u8, TRANSMIT_RING_LEN>,
     bytes: u32,
 }
@@ -107,6 +113,10 @@ impl Line for SerialLine {
         let received = self.received.pop();
         self.bytes = self.bytes.wrapping_add(u32::from(received.is_some()));
         received
+    }
+
+    fn errors(&mut self) -> u32 {
+        self.errors.take()
     }
 
     fn can_send(&self) -> bool {
