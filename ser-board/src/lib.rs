@@ -13,7 +13,7 @@
 //! | [`serialiser`]     | inputs behind industrial digital-input serialisers on SPI                              |
 //! | [`flash_log`]      | the configuration in flash memory                                                      |
 //! | [`clock_chip`]     | the battery-backed clock, with what it has to say against itself                       |
-//! | [`stm32_rtc`]      | the calendar registers of STM32 clocks as date and time                                |
+//! | [`stm32_rtc`]      | the calendar registers of STM32 clocks as date and time, and when to believe them      |
 //! | [`leds`]           | what the four lamps mean                                                               |
 //! | [`fault`]          | what a hard fault was, by what the processor shows of it                               |
 //! | [`last_words`]     | what outlives a reset: its cause, the panic's text, the number of boots                |

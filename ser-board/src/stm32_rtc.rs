@@ -1,7 +1,7 @@
 //! The calendar registers of STM32 clocks (RTC version 2: F2, F4, F7, L4 …) as date and time, without the registers.
 //!
-//! The board reads SSR, TR and DR, in this order, and writes them; what their bits mean is here. Names and layouts
-//! are those of the reference manual (RM0090, chapter "Real-time clock").
+//! The board gives access to SSR, TR and DR; when what they show can be believed, and what their bits mean, is here. Names
+//! and layouts are those of the reference manual (RM0090, chapter "Real-time clock").
 //!
 //! ```text
 //! TR   PM(22) hour tens(21:20) units(19:16) | minute tens(14:12) units(11:8) | second tens(6:4) units(3:0)
@@ -13,6 +13,10 @@
 //! The two digits of the year are those of 2000–2099: the chip takes every year divisible by four as a leap year,
 //! which holds in these years and with no other first year that is not a multiple of four. Registers that hold no
 //! date give `None`, never a panic.
+//!
+//! The registers go on while they are read, one after the other, and one that is read in the moment in which it changes may
+//! show anything (BYPSHAD; the shadow registers, which spare one that, have to be waited for). So all three are read until
+//! two rounds in a row show the same: [`read`].
 //!
 //! # Notes
 //! With `PREDIV_A` 0 and `PREDIV_S` 7FFFh a 32768 Hz crystal is read back in steps of 31 µs, at the price of a little
@@ -41,6 +45,39 @@ pub struct Shift {
     pub add_second: bool,
     /// By how many steps of SSR the clock is put back (SUBFS).
     pub subtract: u16,
+}
+
+/// The registers themselves, each read from the clock in the moment in which it is asked for.
+pub trait CalendarRegisters {
+    /// Sub-second register.
+    fn ssr(&mut self) -> u16;
+
+    /// Time register.
+    fn tr(&mut self) -> u32;
+
+    /// Date register.
+    fn dr(&mut self) -> u32;
+}
+
+/// Rounds until it is given up: the fastest register changes every 31 µs, and a round takes less than one.
+const MAX_ROUNDS: u32 = 16;
+
+/// SSR and the calendar, of one moment. `None` when they never stand still, which no clock that works does.
+///
+/// Between two looks at an equal SSR the clock has not moved, for a whole second is longer than any round takes: date and
+/// time that were read in between are of that moment.
+pub fn read(registers: &mut impl CalendarRegisters) -> Option<(u16, Calendar)> {
+    let mut round = || {
+        let ssr = registers.ssr();
+        (ssr, Calendar { tr: registers.tr(), dr: registers.dr() })
+    };
+    let mut before = round();
+    (0..MAX_ROUNDS).find_map(|_| {
+        let now = round();
+        let stands_still = now == before;
+        before = now;
+        stands_still.then_some(now)
+    })
 }
 
 const FIRST_YEAR: u16 = 2000;
@@ -181,6 +218,99 @@ mod tests {
         assert_eq!(shift, Some(Shift { add_second: true, subtract: 0xC0 }));
         assert_eq!(Shift::to_fraction_of(time("2026-11-22T10:00:00.003"), 0xFF), None);
         assert_eq!(Shift::to_fraction_of(time("2026-11-22T10:00:00"), 0x7FFF), None);
+    }
+
+    /// A clock that takes a step in front of some of the looks at its registers, counted from 0. The look itself may
+    /// then show anything.
+    struct Moving {
+        steps_at: fn(u32, u32) -> bool,
+        argument: u32,
+        /// Turns bits of what is seen in the moment of a step.
+        torn: u32,
+        looks: u32,
+        ssr: u16,
+        second: NaiveDateTime,
+    }
+
+    impl Moving {
+        /// A step before the new year.
+        fn new(steps_at: fn(u32, u32) -> bool, argument: u32, torn: u32) -> Moving {
+            Moving { steps_at, argument, torn, looks: 0, ssr: 0, second: time("2026-12-31T23:59:59") }
+        }
+
+        fn calendar(&self) -> Calendar {
+            Calendar::from_date_time(self.second).unwrap()
+        }
+
+        fn look(&mut self, register: fn(&Moving) -> u32) -> u32 {
+            let steps = (self.steps_at)(self.looks, self.argument);
+            self.looks += 1;
+            if !steps {
+                return register(self);
+            }
+            if let Some(ssr) = self.ssr.checked_sub(1) {
+                self.ssr = ssr;
+            } else {
+                self.ssr = 0x7FFF;
+                self.second += TimeDelta::seconds(1);
+            }
+            register(self) ^ self.torn
+        }
+    }
+
+    impl CalendarRegisters for Moving {
+        fn ssr(&mut self) -> u16 {
+            let [low, high, ..] = self.look(|clock| clock.ssr.into()).to_le_bytes();
+            u16::from_le_bytes([low, high])
+        }
+
+        fn tr(&mut self) -> u32 {
+            self.look(|clock| clock.calendar().tr)
+        }
+
+        fn dr(&mut self) -> u32 {
+            self.look(|clock| clock.calendar().dr)
+        }
+    }
+
+    const TORN: [u32; 4] = [0, 1, 0x0055_5555, u32::MAX];
+
+    #[test]
+    fn a_clock_that_moves_at_any_look_is_read_as_before_or_after() {
+        let old = Moving::new(|_, _| false, 0, 0).calendar();
+        let mut mixed = 0;
+        for at in 0..12 {
+            for torn in TORN {
+                let clock = || Moving::new(|look, at| look == at, at, torn);
+                let mut one_round = clock();
+                let seen = (one_round.ssr(), Calendar { tr: one_round.tr(), dr: one_round.dr() });
+                let mut clock = clock();
+                let read = read(&mut clock);
+                let new = (0x7FFF, Calendar::from_date_time(time("2027-01-01T00:00:00")).unwrap());
+                assert!(read == Some((0, old)) || read == Some(new), "at {at}, {torn:x}: {read:x?}");
+                mixed += u32::from(seen != (0, old) && seen != new);
+            }
+        }
+        // Each of the three looks of a single round is one at which it would be wrong, two of them even without noise.
+        assert_eq!(mixed, 3 * 3 + 2);
+    }
+
+    #[test]
+    fn a_clock_that_moves_again_and_again_is_read_when_it_stands_still_for_two_rounds() {
+        for every in 7..20 {
+            for torn in TORN {
+                let mut clock = Moving::new(|look, every| look % every == every - 1, every, torn);
+                let (ssr, calendar) = read(&mut clock).expect("two rounds without a step");
+                assert_eq!((ssr, calendar), (clock.ssr, clock.calendar()), "every {every}, {torn:x}");
+            }
+        }
+    }
+
+    #[test]
+    fn registers_that_never_stand_still_are_given_up() {
+        let mut clock = Moving::new(|_, _| true, 0, 0);
+        assert_eq!(read(&mut clock), None);
+        assert_eq!(clock.looks, 3 * (MAX_ROUNDS + 1));
     }
 
     proptest! {

@@ -9,14 +9,13 @@
 //! gives a little more current.
 //!
 //! # Notes
-//! Date and time are read around the sub-seconds until nothing has carried over in between. That the clock was never
-//! set, or has lost battery *and* supply, shows in INITS; a crystal that stood still while the battery held does not
-//! show, the chip has no flag for that. (RM0090, chapter "Real-time clock".)
+//! That the clock was never set, or has lost battery *and* supply, shows in INITS; a crystal that stood still while the
+//! battery held does not show, the chip has no flag for that. (RM0090, chapter "Real-time clock".)
 
 use chrono::NaiveDateTime;
 use rtcc::DateTimeAccess;
 use ser_board::clock_chip::{ClockHealth, KeepsTime};
-use ser_board::stm32_rtc::{Calendar, Shift};
+use ser_board::stm32_rtc::{self, Calendar, CalendarRegisters, Shift};
 use stm32f4::stm32f407::{PWR, RCC, RTC};
 
 /// 32768 Hz in one step.
@@ -26,10 +25,6 @@ const KEYS: [u8; 2] = [0xCA, 0x53];
 
 /// Looks at a flag before it is given up: 10 ms, where two periods of the crystal are due.
 const MAX_LOOKS: u32 = 100_000;
-
-/// Reads of date and time until two in a row are equal. A register that is read while it changes may show anything; the
-/// fastest of them changes every 30 µs, and two reads take a few.
-const MAX_READS: u32 = 16;
 
 pub(crate) static HEALTH: ClockHealth = ClockHealth::new();
 
@@ -71,13 +66,6 @@ impl ChipClock {
     fn has_crystal(&self) -> bool {
         let control = self.clocks.bdcr().read();
         control.lserdy().bit_is_set() && control.rtcsel().is_lse()
-    }
-
-    fn read_once(&self) -> (u16, Calendar) {
-        let ssr = self.registers.ssr().read().ss().bits();
-        let tr = self.registers.tr().read().bits();
-        let dr = self.registers.dr().read().bits();
-        (ssr, Calendar { tr, dr })
     }
 
     /// Does `change` with the clock stopped and its registers open.
@@ -128,19 +116,26 @@ fn wait_for(mut condition: impl FnMut() -> bool) -> Result<(), RtcError> {
     if (0..MAX_LOOKS).any(|_| condition()) { Ok(()) } else { Err(RtcError::TimedOut) }
 }
 
+impl CalendarRegisters for ChipClock {
+    fn ssr(&mut self) -> u16 {
+        self.registers.ssr().read().ss().bits()
+    }
+
+    fn tr(&mut self) -> u32 {
+        self.registers.tr().read().bits()
+    }
+
+    fn dr(&mut self) -> u32 {
+        self.registers.dr().read().bits()
+    }
+}
+
 impl DateTimeAccess for ChipClock {
     type Error = RtcError;
 
     fn datetime(&mut self) -> Result<NaiveDateTime, RtcError> {
-        let mut before = self.read_once();
-        for _ in 0..MAX_READS {
-            let now = self.read_once();
-            if now == before {
-                return now.1.to_date_time(now.0, PREDIV_S).ok_or(RtcError::NoDate);
-            }
-            before = now;
-        }
-        Err(RtcError::TimedOut)
+        let (ssr, calendar) = stm32_rtc::read(self).ok_or(RtcError::TimedOut)?;
+        calendar.to_date_time(ssr, PREDIV_S).ok_or(RtcError::NoDate)
     }
 
     fn set_datetime(&mut self, datetime: &NaiveDateTime) -> Result<(), RtcError> {
