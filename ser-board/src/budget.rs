@@ -1,7 +1,16 @@
-//! Ring lengths and interrupt priorities, each with the reckoning behind it. Both boards take them from here.
+//! Ring lengths and interrupt priorities, each with the reckoning behind it. Both boards take all of theirs from here.
 //!
 //! The rule for lengths: whatever comes in while the main loop is away for [`MAIN_LOOP_STALL_MS`] has to find room.
 //! The rule for priorities: the less an interrupt can wait, the higher. A build that breaks a rule does not compile.
+//!
+//! | interrupt                      | can wait for                                  | priority                  |
+//! |--------------------------------|-----------------------------------------------|---------------------------|
+//! | capture                        | its own millisecond, of which it is the stamp | [`CAPTURE_PRIORITY`]      |
+//! | received byte                  | 520 µs                                        | [`RECEIVE_PRIORITY`]      |
+//! | transmitter has room           | as long as it likes: a pause on the line      | [`TRANSMIT_PRIORITY`]     |
+//! | line of the GENI board         | as long as it likes: the pulse is latched     | [`EXTERNAL_BUS_PRIORITY`] |
+//!
+//! The main loop has priority 0. A UART with one interrupt for both directions has it at that of the receiver.
 
 use ser_node::capture::QUEUE_LEN;
 use ser_proto::Baud;
@@ -48,6 +57,14 @@ pub const RECEIVE_PRIORITY: u8 = 2;
 /// Priority of the transmit interrupt: being late makes a pause on the line and nothing else.
 pub const TRANSMIT_PRIORITY: u8 = 1;
 
+/// Priority of the GENI board's interrupt line: its edge is latched and does no more than wake the main loop, which looks at
+/// the board's flags in every pass anyway.
+pub const EXTERNAL_BUS_PRIORITY: u8 = 1;
+
+/// Bytes of the log that may wait for a debug probe: all that a start has to say, some 40 records of 25 bytes at most. What
+/// finds no room is dropped; nothing else waits for the log.
+pub const PROBE_RING_LEN: usize = ring_len(40 * 25);
+
 /// How long the watchdog waits, in milliseconds. Longer than the longest erasing of a 128 KiB sector (2 s,
 /// `STM32F40x` data sheet, 32 bits at a time), which stops everything that runs from the same flash.
 pub const WATCHDOG_MS: u32 = 4000;
@@ -60,8 +77,11 @@ const fn ring_len(items: usize) -> usize {
 const _: () = assert!(QUEUE_LEN >= (MAIN_LOOP_STALL_MS * CHANGES_PER_MS) as usize);
 const _: () = assert!(RECEIVE_RING_LEN >= bytes_in(MAIN_LOOP_STALL_MS));
 const _: () = assert!(CAPTURE_PRIORITY > RECEIVE_PRIORITY && RECEIVE_PRIORITY > TRANSMIT_PRIORITY);
+const _: () = assert!(RECEIVE_PRIORITY > EXTERNAL_BUS_PRIORITY);
 // Priority 0 is the main loop's.
-const _: () = assert!(TRANSMIT_PRIORITY > 0);
+const _: () = assert!(TRANSMIT_PRIORITY > 0 && EXTERNAL_BUS_PRIORITY > 0);
+// Eight priorities are the fewest that a chip in use has; one of them is the main loop's.
+const _: () = assert!(CAPTURE_PRIORITY < 8);
 
 #[cfg(test)]
 mod tests {
@@ -72,6 +92,7 @@ mod tests {
         assert_eq!(bytes_in(MAIN_LOOP_STALL_MS), 192);
         assert_eq!((RECEIVE_RING_LEN, bytes_in(133)), (256, 256));
         assert_eq!(bytes_in(66), 127);
+        assert_eq!(PROBE_RING_LEN, 1024);
         assert_eq!(CHARACTER_BITS * 1_000_000 / MAX_BITS_PER_SECOND, 520);
     }
 }

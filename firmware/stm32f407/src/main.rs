@@ -67,11 +67,11 @@ mod app {
     /// No clock can show an earlier day: there was no such recorder.
     const NOT_BEFORE: NaiveDate = NaiveDate::from_ymd_opt(2026, 1, 1).unwrap();
 
-    // RTIC takes nothing but literals for priorities.
+    // RTIC takes nothing but literals for priorities; `ser-board/tests/priorities.rs` sees that the tasks have these.
     const _: () = {
         assert!(budget::CAPTURE_PRIORITY == 3);
         assert!(budget::RECEIVE_PRIORITY == 2);
-        assert!(budget::TRANSMIT_PRIORITY == 1);
+        assert!(budget::EXTERNAL_BUS_PRIORITY == 1);
     };
 
     pub(crate) type BoardNode = Node<'static, Configuration, ClockChip<'static, ChipClock>>;

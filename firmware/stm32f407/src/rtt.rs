@@ -5,8 +5,7 @@
 
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
-/// A power of two: the whole of what a start has to say, some 40 records.
-const LEN: usize = 1024;
+use ser_board::budget::PROBE_RING_LEN as LEN;
 
 #[repr(C)]
 struct ControlBlock {
