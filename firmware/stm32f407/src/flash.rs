@@ -10,6 +10,7 @@
 //! `reset` tells the log if it is not. Times (data sheet, "Flash memory programming"): 250–500 ms to erase a sector of
 //! 16 KiB, 16–100 µs to write a word.
 
+use core::arch::global_asm;
 use core::ptr;
 
 use cortex_m::asm;
@@ -24,10 +25,19 @@ use stm32f4::stm32f407::FLASH;
 use crate::timer;
 use crate::watchdog::Watchdog;
 
-/// Where sector 2 begins; ram-image.x keeps the image away from it.
+/// Where sector 2 begins; ram-image.x keeps the image away from it, and does not link with another place.
 pub(crate) const BASE: u32 = 0x0800_8000;
 /// Sectors 2 and 3.
 pub(crate) const LEN: u32 = 2 * SECTOR_LEN;
+
+global_asm!(
+    ".global FLASH_RS_BASE",
+    ".set FLASH_RS_BASE, {base}",
+    ".global FLASH_RS_LEN",
+    ".set FLASH_RS_LEN, {len}",
+    base = const BASE,
+    len = const LEN,
+);
 
 const SECTOR_LEN: u32 = 0x4000;
 const FIRST_SECTOR: u8 = 2;
@@ -153,10 +163,17 @@ impl ConfigurationFlash {
         Ok(())
     }
 
+    /// Writes the word at `offset`, a multiple of four less than `LEN`, into flash that is unlocked and idle.
     fn write_word(&mut self, offset: u32, word: u32) -> Result<(), FlashError> {
         self.registers.cr().modify(|_, w| w.psize().psize32().pg().set_bit());
-        // SAFETY: inside of the memory and aligned, as the caller has checked; unlocked flash takes a word that way.
-        unsafe { ptr::write_volatile(address(offset).cast(), word) };
+        // SAFETY: as memory, the word is nobody's. ram-image.x hands sectors 2 and 3 to no section, and does not link if
+        // these are others: no variable and no code is there. Nothing forms a reference to it; it is read by `read` alone,
+        // through this value, of which there is one and which is borrowed for writing. It is aligned and inside of the
+        // sectors (`check_write` has looked at the whole range), where the protection unit grants access.
+        // As hardware, unlocked flash takes a store of 32 bits with PG set and PSIZE at 32 bits. Whatever bits are written over
+        // whatever others, the worst is a cell that holds something else, and the record's check finds that. That
+        // nothing can be read from the bank meanwhile stops nobody: everything runs from RAM.
+        unsafe { ptr::write_volatile(address(offset).cast::<u32>(), word) };
         asm::dsb();
         if (0..WRITE_LOOKS).any(|_| !self.is_busy()) { Ok(()) } else { Err(FlashError::TimedOut) }
     }
@@ -177,7 +194,7 @@ impl ReadNorFlash for ConfigurationFlash {
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
         check_read(self, offset, bytes.len()).map_err(FlashError::Range)?;
         for (offset, byte) in (offset..).zip(bytes) {
-            // SAFETY: inside of the memory, as just checked.
+            // SAFETY: inside of the memory, as just checked; see `write_word` for whose it is. Any value is a byte.
             *byte = unsafe { ptr::read_volatile(address(offset)) };
         }
         Ok(())
