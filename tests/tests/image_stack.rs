@@ -1,10 +1,11 @@
-//! How much of its stack the ARM image needs when everything happens at once.
+//! How much of its stack the ARM image needs when everything happens at once, and that it records all the while.
 #![cfg(unix)]
 
 use std::thread;
 
-use ser_client::{Delivery, Endpoint, Unit, open};
-use ser_proto::{AutoReport, Configuration, Model, TimeStamp};
+use ser_client::{Cursor, Delivery, Endpoint, Unit, open};
+use ser_proto::{AutoReport, Configuration, Entry, Model, TimeStamp};
+use ser_sim::Played;
 use ser_tests::recorder::{Kind, NODE, PATIENCE, PATIENT, Recorder};
 
 /// As the image's memory map has it.
@@ -13,8 +14,11 @@ const STACK_LEN: u32 = 8 * 1024;
 /// Every so often the image looks at its stack.
 const LOOK_EVERY_MS: u32 = 1000;
 
-/// Longer than is waited for, in milliseconds, so that contacts move to the end.
-const MOVING_MS: u64 = 20_000;
+/// How long contacts move, in milliseconds, while hosts ask for everything.
+const MOVING_MS: u64 = 4000;
+
+/// Events that the log holds: fewer than there are moves in that time.
+const SIZE: u16 = 2048;
 
 /// All 32 contacts, once a millisecond, one after the other and all together in turns.
 fn everything_moves(milliseconds: u64) -> Vec<(u64, u8, bool)> {
@@ -29,16 +33,50 @@ fn everything_moves(milliseconds: u64) -> Vec<(u64, u8, bool)> {
         .collect()
 }
 
+/// How many of these moves change anything, with contacts closed as in `state` before.
+fn changes(mut state: u32, steps: &[(u64, u8, bool)]) -> usize {
+    let together = steps.chunk_by(|(a_ms, ..), (b_ms, ..)| a_ms == b_ms);
+    together
+        .filter(|steps| {
+            let before = state;
+            for &(_, input, on) in *steps {
+                let bit = 1 << (input - 1);
+                state = if on { state | bit } else { state & !bit };
+            }
+            state != before
+        })
+        .count()
+}
+
 /// Everything that a host can ask for and have answered at once.
-fn ask_for_everything(unit: &mut Unit, cursor: &mut Option<ser_client::Cursor>) {
+fn ask_for_everything(unit: &mut Unit, cursor: &mut Option<Cursor>) {
     let time = TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 0 };
     unit.set_clock(|_| time).expect("the clock is set");
     unit.mode().expect("the mode");
     unit.last_broadcast().expect("a reply");
     let configuration = unit.configuration().expect("a reply");
     unit.configure(configuration.into()).expect("configured");
-    let mut deliver = |_: Delivery| {};
-    unit.read_new(cursor, 2048, &mut deliver).expect("the log is read");
+    read_new(unit, cursor);
+}
+
+fn read_new(unit: &mut Unit, cursor: &mut Option<Cursor>) -> Vec<Entry> {
+    let mut entries = Vec::new();
+    let mut deliver = |delivery: Delivery| {
+        if let Delivery::Event { entry, .. } = delivery {
+            entries.push(entry);
+        }
+    };
+    unit.read_new(cursor, SIZE, &mut deliver).expect("the log is read");
+    entries
+}
+
+/// Checks that the log holds the latest moves, one event each, in their order.
+fn assert_log_is(entries: &[Entry], played: &[Played]) {
+    assert_eq!(entries.len(), usize::from(SIZE), "the log is full");
+    let latest = &played[played.len() - entries.len()..];
+    for (entry, moved) in entries.iter().zip(latest) {
+        assert_eq!((entry.changed, entry.state), (moved.changed, moved.state), "{moved:?}");
+    }
 }
 
 #[test]
@@ -54,25 +92,30 @@ fn a_quarter_of_the_stack_is_never_in_use() {
         ..Configuration::default()
     };
     recorder.play(&everything_moves(300));
+    let played = recorder.played();
+    let closed = played.last().map_or(0, |moved| moved.state.0);
     // As many as may wait, of lines enough to last to the end.
     for _ in 0..4 {
-        on_bus.print(1, 2048).expect("accepted");
+        on_bus.print(1, SIZE).expect("accepted");
     }
     on_bus.configure(everything.into()).expect("configured");
-    recorder.start_playing(&everything_moves(MOVING_MS));
+    let moves = everything_moves(MOVING_MS);
+    let all_moves = played.len() + changes(closed, &moves);
+    recorder.start_playing(&moves);
 
-    let enough = || recorder.played().len() > 2000;
+    // To the last move: all that the log holds in the end was recorded meanwhile.
+    let is_moving = || recorder.played().len() < all_moves;
     thread::scope(|scope| {
         scope.spawn(|| {
             let endpoint: Endpoint = port.parse().expect("the simulator names its port");
             let mut on_line = Unit::new(open(&endpoint, 9600).expect("the line"), PATIENT);
             let mut cursor = None;
-            while !enough() {
+            while is_moving() {
                 ask_for_everything(&mut on_line, &mut cursor);
             }
         });
         let mut cursor = None;
-        while !enough() {
+        while is_moving() {
             ask_for_everything(&mut on_bus, &mut cursor);
         }
     });
@@ -85,4 +128,7 @@ fn a_quarter_of_the_stack_is_never_in_use() {
     assert!(used <= STACK_LEN / 4 * 3, "{used} of {STACK_LEN} bytes");
     assert_eq!(board.boots(), 1);
     recorder.assert_lawful();
+
+    // A recorder that does nothing needs little stack.
+    assert_log_is(&read_new(&mut recorder.unit(), &mut None), &recorder.played());
 }
