@@ -1,10 +1,10 @@
-//! The clocks: 168 MHz out of the 8 MHz crystal.
+//! The clocks: 84 MHz out of the 8 MHz crystal.
 //!
 //! ```text
 //! 8 MHz crystal ÷4 ─┐
-//!                   ├─ 2 MHz ×168 = 336 MHz ÷2 = 168 MHz ─┬─ HCLK (÷1) processor, memories, FSMC
-//! 16 MHz RC ÷8 ─────┘                                     ├─ PCLK1 (÷16) 10.5 MHz serial line; its timers 21 MHz
-//!                                                         └─ PCLK2 (÷2) 84 MHz
+//!                   ├─ 2 MHz ×168 = 336 MHz ÷4 = 84 MHz ─┬─ HCLK (÷1) processor, memories, FSMC
+//! 16 MHz RC ÷8 ─────┘                                    ├─ PCLK1 (÷8) 10.5 MHz serial line; its timers 21 MHz
+//!                                                        └─ PCLK2 (÷2) 42 MHz
 //! ```
 //!
 //! # Design
@@ -12,6 +12,10 @@
 //! clocks, 1 % off. It goes on recording, and the fault lamp is lit for as long.
 //!
 //! # Tradeoffs
+//! The chip could run twice as fast. But the external bus has the processor's clock, and holds what it writes for one period of
+//! it and no more: at 168 MHz the buffers in front of the GENI board would eat that up (see `geni_bus`, which does not compile
+//! then). The recorder has time to spare at either speed.
+//!
 //! PCLK1 is a quarter of what it could be, because the serial line's divider has 16 bits: at 42 MHz it ends at
 //! 641 bit/s, and the protocol has 300.
 //!
@@ -20,7 +24,7 @@
 //! caches stay off. (RM0090, chapters "Reset and clock control" and "Embedded flash memory interface".)
 
 use cortex_m::asm;
-use stm32f4::stm32f407::{FLASH, PWR, RCC};
+use stm32f4::stm32f407::{FLASH, RCC};
 
 const CRYSTAL_HZ: u32 = 8_000_000;
 const RC_HZ: u32 = 16_000_000;
@@ -28,8 +32,7 @@ const RC_HZ: u32 = 16_000_000;
 const CRYSTAL_DIVIDER: u8 = 4;
 const RC_DIVIDER: u8 = 8;
 const MULTIPLIER: u16 = 168;
-/// As the register has it: 0 stands for 2.
-const OUTPUT_DIVIDER: u32 = 2;
+const OUTPUT_DIVIDER: u32 = 4;
 /// For the 48 MHz of USB, which is not in use; 0 and 1 are not allowed.
 const USB_DIVIDER: u8 = 7;
 
@@ -40,11 +43,11 @@ pub(crate) const PCLK1_HZ: u32 = HCLK_HZ / PCLK1_DIVIDER;
 /// Clock of the timers: twice that of their bus, which is divided.
 pub(crate) const TIMER_HZ: u32 = 2 * PCLK1_HZ;
 
-/// Wait states of the flash at 168 MHz and 2.7–3.6 V.
-const FLASH_WAIT_STATES: u8 = 5;
+/// Wait states of the flash at 60–90 MHz and 2.7–3.6 V.
+const FLASH_WAIT_STATES: u8 = 2;
 
 const _: () = {
-    assert!(HCLK_HZ == 168_000_000);
+    assert!(HCLK_HZ == 84_000_000);
     // The PLL's input should be 2 MHz, its oscillator has to stay within 100–432 MHz.
     assert!(CRYSTAL_HZ / CRYSTAL_DIVIDER as u32 == 2_000_000 && RC_HZ / RC_DIVIDER as u32 == 2_000_000);
     assert!(2 * MULTIPLIER >= 100 && 2 * MULTIPLIER <= 432);
@@ -53,7 +56,7 @@ const _: () = {
 };
 
 /// What PCLK1 is divided by.
-const PCLK1_DIVIDER: u32 = 16;
+const PCLK1_DIVIDER: u32 = 8;
 
 /// Looks at the crystal before it is given up, some 10 clocks of 16 MHz each: 125 ms, where 2 ms are typical.
 const CRYSTAL_LOOKS: u32 = 200_000;
@@ -67,11 +70,7 @@ pub(crate) enum Source {
 }
 
 /// Brings the clocks up. Whatever takes forever here ends with the watchdog.
-pub(crate) fn start(rcc: &RCC, pwr: &PWR, flash: &FLASH) -> Source {
-    rcc.apb1enr().modify(|_, w| w.pwren().set_bit());
-    settle();
-    // Full speed needs the regulator's full voltage.
-    pwr.cr().modify(|_, w| w.vos().set_bit());
+pub(crate) fn start(rcc: &RCC, flash: &FLASH) -> Source {
     // SAFETY: more wait states than needed are safe at any speed.
     flash.acr().modify(|_, w| unsafe { w.latency().bits(FLASH_WAIT_STATES) });
     while flash.acr().read().latency().bits() != FLASH_WAIT_STATES {}
@@ -91,14 +90,14 @@ pub(crate) fn start(rcc: &RCC, pwr: &PWR, flash: &FLASH) -> Source {
             .plln()
             .bits(MULTIPLIER)
             .pllp()
-            .div2()
+            .div4()
             .pllq()
             .bits(USB_DIVIDER)
     });
     rcc.cr().modify(|_, w| w.pllon().set_bit());
     while rcc.cr().read().pllrdy().bit_is_clear() {}
 
-    rcc.cfgr().modify(|_, w| w.hpre().div1().ppre1().div16().ppre2().div2());
+    rcc.cfgr().modify(|_, w| w.hpre().div1().ppre1().div8().ppre2().div2());
     rcc.cfgr().modify(|_, w| w.sw().pll());
     while !rcc.cfgr().read().sws().is_pll() {}
     if from_crystal {

@@ -50,7 +50,7 @@ const WORD_LEN: usize = 4;
 /// Twice what the data sheet grants an erase.
 const ERASE_MAX_MS: u32 = 1000;
 /// Looks at a write before it is given up: some ten clocks each, a millisecond.
-const WRITE_LOOKS: u32 = 17_000;
+const WRITE_LOOKS: u32 = 8400;
 
 pub(crate) static HEALTH: FlashHealth = FlashHealth::new();
 

@@ -1,20 +1,41 @@
 //! The GENI board on the external bus: the 16 KiB window, its timing, reset and interrupt.
 //!
 //! # Timing
-//! From the GENI board's manual, chapter 2, for reading and writing alike; a clock of the bus is 1/168 MHz = 5.95 ns.
+//! From the GENI board's manual, chapter 2, "Timing for Shared RAM Read Cycle" and "… Write Cycle"; a clock of the bus is
+//! 1/84 MHz = 11.9 ns.
 //!
-//! | what                       | board asks for    | set up as                              | gives            |
-//! |----------------------------|-------------------|----------------------------------------|------------------|
-//! | address and select setup   | 0 ns at least     | ADDSET 15 + ADDHLD 15 clocks           | 179 ns           |
-//! | strobe, until ready        | 937 ns at most    | DATAST 168 clocks: 937 + 60 ns         | 1000 ns          |
-//! | data valid before ready    | 96 ns at least    | read at the end of the strobe          | is there         |
-//! | data hold when writing     | 0 ns at least     | one clock after the strobe             | 6 ns             |
-//! | strobe high between cycles | 136 ns at least   | ADDSET + ADDHLD of the next cycle      | 179 ns           |
-//! | cycle                      | 615 ns at least   | the sum                                | 1179 ns          |
-//! | data bus free after select | 32 ns at most     | BUSTURN 15 clocks                      | 89 ns            |
+//! | what                                 | board asks for  | set up as                              | gives         |
+//! |--------------------------------------|-----------------|----------------------------------------|---------------|
+//! | address and select setup (tas, tsels)| 0 ns at least   | ADDSET 8 + ADDHLD 8 clocks             | 190 ns        |
+//! | data setup when writing (tds)        | 0 ns at least   | driven before the strobe begins        | the strobe    |
+//! | strobe, until ready (trdyd)          | 937 ns at most  | DATAST 84 clocks: 937 + 60 ns          | 1000 ns       |
+//! | data valid before ready (tdv)        | 96 ns at least  | read at the end of the strobe          | is there      |
+//! | data hold when writing (tdh)         | 0 ns at least   | one clock after the strobe, see below  | 1.4 ns        |
+//! | address hold (tah)                   | 0 ns at least   | the same                               | 0.9 ns        |
+//! | strobe high in between (trdr, twrr)  | 136 ns at least | ADDSET + ADDHLD of the next cycle      | 190 ns        |
+//! | cycle (trdcyc, twrcyc)               | 615 ns at least | the sum                                | 1190 ns       |
+//! | data bus free after select (thz2)    | 32 ns at most   | BUSTURN 8 clocks                       | 95 ns         |
 //!
-//! The 60 ns are for the buffers between board and controller, 15 ns each way, for 10 ns of wire, and for what the
+//! The 60 ns are for the buffers between board and controller, 10 ns each way, for 10 ns of wire, and for what the
 //! controller wants to see before it reads (data sheet, "Asynchronous … read timings": a clock and 4 ns).
+//!
+//! **Hold when writing.** The controller keeps data, address and select for one clock after `/WR` has risen, and has no
+//! field to make that longer. Of the 11.9 ns, 10.9 are left for data and select and 9.9 for the address (data sheet,
+//! "Asynchronous … write timings": `th(Data_NWE)`, `th(NE_NWE)`, `th(A_NWE)`) †. Then each takes its own way, and it is the
+//! worst that counts: `/WR` through a 74AHCT541 at its slowest, 10 ns †; the data through a 74LVC8T245 at its fastest,
+//! 0.5 ns †; address and select through a 74AHCT541 at its fastest, 1 ns †.
+//!
+//! | held after `/WR` at the board | from the controller | + fastest buffer | − slowest `/WR` | left   |
+//! |-------------------------------|---------------------|------------------|-----------------|--------|
+//! | data                          | 10.9 ns             | 0.5 ns           | 10 ns           | 1.4 ns |
+//! | address                       | 9.9 ns              | 1.0 ns           | 10 ns           | 0.9 ns |
+//! | select (the manual has none)  | 10.9 ns             | 1.0 ns           | 10 ns           | 1.9 ns |
+//!
+//! With a clock of 168 MHz, 4.6 ns would be missing for the data. The data buffer stays enabled for as long as the
+//! select line is low and turned to the board for as long as `/RD` is high, so it does not let go earlier. When reading, the
+//! board holds its data for 2 ns (tdh), and the controller asks for none.
+//!
+//! † Look it up in the issue of the data sheet that belongs to the part.
 //!
 //! # Design
 //! Mode D of the controller's asynchronous accesses is the one in which both strobes are high for the whole of
@@ -59,9 +80,12 @@ const fn clocks_for(ns: u32) -> u32 {
     (ns * (clocks::HCLK_HZ / 1_000_000)).div_ceil(1000)
 }
 
-const ADDRESS_SETUP: u32 = 15;
-const ADDRESS_HOLD: u32 = 15;
-const TURNAROUND: u32 = 15;
+/// A clock of the bus, in picoseconds, rounded down.
+const CLOCK_PS: u32 = 1_000_000_000 / (clocks::HCLK_HZ / 1000);
+
+const ADDRESS_SETUP: u32 = 8;
+const ADDRESS_HOLD: u32 = 8;
+const TURNAROUND: u32 = 8;
 const STROBE: u32 = clocks_for(READY_DELAY_MAX_NS + MARGIN_NS);
 const MODE_D: u32 = 3;
 
@@ -72,17 +96,38 @@ const UNUSED: u32 = 0xFF << 20;
 const TIMING: u32 =
     ADDRESS_SETUP | ADDRESS_HOLD << 4 | STROBE << 8 | TURNAROUND << 16 | UNUSED | MODE_D << 28;
 
+// What the board asks for.
 const READY_DELAY_MAX_NS: u32 = 937;
-const MARGIN_NS: u32 = 60;
 const RECOVERY_MIN_NS: u32 = 136;
 const CYCLE_MIN_NS: u32 = 615;
 const RELEASE_MAX_NS: u32 = 32;
+const HOLD_MIN_PS: u32 = 0;
+
+// What lies in between.
+const MARGIN_NS: u32 = 60;
+const BUFFER_MAX_NS: u32 = 10;
+const STROBE_BUFFER_MAX_PS: u32 = BUFFER_MAX_NS * 1000;
+const ADDRESS_BUFFER_MIN_PS: u32 = 1000;
+const DATA_BUFFER_MIN_PS: u32 = 500;
+/// By how much the controller's hold may be less than a clock.
+const DATA_HOLD_LACKS_PS: u32 = 1000;
+const SELECT_HOLD_LACKS_PS: u32 = 1000;
+const ADDRESS_HOLD_LACKS_PS: u32 = 2000;
+
+/// Whether what is held long enough by the controller is so at the board, where the end of `/WR` arrives later.
+const fn is_held(lacks_ps: u32, buffer_min_ps: u32) -> bool {
+    CLOCK_PS + buffer_min_ps >= STROBE_BUFFER_MAX_PS + lacks_ps + HOLD_MIN_PS
+}
 
 const _: () = {
     assert!(ns(STROBE) >= READY_DELAY_MAX_NS + MARGIN_NS);
-    assert!(ns(ADDRESS_SETUP + ADDRESS_HOLD) >= RECOVERY_MIN_NS);
+    // The end of a strobe may come late at the board, and the beginning of the next one early.
+    assert!(ns(ADDRESS_SETUP + ADDRESS_HOLD) >= RECOVERY_MIN_NS + BUFFER_MAX_NS);
     assert!(ns(ADDRESS_SETUP + ADDRESS_HOLD + STROBE) >= CYCLE_MIN_NS);
-    assert!(ns(TURNAROUND) >= RELEASE_MAX_NS);
+    assert!(ns(TURNAROUND) >= RELEASE_MAX_NS + 2 * BUFFER_MAX_NS);
+    assert!(is_held(DATA_HOLD_LACKS_PS, DATA_BUFFER_MIN_PS));
+    assert!(is_held(SELECT_HOLD_LACKS_PS, ADDRESS_BUFFER_MIN_PS));
+    assert!(is_held(ADDRESS_HOLD_LACKS_PS, ADDRESS_BUFFER_MIN_PS));
     // The fields have four bits, that of the strobe eight.
     assert!(ADDRESS_SETUP < 16 && ADDRESS_HOLD < 16 && TURNAROUND < 16 && STROBE < 256);
 };

@@ -1,4 +1,4 @@
-//! The recorder on an STM32F407 (Cortex-M4F at 168 MHz), 144 pins: the board to flash. `docs/hardware.md` says how it is
+//! The recorder on an STM32F407 (Cortex-M4F at 84 MHz), 144 pins: the board to flash. `docs/hardware.md` says how it is
 //! wired.
 //!
 //! Three interrupts and a main loop: capture (highest priority), RS-232 in both directions, the GENI board's line, and
@@ -121,7 +121,7 @@ mod app {
         };
         pins::set_up(&device.RCC, &ports);
         let watchdog = Watchdog::start(&device.IWDG, &device.DBGMCU);
-        let clock_source = clocks::start(&device.RCC, &device.PWR, &device.FLASH);
+        let clock_source = clocks::start(&device.RCC, &device.FLASH);
         protection::enable(&cx.core.MPU);
         log::start(&device.DBGMCU);
         // SAFETY: `init` runs once, with interrupts off.

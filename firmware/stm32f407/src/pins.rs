@@ -7,7 +7,7 @@
 //! # Tradeoffs
 //! With the external bus in place no chip of the family has two whole ports left: of the 144 pins' ports only B is whole.
 //! So inputs 17–32 are half a port each, taken where no shifting is needed: one load per port and one OR. The three loads
-//! lie some 50 ns apart, which samples a millisecond apart do not see.
+//! lie some 0.1 µs apart, which samples a millisecond apart do not see.
 //!
 //! # Notes
 //! Straps and inputs have the chip's pull-ups (30–50 kΩ): open reads as high. Ports that are not listed, and pins such

@@ -18,13 +18,15 @@ use ser_board::clock_chip::{ClockHealth, KeepsTime};
 use ser_board::stm32_rtc::{self, Calendar, CalendarRegisters, Shift};
 use stm32f4::stm32f407::{PWR, RCC, RTC};
 
+use crate::clocks::settle;
+
 /// 32768 Hz in one step.
 const PREDIV_S: u16 = 0x7FFF;
 
 const KEYS: [u8; 2] = [0xCA, 0x53];
 
 /// Looks at a flag before it is given up: 10 ms, where two periods of the crystal are due.
-const MAX_LOOKS: u32 = 100_000;
+const MAX_LOOKS: u32 = 50_000;
 
 pub(crate) static HEALTH: ClockHealth = ClockHealth::new();
 
@@ -48,6 +50,8 @@ pub(crate) struct ChipClock {
 impl ChipClock {
     /// Starts the clock, or finds it running.
     pub(crate) fn start(clocks: &RCC, power: &PWR, registers: RTC) -> ChipClock {
+        clocks.apb1enr().modify(|_, w| w.pwren().set_bit());
+        settle();
         // The battery-backed registers are locked out of reset.
         power.cr().modify(|_, w| w.dbp().set_bit());
         if !clocks.bdcr().read().rtcsel().is_lse() {
