@@ -23,7 +23,7 @@
 //! many changes, and with the very first change of each copy. It takes 250–500 ms for 16 KiB and 1–2 s for 128 KiB on
 //! an STM32F4 (data sheet, "Flash memory programming", 32 bits at a time), and until it is done nothing can be read
 //! from that bank: code that runs from it stands still, interrupts included. So either the capture interrupt, all
-//! that it calls and the vector table are in RAM, and capture goes on while the main loop waits (its queue takes 255
+//! that it calls and the vector table are in RAM, and capture goes on while the main loop waits (its queue takes 256
 //! changes), or the samples of that time are missed: `ser_node` counts them. The board sees to
 //! its watchdog meanwhile. Writing a record takes 16 bytes of at most 100 µs.
 

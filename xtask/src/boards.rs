@@ -17,7 +17,8 @@ pub(crate) struct Board {
     pub(crate) flash_budget: u32,
     /// Bytes of variables, with an event log of full size.
     pub(crate) variables_budget: u32,
-    /// Where the memory with the stack begins. Below there is nothing: a stack that gets there ends in a fault.
+    /// Where the memory with the stack begins. Below, the protection unit allows nothing: a stack that gets there ends in a
+    /// fault.
     pub(crate) stack_floor: u32,
     /// Functions that go on while the flash is being erased, besides all interrupt handlers: they and all that they
     /// call have to be in RAM. None where nothing is erased.

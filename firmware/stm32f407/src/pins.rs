@@ -10,7 +10,8 @@
 //! lie some 0.1 µs apart, which samples a millisecond apart do not see.
 //!
 //! # Notes
-//! Straps and inputs have the chip's pull-ups (30–50 kΩ): open reads as high. Ports that are not listed, and pins such
+//! Straps and inputs have the chip's pull-ups (30–50 kΩ): open reads as high. They pull against whatever is in series with a
+//! pin, which has to be small beside them; `docs/hardware.md` reckons that for the inputs. Ports that are not listed, and pins such
 //! as those of debugger and crystals, stay as they are out of reset.
 
 use stm32f4::stm32f407::{GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG, RCC};
