@@ -42,11 +42,14 @@ pub const fn bytes_in(ms: u32) -> usize {
 /// Received bytes that may wait: 192 arrive during a stall; the next power of two holds 133 ms.
 pub const RECEIVE_RING_LEN: usize = ring_len(bytes_in(MAIN_LOOP_STALL_MS));
 
-/// Bytes that may wait for the transmitter: 66 ms at the highest rate.
+/// How far ahead of the line the main loop may send, in milliseconds.
 ///
 /// A stall makes the line pause, which loses nothing, so it need not be covered; a short ring has the advantage that
 /// little is in flight when the rate changes or a reset comes.
-pub const TRANSMIT_RING_LEN: usize = 128;
+pub const TRANSMIT_AHEAD_MS: u32 = 66;
+
+/// Bytes that may wait for the transmitter.
+pub const TRANSMIT_RING_LEN: usize = ring_len(bytes_in(TRANSMIT_AHEAD_MS));
 
 /// Priority of the capture interrupt: above everything, for the millisecond of a sample is the product.
 pub const CAPTURE_PRIORITY: u8 = 3;
@@ -91,7 +94,7 @@ mod tests {
     fn the_numbers_in_the_text_are_the_ones_that_come_out() {
         assert_eq!(bytes_in(MAIN_LOOP_STALL_MS), 192);
         assert_eq!((RECEIVE_RING_LEN, bytes_in(133)), (256, 256));
-        assert_eq!(bytes_in(66), 127);
+        assert_eq!((TRANSMIT_RING_LEN, bytes_in(TRANSMIT_AHEAD_MS)), (128, 127));
         assert_eq!(PROBE_RING_LEN, 1024);
         assert_eq!(CHARACTER_BITS * 1_000_000 / MAX_BITS_PER_SECOND, 520);
     }
