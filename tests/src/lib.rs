@@ -2,6 +2,7 @@
 
 pub mod fuzzing;
 pub mod genius_world;
+pub mod pages;
 #[cfg(unix)]
 pub mod recorder;
 pub mod simulation;

@@ -1,0 +1,111 @@
+//! Pages of the documentation that name tests, and whether these tests exist.
+//!
+//! Such a page has a table of prefixes, each with the folder that it stands for, and tables whose rows name tests as
+//! `prefix/file.rs::function`.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Tests that are ignored for this reason run in `cargo xtask test`.
+const IN_THE_EMULATOR: &str = "needs the emulator";
+
+/// The text of a file of the project.
+#[must_use]
+pub fn file(path: &str) -> Option<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    std::fs::read_to_string(root.join(path)).ok()
+}
+
+/// A row of a table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Row<'a> {
+    /// The first cell.
+    pub first: &'a str,
+    /// All cells, the first one included.
+    pub cells: Vec<&'a str>,
+}
+
+/// The cells of a row; the bar at its end may be missing, as in any Markdown.
+fn cells(line: &str) -> Option<Vec<&str>> {
+    let row = line.trim().strip_prefix('|')?;
+    Some(row.strip_suffix('|').unwrap_or(row).split('|').map(str::trim).collect())
+}
+
+/// The rows of all tables whose first column has this heading.
+#[must_use]
+pub fn rows<'a>(page: &'a str, heading: &str) -> Vec<Row<'a>> {
+    let mut in_table = false;
+    let mut rows = Vec::new();
+    for line in page.lines() {
+        let cells = cells(line).unwrap_or_default();
+        match cells.first() {
+            None => in_table = false,
+            Some(&first) if first == heading => in_table = true,
+            Some(first) if first.starts_with("---") => {}
+            Some(&first) if in_table => rows.push(Row { first, cells }),
+            Some(_) => {}
+        }
+    }
+    rows
+}
+
+/// What the names of files begin with, and the folders that this stands for.
+#[must_use]
+pub fn prefixes(page: &str) -> BTreeMap<&str, &str> {
+    let rows = page.lines().filter_map(cells);
+    let folders = rows.filter_map(|cells| Some((code(cells[0])?, code(cells.get(1)?)?)));
+    folders.filter(|(prefix, folder)| prefix.ends_with('/') && folder.ends_with('/')).collect()
+}
+
+/// A cell that is nothing but `this`.
+fn code(cell: &str) -> Option<&str> {
+    cell.strip_prefix('`')?.strip_suffix('`')
+}
+
+/// Whether a source file has a test of this name that is run.
+fn has_test(source: &str, name: &str) -> bool {
+    let head = format!("fn {name}(");
+    let lines: Vec<&str> = source.lines().map(str::trim).collect();
+    let marked = lines.iter().enumerate().filter(|(_, line)| line.starts_with(&head)).any(|(at, _)| {
+        let above =
+            lines[..at].iter().rev().take_while(|line| line.starts_with("#[") || line.starts_with("//"));
+        let above: Vec<_> = above.collect();
+        let is_run = |line: &&&str| !line.starts_with("#[ignore") || line.contains(IN_THE_EMULATOR);
+        above.contains(&&"#[test]") && above.iter().all(is_run)
+    });
+    let listed = source.split("with_both_kinds! {").skip(1).any(|list| {
+        let names = list.split('}').next().unwrap_or_default();
+        names.split(',').any(|listed| listed.trim() == name)
+    });
+    marked || listed && lines.iter().any(|line| line.starts_with(&head))
+}
+
+/// What is wrong with the name of a test, if anything is.
+fn wrong_with(
+    test: &str,
+    prefixes: &BTreeMap<&str, &str>,
+    source_of: &impl Fn(&str) -> Option<String>,
+) -> Option<String> {
+    let Some((file, name)) = code(test).and_then(|test| test.split_once("::")) else {
+        return Some(format!("\"{test}\" is no test, `file::name`"));
+    };
+    let Some((prefix, folder)) = prefixes.iter().find(|(prefix, _)| file.starts_with(**prefix)) else {
+        return Some(format!("{file} begins with no prefix of the page's first table"));
+    };
+    let path = format!("{folder}{}", &file[prefix.len()..]);
+    match source_of(&path) {
+        None => Some(format!("there is no file {path}")),
+        Some(source) if !has_test(&source, name) => Some(format!("{path} has no test {name}")),
+        Some(_) => None,
+    }
+}
+
+/// What is wrong with a list of tests that commas separate.
+#[must_use]
+pub fn wrong_with_tests(
+    tests: &str,
+    prefixes: &BTreeMap<&str, &str>,
+    source_of: &impl Fn(&str) -> Option<String>,
+) -> Vec<String> {
+    tests.split(',').filter_map(|test| wrong_with(test.trim(), prefixes, source_of)).collect()
+}
