@@ -10,7 +10,8 @@
 //!   answer to the next command.
 //! - **Auto reports** are repeated until their receiver has acknowledged one, with growing pauses, as a receiver that is
 //!   not there would cost all others their place in the bus scan. A receiver may get one twice when its acknowledgement
-//!   was lost; total and next slot show it.
+//!   was lost; total and next slot show it. All devices together have one datagram of normal priority per bus scan, and those with
+//!   low numbers have the first chance: after each report as many scans are left to the others as there are others.
 //! - **Read I/O Forces** is answered with the recorder's own input tables: none is forced, and the values are the states
 //!   of the inputs. There are no outputs, so these tables are empty.
 //! - **Requests for memory** are refused: a recorder has none.
@@ -18,8 +19,8 @@
 mod reporter;
 
 use geni::{
-    Completion, Configuration, Counters, Data, Destination, Driver, Event, Failure, MAX_DATA_LEN, Options,
-    Priority, Received, SharedRam, Start, Status, Transmission, timing,
+    Completion, Configuration, Counters, Data, Destination, DeviceChange, Driver, Event, Failure,
+    MAX_DATA_LEN, Options, Priority, Received, SharedRam, Start, Status, Transmission, timing,
 };
 use heapless::{Deque, Vec};
 use ser_proto::genius::{
@@ -150,6 +151,8 @@ pub struct GeniusPort<W> {
     replies: Deque<Waiting, MAX_REPLIES>,
     on_its_way: Option<OnItsWay>,
     reporter: Reporter,
+    /// Devices that are logged in, number 0 in bit 0.
+    others: u32,
     diagnostics: GeniusDiagnostics,
 }
 
@@ -162,6 +165,7 @@ impl<W: SharedRam> GeniusPort<W> {
             replies: Deque::new(),
             on_its_way: None,
             reporter: Reporter::new(),
+            others: 0,
             diagnostics: GeniusDiagnostics::default(),
         }
     }
@@ -223,12 +227,14 @@ impl<W: SharedRam> GeniusPort<W> {
                 // By the time the board is back, nobody waits for these any more.
                 count(&mut self.diagnostics.replies_lost, self.replies.len() as u64);
                 self.replies.clear();
+                self.others = 0;
             }
             Event::Ready(_) => self.reporter.hurry(),
+            Event::Device { number, change: DeviceChange::LoggedOut } => self.others &= !bit(number),
+            Event::Device { number, .. } => self.others |= bit(number),
             // The driver remembers or has dealt with it, or it is not asked for.
             Event::Configured(_)
             | Event::StatusChanged(_)
-            | Event::Device { .. }
             | Event::RequestRefused(_)
             | Event::Request(_)
             | Event::Replied(_)
@@ -277,7 +283,8 @@ impl<W: SharedRam> GeniusPort<W> {
             Some(OnItsWay::Reply) => count(&mut self.diagnostics.replies_lost, (!arrived).into()),
             Some(OnItsWay::Report) if arrived => {
                 count(&mut self.diagnostics.reports_sent, 1);
-                self.reporter.arrived(&mut node.recorder);
+                let turns_ms = self.turns_of_others_ms();
+                self.reporter.arrived(&mut node.recorder, now_ms, turns_ms);
             }
             Some(OnItsWay::Report) => {
                 count(&mut self.diagnostics.reports_failed, 1);
@@ -285,6 +292,12 @@ impl<W: SharedRam> GeniusPort<W> {
             }
             None => {}
         }
+    }
+
+    /// How long it takes until each other device could have sent a datagram: a scan each, and what is left of this one.
+    fn turns_of_others_ms(&self) -> u32 {
+        let scan_ms = self.status().and_then(|status| status.scan_ms).unwrap_or(0);
+        u32::from(scan_ms) * (self.others.count_ones() + 1)
     }
 
     /// Replies go before reports: somebody waits for them.
@@ -334,6 +347,11 @@ impl<W: SharedRam> GeniusPort<W> {
         };
         self.driver.transmit(transmission).is_ok()
     }
+}
+
+/// The bit of a device number; there are 32 of these.
+fn bit(number: u8) -> u32 {
+    1_u32.checked_shl(number.into()).unwrap_or(0)
 }
 
 /// The reply to Read I/O Forces: the table's number and the table. Nothing is ever forced. A host that shows the values

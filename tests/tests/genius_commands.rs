@@ -210,6 +210,46 @@ fn auto_reports_go_to_the_configured_address_once_each() {
 }
 
 #[test]
+fn recorders_that_report_without_end_leave_everybody_a_turn() {
+    let numbers = [5, 6, 7];
+    let mut world = World::started(&numbers.map(|number| (number, Model::Ser320)));
+    let configure = Configure { auto_report: AutoReport::Genius, report_address: HOST, ..unchanged() };
+    for number in numbers {
+        world.ask(number, &Command::Configure(configure));
+    }
+    // More events than all reports together can bring, for a minute. The host has the last turn in every scan.
+    let mut answered = [0; 3];
+    let mut asked_at_ms = 0;
+    let end_ms = world.now_ms + 60_000;
+    let mut turn = 0;
+    while world.now_ms < end_ms {
+        for recorder in &mut world.recorders {
+            recorder.contact(1, world.now_ms % 2 == 0);
+        }
+        world.step();
+        for (index, number) in numbers.into_iter().enumerate() {
+            while let Some((_, data)) = world.take_message(number) {
+                let is_answer = matches!(Reply::parse(&data), Ok(Reply::Mode(_)));
+                answered[index] += u32::from(is_answer);
+                turn += usize::from(is_answer);
+                asked_at_ms = if is_answer { 0 } else { asked_at_ms };
+            }
+        }
+        if asked_at_ms == 0 {
+            asked_at_ms = world.now_ms;
+            world.send(Device(numbers[turn % 3]), &Command::QueryMode);
+        }
+        let waits_ms = world.now_ms - asked_at_ms;
+        assert!(waits_ms < 1_000, "{waits_ms} ms without an answer after {answered:?}");
+    }
+    assert!(answered.iter().all(|&count| count > 100), "{answered:?}");
+    let reports = world.recorders.iter().map(|recorder| recorder.port.diagnostics().reports_sent);
+    assert!(reports.clone().all(|sent| sent > 1_000), "{:?}", reports.collect::<Vec<_>>());
+    assert_eq!(world.host.driver.counters().commands_timed_out, 0);
+    world.assert_lawful();
+}
+
+#[test]
 fn what_one_port_configures_or_erases_holds_for_the_other() {
     let mut world = started(Model::Ser160);
     events(&mut world, 4);

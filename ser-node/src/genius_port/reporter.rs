@@ -1,4 +1,4 @@
-//! Auto reports over Genius: which events are on their way, and when to try again.
+//! Auto reports over Genius: which events are on their way, and when the next ones may go.
 
 use ser_proto::ReadReply;
 
@@ -12,6 +12,9 @@ const FIRST_PAUSE_MS: u32 = 20;
 /// Longest pause between two attempts.
 const LONGEST_PAUSE_MS: u32 = 2_560;
 
+/// After so many failures the pause is as long as it gets.
+const DOUBLINGS: u32 = (LONGEST_PAUSE_MS / FIRST_PAUSE_MS).ilog2();
+
 /// State of the reports.
 #[derive(Debug)]
 pub(super) struct Reporter {
@@ -19,6 +22,8 @@ pub(super) struct Reporter {
     first: u64,
     entries: usize,
     pause: Option<Pause>,
+    /// Attempts in a row that failed.
+    failures: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -29,7 +34,7 @@ struct Pause {
 
 impl Reporter {
     pub(super) const fn new() -> Reporter {
-        Reporter { first: 0, entries: 0, pause: None }
+        Reporter { first: 0, entries: 0, pause: None, failures: 0 }
     }
 
     /// The next report, unless it is to be waited with, or there is none.
@@ -47,20 +52,27 @@ impl Reporter {
         Some(report)
     }
 
-    /// The report has arrived.
-    pub(super) fn arrived<S: Storage, R: Rtc>(&mut self, recorder: &mut Recorder<'_, S, R>) {
+    /// The report has arrived. The next one waits for `turns_ms`, so that others have their turns.
+    pub(super) fn arrived<S: Storage, R: Rtc>(
+        &mut self,
+        recorder: &mut Recorder<'_, S, R>,
+        now_ms: u32,
+        turns_ms: u32,
+    ) {
         recorder.reported(self.first, self.entries);
-        self.pause = None;
+        self.failures = 0;
+        self.pause = Some(Pause { since_ms: now_ms, ms: turns_ms });
     }
 
     /// The report has not arrived, as far as one knows. Its events stay owed.
     pub(super) fn failed(&mut self, now_ms: u32) {
-        let ms = self.pause.map_or(FIRST_PAUSE_MS, |pause| (pause.ms * 2).min(LONGEST_PAUSE_MS));
-        self.pause = Some(Pause { since_ms: now_ms, ms });
+        self.pause = Some(Pause { since_ms: now_ms, ms: FIRST_PAUSE_MS << self.failures });
+        self.failures = (self.failures + 1).min(DOUBLINGS);
     }
 
     /// The reason for the pause may be gone.
     pub(super) fn hurry(&mut self) {
+        self.failures = 0;
         self.pause = None;
     }
 }
