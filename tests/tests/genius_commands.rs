@@ -224,7 +224,7 @@ fn recorders_that_report_without_end_leave_everybody_a_turn() {
     let mut turn = 0;
     while world.now_ms < end_ms {
         for recorder in &mut world.recorders {
-            recorder.contact(1, world.now_ms % 2 == 0);
+            recorder.contact(1, world.now_ms.is_multiple_of(2));
         }
         world.step();
         for (index, number) in numbers.into_iter().enumerate() {

@@ -1,7 +1,8 @@
 //! Whole-system simulation in virtual time: see `ser_tests::simulation`.
 
+use std::fmt;
 use std::process::ExitCode;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::Parser;
 use ser_tests::simulation::{self, Options};
@@ -43,15 +44,43 @@ struct Arguments {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
+    let mut total = Pace::default();
     for seed in arguments.seed..arguments.seed.saturating_add(arguments.seeds) {
-        if !run(seed, &arguments) {
-            return ExitCode::FAILURE;
+        match run(seed, &arguments) {
+            Some(pace) => total = total.and(pace),
+            None => return ExitCode::FAILURE,
         }
+    }
+    if arguments.seeds > 1 {
+        println!("{} seeds, nothing unaccounted for: {total}", arguments.seeds);
     }
     ExitCode::SUCCESS
 }
 
-fn run(seed: u64, arguments: &Arguments) -> bool {
+/// Virtual time, and how long it took.
+#[derive(Clone, Copy, Default)]
+struct Pace {
+    virtual_ms: u64,
+    real: Duration,
+}
+
+impl Pace {
+    fn and(self, other: Pace) -> Pace {
+        Pace { virtual_ms: self.virtual_ms + other.virtual_ms, real: self.real + other.real }
+    }
+}
+
+impl fmt::Display for Pace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        #[expect(clippy::cast_precision_loss, reason = "for people")]
+        let hours = self.virtual_ms as f64 / 3_600_000.0;
+        let minutes = self.real.as_secs_f64() / 60.0;
+        write!(f, "{hours:.2} virtual hours in {minutes:.2} min, {:.0} per minute", hours / minutes)
+    }
+}
+
+/// Runs a seed and says what became of it; nothing when it failed.
+fn run(seed: u64, arguments: &Arguments) -> Option<Pace> {
     let began = Instant::now();
     #[expect(
         clippy::cast_possible_truncation,
@@ -62,16 +91,13 @@ fn run(seed: u64, arguments: &Arguments) -> bool {
     let simulate = if arguments.load { simulation::run_flat_out } else { simulation::run };
     match simulate(Options { seed, duration_ms, bus_one_in: arguments.bus_one_in }) {
         Ok(report) => {
-            println!("{report}");
-            let minutes = began.elapsed().as_secs_f64() / 60.0;
-            #[expect(clippy::cast_precision_loss, reason = "for people")]
-            let hours = report.hours.total_ms as f64 / 3_600_000.0;
-            println!("  {:.0} virtual hours per minute of this computer\n", hours / minutes);
-            true
+            let pace = Pace { virtual_ms: report.hours.total_ms, real: began.elapsed() };
+            println!("{report}\n  {pace}\n");
+            Some(pace)
         }
         Err(failure) => {
             eprintln!("{failure}");
-            false
+            None
         }
     }
 }

@@ -59,50 +59,113 @@ fn hours(ms: u64) -> f64 {
     ms as f64 / 3_600_000.0
 }
 
+impl Report {
+    fn edge_rows(&self) -> Vec<Row> {
+        let row = |what, count: fn(&Edges) -> u64| Row::new(what, self.edges.iter().map(count));
+        vec![
+            row("edges of contacts", |edges| edges.applied),
+            row("= recorded", |edges| edges.recorded),
+            row("+ while stopped", |edges| edges.stopped),
+            row("+ shorter than debounce", |edges| edges.filtered),
+            row("+ beyond the queue, counted", |edges| edges.queue_full),
+            row("+ cut off by the power", |edges| edges.cut_off),
+            row("+ not decided yet", |edges| edges.undecided),
+        ]
+    }
+
+    fn event_rows(&self) -> Vec<Row> {
+        let tallies = || self.tallies.iter().map(|(_, tally)| tally);
+        let row = |what, count: fn(&Tally) -> u64| Row::new(what, tallies().map(count));
+        vec![
+            row("events", |tally| tally.delivered + tally.overwritten + tally.gone + tally.unwatched),
+            row("= delivered, once and in order", |tally| tally.delivered),
+            row("+ overwritten, reported", |tally| tally.overwritten),
+            row("+ gone with the log, reported", |tally| tally.gone),
+            row("+ not connected", |tally| tally.unwatched),
+            row("log restarts reported", |tally| tally.restarts),
+            row("log restarts without a trace", |tally| tally.traceless),
+            row("total wrapped unseen", |tally| tally.wrapped),
+        ]
+    }
+
+    fn talk_rows(&self) -> Vec<Row> {
+        let talks = || [&self.line].into_iter().chain(&self.bus);
+        let row = |what, count: fn(&Talk) -> u64| Row::new(what, talks().map(count));
+        vec![
+            row("requests answered", |talk| talk.answered),
+            row("requests given up", |talk| talk.unanswered),
+            row("readings to the end", |talk| talk.readings),
+            row("readings disturbed", |talk| talk.disturbed),
+            row("reports", |talk| talk.reports),
+            row("reports with what was next", |talk| talk.reports_followed),
+            row("lines of text", |talk| talk.lines),
+        ]
+    }
+}
+
+/// A line of a table: what is counted, and a number for each column.
+struct Row {
+    what: &'static str,
+    counts: Vec<String>,
+}
+
+impl Row {
+    fn new(what: &'static str, counts: impl Iterator<Item = u64>) -> Row {
+        Row { what, counts: counts.map(grouped).collect() }
+    }
+}
+
+/// Digits in groups of three.
+fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let groups: Vec<&str> =
+        digits.as_bytes().rchunks(3).rev().filter_map(|group| std::str::from_utf8(group).ok()).collect();
+    groups.join(",")
+}
+
+fn table<'a>(f: &mut fmt::Formatter<'_>, heads: impl Iterator<Item = &'a str>, rows: &[Row]) -> fmt::Result {
+    write!(f, "\n  {:30}", "")?;
+    heads.into_iter().try_for_each(|head| write!(f, "  {head:>15}"))?;
+    for row in rows {
+        write!(f, "\n  {:30}", row.what)?;
+        row.counts.iter().try_for_each(|count| write!(f, "  {count:>15}"))?;
+    }
+    writeln!(f)
+}
+
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Hours { total_ms, bus_ms, steps } = self.hours;
-        writeln!(f, "seed {}: digest {:016x}", self.seed, self.digest)?;
+        writeln!(f, "seed {}, digest {:016x}", self.seed, self.digest)?;
         writeln!(
             f,
-            "  {:.2} h of virtual time, of these {:.2} h with a bus; {steps} steps, {} operations and faults",
+            "  {:.2} h of virtual time, {:.2} h of them on a bus; {} steps, {} operations and faults",
             hours(total_ms),
             hours(bus_ms),
-            self.operations,
+            grouped(steps),
+            grouped(self.operations),
         )?;
-        for (number, (edges, recorded)) in self.edges.iter().zip(&self.recorded).enumerate() {
-            let Edges { applied, recorded: in_events, stopped, filtered, queue_full, cut_off, undecided } =
-                edges;
-            writeln!(
-                f,
-                "  recorder {}: {applied} edges = {in_events} recorded (in {recorded} events) + {stopped} while stopped \
-                 + {filtered} filtered + {queue_full} beyond the queue + {cut_off} cut off + {undecided} not decided",
-                number + 1,
-            )?;
-        }
-        for (name, tally) in &self.tallies {
-            let Tally { delivered, overwritten, gone, unwatched, restarts, traceless, wrapped } = tally;
-            writeln!(
-                f,
-                "  {name}: {delivered} events delivered + {overwritten} overwritten + {gone} gone with the log + \
-                 {unwatched} not connected; log restarts: {restarts} told, {traceless} traceless; {wrapped} wraps missed",
-            )?;
-        }
-        for (name, talk) in
-            [("line", &self.line)].into_iter().chain(self.bus.iter().map(|talk| ("bus", talk)))
-        {
-            let Talk { answered, unanswered, readings, disturbed, reports, reports_followed, lines } = talk;
-            writeln!(
-                f,
-                "  {name}: {answered} answers, {unanswered} requests unanswered, {readings} readings ({disturbed} \
-                 disturbed), {reports} reports ({reports_followed} followed), {lines} lines",
-            )?;
-        }
+        table(f, ["recorder 1", "recorder 2"].into_iter(), &self.edge_rows())?;
+        table(f, self.tallies.iter().map(|&(name, _)| name), &self.event_rows())?;
+        table(f, self.tallies.iter().map(|&(name, _)| name), &self.talk_rows())?;
         let (printed, missing) = self.printed;
         write!(
             f,
-            "  {printed} events printed, {missing} said to be missing; {} damaged frames looked whole",
-            self.forged
+            "\n  printed by recorder 1: {} events, {} said to be missing; {} damaged frames looked whole",
+            grouped(printed),
+            grouped(missing),
+            grouped(self.forged),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::grouped;
+
+    #[test]
+    fn digits_stand_in_groups_of_three() {
+        let written = [0, 999, 1_000, 12_345, 1_234_567].map(grouped);
+        assert_eq!(written, ["0", "999", "1,000", "12,345", "1,234,567"]);
     }
 }
