@@ -111,10 +111,7 @@ impl Capture<'_> {
     #[inline]
     pub fn sample(&mut self, tick_ms: u32, inputs: u32) {
         match &mut self.filter {
-            None => {
-                self.filter = Some(Filter::new(&self.debounce, inputs));
-                self.push(Sample { tick_ms, changed: 0, state: inputs });
-            }
+            None => self.begin(tick_ms, inputs),
             Some(_) => {
                 let elapsed = tick_ms.wrapping_sub(self.tick_ms);
                 if elapsed == 0 || elapsed > u32::MAX / 2 {
@@ -131,6 +128,14 @@ impl Capture<'_> {
         self.tick_ms = tick_ms;
         // Last: who reads this tick finds everything up to it in the queue.
         self.shared.tick_ms.store(tick_ms, Ordering::Release);
+    }
+
+    /// Takes the baseline. Apart from the rest, which would have to make room for it on the stack in every millisecond.
+    #[cold]
+    #[inline(never)]
+    fn begin(&mut self, tick_ms: u32, inputs: u32) {
+        self.filter = Some(Filter::new(&self.debounce, inputs));
+        self.push(Sample { tick_ms, changed: 0, state: inputs });
     }
 
     #[inline]

@@ -1,7 +1,7 @@
 //! The per-input debounce filter: a change counts when the input has held its new state long enough.
 //!
 //! All inputs are filtered together with bit-parallel counters: plane `p` holds bit `p` of every input's counter,
-//! so one pass over the planes counts 32 inputs down, and the work is the same whatever the inputs do.
+//! so one pass over the planes counts for 32 inputs, and the work is the same whatever the inputs do.
 
 /// Counters are eight bits wide: debounce times reach 255 ms.
 const PLANES: usize = 8;
@@ -49,27 +49,51 @@ impl Debounce {
     }
 }
 
+/// One bit of the counter of every input.
+///
+/// A counter starts at 256 less the time and counts up. What is kept is in which bits it differs from its start, so that
+/// starting anew is a mask.
+#[derive(Clone, Copy, Debug, Default)]
+struct Plane {
+    moved: u32,
+    start: u32,
+}
+
+impl Plane {
+    /// Adds the carry to the counters that are `counting`, and starts the others anew. Gives the carry for the next plane.
+    #[inline]
+    fn count(&mut self, counting: u32, carry: u32) -> u32 {
+        let counter = self.moved ^ self.start;
+        self.moved = (self.moved ^ carry) & counting;
+        carry & counter
+    }
+}
+
 /// The filter at work: one step per sample.
 #[derive(Clone, Debug)]
 pub(crate) struct Filter {
     accepted: u32,
-    /// What is left to count for every input; equal to `reload` while an input agrees with its accepted state.
-    counters: [u32; PLANES],
-    reload: [u32; PLANES],
-    planes: usize,
+    planes: [Plane; PLANES],
+    /// Inputs that have been in their new state for their time: one more sample of it, and it is accepted.
+    due: u32,
+    /// Inputs without a time, which are always due.
+    without: u32,
 }
 
 impl Filter {
     /// A filter that takes `inputs` for accepted.
     pub(crate) fn new(debounce: &Debounce, inputs: u32) -> Filter {
-        let mut reload = [0; PLANES];
-        for (plane, bits) in reload.iter_mut().enumerate() {
-            for (input, time_ms) in debounce.times_ms.iter().enumerate() {
-                *bits |= u32::from(time_ms >> plane & 1) << input;
+        let mut planes = [Plane::default(); PLANES];
+        let mut without = 0;
+        for (input, time_ms) in debounce.times_ms.iter().enumerate() {
+            // 256 less the time, without its ninth bit.
+            let start = time_ms.wrapping_neg();
+            without |= u32::from(start == 0) << input;
+            for (bit, plane) in planes.iter_mut().enumerate() {
+                plane.start |= u32::from(start >> bit & 1) << input;
             }
         }
-        let planes = (u8::BITS - debounce.longest_ms().leading_zeros()) as usize;
-        Filter { accepted: inputs, counters: reload, reload, planes }
+        Filter { accepted: inputs, planes, due: without, without }
     }
 
     /// The state that has been accepted.
@@ -79,26 +103,27 @@ impl Filter {
 
     /// Whether no input has a debounce time, so that repeating a sample changes nothing.
     pub(crate) const fn is_off(&self) -> bool {
-        self.planes == 0
+        self.without == u32::MAX
     }
 
     /// Takes the next sample; returns the inputs whose change has just been accepted.
     #[inline]
     pub(crate) fn step(&mut self, inputs: u32) -> u32 {
         let differ = inputs ^ self.accepted;
-        // Counting down borrows; a borrow out of the highest plane means that the counter was at zero.
-        let mut borrow = differ;
-        for (counter, reload) in self.counters.iter_mut().zip(&self.reload).take(self.planes) {
-            let counted = *counter ^ borrow;
-            borrow &= !*counter;
-            *counter = (counted & differ) | (*reload & !differ);
-        }
-        let accepted = borrow;
-        if accepted != 0 {
-            self.accepted ^= accepted;
-            for (counter, reload) in self.counters.iter_mut().zip(&self.reload).take(self.planes) {
-                *counter = (*counter & !accepted) | (*reload & accepted);
-            }
+        let accepted = differ & self.due;
+        self.accepted ^= accepted;
+        if !self.is_off() {
+            let counting = differ ^ accepted;
+            // Written out: this is half of the capture interrupt, and a loop would take half as long again.
+            let [a, b, c, d, e, f, g, h] = &mut self.planes;
+            let carry = a.count(counting, counting);
+            let carry = b.count(counting, carry);
+            let carry = c.count(counting, carry);
+            let carry = d.count(counting, carry);
+            let carry = e.count(counting, carry);
+            let carry = f.count(counting, carry);
+            let carry = g.count(counting, carry);
+            self.due = h.count(counting, carry) | self.without;
         }
         accepted
     }
