@@ -42,7 +42,7 @@ use crate::scenario::Scenario;
 use crate::scenario_lines::Item;
 use crate::simulator::EmulatorOptions;
 
-const PROGRAM: &str = "qemu-system-arm";
+pub(crate) const PROGRAM: &str = "qemu-system-arm";
 
 /// How long the image may take to answer: QEMU starts slowly on a busy machine.
 const ANSWER_WITHIN: Duration = Duration::from_secs(60);
@@ -104,7 +104,7 @@ struct Running {
 }
 
 /// The process; goes with us.
-struct Qemu(Child);
+pub(crate) struct Qemu(pub(crate) Child);
 
 impl Drop for Qemu {
     fn drop(&mut self) {
@@ -237,16 +237,8 @@ impl Emulator {
         let mut process = Process::new(&self.program);
         process.args(&self.arguments);
         process.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(printed);
-        // Ctrl-C at the terminal is for us; we end it when we end.
-        process.process_group(0);
-        let mut child = match process.spawn() {
-            Err(error) if error.kind() == ErrorKind::NotFound => {
-                return Err(SimError::EmulatorMissing { program: self.program.clone() });
-            }
-            spawned => spawned.map_err(SimError::io(doing()))?,
-        };
-        let (input, output) = (child.stdin.take(), child.stdout.take());
-        let qemu = Qemu(child);
+        let mut qemu = spawn(&mut process, &self.program)?;
+        let (input, output) = (qemu.0.stdin.take(), qemu.0.stdout.take());
         let (Some(input), Some(output)) = (input, output) else {
             return Err(SimError::io(doing())(io::Error::other("no pipes")));
         };
@@ -469,7 +461,20 @@ impl Machine for Emulator {
     }
 }
 
-fn arguments(options: &EmulatorOptions, memory: &Path) -> Vec<OsString> {
+/// Starts the emulator.
+pub(crate) fn spawn(process: &mut Process, program: &Path) -> Result<Qemu, SimError> {
+    // Ctrl-C at the terminal is for us; we end it when we end.
+    process.process_group(0);
+    match process.spawn() {
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            Err(SimError::EmulatorMissing { program: program.to_owned() })
+        }
+        spawned => spawned.map(Qemu).map_err(SimError::io(format!("start {}", program.display()))),
+    }
+}
+
+/// What the board is made of, for the emulator.
+pub(crate) fn arguments(options: &EmulatorOptions, memory: &Path) -> Vec<OsString> {
     let mut backend = OsString::from(format!(
         "memory-backend-file,id=ext,size={},share=on,mem-path=",
         crate::external_bus::MEMORY_LEN
@@ -509,19 +514,19 @@ fn time_of_day_ms() -> u64 {
 }
 
 /// A comma ends an option of QEMU unless it is doubled.
-fn doubled_commas(path: &Path) -> OsString {
+pub(crate) fn doubled_commas(path: &Path) -> OsString {
     let bytes = path.as_os_str().as_bytes();
     OsString::from_vec(
         bytes.iter().flat_map(|&byte| [byte].repeat(if byte == b',' { 2 } else { 1 })).collect(),
     )
 }
 
-fn never_wait(descriptor: impl AsFd) -> io::Result<()> {
+pub(crate) fn never_wait(descriptor: impl AsFd) -> io::Result<()> {
     let flags = fcntl_getfl(&descriptor)?;
     Ok(fcntl_setfl(&descriptor, flags | OFlags::NONBLOCK)?)
 }
 
-fn is_temporary(error: &io::Error) -> bool {
+pub(crate) fn is_temporary(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }
 

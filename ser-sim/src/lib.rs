@@ -6,6 +6,7 @@
 //!   result on every machine.
 //! - [`Simulator`] is a node that keeps pace with real time and answers on a pseudo-terminal or a TCP port:
 //!   what a host program can be tried against.
+//! - [`Lockstep`] is the ARM image in virtual time, held still whenever the world moves: for what has to be exact.
 //! - [`genius`] is the other way to a node: a GENI board, the Genius bus it sits on, and other devices there.
 
 mod breaker_trip;
@@ -24,6 +25,8 @@ pub mod genius;
 mod genius_bench;
 mod genius_options;
 mod line;
+#[cfg(unix)]
+mod lockstep;
 mod machine;
 mod native;
 mod non_volatile;
@@ -45,6 +48,8 @@ pub use emulated_board::{EmulatedBoard, ForcedFault};
 pub use error::SimError;
 pub use genius_options::{GeniusOptions, MAX_NODES};
 pub use line::Port;
+#[cfg(unix)]
+pub use lockstep::{INSTRUCTIONS_PER_MS, Lockstep, LockstepOptions};
 pub use non_volatile::{MemoryStorage, NonVolatile, SimRtc};
 pub use player::{Played, STREAM_LEAD_MS};
 pub use scenario::{MAX_STEPS, Scenario, ScenarioError, ScenarioFault, Step};

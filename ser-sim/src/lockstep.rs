@@ -1,0 +1,328 @@
+//! The ARM image in QEMU in virtual time: it runs from stop to stop, and the world moves while it is held.
+//!
+//! # Design
+//! QEMU counts instructions for time (`-icount`), and a plugin of it (`ser-qemu-plugin`) holds the processor before chosen
+//! instructions. Between two stops nothing reaches the board from outside. What happens is then the same in every run and
+//! on every machine, and every instruction can be looked at.
+//!
+//! Inputs, clock and GENI board are in the memory that both sides map. Bytes for the board's UART go through QEMU's
+//! standard input; the UART's state, read by way of QEMU's test interface (`-qtest`), tells that they have arrived.
+//!
+//! # Tradeoffs
+//! One instruction lasts 2⁵ ns: 31 million in a second, less than any chip that one would flash. At 2⁰ ns the processor
+//! would be so fast that no load is one. Numbers of instructions do not depend on it.
+//!
+//! # Notes
+//! An idle processor makes QEMU 7.2 jump two timer periods ahead instead of one. The bench therefore has to see that
+//! the processor never sleeps, with a `nop` in place of each `wfi`: see [`Lockstep::patch`].
+
+mod probe;
+mod tracer;
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
+use std::os::unix::net::UnixListener;
+use std::path::{Path, PathBuf};
+use std::process::{ChildStdin, ChildStdout, Command as Process, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use ser_proto::Model;
+use tempfile::TempDir;
+
+use crate::emulator::{PROGRAM, Qemu, arguments, doubled_commas, is_temporary, never_wait, spawn};
+use crate::error::SimError;
+use crate::external_bus::ExternalBus;
+use crate::genius::Board;
+use crate::simulator::EmulatorOptions;
+
+use probe::Probe;
+use tracer::Tracer;
+
+/// How long QEMU may take for anything: machines stall for seconds.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// How soon it is looked again.
+const LOOK_EVERY: Duration = Duration::from_millis(1);
+
+/// An instruction lasts two to the power of this, in nanoseconds.
+const INSTRUCTION_SHIFT: u32 = 5;
+
+/// Instructions that the processor executes in a millisecond.
+pub const INSTRUCTIONS_PER_MS: u64 = 1_000_000 >> INSTRUCTION_SHIFT;
+
+/// Nothing more than the straps and the input latch differ between boards.
+#[derive(Clone, Debug)]
+pub struct LockstepOptions {
+    /// The image and the emulator.
+    pub emulator: EmulatorOptions,
+    /// The plugin for QEMU, built from `ser-qemu-plugin`.
+    pub plugin: PathBuf,
+    /// Which recorder the board is strapped to be.
+    pub model: Model,
+    /// Debounce time of all inputs that it is strapped for; 0 is off.
+    pub debounce_ms: u8,
+    /// Whether it has a GENI board.
+    pub geni: bool,
+    /// Addresses of the instructions to stop at. The first instruction after a reset has to be one.
+    pub stops: Vec<u32>,
+}
+
+/// An emulated board that is held at a stop.
+pub struct Lockstep {
+    bus: ExternalBus,
+    /// The GENI board's reset line as it was last seen.
+    geni_reset: u32,
+    tracer: Tracer,
+    probe: Probe,
+    input: ChildStdin,
+    output: ChildStdout,
+    qemu: Qemu,
+    /// Holds memory, sockets, and what QEMU prints. Goes last.
+    directory: TempDir,
+}
+
+impl Lockstep {
+    /// Switches a board on; it is held at the very first instruction. All contacts are open.
+    ///
+    /// # Errors
+    /// When the emulator or the plugin cannot be started.
+    pub fn start(options: &LockstepOptions) -> Result<Lockstep, SimError> {
+        let directory = TempDir::with_prefix("ser-sim-")
+            .map_err(SimError::io("make a temporary directory for the emulator"))?;
+        let memory = directory.path().join("memory");
+        let bus = ExternalBus::open(&memory)
+            .map_err(SimError::io(format!("use {} as external memory", memory.display())))?;
+        bus.set_straps(options.model, options.debounce_ms);
+        bus.fit_geni(options.geni);
+        bus.set_inputs(0);
+        bus.set_clock(0);
+
+        let [plugin_at, probe_at] = ["plugin", "probe"].map(|name| directory.path().join(name));
+        let listen = |path: &Path| UnixListener::bind(path).map_err(SimError::io("listen to the emulator"));
+        let (plugin, probe) = (listen(&plugin_at)?, listen(&probe_at)?);
+        let program = options.emulator.program.clone().unwrap_or_else(|| PROGRAM.into());
+        let printed =
+            File::create(directory.path().join(PRINTED)).map_err(SimError::io("make a temporary file"))?;
+        let mut process = Process::new(&program);
+        process.args(arguments(&options.emulator, &memory)).args(extra(options, &plugin_at, &probe_at));
+        process.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(printed);
+        let mut qemu = spawn(&mut process, &program)?;
+        let (Some(input), Some(output)) = (qemu.0.stdin.take(), qemu.0.stdout.take()) else {
+            return Err(SimError::Ended);
+        };
+        never_wait(&output).map_err(SimError::io("talk to the emulator"))?;
+        let mut accept = |listener| accept(listener, &mut qemu, directory.path());
+        let (tracer, probe) = (Tracer::new(accept(&plugin)?), Probe::new(accept(&probe)?));
+        let geni_reset = bus.geni_reset();
+        let mut lockstep = Lockstep { bus, geni_reset, tracer, probe, input, output, qemu, directory };
+        lockstep.tracer.read(&mut |_| {}).map_err(|error| lockstep.explain(error))?;
+        Ok(lockstep)
+    }
+
+    /// Lets the board run to the next stop; gives its address. `executed` is told of every instruction from the one it is held
+    /// at up to, and without, that stop.
+    ///
+    /// # Errors
+    /// When the emulator has ended or hangs.
+    pub fn run_and_tell(&mut self, executed: &mut impl FnMut(u32)) -> Result<u32, SimError> {
+        self.tracer.go(true).and_then(|()| self.tracer.read(executed)).map_err(|error| self.explain(error))
+    }
+
+    /// The same, and nobody is told of instructions, which is faster.
+    ///
+    /// # Errors
+    /// When the emulator has ended or hangs.
+    pub fn run(&mut self) -> Result<u32, SimError> {
+        self.tracer
+            .go(false)
+            .and_then(|()| self.tracer.read(&mut |_| {}))
+            .map_err(|error| self.explain(error))
+    }
+
+    /// Puts another instruction in the place of one that has not been executed yet.
+    ///
+    /// # Errors
+    /// When the emulator has ended or hangs.
+    pub fn patch(&mut self, address: u32, instruction: u16) -> Result<(), SimError> {
+        self.probe.write_halfword(address, instruction).map_err(|error| self.explain(error))
+    }
+
+    /// Moves all contacts at once.
+    pub fn set_inputs(&self, inputs: u32) {
+        self.bus.set_inputs(inputs);
+    }
+
+    /// Turns the battery-backed clock on.
+    pub fn set_clock(&self, count_ms: u64) {
+        self.bus.set_clock(count_ms);
+    }
+
+    /// The tick of the latest sample.
+    #[must_use]
+    pub fn tick_ms(&self) -> u32 {
+        self.bus.sample_counter()
+    }
+
+    /// How often the image has started.
+    #[must_use]
+    pub fn boots(&self) -> u32 {
+        self.bus.boots()
+    }
+
+    /// Gives the UART a byte, if it has room for one. False if it has not.
+    ///
+    /// # Errors
+    /// When the emulator has ended or hangs.
+    pub fn receive(&mut self, byte: u8) -> Result<bool, SimError> {
+        let received = self.try_receive(byte);
+        received.map_err(|error| self.explain(error))
+    }
+
+    fn try_receive(&mut self, byte: u8) -> io::Result<bool> {
+        if self.probe.uart_is_full()? {
+            return Ok(false);
+        }
+        self.input.write_all(&[byte])?;
+        self.input.flush()?;
+        let deadline = Instant::now() + PATIENCE;
+        while !self.probe.uart_is_full()? {
+            if Instant::now() > deadline {
+                return Err(io::Error::from(io::ErrorKind::TimedOut));
+            }
+        }
+        Ok(true)
+    }
+
+    /// Takes what the UART has sent. QEMU keeps no line rate: it has left at once.
+    ///
+    /// # Errors
+    /// When the emulator has ended.
+    pub fn take_sent(&mut self) -> Result<Vec<u8>, SimError> {
+        let mut sent = Vec::new();
+        let mut buffer = [0; 1024];
+        loop {
+            match self.output.read(&mut buffer) {
+                Ok(0) => return Err(self.explain(io::ErrorKind::UnexpectedEof.into())),
+                Ok(read) => sent.extend(&buffer[..read]),
+                Err(error) if is_temporary(&error) => return Ok(sent),
+                Err(error) => return Err(self.explain(error)),
+            }
+        }
+    }
+
+    /// Shows the GENI board what the image has done to its shared RAM and its reset line.
+    pub fn tell_geni(&mut self, board: &mut Board) {
+        let reset = self.bus.geni_reset();
+        if reset != self.geni_reset {
+            self.geni_reset = reset;
+            board.hold_reset();
+            if reset & 1 == 0 {
+                board.release_reset();
+            }
+        }
+        board.sync_with(|offset| self.bus.read_geni(offset));
+    }
+
+    /// Shows the image what the GENI board has done to its shared RAM.
+    pub fn hear_geni(&mut self, board: &mut Board) {
+        board.publish(|offset, byte| self.bus.write_geni(offset, byte));
+    }
+
+    /// Why the emulator does not talk to us.
+    fn explain(&mut self, error: io::Error) -> SimError {
+        explain(error, &mut self.qemu, self.directory.path())
+    }
+}
+
+/// File for what QEMU prints.
+const PRINTED: &str = "qemu.txt";
+
+/// Options that make QEMU's time virtual and let us in.
+fn extra(options: &LockstepOptions, plugin_at: &Path, probe_at: &Path) -> Vec<OsString> {
+    let mut plugin = OsString::from("file=");
+    plugin.push(doubled_commas(&options.plugin));
+    plugin.push(",socket=");
+    plugin.push(doubled_commas(plugin_at));
+    for stop in &options.stops {
+        plugin.push(format!(",stop={stop:x}"));
+    }
+    let mut probe = OsString::from("unix:");
+    probe.push(doubled_commas(probe_at));
+    let icount = format!("shift={INSTRUCTION_SHIFT},sleep=off");
+    vec![
+        "-icount".into(),
+        icount.into(),
+        "-plugin".into(),
+        plugin,
+        "-qtest".into(),
+        probe,
+        "-qtest-log".into(),
+        "none".into(),
+    ]
+}
+
+/// Waits for the emulator to call.
+fn accept(
+    listener: &UnixListener,
+    qemu: &mut Qemu,
+    directory: &Path,
+) -> Result<std::os::unix::net::UnixStream, SimError> {
+    let deadline = Instant::now() + PATIENCE;
+    let accepted = loop {
+        let ended = qemu.0.try_wait().map_err(SimError::io("look after the emulator"))?.is_some();
+        let accepted = listener.set_nonblocking(true).and_then(|()| listener.accept());
+        match accepted {
+            Err(error) if is_temporary(&error) && !ended && Instant::now() < deadline => {
+                thread::sleep(LOOK_EVERY);
+            }
+            accepted => break accepted,
+        }
+    };
+    let ready = accepted.and_then(|(stream, _)| {
+        stream.set_nonblocking(false)?;
+        stream.set_read_timeout(Some(PATIENCE))?;
+        Ok(stream)
+    });
+    ready.map_err(|error| explain(error, qemu, directory))
+}
+
+fn explain(error: io::Error, qemu: &mut Qemu, directory: &Path) -> SimError {
+    let printed = fs::read(directory.join(PRINTED)).unwrap_or_default();
+    let printed = String::from_utf8_lossy(&printed).trim().to_owned();
+    let lost = matches!(
+        error.kind(),
+        io::ErrorKind::UnexpectedEof | io::ErrorKind::BrokenPipe | io::ErrorKind::ConnectionReset
+    );
+    // A process that hangs up is about to end.
+    let ended = if lost { qemu.0.wait().ok() } else { qemu.0.try_wait().ok().flatten() };
+    match ended {
+        Some(status) => SimError::EmulatorEnded { how: status.to_string(), printed },
+        None if is_temporary(&error) => SimError::NoAnswer { waited: PATIENCE, printed },
+        None => SimError::io("talk to the emulator")(error),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_emulator_that_knows_no_such_options_says_so() {
+        let image = tempfile::NamedTempFile::new().unwrap();
+        let mut emulator = EmulatorOptions::new(image.path());
+        // The shell knows no option -M.
+        emulator.program = Some("/bin/sh".into());
+        let options = LockstepOptions {
+            emulator,
+            plugin: "plugin.so".into(),
+            model: Model::Ser160,
+            debounce_ms: 0,
+            geni: false,
+            stops: vec![0xC0],
+        };
+        let error = Lockstep::start(&options).err().unwrap().to_string();
+        assert!(error.contains("exit status: 2") && error.contains("-M"), "{error}");
+    }
+}
