@@ -6,4 +6,6 @@ pub mod pages;
 #[cfg(unix)]
 pub mod recorder;
 pub mod simulation;
+#[cfg(unix)]
+pub mod timing;
 pub mod vectors;

@@ -20,6 +20,7 @@ mod stack_paths;
 mod steps;
 mod table;
 mod test;
+mod timing;
 
 use std::process::ExitCode;
 
@@ -44,6 +45,7 @@ enum Verb {
     Lint(lint::Arguments),
     Log(log::Arguments),
     Simulate(simulate::Arguments),
+    Timing(timing::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -57,6 +59,7 @@ fn main() -> ExitCode {
         Verb::Lint(arguments) => lint::run(&arguments),
         Verb::Log(arguments) => log::run(&arguments),
         Verb::Simulate(arguments) => simulate::run(&arguments),
+        Verb::Timing(arguments) => timing::run(&arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -13,6 +13,14 @@ pub(crate) fn firmware() -> PathBuf {
     root().join("firmware")
 }
 
+/// Where the host's crates are built.
+pub(crate) fn host_target() -> PathBuf {
+    match std::env::var_os("CARGO_TARGET_DIR") {
+        Some(target) => root().join(target),
+        None => root().join("target"),
+    }
+}
+
 /// Where the firmware is built: apart from the host's crates, for it may have another compiler.
 pub(crate) fn firmware_target() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {

@@ -3,7 +3,7 @@
 use crate::boards::{BOARDS, MPS2_AN385};
 use crate::setup::emulator;
 use crate::steps::{self, Result, heading, note};
-use crate::{firmware, lint};
+use crate::{firmware, lint, timing};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -15,6 +15,9 @@ the tests in the emulator.";
 
 /// Where the tests in the emulator look for the image.
 const IMAGE_VARIABLE: &str = "SER_IMAGE_MPS2_AN385";
+
+/// Where those that count instructions look for the emulator's plugin.
+const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";
 
 /// Check format, clippy, documentation and images; run all tests, including those in the emulator.
 #[derive(Debug, clap::Args)]
@@ -35,6 +38,12 @@ pub(crate) fn run(_arguments: &Arguments) -> Result<()> {
             // In its place: it was built above.
             tests.env(IMAGE_VARIABLE, MPS2_AN385.image());
             tests.args(["--", "--include-ignored"]);
+            match timing::build_plugin() {
+                Ok(plugin) => _ = tests.env(PLUGIN_VARIABLE, plugin),
+                // Where there are no plugins, those tests say that they are left out.
+                Err(_) if cfg!(not(target_os = "linux")) => {}
+                Err(failure) => return Err(failure),
+            }
             heading("Tests, with those in the emulator");
         }
         Ok(()) => heading("Tests, without those in the emulator: there is no image for it"),

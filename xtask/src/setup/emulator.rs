@@ -1,7 +1,7 @@
 //! QEMU for ARM.
 
 use crate::setup::apt;
-use crate::steps::{Failure, Result, heading, note, unrelated, works};
+use crate::steps::{Failure, Result, heading, note, output, unrelated, works};
 
 const PROGRAM: &str = "qemu-system-arm";
 
@@ -38,4 +38,25 @@ pub(crate) fn find() -> Result<()> {
 
 fn there() -> bool {
     works(unrelated(PROGRAM).arg("--version"))
+}
+
+/// The first part of its version.
+pub(crate) fn major_version() -> Option<u32> {
+    major(&output(unrelated(PROGRAM).arg("--version"))?)
+}
+
+fn major(printed: &str) -> Option<u32> {
+    printed.split_once("version ")?.1.split('.').next()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_version_is_read_from_what_the_emulator_prints() {
+        assert_eq!(major("QEMU emulator version 7.2.22 (Debian 1:7.2+dfsg-7)\nCopyright"), Some(7));
+        assert_eq!(major("QEMU emulator version 10.0.2"), Some(10));
+        assert_eq!(major("something else"), None);
+    }
 }

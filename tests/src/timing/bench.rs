@@ -1,0 +1,211 @@
+//! The emulated board on a bench: contacts, a serial line at full rate, perhaps a Genius bus, all in step with the board's
+//! own milliseconds.
+//!
+//! The bench acts while the capture interrupt is about to take its sample. What it changes then is in that very sample.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+
+use ser_board::serial_line::CHARACTER_BITS;
+use ser_proto::{Baud, Command, FrameEncoder, Model};
+use ser_sim::{EmulatorOptions, Lockstep, LockstepOptions};
+
+use super::genius::Genius;
+use super::program::{Handler, Kind, Program};
+use super::tally::Tally;
+
+/// NOP: the processor goes on where it would sleep.
+const NOP: u16 = 0xBF00;
+
+/// Bytes per second on the line, which are thousandths of a byte per millisecond.
+pub const RATE: u32 = Baud::B19200.bits_per_second() / CHARACTER_BITS;
+const BYTE: u32 = 1000;
+
+/// What the battery-backed clock shows first: 2026-11-22 10:00.
+pub const FIRST_MS: u64 = 1_795_341_600_000;
+
+/// Files that it takes.
+#[derive(Clone, Debug)]
+pub struct Parts {
+    /// The image, an ELF file.
+    pub image: PathBuf,
+    /// The plugin for the emulator.
+    pub plugin: PathBuf,
+}
+
+/// How the board is strapped and what is connected.
+#[derive(Clone, Copy, Debug)]
+pub struct Setup {
+    /// Debounce time of all inputs.
+    pub debounce_ms: u8,
+    /// Whether there is a Genius bus.
+    pub genius: bool,
+}
+
+/// The bench.
+pub struct Bench<'p> {
+    /// What was executed while it was [told of](Bench::tell).
+    pub tally: Tally<'p>,
+    /// The bus, if there is one.
+    pub genius: Option<Genius>,
+    program: &'p Program,
+    board: Lockstep,
+    telling: bool,
+    now_ms: u64,
+    inputs: u32,
+    to_board: VecDeque<u8>,
+    /// What the line could have brought by now and did not.
+    credit: u32,
+    sent: Vec<u8>,
+    carried: Carried,
+}
+
+/// Bytes that the serial line has carried.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Carried {
+    /// To the board.
+    pub to: u64,
+    /// From it.
+    pub from: u64,
+}
+
+impl<'p> Bench<'p> {
+    /// Switches the board on. All contacts are open.
+    ///
+    /// # Errors
+    /// When the emulator does not start.
+    pub fn start(parts: &Parts, program: &'p Program, setup: Setup) -> Result<Bench<'p>, String> {
+        let mut stops = vec![program.reset(), program.entry(Handler::Capture)];
+        stops.extend(program.returns(Handler::Receive));
+        let options = LockstepOptions {
+            emulator: EmulatorOptions::new(&parts.image),
+            plugin: parts.plugin.clone(),
+            model: Model::Ser320,
+            debounce_ms: setup.debounce_ms,
+            geni: setup.genius,
+            stops,
+        };
+        let mut board = Lockstep::start(&options).map_err(|error| error.to_string())?;
+        for address in program.all(Kind::Sleep) {
+            board.patch(address, NOP).map_err(|error| error.to_string())?;
+        }
+        board.set_clock(FIRST_MS);
+        Ok(Bench {
+            tally: Tally::new(program),
+            genius: setup.genius.then(Genius::new),
+            program,
+            board,
+            telling: false,
+            now_ms: 0,
+            inputs: 0,
+            to_board: VecDeque::new(),
+            credit: 0,
+            sent: Vec::new(),
+            carried: Carried::default(),
+        })
+    }
+
+    /// Has every instruction counted from now on, or none.
+    pub fn tell(&mut self, telling: bool) {
+        self.telling = telling;
+    }
+
+    /// The tick of the sample that is about to be taken.
+    #[must_use]
+    pub fn now_ms(&self) -> u64 {
+        self.now_ms
+    }
+
+    /// Lets a millisecond pass, and stands before the next sample.
+    ///
+    /// # Errors
+    /// When the board misses a sample, starts anew, or the emulator ends.
+    pub fn pass_ms(&mut self) -> Result<(), String> {
+        let capture = self.program.entry(Handler::Capture);
+        while self.run()? != capture {
+            self.feed()?;
+        }
+        if u64::from(self.board.tick_ms()) != self.now_ms {
+            return Err(format!(
+                "the sample of {} ms is missing: the latest is that of {} ms",
+                self.now_ms,
+                self.board.tick_ms()
+            ));
+        }
+        self.now_ms += 1;
+        self.board.set_clock(FIRST_MS + self.now_ms);
+        if let Some(genius) = &mut self.genius {
+            genius.advance(self.now_ms, &mut self.board);
+        }
+        self.credit = (self.credit + RATE).min(4 * BYTE);
+        self.feed()
+    }
+
+    fn run(&mut self) -> Result<u32, String> {
+        let tally = &mut self.tally;
+        let stop = if self.telling {
+            self.board.run_and_tell(&mut |address| tally.executed(address))
+        } else {
+            self.board.run()
+        };
+        let stop = stop.map_err(|error| error.to_string())?;
+        let sent = self.board.take_sent().map_err(|error| error.to_string())?;
+        self.carried.from += sent.len() as u64;
+        self.sent.extend(sent);
+        if stop == self.program.reset() {
+            return Err("the image has started anew".to_owned());
+        }
+        if self.telling {
+            self.tally.executed(stop);
+        }
+        Ok(stop)
+    }
+
+    /// Brings the next byte, if it is due and there is room for it.
+    fn feed(&mut self) -> Result<(), String> {
+        let Some(&byte) = self.to_board.front() else {
+            // An idle line saves nothing up.
+            self.credit = self.credit.min(BYTE);
+            return Ok(());
+        };
+        if self.credit >= BYTE && self.board.receive(byte).map_err(|error| error.to_string())? {
+            self.credit -= BYTE;
+            self.carried.to += 1;
+            self.to_board.pop_front();
+        }
+        Ok(())
+    }
+
+    /// Moves these contacts, in the sample that is about to be taken.
+    pub fn toggle(&mut self, inputs: u32) {
+        self.inputs ^= inputs;
+        self.board.set_inputs(self.inputs);
+    }
+
+    /// Puts bytes on the line, behind those that wait.
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.to_board.extend(bytes);
+    }
+
+    /// Puts a command on the line.
+    pub fn send_command(&mut self, command: &Command) {
+        self.to_board.extend(FrameEncoder::new(command.to_body()));
+    }
+
+    /// What the line has carried so far.
+    #[must_use]
+    pub fn carried(&self) -> Carried {
+        self.carried
+    }
+
+    /// Bytes that wait for the line.
+    #[must_use]
+    pub fn waiting(&self) -> usize {
+        self.to_board.len()
+    }
+
+    /// Takes what the board has said on the line.
+    pub fn take_sent(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.sent)
+    }
+}

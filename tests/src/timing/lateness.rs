@@ -1,0 +1,115 @@
+//! How late the capture interrupt comes: from the moment its timer expires to the first instruction of its handler.
+//!
+//! The timer expires every millisecond, which is a fixed number of instructions. The earliest interrupt of all comes at
+//! once; the others are late by what they come later within their millisecond.
+
+use std::fmt;
+
+/// Bounds of the histogram's rows, in instructions: up to and with each.
+const ROWS: [u64; 7] = [0, 10, 30, 100, 300, 1_000, 3_000];
+
+/// Widest bar.
+const BAR: u64 = 40;
+
+/// Instructions from expiry to handler, of many interrupts.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Lateness {
+    /// In rising order.
+    sorted: Vec<u64>,
+}
+
+impl Lateness {
+    /// From the count of instructions at each beginning of the handler, and that between two expiries.
+    #[must_use]
+    pub fn of(began: &[u64], period: u64) -> Lateness {
+        let Some(&first) = began.first() else { return Lateness::default() };
+        // Within half a period of the first; that one may have been late itself.
+        let half = period / 2;
+        let offsets = began.iter().map(|&began| (began - first + half) % period);
+        let mut sorted: Vec<u64> = offsets.collect();
+        sorted.sort_unstable();
+        let earliest = sorted.first().copied().unwrap_or_default();
+        sorted.iter_mut().for_each(|offset| *offset -= earliest);
+        Lateness { sorted }
+    }
+
+    /// How many interrupts there were.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.sorted.len()
+    }
+
+    /// The lateness that so many of a thousand do not exceed; the smallest for 0.
+    #[must_use]
+    pub fn per_mille(&self, per_mille: usize) -> u64 {
+        let rank = (self.sorted.len() * per_mille).div_ceil(1000).max(1);
+        self.sorted.get(rank - 1).copied().unwrap_or_default()
+    }
+
+    /// The largest.
+    #[must_use]
+    pub fn max(&self) -> u64 {
+        self.per_mille(1000)
+    }
+
+    /// Rows of a histogram: bounds and how many are within.
+    fn rows(&self) -> impl Iterator<Item = (u64, u64, u64)> {
+        let ends = ROWS.into_iter().chain([u64::MAX]);
+        let begins = [0].into_iter().chain(ROWS.into_iter().map(|end| end + 1));
+        begins.zip(ends).map(|(begin, end)| {
+            let up_to = |bound| self.sorted.partition_point(|&late| late <= bound);
+            let below = begin.checked_sub(1).map_or(0, up_to);
+            (begin, end, (up_to(end) - below) as u64)
+        })
+    }
+}
+
+impl fmt::Display for Lateness {
+    /// A histogram, without the rows behind the last one that counts.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let most = self.rows().map(|(_, _, count)| count).max().unwrap_or(0).max(1);
+        let max = self.max();
+        for (begin, end, count) in self.rows().filter(|&(begin, _, _)| begin <= max) {
+            let range = match (begin, end) {
+                (begin, end) if begin == end => format!("{begin}"),
+                (begin, u64::MAX) => format!("from {begin}"),
+                (begin, end) => format!("{begin}–{end}"),
+            };
+            let bar = (count * BAR).div_ceil(most);
+            let bar = "█".repeat(usize::try_from(bar).unwrap_or_default());
+            writeln!(f, "  {range:>16}  {count:>7}  {bar}")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lateness_counts_from_the_earliest_even_if_the_first_was_late() {
+        let began = [1_007, 2_000, 3_400, 4_001];
+        let lateness = Lateness::of(&began, 1_000);
+        assert_eq!(lateness.sorted, [0, 1, 7, 400]);
+    }
+
+    #[test]
+    fn ranks_are_those_of_the_sorted_list() {
+        let began: Vec<u64> = (0..1000).map(|index| index * 1_000 + index / 10).collect();
+        let lateness = Lateness::of(&began, 1_000);
+        let ranks = [1, 500, 990, 999, 1000].map(|per_mille| lateness.per_mille(per_mille));
+        assert_eq!((lateness.count(), ranks), (1000, [0, 49, 98, 99, 99]));
+        assert_eq!(Lateness::default().max(), 0);
+    }
+
+    #[test]
+    fn the_histogram_ends_with_the_largest() {
+        let lateness = Lateness { sorted: vec![0, 0, 0, 11] };
+        let lines = ["               0        3  ".to_owned() + &"█".repeat(40)];
+        let text = lateness.to_string();
+        assert!(text.starts_with(&format!("  {}\n", lines[0])), "{text}");
+        assert!(text.ends_with(&format!("           11–30        1  {}\n", "█".repeat(14))), "{text}");
+        assert_eq!(text.lines().count(), 3);
+    }
+}

@@ -1,0 +1,213 @@
+//! A recorder at its limit: all inputs change in every millisecond, while hosts on both ports read as fast as they can. Every
+//! event is delivered once or reported as overwritten, to each of them.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use ser_client::LineRate;
+use ser_node::Debounce;
+use ser_proto::{AutoReport, Command, Configure, MAX_SIZE, Model};
+
+use super::bench::{Bench, Carried, Parts, Setup};
+use super::genius::{Genius, HOST};
+use super::program::Program;
+use crate::simulation::account::Tally as Told;
+use crate::simulation::conversation::{Conversation, Order, Outgoing, Talk};
+use crate::simulation::ledger::Ledger;
+
+/// 2000-01-01 00:00, what a clock that has never been set shows at tick 0.
+const NEVER_SET_MS: i64 = 946_684_800_000;
+
+/// The recorder sends every event to the host on the bus, besides.
+const REPORT: Configure = Configure {
+    size: None,
+    baud: None,
+    auto_report: AutoReport::Genius,
+    report_address: HOST,
+    auto_print: false,
+};
+
+/// Bytes that are never missing on the line: more than it takes in a millisecond.
+const LINE_AHEAD: usize = 4;
+
+/// The GENI boards have started by then.
+const START_LIMIT_MS: u64 = 30_000;
+
+/// Hosts have read everything so long after the last change.
+const CATCH_UP_MS: u64 = 60_000;
+
+/// The board with its hosts.
+pub struct Load<'p> {
+    /// Where the board is.
+    pub bench: Bench<'p>,
+    ledger: Ledger,
+    line: Conversation,
+    bus: Conversation,
+    outgoing: VecDeque<Command>,
+    /// Samples in which contacts have moved.
+    changes: u64,
+    /// While contacts moved.
+    carried: Carried,
+    /// Who has read everything since then may rest.
+    still_since_ms: u64,
+}
+
+/// What became of the events of a run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Account {
+    /// Samples that saw a change.
+    pub changes: u64,
+    /// Events that the recorder must have recorded by the books.
+    pub events: u64,
+    /// The host on RS-232, and the one on the bus: what they were told, and what they talked about.
+    pub hosts: [(&'static str, Told, Talk); 2],
+    /// What went over RS-232 while contacts moved.
+    pub carried: Carried,
+    /// How long it took, in milliseconds, until the hosts had read everything.
+    pub lasted_ms: u64,
+}
+
+impl Account {
+    /// Whether nothing is missing: each change is an event, and each event was delivered or reported as lost, to each host.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        let all = |told: &Told| told.delivered + told.overwritten == self.changes;
+        self.events == self.changes && self.hosts.iter().all(|(_, told, _)| all(told))
+    }
+}
+
+impl<'p> Load<'p> {
+    /// Switches a board on, and waits until both hosts can talk to it.
+    ///
+    /// # Errors
+    /// When the board does not do what it must.
+    pub fn start(parts: &Parts, program: &'p Program) -> Result<Load<'p>, String> {
+        let mut bench = Bench::start(parts, program, Setup { debounce_ms: 0, genius: true })?;
+        while !bench.genius.as_ref().is_some_and(Genius::is_ready) {
+            if bench.now_ms() > START_LIMIT_MS {
+                return Err("the hosts do not find the recorder on the bus".to_owned());
+            }
+            bench.pass_ms()?;
+        }
+        let mut ledger = Ledger::new(Model::Ser320.mask());
+        ledger.power_up(0, NEVER_SET_MS, MAX_SIZE, Debounce::OFF);
+        let mut line = Conversation::new("RS-232", LineRate::Instant);
+        line.begin(Order::Ask(Command::Configure(REPORT)), bench.now_ms());
+        Ok(Load {
+            bench,
+            ledger,
+            line,
+            bus: Conversation::new("Genius", LineRate::Instant),
+            outgoing: VecDeque::new(),
+            changes: 0,
+            carried: Carried::default(),
+            still_since_ms: u64::MAX,
+        })
+    }
+
+    /// All inputs change in every one of so many milliseconds, and both hosts read all the time.
+    ///
+    /// # Errors
+    /// When the board or a host's books are not as they must be.
+    pub fn run_ms(&mut self, ms: u64) -> Result<(), String> {
+        let before = self.bench.carried();
+        for _ in 0..ms {
+            self.pass_ms(true)?;
+        }
+        let after = self.bench.carried();
+        self.carried.to += after.to - before.to;
+        self.carried.from += after.from - before.from;
+        Ok(())
+    }
+
+    fn pass_ms(&mut self, moving: bool) -> Result<(), String> {
+        self.bench.pass_ms()?;
+        let now_ms = self.bench.now_ms();
+        self.talk_on_line(now_ms)?;
+        self.talk_on_bus(now_ms)?;
+        if moving {
+            self.changes += 1;
+            self.bench.toggle(u32::MAX);
+            self.ledger.contacts_moved(now_ms, u32::MAX);
+        }
+        self.ledger.settle(now_ms);
+        Ok(())
+    }
+
+    fn talk_on_line(&mut self, now_ms: u64) -> Result<(), String> {
+        let sent = self.bench.take_sent();
+        self.line.session().process(Duration::from_millis(now_ms), &sent);
+        if let Some(outgoing) = next(&mut self.line, now_ms, self.still_since_ms, &self.ledger)? {
+            self.bench.send(&outgoing.frame);
+        }
+        // The line never rests: while the host thinks, it asks for the mode besides.
+        while self.bench.waiting() < LINE_AHEAD {
+            self.bench.send_command(&Command::QueryMode);
+        }
+        Ok(())
+    }
+
+    fn talk_on_bus(&mut self, now_ms: u64) -> Result<(), String> {
+        let Some(genius) = &mut self.bench.genius else { return Ok(()) };
+        for body in genius.take_received() {
+            self.bus.session().process_body(Duration::from_millis(now_ms), &body);
+        }
+        if let Some(outgoing) = next(&mut self.bus, now_ms, self.still_since_ms, &self.ledger)? {
+            self.outgoing.push_back(outgoing.command);
+        }
+        if genius.is_ready()
+            && let Some(command) = self.outgoing.pop_front()
+        {
+            genius.send(&command)?;
+        }
+        Ok(())
+    }
+
+    /// Contacts stay as they are, and the hosts read the rest.
+    ///
+    /// # Errors
+    /// When something is missing in the end.
+    pub fn settle(mut self) -> Result<Account, String> {
+        let still_since_ms = self.bench.now_ms() + 1;
+        self.still_since_ms = still_since_ms;
+        while ![&self.line, &self.bus].iter().all(|host| host.has_read_since(still_since_ms)) {
+            if self.bench.now_ms() > still_since_ms + CATCH_UP_MS {
+                return Err(format!(
+                    "not read to the end: {}, {}",
+                    self.line.describe(),
+                    self.bus.describe()
+                ));
+            }
+            self.pass_ms(false)?;
+        }
+        for host in [&mut self.line, &mut self.bus] {
+            host.account_mut().finish_reading(&self.ledger)?;
+        }
+        if let Some(genius) = &self.bench.genius {
+            genius.check()?;
+        }
+        let told = |host: &Conversation| (host.account().name(), host.account().tally(), host.talk());
+        Ok(Account {
+            changes: self.changes,
+            events: self.ledger.len() as u64,
+            hosts: [told(&self.line), told(&self.bus)],
+            carried: self.carried,
+            lasted_ms: self.bench.now_ms(),
+        })
+    }
+}
+
+/// What a host says next: it reads, and when it has come to the end, it reads on.
+fn next(
+    host: &mut Conversation,
+    now_ms: u64,
+    still_since_ms: u64,
+    ledger: &Ledger,
+) -> Result<Option<Outgoing>, String> {
+    let outgoing = host.poll(now_ms, ledger)?;
+    if outgoing.is_none() && host.is_resting() && !host.has_read_since(still_since_ms) {
+        host.begin(Order::Read, now_ms);
+        return host.poll(now_ms, ledger);
+    }
+    Ok(outgoing)
+}

@@ -1,0 +1,351 @@
+//! All of it as a table, held against the budgets.
+
+use std::fmt;
+
+use ser_board::budget::MAIN_LOOP_STALL_MS;
+use ser_sim::INSTRUCTIONS_PER_MS;
+
+use super::bench::{Parts, RATE};
+use super::costs::{self, Change, Commands, Cost, LONGEST_DEBOUNCE_MS, Way, runs_of};
+use super::lateness::Lateness;
+use super::load::{Account, Load};
+use super::program::{Handler, Program};
+use super::tally::Masked;
+
+/// Instructions that a run of the capture interrupt may take, whatever the inputs do.
+pub const CAPTURE_BUDGET: u64 = 150;
+
+/// Instructions of the main loop that the rings in front of it cover: a pass must not take longer.
+pub const PASS_BUDGET: u64 = MAIN_LOOP_STALL_MS as u64 * INSTRUCTIONS_PER_MS;
+
+/// So long the interrupt is looked at with nothing else going on, in milliseconds.
+const QUIET_MS: u64 = 5_000;
+
+/// What was measured.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Report {
+    /// A run of the capture interrupt, without debounce and with the longest.
+    pub capture: Vec<(Change, [u64; 2])>,
+    /// What commands cost on RS-232 and on Genius.
+    pub commands: Vec<(&'static str, [Cost; 2])>,
+    /// A pass with nothing to do, without and with a GENI board.
+    pub idle_passes: [u64; 2],
+    /// While the image starts, and under load, with the function that masks.
+    pub masked: [(Masked, String); 2],
+    /// With both ports quiet, and with both busy.
+    pub lateness: [Lateness; 2],
+    /// Under load.
+    pub load: Loaded,
+}
+
+/// What a load came to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Loaded {
+    /// How long all inputs changed in every millisecond.
+    pub ms: u64,
+    /// The longest run of the capture interrupt.
+    pub capture: u64,
+    /// The longest pass of the main loop.
+    pub pass: u64,
+    /// Instructions of all interrupt handlers, and of the main loop in passes that did more than look whether there is
+    /// something to do, in thousandths of all.
+    pub busy_per_mille: [u64; 2],
+    /// What became of the events.
+    pub account: Account,
+}
+
+impl Report {
+    /// Measures everything; `load_ms` is how long the load lasts. `next` is told what is measured next.
+    ///
+    /// # Errors
+    /// When the board does not do what it must.
+    pub fn measure(parts: &Parts, load_ms: u64, next: &dyn Fn(&str)) -> Result<Report, String> {
+        let program = &Program::read(&parts.image)?;
+        next("capture interrupt");
+        let mut capture = Vec::new();
+        for change in Change::ALL {
+            let cost = |debounce_ms| costs::capture(parts, program, change, debounce_ms);
+            capture.push((change, [cost(0)?, cost(LONGEST_DEBOUNCE_MS)?]));
+        }
+        next("commands");
+        let mut ways = [Way::Line, Way::Bus].map(|way| Commands::start(parts, program, way));
+        let [Ok(line), Ok(bus)] = &mut ways else {
+            return ways.into_iter().find_map(Result::err).map_or(Err(String::new()), Err);
+        };
+        let mut commands = Vec::new();
+        for (name, command) in costs::commands() {
+            commands.push((name, [line.cost(&command)?, bus.cost(&command)?]));
+        }
+        let idle_passes = [line.idle_pass(), bus.idle_pass()];
+        drop(ways);
+        next("ports quiet");
+        let quiet = costs::quiet_lateness(parts, program, QUIET_MS)?;
+        let at_start = costs::masked_at_start(parts, program)?;
+        next("ports busy, all inputs changing in every millisecond");
+        let (busy, under_load, load) = loaded(parts, program, load_ms, idle_passes[1])?;
+        let named = |masked: Masked| (masked, program.name(masked.at).to_owned());
+        let (masked, lateness) = ([at_start, under_load].map(named), [quiet, busy]);
+        Ok(Report { capture, commands, idle_passes, masked, lateness, load })
+    }
+
+    /// The longest pass of the main loop, and in which command; `None` when it was under load.
+    fn longest_pass(&self) -> (u64, Option<&str>) {
+        let passes =
+            self.commands.iter().flat_map(|&(name, costs)| costs.map(|cost| (cost.longest_pass, Some(name))));
+        passes.chain([(self.load.pass, None)]).max_by_key(|&(pass, _)| pass).unwrap_or_default()
+    }
+
+    /// What is not as it must be.
+    #[must_use]
+    pub fn wrong(&self) -> Vec<String> {
+        let mut wrong = Vec::new();
+        let mut keep = |what: &str, instructions: u64, budget: u64| {
+            if instructions > budget {
+                wrong.push(format!("{what}: {} of {} instructions", Grouped(instructions), Grouped(budget)));
+            }
+        };
+        for &(change, [without, with]) in &self.capture {
+            keep(&format!("capture interrupt, {}", words(change)), without.max(with), CAPTURE_BUDGET);
+        }
+        keep("capture interrupt under load", self.load.capture, CAPTURE_BUDGET);
+        keep("longest pass of the main loop", self.longest_pass().0, PASS_BUDGET);
+        if !self.load.account.is_settled() {
+            wrong.push(format!("events are unaccounted for: {:?}", self.load.account));
+        }
+        wrong
+    }
+}
+
+/// The load: lateness, masking, and the rest.
+fn loaded(
+    parts: &Parts,
+    program: &Program,
+    ms: u64,
+    idle_pass: u64,
+) -> Result<(Lateness, Masked, Loaded), String> {
+    let mut load = Load::start(parts, program)?;
+    load.bench.tell(true);
+    load.run_ms(ms)?;
+    load.bench.tell(false);
+    let tally = &load.bench.tally;
+    let lateness = costs::lateness(tally);
+    let handlers: u64 = tally.runs.iter().map(|run| run.instructions).sum();
+    let passes = || tally.passes.iter().map(|pass| pass.instructions);
+    let main_loop: u64 = passes().filter(|&pass| pass > idle_pass).sum();
+    let per_mille = |instructions: u64| instructions * 1000 / tally.total().max(1);
+    let capture = runs_of(tally, Handler::Capture).map(|run| run.instructions).max().unwrap_or(0);
+    let (pass, masked) = (passes().max().unwrap_or(0), tally.longest_masked);
+    let busy_per_mille = [per_mille(handlers), per_mille(main_loop)];
+    let account = load.settle()?;
+    Ok((lateness, masked, Loaded { ms, capture, pass, busy_per_mille, account }))
+}
+
+fn words(change: Change) -> &'static str {
+    match change {
+        Change::None => "nothing changes",
+        Change::One => "one input changes",
+        Change::All => "all 32 inputs change",
+    }
+}
+
+/// A number with a space before every three digits.
+struct Grouped(u64);
+
+impl fmt::Display for Grouped {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let digits = self.0.to_string();
+        let first = digits.len() % 3;
+        let groups = digits.char_indices().fold(String::new(), |mut text, (index, digit)| {
+            if index > 0 && index % 3 == first {
+                text.push(' ');
+            }
+            text.push(digit);
+            text
+        });
+        f.pad(&groups)
+    }
+}
+
+fn mark(instructions: u64, budget: u64) -> &'static str {
+    if instructions <= budget { "✓" } else { "✗ over budget" }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "Instructions of the image for mps2-an385, counted in the emulator\n")?;
+        self.show_capture(f)?;
+        self.show_commands(f)?;
+        self.show_main_loop(f)?;
+        self.show_lateness(f)?;
+        self.show_load(f)?;
+        writeln!(
+            f,
+            "\nInstructions are not cycles: a chip adds wait states of flash and bus, and a dozen cycles to enter and leave an\n\
+             interrupt. Virtual time has {} million instructions a second.",
+            INSTRUCTIONS_PER_MS / 1000,
+        )
+    }
+}
+
+impl Report {
+    fn show_capture(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{:<28}{:>12}{:>18}{:>9}",
+            "Capture interrupt", "no debounce", "255 ms debounce", "budget"
+        )?;
+        for &(change, [without, with]) in &self.capture {
+            let mark = mark(without.max(with), CAPTURE_BUDGET);
+            writeln!(f, "  {:<26}{without:>12}{with:>18}{CAPTURE_BUDGET:>9}  {mark}", words(change))?;
+        }
+        let under_load = self.load.capture;
+        let mark = mark(under_load, CAPTURE_BUDGET);
+        writeln!(f, "  {:<26}{under_load:>12}{:>18}{CAPTURE_BUDGET:>9}  {mark}", "the longest under load", "")
+    }
+
+    fn show_commands(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "\n{:<30}{:<36}Genius", "Commands", "RS-232")?;
+        let [a, b, c] = ["main loop", "interrupts", "longest pass"];
+        writeln!(f, "  {:<24}{a:>12}{b:>11}{c:>13}{a:>12}{b:>11}{c:>13}", "beyond an idle board")?;
+        for (name, costs) in &self.commands {
+            write!(f, "  {name:<24}")?;
+            for cost in costs {
+                let [a, b, c] = [cost.main_loop, cost.handlers, cost.longest_pass].map(Grouped);
+                write!(f, "{a:>12}{b:>11}{c:>13}")?;
+            }
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+
+    fn show_main_loop(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [without, with] = self.idle_passes.map(Grouped);
+        let (longest, command) = self.longest_pass();
+        let mark = mark(longest, PASS_BUDGET);
+        writeln!(f, "\nMain loop")?;
+        writeln!(f, "  {:<26}{without:>12}  and {with} with a GENI board", "a pass with nothing to do")?;
+        let (name, longest, budget) =
+            (command.unwrap_or("under load"), Grouped(longest), Grouped(PASS_BUDGET));
+        writeln!(
+            f,
+            "  {:<26}{longest:>12}  {name}; {budget} are covered by the rings  {mark}",
+            "the longest pass"
+        )?;
+        let pass = Grouped(self.load.pass);
+        writeln!(f, "  {:<26}{pass:>12}", "the longest under load")?;
+        writeln!(f, "\nInterrupts masked, capture included")?;
+        for (when, (masked, name)) in ["while the image starts", "under load"].iter().zip(&self.masked) {
+            match masked.instructions {
+                0 => writeln!(f, "  {when:<26}{:>12}", "never")?,
+                count => writeln!(f, "  {when:<26}{:>12}  in {name}", Grouped(count))?,
+            }
+        }
+        Ok(())
+    }
+
+    fn show_lateness(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "\nCapture interrupt, instructions from its timer's expiry to the first of its own")?;
+        let heads = ["interrupts", "min", "p50", "p99", "p99.9", "max"];
+        write!(f, "  {:<26}", "")?;
+        let [count, ranks @ ..] = heads;
+        write!(f, "{count:>12}")?;
+        ranks.iter().try_for_each(|head| write!(f, "{head:>9}"))?;
+        writeln!(f)?;
+        let rows = ["both ports quiet", "both ports busy"];
+        for (row, lateness) in rows.iter().zip(&self.lateness) {
+            write!(f, "  {row:<26}{:>12}", Grouped(lateness.count() as u64))?;
+            for per_mille in [0, 500, 990, 999, 1000] {
+                write!(f, "{:>9}", Grouped(lateness.per_mille(per_mille)))?;
+            }
+            writeln!(f)?;
+        }
+        let [_, busy] = &self.lateness;
+        write!(f, "  both ports busy, instructions late and how often:\n{busy}")
+    }
+
+    fn show_load(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Loaded { ms, busy_per_mille: [handlers, main_loop], account, .. } = &self.load;
+        let Account { changes, hosts, carried, lasted_ms, .. } = account;
+        let percent = |per_mille: u64| format!("{}.{} %", per_mille / 10, per_mille % 10);
+        writeln!(
+            f,
+            "\nLoad: all 32 inputs change in every millisecond for {} s, both hosts read all the time",
+            *ms / 1000
+        )?;
+        writeln!(f, "  {:<26}{:>12}", "samples with a change", Grouped(*changes))?;
+        for (name, told, talk) in hosts {
+            let sum = told.delivered + told.overwritten;
+            let mark = if sum == *changes { "✓ none missing" } else { "✗ some are missing" };
+            let [delivered, overwritten, answered, reports] =
+                [told.delivered, told.overwritten, talk.answered, talk.reports].map(Grouped);
+            writeln!(
+                f,
+                "  {name:<26}{delivered:>12} read once + {overwritten} reported as overwritten  {mark}; {answered} answers and {reports} reports"
+            )?;
+        }
+        let [to, from] = [carried.to, carried.from].map(|bytes| Grouped(bytes * 1000 / ms));
+        let rate = Grouped(RATE.into());
+        writeln!(f, "  {:<26}{to:>12} of {rate} to the board, {from} from it", "bytes a second on RS-232")?;
+        writeln!(
+            f,
+            "  {:<26}{:>12} in interrupts, {} in the main loop's busy passes",
+            "of all instructions",
+            percent(*handlers),
+            percent(*main_loop)
+        )?;
+        writeln!(f, "  {:<26}{:>12} ms after power-up", "all was read", Grouped(*lasted_ms))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::account::Tally as Told;
+    use crate::simulation::conversation::Talk;
+    use crate::timing::bench::Carried;
+
+    fn report() -> Report {
+        let told = Told { delivered: 900, overwritten: 100, ..Told::default() };
+        let host = |name| (name, told, Talk::default());
+        let account = Account {
+            changes: 1000,
+            events: 1000,
+            hosts: [host("RS-232"), host("Genius")],
+            carried: Carried { to: 1900, from: 2 },
+            lasted_ms: 3,
+        };
+        Report {
+            capture: vec![(Change::All, [92, 148])],
+            commands: vec![("E  erase", [Cost::default(); 2])],
+            idle_passes: [661, 2772],
+            masked: [(Masked::default(), String::new()), (Masked::default(), String::new())],
+            lateness: [Lateness::default(), Lateness::default()],
+            load: Loaded { ms: 1000, capture: 92, pass: 37_110, busy_per_mille: [57, 310], account },
+        }
+    }
+
+    #[test]
+    fn what_keeps_to_the_budgets_is_not_wrong() {
+        assert_eq!(report().wrong(), Vec::<String>::new());
+        let text = report().to_string();
+        assert!(text.contains("37 110") && text.contains("5.7 %") && !text.contains('✗'), "{text}");
+    }
+
+    #[test]
+    fn what_is_over_budget_or_missing_is_wrong_and_shown() {
+        let mut report = report();
+        report.capture[0].1[1] = 151;
+        report.commands[0].1[1].longest_pass = PASS_BUDGET + 1;
+        report.load.account.hosts[0].1.overwritten -= 1;
+        let wrong = report.wrong();
+        assert_eq!(wrong.len(), 3, "{wrong:?}");
+        assert_eq!(wrong[0], "capture interrupt, all 32 inputs change: 151 of 150 instructions");
+        assert_eq!(report.to_string().matches('✗').count(), 3);
+    }
+
+    #[test]
+    fn digits_are_grouped_from_the_right() {
+        let texts = [0, 999, 1000, 12_345, 1_234_567].map(|number| format!("{:>9}", Grouped(number)));
+        assert_eq!(texts, ["        0", "      999", "    1 000", "   12 345", "1 234 567"]);
+    }
+}

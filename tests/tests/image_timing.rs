@@ -1,0 +1,123 @@
+//! The ARM image in virtual time: what it costs in instructions, and that a load at its limit costs no event. `cargo xtask timing`
+//! prints all the numbers.
+#![cfg(target_os = "linux")]
+
+use ser_proto::Model;
+use ser_sim::{EmulatorOptions, INSTRUCTIONS_PER_MS, Lockstep, LockstepOptions};
+use ser_tests::recorder::image;
+use ser_tests::timing::bench::Parts;
+use ser_tests::timing::costs::{self, Change, Commands, Cost, LONGEST_DEBOUNCE_MS, Way, runs_of};
+use ser_tests::timing::load::Load;
+use ser_tests::timing::program::{Handler, Kind, Program};
+use ser_tests::timing::report::CAPTURE_BUDGET;
+use ser_tests::timing::tally::Tally;
+
+/// Where the emulator's plugin is: set by `cargo xtask test`, which builds it.
+const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";
+
+/// So long all inputs change in every millisecond: more events than the log holds. `cargo xtask timing` goes on for longer.
+const LOAD_MS: u64 = 3_000;
+
+fn parts() -> Parts {
+    let plugin = std::env::var_os(PLUGIN_VARIABLE);
+    let plugin = plugin.unwrap_or_else(|| panic!("{PLUGIN_VARIABLE} is not set: run `cargo xtask test`"));
+    Parts { image: image(), plugin: plugin.into() }
+}
+
+fn program(parts: &Parts) -> Program {
+    Program::read(&parts.image).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+#[ignore = "needs the emulator and the image: cargo xtask test"]
+fn the_capture_interrupt_keeps_to_its_budget() {
+    let parts = parts();
+    let program = program(&parts);
+    let cost = |change, debounce_ms| costs::capture(&parts, &program, change, debounce_ms).unwrap();
+    let [idle, all] = [Change::None, Change::All].map(|change| cost(change, 0));
+    let [idle_debounced, all_debounced] =
+        [Change::None, Change::All].map(|change| cost(change, LONGEST_DEBOUNCE_MS));
+    println!("{idle} and {all} instructions, with debounce {idle_debounced} and {all_debounced}");
+    // They do something at all.
+    assert!(0 < idle && idle < all && idle < idle_debounced && idle_debounced < all_debounced);
+    assert!(all_debounced <= CAPTURE_BUDGET, "{all_debounced} instructions");
+}
+
+#[test]
+#[ignore = "needs the emulator and the image: cargo xtask test"]
+fn a_load_on_both_ports_delays_no_sample_and_loses_no_event() {
+    let parts = parts();
+    let program = program(&parts);
+    let mut load = Load::start(&parts, &program).unwrap();
+    load.bench.tell(true);
+    load.run_ms(LOAD_MS).unwrap();
+    load.bench.tell(false);
+    let lateness = costs::lateness(&load.bench.tally);
+    let longest = runs_of(&load.bench.tally, Handler::Capture).map(|run| run.instructions).max();
+    assert_eq!((lateness.count() as u64, lateness.max()), (LOAD_MS - 1, 0));
+    assert!(longest.is_some_and(|longest| longest <= CAPTURE_BUDGET), "{longest:?}");
+    let account = load.settle().unwrap();
+    println!("{account:?}");
+    assert!(account.is_settled() && account.changes == LOAD_MS, "{account:?}");
+    // There was something to be accounted for: one host kept up, the other one did not.
+    let [(_, line, _), (_, bus, _)] = account.hosts;
+    assert!(line.delivered > 0 && bus.delivered > 0 && bus.overwritten > 0, "{account:?}");
+}
+
+#[test]
+#[ignore = "needs the emulator and the image: cargo xtask test"]
+fn two_runs_count_the_same() {
+    let parts = parts();
+    let program = program(&parts);
+    let run = || -> Vec<Cost> {
+        let mut commands = Commands::start(&parts, &program, Way::Line).unwrap();
+        costs::commands().iter().map(|(_, command)| commands.cost(command).unwrap()).collect()
+    };
+    let costs = run();
+    assert!(costs.iter().all(|cost| cost.main_loop > 0 && cost.handlers > 0), "{costs:?}");
+    assert_eq!(costs, run());
+}
+
+/// The measurement measures: where interrupts are masked, here by another instruction in the place of the sleep, the
+/// interrupt is seen to be late.
+#[test]
+#[ignore = "needs the emulator and the image: cargo xtask test"]
+fn an_interrupt_that_is_masked_is_seen_to_be_late() {
+    const MASK: u16 = 0xB672;
+    const UNMASK: u16 = 0xB662;
+    /// A pass of the main loop is a small part of a millisecond.
+    const PASSES: u64 = 500;
+
+    let parts = parts();
+    let program = program(&parts);
+    let sleeps: Vec<u32> = program.all(Kind::Sleep).collect();
+    let mut lockstep = Lockstep::start(&LockstepOptions {
+        emulator: EmulatorOptions::new(&parts.image),
+        plugin: parts.plugin.clone(),
+        model: Model::Ser320,
+        debounce_ms: 0,
+        geni: false,
+        stops: [&[program.reset()], &sleeps[..]].concat(),
+    })
+    .unwrap();
+    for &sleep in &sleeps {
+        lockstep.patch(sleep, UNMASK).unwrap();
+    }
+    let mut tally = Tally::new(&program);
+    let mut total = 0_u64;
+    for pass in 0..PASSES {
+        let stop = lockstep
+            .run_and_tell(&mut |address| {
+                total += 1;
+                tally.executed(address);
+            })
+            .unwrap();
+        assert!(sleeps.contains(&stop));
+        tally.executed(stop);
+        // Masked during every second pass.
+        lockstep.patch(stop, if pass.is_multiple_of(2) { MASK } else { UNMASK }).unwrap();
+    }
+    let lateness = costs::lateness(&tally);
+    assert!(total / INSTRUCTIONS_PER_MS > 5 && lateness.count() > 5, "{lateness:?}");
+    assert!((1..INSTRUCTIONS_PER_MS).contains(&lateness.max()), "{lateness:?}");
+}
