@@ -114,11 +114,11 @@ impl Capture<'_> {
             None => self.begin(tick_ms, inputs),
             Some(_) => {
                 let elapsed = tick_ms.wrapping_sub(self.tick_ms);
-                if elapsed == 0 || elapsed > u32::MAX / 2 {
-                    // There is one sample to a millisecond, and none to one that is past.
-                    return;
-                }
-                if elapsed > 1 {
+                if elapsed != 1 {
+                    if elapsed == 0 || elapsed > u32::MAX / 2 {
+                        // There is one sample to a millisecond, and none to one that is past.
+                        return;
+                    }
                     self.make_up(tick_ms, elapsed - 1);
                 }
                 self.step(tick_ms, inputs);

@@ -92,7 +92,11 @@ impl<T: Slot, const N: usize> Writer<'_, T, N> {
     #[inline]
     #[must_use]
     pub fn has_room(&self) -> bool {
-        let tail = self.ring.tail.load(Ordering::Relaxed);
+        self.has_room_at(self.ring.tail.load(Ordering::Relaxed))
+    }
+
+    #[inline]
+    fn has_room_at(&self, tail: usize) -> bool {
         // Acquire: the reader has done with the cell before it says so.
         tail.wrapping_sub(self.ring.head.load(Ordering::Acquire)) < N
     }
@@ -108,10 +112,10 @@ impl<T: Slot, const N: usize> Writer<'_, T, N> {
     #[inline]
     #[must_use = "an item that found no room is lost"]
     pub fn push(&mut self, item: T) -> bool {
-        if !self.has_room() {
+        let tail = self.ring.tail.load(Ordering::Relaxed);
+        if !self.has_room_at(tail) {
             return false;
         }
-        let tail = self.ring.tail.load(Ordering::Relaxed);
         if let Some(cell) = self.ring.cell(tail) {
             item.store(cell);
         }

@@ -31,6 +31,7 @@ use std::time::{Duration, Instant};
 use ser_proto::Model;
 use tempfile::TempDir;
 
+use crate::emulated_board::ForcedFault;
 use crate::emulator::{PROGRAM, Qemu, arguments, doubled_commas, is_temporary, never_wait, spawn};
 use crate::error::SimError;
 use crate::external_bus::ExternalBus;
@@ -157,6 +158,11 @@ impl Lockstep {
     /// Turns the battery-backed clock on.
     pub fn set_clock(&self, count_ms: u64) {
         self.bus.set_clock(count_ms);
+    }
+
+    /// Makes something go wrong in the next pass of the main loop.
+    pub fn force(&self, fault: ForcedFault) {
+        self.bus.force(fault as u32);
     }
 
     /// The tick of the latest sample.

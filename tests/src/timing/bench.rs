@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use ser_board::serial_line::CHARACTER_BITS;
 use ser_proto::{Baud, Command, FrameEncoder, Model};
-use ser_sim::{EmulatorOptions, Lockstep, LockstepOptions};
+use ser_sim::{EmulatorOptions, ForcedFault, Lockstep, LockstepOptions};
 
 use super::genius::Genius;
 use super::program::{Handler, Kind, Program};
@@ -51,6 +51,8 @@ pub struct Bench<'p> {
     program: &'p Program,
     board: Lockstep,
     telling: bool,
+    /// The instruction that the board is held at.
+    at: u32,
     now_ms: u64,
     inputs: u32,
     to_board: VecDeque<u8>,
@@ -96,6 +98,7 @@ impl<'p> Bench<'p> {
             program,
             board,
             telling: false,
+            at: program.reset(),
             now_ms: 0,
             inputs: 0,
             to_board: VecDeque::new(),
@@ -107,6 +110,10 @@ impl<'p> Bench<'p> {
 
     /// Has every instruction counted from now on, or none.
     pub fn tell(&mut self, telling: bool) {
+        if telling && !self.telling {
+            // The one that the board is held at has not been counted.
+            self.tally.executed(self.at);
+        }
         self.telling = telling;
     }
 
@@ -158,6 +165,7 @@ impl<'p> Bench<'p> {
         if self.telling {
             self.tally.executed(stop);
         }
+        self.at = stop;
         Ok(stop)
     }
 
@@ -180,6 +188,11 @@ impl<'p> Bench<'p> {
     pub fn toggle(&mut self, inputs: u32) {
         self.inputs ^= inputs;
         self.board.set_inputs(self.inputs);
+    }
+
+    /// Lets the main loop go no further; the watchdog looks on for two seconds.
+    pub fn hang_main_loop(&self) {
+        self.board.force(ForcedFault::MainLoopHangs);
     }
 
     /// Puts bytes on the line, behind those that wait.

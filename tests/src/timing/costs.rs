@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use ser_node::capture::QUEUE_LEN;
 use ser_proto::{AutoReport, Command, Configure, Decoded, FrameDecoder, MAX_BODY_LEN, TimeStamp};
 
 use ser_sim::INSTRUCTIONS_PER_MS;
@@ -17,6 +18,12 @@ const STARTED_MS: u64 = 20;
 
 /// The longest debounce time there is, in milliseconds: all bits of all counters are in use.
 pub const LONGEST_DEBOUNCE_MS: u8 = 255;
+
+/// The shortest debounce time, with which the queue is full before the watchdog looks at the main loop.
+pub const SHORTEST_DEBOUNCE_MS: u8 = 1;
+
+/// Changes that the main loop may still take after it was told to hang.
+const QUEUED_LATER: usize = 10;
 
 /// A GENI board and everybody on its bus are at rest, so long after the host knows the recorder.
 const SETTLED_MS: u64 = 1_500;
@@ -76,6 +83,25 @@ pub fn capture(parts: &Parts, program: &Program, change: Change, debounce_ms: u8
         bench.toggle(change.mask());
         pass(&mut bench, u64::from(debounce_ms) + 5)?;
     }
+    Ok(runs_of(&bench.tally, Handler::Capture).map(|run| run.instructions).max().unwrap_or(0))
+}
+
+/// The longest run of the capture interrupt when all inputs change and its queue is full, because the main loop hangs.
+///
+/// # Errors
+/// When the board does not do what it must.
+pub fn capture_beyond_queue(parts: &Parts, program: &Program, debounce_ms: u8) -> Result<u64, String> {
+    let mut bench = Bench::start(parts, program, Setup { debounce_ms, genius: false })?;
+    pass(&mut bench, STARTED_MS)?;
+    bench.hang_main_loop();
+    // One behind the other, as fast as debounce accepts them; the first ones may still be taken.
+    for _ in 0..QUEUE_LEN + QUEUED_LATER {
+        bench.toggle(u32::MAX);
+        pass(&mut bench, u64::from(debounce_ms) + 1)?;
+    }
+    bench.tell(true);
+    bench.toggle(u32::MAX);
+    pass(&mut bench, u64::from(debounce_ms) + 2)?;
     Ok(runs_of(&bench.tally, Handler::Capture).map(|run| run.instructions).max().unwrap_or(0))
 }
 
