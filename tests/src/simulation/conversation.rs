@@ -212,7 +212,7 @@ impl Conversation {
         self.go_on_reading(Box::new(reader), resyncs, now_ms);
     }
 
-    fn go_on_reading(&mut self, reader: Box<LogReader>, resyncs: u32, now_ms: u64) {
+    fn go_on_reading(&mut self, mut reader: Box<LogReader>, resyncs: u32, now_ms: u64) {
         match reader.request() {
             Some(request) => {
                 self.job = Job::Read { reader, resyncs };

@@ -1,12 +1,13 @@
 //! A unit that says anything.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use ser_client::{
     Cursor, Delivery, LineRate, LogFollower, LogPosition, LogReader, MAX_LINE_LEN, RangeReader, Session,
     Timing, Unsolicited,
 };
-use ser_proto::{Command, MAX_ENTRIES, ReadReply, Reply};
+use ser_proto::{Command, Entry, MAX_ENTRIES, ReadReply, Reply};
 
 use crate::fuzzing::framing::frame_of;
 use crate::fuzzing::script::Script;
@@ -128,6 +129,11 @@ impl Talk {
 struct Readers {
     size: u16,
     reader: LogReader,
+    /// Requests of the reader that may be under way at once, and the starts of those that are.
+    window: usize,
+    asked: VecDeque<u16>,
+    /// All entries that the reader was shown.
+    shown: Vec<Entry>,
     range: RangeReader,
     follower: LogFollower,
 }
@@ -141,6 +147,9 @@ impl Readers {
         Readers {
             size,
             reader: LogReader::new(cursor, size).starting_near(position),
+            window: usize::from(script.byte() % 4) + 1,
+            asked: VecDeque::new(),
+            shown: Vec::new(),
             range: RangeReader::new(script.word(), script.word(), size),
             follower: LogFollower::new(cursor, size),
         }
@@ -151,24 +160,35 @@ impl Readers {
         self.follow(&reply);
         let fitting = self.range.request().map_or(reply.start, |request| request.start);
         self.take_range(&ReadReply { start: fitting, ..reply.clone() });
-        let fitting = self.reader.request().map_or(reply.start, |request| request.start);
         self.take_new(&reply);
+        self.ask();
+        let fitting = self.asked.front().copied().unwrap_or(reply.start);
         self.take_new(&ReadReply { start: fitting, ..reply });
+    }
+
+    fn ask(&mut self) {
+        while self.asked.len() < self.window
+            && let Some(request) = self.reader.request()
+        {
+            assert!(!self.asked.contains(&request.start), "an answer could belong to two requests");
+            self.asked.push_back(request.start);
+        }
     }
 
     fn take_new(&mut self, reply: &ReadReply) {
         let before = self.reader.cursor();
         let mut last = None;
         let mut delivered = 0;
+        self.asked.retain(|&start| start != reply.start);
+        self.shown.extend(&reply.entries);
         let result = self.reader.take(reply, &mut |delivery| {
             if let Delivery::Event { entry_number, entry, .. } = delivery {
                 assert!((1..=self.size.clamp(1, 2048)).contains(&entry_number));
-                assert!(reply.entries.contains(&entry), "an event that nobody told of");
+                assert!(self.shown.contains(&entry), "an event that nobody told of");
                 last = Some(entry);
                 delivered += 1;
             }
         });
-        assert!(delivered <= MAX_ENTRIES);
         match self.reader.cursor() {
             Some(cursor) if delivered > 0 => assert_eq!(cursor.anchor, last),
             // An empty log is the only one in which a cursor can stand without an event.
@@ -179,8 +199,12 @@ impl Readers {
             self.reader.pending() <= 2048
                 && u32::try_from(delivered).is_ok_and(|now| now <= summary.delivered)
         );
-        if result.is_err() || self.reader.request().is_none() {
+        assert_eq!(self.reader.is_waiting(), !self.asked.is_empty());
+        self.ask();
+        if result.is_err() || self.asked.is_empty() {
             // As a program does: on from where this reading stopped.
+            self.asked.clear();
+            self.shown.clear();
             self.reader = LogReader::new(self.reader.cursor(), self.size).starting_near(summary.position);
         }
     }

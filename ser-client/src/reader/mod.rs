@@ -2,23 +2,36 @@
 //!
 //! [`LogReader`] delivers every event once and in order: across the end of the ring, across the wrap of the 16-bit
 //! total, and with events arriving meanwhile. What the recorder overwrote before it could be read is counted exactly.
-//! The reader performs no I/O: send what [`request`](LogReader::request) asks for, hand in the reply with
-//! [`take`](LogReader::take), and so on until there is no request any more.
+//! The reader performs no I/O: send what [`request`](LogReader::request) asks for, hand in the replies with
+//! [`take`](LogReader::take), and so on until there is no request any more and no reply is to come. One request at a time
+//! will do; with two, the next reply can follow the last one without a gap.
 //!
 //! # How it works
 //!
 //! Events have a running index, 0 for the first after an erase. A recorder with total `T` and next slot `S` keeps
 //! event `q` in slot `(S - (T - q)) mod size`, and has overwritten it once `T - q > size`. Every reply carries `T` and
-//! `S` of the very moment at which its entries were copied, so for each entry it is certain which event it is.
+//! `S` of the very moment at which its entries were copied, so for each entry it is certain which event it is, as long
+//! as the log is the same as before.
 //!
-//! Each request begins one entry early, with the last event that was delivered (the *anchor*). If it is still in its
-//! place, this is still the same log; if another entry is there, or none, the log was erased or lost its contents, and
-//! reading begins anew with [`Lost::LogRestarted`]. That costs one entry in ten and makes an erase in the middle of a
-//! reading as visible as one before it.
+//! That it is, only an entry can tell: after an erase, totals and slots may agree by chance with what recording would have
+//! made of them. So nothing is delivered before a reply has shown the *anchor*, the last event that was delivered, in its
+//! place (the first events of all have none, and stand on totals and slots). An erase takes the anchor away for good, since what is recorded later has another time. If the anchor is there in
+//! a reply, nothing was erased between the reply that brought it first and this one; and what was copied between these two,
+//! in whichever order it was asked for, is of the same log. Replies have to be taken in the order in which they were
+//! copied, and that is all that this argument needs: requests may overlap, be lost, be repeated.
 //!
-//! Where the anchor is overwritten itself, the log must be full, which the entry with the highest number shows: if it
-//! does not exist, the log was erased (or the ring was made larger; then total and next slot do not agree, and what
-//! the resize threw away is counted).
+//! Up to nine events fit the reply that begins with the anchor, and if there are no more, one request is all. If there are
+//! more, those that do not fit are asked for first, up to seven replies, and are kept; then comes the request for the anchor
+//! and the events right after it, and its reply proves all of them. So the proof costs one entry in eighty. Where the end
+//! of the ring leaves the anchor alone in its request, it is the same.
+//!
+//! Reading ahead must not cost the oldest events their lives. It goes only so far that the anchor, next to be overwritten,
+//! is still there as long as events come no faster than they are read.
+//!
+//! If another entry is in the place of the anchor, or none, the log was erased or lost its contents, and reading begins
+//! anew with [`Lost::LogRestarted`]. Where the anchor is overwritten itself, the log must be full, which the entry with the
+//! highest number shows: if it does not exist, the log was erased (or the ring was made larger; then total and next slot do
+//! not agree, and what the resize threw away is counted). What was read in time is then delivered all the same.
 //!
 //! A reading ends when everything that had happened when it began is delivered, so it ends also when events come
 //! faster than they can be read. Events that come meanwhile are delivered when they fit the same replies.
@@ -27,11 +40,11 @@
 //!
 //! - The total counts modulo 65536. If more than 65,535 events happen between two readings, the count of lost ones is
 //!   too low by a multiple of 65536.
-//! - An erase that is followed by at least as many events as the log holds, before the next reading, looks like
+//! - An erase that is followed by at least as many events as the log holds, before the next look at the anchor, looks like
 //!   overwriting. The events are delivered; the count of lost ones is that of the totals, whatever it is worth.
+//! - An event that is recorded after an erase, in the slot of the anchor, with its inputs and, since the clock was set back,
+//!   with its time, passes for it.
 //! - A log that was empty has no anchor. Events that came and were erased before the next reading leave no trace.
-//! - Between the last entry of the ring and the first a request cannot overlap. An erase in just this moment is seen in
-//!   the total, which goes back, unless as many events follow at once as there were before.
 //! - The first reading of a log cannot know how often the total has wrapped: [`Lost::OverwrittenAtLeast`].
 //! - When events come so fast that the oldest entries are overwritten while the request for them is on its way, the
 //!   reader gives up some more of the oldest, to get ahead of the recorder. They are counted as lost like the rest.
@@ -40,12 +53,17 @@
 //!
 //! The size of the ring must be right. An original unit does not tell it.
 
+mod ahead;
+mod course;
+
+use std::collections::VecDeque;
 use std::error::Error;
 use std::fmt;
 
 use ser_proto::{Command, Entry, MAX_ENTRIES, MAX_SIZE, Model, ReadReply};
 
 use crate::{Cursor, Delivery, LogPosition, Lost};
+use ahead::Ahead;
 
 /// The index that total 0 gets in the arithmetic here, large enough that nothing ever goes below zero.
 const BASE: u64 = 1 << 32;
@@ -130,6 +148,27 @@ struct Pending {
     overwritten: u64,
 }
 
+/// What a request is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Purpose {
+    Locate,
+    /// Whether the log is full: does the last entry of the ring exist?
+    Probe,
+    /// Events from `next` on that are delivered at once.
+    Plain,
+    /// Events from this index on. Those from `next` on are kept until an answer brings the anchor, too.
+    Events(u64),
+    /// Nothing any more: the log has begun anew.
+    Nothing,
+}
+
+/// A request whose answer has not come.
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    request: ReadRequest,
+    purpose: Purpose,
+}
+
 /// A log that is not full and has had more events than it holds was made larger, or does not have the size that
 /// was given. If there is an entry behind the next slot, the ring goes round earlier than it should.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,16 +176,6 @@ enum Growth {
     Unasked,
     Asking,
     Certain,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Plan {
-    Locate(ReadRequest),
-    /// Whether the log is full: does the last entry of the ring exist?
-    Probe(ReadRequest),
-    Anchored(ReadRequest, Entry),
-    Plain(ReadRequest),
-    Done,
 }
 
 /// One reading from a cursor to the end of the log; see the [module documentation](self).
@@ -167,6 +196,14 @@ pub struct LogReader {
     /// Whether a log that is not full holds fewer entries than events because its ring was made larger.
     growth: Growth,
     pending: Pending,
+    /// In the order in which they were asked.
+    asked: VecDeque<Asked>,
+    /// What is known of the events from `next` on.
+    ahead: Ahead,
+    /// Replies that have brought events since the anchor was last seen in its place.
+    unproven: u64,
+    /// The most entries that a reply brings.
+    most: u64,
     /// How far ahead of the oldest entry reading goes on after a loss; above 0 once the recorder was faster.
     margin: u64,
     fruitless: u32,
@@ -191,6 +228,10 @@ impl LogReader {
             checked: false,
             growth: Growth::Unasked,
             pending: Pending::default(),
+            asked: VecDeque::new(),
+            ahead: Ahead::default(),
+            unproven: 0,
+            most: MAX_ENTRIES as u64,
             margin: 0,
             fruitless: 0,
             delivered: 0,
@@ -210,26 +251,33 @@ impl LogReader {
         self
     }
 
-    /// The entries to ask for next; `None` when the reading is done.
-    #[must_use]
-    pub fn request(&self) -> Option<ReadRequest> {
-        match self.plan() {
-            Plan::Locate(request)
-            | Plan::Probe(request)
-            | Plan::Anchored(request, _)
-            | Plan::Plain(request) => Some(request),
-            Plan::Done => None,
+    /// The entries to ask for next, each time others: several requests may be under way. `None` if there are none before
+    /// an answer comes; the reading is done when none [is awaited](Self::is_waiting) either.
+    pub fn request(&mut self) -> Option<ReadRequest> {
+        let asked = self.plan()?;
+        // By its start an answer is known.
+        if self.asked.iter().any(|other| other.request.start == asked.request.start) {
+            return None;
         }
+        self.asked.push_back(asked);
+        Some(asked.request)
     }
 
-    /// Takes the reply to [`request`](Self::request) and delivers what it brings. A reply that begins with another
-    /// entry is not the reply to it and is ignored.
+    /// Whether an answer is still to come.
+    #[must_use]
+    pub fn is_waiting(&self) -> bool {
+        !self.asked.is_empty()
+    }
+
+    /// Takes the reply to a [`request`](Self::request) and delivers what it brings, or what it proves. Replies have to
+    /// be taken in the order in which the recorder sent them, which may be another one than that of the requests. A
+    /// reply that begins with an entry that no request begins with is ignored.
     ///
     /// # Errors
     /// See [`Disturbed`].
     pub fn take(&mut self, reply: &ReadReply, on: &mut dyn FnMut(Delivery)) -> Result<(), Disturbed> {
-        let plan = self.plan();
-        let Some(request) = self.request().filter(|request| request.start == reply.start) else {
+        let place = self.asked.iter().position(|asked| asked.request.start == reply.start);
+        let Some(Asked { request, purpose }) = place.and_then(|place| self.asked.remove(place)) else {
             return Ok(());
         };
         let delivered_before = self.delivered;
@@ -237,12 +285,12 @@ impl LogReader {
         let entries = reply.entries.get(..asked_for).unwrap_or_default();
         let batch = Batch { entries, model: reply.model.unwrap_or(Model::Ser160) };
         self.see_head(LogPosition::from(reply))?;
-        match plan {
-            Plan::Done => {}
-            Plan::Locate(_) => self.located(request, batch, on)?,
-            Plan::Probe(_) => self.probed(request, entries.len(), on)?,
-            Plan::Anchored(_, anchor) => self.take_anchored(anchor, batch, on)?,
-            Plan::Plain(_) => self.take_plain(request, batch, on)?,
+        match purpose {
+            Purpose::Nothing => return Ok(()),
+            Purpose::Locate => self.located(request, batch, on)?,
+            Purpose::Probe => self.probed(request, entries.len(), on)?,
+            Purpose::Plain => self.take_plain(request, batch, on)?,
+            Purpose::Events(first) => self.take_events(first, request, batch, on)?,
         }
         self.fruitless = if self.delivered == delivered_before { self.fruitless + 1 } else { 0 };
         if self.fruitless > MAX_FRUITLESS { Err(Disturbed::NoProgress) } else { Ok(()) }
@@ -273,43 +321,6 @@ impl LogReader {
                 next_slot: low_16(head.slot),
             }),
         }
-    }
-
-    fn plan(&self) -> Plan {
-        let Some(head) = self.head else {
-            return Plan::Locate(
-                self.expected_slot.map_or(ReadRequest::POSITION, |slot| self.entries(slot, 2)),
-            );
-        };
-        if self.growth == Growth::Asking {
-            return Plan::Probe(self.entries(head.slot, MAX_ENTRIES as u64));
-        }
-        let behind = head.total - self.next;
-        let at_target = self.next >= self.target && self.pending == Pending::default();
-        match self.footing {
-            Footing::Anchored(_) if at_target && self.checked => Plan::Done,
-            Footing::Loose | Footing::Firm if at_target => Plan::Done,
-            Footing::Anchored(anchor) if behind < self.size => {
-                Plan::Anchored(self.entries(self.slot_of(head, self.next - 1), behind + 1), anchor)
-            }
-            Footing::Loose if behind < self.size => {
-                Plan::Plain(self.entries(self.slot_of(head, self.next), behind))
-            }
-            Footing::Firm => Plan::Plain(self.entries(self.slot_of(head, self.next), behind)),
-            Footing::Uncounted | Footing::Anchored(_) | Footing::Loose => Plan::Probe(self.probe()),
-        }
-    }
-
-    /// Asks for the last entry of the ring, and for one more that must not exist.
-    fn probe(&self) -> ReadRequest {
-        let count = if self.size < MAX_SIZE.into() { 2 } else { 1 };
-        ReadRequest { start: low_16(self.size), count }
-    }
-
-    /// Asks for `count` entries from `slot` on, as far as one request goes.
-    fn entries(&self, slot: u64, count: u64) -> ReadRequest {
-        let count = count.min(self.size - slot).clamp(1, MAX_ENTRIES as u64);
-        ReadRequest { start: low_16(slot + 1), count: u8::try_from(count).unwrap_or(1) }
     }
 
     /// The slot of event `index`, which is at most one ring behind the head.
@@ -363,7 +374,7 @@ impl LogReader {
         self.footing = Footing::Anchored(anchor);
         let anchor_entry = self.slot_of(head, self.next - 1) + 1;
         if self.expected_slot.is_some() && u64::from(request.start) == anchor_entry {
-            return self.take_anchored(anchor, batch, on);
+            return self.take_events(self.next - 1, request, batch, on);
         }
         Ok(())
     }
@@ -404,9 +415,13 @@ impl LogReader {
             return self.not_full(head);
         }
         if head.total - self.next >= self.size {
-            self.skip_to(head.total - self.size + self.margin.min(self.size - 1));
+            let alive = head.total - self.size + self.margin.min(self.size - 1);
+            // What was read in time is not lost.
+            let read = self.ahead.first().map(|offset| self.next + offset);
+            self.skip_to(read.map_or(alive, |read| read.min(alive)));
         }
         self.footing = Footing::Firm;
+        self.deliver(on);
         Ok(())
     }
 
@@ -439,6 +454,7 @@ impl LogReader {
         if held == 0 {
             return Err(Disturbed::WrongSize);
         }
+        self.ahead.clear();
         if !self.may_hold_fewer_than(head) {
             return Ok(());
         }
@@ -463,41 +479,76 @@ impl LogReader {
         self.pending = Pending { restarted: self.cursor.is_some(), ..Pending::default() };
         self.footing = Footing::Uncounted;
         self.margin = 0;
+        self.ahead.clear();
+        self.unproven = 0;
+        self.most = MAX_ENTRIES as u64;
+        self.asked.iter_mut().for_each(|asked| asked.purpose = Purpose::Nothing);
         self.next = self.head.map_or(self.next, |head| head.total);
     }
 
     fn skip_to(&mut self, index: u64) {
         self.pending.overwritten += index - self.next;
+        self.ahead.skip(index - self.next);
         self.next = index;
     }
 
-    fn take_anchored(
+    /// Takes events from index `first` on. If the anchor is among them and in its place, everything that was read before
+    /// its turn is of the same log and is delivered.
+    fn take_events(
         &mut self,
-        anchor: Entry,
+        first: u64,
+        request: ReadRequest,
         batch: Batch<'_>,
         on: &mut dyn FnMut(Delivery),
     ) -> Result<(), Disturbed> {
         let Some(head) = self.head else { return Ok(()) };
-        if self.behind() >= self.size {
-            // The anchor has been overwritten meanwhile: the next step is to ask whether the log is full.
-            return Ok(());
-        }
-        match batch.entries.split_first() {
-            None => self.not_full(head)?,
-            // It was there a moment ago. Perhaps the ring was resized and the slots mean something else now.
-            Some((first, _)) if *first != anchor && self.checked => return Err(Disturbed::Changed),
-            Some((first, _)) if *first != anchor => self.restart(),
-            Some((_, entries)) => {
-                self.checked = true;
-                let before = self.delivered;
-                self.deliver(Batch { entries, ..batch }, on);
-                if self.delivered == before {
-                    // At the end of the ring, where no request can overlap.
-                    self.footing = Footing::Firm;
+        let mut proven = false;
+        let asked_for = first..first + u64::from(request.count);
+        // If the anchor has been overwritten meanwhile, the next step is to ask whether the log is full.
+        if let Footing::Anchored(anchor) = self.footing
+            && asked_for.contains(&(self.next - 1))
+            && self.behind() < self.size
+        {
+            let found = usize::try_from(self.next - 1 - first).ok().and_then(|at| batch.entries.get(at));
+            match found {
+                // The log is shorter than it must be, or the reply is.
+                None if batch.entries.is_empty() => return self.not_full(head),
+                None => {}
+                // It was there a moment ago. Perhaps the ring was resized and the slots mean something else now.
+                Some(found) if *found != anchor && self.checked => return Err(Disturbed::Changed),
+                Some(found) if *found != anchor => {
+                    self.restart();
+                    return Ok(());
+                }
+                Some(_) => {
+                    self.checked = true;
+                    proven = true;
                 }
             }
         }
+        self.keep(first, request, batch);
+        if proven {
+            self.deliver(on);
+        } else {
+            self.unproven += 1;
+        }
         Ok(())
+    }
+
+    /// Keeps entries that are events `first`, `first + 1` and so on, as far as these have happened and were there still.
+    fn keep(&mut self, first: u64, request: ReadRequest, batch: Batch<'_>) {
+        let Some(head) = self.head else { return };
+        let len = batch.entries.len() as u64;
+        if (1..u64::from(request.count)).contains(&len) && first + len < head.total {
+            // More there were, so this is all that a message takes here.
+            self.most = self.most.min(len);
+        }
+        for (index, &entry) in (first..head.total).zip(batch.entries) {
+            let offset = index.checked_sub(self.next).and_then(|offset| usize::try_from(offset).ok());
+            if let Some(offset) = offset.filter(|_| head.total - index <= self.size) {
+                self.ahead.keep(offset, entry, batch.model);
+            }
+        }
     }
 
     fn take_plain(
@@ -512,10 +563,10 @@ impl LogReader {
         }
         self.footing = Footing::Loose;
         let overwritten = self.behind().saturating_sub(self.size);
-        let alive = usize::try_from(overwritten).ok().and_then(|skip| batch.entries.get(skip..));
-        if let Some(entries) = alive.filter(|alive| !alive.is_empty()) {
+        if overwritten < batch.entries.len() as u64 {
+            self.keep(self.next, request, batch);
             self.skip_to(self.next + overwritten);
-            self.deliver(Batch { entries, ..batch }, on);
+            self.deliver(on);
             return Ok(());
         }
         // Everything asked for was overwritten on the way, it seems.
@@ -528,20 +579,19 @@ impl LogReader {
         let slot = u64::from(request.start) - 1;
         let age = (head.slot + self.size - slot - 1) % self.size;
         self.skip_to(self.next.max(head.total - 1 - age));
-        self.deliver(batch, on);
+        self.keep(self.next, request, batch);
+        self.deliver(on);
         Ok(())
     }
 
-    /// Delivers entries that are events `next`, `next + 1` and so on, as far as these have happened.
-    fn deliver(&mut self, batch: Batch<'_>, on: &mut dyn FnMut(Delivery)) {
+    /// Delivers what is known of event `next`, `next + 1` and so on.
+    fn deliver(&mut self, on: &mut dyn FnMut(Delivery)) {
         let Some(head) = self.head else { return };
-        for &entry in batch.entries {
-            if self.next >= head.total {
-                break;
-            }
+        self.unproven = 0;
+        while let Some((entry, model)) = self.ahead.pop() {
             self.deliver_losses(on);
             let entry_number = low_16(self.slot_of(head, self.next) + 1);
-            on(Delivery::Event { entry_number, entry, model: batch.model });
+            on(Delivery::Event { entry_number, entry, model });
             self.next += 1;
             self.delivered = self.delivered.saturating_add(1);
             self.cursor = Some(Cursor { total: low_16(self.next), anchor: Some(entry) });

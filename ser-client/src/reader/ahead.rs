@@ -1,0 +1,53 @@
+//! Entries that were read before their turn.
+
+use std::collections::VecDeque;
+
+use ser_proto::{Entry, Model};
+
+/// What is known of the events from a certain one on. Only so much is read ahead, and so this stays small.
+#[derive(Debug, Default)]
+pub(super) struct Ahead {
+    /// In the order of the events, with holes; the last one is known.
+    entries: VecDeque<Option<(Entry, Model)>>,
+}
+
+impl Ahead {
+    /// Keeps the entry of the event that comes so many after the first.
+    pub(super) fn keep(&mut self, offset: usize, entry: Entry, model: Model) {
+        if self.entries.len() <= offset {
+            self.entries.resize(offset + 1, None);
+        }
+        if let Some(known) = self.entries.get_mut(offset) {
+            *known = Some((entry, model));
+        }
+    }
+
+    /// Whether the entry of the event that comes so many after the first is known.
+    pub(super) fn knows(&self, offset: u64) -> bool {
+        let offset = usize::try_from(offset).unwrap_or(usize::MAX);
+        matches!(self.entries.get(offset), Some(Some(_)))
+    }
+
+    /// How many events there are before the first one that is known, if any is.
+    pub(super) fn first(&self) -> Option<u64> {
+        let first = self.entries.iter().position(Option::is_some)?;
+        u64::try_from(first).ok()
+    }
+
+    /// The entry of the first event, if it is known: the one after it is the first now.
+    pub(super) fn pop(&mut self) -> Option<(Entry, Model)> {
+        let known = self.entries.front().copied().flatten()?;
+        self.entries.pop_front();
+        Some(known)
+    }
+
+    /// Passes over so many events.
+    pub(super) fn skip(&mut self, count: u64) {
+        let count = usize::try_from(count).unwrap_or(usize::MAX).min(self.entries.len());
+        self.entries.drain(..count);
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.entries.clear();
+    }
+}
