@@ -100,8 +100,10 @@ impl LogFollower {
         }
         let mut deliveries = Vec::new();
         let mut first = true;
-        while let Some(request) = reader.request() {
-            let reply = unit.read(request)?;
+        unit.cancel();
+        unit.ask(&mut || reader.request())?;
+        while reader.is_waiting() {
+            let reply = unit.next_reply()?;
             if first {
                 // What they tell is in the log that is read now, or was erased since.
                 unit.forget_earlier_reports();
@@ -110,11 +112,14 @@ impl LogFollower {
             deliveries.clear();
             let taken = reader.take(&reply, &mut |delivery| deliveries.push(delivery));
             let (cursor, pending) = (reader.cursor(), reader.pending());
+            // Before anything is done with this: the line shall not have to wait for it.
+            let asked = if taken.is_ok() { unit.ask(&mut || reader.request()) } else { Ok(()) };
             take(&Step { deliveries: &deliveries, cursor, pending, size: self.size })?;
             self.cursor = cursor;
             if taken.is_err() {
                 return Ok((reader.summary(), taken));
             }
+            asked?;
         }
         let summary = reader.summary();
         self.position = Some(summary.position);

@@ -58,7 +58,9 @@ impl Unit {
     #[cfg(unix)]
     pub(crate) fn on_genius(host: crate::GeniHost, node: u8, options: Options) -> Unit {
         let Options { timeout, retries } = options;
-        let session = Session::new(Timing { timeout, retries, line_rate: LineRate::Instant });
+        let timing = Timing { timeout, retries, line_rate: LineRate::Instant };
+        // A bus has many talkers, and no silence that could be filled.
+        let session = Session::new(timing).one_at_a_time();
         let link = Box::new(crate::genius::GeniusLink { host, node });
         Unit { link, session, last_position: None }
     }
@@ -348,6 +350,43 @@ impl Unit {
         self.session.forget_earlier_reports();
     }
 
+    /// Whether reads go one at a time, because the unit does not take a request while it answers another one, or is on a
+    /// Genius bus. Otherwise there are two under way, and the line is never silent.
+    #[must_use]
+    pub fn reads_one_at_a_time(&self) -> bool {
+        self.session.is_one_at_a_time()
+    }
+
+    /// Asks for what `next` gives, as far as there is room for more reads under way, and does not wait.
+    pub(crate) fn ask(&mut self, next: &mut dyn FnMut() -> Option<ReadRequest>) -> Result<(), RequestError> {
+        if !self.session.has_room() {
+            return Ok(());
+        }
+        if self.session.is_idle() {
+            self.prepare()?;
+        }
+        while self.session.has_room()
+            && let Some(request) = next()
+        {
+            // There is room.
+            let _ = self.session.request(request.into());
+        }
+        self.send_due(&mut |_| Err(unexpected(Code::Read)))
+    }
+
+    /// The reply to one of the reads that were asked for.
+    pub(crate) fn next_reply(&mut self) -> Result<ReadReply, RequestError> {
+        match self.converse(&mut |_| Err(unexpected(Code::Read)))? {
+            Reply::Read(reply) => Ok(reply),
+            _ => Err(unexpected(Code::Read)),
+        }
+    }
+
+    /// Forgets what is under way.
+    pub(crate) fn cancel(&mut self) {
+        self.session.cancel(self.now());
+    }
+
     pub(crate) fn read(&mut self, request: ReadRequest) -> Result<ReadReply, RequestError> {
         match self.request(&request.into())? {
             Reply::Read(reply) => Ok(reply),
@@ -367,14 +406,7 @@ impl Unit {
         time_at: &mut dyn FnMut(Duration) -> Result<TimeStamp, RequestError>,
     ) -> Result<Reply, RequestError> {
         loop {
-            let now = self.now();
-            if let Some(mut attempt) = self.session.dispatch(now) {
-                if attempt.wants_time() {
-                    // Without a time nothing is sent; the next request forgets this one.
-                    attempt.set_time(time_at(self.link.delay(&attempt))?);
-                }
-                self.link.send(&attempt)?;
-            }
+            self.send_due(time_at)?;
             match self.session.take_answer() {
                 Some(Ok(reply)) => return Ok(reply),
                 Some(Err(no_reply)) => {
@@ -386,6 +418,20 @@ impl Unit {
             let left = self.session.poll_at().unwrap_or_default().saturating_sub(self.now());
             self.receive(left)?;
         }
+    }
+
+    fn send_due(
+        &mut self,
+        time_at: &mut dyn FnMut(Duration) -> Result<TimeStamp, RequestError>,
+    ) -> Result<(), RequestError> {
+        while let Some(mut attempt) = self.session.dispatch(self.link.now()) {
+            if attempt.wants_time() {
+                // Without a time nothing is sent; the next request forgets this one.
+                attempt.set_time(time_at(self.link.delay(&attempt))?);
+            }
+            self.link.send(&attempt)?;
+        }
+        Ok(())
     }
 
     fn listen_for(&mut self, time: Duration) -> Result<(), RequestError> {

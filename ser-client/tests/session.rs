@@ -1,4 +1,4 @@
-//! One request and its answer, with every byte and every moment written down.
+//! Requests and their answers, with every byte and every moment written down.
 
 mod common;
 
@@ -380,6 +380,249 @@ fn a_cancelled_request_leaves_the_session_free() {
     assert_eq!(session.take_answer(), None);
     session.process(ms(20), &frame(&RUNNING));
     assert_eq!(session.take_answer(), Some(Ok(RUNNING)));
+}
+
+fn read(start: u16) -> Command {
+    Command::Read { start, count: 1 }
+}
+
+/// The starts of the reads that the session sends now.
+fn starts(session: &mut Session, now: Duration) -> Vec<u16> {
+    let mut starts = Vec::new();
+    while let Some(attempt) = session.dispatch(now) {
+        match attempt.command() {
+            Command::Read { start, .. } => starts.push(*start),
+            other => panic!("{other:?}"),
+        }
+    }
+    starts
+}
+
+/// The answer to a read arrives.
+fn answer(session: &mut Session, now: Duration, start: u16) {
+    session.process(now, &frame(&Reply::Read(read_reply(start, 1))));
+}
+
+/// The start of the answer that is handed out, if there is one.
+fn answered(session: &mut Session) -> Option<u16> {
+    match session.take_answer()? {
+        Ok(Reply::Read(reply)) => Some(reply.start),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A session with a unit that has taken many requests while it answered others.
+fn proven(retries: u32) -> Session {
+    let mut session = session(retries);
+    session.request(read(20)).unwrap();
+    for start in 0..20 {
+        session.request(read(start % 2 + 10)).unwrap();
+        starts(&mut session, ms(0));
+        answer(&mut session, ms(0), if start == 0 { 20 } else { (start + 1) % 2 + 10 });
+        answered(&mut session).unwrap();
+    }
+    answer(&mut session, ms(0), 11);
+    assert_eq!(answered(&mut session), Some(11));
+    session
+}
+
+#[test]
+fn two_reads_are_under_way_and_nothing_else_beside_them() {
+    let mut session = session(0);
+    assert!(session.has_room() && session.is_idle());
+    session.request(read(1)).unwrap();
+    assert_eq!(session.request(Command::QueryMode), Err(Busy));
+    session.request(read(2)).unwrap();
+    assert!(!session.has_room());
+    assert_eq!(session.request(read(3)), Err(Busy));
+    assert_eq!(starts(&mut session, ms(0)), [1, 2]);
+    answer(&mut session, ms(100), 1);
+    assert_eq!(session.request(read(3)), Err(Busy), "the answer has not been taken");
+    assert_eq!(answered(&mut session), Some(1));
+    session.request(read(3)).unwrap();
+    assert_eq!(starts(&mut session, ms(100)), [3]);
+    answer(&mut session, ms(200), 2);
+    answer(&mut session, ms(300), 3);
+    assert_eq!((answered(&mut session), answered(&mut session)), (Some(2), Some(3)));
+    assert!(session.is_idle());
+    session.request(Command::QueryMode).unwrap();
+    assert!(!session.has_room());
+    assert_eq!(session.request(read(1)), Err(Busy));
+}
+
+#[test]
+fn the_time_for_an_answer_begins_when_the_one_before_is_there() {
+    let mut session = session(0);
+    session.request(read(1)).unwrap();
+    session.request(read(2)).unwrap();
+    assert_eq!(starts(&mut session, ms(0)), [1, 2]);
+    assert_eq!(session.poll_at(), Some(ms(1000)));
+    answer(&mut session, ms(900), 1);
+    assert_eq!(answered(&mut session), Some(1));
+    assert_eq!(session.poll_at(), Some(ms(1900)));
+}
+
+#[test]
+fn an_answer_that_was_lost_is_noticed_by_the_next_one() {
+    let mut session = proven(1);
+    session.request(read(1)).unwrap();
+    session.request(read(2)).unwrap();
+    assert_eq!(starts(&mut session, ms(0)), [1, 2]);
+    answer(&mut session, ms(100), 2);
+    assert_eq!(answered(&mut session), Some(2));
+    // At once, and alone.
+    assert!(!session.has_room());
+    assert_eq!(starts(&mut session, ms(100)), [1]);
+    assert_eq!(session.poll_at(), Some(ms(1100)));
+    answer(&mut session, ms(200), 1);
+    assert_eq!(answered(&mut session), Some(1));
+    assert!(session.has_room() && !session.is_one_at_a_time());
+}
+
+#[test]
+fn an_answer_that_is_passed_over_again_and_again_is_given_up() {
+    let mut session = proven(0);
+    session.request(read(1)).unwrap();
+    session.request(read(2)).unwrap();
+    starts(&mut session, ms(0));
+    answer(&mut session, ms(100), 2);
+    assert_eq!(answered(&mut session), Some(2));
+    let given_up = session.take_answer().unwrap().unwrap_err();
+    assert_eq!((given_up.command, given_up.attempts), (Code::Read, 1));
+    assert!(session.is_idle());
+}
+
+#[test]
+fn after_a_timeout_both_are_asked_again_one_after_the_other() {
+    let mut session = proven(1);
+    session.request(read(1)).unwrap();
+    session.request(read(2)).unwrap();
+    starts(&mut session, ms(0));
+    assert_eq!(starts(&mut session, ms(1000)), [1]);
+    // The first answer was only late, and so was the second.
+    answer(&mut session, ms(1100), 1);
+    assert_eq!(answered(&mut session), Some(1));
+    answer(&mut session, ms(1150), 2);
+    assert_eq!(answered(&mut session), Some(2));
+    // An answer to the repeated request may come, and must not pass for another one.
+    session.request(read(1)).unwrap();
+    assert_eq!(starts(&mut session, ms(1150)), []);
+    answer(&mut session, ms(1200), 1);
+    assert_eq!(answered(&mut session), None);
+    assert_eq!(starts(&mut session, ms(1200)), [1]);
+    answer(&mut session, ms(1300), 1);
+    assert_eq!(answered(&mut session), Some(1));
+    assert!(!session.is_one_at_a_time());
+}
+
+#[test]
+fn a_unit_that_takes_no_request_while_it_answers_is_asked_one_at_a_time() {
+    for retries in [0, 2] {
+        // Found out by the answer to the next request, or by a timeout.
+        for next in [true, false] {
+            let mut session = session(retries);
+            session.request(read(1)).unwrap();
+            session.request(read(2)).unwrap();
+            assert_eq!(starts(&mut session, ms(0)), [1, 2]);
+            answer(&mut session, ms(100), 1);
+            assert_eq!(answered(&mut session), Some(1));
+            let mut now = 100;
+            if next {
+                session.request(read(3)).unwrap();
+                assert_eq!(starts(&mut session, ms(now)), [3]);
+                now += 100;
+                answer(&mut session, ms(now), 3);
+                assert_eq!(answered(&mut session), Some(3));
+            } else {
+                now += 1000;
+            }
+            assert_eq!(starts(&mut session, ms(now)), [2]);
+            assert!(session.is_one_at_a_time());
+            now += 100;
+            answer(&mut session, ms(now), 2);
+            assert_eq!(answered(&mut session), Some(2));
+            session.request(read(4)).unwrap();
+            assert_eq!(session.request(read(5)), Err(Busy));
+        }
+    }
+}
+
+#[test]
+fn a_unit_that_is_confused_by_a_second_request_is_asked_one_at_a_time() {
+    let mut session = session(0);
+    session.request(read(1)).unwrap();
+    session.request(read(2)).unwrap();
+    starts(&mut session, ms(0));
+    // Neither is answered; that was no attempt.
+    assert_eq!(starts(&mut session, ms(1000)), [1]);
+    assert!(session.is_one_at_a_time());
+    answer(&mut session, ms(1100), 1);
+    assert_eq!(answered(&mut session), Some(1));
+    assert_eq!(starts(&mut session, ms(1100)), [2]);
+    // This one is.
+    assert_eq!(starts(&mut session, ms(2100)), []);
+    session.take_answer().unwrap().unwrap_err();
+}
+
+#[test]
+fn one_loss_in_five_is_too_many_for_two_at_once() {
+    let mut session = proven(2);
+    let mut now = 0;
+    for losses in 1.. {
+        session.request(read(1)).unwrap();
+        session.request(read(2)).unwrap();
+        starts(&mut session, ms(now));
+        answer(&mut session, ms(now), 2);
+        assert_eq!(answered(&mut session), Some(2));
+        assert_eq!(starts(&mut session, ms(now)), [1]);
+        answer(&mut session, ms(now), 1);
+        assert_eq!(answered(&mut session), Some(1));
+        if session.is_one_at_a_time() {
+            assert_eq!(losses, 3);
+            break;
+        }
+        now += 2000;
+    }
+    // It was the line: the unit has shown that it takes two.
+    now += 2000;
+    for answers in 1.. {
+        session.request(read(1)).unwrap();
+        assert!(!session.has_room());
+        starts(&mut session, ms(now));
+        answer(&mut session, ms(now), 1);
+        assert_eq!(answered(&mut session), Some(1));
+        if !session.is_one_at_a_time() {
+            // The last repeat above was the first answer.
+            assert_eq!(answers, 99);
+            break;
+        }
+    }
+}
+
+#[test]
+fn a_session_can_be_told_to_ask_one_at_a_time() {
+    let mut session = session(0).one_at_a_time();
+    session.request(read(1)).unwrap();
+    assert!(!session.has_room() && session.is_one_at_a_time());
+    assert_eq!(session.request(read(2)), Err(Busy));
+}
+
+#[test]
+fn what_is_under_way_is_forgotten_together() {
+    let mut session = proven(0);
+    session.request(read(1)).unwrap();
+    session.request(read(2)).unwrap();
+    starts(&mut session, ms(0));
+    session.cancel(ms(0));
+    assert!(session.is_idle());
+    // Late answers to them are no answers to new ones.
+    session.request(read(2)).unwrap();
+    session.request(read(3)).unwrap();
+    assert_eq!(starts(&mut session, ms(0)), []);
+    answer(&mut session, ms(100), 1);
+    answer(&mut session, ms(100), 2);
+    assert_eq!(answered(&mut session), None);
+    assert_eq!(starts(&mut session, ms(100)), [2, 3]);
 }
 
 proptest! {

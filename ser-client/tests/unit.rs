@@ -209,6 +209,19 @@ fn a_log_is_read_over_a_line_that_loses_replies() {
 }
 
 #[test]
+fn two_reads_are_under_way_unless_the_unit_hears_only_one() {
+    for deaf_when_talking in [false, true] {
+        let mut bench = Bench::new(100);
+        bench.fake().recorder.append_many(100);
+        bench.fake().deaf_when_talking = deaf_when_talking;
+        let (all, result) = read_new(&mut bench.unit, &mut None, 100);
+        assert_eq!(all, (1..=100).map(Told::Event).collect::<Vec<_>>());
+        assert_eq!(result.unwrap().delivered, 100);
+        assert_eq!(bench.unit.reads_one_at_a_time(), deaf_when_talking);
+    }
+}
+
+#[test]
 fn a_reading_that_fails_goes_on_where_it_stopped() {
     let mut bench = Bench::new(100);
     bench.fake().recorder.append_many(100);

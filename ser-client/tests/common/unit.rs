@@ -29,6 +29,8 @@ pub(crate) struct Fake {
     pub(crate) swallow: usize,
     /// Original units do not know the queries.
     pub(crate) original: bool,
+    /// Whether a command is not heard while an answer is on the line.
+    pub(crate) deaf_when_talking: bool,
     /// After so many more commands the line fails.
     pub(crate) breaks_in: Option<usize>,
     /// The line fails with this.
@@ -63,6 +65,9 @@ impl Fake {
             }
             Err(_) => return,
         };
+        if self.deaf_when_talking && !self.to_client.is_empty() {
+            return;
+        }
         self.commands.push(command);
         let mut new_rate = None;
         let reply = match command {
@@ -183,6 +188,7 @@ impl Bench {
             recording: true,
             swallow: 0,
             original: false,
+            deaf_when_talking: false,
             breaks_in: None,
             broken: None,
             commands: Vec::new(),

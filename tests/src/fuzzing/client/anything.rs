@@ -21,7 +21,8 @@ const TIMEOUT: Duration = Duration::from_millis(300);
 struct Talk {
     session: Session,
     now: Duration,
-    asked: Option<Command>,
+    /// What is not answered.
+    asked: Vec<Command>,
     readers: Readers,
 }
 
@@ -32,7 +33,7 @@ pub(super) fn talk(mut script: Script<'_>) {
     };
     let timing = Timing { timeout: TIMEOUT, retries: script.byte().into(), line_rate: rate };
     let readers = Readers::new(&mut script);
-    let mut talk = Talk { session: Session::new(timing), now: Duration::ZERO, asked: None, readers };
+    let mut talk = Talk { session: Session::new(timing), now: Duration::ZERO, asked: Vec::new(), readers };
     while !script.is_over() {
         talk.act(&mut script);
         talk.check();
@@ -52,7 +53,7 @@ impl Talk {
             4 => self.now += Duration::from_millis(script.word().into()),
             5 => {
                 self.session.cancel(self.now);
-                self.asked = None;
+                self.asked.clear();
             }
             6 => self.session.set_line_rate(LineRate::BitsPerSecond(script.word().into())),
             _ => {
@@ -70,47 +71,67 @@ impl Talk {
 
     fn ask(&mut self, script: &mut Script<'_>) {
         let Ok(command) = Command::parse(script.run()) else { return };
-        let is_free = self.asked.is_none();
+        let is_read = matches!(command, Command::Read { .. });
+        let may_join = is_read && self.session.has_room();
         let begun = match command {
             Command::SetClock(_) => self.session.request_set_clock(),
             command => self.session.request(command),
         };
-        assert_eq!(begun.is_ok(), is_free, "one request at a time");
-        if is_free {
-            self.asked = Some(command);
+        assert_eq!(
+            begun.is_ok(),
+            self.asked.is_empty() || may_join,
+            "one request at a time, unless these are reads"
+        );
+        if begun.is_ok() {
+            self.asked.push(command);
         }
+        let only_reads = self.asked.iter().all(|asked| matches!(asked, Command::Read { .. }));
+        assert!(self.asked.len() <= 1 || (only_reads && self.asked.len() == 2), "two reads at most");
     }
 
     /// Does what is due, and takes what there is.
     fn check(&mut self) {
-        if let Some(attempt) = self.session.dispatch(self.now) {
-            assert!(self.asked.is_some());
-            assert_eq!(Some(attempt.command().code()), self.asked.map(|asked| asked.code()));
+        for sent in 0.. {
+            let Some(attempt) = self.session.dispatch(self.now) else { break };
+            assert!(sent < self.asked.len(), "each request is sent once at a time");
+            let is_it = |asked: &Command| match (asked, attempt.command()) {
+                (Command::SetClock(_), command) => matches!(command, Command::SetClock(_)),
+                (asked, command) => asked == command,
+            };
+            assert!(self.asked.iter().any(is_it), "nobody asked for that");
             assert!(attempt.number() >= 1 && attempt.frame().len() >= 7);
         }
-        match self.session.take_answer() {
-            Some(Ok(reply)) => {
-                let asked = self.asked.take().expect("a request");
-                assert_eq!(reply.code(), asked.code());
-                if let (Reply::Read(reply), Command::Read { start, count }) = (reply, asked) {
-                    assert_eq!(reply.start, start);
-                    assert!(reply.entries.len() <= usize::from(count));
-                    self.readers.take(reply);
+        while let Some(answer) = self.session.take_answer() {
+            match answer {
+                Ok(reply) => self.answered(reply),
+                Err(no_reply) => {
+                    assert!(self.asked.iter().any(|asked| asked.code() == no_reply.command));
+                    assert!(no_reply.attempts >= 1 && !no_reply.diagnosis.to_string().is_empty());
+                    self.asked.clear();
                 }
             }
-            Some(Err(no_reply)) => {
-                let asked = self.asked.take().expect("a request");
-                assert_eq!(no_reply.command, asked.code());
-                assert!(no_reply.attempts >= 1 && !no_reply.diagnosis.to_string().is_empty());
-            }
-            None => {}
         }
         assert_eq!(
             self.session.poll_at().is_some(),
-            self.asked.is_some(),
+            !self.asked.is_empty(),
             "somebody waits for a request only"
         );
+        assert_eq!(self.session.is_idle(), self.asked.is_empty());
         self.take_unasked();
+    }
+
+    fn answered(&mut self, reply: Reply) {
+        let is_answer = |asked: &Command| match (asked, &reply) {
+            (&Command::Read { start, count }, Reply::Read(reply)) => {
+                reply.start == start && reply.entries.len() <= usize::from(count)
+            }
+            (asked, reply) => asked.code() == reply.code(),
+        };
+        let place = self.asked.iter().position(is_answer).expect("a request");
+        self.asked.remove(place);
+        if let Reply::Read(reply) = reply {
+            self.readers.take(reply);
+        }
     }
 
     fn take_unasked(&mut self) {
@@ -142,12 +163,13 @@ impl Readers {
     fn new(script: &mut Script<'_>) -> Readers {
         let size = script.word() % 2100;
         let cursor = Cursor { total: script.word(), anchor: None };
-        let cursor = (script.byte() % 2 == 1).then_some(cursor);
+        let choice = script.byte();
+        let cursor = (choice % 2 == 1).then_some(cursor);
         let position = LogPosition { total: script.word(), next_slot: script.word() % 2048 };
         Readers {
             size,
             reader: LogReader::new(cursor, size).starting_near(position),
-            window: usize::from(script.byte() % 4) + 1,
+            window: usize::from(choice / 2 % 4) + 1,
             asked: VecDeque::new(),
             shown: Vec::new(),
             range: RangeReader::new(script.word(), script.word(), size),

@@ -7,7 +7,7 @@ use ser_client::{
     Cursor, Delivery, Disturbed, LineRate, LogFollower, LogPosition, LogReader, Lost, Session, Timing,
     Unsolicited,
 };
-use ser_proto::{Command, Decoded, FrameDecoder, Reply};
+use ser_proto::{Command, Decoded, FrameDecoder, ReadReply, Reply};
 
 use super::truthful_unit::{TruthfulUnit, number_of};
 use crate::fuzzing::framing::frame_of;
@@ -48,8 +48,6 @@ struct World {
     size: u16,
     cursor: Option<Cursor>,
     position: Option<LogPosition>,
-    /// How many events had happened when the log was last read to its end.
-    read_to: u32,
 }
 
 pub(super) fn follow(mut script: Script<'_>) {
@@ -66,7 +64,6 @@ pub(super) fn follow(mut script: Script<'_>) {
         size,
         cursor: None,
         position: None,
-        read_to: 0,
     };
     while !script.is_over() && world.unit.happened() < 200_000 {
         match script.byte() % 8 {
@@ -88,7 +85,7 @@ pub(super) fn follow(mut script: Script<'_>) {
 impl World {
     fn record(&mut self, count: u32) {
         self.unit.record(count);
-        self.received.exact &= self.unit.happened() - self.read_to <= MAX_UNREAD;
+        self.received.exact &= self.unit.happened() - self.received.next <= MAX_UNREAD;
     }
 
     /// Somebody erases the log, when nothing is under way: what an older log said could be taken for news of the new one.
@@ -111,7 +108,6 @@ impl World {
             match end {
                 Some(Ok(())) => {
                     self.position = Some(reader.summary().position);
-                    self.read_to = self.unit.happened();
                     return;
                 }
                 None | Some(Err(Disturbed::NoProgress)) => return,
@@ -126,28 +122,40 @@ impl World {
         reader: &mut LogReader,
         script: &mut Script<'_>,
     ) -> Option<Result<(), Disturbed>> {
-        while let Some(request) = reader.request() {
-            let Some(Reply::Read(reply)) = self.ask(request.into(), script) else { return None };
+        self.session.cancel(self.now);
+        let mut first = true;
+        loop {
+            while self.session.has_room()
+                && let Some(request) = reader.request()
+            {
+                self.session.request(request.into()).expect("there is room");
+            }
+            if !reader.is_waiting() {
+                return Some(Ok(()));
+            }
+            let reply = self.next_reply(script)?;
+            if std::mem::take(&mut first) {
+                // As the client does: they tell what the log is about to be read for.
+                self.session.forget_earlier_reports();
+            }
             let received = &mut self.received;
             if let Err(disturbed) = reader.take(&reply, &mut |delivery| received.take(delivery)) {
                 return Some(Err(disturbed));
             }
         }
-        Some(Ok(()))
     }
 
-    /// A request over the line, with everything that may happen to it.
-    fn ask(&mut self, command: Command, script: &mut Script<'_>) -> Option<Reply> {
-        self.session.cancel(self.now);
-        self.session.request(command).expect("nothing else is under way");
+    /// The reply to one of the requests over the line, with everything that may happen to them.
+    fn next_reply(&mut self, script: &mut Script<'_>) -> Option<ReadReply> {
         loop {
-            let sent = self.session.dispatch(self.now).map(|attempt| attempt.frame().to_vec());
-            if let Some(frame) = sent {
+            while let Some(attempt) = self.session.dispatch(self.now) {
+                let frame = attempt.frame().to_vec();
                 self.arrive_at_unit(&frame, script);
             }
             self.bring();
             match self.session.take_answer() {
-                Some(Ok(reply)) => return Some(reply),
+                Some(Ok(Reply::Read(reply))) => return Some(reply),
+                Some(Ok(other)) => panic!("the answer to a read is {other:?}"),
                 Some(Err(_)) => return None,
                 None => {}
             }
@@ -248,7 +256,8 @@ impl Received {
             }
             Delivery::Lost(Lost::OverwrittenAtLeast { count }) => {
                 assert!(!self.exact || !self.began, "what was read once is known");
-                self.next += count;
+                // Otherwise it may count from an erase, or from the turn of the total.
+                self.next += if self.exact { count } else { 0 };
             }
             Delivery::Lost(Lost::Overwritten { count }) if self.exact => self.next += count,
             Delivery::Lost(Lost::LogRestarted) => assert!(!self.exact, "nobody has erased the log"),

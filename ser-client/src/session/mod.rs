@@ -1,4 +1,4 @@
-//! One request after the other and the answer to each, told apart from what the recorder says by itself.
+//! Requests and the answer to each, told apart from what the recorder says by itself.
 //!
 //! A session owns neither port nor clock. Give it a command with [`request`](Session::request); send what
 //! [`dispatch`](Session::dispatch) hands out; give it what arrives with [`process`](Session::process); call
@@ -20,6 +20,21 @@
 //! answer for its own, and the next one the answer after that, and so on. Such a request is therefore held back until
 //! the missing answers have come, or one more timeout has passed.
 //!
+//! # Two reads at once
+//!
+//! Reads may be [requested](Session::has_room) while another one is under way, so that the unit finds the next request when
+//! it is done with an answer, and the line is never silent. Everything else is one at a time.
+//!
+//! A unit answers in the order in which it was asked, and a line keeps the order. So an answer that comes before that to an
+//! earlier request shows that the earlier request or its answer was lost, and it is sent again at once. Answers are
+//! [handed out](Session::take_answer) in the order in which they come. The time for an answer begins when the one before it
+//! is there. A request that is repeated is alone under way.
+//!
+//! A unit need not take a request while it answers another one. When one of the first two goes unanswered, it is
+//! [one at a time](Session::is_one_at_a_time) for the rest of the session, and nothing of this counts as an attempt: to
+//! have tried it costs such a unit one timeout at most. A unit that has taken some is forgiven a loss, but not one in five;
+//! one that has taken eight without a loss is tried again after a hundred answers, because then it was the line.
+//!
 //! # What is repeated
 //!
 //! Queries, reads, start, stop and settings are sent again when no answer comes. Not so:
@@ -28,16 +43,27 @@
 //! - *Configure* with a baud rate: the unit may have changed the rate already, so the repeat would be garbage;
 //! - *Set clock*, unless each attempt gets a time of its own: see [`Session::request_set_clock`].
 
+mod owed;
+mod pace;
+mod request;
+
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use ser_proto::{
-    Code, Command, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, MAX_ENTRIES, Model, ParseError, Reply,
-    TimeStamp, encoded_len,
+    Code, Command, Decoded, FrameDecoder, MAX_BODY_LEN, ParseError, Reply, TimeStamp, encoded_len,
 };
 
 use crate::text_line::LineAssembler;
 use crate::unsolicited::UnsolicitedQueue;
 use crate::{Counters, Diagnosis, LineRate, Unsolicited};
+use owed::Owed;
+use pace::Pace;
+pub use request::Attempt;
+use request::{Request, changes_something, encode, longest_reply, may_be_repeated};
+
+/// Reads that may be under way at once.
+const MAX_READS: usize = 2;
 
 /// How much longer than its timeout an attempt may last because a frame is just arriving: the longest frame at the
 /// lowest rate. It matters where the rate of the line is not known, as behind a terminal server.
@@ -70,44 +96,7 @@ impl Timing {
     }
 }
 
-/// Bytes of the longest body that can answer `command`.
-fn longest_reply(command: &Command) -> usize {
-    match command {
-        Command::Read { count, .. } => Model::Ser320.read_reply_len(usize::from(*count).min(MAX_ENTRIES)),
-        Command::QueryConfiguration | Command::Configure(_) | Command::LastBroadcast => 7,
-        Command::QueryMode | Command::SetMode { .. } => 3,
-        // Some units echo the parameters of a print command.
-        Command::Print { .. } => 5,
-        Command::Erase | Command::SetClock(_) => 1,
-    }
-}
-
-const fn may_be_repeated(command: &Command) -> bool {
-    match command {
-        Command::Erase | Command::Print { .. } | Command::SetClock(_) => false,
-        Command::Configure(configure) => configure.baud.is_none(),
-        Command::QueryConfiguration
-        | Command::LastBroadcast
-        | Command::QueryMode
-        | Command::SetMode { .. }
-        | Command::Read { .. } => true,
-    }
-}
-
-const fn changes_something(command: &Command) -> bool {
-    match command {
-        Command::Erase
-        | Command::Print { .. }
-        | Command::SetClock(_)
-        | Command::Configure(_)
-        | Command::SetMode { .. } => true,
-        Command::QueryConfiguration | Command::LastBroadcast | Command::QueryMode | Command::Read { .. } => {
-            false
-        }
-    }
-}
-
-/// A request is under way, or its answer has not been taken.
+/// A request is under way that leaves no room for this one, or an answer has not been taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Busy;
 
@@ -124,121 +113,9 @@ pub struct NoReply {
     pub may_have_been_done: bool,
 }
 
-/// The request under way.
-#[derive(Debug)]
-struct Request {
-    command: Command,
-    /// Whether each attempt is given a time of its own.
-    wants_time: bool,
-    repeat: bool,
-    attempts: u32,
-    /// When the attempt under way ends; before the first attempt there is none.
-    deadline: Option<Duration>,
-    /// What the counters were at the first attempt.
-    before: Counters,
-    not_understood: Option<ParseError>,
-}
-
-impl Request {
-    fn is_answered_by(&self, reply: &Reply) -> bool {
-        match (&self.command, reply) {
-            _ if self.deadline.is_none() => false,
-            (&Command::Read { start, count }, Reply::Read(reply)) => {
-                reply.start == start && reply.entries.len() <= usize::from(count)
-            }
-            (command, reply) => command.code() == reply.code(),
-        }
-    }
-}
-
-/// Answers that may still come although nobody waits for them any more.
-#[derive(Debug)]
-struct Owed {
-    code: Code,
-    /// Where a read began.
-    start: Option<u16>,
-    replies: u32,
-    until: Duration,
-}
-
-impl Owed {
-    fn could_answer(&self, command: &Command) -> bool {
-        self.code == command.code() && self.start == read_start(command)
-    }
-
-    fn is(&self, reply: &Reply) -> bool {
-        let start = match reply {
-            Reply::Read(reply) => Some(reply.start),
-            _ => None,
-        };
-        self.code == reply.code() && self.start == start
-    }
-}
-
-const fn read_start(command: &Command) -> Option<u16> {
-    match command {
-        Command::Read { start, .. } => Some(*start),
-        _ => None,
-    }
-}
-
-/// A frame that wants to be sent now.
-#[derive(Debug)]
-pub struct Attempt<'a> {
-    request: &'a mut Request,
-    frame: &'a mut Vec<u8>,
-    line_rate: LineRate,
-}
-
-impl Attempt<'_> {
-    /// Which attempt this is, from 1.
-    #[must_use]
-    pub fn number(&self) -> u32 {
-        self.request.attempts
-    }
-
-    /// How long the frame is on the line.
-    #[must_use]
-    pub fn duration(&self) -> Duration {
-        self.line_rate.time_for(self.frame.len())
-    }
-
-    /// Whether the attempt has to be given a time: it sets the clock.
-    #[must_use]
-    pub fn wants_time(&self) -> bool {
-        self.request.wants_time
-    }
-
-    /// Gives the attempt its time, the one at which the last byte of the frame arrives: now and
-    /// [`duration`](Self::duration). Other attempts than those that want a time stay as they are.
-    pub fn set_time(&mut self, time: TimeStamp) {
-        if self.request.wants_time {
-            self.request.command = Command::SetClock(time);
-            encode(&self.request.command, self.frame);
-        }
-    }
-
-    /// The command to send, where that is done without a frame.
-    #[must_use]
-    pub fn command(&self) -> &Command {
-        &self.request.command
-    }
-
-    /// The bytes to send.
-    #[must_use]
-    pub fn frame(&self) -> &[u8] {
-        self.frame
-    }
-}
-
 /// The reply in a body, or which one it seemed to be.
 fn understand(body: &[u8]) -> Result<Reply, (Option<u8>, ParseError)> {
     Reply::parse(body).map_err(|error| (body.first().copied(), error))
-}
-
-fn encode(command: &Command, frame: &mut Vec<u8>) {
-    frame.clear();
-    frame.extend(FrameEncoder::new(command.to_body()));
 }
 
 /// A conversation over one line; see the [module documentation](self).
@@ -249,9 +126,13 @@ pub struct Session {
     lines: LineAssembler,
     counters: Counters,
     last_byte_at: Duration,
-    request: Option<Request>,
-    answer: Option<Result<Reply, NoReply>>,
-    owed: Option<Owed>,
+    /// Those under way come first, in the order in which they were sent.
+    requests: VecDeque<Request>,
+    /// When the attempt of the first request under way ends.
+    deadline: Duration,
+    answers: VecDeque<Result<Reply, NoReply>>,
+    pace: Pace,
+    owed: Owed,
     unsolicited: UnsolicitedQueue,
     frame: Vec<u8>,
 }
@@ -266,20 +147,51 @@ impl Session {
             lines: LineAssembler::default(),
             counters: Counters::default(),
             last_byte_at: Duration::ZERO,
-            request: None,
-            answer: None,
-            owed: None,
+            requests: VecDeque::new(),
+            deadline: Duration::ZERO,
+            answers: VecDeque::new(),
+            pace: Pace::default(),
+            owed: Owed::default(),
             unsolicited: UnsolicitedQueue::default(),
             frame: Vec::new(),
         }
     }
 
+    /// The same session, with one request at a time under way, reads or not.
+    #[must_use]
+    pub fn one_at_a_time(self) -> Session {
+        Session { pace: Pace::ONE_AT_A_TIME, ..self }
+    }
+
+    /// Whether one request at a time is under way, reads or not: because that was wanted, or because the unit does not
+    /// take a request while it answers another one.
+    #[must_use]
+    pub const fn is_one_at_a_time(&self) -> bool {
+        self.pace.is_one_at_a_time()
+    }
+
     /// Begins a request. [`dispatch`](Self::dispatch) sends it.
     ///
     /// # Errors
-    /// One at a time: when another one is under way, or its answer has not been taken.
+    /// When another one is under way and this one is no read for which [there is room](Self::has_room), or an answer
+    /// has not been taken.
     pub fn request(&mut self, command: Command) -> Result<(), Busy> {
         self.begin(command, may_be_repeated(&command), false)
+    }
+
+    /// Whether a read may be requested now: nothing else is under way, or only reads, fewer than two.
+    #[must_use]
+    pub fn has_room(&self) -> bool {
+        // What is asked again is alone under way.
+        let may_be_joined = |request: &Request| request.is_read() && request.failed == 0;
+        let room = if self.is_one_at_a_time() { 1 } else { MAX_READS };
+        self.answers.is_empty() && self.requests.len() < room && self.requests.iter().all(may_be_joined)
+    }
+
+    /// Whether no answer is to come or to be taken.
+    #[must_use]
+    pub fn is_idle(&self) -> bool {
+        self.answers.is_empty() && self.requests.is_empty()
     }
 
     /// Begins to set the clock. Unlike a [`Command::SetClock`] this is repeated, because each [`Attempt`] wants a
@@ -292,40 +204,35 @@ impl Session {
     }
 
     fn begin(&mut self, command: Command, repeat: bool, wants_time: bool) -> Result<(), Busy> {
-        if self.request.is_some() || self.answer.is_some() {
+        let is_read = matches!(command, Command::Read { .. });
+        let may_join = is_read && self.has_room();
+        if !may_join && !self.is_idle() {
             return Err(Busy);
         }
-        self.request = Some(Request {
-            command,
-            wants_time,
-            repeat,
-            attempts: 0,
-            deadline: None,
-            before: self.counters,
-            not_understood: None,
-        });
+        self.requests.push_back(Request::new(command, repeat, wants_time, self.counters));
         Ok(())
     }
 
-    /// Does what is due: hands out a frame to send, or gives the request up.
+    /// Does what is due: hands out a frame to send, or gives a request up. When it has handed one out, another may be due.
     pub fn dispatch(&mut self, now: Duration) -> Option<Attempt<'_>> {
-        if self.owed.as_ref().is_some_and(|owed| now >= owed.until) {
-            self.owed = None;
+        self.owed.expire(now);
+        if self.attempt_ends_at().is_some_and(|end| end <= now) {
+            self.time_out(now);
         }
-        if self.poll_at()? > now {
+        let (place, due) = self.next_to_send()?;
+        if due > now {
             return None;
         }
-        let retries = self.timing.retries;
-        if self.request.as_ref().is_some_and(|r| r.attempts > 0 && (!r.repeat || r.attempts > retries)) {
-            self.give_up(now);
-            return None;
-        }
-        let request = self.request.as_mut()?;
-        if request.attempts == 0 {
+        let request = self.requests.get_mut(place)?;
+        if request.sent == 0 {
             request.before = self.counters;
         }
-        request.attempts += 1;
-        request.deadline = Some(now.saturating_add(self.timing.attempt(&request.command)));
+        request.sent += 1;
+        request.under_way = true;
+        request.behind = place > 0;
+        if place == 0 {
+            self.deadline = now.saturating_add(self.timing.attempt(&request.command));
+        }
         encode(&request.command, &mut self.frame);
         Some(Attempt { request, frame: &mut self.frame, line_rate: self.timing.line_rate })
     }
@@ -334,16 +241,30 @@ impl Session {
     /// once. `None` while there is no request.
     #[must_use]
     pub fn poll_at(&self) -> Option<Duration> {
-        let request = self.request.as_ref()?;
-        let Some(deadline) = request.deadline else {
-            let held_back = self.owed.as_ref().filter(|owed| owed.could_answer(&request.command));
-            return Some(held_back.map_or(Duration::ZERO, |owed| owed.until));
-        };
+        let next = self.next_to_send().map(|(_, due)| due);
+        self.attempt_ends_at().into_iter().chain(next).min()
+    }
+
+    /// When the attempt under way is given up, the first if there are two.
+    fn attempt_ends_at(&self) -> Option<Duration> {
+        self.requests.front().filter(|request| request.under_way)?;
         if !self.decoder.inside_frame() {
-            return Some(deadline);
+            return Some(self.deadline);
         }
         let end_of_frame = self.last_byte_at.saturating_add(self.timing.timeout);
-        Some(end_of_frame.min(deadline.saturating_add(LONGEST_FRAME)).max(deadline))
+        Some(end_of_frame.min(self.deadline.saturating_add(LONGEST_FRAME)).max(self.deadline))
+    }
+
+    /// The request to be sent next, and when.
+    fn next_to_send(&self) -> Option<(usize, Duration)> {
+        let place = self.requests.iter().position(|request| !request.under_way)?;
+        // Two only where neither was asked in vain.
+        let together = self.requests.iter().take(place + 1);
+        if place > 0 && (self.is_one_at_a_time() || { together }.any(|request| request.failed > 0)) {
+            return None;
+        }
+        let held_back = self.owed.holds_back(&self.requests.get(place)?.command);
+        Some((place, held_back.unwrap_or_default()))
     }
 
     /// Takes bytes that have arrived, cut in any way.
@@ -395,7 +316,7 @@ impl Session {
 
     fn take_nonsense(&mut self, code: Option<u8>, error: ParseError) {
         self.counters.not_understood += 1;
-        if let Some(request) = &mut self.request
+        if let Some(request) = self.requests.front_mut()
             && code == Some(request.command.code().byte())
         {
             request.not_understood = Some(error);
@@ -403,26 +324,12 @@ impl Session {
     }
 
     fn take_reply(&mut self, now: Duration, reply: Reply) {
-        if let Some(request) = self.request.take_if(|request| request.is_answered_by(&reply)) {
-            let until = request.deadline.unwrap_or(now);
-            self.remember_owed(&request, request.attempts - 1, until);
-            if reply == Reply::PrintAccepted {
-                // Nothing but their time tells earlier lines from those that were asked for.
-                self.unsolicited.drop_lines();
-                self.lines.clear();
-            }
-            self.answer = Some(Ok(reply));
-            self.unsolicited.mark();
+        let place = self.requests.iter().position(|request| request.is_answered_by(&reply));
+        if let Some(place) = place {
+            self.answered(now, place, reply);
             return;
         }
-        if let Some(owed) = &mut self.owed
-            && owed.is(&reply)
-        {
-            owed.replies -= 1;
-            if owed.replies == 0 {
-                self.owed = None;
-            }
-        }
+        self.owed.came(&reply);
         if let Reply::Read(reply) = reply {
             self.counters.reports += 1;
             self.unsolicited.push(Unsolicited::Report(reply));
@@ -431,36 +338,92 @@ impl Session {
         }
     }
 
-    fn give_up(&mut self, now: Duration) {
-        let Some(request) = self.request.take() else { return };
+    fn answered(&mut self, now: Duration, place: usize, reply: Reply) {
+        let Some(request) = self.requests.remove(place) else { return };
+        let end = now.saturating_add(self.timing.attempt(&request.command));
+        self.owed.remember(&request.command, request.sent - 1, if place == 0 { self.deadline } else { end });
+        if reply == Reply::PrintAccepted {
+            // Nothing but their time tells earlier lines from those that were asked for.
+            self.unsolicited.drop_lines();
+            self.lines.clear();
+        }
+        self.answers.push_back(Ok(reply));
+        self.unsolicited.mark();
+        if place == 0 {
+            self.pace.kept(request.behind);
+        }
+        // Otherwise it is the late answer to an earlier attempt, and says nothing about what was sent since.
+        if request.under_way && place > 0 {
+            self.passed_over(now, place);
+        }
+        if let Some(next) = self.requests.front() {
+            self.deadline = now.saturating_add(self.timing.attempt(&next.command));
+        }
+    }
+
+    /// The answer to a later request came before those to the first `count`: they are not coming any more.
+    fn passed_over(&mut self, now: Duration, count: usize) {
+        let free = self.pace.lost();
+        for _ in 0..count {
+            if let Some(mut request) = self.requests.pop_front() {
+                request.ask_again();
+                request.failed += u32::from(!free);
+                let still_under_way = self.requests.iter().take_while(|request| request.under_way).count();
+                self.requests.insert(still_under_way, request);
+            }
+        }
+        if let Some(hopeless) = self.requests.iter().position(|request| self.is_hopeless(request)) {
+            self.give_up(now, hopeless);
+        }
+    }
+
+    /// The first of the requests under way was not answered in time.
+    fn time_out(&mut self, now: Duration) {
+        let others = self.requests.iter().skip(1).any(|request| request.under_way);
+        let Some(first) = self.requests.front_mut() else { return };
+        let free = (first.behind || others) && self.pace.lost();
+        first.failed += u32::from(!free);
+        if self.requests.front().is_some_and(|first| self.is_hopeless(first)) {
+            return self.give_up(now, 0);
+        }
+        self.requests.iter_mut().for_each(Request::ask_again);
+    }
+
+    fn is_hopeless(&self, request: &Request) -> bool {
+        request.failed > if request.repeat { self.timing.retries } else { 0 }
+    }
+
+    /// Gives up the request at a place, and with it the others.
+    fn give_up(&mut self, now: Duration, place: usize) {
+        let Some(request) = self.requests.get(place) else { return };
         let seen = self.counters.since(&request.before);
-        self.remember_owed(&request, request.attempts, now.saturating_add(self.timing.timeout));
-        self.answer = Some(Err(NoReply {
+        let no_reply = NoReply {
             command: request.command.code(),
-            attempts: request.attempts,
+            attempts: request.sent,
             diagnosis: Diagnosis::of(&seen, request.not_understood, self.decoder.inside_frame()),
             may_have_been_done: changes_something(&request.command),
-        }));
+        };
+        self.forget_requests(now);
+        self.answers.push_back(Err(no_reply));
     }
 
-    /// Forgets the request under way, as after an error of the line.
+    /// Forgets the requests under way, as after an error of the line.
     pub fn cancel(&mut self, now: Duration) {
-        self.answer = None;
-        if let Some(request) = self.request.take() {
-            self.remember_owed(&request, request.attempts, now.saturating_add(self.timing.timeout));
+        self.answers.clear();
+        self.forget_requests(now);
+    }
+
+    fn forget_requests(&mut self, now: Duration) {
+        let until = now.saturating_add(self.timing.timeout);
+        for request in self.requests.drain(..) {
+            self.owed.remember(&request.command, request.sent, until);
         }
     }
 
-    fn remember_owed(&mut self, request: &Request, replies: u32, until: Duration) {
-        if replies > 0 {
-            let start = read_start(&request.command);
-            self.owed = Some(Owed { code: request.command.code(), start, replies, until });
-        }
-    }
-
-    /// The outcome of the request, once.
+    /// The outcome of a request, once. Of two reads it says itself, by its start, to which it is the answer. When one is
+    /// given up, so is the other.
     pub fn take_answer(&mut self) -> Option<Result<Reply, NoReply>> {
-        self.answer.take()
+        self.answers.pop_front()
     }
 
     /// The oldest message that answers no request.
@@ -505,6 +468,6 @@ impl Session {
             self.counters.dropped(unfinished.cause);
         }
         self.lines.clear();
-        self.owed = None;
+        self.owed.clear();
     }
 }

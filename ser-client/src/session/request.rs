@@ -1,0 +1,155 @@
+//! A request: what may be done with it, where it stands, and an attempt of it.
+
+use std::time::Duration;
+
+use ser_proto::{Command, FrameEncoder, MAX_ENTRIES, Model, ParseError, Reply, TimeStamp};
+
+use crate::{Counters, LineRate};
+
+/// A request whose answer has not come.
+#[derive(Debug)]
+pub(super) struct Request {
+    pub(super) command: Command,
+    /// Whether each attempt is given a time of its own.
+    pub(super) wants_time: bool,
+    pub(super) repeat: bool,
+    /// How often it was sent.
+    pub(super) sent: u32,
+    /// How many attempts have failed.
+    pub(super) failed: u32,
+    /// Whether an attempt is under way; otherwise one is to be made.
+    pub(super) under_way: bool,
+    /// Whether another request was under way when this one was sent.
+    pub(super) behind: bool,
+    /// What the counters were at the first attempt.
+    pub(super) before: Counters,
+    pub(super) not_understood: Option<ParseError>,
+}
+
+impl Request {
+    /// A request that has not been sent.
+    pub(super) fn new(command: Command, repeat: bool, wants_time: bool, before: Counters) -> Request {
+        Request {
+            command,
+            wants_time,
+            repeat,
+            sent: 0,
+            failed: 0,
+            under_way: false,
+            behind: false,
+            before,
+            not_understood: None,
+        }
+    }
+
+    pub(super) fn is_answered_by(&self, reply: &Reply) -> bool {
+        match (&self.command, reply) {
+            _ if self.sent == 0 => false,
+            (&Command::Read { start, count }, Reply::Read(reply)) => {
+                reply.start == start && reply.entries.len() <= usize::from(count)
+            }
+            (command, reply) => command.code() == reply.code(),
+        }
+    }
+
+    pub(super) fn is_read(&self) -> bool {
+        matches!(self.command, Command::Read { .. })
+    }
+
+    /// The attempt under way has come to nothing.
+    pub(super) fn ask_again(&mut self) {
+        self.under_way = false;
+        self.behind = false;
+    }
+}
+
+/// A frame that wants to be sent now.
+#[derive(Debug)]
+pub struct Attempt<'a> {
+    pub(super) request: &'a mut Request,
+    pub(super) frame: &'a mut Vec<u8>,
+    pub(super) line_rate: LineRate,
+}
+
+impl Attempt<'_> {
+    /// Which attempt this is, from 1.
+    #[must_use]
+    pub fn number(&self) -> u32 {
+        self.request.sent
+    }
+
+    /// How long the frame is on the line.
+    #[must_use]
+    pub fn duration(&self) -> Duration {
+        self.line_rate.time_for(self.frame.len())
+    }
+
+    /// Whether the attempt has to be given a time: it sets the clock.
+    #[must_use]
+    pub fn wants_time(&self) -> bool {
+        self.request.wants_time
+    }
+
+    /// Gives the attempt its time, the one at which the last byte of the frame arrives: now and
+    /// [`duration`](Self::duration). Other attempts than those that want a time stay as they are.
+    pub fn set_time(&mut self, time: TimeStamp) {
+        if self.request.wants_time {
+            self.request.command = Command::SetClock(time);
+            encode(&self.request.command, self.frame);
+        }
+    }
+
+    /// The command to send, where that is done without a frame.
+    #[must_use]
+    pub fn command(&self) -> &Command {
+        &self.request.command
+    }
+
+    /// The bytes to send.
+    #[must_use]
+    pub fn frame(&self) -> &[u8] {
+        self.frame
+    }
+}
+
+/// Bytes of the longest body that can answer `command`.
+pub(super) fn longest_reply(command: &Command) -> usize {
+    match command {
+        Command::Read { count, .. } => Model::Ser320.read_reply_len(usize::from(*count).min(MAX_ENTRIES)),
+        Command::QueryConfiguration | Command::Configure(_) | Command::LastBroadcast => 7,
+        Command::QueryMode | Command::SetMode { .. } => 3,
+        // Some units echo the parameters of a print command.
+        Command::Print { .. } => 5,
+        Command::Erase | Command::SetClock(_) => 1,
+    }
+}
+
+pub(super) const fn may_be_repeated(command: &Command) -> bool {
+    match command {
+        Command::Erase | Command::Print { .. } | Command::SetClock(_) => false,
+        Command::Configure(configure) => configure.baud.is_none(),
+        Command::QueryConfiguration
+        | Command::LastBroadcast
+        | Command::QueryMode
+        | Command::SetMode { .. }
+        | Command::Read { .. } => true,
+    }
+}
+
+pub(super) const fn changes_something(command: &Command) -> bool {
+    match command {
+        Command::Erase
+        | Command::Print { .. }
+        | Command::SetClock(_)
+        | Command::Configure(_)
+        | Command::SetMode { .. } => true,
+        Command::QueryConfiguration | Command::LastBroadcast | Command::QueryMode | Command::Read { .. } => {
+            false
+        }
+    }
+}
+
+pub(super) fn encode(command: &Command, frame: &mut Vec<u8>) {
+    frame.clear();
+    frame.extend(FrameEncoder::new(command.to_body()));
+}
