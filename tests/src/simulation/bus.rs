@@ -63,7 +63,8 @@ impl BusHost {
     #[must_use]
     pub fn new(chance: Chance, units: usize) -> BusHost {
         const NAMES: [&str; 2] = ["bus, first", "bus, second"];
-        let talk = |index: usize| Conversation::new(NAMES[index], ser_client::LineRate::Instant);
+        let talk =
+            |index: usize| Conversation::new(NAMES[index], ser_client::LineRate::Instant).one_at_a_time();
         BusHost {
             talks: (0..units).map(talk).collect(),
             next_order_ms: vec![0; units],

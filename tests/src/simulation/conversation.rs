@@ -102,6 +102,12 @@ impl Conversation {
         }
     }
 
+    /// The same with one request at a time, as the client does it on a bus.
+    #[must_use]
+    pub fn one_at_a_time(self) -> Conversation {
+        Conversation { session: self.session.one_at_a_time(), ..self }
+    }
+
     /// The session, where the line changes.
     pub fn session(&mut self) -> &mut Session {
         &mut self.session
@@ -209,21 +215,25 @@ impl Conversation {
         if let Some(position) = self.position.take() {
             reader = reader.starting_near(position);
         }
-        self.go_on_reading(Box::new(reader), resyncs, now_ms);
+        self.session.cancel(duration(now_ms));
+        self.go_on_reading(Box::new(reader), resyncs);
     }
 
-    fn go_on_reading(&mut self, mut reader: Box<LogReader>, resyncs: u32, now_ms: u64) {
-        match reader.request() {
-            Some(request) => {
-                self.job = Job::Read { reader, resyncs };
-                self.request(request.into(), now_ms);
-            }
-            None => {
-                self.position = Some(reader.summary().position);
-                self.at_end = true;
-                self.talk.readings += 1;
-                self.job = Job::Rest;
-            }
+    /// Asks for as much as may be under way at once.
+    fn go_on_reading(&mut self, mut reader: Box<LogReader>, resyncs: u32) {
+        while self.session.has_room()
+            && let Some(request) = reader.request()
+        {
+            // There is room.
+            let _ = self.session.request(request.into());
+        }
+        if reader.is_waiting() {
+            self.job = Job::Read { reader, resyncs };
+        } else {
+            self.position = Some(reader.summary().position);
+            self.at_end = true;
+            self.talk.readings += 1;
+            self.job = Job::Rest;
         }
     }
 
@@ -308,7 +318,7 @@ impl Conversation {
         self.deliver(&deliveries, ledger)?;
         self.cursor = reader.cursor();
         match taken {
-            Ok(()) => self.go_on_reading(reader, resyncs, now_ms),
+            Ok(()) => self.go_on_reading(reader, resyncs),
             Err(Disturbed::Changed | Disturbed::WrongSize) if resyncs < MAX_RESYNCS => {
                 self.talk.disturbed += 1;
                 self.job = Job::LearnSize { resyncs: resyncs + 1 };

@@ -303,7 +303,7 @@ impl LineHost {
         if self.talk.is_resting() && self.order_ms(errand) <= now_ms {
             self.begin_next(now_ms, errand, trail);
         }
-        if let Some(outgoing) = self.talk.poll(now_ms, ledger)? {
+        while let Some(outgoing) = self.talk.poll(now_ms, ledger)? {
             self.send(now_ms, &outgoing.frame);
         }
         if let Some(in_force) = self.talk.take_in_force()
