@@ -290,8 +290,8 @@ impl Account {
         if place == len {
             return Ok(());
         }
-        // An erase with nothing after it.
-        let emptied = self.erases_ahead(ledger).last().is_some_and(|erase| erase.to >= len);
+        // An erase with nothing after it; that one need not be the last to have arrived.
+        let emptied = self.erases_ahead(ledger).any(|erase| erase.to >= len);
         if emptied {
             self.life = ledger.life();
             self.tally.gone += (len - place) as u64;
