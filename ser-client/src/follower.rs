@@ -1,8 +1,13 @@
 //! Following a log: reading after reading from where the last one ended, and auto reports where they fit.
+//!
+//! A report says which events it brings by their place and the total, and nothing else shows that the log is still the same: after
+//! an erase both begin anew, and the second event may then look like the one that follows. The report of the first event would
+//! show it, so reports are believed only as long as none can have been lost. After any damage on the line a reading is due, which
+//! looks at the last event that was delivered.
 
 use ser_proto::{Entry, Model, ReadReply};
 
-use crate::{Cursor, Delivery, Disturbed, LogPosition, LogReader, RequestError, Summary, Unit};
+use crate::{Counters, Cursor, Delivery, Disturbed, LogPosition, LogReader, RequestError, Summary, Unit};
 
 /// How often a reading begins anew because the log was changed under it.
 const MAX_RESYNCS: u32 = 4;
@@ -26,13 +31,15 @@ pub struct LogFollower {
     size: u16,
     cursor: Option<Cursor>,
     position: Option<LogPosition>,
+    /// [`Counters::damages`] when the latest reading began, or the latest report was taken.
+    damages: Option<u64>,
 }
 
 impl LogFollower {
     /// Begins behind `cursor`, or with the oldest event. `size` is how many entries the log holds.
     #[must_use]
     pub fn new(cursor: Option<Cursor>, size: u16) -> LogFollower {
-        LogFollower { size, cursor, position: None }
+        LogFollower { size, cursor, position: None, damages: None }
     }
 
     /// How many entries the log holds, as far as is known.
@@ -51,6 +58,14 @@ impl LogFollower {
     #[must_use]
     pub fn starting_near(mut self, position: Option<LogPosition>) -> LogFollower {
         self.position = position;
+        self
+    }
+
+    /// The same, where the line had shown this by the time of the cursor. If that is not said, it shows it with the first
+    /// report.
+    #[must_use]
+    pub fn since(mut self, seen: &Counters) -> LogFollower {
+        self.damages = Some(seen.damages());
         self
     }
 
@@ -98,6 +113,7 @@ impl LogFollower {
         if let Some(position) = self.position.take() {
             reader = reader.starting_near(position);
         }
+        self.damages = Some(unit.counters().damages());
         let mut deliveries = Vec::new();
         let mut first = true;
         unit.cancel();
@@ -136,9 +152,14 @@ impl LogFollower {
         Ok(())
     }
 
-    /// Takes events out of an auto report, if they are the very next ones. `None`: only a reading can tell.
-    pub fn continue_with(&mut self, report: &ReadReply) -> Option<(Vec<Delivery>, Cursor)> {
+    /// Takes events out of an auto report, if they are the very next ones, and `seen` says that no report can have been lost since
+    /// the cursor. `None`: only a reading can tell.
+    pub fn continue_with(&mut self, report: &ReadReply, seen: &Counters) -> Option<(Vec<Delivery>, Cursor)> {
         let mut cursor = self.cursor?;
+        let damages = seen.damages();
+        if self.damages.is_some_and(|known| known != damages) {
+            return None;
+        }
         let mut deliveries = Vec::new();
         for (entry_number, entry, model) in numbered(report) {
             let total = self.total_after(report, entry_number)?;
@@ -152,6 +173,7 @@ impl LogFollower {
             return None;
         }
         self.cursor = Some(cursor);
+        self.damages = Some(damages);
         self.position = Some(LogPosition { total: report.total, next_slot: report.next_slot });
         Some((deliveries, cursor))
     }
@@ -181,6 +203,18 @@ mod tests {
     use super::*;
     use ser_proto::{Inputs, TimeStamp};
 
+    const CLEAN: Counters = Counters {
+        bytes: 0,
+        frames: 0,
+        not_understood: 0,
+        bad_checksums: 0,
+        broken_frames: 0,
+        reports: 0,
+        stray_replies: 0,
+        lines: 0,
+        noise: 0,
+    };
+
     fn report(start: u16, total: u16, next_slot: u16, count: usize) -> ReadReply {
         let time =
             TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 250 };
@@ -204,26 +238,29 @@ mod tests {
 
     #[test]
     fn a_report_with_the_next_events_is_as_good_as_a_reading() {
-        assert_eq!(numbers(follower(4, 8).continue_with(&report(5, 6, 6, 2))), Some((vec![5, 6], 6)));
+        assert_eq!(numbers(follower(4, 8).continue_with(&report(5, 6, 6, 2), &CLEAN)), Some((vec![5, 6], 6)));
         // More has happened since the entries were chosen.
-        assert_eq!(numbers(follower(4, 8).continue_with(&report(5, 9, 1, 2))), Some((vec![5, 6], 6)));
+        assert_eq!(numbers(follower(4, 8).continue_with(&report(5, 9, 1, 2), &CLEAN)), Some((vec![5, 6], 6)));
         // Over the end of the ring and of the total.
         assert_eq!(
-            numbers(follower(65_534, 8).continue_with(&report(8, 65_535, 0, 1))),
+            numbers(follower(65_534, 8).continue_with(&report(8, 65_535, 0, 1), &CLEAN)),
             Some((vec![8], 65_535))
         );
-        assert_eq!(numbers(follower(65_535, 8).continue_with(&report(1, 0, 1, 1))), Some((vec![1], 0)));
+        assert_eq!(
+            numbers(follower(65_535, 8).continue_with(&report(1, 0, 1, 1), &CLEAN)),
+            Some((vec![1], 0))
+        );
     }
 
     #[test]
     fn everything_else_needs_a_reading() {
         for (what, taken) in [
-            ("a gap", follower(3, 8).continue_with(&report(5, 6, 6, 2))),
-            ("known events", follower(5, 8).continue_with(&report(5, 6, 6, 2))),
-            ("no events", follower(4, 8).continue_with(&report(5, 4, 4, 0))),
-            ("another size", follower(4, 5).continue_with(&report(5, 6, 6, 2))),
-            ("no cursor", LogFollower::new(None, 8).continue_with(&report(1, 1, 1, 1))),
-            ("numbers that no log has", follower(4, 8).continue_with(&report(u16::MAX, 5, 5, 10))),
+            ("a gap", follower(3, 8).continue_with(&report(5, 6, 6, 2), &CLEAN)),
+            ("known events", follower(5, 8).continue_with(&report(5, 6, 6, 2), &CLEAN)),
+            ("no events", follower(4, 8).continue_with(&report(5, 4, 4, 0), &CLEAN)),
+            ("another size", follower(4, 5).continue_with(&report(5, 6, 6, 2), &CLEAN)),
+            ("no cursor", LogFollower::new(None, 8).continue_with(&report(1, 1, 1, 1), &CLEAN)),
+            ("numbers that no log has", follower(4, 8).continue_with(&report(u16::MAX, 5, 5, 10), &CLEAN)),
         ] {
             assert_eq!(numbers(taken), None, "{what}");
         }
@@ -233,7 +270,29 @@ mod tests {
     fn reports_follow_each_other() {
         let mut follower = follower(0, 2);
         for (start, total) in [(1, 1), (2, 2), (1, 3), (2, 4)] {
-            assert!(follower.continue_with(&report(start, total, start % 2, 1)).is_some(), "{total}");
+            assert!(follower.continue_with(&report(start, total, start % 2, 1), &CLEAN).is_some(), "{total}");
         }
+    }
+
+    #[test]
+    fn a_report_behind_damage_is_not_believed() {
+        // Entry 2 with total 2 follows the first event, or is the second one after an erase whose first report is the damage.
+        let damaged = [
+            Counters { bad_checksums: 1, ..CLEAN },
+            Counters { broken_frames: 1, ..CLEAN },
+            Counters { not_understood: 1, ..CLEAN },
+            Counters { noise: 1, ..CLEAN },
+        ];
+        for seen in damaged {
+            let mut follower = follower(1, 8).since(&CLEAN);
+            assert_eq!(numbers(follower.continue_with(&report(2, 2, 2, 1), &seen)), None, "{seen:?}");
+            assert_eq!(
+                numbers(follower.since(&seen).continue_with(&report(2, 2, 2, 1), &seen)),
+                Some((vec![2], 2))
+            );
+        }
+        // What is no damage changes nothing.
+        let seen = Counters { bytes: 9, frames: 9, reports: 9, stray_replies: 9, lines: 9, ..CLEAN };
+        assert!(follower(1, 8).since(&CLEAN).continue_with(&report(2, 2, 2, 1), &seen).is_some());
     }
 }

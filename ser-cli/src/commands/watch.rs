@@ -212,7 +212,7 @@ impl Watch {
     }
 
     fn take(&mut self, report: &ReadReply) -> Result<()> {
-        let Some((deliveries, cursor)) = self.follower.continue_with(report) else {
+        let Some((deliveries, cursor)) = self.follower.continue_with(report, &self.unit.counters()) else {
             // One reading takes the place of all reports that are waiting.
             return self.read_new();
         };

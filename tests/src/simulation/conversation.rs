@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use ser_client::{
-    Cursor, Delivery, Disturbed, LineRate, LogFollower, LogPosition, LogReader, Session, Timing, Unsolicited,
+    Counters, Cursor, Delivery, Disturbed, LineRate, LogFollower, LogPosition, LogReader, Session, Timing,
+    Unsolicited,
 };
 use ser_proto::{Command, Configuration, ReadReply, Reply, TimeStamp};
 
@@ -70,6 +71,10 @@ pub struct Conversation {
     at_end: bool,
     /// Whether a report has shown that there is more to read than it brought.
     behind: bool,
+    /// What the line had shown when the latest reading began, or the latest report was taken.
+    seen: Counters,
+    /// Whether a report since then was thrown away.
+    missed: bool,
     talk: Talk,
 }
 
@@ -98,6 +103,8 @@ impl Conversation {
             began_ms: 0,
             at_end: false,
             behind: false,
+            seen: Counters::default(),
+            missed: false,
             talk: Talk::default(),
         }
     }
@@ -211,6 +218,7 @@ impl Conversation {
 
     fn begin_reading(&mut self, resyncs: u32, now_ms: u64) {
         self.account.begin_reading();
+        (self.seen, self.missed) = (self.session.counters(), false);
         let mut reader = LogReader::new(self.cursor, self.size);
         if let Some(position) = self.position.take() {
             reader = reader.starting_near(position);
@@ -340,9 +348,11 @@ impl Conversation {
                 Unsolicited::Line(_) => self.talk.lines += 1,
                 Unsolicited::Report(report) => {
                     self.talk.reports += 1;
-                    // Who is reading gets to these events anyway.
+                    // Who is reading gets to these events anyway; who is asking has to read.
                     if self.is_resting() {
                         self.follow(&report, ledger)?;
+                    } else {
+                        self.missed = true;
                     }
                 }
             }
@@ -351,11 +361,14 @@ impl Conversation {
     }
 
     fn follow(&mut self, report: &ReadReply, ledger: &Ledger) -> Result<(), String> {
-        let mut follower = LogFollower::new(self.cursor, self.size).starting_near(self.position);
-        let Some((deliveries, cursor)) = follower.continue_with(report) else {
+        let follower = LogFollower::new(self.cursor, self.size).starting_near(self.position);
+        let (mut follower, seen) = (follower.since(&self.seen), self.session.counters());
+        let continued = if self.missed { None } else { follower.continue_with(report, &seen) };
+        let Some((deliveries, cursor)) = continued else {
             self.behind = true;
             return Ok(());
         };
+        self.seen = seen;
         self.talk.reports_followed += 1;
         self.deliver(&deliveries, ledger)?;
         self.cursor = Some(cursor);

@@ -85,7 +85,7 @@ fn watch(host: &GeniHost) -> Result<Seen, RequestError> {
     read_new(&mut follower, &mut unit, &mut seen)?;
     while let Some(message) = unit.wait_event(std::time::Duration::from_millis(200))? {
         let Unsolicited::Report(report) = message else { panic!("{message:?}") };
-        match follower.continue_with(&report) {
+        match follower.continue_with(&report, &unit.counters()) {
             Some((deliveries, _)) => seen.extend(states(&deliveries)),
             None => {
                 read_new(&mut follower, &mut unit, &mut seen)?;
@@ -165,7 +165,7 @@ fn reports_that_come_while_something_else_is_asked_are_not_lost() {
     let mut seen = Vec::new();
     while let Some(message) = unit.wait_event(std::time::Duration::ZERO).expect("all is well") {
         let Unsolicited::Report(report) = message else { panic!("{message:?}") };
-        let (deliveries, _) = follower.continue_with(&report).expect("the next event");
+        let (deliveries, _) = follower.continue_with(&report, &unit.counters()).expect("the next event");
         seen.extend(states(&deliveries));
     }
     assert_eq!(seen, of([2, 3]));

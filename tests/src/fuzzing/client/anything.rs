@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use ser_client::{
-    Cursor, Delivery, LineRate, LogFollower, LogPosition, LogReader, MAX_LINE_LEN, RangeReader, Session,
-    Timing, Unsolicited,
+    Counters, Cursor, Delivery, LineRate, LogFollower, LogPosition, LogReader, MAX_LINE_LEN, RangeReader,
+    Session, Timing, Unsolicited,
 };
 use ser_proto::{Command, Entry, MAX_ENTRIES, ReadReply, Reply};
 
@@ -59,7 +59,7 @@ impl Talk {
             _ => {
                 let body = script.run();
                 if let Ok(Reply::Read(reply)) = Reply::parse(body) {
-                    self.readers.take(reply);
+                    self.readers.take(reply, &self.session.counters());
                 }
             }
         }
@@ -130,7 +130,7 @@ impl Talk {
         let place = self.asked.iter().position(is_answer).expect("a request");
         self.asked.remove(place);
         if let Reply::Read(reply) = reply {
-            self.readers.take(reply);
+            self.readers.take(reply, &self.session.counters());
         }
     }
 
@@ -139,7 +139,7 @@ impl Talk {
             match self.session.take_unsolicited() {
                 None => return,
                 Some(Unsolicited::Line(line)) => assert!(line.text.len() <= MAX_LINE_LEN),
-                Some(Unsolicited::Report(report)) => self.readers.take(report),
+                Some(Unsolicited::Report(report)) => self.readers.take(report, &self.session.counters()),
             }
         }
         panic!("more than {MAX_KEPT} messages were kept");
@@ -178,8 +178,8 @@ impl Readers {
     }
 
     /// Takes a reply as it is, and as the answer to what was asked for.
-    fn take(&mut self, reply: ReadReply) {
-        self.follow(&reply);
+    fn take(&mut self, reply: ReadReply, seen: &Counters) {
+        self.follow(&reply, seen);
         let fitting = self.range.request().map_or(reply.start, |request| request.start);
         self.take_range(&ReadReply { start: fitting, ..reply.clone() });
         self.take_new(&reply);
@@ -239,9 +239,9 @@ impl Readers {
         let _ = self.range.is_mixed();
     }
 
-    fn follow(&mut self, report: &ReadReply) {
+    fn follow(&mut self, report: &ReadReply, seen: &Counters) {
         let before = self.follower.cursor();
-        match self.follower.continue_with(report) {
+        match self.follower.continue_with(report, seen) {
             Some((deliveries, cursor)) => {
                 assert_eq!(self.follower.cursor(), Some(cursor));
                 assert!((1..=MAX_ENTRIES).contains(&deliveries.len()));

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use ser_client::{
-    Cursor, Delivery, Disturbed, LineRate, LogFollower, LogPosition, LogReader, Lost, Session, Timing,
-    Unsolicited,
+    Counters, Cursor, Delivery, Disturbed, LineRate, LogFollower, LogPosition, LogReader, Lost, Session,
+    Timing, Unsolicited,
 };
 use ser_proto::{Command, Decoded, FrameDecoder, ReadReply, Reply};
 
@@ -48,6 +48,8 @@ struct World {
     size: u16,
     cursor: Option<Cursor>,
     position: Option<LogPosition>,
+    /// What the line had shown by the time of the cursor.
+    seen: Counters,
 }
 
 pub(super) fn follow(mut script: Script<'_>) {
@@ -64,6 +66,7 @@ pub(super) fn follow(mut script: Script<'_>) {
         size,
         cursor: None,
         position: None,
+        seen: Counters::default(),
     };
     while !script.is_over() && world.unit.happened() < 200_000 {
         match script.byte() % 8 {
@@ -99,6 +102,7 @@ impl World {
     /// Readings from the cursor on, until one comes to its end or the line is too bad.
     fn read_new(&mut self, script: &mut Script<'_>) {
         for _ in 0..=MAX_RESYNCS {
+            self.seen = self.session.counters();
             let mut reader = LogReader::new(self.cursor, self.size);
             if let Some(position) = self.position.take() {
                 reader = reader.starting_near(position);
@@ -231,8 +235,9 @@ impl World {
     fn take_reports(&mut self) {
         while let Some(unasked) = self.session.take_unsolicited() {
             let Unsolicited::Report(report) = unasked else { continue };
-            let mut follower = LogFollower::new(self.cursor, self.size).starting_near(self.position);
-            if let Some((deliveries, cursor)) = follower.continue_with(&report) {
+            let follower = LogFollower::new(self.cursor, self.size).starting_near(self.position);
+            let (mut follower, seen) = (follower.since(&self.seen), self.session.counters());
+            if let Some((deliveries, cursor)) = follower.continue_with(&report, &seen) {
                 deliveries.into_iter().for_each(|delivery| self.received.take(delivery));
                 self.cursor = Some(cursor);
                 self.position = follower.position();
