@@ -105,7 +105,7 @@ impl Image {
             self.code_begins.insert(address, name.starts_with("$t"));
         } else {
             if loaded && symbol.kind() == SymbolKind::Data {
-                self.objects.insert(address, narrow(symbol.size()));
+                self.add_object(address, narrow(symbol.size()));
             }
             self.symbols.insert(name.to_owned(), address);
         }
@@ -115,6 +115,12 @@ impl Image {
         let function = self.functions.entry(address).or_default();
         function.names.push(names::as_in_source(name));
         function.end = function.end.max(address + size);
+    }
+
+    /// A variable without a size may stand where another one begins.
+    fn add_object(&mut self, address: u32, size: u32) {
+        let known = self.objects.entry(address).or_default();
+        *known = size.max(*known);
     }
 
     /// Symbols of hand-written functions may lack a size: these end where the next one begins.
@@ -254,7 +260,7 @@ impl Image {
 
     /// Adds a variable.
     pub(crate) fn with_object(mut self, address: u32, size: u32) -> Image {
-        self.objects.insert(address, size);
+        self.add_object(address, size);
         self
     }
 
@@ -278,6 +284,12 @@ mod tests {
         image.end_functions();
         let ends: Vec<_> = image.functions.iter().map(|(&begin, function)| (begin, function.end)).collect();
         assert_eq!(ends, [(0x100, 0x108), (0x104, 0x108), (0x108, 0x10C)]);
+    }
+
+    #[test]
+    fn a_variable_is_found_though_an_empty_one_has_its_address() {
+        let image = Image::of_functions(0x100, &[]).with_object(0x200, 16).with_object(0x200, 0);
+        assert_eq!(image.size_of_object_before(0x210), Some(16));
     }
 
     #[test]
