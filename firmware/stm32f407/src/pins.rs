@@ -10,9 +10,11 @@
 //! lie some 0.1 µs apart, which samples a millisecond apart do not see.
 //!
 //! # Notes
-//! Straps and inputs have the chip's pull-ups (30–50 kΩ): open reads as high. They pull against whatever is in series with a
-//! pin, which has to be small beside them; `docs/hardware.md` reckons that for the inputs. Ports that are not listed, and pins such
-//! as those of debugger and crystals, stay as they are out of reset.
+//! Only straps and the serial line's receiver have the chip's pull-ups. They are 30–50 kΩ, but 8–15 kΩ at PA10 and PB12
+//! (data sheet, "I/O static characteristics"), which a closed contact on PB12 could not pull to a valid low; and they must be off
+//! on a pin that is driven above the chip's supply, as 5 V logic may do. So field inputs and the GENI board's lines are held
+//! from outside, and where nothing is fitted outside nothing holds them; `docs/hardware.md` says with what. Ports that are
+//! not listed, and pins such as those of debugger and crystals, stay as they are out of reset.
 
 use stm32f4::stm32f407::{GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG, RCC};
 
@@ -29,16 +31,33 @@ enum Port {
 
 #[derive(Clone, Copy)]
 enum Role {
-    /// With a pull-up.
+    /// Without a pull-up: held from outside.
     Input,
+    /// With the chip's pull-up: open is high.
+    PulledInput,
     /// Push-pull, low to begin with.
     Output,
     /// Of a peripheral, by the number of its alternate function.
     Alternate(u8),
-    /// The same, with a pull-up.
-    AlternateInput(u8),
+    /// The same, with the chip's pull-up.
+    PulledAlternate(u8),
     /// Not touched: it has its role by hardware.
     Fixed,
+}
+
+impl Role {
+    const fn is_pulled(&self) -> bool {
+        matches!(self, Role::PulledInput | Role::PulledAlternate(_))
+    }
+}
+
+/// Pins whose pull-up is four times as strong as all others: see the notes.
+const fn strongly_pulled(port: Port) -> u16 {
+    match port {
+        Port::A => pin(10),
+        Port::B => pin(12),
+        _ => 0,
+    }
 }
 
 struct Assignment {
@@ -61,7 +80,7 @@ const ASSIGNMENTS: [Assignment; 16] = [
     assign(Port::G, range(8, 15), Role::Input),
     // Transmit and receive data of RS-232: USART2.
     assign(Port::A, pin(2), Role::Alternate(USART)),
-    assign(Port::A, pin(3), Role::AlternateInput(USART)),
+    assign(Port::A, pin(3), Role::PulledAlternate(USART)),
     // SWDIO and SWCLK.
     assign(Port::A, range(13, 14), Role::Fixed),
     // 32 kHz crystal.
@@ -82,7 +101,7 @@ const ASSIGNMENTS: [Assignment; 16] = [
     assign(Port::D, pin(6), Role::Input),
     assign(Port::D, pins([LAMP_RUN, LAMP_EVENT, LAMP_COMMUNICATION, LAMP_FAULT]), Role::Output),
     // Straps: see `straps`.
-    assign(Port::E, range(0, 3), Role::Input),
+    assign(Port::E, range(0, 3), Role::PulledInput),
 ];
 
 /// Number of the GENI board's reset line on port G.
@@ -166,7 +185,7 @@ impl SetUp {
         data: Bits::NONE,
     };
 
-    /// Of a port, from the table. Does not compile when a pin has two roles.
+    /// Of a port, from the table. Does not compile when a pin has two roles, or a pull-up that is stronger than is reckoned.
     const fn of(port: Port) -> SetUp {
         let mut set_up = SetUp::NONE;
         let mut taken = 0;
@@ -176,6 +195,7 @@ impl SetUp {
             if *its_port as u8 == port as u8 {
                 assert!(taken & *pins == 0, "a pin has two roles");
                 taken |= *pins;
+                assert!(!role.is_pulled() || *pins & strongly_pulled(port) == 0, "a pull-up of 8–15 kΩ");
                 let mut number = 0;
                 while number < 16 {
                     if *pins >> number & 1 != 0 {
@@ -191,10 +211,11 @@ impl SetUp {
 
     const fn with(self, number: u32, role: Role) -> SetUp {
         match role {
-            Role::Input => self.plain(number, INPUT, PULL_UP),
+            Role::Input => self.plain(number, INPUT, NO_PULL),
+            Role::PulledInput => self.plain(number, INPUT, PULL_UP),
             Role::Output => self.plain(number, OUTPUT, NO_PULL),
             Role::Alternate(function) => self.alternate(number, function, NO_PULL),
-            Role::AlternateInput(function) => self.alternate(number, function, PULL_UP),
+            Role::PulledAlternate(function) => self.alternate(number, function, PULL_UP),
             Role::Fixed => self,
         }
     }
