@@ -14,7 +14,7 @@ pub trait Rtc {
     /// The time now, asked once at power-up; `None` when it is not known.
     fn read(&mut self) -> Option<NaiveDateTime>;
 
-    /// Takes over the time, when the recorder's clock is set.
+    /// Takes over the time, when the recorder's clock is set. `now` is that of the call, not of the command's arrival.
     fn write(&mut self, now: NaiveDateTime);
 }
 

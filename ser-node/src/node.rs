@@ -214,7 +214,10 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         let tick_ms = self.ticks.extend(tick_ms);
         self.record_until(tick_ms);
         match received {
-            Ok(command) => Some(self.recorder.arrived(&command, tick_ms)),
+            Ok(command) => {
+                let now_ms = self.ticks.extend(self.capture.tick_ms());
+                Some(self.recorder.arrived(&command, tick_ms, now_ms))
+            }
             Err(error) => self.recorder.refuse(error),
         }
     }

@@ -6,6 +6,7 @@ use ser_proto::{
     ParseError, ReadReply, Reply, TimeStamp,
 };
 
+use crate::calendar::date_time;
 use crate::clock::{Clock, Rtc, to_time_stamp};
 use crate::diagnostics::{Diagnostics, count};
 use crate::event_log::{Event, EventLog};
@@ -84,11 +85,12 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
-    /// Takes a command that arrived at `tick_ms`, and carries it out if that moment matters.
-    pub(crate) fn arrived(&mut self, command: &Command, tick_ms: u64) -> Answer {
+    /// Takes a command that arrived at `tick_ms`, which may be a while before `now_ms`, and carries it out if that moment
+    /// matters.
+    pub(crate) fn arrived(&mut self, command: &Command, tick_ms: u64, now_ms: u64) -> Answer {
         match *command {
             Command::SetClock(time) => {
-                self.set_clock(time, tick_ms);
+                self.set_clock(time, tick_ms, now_ms);
                 Answer::ClockSet
             }
             Command::SetMode { recording } => {
@@ -233,11 +235,12 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         count(&mut self.diagnostics.parameters_refused, u64::from(refused));
     }
 
-    fn set_clock(&mut self, time: TimeStamp, tick_ms: u64) {
+    fn set_clock(&mut self, time: TimeStamp, tick_ms: u64, now_ms: u64) {
         // The parser let no impossible date through.
         if let Ok(time) = NaiveDateTime::try_from(time) {
             self.clock.set(tick_ms, time);
-            self.rtc.write(time);
+            // The battery-backed clock starts from what it is given when it is given it.
+            self.rtc.write(date_time(self.clock.now_ms(now_ms)).unwrap_or(time));
         }
     }
 }

@@ -401,7 +401,8 @@ fn the_clock_is_set_when_the_last_byte_arrives() {
 
 #[test]
 fn a_main_loop_that_comes_late_stamps_as_if_it_had_been_there() {
-    let mut bench = Bench::new(Model::Ser160);
+    let survivors = Survivors::default();
+    let mut bench = Bench::with(Model::Ser160, Debounce::OFF, 2048, survivors.clone());
     // For 100 ms nobody polls: a change, the command at tick 51, another change.
     let arrival_ms = bench.tick_ms + 50;
     for ms in 1..=100 {
@@ -412,6 +413,9 @@ fn a_main_loop_that_comes_late_stamps_as_if_it_had_been_there() {
     for byte in FrameEncoder::new(Command::SetClock(TEN_O_CLOCK).to_body()) {
         bench.node.serial_receive(byte, arrival_ms);
     }
+    // So does the battery-backed clock, which shows the time from the moment on in which it is written.
+    let now = survivors.clock.borrow().expect("was set");
+    assert_eq!(TimeStamp::try_from(now), Ok(TimeStamp { millisecond: 50, ..TEN_O_CLOCK }));
     bench.node.poll(bench.tick_ms);
     assert_eq!(bench.line(), b"\x1B015353");
     assert_eq!(
