@@ -54,14 +54,14 @@ impl ChipClock {
         settle();
         // The battery-backed registers are locked out of reset.
         power.cr().modify(|_, w| w.dbp().set_bit());
-        if !clocks.bdcr().read().rtcsel().is_lse() {
-            // A choice that another program has made holds until all of this part is reset; without a choice there is
-            // nothing to lose.
-            clocks.bdcr().modify(|_, w| w.bdrst().set_bit());
-            clocks.bdcr().modify(|_, w| w.bdrst().clear_bit());
-            clocks.bdcr().modify(|_, w| w.rtcsel().lse());
-        }
-        clocks.bdcr().modify(|_, w| w.lseon().set_bit());
+        // What is written before the lock is off is lost. A lock that stays, and a choice that does not, leave a clock
+        // without crystal: it is not believed, and does not let itself be set.
+        let _ = wait_for(|| power.cr().read().dbp().bit_is_set());
+        let _ = wait_for(|| {
+            choose_crystal(clocks);
+            let control = clocks.bdcr().read();
+            control.lseon().bit_is_set() && control.rtcsel().is_lse()
+        });
         clocks.bdcr().modify(|_, w| w.rtcen().set_bit());
         // SAFETY: from here on its register of the battery-backed part is all that is used, and that is only read.
         ChipClock { clocks: unsafe { RCC::steal() }, registers }
@@ -114,6 +114,18 @@ impl ChipClock {
         // SAFETY: as above; anything but the keys locks.
         self.registers.wpr().write(|w| unsafe { w.key().bits(0xFF) });
     }
+}
+
+/// Has the clock count the 32 kHz crystal, and switches that on.
+fn choose_crystal(clocks: &RCC) {
+    if !clocks.bdcr().read().rtcsel().is_lse() {
+        // A choice that another program has made holds until all of this part is reset; without a choice there is
+        // nothing to lose.
+        clocks.bdcr().modify(|_, w| w.bdrst().set_bit());
+        clocks.bdcr().modify(|_, w| w.bdrst().clear_bit());
+        clocks.bdcr().modify(|_, w| w.rtcsel().lse());
+    }
+    clocks.bdcr().modify(|_, w| w.lseon().set_bit());
 }
 
 fn wait_for(mut condition: impl FnMut() -> bool) -> Result<(), RtcError> {
