@@ -1,9 +1,13 @@
 //! What runs from flash: until everything else is in RAM.
 //!
 //! Out of reset the processor takes stack and entry from the first two words of the flash. cortex-m-rt's start-up code
-//! then copies the image into RAM, vector table included, and calls `main` there; see `ram-image.x`.
+//! then copies the image into RAM, vector table included, and calls `main` there; see `ram-image.x`. The first thing that `init`
+//! does is to go over to that table.
 
 use core::arch::naked_asm;
+
+use cortex_m::asm;
+use cortex_m::peripheral::SCB;
 
 /// One place of the vector table.
 #[repr(C)]
@@ -18,13 +22,14 @@ unsafe impl Sync for Vector {}
 
 unsafe extern "C" {
     static _stack_start: u32;
+    static __vector_table: u32;
     fn Reset() -> !;
 }
 
 const NONE: Vector = Vector { reserved: 0 };
 const FAULT: Vector = Vector { handler: boot_fault };
 
-/// The vector table of the first milliseconds. Interrupts are off then; whatever happens all the same is a reset.
+/// The vector table until [`use_vectors_in_ram`]. Interrupts are off then; whatever happens all the same is a reset.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".boot_vectors")]
 static BOOT_VECTORS: [Vector; 16] = [
@@ -73,4 +78,14 @@ unsafe extern "C" fn boot_fault() -> ! {
         "str r1, [r0]",
         "0: b 0b",
     )
+}
+
+/// Faults and interrupts go to the handlers in RAM from here on.
+pub(crate) fn use_vectors_in_ram(scb: &SCB) {
+    #[expect(clippy::cast_possible_truncation, reason = "an address of this processor has 32 bits")]
+    let table = (&raw const __vector_table).addr() as u32;
+    // SAFETY: the table has been copied, and is aligned: ram-image.x does not link otherwise.
+    unsafe { scb.vtor.write(table) };
+    asm::dsb();
+    asm::isb();
 }

@@ -59,7 +59,7 @@ mod app {
     use crate::timer::{self, Timer};
     use crate::uart::{self, Rings, SerialInterrupt, SerialLine};
     use crate::watchdog::Watchdog;
-    use crate::{log, pins, protection, reset};
+    use crate::{boot, log, pins, protection, reset};
 
     /// Events that the log holds: the largest size that can be configured.
     const LOG_LEN: usize = 2048;
@@ -108,6 +108,7 @@ mod app {
         rings: Rings = Rings::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
+        boot::use_vectors_in_ram(&cx.core.SCB);
         let init::LocalResources { channel, events, rings, .. } = cx.local;
         let device = cx.device;
         let ports = pins::Ports {
