@@ -22,7 +22,7 @@ use crate::serial_line::CHARACTER_BITS;
 /// What keeps it away while all is well, by far less than this: a log record of 2 ms, a frame's worth of entries, the
 /// programming of one configuration record (16 bytes of at most 100 µs each, `STM32F40x` data sheet, "Flash memory
 /// programming"). The rest is reserve for interrupts and for what is still to come. The erasing of a flash sector is
-/// *not* covered: it takes up to two seconds, is due once in a thousand configuration changes or less (see
+/// *not* covered: 16 KiB take up to half a second, which is due once in a thousand configuration changes or less (see
 /// [`flash_log`](crate::flash_log)), and what it costs is counted.
 pub const MAIN_LOOP_STALL_MS: u32 = 100;
 
@@ -67,10 +67,6 @@ pub const EXTERNAL_BUS_PRIORITY: u8 = 1;
 /// Bytes of the log that may wait for a debug probe: all that a start has to say, some 40 records of 25 bytes at most. What
 /// finds no room is dropped; nothing else waits for the log.
 pub const PROBE_RING_LEN: usize = ring_len(40 * 25);
-
-/// How long the watchdog waits, in milliseconds. Longer than the longest erasing of a 128 KiB sector (2 s,
-/// `STM32F40x` data sheet, 32 bits at a time), which stops everything that runs from the same flash.
-pub const WATCHDOG_MS: u32 = 4000;
 
 /// The length of a ring for so many items.
 const fn ring_len(items: usize) -> usize {
