@@ -30,7 +30,7 @@
 //! all but one in 32.
 
 use crc::{Algorithm, Crc, NoTable};
-use embedded_hal::spi::SpiDevice;
+use embedded_hal::spi::{MODE_0, Mode, SpiDevice};
 
 use crate::counter::Counter;
 use crate::inputs::InputPorts;
@@ -55,6 +55,14 @@ const CHECK_SHIFT: u32 = 3;
 
 const WORD_LEN: usize = 2;
 const INPUTS_PER_PART: usize = 8;
+
+/// How the bus has to be set up: the clock rests low, data are taken with its rising edge and change with the falling one; the
+/// first bit is there as soon as chip select falls.
+pub const MODE: Mode = MODE_0;
+
+/// The fastest clock that the parts take, in hertz (data sheet, "SPI timing"; look it up for yours). An isolator in the
+/// lines delays what comes back against the clock that goes out: 5 MHz leave 100 ns for both ways.
+pub const MAX_CLOCK_HZ: u32 = 25_000_000;
 
 /// Why a sample is no good.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
