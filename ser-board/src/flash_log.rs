@@ -57,16 +57,9 @@ impl FlashHealth {
     }
 }
 
-/// The sectors given cannot hold the two copies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct BadSectors;
-
-/// Two sectors of flash memory as the recorder's [`Storage`].
+/// The first two sectors of a flash memory as the recorder's [`Storage`].
 pub struct FlashLog<'a, F> {
     flash: F,
-    /// Where the sectors begin.
-    sectors: [u32; 2],
     health: &'a FlashHealth,
 }
 
@@ -86,21 +79,10 @@ impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
 
     const SECTOR_LEN: u32 = Self::SLOTS * SLOT_LEN;
 
-    /// The first copy in the sector that begins at `sectors[0]`, the second one in that at `sectors[1]`. Nothing is
-    /// touched yet.
-    ///
-    /// # Errors
-    /// When an address is not the beginning of a sector of this memory, or both are the same.
-    pub fn new(flash: F, sectors: [u32; 2], health: &'a FlashHealth) -> Result<Self, BadSectors> {
-        let in_memory = |&sector: &u32| {
-            let end = sector.checked_add(Self::SECTOR_LEN).and_then(|end| usize::try_from(end).ok());
-            sector.is_multiple_of(Self::SECTOR_LEN) && end.is_some_and(|end| end <= flash.capacity())
-        };
-        let [first, second] = sectors;
-        if first == second || !sectors.iter().all(in_memory) {
-            return Err(BadSectors);
-        }
-        Ok(FlashLog { flash, sectors, health })
+    /// The first copy in the first sector of `flash`, the second one in the second. Nothing is touched yet. A memory that is
+    /// smaller answers with an error of its own when it is.
+    pub const fn new(flash: F, health: &'a FlashHealth) -> Self {
+        FlashLog { flash, health }
     }
 
     /// How many configurations find room in the sector of `copy` before it has to be erased: 0 when that is due.
@@ -108,18 +90,19 @@ impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
     /// # Errors
     /// When the memory cannot be read.
     pub fn records_left(&mut self, copy: CopyNumber) -> Result<u32, F::Error> {
-        let used = self.slots_used(self.sector(copy))?;
+        let used = self.slots_used(Self::sector(copy))?;
         Ok(used.map_or(0, |used| Self::SLOTS - used))
     }
 
-    const fn sector(&self, copy: CopyNumber) -> u32 {
-        let [first, second] = self.sectors;
+    /// Where the sector of a copy begins.
+    const fn sector(copy: CopyNumber) -> u32 {
         match copy {
-            CopyNumber::First => first,
-            CopyNumber::Second => second,
+            CopyNumber::First => 0,
+            CopyNumber::Second => Self::SECTOR_LEN,
         }
     }
 
+    #[inline]
     fn slot(&mut self, sector: u32, slot: u32) -> Result<[u8; RECORD_LEN], F::Error> {
         let mut content = [0; RECORD_LEN];
         self.flash.read(sector + slot * SLOT_LEN, &mut content)?;
@@ -132,13 +115,36 @@ impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
             return Ok(None);
         }
         // From the end: behind a record that was cut short there may be nothing, in front of it there are only
-        // records.
+        // records. Not by halves: one that was cut short may hold bits that read now so, now so, and must not hide
+        // those that came after it.
         for slot in (1..Self::SLOTS).rev() {
-            if self.slot(sector, slot)?.iter().any(|&byte| byte != ERASED) {
+            // As one number: in a sector with few records this is most of what a start does.
+            if u128::from_ne_bytes(self.slot(sector, slot)?) != u128::MAX {
                 return Ok(Some(slot + 1));
             }
         }
         Ok(Some(1))
+    }
+
+    fn newest(&mut self, copy: CopyNumber) -> Result<[u8; RECORD_LEN], F::Error> {
+        let sector = Self::sector(copy);
+        match self.slots_used(sector)? {
+            Some(used) if used > 1 => self.slot(sector, used - 1),
+            _ => Ok([ERASED; RECORD_LEN]),
+        }
+    }
+
+    fn append(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), F::Error> {
+        let sector = Self::sector(copy);
+        let slot = match self.slots_used(sector)? {
+            Some(used) if used < Self::SLOTS => used,
+            _ => {
+                self.erase(sector)?;
+                1
+            }
+        };
+        self.health.writes.count();
+        self.flash.write(sector + slot * SLOT_LEN, record)
     }
 
     fn erase(&mut self, sector: u32) -> Result<(), F::Error> {
@@ -153,24 +159,11 @@ impl<F: MultiwriteNorFlash> Storage for FlashLog<'_, F> {
     type Error = F::Error;
 
     fn read(&mut self, copy: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), F::Error> {
-        let sector = self.sector(copy);
-        *record = match self.slots_used(sector)? {
-            Some(used) if used > 1 => self.slot(sector, used - 1)?,
-            _ => [ERASED; RECORD_LEN],
-        };
+        *record = self.newest(copy)?;
         Ok(())
     }
 
     fn write(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), F::Error> {
-        let sector = self.sector(copy);
-        let slot = match self.slots_used(sector)? {
-            Some(used) if used < Self::SLOTS => used,
-            _ => {
-                self.erase(sector)?;
-                1
-            }
-        };
-        self.health.writes.count();
-        self.flash.write(sector + slot * SLOT_LEN, record)
+        self.append(copy, record)
     }
 }

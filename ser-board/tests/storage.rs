@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use flash::{Flash, PowerCut};
-use ser_board::flash_log::{BadSectors, FlashHealth, FlashLog};
+use ser_board::flash_log::{FlashHealth, FlashLog};
 use ser_node::{
     Capture, CaptureChannel, CopyNumber, Debounce, Event, NoRtc, Node, NodeParts, RECORD_LEN, Storage,
 };
@@ -96,8 +96,7 @@ static HEALTH: FlashHealth = FlashHealth::new();
 fn log<const SECTOR: usize, const WORD: usize>(
     flash: &Flash<SECTOR, WORD>,
 ) -> impl Storage + use<SECTOR, WORD> {
-    let sectors = [SECTOR, 2 * SECTOR].map(|sector| sector.try_into().unwrap());
-    FlashLog::new(flash.clone(), sectors, &HEALTH).unwrap()
+    FlashLog::new(flash.clone(), &HEALTH)
 }
 
 /// What must not be done: both copies in one sector, which is erased for every change and then written anew.
@@ -255,14 +254,14 @@ fn an_erase_is_as_rare_as_the_documentation_says() {
     let changes = [(1, [1, 0]), (2, [1, 1]), (2046, [1, 1]), (2047, [2, 1]), (2048, [2, 2]), (4092, [2, 2])];
     for (last, [first, second]) in changes {
         let flash = stored(log::<REAL, 1>, 1..last + 1);
-        assert_eq!(flash.erased(), [0, first, second, 0], "after {last} changes");
+        assert_eq!(flash.erased(), [first, second, 0, 0], "after {last} changes");
     }
 }
 
 #[test]
 fn the_log_says_how_many_records_are_left() {
     let flash = Flash::<SMALL, 1>::new(3);
-    let mut log = FlashLog::new(flash.clone(), [0, 256], &HEALTH).unwrap();
+    let mut log = FlashLog::new(flash.clone(), &HEALTH);
     assert_eq!(log.records_left(CopyNumber::First), Ok(0));
     for left in (0..7).rev() {
         log.write(CopyNumber::First, &[left; RECORD_LEN]).unwrap();
@@ -278,18 +277,9 @@ fn the_log_says_how_many_records_are_left() {
 #[test]
 fn writes_and_erases_are_counted() {
     let health = FlashHealth::new();
-    let mut log = FlashLog::new(Flash::<SMALL, 4>::new(2), [0, 128], &health).unwrap();
+    let mut log = FlashLog::new(Flash::<SMALL, 4>::new(2), &health);
     for number in 0..8 {
         log.write(CopyNumber::Second, &[number; RECORD_LEN]).unwrap();
     }
     assert_eq!((health.writes.get(), health.erases.get()), (8, 2));
-}
-
-#[test]
-fn sectors_that_cannot_hold_the_copies_are_refused() {
-    let flash = Flash::<SMALL, 1>::new(4);
-    for sectors in [[0, 0], [0, 64], [0, 512], [512, 0], [0, u32::MAX - 127]] {
-        assert_eq!(FlashLog::new(flash.clone(), sectors, &HEALTH).err(), Some(BadSectors), "{sectors:?}");
-    }
-    assert!(FlashLog::new(flash, [384, 0], &HEALTH).is_ok());
 }

@@ -215,6 +215,24 @@ fn a_power_cycle_leaves_configuration_and_time() {
     in_use.assert_goes_on();
 }
 
+/// The emulated memory's sectors hold 15 records each; every one of these changes is written.
+#[test]
+#[ignore = "needs the emulator and the image: cargo xtask test"]
+fn a_configuration_outlives_power_cycles_around_the_erasing_of_its_sectors() {
+    let recorder = Recorder::start(Kind::Emulated, Model::Ser160);
+    let mut wanted = WANTED;
+    for round in 0..5 {
+        let mut unit = recorder.unit();
+        for change in 1..=8 {
+            wanted.size = 100 * round + change;
+            assert_eq!(unit.configure(wanted.into()).expect("configured"), wanted);
+        }
+        drop(unit);
+        recorder.power_cycle();
+        assert_eq!(recorder.unit().configuration().expect("it answers"), wanted);
+    }
+}
+
 #[test]
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn the_clock_goes_on_from_one_simulator_to_the_next_with_the_same_memory() {

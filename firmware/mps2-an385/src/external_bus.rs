@@ -25,7 +25,7 @@
 //! | 8080h         | length of the latest fault's last words, in bytes      | recorder   |
 //! | 8084h–80DFh   | these words, UTF-8                                     | recorder   |
 //! | 80E0h         | how many starts ago that was; 0 for never              | recorder   |
-//! | 9000h, 9040h  | configuration memory, two blocks of 64 bytes           | recorder   |
+//! | 9000h–91FFh   | configuration memory, see `configuration`              | recorder   |
 //!
 //! Words have 32 bits, little-endian.
 //!
@@ -39,8 +39,7 @@
 //! changes the latch and then finds the change at 8020h knows that it has been sampled, and not later than at the tick
 //! that stands at 8004h. It is what a trigger output is to a scope. Before a boot is counted, both are set to what no
 //! sample can have written, so that nobody takes the run before for this one. The reset line is counted because the bench
-//! looks at it now and then, and a GENI board misses no pulse. Configuration memory stands for an FRAM: it needs no
-//! erasing, and the two blocks never share a write.
+//! looks at it now and then, and a GENI board misses no pulse.
 //!
 //! # Tradeoffs
 //! Everything sits on one bus, so one file on the desktop holds all there is to see and to set.
@@ -49,12 +48,11 @@
 //! QEMU backs the bus with a file; what is written on either side is seen on the other at once. The file outlives
 //! the emulator, and so do the configuration and the clock. On the real board the memory there is a PSRAM.
 
-use core::convert::Infallible;
 use core::ptr::{self, NonNull};
 
 use geni::WindowRam;
 use ser_board::last_words::{Boot, MAX_TEXT_LEN, Text};
-use ser_node::{CopyNumber, Debounce, RECORD_LEN, Storage};
+use ser_node::Debounce;
 use ser_proto::Model;
 
 use crate::device::base;
@@ -108,9 +106,9 @@ const _: () = assert!(MAX_TEXT_LEN == 0x80E0 - LAST_WORDS);
 
 const GENI_WINDOW: usize = 0x0000;
 const CONFIGURATION_MEMORY: usize = 0x9000;
-const COPY_DISTANCE: usize = 0x40;
+/// Bytes of configuration memory.
+pub(crate) const CONFIGURATION_LEN: usize = 0x200;
 const WORD_LEN: usize = size_of::<u32>();
-const _: () = assert!(RECORD_LEN <= COPY_DISTANCE && RECORD_LEN.is_multiple_of(WORD_LEN));
 
 /// All field inputs, at once.
 #[inline]
@@ -271,32 +269,9 @@ const fn seal_of(low: u32, high: u32) -> u32 {
     !(low ^ high.rotate_left(16))
 }
 
-/// The two blocks of configuration memory.
-pub(crate) struct ConfigurationMemory;
-
-fn words(copy: CopyNumber) -> impl Iterator<Item = Word> {
-    let block = match copy {
-        CopyNumber::First => CONFIGURATION_MEMORY,
-        CopyNumber::Second => CONFIGURATION_MEMORY + COPY_DISTANCE,
-    };
-    // SAFETY: see the map; the blocks begin at a multiple of four.
-    (block..block + RECORD_LEN).step_by(WORD_LEN).map(|offset| unsafe { word(offset) })
-}
-
-impl Storage for ConfigurationMemory {
-    type Error = Infallible;
-
-    fn read(&mut self, copy: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), Infallible> {
-        for (word, bytes) in words(copy).zip(record.as_chunks_mut::<WORD_LEN>().0) {
-            *bytes = word.read().to_le_bytes();
-        }
-        Ok(())
-    }
-
-    fn write(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), Infallible> {
-        for (word, bytes) in words(copy).zip(record.as_chunks::<WORD_LEN>().0) {
-            word.write(u32::from_le_bytes(*bytes));
-        }
-        Ok(())
-    }
+/// The words of configuration memory from `offset` on, which is rounded down to a word.
+pub(crate) fn configuration(offset: u32) -> impl Iterator<Item = Word> {
+    let words = (0..CONFIGURATION_LEN).step_by(WORD_LEN).skip(offset as usize / WORD_LEN);
+    // SAFETY: see the map; the memory begins at a multiple of four.
+    words.map(|offset| unsafe { word(CONFIGURATION_MEMORY + offset) })
 }

@@ -10,6 +10,7 @@
 use cortex_m_rt as _;
 
 mod boot;
+mod configuration;
 mod device;
 mod external_bus;
 mod fault;
@@ -38,7 +39,8 @@ mod app {
     use ser_cortex_m::stack;
     use ser_node::{Capture, CaptureChannel, Event, Liveness, Node, NodeParts, VERSION};
 
-    use crate::external_bus::{self, ConfigurationMemory};
+    use crate::configuration::{self, BenchFlash, Configuration};
+    use crate::external_bus;
     use crate::genius::Genius;
     use crate::inputs::{self, InputLatch};
     use crate::lamps::Lamps;
@@ -64,7 +66,7 @@ mod app {
         assert!(budget::TRANSMIT_PRIORITY == 1);
     };
 
-    pub(crate) type BoardNode = Node<'static, ConfigurationMemory, ClockChip<'static, BenchClock>>;
+    pub(crate) type BoardNode = Node<'static, Configuration, ClockChip<'static, BenchClock>>;
 
     #[shared]
     struct Shared {}
@@ -103,11 +105,13 @@ mod app {
         let (capture, reader) = channel.split(external_bus::debounce());
         // SAFETY: `init` runs once.
         let clock = unsafe { BenchClock::open() };
+        // SAFETY: as above.
+        let memory = unsafe { BenchFlash::open() };
         let node = Node::new(NodeParts {
             model,
             log: events,
             capture: reader,
-            storage: ConfigurationMemory,
+            storage: Configuration::new(memory, &configuration::HEALTH),
             rtc: ClockChip::new(clock, NOT_BEFORE, &rtc::HEALTH),
         });
         let (serial, receive, transmit) = uart::start(rings, node.baud());

@@ -19,7 +19,7 @@ use embedded_storage::nor_flash::{
     check_read, check_write,
 };
 use ser_board::flash_log::{FlashHealth, FlashLog};
-use ser_node::{CopyNumber, Liveness, RECORD_LEN, Storage};
+use ser_node::Liveness;
 use stm32f4::stm32f407::FLASH;
 
 use crate::timer;
@@ -63,45 +63,19 @@ pub(crate) enum FlashError {
     TimedOut,
     /// The controller has refused or given up.
     Refused,
-    /// The log of configurations does not accept the sectors, which would be a mistake of this module.
-    NoSectors,
 }
 
 impl NorFlashError for FlashError {
     fn kind(&self) -> NorFlashErrorKind {
         match self {
             FlashError::Range(kind) => *kind,
-            FlashError::TimedOut | FlashError::Refused | FlashError::NoSectors => NorFlashErrorKind::Other,
+            FlashError::TimedOut | FlashError::Refused => NorFlashErrorKind::Other,
         }
     }
 }
 
-/// The configuration, as the recorder wants it. Without sectors it records all the same, by the default configuration.
-pub(crate) struct Configuration(Option<FlashLog<'static, ConfigurationFlash>>);
-
-impl Configuration {
-    /// The two copies that the sectors hold.
-    pub(crate) fn new(registers: FLASH, watchdog: Watchdog) -> Configuration {
-        let flash = ConfigurationFlash { registers, watchdog };
-        Configuration(FlashLog::new(flash, [0, SECTOR_LEN], &HEALTH).ok())
-    }
-
-    fn log(&mut self) -> Result<&mut FlashLog<'static, ConfigurationFlash>, FlashError> {
-        self.0.as_mut().ok_or(FlashError::NoSectors)
-    }
-}
-
-impl Storage for Configuration {
-    type Error = FlashError;
-
-    fn read(&mut self, copy: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), FlashError> {
-        self.log()?.read(copy, record)
-    }
-
-    fn write(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), FlashError> {
-        self.log()?.write(copy, record)
-    }
-}
+/// Both copies, one in each sector.
+pub(crate) type Configuration = FlashLog<'static, ConfigurationFlash>;
 
 /// Both sectors as one memory.
 pub(crate) struct ConfigurationFlash {
@@ -110,6 +84,10 @@ pub(crate) struct ConfigurationFlash {
 }
 
 impl ConfigurationFlash {
+    pub(crate) const fn new(registers: FLASH, watchdog: Watchdog) -> ConfigurationFlash {
+        ConfigurationFlash { registers, watchdog }
+    }
+
     /// Takes the lock off for as long as `change` takes, and sees whether it went well.
     fn change(&mut self, change: impl FnOnce(&mut Self) -> Result<(), FlashError>) -> Result<(), FlashError> {
         // While the flash is at work a write to its registers stalls the bus, and capture with it.
@@ -189,13 +167,18 @@ impl ErrorType for ConfigurationFlash {
 }
 
 impl ReadNorFlash for ConfigurationFlash {
-    const READ_SIZE: usize = 1;
+    /// By words, as it is written: finding the newest record is most of what a start does.
+    const READ_SIZE: usize = WORD_LEN;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
         check_read(self, offset, bytes.len()).map_err(FlashError::Range)?;
-        for (offset, byte) in (offset..).zip(bytes) {
-            // SAFETY: inside of the memory, as just checked; see `write_word` for whose it is. Any value is a byte.
-            *byte = unsafe { ptr::read_volatile(address(offset)) };
+        // A load from a bank that is at work stalls the bus until it is done, and capture with it.
+        if self.is_busy() {
+            return Err(FlashError::TimedOut);
+        }
+        for (offset, word) in (offset..).step_by(WORD_LEN).zip(bytes.as_chunks_mut().0) {
+            // SAFETY: inside of the memory and aligned, as just checked; see `write_word` for whose it is. Any value is a word.
+            *word = unsafe { ptr::read_volatile(address(offset).cast::<u32>()) }.to_le_bytes();
         }
         Ok(())
     }

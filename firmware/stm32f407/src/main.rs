@@ -49,7 +49,7 @@ mod app {
     use ser_node::{Capture, CaptureChannel, Event, Liveness, Node, NodeParts, VERSION};
 
     use crate::clocks::{self, Source};
-    use crate::flash::Configuration;
+    use crate::flash::{self, Configuration, ConfigurationFlash};
     use crate::geni_bus::{GeniBoard, InterruptLine};
     use crate::genius::Genius;
     use crate::inputs::{self, InputPins};
@@ -138,7 +138,7 @@ mod app {
             model,
             log: events,
             capture: reader,
-            storage: Configuration::new(device.FLASH, watchdog),
+            storage: Configuration::new(ConfigurationFlash::new(device.FLASH, watchdog), &flash::HEALTH),
             rtc: ClockChip::new(clock, NOT_BEFORE, &rtc::HEALTH),
         });
         let (serial, serial_interrupt) = uart::start(&device.RCC, device.USART2, rings, node.baud());
