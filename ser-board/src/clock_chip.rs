@@ -175,6 +175,9 @@ mod tests {
     use chrono::{DurationRound, TimeDelta};
 
     use super::*;
+    use crate::flash_log::FlashHealth;
+    use crate::health::Health;
+    use crate::inputs::InputHealth;
 
     fn time(text: &str) -> NaiveDateTime {
         text.parse().unwrap()
@@ -270,6 +273,9 @@ mod tests {
         clock.write(time("2026-11-22T10:00:00"));
         clock.write(time("2026-11-22T10:00:00"));
         assert_eq!((health.state(), health.writes_failed.get()), (ClockState::Silent, 2));
+        let (inputs, storage) = (InputHealth::new(), FlashHealth::new());
+        let board = Health { inputs: &inputs, serialisers: None, clock: &health, storage: &storage };
+        assert!(board.is_broken());
     }
 
     #[test]

@@ -27,6 +27,8 @@
 //! changes), or the samples of that time are missed: `ser_node` counts them. The board sees to
 //! its watchdog meanwhile. Writing a record takes 16 bytes of at most 100 µs.
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use embedded_storage::nor_flash::MultiwriteNorFlash;
 use ser_node::{CopyNumber, RECORD_LEN, Storage};
 
@@ -47,13 +49,35 @@ pub struct FlashHealth {
     pub writes: Counter,
     /// Sectors erased.
     pub erases: Counter,
+    /// Accesses that failed.
+    pub failed: Counter,
+    failing: AtomicBool,
 }
 
 impl FlashHealth {
     /// Nothing has been written yet.
     #[must_use]
     pub const fn new() -> FlashHealth {
-        FlashHealth { writes: Counter::new(), erases: Counter::new() }
+        FlashHealth {
+            writes: Counter::new(),
+            erases: Counter::new(),
+            failed: Counter::new(),
+            failing: AtomicBool::new(false),
+        }
+    }
+
+    /// Whether the latest access failed.
+    #[must_use]
+    pub fn is_failing(&self) -> bool {
+        self.failing.load(Ordering::Relaxed)
+    }
+
+    fn note<T, E>(&self, result: Result<T, E>) -> Result<T, E> {
+        if result.is_err() {
+            self.failed.count();
+        }
+        self.failing.store(result.is_err(), Ordering::Relaxed);
+        result
     }
 }
 
@@ -159,11 +183,13 @@ impl<F: MultiwriteNorFlash> Storage for FlashLog<'_, F> {
     type Error = F::Error;
 
     fn read(&mut self, copy: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), F::Error> {
-        *record = self.newest(copy)?;
+        let newest = self.newest(copy);
+        *record = self.health.note(newest)?;
         Ok(())
     }
 
     fn write(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), F::Error> {
-        self.append(copy, record)
+        let written = self.append(copy, record);
+        self.health.note(written)
     }
 }

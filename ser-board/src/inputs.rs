@@ -5,6 +5,8 @@
 //! they were last seen, says so, and counts. The capture interrupt goes on with these: its tick is the recorder's clock
 //! and feeds the watchdog, and a recorder that cannot see its inputs still has something to tell.
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use crate::counter::Counter;
 
 /// Where the inputs come from. Input 1 is bit 0.
@@ -57,13 +59,21 @@ pub struct InputHealth {
     pub failed: Counter,
     /// Times that sampling began to fail, however long it did.
     pub outages: Counter,
+    failing: AtomicBool,
 }
 
 impl InputHealth {
     /// Nothing has failed yet.
     #[must_use]
     pub const fn new() -> InputHealth {
-        InputHealth { failed: Counter::new(), outages: Counter::new() }
+        InputHealth { failed: Counter::new(), outages: Counter::new(), failing: AtomicBool::new(false) }
+    }
+
+    /// Whether the latest sample could not be taken.
+    #[inline]
+    #[must_use]
+    pub fn is_failing(&self) -> bool {
+        self.failing.load(Ordering::Relaxed)
     }
 }
 
@@ -85,13 +95,12 @@ pub struct Sampler<'a, P> {
     wiring: Wiring,
     health: &'a InputHealth,
     latest: Option<u32>,
-    failing: bool,
 }
 
 impl<'a, P: InputPorts> Sampler<'a, P> {
     /// A sampler that has not read anything yet.
     pub const fn new(ports: P, wiring: Wiring, health: &'a InputHealth) -> Sampler<'a, P> {
-        Sampler { ports, wiring, health, latest: None, failing: false }
+        Sampler { ports, wiring, health, latest: None }
     }
 
     /// Ends sampling; gives the ports back.
@@ -106,7 +115,7 @@ impl<'a, P: InputPorts> Sampler<'a, P> {
             Ok(read) => {
                 let inputs = self.wiring.on(read);
                 self.latest = Some(inputs);
-                self.failing = false;
+                self.health.failing.store(false, Ordering::Relaxed);
                 Sample::Fresh(inputs)
             }
             Err(_) => self.hold(),
@@ -116,8 +125,8 @@ impl<'a, P: InputPorts> Sampler<'a, P> {
     #[cold]
     fn hold(&mut self) -> Sample {
         self.health.failed.count();
-        if !self.failing {
-            self.failing = true;
+        if !self.health.is_failing() {
+            self.health.failing.store(true, Ordering::Relaxed);
             self.health.outages.count();
         }
         self.latest.map_or(Sample::Unknown, Sample::Held)

@@ -36,7 +36,8 @@ pub struct Condition {
     pub events: u32,
     /// Messages received or sent so far, on any port.
     pub messages: u32,
-    /// Something is broken now: inputs that cannot be read, a clock or memory that does not answer.
+    /// Something is broken now: see [`Health::is_broken`](crate::health::Health::is_broken), and what the board knows
+    /// besides.
     pub broken: bool,
     /// The run before this one ended in a fault (panic, hard fault, stack overflow, watchdog).
     pub reset_by_fault: bool,

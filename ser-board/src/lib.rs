@@ -14,6 +14,7 @@
 //! | [`flash_log`]      | the configuration in flash memory                                                      |
 //! | [`clock_chip`]     | the battery-backed clock, with what it has to say against itself                       |
 //! | [`stm32_rtc`]      | the calendar registers of STM32 clocks as date and time, and when to believe them      |
+//! | [`health`]         | what a board's parts have to say against themselves, for the log and the fault lamp     |
 //! | [`leds`]           | what the four lamps mean                                                               |
 //! | [`fault`]          | what a hard fault was, by what the processor shows of it                               |
 //! | [`last_words`]     | what outlives a reset: its cause, the panic's text, the number of boots                |
@@ -31,6 +32,7 @@ pub mod clock_chip;
 pub mod counter;
 pub mod fault;
 pub mod flash_log;
+pub mod health;
 pub mod inputs;
 pub mod last_words;
 pub mod leds;

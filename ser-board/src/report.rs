@@ -5,6 +5,8 @@
 use geni::Counters;
 use ser_node::{Diagnostics, GeniusDiagnostics};
 
+use crate::clock_chip::ClockState;
+use crate::health::{Failures, Health};
 use crate::last_words::Boot;
 
 /// Counters that run all the time must not fill the log.
@@ -31,19 +33,31 @@ pub fn last_words(boot: &Boot) {
 }
 
 /// What the log knows already.
-pub struct Report {
+pub struct Report<'a> {
     looked_ms: u32,
+    health: &'a Health<'a>,
+    failures: Failures,
+    clock: ClockState,
+    /// Records written and sectors erased.
+    storage: (u32, u32),
     diagnostics: Diagnostics,
     genius: GeniusDiagnostics,
     stack_bytes: usize,
 }
 
-impl Report {
-    /// The log knows nothing; it is told for the first time a second from `now_ms`.
+impl<'a> Report<'a> {
+    /// Tells how it stands with the clock; the log knows nothing else, and is told a second from `now_ms` for the first
+    /// time.
     #[must_use]
-    pub fn new(now_ms: u32) -> Report {
+    pub fn new(now_ms: u32, health: &'a Health<'a>) -> Report<'a> {
+        let clock = health.clock.state();
+        log_clock(clock);
         Report {
             looked_ms: now_ms,
+            health,
+            failures: Failures::default(),
+            clock,
+            storage: (0, 0),
             diagnostics: Diagnostics::default(),
             genius: GeniusDiagnostics::default(),
             stack_bytes: 0,
@@ -69,12 +83,34 @@ impl Report {
             log_changed_genius(&self.genius, &genius);
             self.genius = genius;
         }
+        self.log_health();
         let stack_bytes = stack_bytes();
         if stack_bytes > self.stack_bytes {
             self.stack_bytes = stack_bytes;
             defmt::info!("stack: {=usize} bytes used at most", stack_bytes);
         }
     }
+
+    fn log_health(&mut self) {
+        let failures = self.health.failures();
+        log_changed_failures(&self.failures, &failures);
+        self.failures = failures;
+        let clock = self.health.clock.state();
+        if clock != self.clock {
+            self.clock = clock;
+            log_clock(clock);
+        }
+        let storage = (self.health.storage.writes.get(), self.health.storage.erases.get());
+        if storage != self.storage {
+            self.storage = storage;
+            let (writes, erases) = storage;
+            defmt::info!("configuration: {=u32} records written, {=u32} sectors erased", writes, erases);
+        }
+    }
+}
+
+fn log_clock(state: ClockState) {
+    defmt::info!("battery-backed clock: {}", state);
 }
 
 /// One line for each counter of a structure that has moved. Every field is a counter or named as something else, so that
@@ -112,6 +148,25 @@ fn log_changed(before: &Diagnostics, after: &Diagnostics) {
             events_unreported,
             events_unprinted,
             storage_errors,
+        ]
+    );
+}
+
+fn log_changed_failures(before: &Failures, after: &Failures) {
+    log_counters!(
+        Failures,
+        before,
+        after,
+        [
+            samples_failed,
+            input_outages,
+            serialiser_bus_errors,
+            serialiser_check_errors,
+            field_supply_lost,
+            field_supply_low,
+            serialisers_too_hot,
+            clock_writes_failed,
+            storage_failed,
         ]
     );
 }

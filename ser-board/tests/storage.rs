@@ -10,7 +10,10 @@ use std::ops::Range;
 
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use flash::{Flash, PowerCut};
+use ser_board::clock_chip::ClockHealth;
 use ser_board::flash_log::{FlashHealth, FlashLog};
+use ser_board::health::Health;
+use ser_board::inputs::InputHealth;
 use ser_node::{
     Capture, CaptureChannel, CopyNumber, Debounce, Event, NoRtc, Node, NodeParts, RECORD_LEN, Storage,
 };
@@ -272,6 +275,25 @@ fn the_log_says_how_many_records_are_left() {
     assert_eq!((log.records_left(CopyNumber::First), flash.erased()), (Ok(6), vec![2, 0, 0]));
     flash.cut_after(0, 0);
     assert_eq!(log.records_left(CopyNumber::Second), Err(PowerCut));
+}
+
+#[test]
+fn memory_that_fails_says_so_until_it_does_not() {
+    let health = FlashHealth::new();
+    let flash = Flash::<SMALL, 1>::new(2);
+    let mut log = FlashLog::new(flash.clone(), &health);
+    log.write(CopyNumber::First, &[1; RECORD_LEN]).unwrap();
+    let (inputs, clock) = (InputHealth::new(), ClockHealth::new());
+    let board = Health { inputs: &inputs, serialisers: None, clock: &clock, storage: &health };
+    assert!(!health.is_failing() && !board.is_broken());
+    flash.cut_after(0, 0);
+    let mut record = [0; RECORD_LEN];
+    assert_eq!(log.write(CopyNumber::First, &[2; RECORD_LEN]), Err(PowerCut));
+    assert_eq!(log.read(CopyNumber::First, &mut record), Err(PowerCut));
+    assert_eq!((health.is_failing(), board.is_broken(), health.failed.get()), (true, true, 2));
+    flash.power_up();
+    assert_eq!(log.read(CopyNumber::First, &mut record), Ok(()));
+    assert_eq!((board.is_broken(), health.failed.get(), record), (false, 2, [1; RECORD_LEN]));
 }
 
 #[test]

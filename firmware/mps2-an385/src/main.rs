@@ -29,7 +29,8 @@ mod watchdog;
 mod app {
     use chrono::NaiveDate;
     use ser_board::budget;
-    use ser_board::clock_chip::{ClockChip, ClockState};
+    use ser_board::clock_chip::ClockChip;
+    use ser_board::health::Health;
     use ser_board::inputs::{Sample, Sampler};
     use ser_board::last_words::Boot;
     use ser_board::leds::{self, Condition};
@@ -67,6 +68,13 @@ mod app {
     };
 
     pub(crate) type BoardNode = Node<'static, Configuration, ClockChip<'static, BenchClock>>;
+
+    static HEALTH: Health<'static> = Health {
+        inputs: &inputs::HEALTH,
+        serialisers: None,
+        clock: &rtc::HEALTH,
+        storage: &configuration::HEALTH,
+    };
 
     #[shared]
     struct Shared {}
@@ -172,9 +180,8 @@ mod app {
     #[idle(local = [serial, node, genius, lamps, watchdog, was_fault])]
     fn idle(cx: idle::Context) -> ! {
         let idle::LocalResources { serial, node, genius, lamps, watchdog, was_fault, .. } = cx.local;
-        defmt::info!("battery-backed clock: {}", rtc::HEALTH.state());
         let mut liveness = Liveness::new();
-        let mut report = Report::new(node.tick_ms());
+        let mut report = Report::new(node.tick_ms(), &HEALTH);
         loop {
             let now_ms = main_loop::pass(node, serial);
             if let Some(genius) = genius {
@@ -214,7 +221,7 @@ mod app {
             recording: node.is_recording(),
             events: node.events(),
             messages: serial.bytes().wrapping_add(node.commands()).wrapping_add(reports),
-            broken: rtc::HEALTH.state() == ClockState::Silent,
+            broken: HEALTH.is_broken(),
             reset_by_fault: was_fault,
             lost: leds::has_lost(&node.diagnostics()),
         }

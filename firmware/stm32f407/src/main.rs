@@ -39,7 +39,8 @@ mod watchdog;
 mod app {
     use chrono::NaiveDate;
     use ser_board::budget;
-    use ser_board::clock_chip::{ClockChip, ClockState};
+    use ser_board::clock_chip::ClockChip;
+    use ser_board::health::Health;
     use ser_board::inputs::{InputHealth, Sample, Sampler};
     use ser_board::last_words::Boot;
     use ser_board::leds::{self, Condition};
@@ -101,6 +102,9 @@ mod app {
     }
 
     static INPUT_HEALTH: InputHealth = InputHealth::new();
+
+    static HEALTH: Health<'static> =
+        Health { inputs: &INPUT_HEALTH, serialisers: None, clock: &rtc::HEALTH, storage: &flash::HEALTH };
 
     #[init(local = [
         channel: CaptureChannel = CaptureChannel::new(),
@@ -174,7 +178,9 @@ mod app {
     fn log_start(boot: &Boot, clock_source: Source, guards_brown_out: bool) {
         report::last_words(boot);
         if clock_source == Source::RcOscillator {
-            defmt::error!("the crystal does not swing: time runs by the RC oscillator, 1 % off");
+            defmt::error!(
+                "the crystal does not swing: time runs by the RC oscillator, off by up to several percent"
+            );
         }
         if !guards_brown_out {
             defmt::warn!("the brown-out level of the option bytes is not 3 (2.7 V)");
@@ -206,9 +212,8 @@ mod app {
     #[idle(local = [serial, node, genius, lamps, watchdog, start])]
     fn idle(cx: idle::Context) -> ! {
         let idle::LocalResources { serial, node, genius, lamps, watchdog, start, .. } = cx.local;
-        defmt::info!("battery-backed clock: {}", rtc::HEALTH.state());
         let mut liveness = Liveness::new();
-        let mut report = Report::new(node.tick_ms());
+        let mut report = Report::new(node.tick_ms(), &HEALTH);
         loop {
             let now_ms = main_loop::pass(node, serial);
             if let Some(genius) = genius {
@@ -236,7 +241,7 @@ mod app {
             recording: node.is_recording(),
             events: node.events(),
             messages: serial.bytes().wrapping_add(node.commands()).wrapping_add(reports),
-            broken: start.clock_source != Source::Crystal || rtc::HEALTH.state() == ClockState::Silent,
+            broken: start.clock_source != Source::Crystal || HEALTH.is_broken(),
             reset_by_fault: start.was_fault,
             lost: leds::has_lost(&node.diagnostics()),
         }
