@@ -9,7 +9,8 @@
 //!
 //! # Design
 //! A crystal that does not swing, or stops later, leaves the recorder with the chip's RC oscillator in its place: the same
-//! clocks, 1 % off. It goes on recording, and the fault lamp is lit for as long.
+//! clocks, 1 % off at 25 °C and by several percent where it is hot or cold (data sheet, "HSI oscillator characteristics"). It goes
+//! on recording, and the fault lamp is lit for as long. Beyond some 4 % off, both ends together, RS-232 does not answer any more.
 //!
 //! # Tradeoffs
 //! The chip could run twice as fast. But the external bus has the processor's clock, and holds what it writes for one period of
