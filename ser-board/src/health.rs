@@ -75,6 +75,8 @@ impl Health<'_> {
 
 #[cfg(test)]
 mod tests {
+    use core::cell::Cell;
+
     use super::*;
     use crate::inputs::{InputPorts, Sampler, Wiring};
 
@@ -97,24 +99,26 @@ mod tests {
         }
     }
 
-    struct Port(bool);
+    /// A port that can be read when this says so.
+    struct Port<'a>(&'a Cell<bool>);
 
-    impl InputPorts for Port {
+    impl InputPorts for Port<'_> {
         type Error = ();
 
         fn read(&mut self) -> Result<u32, ()> {
-            self.0.then_some(0).ok_or(())
+            self.0.get().then_some(0).ok_or(())
         }
     }
 
     #[test]
     fn a_board_is_broken_for_as_long_as_its_inputs_cannot_be_read() {
         let parts = Parts::default();
-        let mut sampler = Sampler::new(Port(false), Wiring::DIRECT, &parts.inputs);
+        let readable = Cell::new(false);
+        let mut sampler = Sampler::new(Port(&readable), Wiring::DIRECT, &parts.inputs);
         assert!(!parts.health().is_broken());
         sampler.sample();
         assert!(parts.health().is_broken());
-        let mut sampler = Sampler::new(Port(true), Wiring::DIRECT, &parts.inputs);
+        readable.set(true);
         sampler.sample();
         assert!(!parts.health().is_broken());
         let failures = Failures { samples_failed: 1, input_outages: 1, ..Failures::default() };

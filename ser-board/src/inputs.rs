@@ -95,12 +95,14 @@ pub struct Sampler<'a, P> {
     wiring: Wiring,
     health: &'a InputHealth,
     latest: Option<u32>,
+    /// As in `health`, which costs more to look at.
+    failing: bool,
 }
 
 impl<'a, P: InputPorts> Sampler<'a, P> {
     /// A sampler that has not read anything yet.
     pub const fn new(ports: P, wiring: Wiring, health: &'a InputHealth) -> Sampler<'a, P> {
-        Sampler { ports, wiring, health, latest: None }
+        Sampler { ports, wiring, health, latest: None, failing: false }
     }
 
     /// Ends sampling; gives the ports back.
@@ -115,7 +117,9 @@ impl<'a, P: InputPorts> Sampler<'a, P> {
             Ok(read) => {
                 let inputs = self.wiring.on(read);
                 self.latest = Some(inputs);
-                self.health.failing.store(false, Ordering::Relaxed);
+                if self.failing {
+                    self.set_failing(false);
+                }
                 Sample::Fresh(inputs)
             }
             Err(_) => self.hold(),
@@ -125,11 +129,17 @@ impl<'a, P: InputPorts> Sampler<'a, P> {
     #[cold]
     fn hold(&mut self) -> Sample {
         self.health.failed.count();
-        if !self.health.is_failing() {
-            self.health.failing.store(true, Ordering::Relaxed);
+        if !self.failing {
+            self.set_failing(true);
             self.health.outages.count();
         }
         self.latest.map_or(Sample::Unknown, Sample::Held)
+    }
+
+    #[cold]
+    fn set_failing(&mut self, failing: bool) {
+        self.failing = failing;
+        self.health.failing.store(failing, Ordering::Relaxed);
     }
 }
 
