@@ -312,6 +312,35 @@ fn a_total_that_goes_back_during_the_reading_is_an_erase() {
 }
 
 #[test]
+fn a_total_that_goes_back_by_any_number_is_never_a_loss_of_65536() {
+    for (at_reply, events_after) in (1..=6).flat_map(|reply| (0..60).map(move |events| (reply, events))) {
+        let mut recorder = Recorder::new(4);
+        recorder.append_many(8);
+        // The log was empty when it was read last: there is no anchor.
+        let mut reader = LogReader::new(Some(Cursor { total: 0, anchor: None }), 4);
+        let mut lost = 0;
+        for reply in 1..=8 {
+            let Some(request) = reader.request() else { break };
+            let taken = reader.take(&recorder.read(request.start, request.count), &mut |delivery| {
+                if let Delivery::Lost(what) = delivery {
+                    lost += what.known_count();
+                }
+            });
+            if taken.is_err() {
+                break;
+            }
+            // More than the ring holds, so that the reading is behind.
+            recorder.append_many(9);
+            if reply == at_reply {
+                recorder.erase();
+                recorder.append_many(events_after);
+            }
+        }
+        assert!(lost < 1000, "{lost} events lost, erased at reply {at_reply} and {events_after} since");
+    }
+}
+
+#[test]
 fn polling_an_idle_log_takes_one_request_when_the_position_is_known() {
     for size in [1, 7, 2048] {
         let mut recorder = Recorder::after(size, 20);

@@ -69,6 +69,10 @@ use ahead::Ahead;
 /// The index that total 0 gets in the arithmetic here, large enough that nothing ever goes below zero.
 const BASE: u64 = 1 << 32;
 
+/// Events between two replies of a reading that are believed: half of what the total can tell, half a minute at the most that
+/// a recorder can do.
+const MAX_HAPPENED: u64 = 1 << 15;
+
 /// A reading needs a few replies now and then that bring no event; so many in a row mean that something is wrong.
 const MAX_FRUITLESS: u32 = 32;
 
@@ -349,8 +353,10 @@ impl LogReader {
         };
         let happened = u64::from(position.total.wrapping_sub(low_16(head.total)));
         let total = head.total + happened;
-        // A total that went back looks as if almost 65536 events had happened.
-        if slot != (head.slot + happened) % self.size || total - self.next > u16::MAX.into() {
+        // A total that went back looks as if almost 65536 events had happened. Where so many have indeed, between two replies, a
+        // reading from the cursor on sorts it out as well.
+        let went_back = happened > MAX_HAPPENED || total - self.next > u16::MAX.into();
+        if slot != (head.slot + happened) % self.size || went_back {
             return Err(Disturbed::Changed);
         }
         self.head = Some(Head { total, slot, happened });
