@@ -33,12 +33,6 @@ impl Counters {
         }
     }
 
-    /// Places where the line has shown that something was lost or spoilt: a message may have gone with each.
-    #[must_use]
-    pub const fn damages(&self) -> u64 {
-        self.not_understood + self.bad_checksums + self.broken_frames + self.noise
-    }
-
     /// What was counted after `earlier`.
     #[must_use]
     pub fn since(&self, earlier: &Counters) -> Counters {

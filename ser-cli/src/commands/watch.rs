@@ -6,7 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use ser_client::{LogFollower, Unit, Unsolicited};
-use ser_proto::{AutoReport, Configuration, Configure, ReadReply};
+use ser_proto::{AutoReport, Configuration, Configure};
 
 use crate::cli::ConnectionArgs;
 use crate::connection::{self, HEARTBEAT};
@@ -178,10 +178,8 @@ impl Watch {
     }
 
     fn look(&mut self) -> Result<()> {
-        match self.wait()? {
-            Some(report) => self.take(&report),
-            None => self.read_new(),
-        }
+        self.wait()?;
+        self.read_new()
     }
 
     /// Tries until the log can be read again, with all that has happened meanwhile.
@@ -195,29 +193,21 @@ impl Watch {
         Ok(())
     }
 
-    /// Waits for a report, or for the time to look at the log.
-    fn wait(&mut self) -> Result<Option<ReadReply>> {
+    /// Waits for a report, or for the time to look at the log. Which it was makes no difference: only a reading shows whether
+    /// it is still the same log, and one takes the place of all reports that are waiting.
+    fn wait(&mut self) -> Result<()> {
         let until = Instant::now() + self.interval;
         loop {
             self.check_interrupt()?;
             let left = until.saturating_duration_since(Instant::now());
             match self.unit.wait_event(left.min(HEARTBEAT))? {
-                Some(Unsolicited::Report(report)) => return Ok(Some(report)),
+                Some(Unsolicited::Report(_)) => return Ok(()),
                 // What the unit prints says nothing that the log does not.
                 Some(Unsolicited::Line(_)) => {}
-                None if left.is_zero() => return Ok(None),
+                None if left.is_zero() => return Ok(()),
                 None => self.keeper.save_if_due()?,
             }
         }
-    }
-
-    fn take(&mut self, report: &ReadReply) -> Result<()> {
-        let Some((deliveries, cursor)) = self.follower.continue_with(report, &self.unit.counters()) else {
-            // One reading takes the place of all reports that are waiting.
-            return self.read_new();
-        };
-        self.outlet.take(&deliveries, 0)?;
-        self.keeper.delivered(Some(cursor), self.follower.size())
     }
 
     fn read_new(&mut self) -> Result<()> {

@@ -3,8 +3,7 @@
 use std::time::Duration;
 
 use ser_client::{
-    Counters, Cursor, Delivery, Disturbed, LineRate, LogFollower, LogPosition, LogReader, Session, Timing,
-    Unsolicited,
+    Cursor, Delivery, Disturbed, LineRate, LogPosition, LogReader, Session, Timing, Unsolicited,
 };
 use ser_proto::{Command, Configuration, ReadReply, Reply, TimeStamp};
 
@@ -47,8 +46,6 @@ pub struct Talk {
     pub disturbed: u64,
     /// Read replies that nobody was waiting for: auto reports, answers that came too late.
     pub reports: u64,
-    /// Those of them that brought the very next events.
-    pub reports_followed: u64,
     /// Lines of text.
     pub lines: u64,
 }
@@ -69,12 +66,8 @@ pub struct Conversation {
     began_ms: u64,
     /// Whether the latest reading came to the end of the log.
     at_end: bool,
-    /// Whether a report has shown that there is more to read than it brought.
+    /// Whether a report has shown that there is something to read.
     behind: bool,
-    /// What the line had shown when the latest reading began, or the latest report was taken.
-    seen: Counters,
-    /// Whether a report since then was thrown away.
-    missed: bool,
     talk: Talk,
 }
 
@@ -103,8 +96,6 @@ impl Conversation {
             began_ms: 0,
             at_end: false,
             behind: false,
-            seen: Counters::default(),
-            missed: false,
             talk: Talk::default(),
         }
     }
@@ -218,7 +209,6 @@ impl Conversation {
 
     fn begin_reading(&mut self, resyncs: u32, now_ms: u64) {
         self.account.begin_reading();
-        (self.seen, self.missed) = (self.session.counters(), false);
         let mut reader = LogReader::new(self.cursor, self.size);
         if let Some(position) = self.position.take() {
             reader = reader.starting_near(position);
@@ -257,7 +247,7 @@ impl Conversation {
     /// # Errors
     /// When the recorder's log is not what it must be.
     pub fn poll(&mut self, now_ms: u64, ledger: &Ledger) -> Result<Option<Outgoing>, String> {
-        self.take_unsolicited(ledger)?;
+        self.take_unsolicited();
         loop {
             if let Some(outgoing) = self.dispatch(now_ms) {
                 return Ok(Some(outgoing));
@@ -342,38 +332,17 @@ impl Conversation {
         deliveries.iter().try_for_each(|delivery| self.account.take(delivery, ledger))
     }
 
-    fn take_unsolicited(&mut self, ledger: &Ledger) -> Result<(), String> {
+    fn take_unsolicited(&mut self) {
         while let Some(message) = self.session.take_unsolicited() {
             match message {
                 Unsolicited::Line(_) => self.talk.lines += 1,
-                Unsolicited::Report(report) => {
+                Unsolicited::Report(_) => {
                     self.talk.reports += 1;
-                    // Who is reading gets to these events anyway; who is asking has to read.
-                    if self.is_resting() {
-                        self.follow(&report, ledger)?;
-                    } else {
-                        self.missed = true;
-                    }
+                    // Who is reading gets to these events anyway.
+                    self.behind |= !matches!(self.job, Job::Read { .. });
                 }
             }
         }
-        Ok(())
-    }
-
-    fn follow(&mut self, report: &ReadReply, ledger: &Ledger) -> Result<(), String> {
-        let follower = LogFollower::new(self.cursor, self.size).starting_near(self.position);
-        let (mut follower, seen) = (follower.since(&self.seen), self.session.counters());
-        let continued = if self.missed { None } else { follower.continue_with(report, &seen) };
-        let Some((deliveries, cursor)) = continued else {
-            self.behind = true;
-            return Ok(());
-        };
-        self.seen = seen;
-        self.talk.reports_followed += 1;
-        self.deliver(&deliveries, ledger)?;
-        self.cursor = Some(cursor);
-        self.position = follower.position();
-        Ok(())
     }
 }
 

@@ -97,7 +97,6 @@ impl Report {
             row("readings to the end", |talk| talk.readings),
             row("readings disturbed", |talk| talk.disturbed),
             row("reports", |talk| talk.reports),
-            row("reports with what was next", |talk| talk.reports_followed),
             row("lines of text", |talk| talk.lines),
         ]
     }

@@ -4,10 +4,10 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use ser_client::{
-    Counters, Cursor, Delivery, LineRate, LogFollower, LogPosition, LogReader, MAX_LINE_LEN, RangeReader,
-    Session, Timing, Unsolicited,
+    Cursor, Delivery, LineRate, LogPosition, LogReader, MAX_LINE_LEN, RangeReader, Session, Timing,
+    Unsolicited,
 };
-use ser_proto::{Command, Entry, MAX_ENTRIES, ReadReply, Reply};
+use ser_proto::{Command, Entry, ReadReply, Reply};
 
 use crate::fuzzing::framing::frame_of;
 use crate::fuzzing::script::Script;
@@ -59,7 +59,7 @@ impl Talk {
             _ => {
                 let body = script.run();
                 if let Ok(Reply::Read(reply)) = Reply::parse(body) {
-                    self.readers.take(reply, &self.session.counters());
+                    self.readers.take(reply);
                 }
             }
         }
@@ -130,7 +130,7 @@ impl Talk {
         let place = self.asked.iter().position(is_answer).expect("a request");
         self.asked.remove(place);
         if let Reply::Read(reply) = reply {
-            self.readers.take(reply, &self.session.counters());
+            self.readers.take(reply);
         }
     }
 
@@ -139,7 +139,7 @@ impl Talk {
             match self.session.take_unsolicited() {
                 None => return,
                 Some(Unsolicited::Line(line)) => assert!(line.text.len() <= MAX_LINE_LEN),
-                Some(Unsolicited::Report(report)) => self.readers.take(report, &self.session.counters()),
+                Some(Unsolicited::Report(report)) => self.readers.take(report),
             }
         }
         panic!("more than {MAX_KEPT} messages were kept");
@@ -156,7 +156,6 @@ struct Readers {
     /// All entries that the reader was shown.
     shown: Vec<Entry>,
     range: RangeReader,
-    follower: LogFollower,
 }
 
 impl Readers {
@@ -173,13 +172,11 @@ impl Readers {
             asked: VecDeque::new(),
             shown: Vec::new(),
             range: RangeReader::new(script.word(), script.word(), size),
-            follower: LogFollower::new(cursor, size),
         }
     }
 
     /// Takes a reply as it is, and as the answer to what was asked for.
-    fn take(&mut self, reply: ReadReply, seen: &Counters) {
-        self.follow(&reply, seen);
+    fn take(&mut self, reply: ReadReply) {
         let fitting = self.range.request().map_or(reply.start, |request| request.start);
         self.take_range(&ReadReply { start: fitting, ..reply.clone() });
         self.take_new(&reply);
@@ -237,18 +234,5 @@ impl Readers {
         self.range.take(reply, &mut |_| delivered += 1);
         assert_eq!(self.range.delivered(), before + delivered);
         let _ = self.range.is_mixed();
-    }
-
-    fn follow(&mut self, report: &ReadReply, seen: &Counters) {
-        let before = self.follower.cursor();
-        match self.follower.continue_with(report, seen) {
-            Some((deliveries, cursor)) => {
-                assert_eq!(self.follower.cursor(), Some(cursor));
-                assert!((1..=MAX_ENTRIES).contains(&deliveries.len()));
-                let moved = cursor.total.wrapping_sub(before.expect("a cursor to go on from").total);
-                assert_eq!(usize::from(moved), deliveries.len());
-            }
-            None => assert_eq!(self.follower.cursor(), before),
-        }
     }
 }
