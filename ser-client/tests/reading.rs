@@ -356,6 +356,24 @@ fn polling_an_idle_log_takes_one_request_when_the_position_is_known() {
 }
 
 #[test]
+fn a_resize_that_nobody_told_of_is_no_restart_where_the_position_is_known() {
+    let mut recorder = Recorder::after(8, 12);
+    let mut host = Host::new();
+    let (_, summary) = host.read(&mut recorder, |_| {});
+    for events in 0..20 {
+        recorder.resize(3);
+        recorder.append_many(events);
+        let mut reader = LogReader::new(host.cursor, 8).starting_near(summary.position);
+        let request = reader.request().unwrap();
+        let reply = recorder.read(request.start, request.count);
+        let taken = reader.take(&reply, &mut |delivery| panic!("{delivery:?}"));
+        // Now and then the ring of three happens to stand where one of eight would.
+        let agrees = u32::from(reply.next_slot) == (4 + u32::from(reply.total) - 12) % 8;
+        assert_eq!(taken.is_err(), !agrees, "{reply:?}");
+    }
+}
+
+#[test]
 fn a_size_that_is_not_the_recorders_is_noticed() {
     let mut recorder = Recorder::new(20);
     recorder.append_many(25);

@@ -49,6 +49,8 @@
 //! - The first reading of a log cannot know how often the total has wrapped: [`Lost::OverwrittenAtLeast`].
 //! - When events come so fast that the oldest entries are overwritten while the request for them is on its way, the
 //!   reader gives up some more of the oldest, to get ahead of the recorder. They are counted as lost like the rest.
+//! - A resize of which nobody knows, before the first reading of a program, puts another entry in the place of the anchor, and
+//!   looks as if the log had begun anew.
 //! - A resize in the middle of a reading shows when total and next slot part, or when the anchor is in another place.
 //!   In a ring of a few entries both may agree by chance, and an entry be taken for its neighbour.
 //!
@@ -190,6 +192,8 @@ pub struct LogReader {
     cursor: Option<Cursor>,
     /// Where the last entry that was delivered probably is.
     expected_slot: Option<u64>,
+    /// Where the log stood at the end of the reading before.
+    near: Option<LogPosition>,
     head: Option<Head>,
     /// Index of the next event to deliver, up to date with `head`.
     next: u64,
@@ -226,6 +230,7 @@ impl LogReader {
             size: size.clamp(1, MAX_SIZE).into(),
             cursor,
             expected_slot: None,
+            near: None,
             head: None,
             next: 0,
             target: 0,
@@ -246,12 +251,14 @@ impl LogReader {
     }
 
     /// Uses the position in which an earlier reading ended: if nothing has happened since, one request will do
-    /// instead of two. A position that does not belong to the cursor does no harm.
+    /// instead of two, and a ring that goes round earlier or later than it did then has another size, or was erased:
+    /// [`Disturbed::Changed`]. So has one whose position belongs to another cursor.
     #[must_use]
     pub fn starting_near(mut self, position: LogPosition) -> LogReader {
         let slot = u64::from(position.next_slot);
         if slot < self.size && self.cursor.is_some_and(|cursor| cursor.anchor.is_some()) {
             self.expected_slot = Some((slot + self.size - 1) % self.size);
+            self.near = Some(position);
         }
         self
     }
@@ -344,6 +351,13 @@ impl LogReader {
             return Err(Disturbed::WrongSize);
         }
         let Some(head) = self.head else {
+            let goes_on = |near: LogPosition| {
+                let happened = position.total.wrapping_sub(near.total);
+                slot == (u64::from(near.next_slot) + u64::from(happened)) % self.size
+            };
+            if !self.near.is_none_or(goes_on) {
+                return Err(Disturbed::Changed);
+            }
             let cursor_total = self.cursor.map_or(position.total, |cursor| cursor.total);
             self.next = BASE + u64::from(cursor_total);
             let total = self.next + u64::from(position.total.wrapping_sub(cursor_total));
