@@ -9,7 +9,7 @@
 //! standard input; the UART's state, read by way of QEMU's test interface (`-qtest`), tells that they have arrived.
 //!
 //! # Tradeoffs
-//! One instruction lasts 2⁵ ns: 31 million in a second, less than any chip that one would flash. At 2⁰ ns the processor
+//! One instruction lasts 2⁵ ns: 31.25 million in a second, less than any chip that one would flash. At 2⁰ ns the processor
 //! would be so fast that no load is one. Numbers of instructions do not depend on it.
 //!
 //! # Notes
