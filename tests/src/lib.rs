@@ -1,5 +1,6 @@
 //! Helpers of the end-to-end tests, which live in `tests/`.
 
+pub mod digits;
 pub mod download;
 pub mod fuzzing;
 pub mod genius_world;

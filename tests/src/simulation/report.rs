@@ -5,6 +5,7 @@ use std::fmt;
 use super::account::Tally;
 use super::conversation::Talk;
 use super::ledger::Edges;
+use crate::digits::grouped;
 
 /// How much time passed, and how.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -114,14 +115,6 @@ impl Row {
     }
 }
 
-/// Digits in groups of three.
-fn grouped(count: u64) -> String {
-    let digits = count.to_string();
-    let groups: Vec<&str> =
-        digits.as_bytes().rchunks(3).rev().filter_map(|group| std::str::from_utf8(group).ok()).collect();
-    groups.join(",")
-}
-
 fn table<'a>(f: &mut fmt::Formatter<'_>, heads: impl Iterator<Item = &'a str>, rows: &[Row]) -> fmt::Result {
     write!(f, "\n  {:30}", "")?;
     heads.into_iter().try_for_each(|head| write!(f, "  {head:>15}"))?;
@@ -155,16 +148,5 @@ impl fmt::Display for Report {
             grouped(missing),
             grouped(self.forged),
         )
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::grouped;
-
-    #[test]
-    fn digits_stand_in_groups_of_three() {
-        let written = [0, 999, 1_000, 12_345, 1_234_567].map(grouped);
-        assert_eq!(written, ["0", "999", "1,000", "12,345", "1,234,567"]);
     }
 }
