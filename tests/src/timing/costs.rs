@@ -5,11 +5,8 @@ use std::collections::BTreeMap;
 use ser_node::capture::QUEUE_LEN;
 use ser_proto::{AutoReport, Command, Configure, Decoded, FrameDecoder, MAX_BODY_LEN, TimeStamp};
 
-use ser_sim::INSTRUCTIONS_PER_MS;
-
 use super::bench::{Bench, Parts, Setup};
 use super::genius::Genius;
-use super::lateness::Lateness;
 use super::program::{Handler, Program};
 use super::tally::{Masked, Pass, Run, Tally};
 
@@ -116,23 +113,10 @@ pub fn masked_at_start(parts: &Parts, program: &Program) -> Result<Masked, Strin
     Ok(bench.tally.longest_masked)
 }
 
-/// How late the capture interrupt is with both ports quiet.
-///
-/// # Errors
-/// When the board does not do what it must.
-pub fn quiet_lateness(parts: &Parts, program: &Program, ms: u64) -> Result<Lateness, String> {
-    let mut bench = Bench::start(parts, program, Setup { debounce_ms: 0, genius: false })?;
-    pass(&mut bench, STARTED_MS)?;
-    bench.tell(true);
-    pass(&mut bench, ms)?;
-    Ok(lateness(&bench.tally))
-}
-
-/// How late the capture interrupts were that have been counted.
+/// When each of the counted capture interrupts began, in instructions.
 #[must_use]
-pub fn lateness(tally: &Tally<'_>) -> Lateness {
-    let began: Vec<u64> = runs_of(tally, Handler::Capture).map(|run| run.began).collect();
-    Lateness::of(&began, INSTRUCTIONS_PER_MS)
+pub fn beginnings(tally: &Tally<'_>) -> Vec<u64> {
+    runs_of(tally, Handler::Capture).map(|run| run.began).collect()
 }
 
 fn pass(bench: &mut Bench<'_>, ms: u64) -> Result<(), String> {

@@ -1,7 +1,8 @@
 //! How late the capture interrupt comes: from the moment its timer expires to the first instruction of its handler.
 //!
-//! The timer expires every millisecond, which is a fixed number of instructions. The earliest interrupt of all comes at
-//! once; the others are late by what they come later within their millisecond.
+//! The timer expires every millisecond, which is a fixed number of instructions. The earliest interrupt of a board's life comes at
+//! once, and shows [when that is](expiry); the others are late by what they come later within their millisecond. Interrupts of a
+//! time in which all of them are late need those of another time to be measured by.
 
 use std::fmt;
 
@@ -18,18 +19,23 @@ pub struct Lateness {
     sorted: Vec<u64>,
 }
 
+/// When the timer expires, within its period, by the earliest of these beginnings of the handler.
+#[must_use]
+pub fn expiry(began: &[u64], period: u64) -> u64 {
+    let Some(&first) = began.first() else { return 0 };
+    // Within half a period of the first; that one may have been late itself.
+    let half = period / 2;
+    let earliest = began.iter().map(|&began| (began - first + half) % period).min().unwrap_or(half);
+    (first + period - half + earliest) % period
+}
+
 impl Lateness {
-    /// From the count of instructions at each beginning of the handler, and that between two expiries.
+    /// From the count of instructions at each beginning of the handler, when the timer expires within its period, and the
+    /// period.
     #[must_use]
-    pub fn of(began: &[u64], period: u64) -> Lateness {
-        let Some(&first) = began.first() else { return Lateness::default() };
-        // Within half a period of the first; that one may have been late itself.
-        let half = period / 2;
-        let offsets = began.iter().map(|&began| (began - first + half) % period);
-        let mut sorted: Vec<u64> = offsets.collect();
+    pub fn of(began: &[u64], expiry: u64, period: u64) -> Lateness {
+        let mut sorted: Vec<u64> = began.iter().map(|&began| (began + period - expiry) % period).collect();
         sorted.sort_unstable();
-        let earliest = sorted.first().copied().unwrap_or_default();
-        sorted.iter_mut().for_each(|offset| *offset -= earliest);
         Lateness { sorted }
     }
 
@@ -88,16 +94,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lateness_counts_from_the_earliest_even_if_the_first_was_late() {
+    fn the_earliest_shows_the_expiry_even_if_the_first_was_late() {
         let began = [1_007, 2_000, 3_400, 4_001];
-        let lateness = Lateness::of(&began, 1_000);
-        assert_eq!(lateness.sorted, [0, 1, 7, 400]);
+        assert_eq!(expiry(&began, 1_000), 0);
+        assert_eq!(Lateness::of(&began, 0, 1_000).sorted, [0, 1, 7, 400]);
+        // Where the period begins within their spread, too.
+        let began = began.map(|began| began + 998);
+        assert_eq!(expiry(&began, 1_000), 998);
+        assert_eq!(Lateness::of(&began, 998, 1_000).sorted, [0, 1, 7, 400]);
+        assert_eq!(expiry(&[], 1_000), 0);
+    }
+
+    #[test]
+    fn a_delay_that_all_have_shows_against_others() {
+        let (quiet, busy) = ([1_100, 2_100], [3_105, 4_105]);
+        let expiry = expiry(&[quiet, busy].concat(), 1_000);
+        let [quiet, busy] = [quiet, busy].map(|began| Lateness::of(&began, expiry, 1_000).sorted);
+        assert_eq!((quiet, busy), (vec![0, 0], vec![5, 5]));
     }
 
     #[test]
     fn ranks_are_those_of_the_sorted_list() {
         let began: Vec<u64> = (0..1000).map(|index| index * 1_000 + index / 10).collect();
-        let lateness = Lateness::of(&began, 1_000);
+        let lateness = Lateness::of(&began, 0, 1_000);
         let ranks = [1, 500, 990, 999, 1000].map(|per_mille| lateness.per_mille(per_mille));
         assert_eq!((lateness.count(), ranks), (1000, [0, 49, 98, 99, 99]));
         assert_eq!(Lateness::default().max(), 0);

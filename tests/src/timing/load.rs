@@ -6,10 +6,13 @@ use std::time::Duration;
 
 use ser_client::LineRate;
 use ser_node::Debounce;
-use ser_proto::{AutoReport, Command, Configure, MAX_SIZE, Model};
+use ser_proto::{AutoReport, Command, Configure, MAX_SIZE, Model, Reply};
+use ser_sim::INSTRUCTIONS_PER_MS;
 
 use super::bench::{Bench, Carried, Parts, Setup};
+use super::costs::beginnings;
 use super::genius::{Genius, HOST};
+use super::lateness::{Lateness, expiry};
 use super::program::Program;
 use crate::simulation::account::Tally as Told;
 use crate::simulation::conversation::{Conversation, Order, Outgoing, Talk};
@@ -36,6 +39,9 @@ const START_LIMIT_MS: u64 = 30_000;
 /// Hosts have read everything so long after the last change.
 const CATCH_UP_MS: u64 = 60_000;
 
+/// The total counts modulo this.
+const TOTAL_WRAPS: u64 = 1 << 16;
+
 /// The board with its hosts.
 pub struct Load<'p> {
     /// Where the board is.
@@ -46,6 +52,10 @@ pub struct Load<'p> {
     outgoing: VecDeque<Command>,
     /// Samples in which contacts have moved.
     changes: u64,
+    /// Events that the recorder has counted, by what it said last.
+    total: Option<u16>,
+    /// When capture interrupts began while nothing happened.
+    quiet: Vec<u64>,
     /// While contacts moved.
     carried: Carried,
     /// Who has read everything since then may rest.
@@ -57,8 +67,8 @@ pub struct Load<'p> {
 pub struct Account {
     /// Samples that saw a change.
     pub changes: u64,
-    /// Events that the recorder must have recorded by the books.
-    pub events: u64,
+    /// Events that the recorder says it has counted, modulo 65536; `None` when it never said.
+    pub total: Option<u16>,
     /// The host on RS-232, and the one on the bus: what they were told, and what they talked about.
     pub hosts: [(&'static str, Told, Talk); 2],
     /// What went over RS-232 while contacts moved.
@@ -68,11 +78,13 @@ pub struct Account {
 }
 
 impl Account {
-    /// Whether nothing is missing: each change is an event, and each event was delivered or reported as lost, to each host.
+    /// Whether nothing is missing: the recorder has counted each change, and each was delivered or reported as lost, to each
+    /// host.
     #[must_use]
     pub fn is_settled(&self) -> bool {
         let all = |told: &Told| told.delivered + told.overwritten == self.changes;
-        self.events == self.changes && self.hosts.iter().all(|(_, told, _)| all(told))
+        let total = self.total.map(u64::from);
+        total == Some(self.changes % TOTAL_WRAPS) && self.hosts.iter().all(|(_, told, _)| all(told))
     }
 }
 
@@ -97,12 +109,34 @@ impl<'p> Load<'p> {
             bench,
             ledger,
             line,
-            bus: Conversation::new("Genius", LineRate::Instant),
+            bus: Conversation::new("Genius", LineRate::Instant).one_at_a_time(),
             outgoing: VecDeque::new(),
             changes: 0,
+            total: None,
+            quiet: Vec::new(),
             carried: Carried::default(),
             still_since_ms: u64::MAX,
         })
+    }
+
+    /// Nothing changes and nobody says anything for so many milliseconds; only what comes behind them counts as load.
+    ///
+    /// # Errors
+    /// When the board does not do what it must.
+    pub fn rest_ms(&mut self, ms: u64) -> Result<(), String> {
+        self.bench.tell(true);
+        (0..ms).try_for_each(|_| self.bench.pass_ms())?;
+        self.quiet = beginnings(&self.bench.tally);
+        self.bench.tally.begin_anew();
+        Ok(())
+    }
+
+    /// How late the capture interrupts were, at rest and later, all against the earliest of them.
+    #[must_use]
+    pub fn lateness(&self) -> [Lateness; 2] {
+        let busy = beginnings(&self.bench.tally);
+        let expiry = expiry(&[&self.quiet[..], &busy].concat(), INSTRUCTIONS_PER_MS);
+        [&self.quiet, &busy].map(|began| Lateness::of(began, expiry, INSTRUCTIONS_PER_MS))
     }
 
     /// All inputs change in every one of so many milliseconds, and both hosts read all the time.
@@ -150,6 +184,9 @@ impl<'p> Load<'p> {
     fn talk_on_bus(&mut self, now_ms: u64) -> Result<(), String> {
         let Some(genius) = &mut self.bench.genius else { return Ok(()) };
         for body in genius.take_received() {
+            if let Ok(Reply::Read(reply)) = Reply::parse(&body) {
+                self.total = Some(reply.total);
+            }
             self.bus.session().process_body(Duration::from_millis(now_ms), &body);
         }
         if let Some(outgoing) = next(&mut self.bus, now_ms, self.still_since_ms, &self.ledger)? {
@@ -189,7 +226,7 @@ impl<'p> Load<'p> {
         let told = |host: &Conversation| (host.account().name(), host.account().tally(), host.talk());
         Ok(Account {
             changes: self.changes,
-            events: self.ledger.len() as u64,
+            total: self.total,
             hosts: [told(&self.line), told(&self.bus)],
             carried: self.carried,
             lasted_ms: self.bench.now_ms(),

@@ -6,6 +6,7 @@ pub mod costs;
 pub mod genius;
 pub mod lateness;
 pub mod load;
+mod masking;
 pub mod program;
 pub mod report;
 pub mod tally;

@@ -8,6 +8,8 @@ use std::path::Path;
 
 use object::{File, Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 
+use super::masking::Masking;
+
 /// Entry of the vector table, in words, with the first instruction after a reset.
 const RESET_VECTOR: usize = 1;
 /// The first of the chip's own interrupts.
@@ -61,6 +63,7 @@ pub struct Program {
     /// The same: whether it has four bytes.
     wide: Vec<bool>,
     functions: BTreeMap<u32, (u32, String)>,
+    masking: Masking,
     reset: u32,
 }
 
@@ -68,7 +71,7 @@ impl Program {
     /// Reads an ELF file.
     ///
     /// # Errors
-    /// When it is not what an image has to be.
+    /// When it is not what an image has to be, or may mask interrupts in a way that a trace of addresses does not show.
     pub fn read(path: &Path) -> Result<Program, String> {
         let fails = |what: &dyn std::fmt::Display| format!("{}: {what}", path.display());
         let bytes = fs::read(path).map_err(|error| fails(&error))?;
@@ -103,7 +106,13 @@ impl Program {
             }
         }
         program.add_vectors(file)?;
-        Ok(program)
+        match program.masking.unseen(|address| program.function_around(address)) {
+            None => Ok(program),
+            Some(at) => Err(format!(
+                "the instruction at {at:#x} in {} may mask interrupts, by a value that is not seen here",
+                program.name(at)
+            )),
+        }
     }
 
     fn add_vectors(&mut self, file: &File<'_>) -> Result<(), String> {
@@ -125,12 +134,14 @@ impl Program {
     fn add_code(&mut self, begin: u32, code: &[u8]) {
         let (halfwords, _) = code.as_chunks::<2>();
         let mut halfwords = halfwords.iter().map(|&bytes| u16::from_le_bytes(bytes));
-        let mut address = begin;
+        let (mut address, mut before) = (begin, 0);
         while let Some(first) = halfwords.next() {
             // ARMv7-M Architecture Reference Manual, A5.1.
             let wide = first >> 11 >= 0b11101;
             let second = if wide { halfwords.next() } else { None };
             self.set(address, kind(first, second));
+            self.masking.note(address, before, first, second);
+            before = if wide { 0 } else { first };
             self.wide[index_of(address / 2)] = wide;
             address += if wide { 4 } else { 2 };
         }
@@ -206,10 +217,10 @@ fn kind(first: u16, second: Option<u16>) -> Kind {
         (first, None) if first & 0xFF87 == 0x4780 => Kind::Call,
         // BL.
         (0xF000..=0xF7FF, Some(second)) if second & 0xD000 == 0xD000 => Kind::Call,
-        // CPSID I.
-        (0xB672, None) => Kind::Mask,
-        // CPSIE I; MSR PRIMASK, Rn.
-        (0xB662, None) | (0xF380..=0xF38F, Some(0x8810)) => Kind::Unmask,
+        // CPSID I, F, or both.
+        (0xB671..=0xB673, None) => Kind::Mask,
+        // CPSIE; MSR PRIMASK, Rn, which gives back what was in force: `Masking` sees to that.
+        (0xB661..=0xB663, None) | (0xF380..=0xF38F, Some(0x8810)) => Kind::Unmask,
         // WFI.
         (0xBF30, None) => Kind::Sleep,
         _ => Kind::Plain,
@@ -263,5 +274,11 @@ mod tests {
         assert_eq!(kind(0x4798, None), Kind::Call);
         assert_eq!(kind(0xE8BD, Some(0x83F0)), Kind::Return);
         assert_eq!(kind(0xE8BD, Some(0x03F0)), Kind::Plain);
+    }
+
+    #[test]
+    fn faults_are_masked_along_with_interrupts() {
+        assert_eq!([0xB671, 0xB672, 0xB673].map(|first| kind(first, None)), [Kind::Mask; 3]);
+        assert_eq!([0xB661, 0xB662, 0xB663].map(|first| kind(first, None)), [Kind::Unmask; 3]);
     }
 }
