@@ -2,9 +2,7 @@
 
 use std::ffi::OsString;
 
-use crate::boards::MPS2_AN385;
-use crate::setup::{cross, emulator};
-use crate::steps::{self, Result, heading};
+use crate::steps::{self, Result};
 use crate::{firmware, qemu};
 
 const EXAMPLES: &str = "\
@@ -28,10 +26,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let mut demo = qemu::ser_cli("demo");
     if arguments.qemu {
-        emulator::find()?;
-        let toolchain = cross::find_one(MPS2_AN385.target)?;
-        heading("Firmware");
-        demo.arg("--image").arg(firmware::build(&toolchain, &MPS2_AN385)?);
+        demo.arg("--image").arg(firmware::build_emulated()?);
     }
     qemu::build_ser_cli()?;
     steps::become_program(demo.args(&arguments.options))

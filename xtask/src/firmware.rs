@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
-use crate::boards::{BOARDS, Board};
+use crate::boards::{BOARDS, Board, MPS2_AN385};
 use crate::checks::{self, Outcome};
 use crate::image::Image;
 use crate::image::calls::Calls;
 use crate::setup::cross::{self, CrossToolchain};
+use crate::setup::emulator;
 use crate::steps::{self, Failure, Result, heading, note};
 use crate::{stack_paths, table};
 
@@ -72,8 +73,16 @@ pub(crate) fn toolchains<'a>(boards: &[&'a Board]) -> Toolchains<'a> {
     (found, missing)
 }
 
+/// Builds the image for the emulator, which has to be there; gives its file.
+pub(crate) fn build_emulated() -> Result<PathBuf> {
+    emulator::find()?;
+    let toolchain = cross::find_one(MPS2_AN385.target)?;
+    heading("Firmware");
+    build(&toolchain, &MPS2_AN385)
+}
+
 /// Builds one image; gives its file.
-pub(crate) fn build(toolchain: &CrossToolchain, board: &Board) -> Result<PathBuf> {
+fn build(toolchain: &CrossToolchain, board: &Board) -> Result<PathBuf> {
     steps::run(toolchain.cargo("build").args(["--release", "--package", board.package]))?;
     Ok(board.image())
 }

@@ -3,9 +3,7 @@
 use std::ffi::OsString;
 use std::process::Command;
 
-use crate::boards::MPS2_AN385;
 use crate::firmware;
-use crate::setup::{cross, emulator};
 use crate::steps::{self, Result, heading};
 
 const EXAMPLES: &str = "\
@@ -27,10 +25,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    emulator::find()?;
-    let toolchain = cross::find_one(MPS2_AN385.target)?;
-    heading("Firmware");
-    let image = firmware::build(&toolchain, &MPS2_AN385)?;
+    let image = firmware::build_emulated()?;
     build_ser_cli()?;
     steps::become_program(ser_cli("sim").arg("--image").arg(image).args(&arguments.options))
 }

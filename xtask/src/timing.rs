@@ -3,8 +3,7 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use crate::boards::MPS2_AN385;
-use crate::setup::{cross, emulator};
+use crate::setup::emulator;
 use crate::steps::{self, Failure, Result, heading};
 use crate::{firmware, places};
 
@@ -25,10 +24,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    emulator::find()?;
-    let toolchain = cross::find_one(MPS2_AN385.target)?;
-    heading("Firmware");
-    let image = firmware::build(&toolchain, &MPS2_AN385)?;
+    let image = firmware::build_emulated()?;
     let plugin = build_plugin()?;
     heading("Timing");
     let mut timing = steps::cargo();
