@@ -6,8 +6,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Tests that are ignored for this reason run in `cargo xtask test`.
-const IN_THE_EMULATOR: &str = "needs the emulator";
+/// Tests that are ignored for one of these reasons run in `cargo xtask test`.
+const RUN_BY_XTASK: [&str; 2] = ["needs the emulator", "takes minutes: cargo xtask test"];
+
+/// Macros that make a test of each name between their braces.
+const MAKE_TESTS: [&str; 1] = ["targets! {"];
+
+/// Macros that make two tests of each function that is named between their braces.
+const MAKE_TESTS_OF_FUNCTIONS: [&str; 1] = ["with_both_kinds! {"];
 
 /// The text of a file of the project.
 #[must_use]
@@ -70,14 +76,24 @@ fn has_test(source: &str, name: &str) -> bool {
         let above =
             lines[..at].iter().rev().take_while(|line| line.starts_with("#[") || line.starts_with("//"));
         let above: Vec<_> = above.collect();
-        let is_run = |line: &&&str| !line.starts_with("#[ignore") || line.contains(IN_THE_EMULATOR);
+        let is_run = |line: &&&str| {
+            !line.starts_with("#[ignore") || RUN_BY_XTASK.iter().any(|reason| line.contains(reason))
+        };
         above.contains(&&"#[test]") && above.iter().all(is_run)
     });
-    let listed = source.split("with_both_kinds! {").skip(1).any(|list| {
-        let names = list.split('}').next().unwrap_or_default();
-        names.split(',').any(|listed| listed.trim() == name)
+    let is_function = lines.iter().any(|line| line.starts_with(&head));
+    let listed = |macros: &[&str]| macros.iter().any(|opening| is_listed(source, opening, name));
+    marked || listed(&MAKE_TESTS) || is_function && listed(&MAKE_TESTS_OF_FUNCTIONS)
+}
+
+/// Whether a name stands between the braces of a macro that is called with names only.
+fn is_listed(source: &str, opening: &str, name: &str) -> bool {
+    let mut calls = source.lines().scan(false, |inside, line| {
+        let list = if *inside { Some(line) } else { line.strip_prefix(opening) };
+        *inside = list.is_some_and(|list| !list.contains('}'));
+        Some(list.unwrap_or_default().split('}').next().unwrap_or_default())
     });
-    marked || listed && lines.iter().any(|line| line.starts_with(&head))
+    calls.any(|names| names.split([',', ' ']).any(|listed| listed == name))
 }
 
 /// What is wrong with the name of a test, if anything is.
@@ -108,4 +124,27 @@ pub fn wrong_with_tests(
     source_of: &impl Fn(&str) -> Option<String>,
 ) -> Vec<String> {
     tests.split(',').filter_map(|test| wrong_with(test.trim(), prefixes, source_of)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::has_test;
+
+    #[test]
+    fn a_test_is_run_or_ignored_for_a_reason_that_has_it_run_elsewhere() {
+        let test = |ignored: &str| has_test(&format!("#[test]\n{ignored}fn trips() {{"), "trips");
+        assert!(test("") && test("#[ignore = \"needs the emulator and the image: cargo xtask test\"]\n"));
+        assert!(test("#[ignore = \"takes minutes: cargo xtask test\"]\n"));
+        assert!(!test("#[ignore]\n") && !test("#[ignore = \"takes minutes\"]\n"));
+        assert!(!has_test("fn trips() {", "trips"));
+    }
+
+    #[test]
+    fn macros_make_tests_of_the_names_in_their_calls() {
+        let targets = "macro_rules! targets {\n    ($name:ident) => {\n}\n\ntargets! { frames node }\n";
+        assert!(has_test(targets, "node") && has_test(targets, "frames"));
+        assert!(!has_test(targets, "nod") && !has_test(targets, "ident"));
+        let both = "fn trips(kind: Kind) {}\nwith_both_kinds! {\n    trips,\n    missing,\n}\n";
+        assert!(has_test(both, "trips") && !has_test(both, "missing"));
+    }
 }

@@ -8,7 +8,7 @@ use crate::{firmware, lint, timing};
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask test
-  cargo test                only the tests that need neither emulator nor cross compiler
+  cargo test                only the tests that need neither emulator nor cross compiler, nor minutes
 
 What cannot be built or run here is left out, and it is said what is missing: the checks of an image,
 the tests in the emulator.";
@@ -32,12 +32,14 @@ pub(crate) fn run(_arguments: &Arguments) -> Result<()> {
 
     let mut tests = steps::cargo();
     tests.args(["test", "--workspace"]);
+    let mut with_ignored = false;
     let emulated = found.iter().any(|(board, _)| board.name == MPS2_AN385.name);
     match emulator::find() {
         Ok(()) if emulated => {
             // In its place: it was built above.
             tests.env(IMAGE_VARIABLE, MPS2_AN385.image());
             tests.args(["--", "--include-ignored"]);
+            with_ignored = true;
             match timing::build_plugin() {
                 Ok(plugin) => _ = tests.env(PLUGIN_VARIABLE, plugin),
                 // Where there are no plugins, those tests say that they are left out.
@@ -52,5 +54,13 @@ pub(crate) fn run(_arguments: &Arguments) -> Result<()> {
             note(&format!("What is missing for those:{missing}\n"));
         }
     }
-    steps::run(&mut tests)
+    steps::run(&mut tests)?;
+    if with_ignored { Ok(()) } else { long_tests() }
+}
+
+/// The tests that take minutes and no emulator.
+fn long_tests() -> Result<()> {
+    heading("Tests that take minutes");
+    let long = ["test", "--package", "ser-tests", "--test", "simulation", "--", "--ignored"];
+    steps::run(steps::cargo().args(long))
 }
