@@ -21,7 +21,8 @@ const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";
 /// So long nothing happens before.
 const REST_MS: u64 = 100;
 
-/// So long all inputs change in every millisecond: more events than the log holds. `cargo xtask timing` goes on for longer.
+/// So long all inputs change in every millisecond: more events than the log holds. `cargo xtask timing --load-seconds 60`
+/// goes on for a minute, which takes some three of real time.
 const LOAD_MS: u64 = 3_000;
 
 fn parts() -> Parts {

@@ -29,7 +29,7 @@ Examples:
   cargo xtask timing --load-seconds 60    with a minute of load
 
 Seconds are of virtual time, which counts instructions: the numbers are the same in every run and on every machine.
-Exit code 1 when something is over budget, or an event unaccounted for.";
+Exit code 1 when something is over budget, the capture interrupt late, or an event unaccounted for.";
 
     /// Count the instructions of the ARM image in the emulator, hold them against the budgets, and account for every event of
     /// a load.
@@ -57,7 +57,7 @@ Exit code 1 when something is over budget, or an event unaccounted for.";
             Ok(report) => {
                 println!("\n{report}");
                 let wrong = report.wrong();
-                wrong.iter().for_each(|wrong| eprintln!("over budget or missing: {wrong}"));
+                wrong.iter().for_each(|wrong| eprintln!("over budget, late or missing: {wrong}"));
                 if wrong.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
             }
             Err(what) => {
