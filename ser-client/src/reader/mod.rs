@@ -51,8 +51,9 @@
 //!   reader gives up some more of the oldest, to get ahead of the recorder. They are counted as lost like the rest.
 //! - A resize of which nobody knows, before the first reading of a program, puts another entry in the place of the anchor, and
 //!   looks as if the log had begun anew.
-//! - A resize in the middle of a reading shows when total and next slot part, or when the anchor is in another place.
-//!   In a ring of a few entries both may agree by chance, and an entry be taken for its neighbour.
+//! - A resize in the middle of a reading shows when total and next slot part, or when the anchor is in another place. Where
+//!   the anchor is overwritten already, or in a ring of a few entries, both may agree by chance (next slot 0 before and after
+//!   is enough), and an entry be taken for another: the events are right, and the count of the lost ones between them is not.
 //!
 //! The size of the ring must be right. An original unit does not tell it.
 
