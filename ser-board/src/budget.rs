@@ -1,5 +1,5 @@
-//! Ring lengths, interrupt priorities and what the capture interrupt may take, each with the reckoning behind it. Both boards take
-//! all of theirs from here.
+//! Ring lengths, interrupt priorities and what the capture interrupt may take, each with the reckoning behind it.
+//! Both boards take all of theirs from here.
 //!
 //! The rule for lengths: whatever comes in while the main loop is away for [`MAIN_LOOP_STALL_MS`] has to find room.
 //! The rule for priorities: the less an interrupt can wait, the higher. A build that breaks a rule does not compile.
@@ -54,11 +54,11 @@ pub const TRANSMIT_RING_LEN: usize = ring_len(bytes_in(TRANSMIT_AHEAD_MS));
 
 /// Instructions that a run of the capture interrupt may take, whatever the inputs do: `cargo xtask timing` counts them.
 ///
-/// It runs a thousand times a second, and a millisecond has 84,000 cycles at 84 MHz, the clock of the board to flash. At 4
-/// cycles each, taken high and not measured, 150 instructions are 600 cycles: 0.7 % of the processor, for the 7 µs of which
-/// everything else waits; the receiver can wait 520 µs. More would work, too. The bound is as close as the longest run
-/// allows, with debounce of all inputs and a full queue, so that what is added to it has to be worth it: all that can wait
-/// belongs in the main loop.
+/// It runs a thousand times a second, and a millisecond has 84,000 cycles at 84 MHz, the clock of the board to flash.
+/// At 4 cycles each, taken high and not measured, 150 instructions are 600 cycles: 0.7 % of the processor, for the 7
+/// µs of which everything else waits; the receiver can wait 520 µs. More would work, too. The bound is as close as
+/// the longest run allows, with debounce of all inputs and a full queue, so that what is added to it has to be worth
+/// it: all that can wait belongs in the main loop.
 pub const CAPTURE_INSTRUCTIONS: u64 = 150;
 
 /// Priority of the capture interrupt: above everything, for the millisecond of a sample is the product.
@@ -70,12 +70,12 @@ pub const RECEIVE_PRIORITY: u8 = 2;
 /// Priority of the transmit interrupt: being late makes a pause on the line and nothing else.
 pub const TRANSMIT_PRIORITY: u8 = 1;
 
-/// Priority of the GENI board's interrupt line: its edge is latched and does no more than wake the main loop, which looks at
-/// the board's flags in every pass anyway.
+/// Priority of the GENI board's interrupt line: its edge is latched and does no more than wake the main loop, which
+/// looks at the board's flags in every pass anyway.
 pub const EXTERNAL_BUS_PRIORITY: u8 = 1;
 
-/// Bytes of the log that may wait for a debug probe: all that a start has to say, some 40 records of 25 bytes at most. What
-/// finds no room is dropped; nothing else waits for the log.
+/// Bytes of the log that may wait for a debug probe: all that a start has to say, some 40 records of 25 bytes at
+/// most. What finds no room is dropped; nothing else waits for the log.
 pub const PROBE_RING_LEN: usize = ring_len(40 * 25);
 
 /// The length of a ring for so many items.

@@ -3,17 +3,17 @@
 //! The board hands over what the processor shows (ARMv7-M: Cortex-M3, M4, M7); what that means is here.
 //!
 //! # Design
-//! A stack runs out in three ways. The processor finds no room for the registers that it saves when an interrupt comes;
-//! a function moves the stack pointer out of the stack and then writes there, and when the processor takes that fault, it
-//! finds no room either; or a function writes several registers at once, which fails as a whole, with the stack pointer
-//! still in the stack and room above it. Only the third one looks like any other bad access: it is known by its address,
-//! right below the stack's end.
+//! A stack runs out in three ways. The processor finds no room for the registers that it saves when an interrupt
+//! comes; a function moves the stack pointer out of the stack and then writes there, and when the processor takes
+//! that fault, it finds no room either; or a function writes several registers at once, which fails as a whole, with
+//! the stack pointer still in the stack and room above it. Only the third one looks like any other bad access: it is
+//! known by its address, right below the stack's end.
 //!
 //! # Notes
-//! An address counts only while its valid bit is set; without, the register holds that of an earlier fault, or anything. A
-//! processor that puts writes off may report them without an address (`IMPRECISERR`): such a fault tells no place, and
-//! is a hard fault. Where a memory protection unit watches the stack's end, there are none of these. (ARMv7-M
-//! architecture, B3.2.15, B3.2.18.)
+//! An address counts only while its valid bit is set; without, the register holds that of an earlier fault, or
+//! anything. A processor that puts writes off may report them without an address (`IMPRECISERR`): such a fault tells
+//! no place, and is a hard fault. Where a memory protection unit watches the stack's end, there are none of these.
+//! (ARMv7-M architecture, B3.2.15, B3.2.18.)
 
 use crate::last_words::{Fault, Text};
 

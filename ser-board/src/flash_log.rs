@@ -12,11 +12,11 @@
 //! That a record is whole, and which of the two is newer, is for `ser_node` to say: it checks and numbers them.
 //!
 //! # Tradeoffs
-//! A general store for keys and values, `sequential-storage`, reads every record of a sector to find the last, takes six
-//! times the code, brings panicking paths into the image, and needs two sectors of one size for each copy that is to have
-//! sectors of its own (of the four of 16 KiB on an STM32F407, the first has to hold the vector table). There is one value
-//! here, it has one length, and its check and number come with it: a log of slots will do. Two sectors of 16 KiB with
-//! 10 000 erasures each are good for 20 million changes.
+//! A general store for keys and values, `sequential-storage`, reads every record of a sector to find the last, takes
+//! six times the code, brings panicking paths into the image, and needs two sectors of one size for each copy that is
+//! to have sectors of its own (of the four of 16 KiB on an STM32F407, the first has to hold the vector table). There
+//! is one value here, it has one length, and its check and number come with it: a log of slots will do. Two sectors
+//! of 16 KiB with 10 000 erasures each are good for 20 million changes.
 //!
 //! # Notes
 //! A sector of 16 KiB takes 1023 records, one of 128 KiB 8191. As the copies take turns, an erase is due once in as
@@ -103,8 +103,8 @@ impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
 
     const SECTOR_LEN: u32 = Self::SLOTS * SLOT_LEN;
 
-    /// The first copy in the first sector of `flash`, the second one in the second. Nothing is touched yet. A memory that is
-    /// smaller answers with an error of its own when it is.
+    /// The first copy in the first sector of `flash`, the second one in the second. Nothing is touched yet. A memory
+    /// that is smaller answers with an error of its own when it is.
     pub const fn new(flash: F, health: &'a FlashHealth) -> Self {
         FlashLog { flash, health }
     }

@@ -11,9 +11,9 @@
 //!
 //! # Design
 //! Two records, each with its own CRC-32: a fault that is cut short while it writes its words costs the words, never
-//! the count of boots. A fault's words stay, however many starts come after it, until the next fault's take their place or
-//! the power goes: whoever comes to see what happened comes late. The number of the boot that they belong to tells
-//! whether they are why the recorder starts, so they need not be touched to become old.
+//! the count of boots. A fault's words stay, however many starts come after it, until the next fault's take their
+//! place or the power goes: whoever comes to see what happened comes late. The number of the boot that they belong to
+//! tells whether they are why the recorder starts, so they need not be touched to become old.
 //!
 //! # Tradeoffs
 //! A panic's message is kept as far as it fits, 92 bytes; formatting it is up to the board, by [`Text`]'s
@@ -159,9 +159,9 @@ impl ResetCause {
         })
     }
 
-    /// `fault` is that of the run before. The flags know about the power; whatever the program wrote down before a sag is
-    /// not why it starts now. In all other cases the program knew better than the flags: a panic ends in a software reset, a locked-up processor in
-    /// the watchdog.
+    /// `fault` is that of the run before. The flags know about the power; whatever the program wrote down before a
+    /// sag is not why it starts now. In all other cases the program knew better than the flags: a panic ends in a
+    /// software reset, a locked-up processor in the watchdog.
     const fn new(flag: ResetFlag, fault: Option<Fault>) -> ResetCause {
         match (flag, fault) {
             (ResetFlag::PowerOn, _) => ResetCause::PowerOn,
@@ -336,8 +336,8 @@ pub struct Boot {
     pub last_words: Option<LastWords>,
 }
 
-/// Whether the memory holds what an earlier run of the program left. Where the chip does not tell why it was reset, memory
-/// that does not has been without power.
+/// Whether the memory holds what an earlier run of the program left. Where the chip does not tell why it was reset,
+/// memory that does not has been without power.
 #[must_use]
 pub fn is_kept(memory: &Memory) -> bool {
     let (boots, _) = memory.split_at(BOOT_WORDS);

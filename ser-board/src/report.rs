@@ -12,7 +12,8 @@ use crate::last_words::Boot;
 /// Counters that run all the time must not fill the log.
 const INTERVAL_MS: u32 = 1000;
 
-/// Logs how the run before ended, if it was a fault, or else what the latest fault had to say. Called once, at start-up.
+/// Logs how the run before ended, if it was a fault, or else what the latest fault had to say. Called once, at
+/// start-up.
 pub fn last_words(boot: &Boot) {
     let told = boot.last_words.as_ref().filter(|words| words.starts_ago == 1);
     if boot.cause.is_fault() {
@@ -113,8 +114,8 @@ fn log_clock(state: ClockState) {
     defmt::info!("battery-backed clock: {}", state);
 }
 
-/// One line for each counter of a structure that has moved. Every field is a counter or named as something else, so that
-/// a new one is not forgotten here.
+/// One line for each counter of a structure that has moved. Every field is a counter or named as something else, so
+/// that a new one is not forgotten here.
 macro_rules! log_counters {
     ($Type:ident, $before:expr, $after:expr, [$($counter:ident),* $(,)?] $(, other [$($other:ident),*])?) => {
         let (before, after): (&$Type, &$Type) = ($before, $after);

@@ -1,8 +1,9 @@
 //! The RS-232 line between the UART's interrupts and the main loop.
 //!
 //! A received byte keeps the tick at which it arrived, because the moment at which a command arrives matters to the
-//! recorder (it may set the clock), however late the main loop looks. A byte that is lost or misread is counted at once, by
-//! a count of its own: it is told even if no other byte ever comes, and when the ring has no room for anything.
+//! recorder (it may set the clock), however late the main loop looks. A byte that is lost or misread is counted at
+//! once, by a count of its own: it is told even if no other byte ever comes, and when the ring has no room for
+//! anything.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
@@ -188,8 +189,8 @@ impl Quiet {
     /// Looks at the transmitter. `idle` says that no byte waits in the ring or in the UART's data register.
     ///
     /// True two characters' time after the first look that found it idle: one character may be in the shift register.
-    /// Counts from looks and not from bytes, so however late it is asked, no character is cut short; but it has to be told
-    /// of bytes that were [`sent`](Self::sent) in between.
+    /// Counts from looks and not from bytes, so however late it is asked, no character is cut short; but it has to be
+    /// told of bytes that were [`sent`](Self::sent) in between.
     pub fn look(&mut self, idle: bool, now_ms: u32, baud: Baud) -> bool {
         if !idle {
             self.since_ms = None;

@@ -56,8 +56,8 @@ const CHECK_SHIFT: u32 = 3;
 const WORD_LEN: usize = 2;
 const INPUTS_PER_PART: usize = 8;
 
-/// How the bus has to be set up: the clock rests low, data are taken with its rising edge and change with the falling one; the
-/// first bit is there as soon as chip select falls.
+/// How the bus has to be set up: the clock rests low, data are taken with its rising edge and change with the falling
+/// one; the first bit is there as soon as chip select falls.
 pub const MODE: Mode = MODE_0;
 
 /// The fastest clock that the parts take, in hertz (data sheet, "SPI timing"; look it up for yours). An isolator in the

@@ -1,7 +1,7 @@
 //! The calendar registers of STM32 clocks (RTC version 2: F2, F4, F7, L4 …) as date and time, without the registers.
 //!
-//! The board gives access to SSR, TR and DR; when what they show can be believed, and what their bits mean, is here. Names
-//! and layouts are those of the reference manual (RM0090, chapter "Real-time clock").
+//! The board gives access to SSR, TR and DR; when what they show can be believed, and what their bits mean, is here.
+//! Names and layouts are those of the reference manual (RM0090, chapter "Real-time clock").
 //!
 //! ```text
 //! TR   PM(22) hour tens(21:20) units(19:16) | minute tens(14:12) units(11:8) | second tens(6:4) units(3:0)
@@ -14,9 +14,9 @@
 //! which holds in these years and with no other first year that is not a multiple of four. Registers that hold no
 //! date give `None`, never a panic.
 //!
-//! The registers go on while they are read, one after the other, and one that is read in the moment in which it changes may
-//! show anything (BYPSHAD; the shadow registers, which spare one that, have to be waited for). So all three are read until
-//! two rounds in a row show the same: [`read`].
+//! The registers go on while they are read, one after the other, and one that is read in the moment in which it
+//! changes may show anything (BYPSHAD; the shadow registers, which spare one that, have to be waited for). So all
+//! three are read until two rounds in a row show the same: [`read`].
 //!
 //! # Notes
 //! With `PREDIV_A` 0 and `PREDIV_S` 7FFFh a 32768 Hz crystal is read back in steps of 31 µs, at the price of a little
@@ -64,8 +64,8 @@ const MAX_ROUNDS: u32 = 16;
 
 /// SSR and the calendar, of one moment. `None` when they never stand still, which no clock that works does.
 ///
-/// Between two looks at an equal SSR the clock has not moved, for a whole second is longer than any round takes: date and
-/// time that were read in between are of that moment.
+/// Between two looks at an equal SSR the clock has not moved, for a whole second is longer than any round takes: date
+/// and time that were read in between are of that moment.
 pub fn read(registers: &mut impl CalendarRegisters) -> Option<(u16, Calendar)> {
     let mut round = || {
         let ssr = registers.ssr();

@@ -1,9 +1,9 @@
 //! Following a log: reading after reading, each from where the last one ended.
 //!
-//! An auto report is a reason to read, and no more. It says which events it brings by their place and the total, and both begin
-//! anew after an erase: nothing in a report shows whether it goes on with the log that was read last, and reports that would have
-//! shown it may be lost, or were never sent. A reading begins with the last event that was delivered, and if no more than nine
-//! have happened since, it is one request.
+//! An auto report is a reason to read, and no more. It says which events it brings by their place and the total, and
+//! both begin anew after an erase: nothing in a report shows whether it goes on with the log that was read last, and
+//! reports that would have shown it may be lost, or were never sent. A reading begins with the last event that was
+//! delivered, and if no more than nine have happened since, it is one request.
 
 use crate::{Cursor, Delivery, Disturbed, LogPosition, LogReader, RequestError, Summary, Unit};
 
@@ -63,8 +63,9 @@ impl LogFollower {
         self.position
     }
 
-    /// Reads what is new and hands it to `take`, reply by reply; each event comes once and in order, and what was lost is
-    /// told. Auto reports that came before the first reply are forgotten: the reading brings what they have to tell. When `take` fails, the reading ends with its error, and the next one begins before what it was given.
+    /// Reads what is new and hands it to `take`, reply by reply; each event comes once and in order, and what was
+    /// lost is told. Auto reports that came before the first reply are forgotten: the reading brings what they have
+    /// to tell. When `take` fails, the reading ends with its error, and the next one begins before what it was given.
     ///
     /// # Errors
     /// Those of `take`; no reply, a line that fails, or a log that is changed again and again while it is read.

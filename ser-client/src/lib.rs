@@ -1,9 +1,9 @@
 //! A host's conversation with a sequential event recorder: commands and their answers, told apart from what the
 //! recorder says by itself, and a log that is read by cursor, so that every event arrives once and in order.
 //!
-//! Most programs want [`open`] and [`Unit`]: blocking calls over a serial port or TCP. Underneath, [`Session`] (requests
-//! and their answers) and [`LogReader`] (which entries to read next) know neither clock nor port; they can be
-//! driven by any event loop, and by tests without waiting.
+//! Most programs want [`open`] and [`Unit`]: blocking calls over a serial port or TCP. Underneath, [`Session`]
+//! (requests and their answers) and [`LogReader`] (which entries to read next) know neither clock nor port; they can
+//! be driven by any event loop, and by tests without waiting.
 //!
 //! On a Genius bus a unit is reached through the window that a host shares with its GENI board; [`GeniHost`] also knows
 //! who else is on the bus, and speaks to all of them.

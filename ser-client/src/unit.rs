@@ -350,8 +350,8 @@ impl Unit {
         self.session.forget_earlier_reports();
     }
 
-    /// Whether reads go one at a time, because the unit does not take a request while it answers another one, or is on a
-    /// Genius bus. Otherwise there are two under way, and the line is never silent.
+    /// Whether reads go one at a time, because the unit does not take a request while it answers another one, or is
+    /// on a Genius bus. Otherwise there are two under way, and the line is never silent.
     #[must_use]
     pub fn reads_one_at_a_time(&self) -> bool {
         self.session.is_one_at_a_time()

@@ -594,8 +594,8 @@ proptest! {
         prop_assert_eq!(host.expected, Some(next_serial), "{:?}", told);
     }
 
-    /// The total has wrapped, and after an erase so many events follow at once that neither it nor the next slot shows it.
-    /// The entries do.
+    /// The total has wrapped, and after an erase so many events follow at once that neither it nor the next slot
+    /// shows it. The entries do.
     #[test]
     fn an_erase_that_no_header_shows_is_noticed(
         size in prop_oneof![Just(64_usize), Just(256), Just(2048)],

@@ -1,8 +1,8 @@
 //! What the event log costs, beside the rings of `heapless`, which one would use instead.
 //!
-//! The work is the recorder's: `append` adds an event to a full log, and the oldest one goes; `read_ten` finds the ten entries of
-//! a read reply in the middle of the ring; `read_all` takes all 2048 from the oldest to the newest. Both rivals do less: they know
-//! no entry numbers that outlive a wrap, no total, and no size that can be changed.
+//! The work is the recorder's: `append` adds an event to a full log, and the oldest one goes; `read_ten` finds the
+//! ten entries of a read reply in the middle of the ring; `read_all` takes all 2048 from the oldest to the newest.
+//! Both rivals do less: they know no entry numbers that outlive a wrap, no total, and no size that can be changed.
 
 use std::hint::black_box;
 

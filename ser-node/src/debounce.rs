@@ -51,8 +51,8 @@ impl Debounce {
 
 /// One bit of the counter of every input.
 ///
-/// A counter starts at 256 less the time and counts up. What is kept is in which bits it differs from its start, so that
-/// starting anew is a mask.
+/// A counter starts at 256 less the time and counts up. What is kept is in which bits it differs from its start, so
+/// that starting anew is a mask.
 #[derive(Clone, Copy, Debug, Default)]
 struct Plane {
     moved: u32,
@@ -60,7 +60,8 @@ struct Plane {
 }
 
 impl Plane {
-    /// Adds the carry to the counters that are `counting`, and starts the others anew. Gives the carry for the next plane.
+    /// Adds the carry to the counters that are `counting`, and starts the others anew. Gives the carry for the next
+    /// plane.
     #[inline]
     fn count(&mut self, counting: u32, carry: u32) -> u32 {
         let counter = self.moved ^ self.start;

@@ -6,14 +6,15 @@
 //! - **Time of arrival** is the tick of the [`poll`](GeniusPort::poll) in which the board handed the datagram over. It
 //!   lies behind the last bit on the bus by what the board takes to say so and to carry out Read Datagram, and by
 //!   up to two turns of the main loop; a datagram waits longer when others wait in the board before it.
-//! - **Replies** are sent once. A host that misses one asks again, as on RS-232; a repeated reply might be taken for the
-//!   answer to the next command.
-//! - **Auto reports** are repeated until their receiver has acknowledged one, with growing pauses, as a receiver that is
-//!   not there would cost all others their place in the bus scan. A receiver may get one twice when its acknowledgement
-//!   was lost; total and next slot show it. All devices together have one datagram of normal priority per bus scan, and those with
-//!   low numbers have the first chance: after each report as many scans are left to the others as there are others.
-//! - **Read I/O Forces** is answered with the recorder's own input tables: none is forced, and the values are the states
-//!   of the inputs. There are no outputs, so these tables are empty.
+//! - **Replies** are sent once. A host that misses one asks again, as on RS-232; a repeated reply might be taken for
+//!   the answer to the next command.
+//! - **Auto reports** are repeated until their receiver has acknowledged one, with growing pauses, as a receiver that
+//!   is not there would cost all others their place in the bus scan. A receiver may get one twice when its
+//!   acknowledgement was lost; total and next slot show it. All devices together have one datagram of normal priority
+//!   per bus scan, and those with low numbers have the first chance: after each report as many scans are left to the
+//!   others as there are others.
+//! - **Read I/O Forces** is answered with the recorder's own input tables: none is forced, and the values are the
+//!   states of the inputs. There are no outputs, so these tables are empty.
 //! - **Requests for memory** are refused: a recorder has none.
 
 mod reporter;

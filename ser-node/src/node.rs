@@ -72,8 +72,8 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
 
     /// Records all changes up to the sample of `now_ms`.
     ///
-    /// The main loop reads `now_ms` from [`tick_ms`](Self::tick_ms) *before* it hands over received bytes: a command that arrives
-    /// later than `now_ms` then never finds changes recorded that came after it.
+    /// The main loop reads `now_ms` from [`tick_ms`](Self::tick_ms) *before* it hands over received bytes: a command
+    /// that arrives later than `now_ms` then never finds changes recorded that came after it.
     pub fn poll(&mut self, now_ms: u32) {
         let now_ms = self.ticks.extend(now_ms);
         self.record_until(now_ms);

@@ -85,8 +85,8 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
-    /// Takes a command that arrived at `tick_ms`, which may be a while before `now_ms`, and carries it out if that moment
-    /// matters.
+    /// Takes a command that arrived at `tick_ms`, which may be a while before `now_ms`, and carries it out if that
+    /// moment matters.
     pub(crate) fn arrived(&mut self, command: &Command, tick_ms: u64, now_ms: u64) -> Answer {
         match *command {
             Command::SetClock(time) => {

@@ -1,10 +1,10 @@
 //! What it costs to find a full read reply in a byte stream and to understand it, beside what one would use instead.
 //!
 //! Two steps, each in a group with its rivals on the same work:
-//! - `to_bytes`: from characters to bytes. `faster-hex` turns the same characters into the same bytes; it is told where they
-//!   begin and end, and looks neither for a frame nor at a checksum.
-//! - `to_events`: from characters to ten events. For `nmea` each event is a ZDA sentence, cut out already, which holds time, date
-//!   and a checksum, and has no room for the inputs.
+//! - `to_bytes`: from characters to bytes. `faster-hex` turns the same characters into the same bytes; it is told
+//!   where they begin and end, and looks neither for a frame nor at a checksum.
+//! - `to_events`: from characters to ten events. For `nmea` each event is a ZDA sentence, cut out already, which
+//!   holds time, date and a checksum, and has no room for the inputs.
 
 use std::fmt::Write;
 use std::hint::black_box;

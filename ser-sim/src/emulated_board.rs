@@ -1,5 +1,5 @@
-//! What can be seen of the emulated board from outside, and done to it: the words of its external bus that are there for
-//! the bench.
+//! What can be seen of the emulated board from outside, and done to it: the words of its external bus that are there
+//! for the bench.
 
 use std::fmt;
 use std::num::NonZeroU32;

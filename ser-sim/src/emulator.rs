@@ -4,11 +4,12 @@
 //! QEMU's standard input and output are the RS-232 port. The contacts are a latch in the board's external memory, a
 //! file that both sides map, and there the board says which sample it took last.
 //!
-//! On a Genius bus the file also holds the shared RAM of the board's GENI, and whoever plays the bus plays the GENI too.
+//! On a Genius bus the file also holds the shared RAM of the board's GENI, and whoever plays the bus plays the GENI
+//! too.
 //!
-//! On the same bus the board finds its battery-backed clock: a count of milliseconds from here, written whenever the board
-//! is looked after, at least every 2 ms unless this computer is busy. It begins with this computer's time of day, so it goes
-//! on from one simulator to the next with the same memory.
+//! On the same bus the board finds its battery-backed clock: a count of milliseconds from here, written whenever the
+//! board is looked after, at least every 2 ms unless this computer is busy. It begins with this computer's time of
+//! day, so it goes on from one simulator to the next with the same memory.
 //!
 //! A step is written when its time has come, and not before the board has sampled the step before: on a stalled
 //! machine contacts move late, but no two moves become one and none is lost. What was played is recorded with the

@@ -1,9 +1,9 @@
 //! The desktop's view of the emulated board's external bus: the file behind its external memory.
 //!
 //! # Design
-//! The file is mapped and used one aligned 32-bit word at a time, except for the GENI window, which has bytes. Plain writes
-//! to the file would show up on the board as well, but the kernel copies a few bytes one by one, and an input latch
-//! caught between two of its bytes would be a contact change that never was.
+//! The file is mapped and used one aligned 32-bit word at a time, except for the GENI window, which has bytes. Plain
+//! writes to the file would show up on the board as well, but the kernel copies a few bytes one by one, and an input
+//! latch caught between two of its bytes would be a contact change that never was.
 
 use std::fs::{File, OpenOptions};
 use std::io;

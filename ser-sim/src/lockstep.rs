@@ -1,16 +1,16 @@
 //! The ARM image in QEMU in virtual time: it runs from stop to stop, and the world moves while it is held.
 //!
 //! # Design
-//! QEMU counts instructions for time (`-icount`), and a plugin of it (`ser-qemu-plugin`) holds the processor before chosen
-//! instructions. Between two stops nothing reaches the board from outside. What happens is then the same in every run and
-//! on every machine, and every instruction can be looked at.
+//! QEMU counts instructions for time (`-icount`), and a plugin of it (`ser-qemu-plugin`) holds the processor before
+//! chosen instructions. Between two stops nothing reaches the board from outside. What happens is then the same in
+//! every run and on every machine, and every instruction can be looked at.
 //!
 //! Inputs, clock and GENI board are in the memory that both sides map. Bytes for the board's UART go through QEMU's
 //! standard input; the UART's state, read by way of QEMU's test interface (`-qtest`), tells that they have arrived.
 //!
 //! # Tradeoffs
-//! One instruction lasts 2⁵ ns: 31.25 million in a second, less than any chip that one would flash. At 2⁰ ns the processor
-//! would be so fast that no load is one. Numbers of instructions do not depend on it.
+//! One instruction lasts 2⁵ ns: 31.25 million in a second, less than any chip that one would flash. At 2⁰ ns the
+//! processor would be so fast that no load is one. Numbers of instructions do not depend on it.
 //!
 //! # Notes
 //! An idle processor makes QEMU 7.2 jump two timer periods ahead instead of one. The bench therefore has to see that
@@ -122,8 +122,8 @@ impl Lockstep {
         Ok(lockstep)
     }
 
-    /// Lets the board run to the next stop; gives its address. `executed` is told of every instruction from the one it is held
-    /// at up to, and without, that stop.
+    /// Lets the board run to the next stop; gives its address. `executed` is told of every instruction from the one
+    /// it is held at up to, and without, that stop.
     ///
     /// # Errors
     /// When the emulator has ended or hangs.

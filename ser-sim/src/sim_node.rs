@@ -1,8 +1,8 @@
 //! A node in virtual time: the recorder itself, its contacts and both ends of its line.
 //!
-//! Time passes only when [`SimNode::advance_to`] says so, and then every millisecond of it, in order: contacts due
-//! in that millisecond move, all inputs are sampled, the node's main loop runs. However the caller is delayed, a
-//! contact lands on exactly the millisecond that its scenario gives. [`SimNode::leap_to`] comes to the same and passes over
+//! Time passes only when [`SimNode::advance_to`] says so, and then every millisecond of it, in order: contacts due in
+//! that millisecond move, all inputs are sampled, the node's main loop runs. However the caller is delayed, a contact
+//! lands on exactly the millisecond that its scenario gives. [`SimNode::leap_to`] comes to the same and passes over
 //! stretches in which nothing can happen, so that a quiet month takes no longer than a busy second.
 
 use std::collections::VecDeque;

@@ -1,8 +1,8 @@
 //! How long it takes to read a full log over RS-232, beside the least that it could take.
 //!
 //! The client's own session and log reader talk to the recorder over a line that has its rate in both directions, in
-//! virtual time: the same on every computer. Everything counts, from the first bit of the first request to the moment in which
-//! the last event is delivered.
+//! virtual time: the same on every computer. Everything counts, from the first bit of the first request to the moment
+//! in which the last event is delivered.
 
 use std::collections::VecDeque;
 use std::time::Duration;

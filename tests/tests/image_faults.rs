@@ -1,7 +1,7 @@
 //! What the ARM image does when something goes wrong for good: it starts anew, records again, and says what it was.
 //!
-//! The faults are brought about in the very image that is to be flashed: a word of the emulated board's external bus tells it
-//! to. Events are lost with the memory that they were in; the configuration and the time are not.
+//! The faults are brought about in the very image that is to be flashed: a word of the emulated board's external bus
+//! tells it to. Events are lost with the memory that they were in; the configuration and the time are not.
 #![cfg(unix)]
 
 mod image_records;

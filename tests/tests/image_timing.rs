@@ -1,5 +1,5 @@
-//! The ARM image in virtual time: what it costs in instructions, and that a load at its limit costs no event. `cargo xtask timing`
-//! prints all the numbers.
+//! The ARM image in virtual time: what it costs in instructions, and that a load at its limit costs no event. `cargo
+//! xtask timing` prints all the numbers.
 #![cfg(target_os = "linux")]
 
 use ser_board::budget::CAPTURE_INSTRUCTIONS;
@@ -21,8 +21,8 @@ const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";
 /// So long nothing happens before.
 const REST_MS: u64 = 100;
 
-/// So long all inputs change in every millisecond: more events than the log holds. `cargo xtask timing --load-seconds 60`
-/// goes on for a minute, which takes some three of real time.
+/// So long all inputs change in every millisecond: more events than the log holds. `cargo xtask timing --load-seconds
+/// 60` goes on for a minute, which takes some three of real time.
 const LOAD_MS: u64 = 3_000;
 
 fn parts() -> Parts {

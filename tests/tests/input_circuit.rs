@@ -1,5 +1,5 @@
-//! The circuit in front of each input, as `docs/hardware.md` draws it, reckoned for its worst case: the page's figures are
-//! the ones that come out, and its levels are valid ones.
+//! The circuit in front of each input, as `docs/hardware.md` draws it, reckoned for its worst case: the page's
+//! figures are the ones that come out, and its levels are valid ones.
 
 use std::fs;
 use std::path::Path;

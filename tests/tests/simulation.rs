@@ -84,7 +84,8 @@ fn the_same_seed_gives_the_same_run() {
     }
 }
 
-/// Checks that a time in which all inputs toggle in every millisecond is accounted for, and that both ports were busy in it.
+/// Checks that a time in which all inputs toggle in every millisecond is accounted for, and that both ports were busy
+/// in it.
 fn all_inputs_toggle_for(duration_ms: u64) {
     let options = Options { seed: 1, duration_ms, bus_one_in: 1 };
     let report = run_flat_out(options).unwrap_or_else(|failure| panic!("{failure}"));

@@ -17,13 +17,14 @@ pub(crate) struct Board {
     pub(crate) flash_budget: u32,
     /// Bytes of variables, with an event log of full size.
     pub(crate) variables_budget: u32,
-    /// Where the memory with the stack begins. Below, the protection unit allows nothing: a stack that gets there ends in a
-    /// fault.
+    /// Where the memory with the stack begins. Below, the protection unit allows nothing: a stack that gets there
+    /// ends in a fault.
     pub(crate) stack_floor: u32,
     /// Functions that go on while the flash is being erased, besides all interrupt handlers: they and all that they
     /// call have to be in RAM. None where nothing is erased.
     pub(crate) while_erasing: &'static [&'static str],
-    /// Functions that end the program on purpose, each with the reason: they may panic, and have no bound for the stack.
+    /// Functions that end the program on purpose, each with the reason: they may panic, and have no bound for the
+    /// stack.
     pub(crate) forced: &'static [(&'static str, &'static str)],
     /// The chip as probe-rs calls it; none on a board that is emulated.
     pub(crate) chip: Option<&'static str>,

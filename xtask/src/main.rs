@@ -1,7 +1,8 @@
 //! Everything about the project that is one command: `cargo xtask --help`.
 //!
-//! A verb is a file. What verbs share: [`setup`] finds or installs tools, [`steps`] runs them and says how to repeat what
-//! failed. [`boards`] says what there is to build, [`image`] reads what was built, [`checks`] says whether it may be flashed.
+//! A verb is a file. What verbs share: [`setup`] finds or installs tools, [`steps`] runs them and says how to repeat
+//! what failed. [`boards`] says what there is to build, [`image`] reads what was built, [`checks`] says whether it
+//! may be flashed.
 
 mod boards;
 mod checks;

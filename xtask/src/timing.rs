@@ -13,8 +13,8 @@ const PLUGIN: &str = "ser-qemu-plugin";
 /// From this version on QEMU has plugins name the second version of its interface.
 const SECOND_INTERFACE: u32 = 9;
 
-/// Count the instructions of the ARM image in the emulator, hold them against the budgets, and account for every event of
-/// a load.
+/// Count the instructions of the ARM image in the emulator, hold them against the budgets, and account for every
+/// event of a load.
 #[derive(Debug, clap::Args)]
 #[command(disable_help_flag = true)]
 pub(crate) struct Arguments {

@@ -1,9 +1,9 @@
 //! The hard fault handler's way in.
 //!
 //! # Design
-//! It changes to a stack of its own before it does anything, so that a stack that has run out is a fault like any other. The
-//! processor's own attempt to save registers there fails as well, and it then enters the handler without them (ARMv7-M
-//! architecture, B1.5.11, derived exceptions).
+//! It changes to a stack of its own before it does anything, so that a stack that has run out is a fault like any
+//! other. The processor's own attempt to save registers there fails as well, and it then enters the handler without
+//! them (ARMv7-M architecture, B1.5.11, derived exceptions).
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;

@@ -37,8 +37,8 @@ fn with_memory<T>(change: impl FnOnce(&mut Memory) -> T) -> T {
     result
 }
 
-/// What is known about the runs before; counts the start. `flag` says why the chip was reset, by the chip's own flags or by
-/// what is in the memory.
+/// What is known about the runs before; counts the start. `flag` says why the chip was reset, by the chip's own flags
+/// or by what is in the memory.
 ///
 /// # Safety
 /// This is called once only, before there are interrupts.

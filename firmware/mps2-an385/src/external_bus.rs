@@ -30,16 +30,16 @@
 //! Words have 32 bits, little-endian.
 //!
 //! - Causes: 0 unknown, 1 panic, 2 hard fault, 3 watchdog, 4 stack overflow, 5 the program asked for it, 6 power.
-//! - Faults that can be forced: 1 hard fault, 2 the main loop hangs, 3 panic, 4 stack overflow, 5 capture stops, 6 stack
-//!   overflow by a store, 7 reset without a word. The recorder clears the word before it obeys.
+//! - Faults that can be forced: 1 hard fault, 2 the main loop hangs, 3 panic, 4 stack overflow, 5 capture stops, 6
+//!   stack overflow by a store, 7 reset without a word. The recorder clears the word before it obeys.
 //! - Two words with a seal are good when the seal is the inverse of (low xor (high rotated by 16 bits)).
 //!
 //! # Design
 //! Straps are read once, at boot. After each sample the recorder writes first its tick and then what it saw: whoever
-//! changes the latch and then finds the change at 8020h knows that it has been sampled, and not later than at the tick
-//! that stands at 8004h. It is what a trigger output is to a scope. Before a boot is counted, both are set to what no
-//! sample can have written, so that nobody takes the run before for this one. The reset line is counted because the bench
-//! looks at it now and then, and a GENI board misses no pulse.
+//! changes the latch and then finds the change at 8020h knows that it has been sampled, and not later than at the
+//! tick that stands at 8004h. It is what a trigger output is to a scope. Before a boot is counted, both are set to
+//! what no sample can have written, so that nobody takes the run before for this one. The reset line is counted
+//! because the bench looks at it now and then, and a GENI board misses no pulse.
 //!
 //! # Tradeoffs
 //! Everything sits on one bus, so one file on the desktop holds all there is to see and to set.
@@ -116,7 +116,8 @@ pub(crate) fn read_inputs() -> u32 {
     INPUT_LATCH.read()
 }
 
-/// Tells the bench that the sample of `tick_ms` has been taken, and what it was. The order is a promise: see the design.
+/// Tells the bench that the sample of `tick_ms` has been taken, and what it was. The order is a promise: see the
+/// design.
 #[inline]
 pub(crate) fn mark_sample(tick_ms: u32, inputs: u32) {
     SAMPLE_COUNTER.write(tick_ms);

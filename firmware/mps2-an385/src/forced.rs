@@ -1,7 +1,7 @@
 //! Faults that the bench forces, to see what this very image does about them.
 //!
-//! A word of the external bus says which; it is cleared before it is obeyed, so that the next start is sane. Only the emulated
-//! board has such a word.
+//! A word of the external bus says which; it is cleared before it is obeyed, so that the next start is sane. Only the
+//! emulated board has such a word.
 
 use core::arch::naked_asm;
 use core::hint::black_box;

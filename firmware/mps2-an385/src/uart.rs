@@ -10,9 +10,10 @@
 //! capture interrupt delays.
 //!
 //! # Notes
-//! The transmit interrupt comes when the byte buffer becomes *empty*, never because it *is* empty, hence the main loop
-//! pends it. "Not full" says nothing about the shift register: that the line is quiet is found out by waiting. QEMU keeps no line speed: bytes come and go as fast as the other side takes them, and it holds back
-//! what the UART has no room for.
+//! The transmit interrupt comes when the byte buffer becomes *empty*, never because it *is* empty, hence the main
+//! loop pends it. "Not full" says nothing about the shift register: that the line is quiet is found out by waiting.
+//! QEMU keeps no line speed: bytes come and go as fast as the other side takes them, and it holds back what the UART
+//! has no room for.
 
 use cortex_m::peripheral::NVIC;
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};

@@ -1,8 +1,8 @@
 //! What runs from flash: until everything else is in RAM.
 //!
-//! Out of reset the processor takes stack and entry from the first two words of the flash. cortex-m-rt's start-up code
-//! then copies the image into RAM, vector table included, and calls `main` there; see `ram-image.x`. The first thing that `init`
-//! does is to go over to that table.
+//! Out of reset the processor takes stack and entry from the first two words of the flash. cortex-m-rt's start-up
+//! code then copies the image into RAM, vector table included, and calls `main` there; see `ram-image.x`. The first
+//! thing that `init` does is to go over to that table.
 
 use core::arch::naked_asm;
 
@@ -51,8 +51,8 @@ static BOOT_VECTORS: [Vector; 16] = [
     FAULT,
 ];
 
-/// The very first step: the watchdog, with the 0.5 s that it has by itself (4096 steps of 4 periods of some 32 kHz). From
-/// here on, a start that gets stuck, be it at a crystal that does not swing, is tried again.
+/// The very first step: the watchdog, with the 0.5 s that it has by itself (4096 steps of 4 periods of some 32 kHz).
+/// From here on, a start that gets stuck, be it at a crystal that does not swing, is tried again.
 ///
 /// # Safety
 /// Called by the start-up code, before there are variables.

@@ -8,14 +8,15 @@
 //! ```
 //!
 //! # Design
-//! A crystal that does not swing, or stops later, leaves the recorder with the chip's RC oscillator in its place: the same
-//! clocks, 1 % off at 25 °C and by several percent where it is hot or cold (data sheet, "HSI oscillator characteristics"). It goes
-//! on recording, and the fault lamp is lit for as long. Beyond some 4 % off, both ends together, RS-232 does not answer any more.
+//! A crystal that does not swing, or stops later, leaves the recorder with the chip's RC oscillator in its place: the
+//! same clocks, 1 % off at 25 °C and by several percent where it is hot or cold (data sheet, "HSI oscillator
+//! characteristics"). It goes on recording, and the fault lamp is lit for as long. Beyond some 4 % off, both ends
+//! together, RS-232 does not answer any more.
 //!
 //! # Tradeoffs
-//! The chip could run twice as fast. But the external bus has the processor's clock, and holds what it writes for one period of
-//! it and no more: at 168 MHz the buffers in front of the GENI board would eat that up (see `geni_bus`, which does not compile
-//! then). The recorder has time to spare at either speed.
+//! The chip could run twice as fast. But the external bus has the processor's clock, and holds what it writes for one
+//! period of it and no more: at 168 MHz the buffers in front of the GENI board would eat that up (see `geni_bus`,
+//! which does not compile then). The recorder has time to spare at either speed.
 //!
 //! PCLK1 is a quarter of what it could be, because the serial line's divider has 16 bits: at 42 MHz it ends at
 //! 641 bit/s, and the protocol has 300.

@@ -1,8 +1,8 @@
 //! What happens when something goes wrong for good: it is written down for the next start, and the board resets.
 //!
 //! # Design
-//! Nothing is logged here. The last words are, by the start that follows: the log's memory may be what has gone wrong, and
-//! a probe that comes later finds them too.
+//! Nothing is logged here. The last words are, by the start that follows: the log's memory may be what has gone
+//! wrong, and a probe that comes later finds them too.
 
 use core::panic::PanicInfo;
 

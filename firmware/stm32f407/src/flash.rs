@@ -1,9 +1,9 @@
 //! The configuration's flash: sectors 2 and 3, 16 KiB each.
 //!
 //! # Design
-//! Everything runs from RAM, so erasing and writing stop nobody: capture and the serial interrupts go on, and the main loop
-//! waits here. While it waits for an erase it feeds the watchdog, as long as capture makes progress and the erase takes no
-//! longer than it may.
+//! Everything runs from RAM, so erasing and writing stop nobody: capture and the serial interrupts go on, and the
+//! main loop waits here. While it waits for an erase it feeds the watchdog, as long as capture makes progress and the
+//! erase takes no longer than it may.
 //!
 //! # Notes
 //! 32 bits at a time, which wants 2.7 V at least: the brown-out reset has to be at its highest level, which
@@ -215,5 +215,6 @@ impl NorFlash for ConfigurationFlash {
     }
 }
 
-/// A bit that is 0 stays 0 and the others may follow, one write after the other: there is no check word beside the data.
+/// A bit that is 0 stays 0 and the others may follow, one write after the other: there is no check word beside the
+/// data.
 impl MultiwriteNorFlash for ConfigurationFlash {}

@@ -1,8 +1,8 @@
 //! The GENI board on the external bus: the 16 KiB window, its timing, reset and interrupt.
 //!
 //! # Timing
-//! From the GENI board's manual, chapter 2, "Timing for Shared RAM Read Cycle" and "… Write Cycle"; a clock of the bus is
-//! 1/84 MHz = 11.9 ns.
+//! From the GENI board's manual, chapter 2, "Timing for Shared RAM Read Cycle" and "… Write Cycle"; a clock of the
+//! bus is 1/84 MHz = 11.9 ns.
 //!
 //! | what                                 | board asks for  | set up as                              | gives         |
 //! |--------------------------------------|-----------------|----------------------------------------|---------------|
@@ -19,11 +19,11 @@
 //! The 60 ns are for the buffers between board and controller, 10 ns each way, for 10 ns of wire, and for what the
 //! controller wants to see before it reads (data sheet, "Asynchronous … read timings": a clock and 4 ns).
 //!
-//! **Hold when writing.** The controller keeps data, address and select for one clock after `/WR` has risen, and has no
-//! field to make that longer. Of the 11.9 ns, 10.9 are left for data and select and 9.9 for the address (data sheet,
-//! "Asynchronous … write timings": `th(Data_NWE)`, `th(NE_NWE)`, `th(A_NWE)`) †. Then each takes its own way, and it is the
-//! worst that counts: `/WR` through a 74AHCT541 at its slowest, 10 ns †; the data through a 74LVC8T245 at its fastest,
-//! 0.5 ns †; address and select through a 74AHCT541 at its fastest, 1 ns †.
+//! **Hold when writing.** The controller keeps data, address and select for one clock after `/WR` has risen, and has
+//! no field to make that longer. Of the 11.9 ns, 10.9 are left for data and select and 9.9 for the address (data
+//! sheet, "Asynchronous … write timings": `th(Data_NWE)`, `th(NE_NWE)`, `th(A_NWE)`) †. Then each takes its own way,
+//! and it is the worst that counts: `/WR` through a 74AHCT541 at its slowest, 10 ns †; the data through a 74LVC8T245
+//! at its fastest, 0.5 ns †; address and select through a 74AHCT541 at its fastest, 1 ns †.
 //!
 //! | held after `/WR` at the board | from the controller | + fastest buffer | − slowest `/WR` | left   |
 //! |-------------------------------|---------------------|------------------|-----------------|--------|
@@ -32,8 +32,8 @@
 //! | select (the manual has none)  | 10.9 ns             | 1.0 ns           | 10 ns           | 1.9 ns |
 //!
 //! With a clock of 168 MHz, 4.6 ns would be missing for the data. The data buffer stays enabled for as long as the
-//! select line is low and turned to the board for as long as `/RD` is high, so it does not let go earlier. When reading, the
-//! board holds its data for 2 ns (tdh), and the controller asks for none.
+//! select line is low and turned to the board for as long as `/RD` is high, so it does not let go earlier. When
+//! reading, the board holds its data for 2 ns (tdh), and the controller asks for none.
 //!
 //! † Look it up in the issue of the data sheet that belongs to the part.
 //!
@@ -46,12 +46,12 @@
 //! push-pull.
 //!
 //! # Tradeoffs
-//! The board's `/GENRDY` could end the strobe earlier, by half of it at best (ASYNCWAIT with WAITPOL high, since the line is
-//! high while the board is busy; DATAST then is 4 clocks and 30 ns at least). It is not used: the manual says that the
-//! line may stay high for ever after a reset, a broken board may hold it, and an access that waits on the bus can
-//! be interrupted by nothing. Capture would stand still, and the watchdog would reset a recorder that is well, over and
-//! over. With a strobe of fixed length the worst that a GENI board can do is to hand over wrong bytes, which its driver
-//! deals with. A pass of the main loop with 128 bytes of a datagram takes 0.15 ms for them.
+//! The board's `/GENRDY` could end the strobe earlier, by half of it at best (ASYNCWAIT with WAITPOL high, since the
+//! line is high while the board is busy; DATAST then is 4 clocks and 30 ns at least). It is not used: the manual says
+//! that the line may stay high for ever after a reset, a broken board may hold it, and an access that waits on the
+//! bus can be interrupted by nothing. Capture would stand still, and the watchdog would reset a recorder that is
+//! well, over and over. With a strobe of fixed length the worst that a GENI board can do is to hand over wrong bytes,
+//! which its driver deals with. A pass of the main loop with 128 bytes of a datagram takes 0.15 ms for them.
 //!
 //! # Notes
 //! `/INT` pulses for 5.44 µs; its edge is latched by the interrupt controller. During the 0.5 ms after `/RST`, in which

@@ -6,10 +6,10 @@
 //! nobody, not even for the flash: everything runs from RAM (`ram-image.x`).
 //!
 //! # Tradeoffs
-//! Registers are named by the register crate, and there is no HAL between. `stm32f4xx-hal` takes the ports of 16 inputs pin by
-//! pin, waits without bound and unwraps what it reads from the clock (whose leap years it counts from 1970), knows the flash
-//! in sectors of 128 KiB only, and brings paths to a panic into the image. What it would have saved is a few dozen lines, one
-//! file per part of the chip.
+//! Registers are named by the register crate, and there is no HAL between. `stm32f4xx-hal` takes the ports of 16
+//! inputs pin by pin, waits without bound and unwraps what it reads from the clock (whose leap years it counts from
+//! 1970), knows the flash in sectors of 128 KiB only, and brings paths to a panic into the image. What it would have
+//! saved is a few dozen lines, one file per part of the chip.
 #![no_std]
 #![no_main]
 

@@ -5,16 +5,17 @@
 //! a table in which two assignments share a pin. `docs/hardware.md` tells the same with package pins and parts.
 //!
 //! # Tradeoffs
-//! With the external bus in place no chip of the family has two whole ports left: of the 144 pins' ports only B is whole.
-//! So inputs 17–32 are half a port each, taken where no shifting is needed: one load per port and one OR. The three loads
-//! lie some 0.1 µs apart, which samples a millisecond apart do not see.
+//! With the external bus in place no chip of the family has two whole ports left: of the 144 pins' ports only B is
+//! whole. So inputs 17–32 are half a port each, taken where no shifting is needed: one load per port and one OR. The
+//! three loads lie some 0.1 µs apart, which samples a millisecond apart do not see.
 //!
 //! # Notes
-//! Only straps and the serial line's receiver have the chip's pull-ups. They are 30–50 kΩ, but 8–15 kΩ at PA10 and PB12
-//! (data sheet, "I/O static characteristics"), which a closed contact on PB12 could not pull to a valid low; and they must be off
-//! on a pin that is driven above the chip's supply, as 5 V logic may do. So field inputs and the GENI board's lines are held
-//! from outside, and where nothing is fitted outside nothing holds them; `docs/hardware.md` says with what. Ports that are
-//! not listed, and pins such as those of debugger and crystals, stay as they are out of reset.
+//! Only straps and the serial line's receiver have the chip's pull-ups. They are 30–50 kΩ, but 8–15 kΩ at PA10 and
+//! PB12 (data sheet, "I/O static characteristics"), which a closed contact on PB12 could not pull to a valid low; and
+//! they must be off on a pin that is driven above the chip's supply, as 5 V logic may do. So field inputs and the
+//! GENI board's lines are held from outside, and where nothing is fitted outside nothing holds them;
+//! `docs/hardware.md` says with what. Ports that are not listed, and pins such as those of debugger and crystals,
+//! stay as they are out of reset.
 
 use stm32f4::stm32f407::{GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG, RCC};
 
@@ -185,7 +186,8 @@ impl SetUp {
         data: Bits::NONE,
     };
 
-    /// Of a port, from the table. Does not compile when a pin has two roles, or a pull-up that is stronger than is reckoned.
+    /// Of a port, from the table. Does not compile when a pin has two roles, or a pull-up that is stronger than is
+    /// reckoned.
     const fn of(port: Port) -> SetUp {
         let mut set_up = SetUp::NONE;
         let mut taken = 0;

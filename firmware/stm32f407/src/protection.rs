@@ -8,9 +8,9 @@
 //! | 60000000h–60003FFFh  | shared RAM of the GENI board                       | data, one access at a time    |
 //!
 //! # Design
-//! *That nothing runs from flash* is what capture stands on while a sector is erased, so it is not left to the linker's
-//! word: a jump or a load that leaves the RAM is a fault at once, on the bench, and not a stalled sample once a year. The
-//! same region catches null pointers and a stack that has run out.
+//! *That nothing runs from flash* is what capture stands on while a sector is erased, so it is not left to the
+//! linker's word: a jump or a load that leaves the RAM is a fault at once, on the bench, and not a stalled sample
+//! once a year. The same region catches null pointers and a stack that has run out.
 //!
 //! # Notes
 //! By itself the processor takes the external bus for ordinary memory, whose accesses may be repeated, joined

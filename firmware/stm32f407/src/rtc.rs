@@ -1,12 +1,12 @@
 //! The chip's battery-backed clock, on its 32 kHz crystal.
 //!
 //! # Design
-//! The crystal takes up to seconds to start when the battery is new, and recording waits for no clock: it is switched on
-//! at start-up and looked at again when the clock is set. Every wait is bounded.
+//! The crystal takes up to seconds to start when the battery is new, and recording waits for no clock: it is switched
+//! on at start-up and looked at again when the clock is set. Every wait is bounded.
 //!
 //! # Tradeoffs
-//! All 15 bits of the divider are synchronous: the clock is read back in steps of 31 µs instead of 4 ms, and the battery
-//! gives a little more current.
+//! All 15 bits of the divider are synchronous: the clock is read back in steps of 31 µs instead of 4 ms, and the
+//! battery gives a little more current.
 //!
 //! # Notes
 //! That the clock was never set, or has lost battery *and* supply, shows in INITS; a crystal that stood still while the

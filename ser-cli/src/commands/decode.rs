@@ -31,7 +31,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "SIDE")]
     from: Option<Side>,
 
-    /// What the input looks like; without it, it is hex text if its first line is and no ESC byte (1Bh) is in the first 64 KiB.
+    /// What the input looks like; without it, it is hex text if its first line is and no ESC byte (1Bh) is in the
+    /// first 64 KiB.
     #[arg(long)]
     format: Option<CaptureFormat>,
 

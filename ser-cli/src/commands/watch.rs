@@ -193,8 +193,8 @@ impl Watch {
         Ok(())
     }
 
-    /// Waits for a report, or for the time to look at the log. Which it was makes no difference: only a reading shows whether
-    /// it is still the same log, and one takes the place of all reports that are waiting.
+    /// Waits for a report, or for the time to look at the log. Which it was makes no difference: only a reading shows
+    /// whether it is still the same log, and one takes the place of all reports that are waiting.
     fn wait(&mut self) -> Result<()> {
         let until = Instant::now() + self.interval;
         loop {

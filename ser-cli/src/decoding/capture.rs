@@ -21,8 +21,8 @@ pub struct CaptureOptions {
 }
 
 impl CaptureOptions {
-    /// Decodes all of `input` and lists what it holds, damage included. Any bytes are a capture. When reading fails, what came
-    /// before is listed, and the error is given back.
+    /// Decodes all of `input` and lists what it holds, damage included. Any bytes are a capture. When reading fails,
+    /// what came before is listed, and the error is given back.
     ///
     /// # Errors
     /// When the list cannot be written.

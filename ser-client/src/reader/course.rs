@@ -44,8 +44,8 @@ impl LogReader {
         }
     }
 
-    /// Asks for events that come after the anchor: first for those that do not fit the request for the anchor itself, up
-    /// to `DEPTH` replies in all, and then for the anchor and what does fit.
+    /// Asks for events that come after the anchor: first for those that do not fit the request for the anchor itself,
+    /// up to `DEPTH` replies in all, and then for the anchor and what does fit.
     fn next_events(&self, head: Head) -> Option<Asked> {
         if !self.checked && !self.asked.is_empty() {
             // It may be another log.

@@ -3,8 +3,8 @@
 //! [`LogReader`] delivers every event once and in order: across the end of the ring, across the wrap of the 16-bit
 //! total, and with events arriving meanwhile. What the recorder overwrote before it could be read is counted exactly.
 //! The reader performs no I/O: send what [`request`](LogReader::request) asks for, hand in the replies with
-//! [`take`](LogReader::take), and so on until there is no request any more and no reply is to come. One request at a time
-//! will do; with two, the next reply can follow the last one without a gap.
+//! [`take`](LogReader::take), and so on until there is no request any more and no reply is to come. One request at a
+//! time will do; with two, the next reply can follow the last one without a gap.
 //!
 //! # How it works
 //!
@@ -13,25 +13,27 @@
 //! `S` of the very moment at which its entries were copied, so for each entry it is certain which event it is, as long
 //! as the log is the same as before.
 //!
-//! That it is, only an entry can tell: after an erase, totals and slots may agree by chance with what recording would have
-//! made of them. So nothing is delivered before a reply has shown the *anchor*, the last event that was delivered, in its
-//! place (the first events of all have none, and stand on totals and slots). An erase takes the anchor away for good, since what is recorded later has another time. If the anchor is there in
-//! a reply, nothing was erased between the reply that brought it first and this one; and what was copied between these two,
-//! in whichever order it was asked for, is of the same log. Replies have to be taken in the order in which they were
+//! That it is, only an entry can tell: after an erase, totals and slots may agree by chance with what recording would
+//! have made of them. So nothing is delivered before a reply has shown the *anchor*, the last event that was
+//! delivered, in its place (the first events of all have none, and stand on totals and slots). An erase takes the
+//! anchor away for good, since what is recorded later has another time. If the anchor is there in a reply, nothing
+//! was erased between the reply that brought it first and this one; and what was copied between these two, in
+//! whichever order it was asked for, is of the same log. Replies have to be taken in the order in which they were
 //! copied, and that is all that this argument needs: requests may overlap, be lost, be repeated.
 //!
-//! Up to nine events fit the reply that begins with the anchor, and if there are no more, one request is all. If there are
-//! more, those that do not fit are asked for first, up to seven replies, and are kept; then comes the request for the anchor
-//! and the events right after it, and its reply proves all of them. So the proof costs one entry in eighty. Where the end
-//! of the ring leaves the anchor alone in its request, it is the same.
+//! Up to nine events fit the reply that begins with the anchor, and if there are no more, one request is all. If
+//! there are more, those that do not fit are asked for first, up to seven replies, and are kept; then comes the
+//! request for the anchor and the events right after it, and its reply proves all of them. So the proof costs one
+//! entry in eighty. Where the end of the ring leaves the anchor alone in its request, it is the same.
 //!
-//! Reading ahead must not cost the oldest events their lives. It goes only so far that the anchor, next to be overwritten,
-//! is still there as long as events come no faster than they are read.
+//! Reading ahead must not cost the oldest events their lives. It goes only so far that the anchor, next to be
+//! overwritten, is still there as long as events come no faster than they are read.
 //!
-//! If another entry is in the place of the anchor, or none, the log was erased or lost its contents, and reading begins
-//! anew with [`Lost::LogRestarted`]. Where the anchor is overwritten itself, the log must be full, which the entry with the
-//! highest number shows: if it does not exist, the log was erased (or the ring was made larger; then total and next slot do
-//! not agree, and what the resize threw away is counted). What was read in time is then delivered all the same.
+//! If another entry is in the place of the anchor, or none, the log was erased or lost its contents, and reading
+//! begins anew with [`Lost::LogRestarted`]. Where the anchor is overwritten itself, the log must be full, which the
+//! entry with the highest number shows: if it does not exist, the log was erased (or the ring was made larger; then
+//! total and next slot do not agree, and what the resize threw away is counted). What was read in time is then
+//! delivered all the same.
 //!
 //! A reading ends when everything that had happened when it began is delivered, so it ends also when events come
 //! faster than they can be read. Events that come meanwhile are delivered when they fit the same replies.
@@ -39,21 +41,22 @@
 //! # What cannot be known
 //!
 //! - The total counts modulo 65536. If more than 65,535 events happen between two readings, the count of lost ones is
-//!   too low by a multiple of 65536; and where the total makes it seem that the anchor must still be there, the log seems to
-//!   have begun anew.
-//! - An erase that is followed by at least as many events as the log holds, before the next look at the anchor, looks like
-//!   overwriting. The events are delivered; the count of lost ones is that of the totals, whatever it is worth.
-//! - An event that is recorded after an erase, in the slot of the anchor, with its inputs and, since the clock was set back,
-//!   with its time, passes for it.
+//!   too low by a multiple of 65536; and where the total makes it seem that the anchor must still be there, the log
+//!   seems to have begun anew.
+//! - An erase that is followed by at least as many events as the log holds, before the next look at the anchor, looks
+//!   like overwriting. The events are delivered; the count of lost ones is that of the totals, whatever it is worth.
+//! - An event that is recorded after an erase, in the slot of the anchor, with its inputs and, since the clock was
+//!   set back, with its time, passes for it.
 //! - A log that was empty has no anchor. Events that came and were erased before the next reading leave no trace.
 //! - The first reading of a log cannot know how often the total has wrapped: [`Lost::OverwrittenAtLeast`].
 //! - When events come so fast that the oldest entries are overwritten while the request for them is on its way, the
 //!   reader gives up some more of the oldest, to get ahead of the recorder. They are counted as lost like the rest.
-//! - A resize of which nobody knows, before the first reading of a program, puts another entry in the place of the anchor, and
-//!   looks as if the log had begun anew.
-//! - A resize in the middle of a reading shows when total and next slot part, or when the anchor is in another place. Where
-//!   the anchor is overwritten already, or in a ring of a few entries, both may agree by chance (next slot 0 before and after
-//!   is enough), and an entry be taken for another: the events are right, and the count of the lost ones between them is not.
+//! - A resize of which nobody knows, before the first reading of a program, puts another entry in the place of the
+//!   anchor, and looks as if the log had begun anew.
+//! - A resize in the middle of a reading shows when total and next slot part, or when the anchor is in another place.
+//!   Where the anchor is overwritten already, or in a ring of a few entries, both may agree by chance (next slot 0
+//!   before and after is enough), and an entry be taken for another: the events are right, and the count of the lost
+//!   ones between them is not.
 //!
 //! The size of the ring must be right. An original unit does not tell it.
 
@@ -72,8 +75,8 @@ use ahead::Ahead;
 /// The index that total 0 gets in the arithmetic here, large enough that nothing ever goes below zero.
 const BASE: u64 = 1 << 32;
 
-/// Events between two replies of a reading that are believed: half of what the total can tell, half a minute at the most that
-/// a recorder can do.
+/// Events between two replies of a reading that are believed: half of what the total can tell, half a minute at the
+/// most that a recorder can do.
 const MAX_HAPPENED: u64 = 1 << 15;
 
 /// A reading needs a few replies now and then that bring no event; so many in a row mean that something is wrong.
@@ -264,8 +267,8 @@ impl LogReader {
         self
     }
 
-    /// The entries to ask for next, each time others: several requests may be under way. `None` if there are none before
-    /// an answer comes; the reading is done when none [is awaited](Self::is_waiting) either.
+    /// The entries to ask for next, each time others: several requests may be under way. `None` if there are none
+    /// before an answer comes; the reading is done when none [is awaited](Self::is_waiting) either.
     pub fn request(&mut self) -> Option<ReadRequest> {
         let asked = self.plan()?;
         // By its start an answer is known.
@@ -514,8 +517,8 @@ impl LogReader {
         self.next = index;
     }
 
-    /// Takes events from index `first` on. If the anchor is among them and in its place, everything that was read before
-    /// its turn is of the same log and is delivered.
+    /// Takes events from index `first` on. If the anchor is among them and in its place, everything that was read
+    /// before its turn is of the same log and is delivered.
     fn take_events(
         &mut self,
         first: u64,
@@ -557,7 +560,8 @@ impl LogReader {
         Ok(())
     }
 
-    /// Keeps entries that are events `first`, `first + 1` and so on, as far as these have happened and were there still.
+    /// Keeps entries that are events `first`, `first + 1` and so on, as far as these have happened and were there
+    /// still.
     fn keep(&mut self, first: u64, request: ReadRequest, batch: Batch<'_>) {
         let Some(head) = self.head else { return };
         let len = batch.entries.len() as u64;

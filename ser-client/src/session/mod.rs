@@ -22,18 +22,19 @@
 //!
 //! # Two reads at once
 //!
-//! Reads may be [requested](Session::has_room) while another one is under way, so that the unit finds the next request when
-//! it is done with an answer, and the line is never silent. Everything else is one at a time.
+//! Reads may be [requested](Session::has_room) while another one is under way, so that the unit finds the next
+//! request when it is done with an answer, and the line is never silent. Everything else is one at a time.
 //!
-//! A unit answers in the order in which it was asked, and a line keeps the order. So an answer that comes before that to an
-//! earlier request shows that the earlier request or its answer was lost, and it is sent again at once. Answers are
-//! [handed out](Session::take_answer) in the order in which they come. The time for an answer begins when the one before it
-//! is there. A request that is repeated is alone under way.
+//! A unit answers in the order in which it was asked, and a line keeps the order. So an answer that comes before that
+//! to an earlier request shows that the earlier request or its answer was lost, and it is sent again at once. Answers
+//! are [handed out](Session::take_answer) in the order in which they come. The time for an answer begins when the one
+//! before it is there. A request that is repeated is alone under way.
 //!
-//! A unit need not take a request while it answers another one. When one of the first two goes unanswered, it is
-//! [one at a time](Session::is_one_at_a_time) for the rest of the session, and nothing of this counts as an attempt: to
-//! have tried it costs such a unit one timeout at most. A unit that has taken some is forgiven a loss, but not one in five;
-//! one that has taken eight without a loss is tried again after a hundred answers, because then it was the line.
+//! A unit need not take a request while it answers another one. When one of the first two goes unanswered, it is [one
+//! at a time](Session::is_one_at_a_time) for the rest of the session, and nothing of this counts as an attempt: to
+//! have tried it costs such a unit one timeout at most. A unit that has taken some is forgiven a loss, but not one in
+//! five; one that has taken eight without a loss is tried again after a hundred answers, because then it was the
+//! line.
 //!
 //! # What is repeated
 //!
@@ -213,7 +214,8 @@ impl Session {
         Ok(())
     }
 
-    /// Does what is due: hands out a frame to send, or gives a request up. When it has handed one out, another may be due.
+    /// Does what is due: hands out a frame to send, or gives a request up. When it has handed one out, another may be
+    /// due.
     pub fn dispatch(&mut self, now: Duration) -> Option<Attempt<'_>> {
         self.owed.expire(now);
         if self.attempt_ends_at().is_some_and(|end| end <= now) {
@@ -420,8 +422,8 @@ impl Session {
         }
     }
 
-    /// The outcome of a request, once. Of two reads it says itself, by its start, to which it is the answer. When one is
-    /// given up, so is the other.
+    /// The outcome of a request, once. Of two reads it says itself, by its start, to which it is the answer. When one
+    /// is given up, so is the other.
     pub fn take_answer(&mut self) -> Option<Result<Reply, NoReply>> {
         self.answers.pop_front()
     }

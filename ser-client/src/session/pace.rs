@@ -43,8 +43,8 @@ impl Pace {
         }
     }
 
-    /// One of two requests under way was not answered. Whether that is put down to there having been two: then it is one
-    /// at a time.
+    /// One of two requests under way was not answered. Whether that is put down to there having been two: then it is
+    /// one at a time.
     pub(super) fn lost(&mut self) -> bool {
         match self.credit.checked_sub(LOSS) {
             Some(credit) => self.credit = credit,

@@ -31,8 +31,8 @@ Examples:
 Seconds are of virtual time, which counts instructions: the numbers are the same in every run and on every machine.
 Exit code 1 when something is over budget, the capture interrupt late, or an event unaccounted for.";
 
-    /// Count the instructions of the ARM image in the emulator, hold them against the budgets, and account for every event of
-    /// a load.
+    /// Count the instructions of the ARM image in the emulator, hold them against the budgets, and account for every
+    /// event of a load.
     #[derive(Debug, Parser)]
     #[command(name = "cargo xtask timing", bin_name = "cargo xtask timing", version, after_help = EXAMPLES)]
     struct Arguments {

@@ -8,8 +8,8 @@ use super::ledger::{Erase, Ledger};
 /// The recorder's total counts modulo this, so that a reader may miss a multiple of it without a trace.
 const TOTAL_WRAPS_AT: usize = 65_536;
 
-/// A reader that events come too fast for gives up some of the oldest that are still there: as many as came during one of its
-/// requests, and as many again.
+/// A reader that events come too fast for gives up some of the oldest that are still there: as many as came during
+/// one of its requests, and as many again.
 const HASTE: usize = 2;
 
 /// What became of the events of a recorder, for one reader; each is in one of these.
@@ -88,8 +88,8 @@ impl Account {
         self.read_from = None;
     }
 
-    /// A reply of the reading says that the log has had so many events. Replies may be late, so how many there are by now is not
-    /// what the reader goes by.
+    /// A reply of the reading says that the log has had so many events. Replies may be late, so how many there are by
+    /// now is not what the reader goes by.
     pub fn see_total(&mut self, total: u16) {
         self.came_meanwhile = total.wrapping_sub(*self.read_from.get_or_insert(total));
     }
@@ -187,8 +187,8 @@ impl Account {
         }
     }
 
-    /// Whether so much has happened since the latest delivery that the total tells little of it. It can look as if the event
-    /// delivered last must still be there, and then its absence looks like an erase.
+    /// Whether so much has happened since the latest delivery that the total tells little of it. It can look as if
+    /// the event delivered last must still be there, and then its absence looks like an erase.
     fn has_wrapped(&self, ledger: &Ledger) -> bool {
         ledger.len() - self.next >= TOTAL_WRAPS_AT
     }
@@ -200,8 +200,9 @@ impl Account {
         (self.restart_told && self.has_wrapped(ledger)).then_some(latest)
     }
 
-    /// The event after an erase of which there is no word. It leaves no trace where the log was empty before, and where it is
-    /// full again; the count of what is lost is then that of two totals that have nothing to do with each other.
+    /// The event after an erase of which there is no word. It leaves no trace where the log was empty before, and
+    /// where it is full again; the count of what is lost is then that of two totals that have nothing to do with each
+    /// other.
     fn after_traceless(&self, erase: Erase, ledger: &Ledger, is: impl Fn(usize) -> bool) -> Option<usize> {
         let full_again = ledger.overwritten_before() > erase.from
             || ledger.len() - erase.from >= ledger.smallest_size().into();

@@ -16,8 +16,8 @@ use super::debounce_model::{Accepted, DebounceModel};
 /// A hundred years, 1970–2069: what two-digit years can tell apart.
 const CENTURY_MS: i64 = 36_525 * 86_400_000;
 
-/// So many events are kept at least: more than a log holds and a plant does while a printed line waits for a host that is
-/// stuck.
+/// So many events are kept at least: more than a log holds and a plant does while a printed line waits for a host
+/// that is stuck.
 const KEPT: usize = 1 << 17;
 
 /// For so long a reply may be on its way that tells older settings.

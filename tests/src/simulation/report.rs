@@ -48,8 +48,8 @@ pub struct Report {
     pub line: Talk,
     /// What was talked about on the bus, per recorder.
     pub bus: Vec<Talk>,
-    /// Events that the first recorder has printed, each one an event of the ledger; and events and edges that it has printed
-    /// not to be printed.
+    /// Events that the first recorder has printed, each one an event of the ledger; and events and edges that it has
+    /// printed not to be printed.
     pub printed: (u64, u64),
     /// Damaged frames that an eight-bit checksum would have let through, stopped by the simulation.
     pub forged: u64,

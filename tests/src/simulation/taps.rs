@@ -102,8 +102,8 @@ impl LineTap {
         LineTap { commands: FrameDecoder::new(), replies: FrameDecoder::new(), printout: Printout::default() }
     }
 
-    /// A byte goes in. Gives the command that it completes, if the recorder has room for it; a configuration that is refused is
-    /// as good as a question.
+    /// A byte goes in. Gives the command that it completes, if the recorder has room for it; a configuration that is
+    /// refused is as good as a question.
     pub fn goes_in(&mut self, byte: u8, has_room: bool, expected: &mut Expected) -> Option<Command> {
         match self.commands.push(byte)? {
             Decoded::Text(_) => None,

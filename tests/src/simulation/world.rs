@@ -1,4 +1,5 @@
-//! Recorders, hosts, lines and bus in one virtual time, life after life: a life is what lies between power-up and power cut.
+//! Recorders, hosts, lines and bus in one virtual time, life after life: a life is what lies between power-up and
+//! power cut.
 
 use ser_node::Debounce;
 use ser_proto::{AutoReport, Baud, Command, Configure, Model};
@@ -97,8 +98,8 @@ impl World {
         self.report()
     }
 
-    /// Lives one life on a bus in which all inputs toggle in every millisecond, and all hosts read as fast as they can while the
-    /// first recorder prints and reports everything.
+    /// Lives one life on a bus in which all inputs toggle in every millisecond, and all hosts read as fast as they
+    /// can while the first recorder prints and reports everything.
     ///
     /// # Errors
     /// The first thing that is not as it must be.

@@ -1,5 +1,5 @@
-//! The emulated board on a bench: contacts, a serial line at full rate, perhaps a Genius bus, all in step with the board's
-//! own milliseconds.
+//! The emulated board on a bench: contacts, a serial line at full rate, perhaps a Genius bus, all in step with the
+//! board's own milliseconds.
 //!
 //! The bench acts while the capture interrupt is about to take its sample. What it changes then is in that very sample.
 

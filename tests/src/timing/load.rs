@@ -1,5 +1,5 @@
-//! A recorder at its limit: all inputs change in every millisecond, while hosts on both ports read as fast as they can. Every
-//! event is delivered once or reported as overwritten, to each of them.
+//! A recorder at its limit: all inputs change in every millisecond, while hosts on both ports read as fast as they
+//! can. Every event is delivered once or reported as overwritten, to each of them.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -78,8 +78,8 @@ pub struct Account {
 }
 
 impl Account {
-    /// Whether nothing is missing: the recorder has counted each change, and each was delivered or reported as lost, to each
-    /// host.
+    /// Whether nothing is missing: the recorder has counted each change, and each was delivered or reported as lost,
+    /// to each host.
     #[must_use]
     pub fn is_settled(&self) -> bool {
         let all = |told: &Told| told.delivered + told.overwritten == self.changes;

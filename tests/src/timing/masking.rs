@@ -1,7 +1,8 @@
 //! Instructions that write the registers that mask interrupts.
 //!
-//! `CPSID` and `CPSIE` say in their own bits what they do. What `MSR` writes is in a register, which a trace of addresses does
-//! not show. An image may therefore only give back with it what was in force before: anything else could mask capture unseen.
+//! `CPSID` and `CPSIE` say in their own bits what they do. What `MSR` writes is in a register, which a trace of
+//! addresses does not show. An image may therefore only give back with it what was in force before: anything else
+//! could mask capture unseen.
 
 use std::ops::Range;
 

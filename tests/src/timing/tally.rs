@@ -1,10 +1,10 @@
-//! Counts instructions, one after the other as they are executed: per run of a handler, per pass of the main loop, and while
-//! interrupts are masked.
+//! Counts instructions, one after the other as they are executed: per run of a handler, per pass of the main loop,
+//! and while interrupts are masked.
 //!
 //! # Design
-//! A handler begins with its first instruction, which nobody calls, and ends with a return that belongs to no call inside
-//! of it. What a handler of higher priority does in between counts for that one alone. A pass of the main loop goes from the
-//! place that it jumps to behind its sleep to the same place again.
+//! A handler begins with its first instruction, which nobody calls, and ends with a return that belongs to no call
+//! inside of it. What a handler of higher priority does in between counts for that one alone. A pass of the main loop
+//! goes from the place that it jumps to behind its sleep to the same place again.
 //!
 //! # Notes
 //! Entry and exit of an exception take a dozen cycles each and are no instructions.
@@ -201,8 +201,8 @@ impl<'p> Tally<'p> {
 mod tests {
     use super::*;
 
-    /// Main loop at 100h: NOP, CPSID I, CPSIE I, WFI, MOV, B back to 100h. Capture at 200h: PUSH, BL 210h, POP {PC}. Its
-    /// function at 210h: BX LR. Receive at 220h: NOP, BX LR.
+    /// Main loop at 100h: NOP, CPSID I, CPSIE I, WFI, MOV, B back to 100h. Capture at 200h: PUSH, BL 210h, POP {PC}.
+    /// Its function at 210h: BX LR. Receive at 220h: NOP, BX LR.
     fn program() -> Program {
         let mut code = vec![0xBF00; 0x140 / 2];
         let mut put = |at: usize, halfwords: &[u16]| {

@@ -85,7 +85,8 @@ impl World {
         self.received.exact &= self.unit.happened() - self.received.next <= MAX_UNREAD;
     }
 
-    /// Somebody erases the log, when nothing is under way: what an older log said could be taken for news of the new one.
+    /// Somebody erases the log, when nothing is under way: what an older log said could be taken for news of the new
+    /// one.
     fn erase(&mut self) {
         self.bring_all();
         self.take_reports();
