@@ -24,8 +24,7 @@ fn assert_accounted(report: &Report) {
         assert_eq!(edges.applied, in_columns, "{report}");
     }
     for (tally, recorder) in report.tallies.iter().map(|(_, tally)| tally).zip([0, 0, 1]) {
-        let in_columns = tally.delivered + tally.overwritten + tally.gone + tally.unwatched;
-        assert_eq!(report.recorded[recorder], in_columns, "{report}");
+        assert_eq!(report.recorded[recorder], tally.accounted(), "{report}");
     }
 }
 

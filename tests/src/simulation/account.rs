@@ -1,5 +1,8 @@
 //! What one reader was told, held against the ledger: each event once and in order, and each loss for what it was.
 
+#[cfg(test)]
+mod tests;
+
 use ser_client::{Delivery, Lost};
 use ser_proto::Entry;
 
@@ -12,6 +15,9 @@ const TOTAL_WRAPS_AT: usize = 65_536;
 /// one of its requests, and as many again.
 const HASTE: usize = 2;
 
+/// Power-up is as good as an erase.
+const POWER_UP: Erase = Erase { from: 0, to: 0, certain: true };
+
 /// What became of the events of a recorder, for one reader; each is in one of these.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
@@ -21,6 +27,9 @@ pub struct Tally {
     pub overwritten: u64,
     /// Went unread with an erase or the power, and that was reported.
     pub gone: u64,
+    /// Went the same way without a report. Only a reader that knows no event to miss can be left without, or one that finds the
+    /// log full again, or one that has not read since.
+    pub unreported: u64,
     /// Recorded while this reader's port was not connected.
     pub unwatched: u64,
     /// Restarts of the log that were reported.
@@ -29,6 +38,14 @@ pub struct Tally {
     pub traceless: u64,
     /// Losses whose count was too low by a multiple of 65536.
     pub wrapped: u64,
+}
+
+impl Tally {
+    /// All events that are in one of the columns.
+    #[must_use]
+    pub fn accounted(&self) -> u64 {
+        self.delivered + self.overwritten + self.gone + self.unreported + self.unwatched
+    }
 }
 
 /// A reader's place in the ledger.
@@ -50,6 +67,8 @@ pub struct Account {
     came_meanwhile: u16,
     /// Whether the reader knows the last event that it was given, and so would miss it.
     anchored: bool,
+    /// Events that went unread with the power, until it is seen whether that is reported.
+    cut_off: u64,
     tally: Tally,
 }
 
@@ -68,6 +87,7 @@ impl Account {
             read_from: None,
             came_meanwhile: 0,
             anchored: false,
+            cut_off: 0,
             tally: Tally::default(),
         }
     }
@@ -97,7 +117,7 @@ impl Account {
     /// What became of all events up to the reader's place.
     #[must_use]
     pub fn tally(&self) -> Tally {
-        self.tally
+        Tally { unreported: self.tally.unreported + self.cut_off, ..self.tally }
     }
 
     /// The next event to be delivered, if the reader has read in this life.
@@ -106,11 +126,14 @@ impl Account {
         (self.life == ledger.life()).then_some(self.next)
     }
 
-    /// The power goes. What is unread is gone, with notice if this reader was connected.
+    /// The power goes. What is unread is gone; if this reader was connected, it has to be told.
     pub fn power_goes(&mut self, ledger: &Ledger, connected: bool) {
+        if self.restart_told {
+            self.end_restart();
+        }
         let place = self.place(ledger).unwrap_or(0);
         let unread = (ledger.len() - place) as u64;
-        *(if connected { &mut self.tally.gone } else { &mut self.tally.unwatched }) += unread;
+        *(if connected { &mut self.cut_off } else { &mut self.tally.unwatched }) += unread;
         self.life = ledger.life() + 1;
         self.next = 0;
         self.erases_behind = 0;
@@ -166,23 +189,18 @@ impl Account {
                 return self.go_on(straight + wraps * TOTAL_WRAPS_AT, wraps, lost, ledger);
             }
         }
-        // Power-up is as good as an erase.
-        let power_up = self.new_life.then_some(Erase { from: 0, to: 0 });
+        let power_up = self.new_life.then_some(POWER_UP);
         let erases = self.erases_ahead(ledger).rev().chain(power_up).chain(self.looks_erased(ledger));
         let after_erase = { erases }.find_map(|erase| {
-            let last = erase.to.min(ledger.len());
-            let wraps = (ledger.len() - erase.from) / TOTAL_WRAPS_AT;
-            let exact = (0..=wraps).find_map(|wraps| {
-                let lost = lost + wraps * TOTAL_WRAPS_AT;
-                (erase.from + lost..=last + lost).find(|&index| is(index))
-            });
-            exact.or_else(|| self.after_traceless(erase, ledger, is))
+            let index = if self.anchored && !self.restart_told {
+                self.after_traceless(erase, ledger, is)
+            } else {
+                after_exactly(erase, lost, ledger, is)
+            };
+            index.map(|index| (index, erase))
         });
-        match after_erase.filter(|&index| index >= self.next) {
-            Some(index) => {
-                self.restarted_at(index, lost, ledger);
-                Ok(())
-            }
+        match after_erase.filter(|&(index, _)| index >= self.next) {
+            Some((index, erase)) => self.restarted_at(index, erase, lost, ledger),
             None => Err(self.explain(entry, lost, ledger)),
         }
     }
@@ -195,21 +213,34 @@ impl Account {
 
     /// The erase from which on the total counts, where there seems to have been another one since.
     fn looks_erased(&self, ledger: &Ledger) -> Option<Erase> {
-        let power_up = Erase { from: 0, to: 0 };
-        let latest = ledger.erases()[..self.erases_behind].last().copied().unwrap_or(power_up);
+        let latest = ledger.erases()[..self.erases_behind].last().copied().unwrap_or(POWER_UP);
         (self.restart_told && self.has_wrapped(ledger)).then_some(latest)
     }
 
-    /// The event after an erase of which there is no word. It leaves no trace where the log was empty before, and
-    /// where it is full again; the count of what is lost is then that of two totals that have nothing to do with each
-    /// other.
+    /// The event after an erase of which there is no word, to a reader that knows the event before. It leaves no trace where the log
+    /// is full again; the count of what is lost is then that of two totals that have nothing to do with each other.
     fn after_traceless(&self, erase: Erase, ledger: &Ledger, is: impl Fn(usize) -> bool) -> Option<usize> {
+        let found = || (erase.from..ledger.len()).find(|&index| is(index));
+        self.may_miss(erase, ledger).then(found).flatten()
+    }
+
+    /// Whether the reader finds no trace of an erase: it knows no event that is gone with it, or the log is full again and the event
+    /// would have been overwritten.
+    fn may_miss(&self, erase: Erase, ledger: &Ledger) -> bool {
         let full_again = ledger.overwritten_before() > erase.from
             || ledger.len() - erase.from >= ledger.smallest_size().into();
-        if self.restart_told || self.anchored && !full_again {
+        !self.anchored || full_again
+    }
+
+    /// An erase that lies between the latest delivery and the event of this index, that must have been seen and of which there is
+    /// no word.
+    fn silent_erase(&self, index: usize, ledger: &Ledger) -> Option<Erase> {
+        if self.restart_told {
             return None;
         }
-        (erase.from..ledger.len()).find(|&index| is(index))
+        let between = |erase: &Erase| erase.certain && erase.from >= self.next && erase.to <= index;
+        let erases = self.erases_ahead(ledger).filter(between).chain(self.new_life.then_some(POWER_UP));
+        { erases }.find(|&erase| !self.may_miss(erase, ledger))
     }
 
     /// How many times the total has wrapped unseen before the event at `index` or so many rings further on.
@@ -220,19 +251,12 @@ impl Account {
 
     /// Delivers an event of the same log, after so many that were reported as lost.
     fn go_on(&mut self, index: usize, wraps: usize, lost: usize, ledger: &Ledger) -> Result<(), String> {
+        if let Some(erase) = self.silent_erase(index, ledger) {
+            return Err(self.explain_silence(index, erase));
+        }
         let missing = index - self.next;
         if missing > 0 {
-            let came = self.came_meanwhile;
-            let may_be_lost = ledger.overwritten_before() + HASTE * usize::from(came);
-            if index > may_be_lost {
-                return Err(format!(
-                    "{}: {lost} events before number {index} are reported as lost and are still there: of {}, those \
-                     before {} may be overwritten, and {came} came during the reading",
-                    self.name,
-                    ledger.len(),
-                    ledger.overwritten_before(),
-                ));
-            }
+            self.check_overwritten(index, lost, ledger)?;
         }
         self.tally.wrapped += u64::from(wraps > 0);
         self.tally.overwritten += missing as u64;
@@ -241,23 +265,69 @@ impl Account {
     }
 
     /// Delivers the first event after an erase.
-    fn restarted_at(&mut self, index: usize, lost: usize, ledger: &Ledger) {
+    fn restarted_at(
+        &mut self,
+        index: usize,
+        erase: Erase,
+        lost: usize,
+        ledger: &Ledger,
+    ) -> Result<(), String> {
+        if lost > 0 || index > erase.to {
+            self.check_overwritten(index, lost, ledger)?;
+        }
         let overwritten = if self.restart_told { lost.min(index - self.next) } else { 0 };
         self.tally.overwritten += overwritten as u64;
-        self.tally.gone += (index - self.next - overwritten) as u64;
+        self.count_gone((index - self.next - overwritten) as u64);
         self.deliver(index, ledger);
+        Ok(())
+    }
+
+    /// Checks that the events before this one, which the reader was not given, can have been overwritten.
+    fn check_overwritten(&self, index: usize, lost: usize, ledger: &Ledger) -> Result<(), String> {
+        let came = self.came_meanwhile;
+        let may_be_lost = ledger.overwritten_before() + HASTE * usize::from(came);
+        if index <= may_be_lost {
+            return Ok(());
+        }
+        Err(format!(
+            "{}: {lost} events before number {index} are reported as lost and are still there: of {}, those before {} may be \
+             overwritten, and {came} came during the reading",
+            self.name,
+            ledger.len(),
+            ledger.overwritten_before(),
+        ))
+    }
+
+    /// So many events are gone with the log, with or without a word.
+    fn count_gone(&mut self, events: u64) {
+        *(if self.restart_told { &mut self.tally.gone } else { &mut self.tally.unreported }) += events;
+    }
+
+    /// What was told of a restart, or was not, has been accounted for.
+    fn end_restart(&mut self) {
+        let cut_off = std::mem::take(&mut self.cut_off);
+        self.count_gone(cut_off);
+        self.tally.restarts += u64::from(self.restart_told);
+        self.restart_told = false;
     }
 
     fn deliver(&mut self, index: usize, ledger: &Ledger) {
         let passed = self.erases_ahead(ledger).filter(|erase| erase.to <= index).count();
         self.tally.traceless += passed.saturating_sub(self.restart_told.into()) as u64;
-        self.tally.restarts += u64::from(self.restart_told);
+        self.end_restart();
         let rest = &ledger.erases()[self.erases_behind..];
         self.erases_behind += rest.iter().take_while(|erase| erase.to <= index).count();
-        self.restart_told = false;
         self.new_life = false;
+        self.anchored = true;
         self.tally.delivered += 1;
         self.next = index + 1;
+    }
+
+    fn explain_silence(&self, index: usize, erase: Erase) -> String {
+        format!(
+            "{}: event {} was due, event {index} comes, and there is no word of a restart between: {erase:?}, new life: {}",
+            self.name, self.next, self.new_life,
+        )
     }
 
     fn explain(&self, entry: &Entry, lost: usize, ledger: &Ledger) -> String {
@@ -288,14 +358,20 @@ impl Account {
     pub fn finish_reading(&mut self, ledger: &Ledger) -> Result<(), String> {
         let len = ledger.len();
         let place = self.place(ledger).unwrap_or(0);
-        if place == len {
-            return Ok(());
-        }
         // An erase with nothing after it; that one need not be the last to have arrived.
-        let emptied = self.erases_ahead(ledger).any(|erase| erase.to >= len);
-        if emptied {
+        let emptied = || self.erases_ahead(ledger).any(|erase| erase.to >= len);
+        let gone = place < len && emptied();
+        if (self.new_life || gone) && self.anchored && !self.restart_told {
+            return Err(format!(
+                "{}: nothing has come of a log that began anew, nor a word of a restart",
+                self.name
+            ));
+        }
+        if place == len || gone {
             self.life = ledger.life();
-            self.tally.gone += (len - place) as u64;
+            self.count_gone((len - place) as u64);
+            let cut_off = std::mem::take(&mut self.cut_off);
+            self.count_gone(cut_off);
             self.next = len;
             return Ok(());
         }
@@ -306,4 +382,14 @@ impl Account {
             self.erases_ahead(ledger).collect::<Vec<_>>(),
         ))
     }
+}
+
+/// The event after an erase with so many reported as lost before it, or a multiple of 65536 more.
+fn after_exactly(erase: Erase, lost: usize, ledger: &Ledger, is: impl Fn(usize) -> bool) -> Option<usize> {
+    let last = erase.to.min(ledger.len());
+    let wraps = (ledger.len() - erase.from) / TOTAL_WRAPS_AT;
+    (0..=wraps).find_map(|wraps| {
+        let lost = lost + wraps * TOTAL_WRAPS_AT;
+        (erase.from + lost..=last + lost).find(|&index| is(index))
+    })
 }

@@ -75,6 +75,8 @@ pub struct Erase {
     pub from: usize,
     /// The latest it can have been; grows until its reply has been seen.
     pub to: usize,
+    /// Whether it has been, and not only may have been.
+    pub certain: bool,
 }
 
 /// The port that a command came by.
@@ -293,7 +295,7 @@ impl Ledger {
     pub fn command_arrived(&mut self, port: Port, command: &Command, until_ms: u64) {
         match command {
             Command::Erase => {
-                self.erases.push(Erase { from: self.len(), to: usize::MAX });
+                self.erases.push(Erase { from: self.len(), to: usize::MAX, certain: false });
                 self.due.push_back((port, until_ms, Due::Erase(self.erases.len() - 1)));
             }
             // Its answer looks the same.
@@ -310,7 +312,9 @@ impl Ledger {
     /// A command has arrived and been carried out at once.
     pub fn command_done(&mut self, command: &Command) {
         match command {
-            Command::Erase => self.erases.push(Erase { from: self.len(), to: self.len() }),
+            Command::Erase => {
+                self.erases.push(Erase { from: self.len(), to: self.len(), certain: true });
+            }
             Command::Configure(configure) => {
                 self.forget_configuration(Port::Bus);
                 self.size = configure.size.unwrap_or(self.size);
@@ -333,7 +337,12 @@ impl Ledger {
     /// When it tells other settings than those in force.
     pub fn replied(&mut self, port: Port, reply: &Reply) -> Result<(), String> {
         match reply {
-            Reply::Erased => self.finish(|of, _, due| of == port && matches!(due, Due::Erase(_))),
+            Reply::Erased => {
+                let done = self.finish(|of, _, due| of == port && matches!(due, Due::Erase(_)));
+                if let Some(Due::Erase(number)) = done {
+                    self.erases[number].certain = true;
+                }
+            }
             Reply::Configuration(configuration) => {
                 self.finish(|of, _, due| of == port && matches!(due, Due::Size(_)));
                 self.size = configuration.size;
@@ -364,20 +373,18 @@ impl Ledger {
         }
     }
 
-    /// The oldest of these has been done.
-    fn finish(&mut self, is: impl Fn(Port, u64, &Due) -> bool) {
-        let Some(index) = self.due.iter().position(|(of, until_ms, due)| is(*of, *until_ms, due)) else {
-            return;
-        };
-        match self.due.remove(index) {
-            Some((_, _, Due::Erase(number))) => self.erases[number].to = self.len(),
-            Some((_, _, Due::Size(Some(size)))) => {
-                // Which of the two it is, the next configuration tells.
-                self.size = self.size.min(size);
-            }
-            Some((_, _, Due::Size(None))) | None => {}
+    /// The oldest of these has been done, or never will be. Gives what it was.
+    fn finish(&mut self, is: impl Fn(Port, u64, &Due) -> bool) -> Option<Due> {
+        let index = self.due.iter().position(|(of, until_ms, due)| is(*of, *until_ms, due))?;
+        let (_, _, due) = self.due.remove(index)?;
+        match due {
+            Due::Erase(number) => self.erases[number].to = self.len(),
+            // Which of the two it is, the next configuration tells.
+            Due::Size(Some(size)) => self.size = self.size.min(size),
+            Due::Size(None) => {}
         }
         self.note_overwritten();
+        Some(due)
     }
 
     /// How many events there were since power-up.

@@ -78,10 +78,11 @@ impl Report {
         let tallies = || self.tallies.iter().map(|(_, tally)| tally);
         let row = |what, count: fn(&Tally) -> u64| Row::new(what, tallies().map(count));
         vec![
-            row("events", |tally| tally.delivered + tally.overwritten + tally.gone + tally.unwatched),
+            row("events", Tally::accounted),
             row("= delivered, once and in order", |tally| tally.delivered),
             row("+ overwritten, reported", |tally| tally.overwritten),
             row("+ gone with the log, reported", |tally| tally.gone),
+            row("+ gone without a trace", |tally| tally.unreported),
             row("+ not connected", |tally| tally.unwatched),
             row("log restarts reported", |tally| tally.restarts),
             row("log restarts without a trace", |tally| tally.traceless),

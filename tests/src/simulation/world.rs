@@ -129,7 +129,7 @@ impl World {
         // The line is the first recorder's, and then each has its conversation on the bus.
         for (account, unit) in accounts.clone().zip([0, 0, 1]) {
             let tally = account.tally();
-            let accounted = tally.delivered + tally.overwritten + tally.gone + tally.unwatched;
+            let accounted = tally.accounted();
             if accounted != recorded[unit] {
                 return Err(format!("{}: {} events, and {tally:?}", account.name(), recorded[unit]));
             }

@@ -1,0 +1,271 @@
+//! The judge judged: what a reader must be told, and what must not pass.
+
+use chrono::DateTime;
+use ser_node::Debounce;
+use ser_proto::{Command, Inputs, Model, Reply, TimeStamp};
+
+use super::*;
+use crate::simulation::ledger::Port;
+
+const SIZE: u16 = 100;
+const RESTARTED: Delivery = Delivery::Lost(Lost::LogRestarted);
+
+/// A recorder's books with a reader's account; the events are numbered over all lives.
+struct Case {
+    ledger: Ledger,
+    account: Account,
+    now_ms: u64,
+    entries: Vec<Entry>,
+}
+
+impl Case {
+    fn new() -> Case {
+        let mut ledger = Ledger::new(Model::Ser160.mask());
+        ledger.power_up(0, 0, SIZE, Debounce::OFF);
+        Case { ledger, account: Account::new("reader"), now_ms: 0, entries: Vec::new() }
+    }
+
+    /// With so many events recorded and read.
+    fn read_up_to(count: usize) -> Case {
+        let mut case = Case::new();
+        case.record(count);
+        case.read(&[]).and_then(|()| case.deliver(0, count)).expect("they are all there");
+        case
+    }
+
+    fn record(&mut self, count: usize) {
+        for _ in 0..count {
+            self.now_ms += 1;
+            self.ledger.contacts_moved(self.now_ms, 1);
+            self.ledger.settle(self.now_ms);
+            self.entries.push(entry(self.ledger.latest().next().expect("one was recorded")));
+        }
+    }
+
+    fn erase(&mut self) {
+        self.ledger.command_arrived(Port::Line, &Command::Erase, u64::MAX);
+        self.ledger.replied(Port::Line, &Reply::Erased).expect("a reply");
+    }
+
+    fn power_cycle(&mut self) {
+        self.account.power_goes(&self.ledger, true);
+        self.now_ms += 1000;
+        let time_ms = i64::try_from(self.now_ms).expect("early");
+        self.ledger.power_up(self.now_ms, time_ms, SIZE, Debounce::OFF);
+    }
+
+    /// A reading that begins with these.
+    fn read(&mut self, deliveries: &[Delivery]) -> Result<(), String> {
+        self.account.begin_reading();
+        // It knows the last event that it was given, unless it has found the log empty since.
+        let anchored = self.account.tally.delivered > 0 && !self.account.restart_told;
+        self.account.set_anchored(anchored);
+        deliveries.iter().try_for_each(|delivery| self.account.take(delivery, &self.ledger))
+    }
+
+    /// So many events from the one of this number on.
+    fn deliver(&mut self, from: usize, count: usize) -> Result<(), String> {
+        self.entries[from..from + count]
+            .iter()
+            .try_for_each(|entry| self.account.take(&delivery(*entry), &self.ledger))
+    }
+
+    /// The end of the reading; and what it has come to, with nothing missing in it.
+    fn finish(&mut self) -> Result<Tally, String> {
+        self.account.finish_reading(&self.ledger)?;
+        let tally = self.account.tally();
+        assert_eq!(tally.accounted(), self.entries.len() as u64, "{tally:?}");
+        Ok(tally)
+    }
+}
+
+fn entry(event: &crate::simulation::ledger::Recorded) -> Entry {
+    let time = DateTime::from_timestamp_millis(event.stamp_ms).expect("a time").naive_utc();
+    let time = TimeStamp::try_from(time).expect("in this century");
+    Entry { changed: Inputs(event.changed), state: Inputs(event.state), time }
+}
+
+fn delivery(entry: Entry) -> Delivery {
+    Delivery::Event { entry_number: 1, entry, model: Model::Ser160 }
+}
+
+fn overwritten(count: u32) -> Delivery {
+    Delivery::Lost(Lost::Overwritten { count })
+}
+
+/// It is refused, in these words.
+fn assert_refused<T: std::fmt::Debug>(result: Result<T, String>, words: &str) {
+    let error = result.expect_err(words);
+    assert!(error.contains(words), "{error}");
+}
+
+#[test]
+fn events_in_order_are_delivered() {
+    let mut case = Case::read_up_to(3);
+    case.record(2);
+    case.read(&[]).and_then(|()| case.deliver(3, 2)).expect("they are all there");
+    assert_eq!(case.finish(), Ok(Tally { delivered: 5, ..Tally::default() }));
+}
+
+#[test]
+fn overwritten_events_are_lost_with_their_count() {
+    let mut case = Case::read_up_to(3);
+    case.record(usize::from(SIZE) + 7);
+    let lost = |count| {
+        let mut case = Case {
+            ledger: case.ledger.clone(),
+            account: case.account.clone(),
+            entries: case.entries.clone(),
+            ..case
+        };
+        case.read(&[overwritten(count)]).and_then(|()| case.deliver(10, SIZE.into()))?;
+        case.finish()
+    };
+    assert_eq!(lost(7), Ok(Tally { delivered: 103, overwritten: 7, ..Tally::default() }));
+    assert_refused(lost(0), "event 10 comes too early");
+    assert_refused(lost(6), "event 10 comes too early");
+    assert_refused(lost(8), "event 10 comes too early");
+}
+
+#[test]
+fn events_that_are_still_there_are_not_lost() {
+    let mut case = Case::read_up_to(3);
+    case.record(5);
+    assert_refused(case.read(&[overwritten(2)]).and_then(|()| case.deliver(5, 1)), "are still there");
+}
+
+#[test]
+fn events_come_once_in_order_and_as_recorded() {
+    let mut case = Case::read_up_to(3);
+    case.record(3);
+    case.read(&[]).expect("nothing yet");
+    assert_refused(case.deliver(2, 1), "event 2 comes twice or too late");
+    assert_refused(case.deliver(4, 1), "event 4 comes too early");
+    let never = Entry { changed: Inputs(2), ..case.entries[3] };
+    assert_refused(case.read(&[delivery(never)]), "this event has never been");
+    let mut time = case.entries[3].time;
+    time.millisecond += 1;
+    let late = Entry { time, ..case.entries[3] };
+    assert_refused(case.read(&[delivery(late)]), "this event has never been");
+    case.deliver(3, 2).expect("they are next");
+    assert_refused(case.finish(), "events 5 to 6 have not been delivered");
+}
+
+/// Three events read, three unread, and then the log begins anew and has five more.
+fn began_anew(how: fn(&mut Case)) -> Case {
+    let mut case = Case::read_up_to(3);
+    case.record(3);
+    how(&mut case);
+    case.record(5);
+    case
+}
+
+#[test]
+fn a_reported_restart_accounts_for_what_went_unread() {
+    for how in [Case::erase, Case::power_cycle] {
+        let mut case = began_anew(how);
+        case.read(&[RESTARTED]).and_then(|()| case.deliver(6, 5)).expect("it was told");
+        assert_eq!(case.finish(), Ok(Tally { delivered: 8, gone: 3, restarts: 1, ..Tally::default() }));
+    }
+}
+
+#[test]
+fn a_restart_without_a_word_is_refused() {
+    assert_refused(began_anew(Case::erase).deliver(6, 1), "event 6 comes too early");
+    assert_refused(began_anew(Case::power_cycle).deliver(6, 1), "no word of a restart");
+    // The wrong word is no better: nothing was overwritten.
+    for how in [Case::erase, Case::power_cycle] {
+        let mut case = began_anew(how);
+        assert!(case.read(&[overwritten(3)]).and_then(|()| case.deliver(6, 1)).is_err());
+    }
+}
+
+#[test]
+fn a_restart_without_a_word_is_refused_where_nothing_is_lost() {
+    for how in [Case::erase, Case::power_cycle] {
+        let mut case = Case::read_up_to(3);
+        how(&mut case);
+        case.record(2);
+        assert_refused(case.read(&[]).and_then(|()| case.deliver(3, 1)), "no word of a restart");
+    }
+}
+
+#[test]
+fn a_log_that_is_empty_is_told_too() {
+    for how in [Case::erase, Case::power_cycle] {
+        let mut case = Case::read_up_to(3);
+        case.record(3);
+        how(&mut case);
+        case.read(&[]).expect("nothing yet");
+        assert_refused(case.account.clone().finish_reading(&case.ledger), "nor a word of a restart");
+        case.read(&[RESTARTED]).expect("it did begin anew");
+        let tally = case.finish().expect("it was told");
+        assert_eq!(Tally { restarts: 0, ..tally }, Tally { delivered: 3, gone: 3, ..Tally::default() });
+    }
+}
+
+#[test]
+fn a_restart_that_never_was_is_refused() {
+    let mut case = Case::read_up_to(3);
+    case.record(1);
+    assert_refused(case.read(&[RESTARTED]), "there was none");
+}
+
+#[test]
+fn what_follows_a_restart_is_not_overwritten_while_it_is_there() {
+    for how in [Case::erase, Case::power_cycle] {
+        let mut case = began_anew(how);
+        let told = case.read(&[RESTARTED, overwritten(2)]);
+        assert_refused(told.and_then(|()| case.deliver(8, 1)), "are still there");
+    }
+}
+
+#[test]
+fn what_follows_a_restart_can_be_overwritten() {
+    for how in [Case::erase, Case::power_cycle] {
+        let mut case = began_anew(how);
+        case.record(SIZE.into());
+        let told = case.read(&[RESTARTED, Delivery::Lost(Lost::OverwrittenAtLeast { count: 5 })]);
+        told.and_then(|()| case.deliver(11, SIZE.into())).expect("it was told");
+        let expected = Tally { delivered: 103, overwritten: 5, gone: 3, restarts: 1, ..Tally::default() };
+        assert_eq!(case.finish(), Ok(expected));
+    }
+}
+
+#[test]
+fn a_reader_that_knows_no_event_can_miss_an_erase() {
+    let mut case = Case::new();
+    case.record(3);
+    case.erase();
+    case.record(2);
+    case.read(&[]).and_then(|()| case.deliver(3, 2)).expect("it has nothing to go by");
+    let expected = Tally { delivered: 2, unreported: 3, traceless: 1, ..Tally::default() };
+    assert_eq!(case.finish(), Ok(expected));
+}
+
+#[test]
+fn a_log_that_is_full_again_can_hide_an_erase() {
+    let mut case = began_anew(Case::erase);
+    case.record(SIZE.into());
+    // Two totals, 3 and 105, and the log holds the latest 100.
+    case.read(&[overwritten(2)]).and_then(|()| case.deliver(11, SIZE.into())).expect("it cannot know");
+    let expected = Tally { delivered: 103, unreported: 8, traceless: 1, ..Tally::default() };
+    assert_eq!(case.finish(), Ok(expected));
+}
+
+#[test]
+fn a_log_that_is_full_again_hides_no_event_that_is_there() {
+    let mut case = began_anew(Case::erase);
+    case.record(SIZE.into());
+    let told = case.read(&[overwritten(2)]);
+    assert_refused(told.and_then(|()| case.deliver(14, 1)), "are still there");
+}
+
+#[test]
+fn the_power_takes_what_a_reader_that_is_not_connected_cannot_miss() {
+    let mut case = Case::read_up_to(3);
+    case.record(2);
+    case.account.power_goes(&case.ledger, false);
+    let tally = case.account.tally();
+    assert_eq!(tally, Tally { delivered: 3, unwatched: 2, ..Tally::default() });
+}
