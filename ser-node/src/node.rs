@@ -3,7 +3,7 @@
 //! A main loop reads the tick, hands over the bytes that have arrived, calls [`Node::poll`] with that tick, and takes
 //! bytes to send for as long as there is room for them.
 
-use ser_proto::{Baud, Command, Inputs, MAX_ENTRIES, Model, Reply};
+use ser_proto::{Baud, Command, Inputs, MAX_ENTRIES, Model, ReadReply, Reply};
 
 use crate::capture::CaptureReader;
 use crate::clock::Rtc;
@@ -155,6 +155,11 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
     pub fn events(&self) -> u32 {
         let [a, b, c, d, ..] = self.recorder.log.next_sequence().to_le_bytes();
         u32::from_le_bytes([a, b, c, d])
+    }
+
+    /// What a read of `count` entries (at most 10) from number `start` on would bring now, without a port and without a trace.
+    pub fn read(&self, start: u16, count: u8) -> ReadReply {
+        self.recorder.read(start, count.into())
     }
 
     /// Commands that have arrived since power-up on any port, those included that were refused; wraps.

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 use geni::SharedRam;
 use ser_node::{Capture, CaptureChannel, Debounce, Diagnostics, Event, GeniusPort, Node, NodeParts};
-use ser_proto::{Baud, MAX_SIZE, Model};
+use ser_proto::{Baud, Entry, MAX_SIZE, Model};
 
 use crate::non_volatile::{MemoryStorage, NonVolatile, SimRtc};
 use crate::player::{Played, Player};
@@ -345,6 +345,22 @@ impl<'a> SimNode<'a> {
         // The node's own count stops at its largest value, after 49 days that were passed over; then it says nothing.
         let leapt_ms = u32::try_from(self.leapt_ms).unwrap_or(u32::MAX);
         Diagnostics { samples_missed: seen.samples_missed.saturating_sub(leapt_ms), ..seen }
+    }
+
+    /// The log as it is now: the total since the last erase, modulo 65536, and its entries from the oldest to the newest. Nothing
+    /// goes over the line for it.
+    #[must_use]
+    pub fn log(&self) -> (u16, Vec<Entry>) {
+        const COUNT: u8 = 10;
+        let mut entries: Vec<Entry> = Vec::new();
+        for start in (1..=MAX_SIZE).step_by(COUNT.into()) {
+            entries.extend(self.node.read(start, COUNT).entries);
+        }
+        let head = self.node.read(1, 0);
+        // In a ring that has wrapped, the oldest entry is in the slot that comes next.
+        let oldest = usize::from(head.next_slot).min(entries.len());
+        entries.rotate_left(oldest);
+        (head.total, entries)
     }
 
     /// Whether another command finds room to wait for its turn.

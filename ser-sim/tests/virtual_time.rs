@@ -90,6 +90,32 @@ fn the_breaker_trip_is_recorded_to_the_millisecond_after_a_stall_of_seconds() {
 }
 
 #[test]
+fn a_log_shows_what_reading_it_brings() {
+    let mut ram = Ram::new();
+    let mut node = SimNode::new(options(Model::Ser160), &mut ram);
+    assert_eq!(node.log(), (0, vec![]));
+    let small = Configure {
+        size: Some(25),
+        baud: None,
+        auto_report: ser_proto::AutoReport::Off,
+        report_address: 0,
+        auto_print: false,
+    };
+    ask(&mut node, &Command::Configure(small));
+    // Not full, full to the last entry, and wrapped.
+    for total in 1..=60 {
+        node.play(&Scenario::from_steps([step(0, 1, total % 2 == 1)]));
+        node.advance_to(u64::from(total) * 10);
+        let mut by_number = log(&mut node);
+        let oldest = if total < 25 { 0 } else { usize::from(total % 25) };
+        by_number.rotate_left(oldest);
+        assert_eq!(node.log(), (total, by_number));
+    }
+    ask(&mut node, &Command::Erase);
+    assert_eq!(node.log(), (0, vec![]));
+}
+
+#[test]
 fn contacts_at_power_up_are_the_baseline_and_a_power_cycle_forgets_the_log_and_keeps_the_configuration() {
     let mut ram = Ram::new();
     let mut node = SimNode::new(options(Model::Ser160), &mut ram);

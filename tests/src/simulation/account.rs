@@ -15,9 +15,6 @@ const TOTAL_WRAPS_AT: usize = 65_536;
 /// one of its requests, and as many again.
 const HASTE: usize = 2;
 
-/// Power-up is as good as an erase.
-const POWER_UP: Erase = Erase { from: 0, to: 0, certain: true };
-
 /// What became of the events of a recorder, for one reader; each is in one of these.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
@@ -189,7 +186,7 @@ impl Account {
                 return self.go_on(straight + wraps * TOTAL_WRAPS_AT, wraps, lost, ledger);
             }
         }
-        let power_up = self.new_life.then_some(POWER_UP);
+        let power_up = self.new_life.then_some(Erase::POWER_UP);
         let erases = self.erases_ahead(ledger).rev().chain(power_up).chain(self.looks_erased(ledger));
         let after_erase = { erases }.find_map(|erase| {
             let index = if self.anchored && !self.restart_told {
@@ -213,7 +210,7 @@ impl Account {
 
     /// The erase from which on the total counts, where there seems to have been another one since.
     fn looks_erased(&self, ledger: &Ledger) -> Option<Erase> {
-        let latest = ledger.erases()[..self.erases_behind].last().copied().unwrap_or(POWER_UP);
+        let latest = ledger.erases()[..self.erases_behind].last().copied().unwrap_or(Erase::POWER_UP);
         (self.restart_told && self.has_wrapped(ledger)).then_some(latest)
     }
 
@@ -239,7 +236,8 @@ impl Account {
             return None;
         }
         let between = |erase: &Erase| erase.certain && erase.from >= self.next && erase.to <= index;
-        let erases = self.erases_ahead(ledger).filter(between).chain(self.new_life.then_some(POWER_UP));
+        let erases =
+            self.erases_ahead(ledger).filter(between).chain(self.new_life.then_some(Erase::POWER_UP));
         { erases }.find(|&erase| !self.may_miss(erase, ledger))
     }
 

@@ -4,12 +4,15 @@
 //! moment, recorded or not as the mode was. The result is a list of events that is never erased nor overwritten; erases
 //! are marks in it, between the events that they can have come between.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::{BTreeMap, VecDeque};
 
 use chrono::NaiveDateTime;
 use ser_node::Debounce;
 use ser_node::capture::QUEUE_LEN;
-use ser_proto::{Command, Configuration, Entry, Reply, TimeStamp};
+use ser_proto::{Command, Configuration, Entry, MAX_SIZE, Reply, TimeStamp};
 
 use super::debounce_model::{Accepted, DebounceModel};
 
@@ -77,6 +80,11 @@ pub struct Erase {
     pub to: usize,
     /// Whether it has been, and not only may have been.
     pub certain: bool,
+}
+
+impl Erase {
+    /// Power-up is as good as an erase.
+    pub const POWER_UP: Erase = Erase { from: 0, to: 0, certain: true };
 }
 
 /// The port that a command came by.
@@ -387,6 +395,54 @@ impl Ledger {
         Some(due)
     }
 
+    /// Checks what a recorder holds in its log: the total, and its entries from the oldest to the newest.
+    ///
+    /// # Errors
+    /// The first difference.
+    pub fn check_log(&self, total: u16, entries: &[Entry]) -> Result<(), String> {
+        let len = self.len();
+        let Some(first) = len.checked_sub(entries.len()) else {
+            return Err(format!("the log holds {} entries of {len} events", entries.len()));
+        };
+        let wrong = entries.iter().enumerate().rev().find(|(place, entry)| {
+            let event = self.event(first + place);
+            !event.is_some_and(|event| event.is(entry))
+        });
+        if let Some((place, entry)) = wrong {
+            let (index, event) = (first + place, self.event(first + place));
+            return Err(format!("the log holds {entry:?} as event {index} of {len}, which was {event:?}"));
+        }
+        let counts_from = |from: usize| from <= first && low_16(len - from) == total;
+        let Some(from) = self.may_count_from().find(|&from| counts_from(from)) else {
+            let erases = &self.erases;
+            return Err(format!(
+                "the log counts {total} events and holds {}, of {len}; erases: {erases:?}",
+                entries.len()
+            ));
+        };
+        let oldest_kept = self.overwritten_before.max(from);
+        if first > oldest_kept {
+            return Err(format!(
+                "the log begins with event {first} of {len}, and event {oldest_kept} must be there"
+            ));
+        }
+        let most = self.configuration.map_or(MAX_SIZE, |configuration| configuration.size);
+        if entries.len() > most.into() {
+            return Err(format!("the log holds {} entries, and its size is {most}", entries.len()));
+        }
+        Ok(())
+    }
+
+    /// Indices from which on the total can count: all places where the latest erase can have been. They are not done in the order in
+    /// which they arrive, as each port has its own queue.
+    fn may_count_from(&self) -> impl Iterator<Item = usize> {
+        let certain = self.erases.iter().filter(|erase| erase.certain);
+        let earliest = certain.map(|erase| erase.from).max().unwrap_or(0);
+        let len = self.len();
+        let erases = self.erases.iter().copied().chain([Erase::POWER_UP]);
+        erases.flat_map(move |erase| erase.from.max(earliest)..=erase.to.min(len))
+    }
+
     /// How many events there were since power-up.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -450,6 +506,11 @@ impl Ledger {
 fn in_force<T: Copy + Default>(settings: &[(u64, T)], at_ms: u64) -> T {
     let before = settings.iter().rev().find(|(from_ms, _)| *from_ms < at_ms);
     before.or(settings.first()).map_or(T::default(), |&(_, value)| value)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the total wraps")]
+fn low_16(count: usize) -> u16 {
+    count as u16
 }
 
 fn signed(ms: u64) -> i64 {

@@ -1,7 +1,7 @@
 //! One recorder with everything that outlives a power cut: its contacts, its books, what it keeps.
 
 use chrono::{DateTime, NaiveDateTime};
-use ser_node::{Debounce, Diagnostics, Rtc};
+use ser_node::{Debounce, Rtc};
 use ser_proto::{MAX_SIZE, Model};
 use ser_sim::{LineRate, MemoryStorage, NonVolatile, SimNode, SimNodeOptions, SimRtc};
 
@@ -114,14 +114,16 @@ impl Unit {
         }
     }
 
-    /// Checks what the recorder has counted since power-up.
+    /// Checks what the recorder has counted since power-up, and every entry of its log, whether or not somebody reads it.
     ///
     /// # Errors
     /// When it is not what it must be.
-    pub fn check(&mut self, counted: &Diagnostics) -> Result<(), String> {
+    pub fn check(&mut self, node: &SimNode<'_>) -> Result<(), String> {
         let lost = self.ledger.edges().queue_full - self.lost_before;
         self.expected.0.edges_lost = u32::try_from(lost).unwrap_or(u32::MAX);
-        self.expected.check(counted)
+        self.expected.check(&node.diagnostics())?;
+        let (total, entries) = node.log();
+        self.ledger.check_log(total, &entries)
     }
 }
 

@@ -360,7 +360,7 @@ impl World {
             bus.check()?;
         }
         for (unit, node) in self.units.iter_mut().zip(&life.nodes) {
-            unit.check(&node.diagnostics())?;
+            unit.check(node)?;
         }
         Ok(())
     }
@@ -378,7 +378,7 @@ impl World {
             bus.check()?;
         }
         for ((unit, node), recorded) in self.units.iter_mut().zip(&life.nodes).zip(&mut self.recorded) {
-            unit.check(&node.diagnostics())?;
+            unit.check(node)?;
             *recorded += unit.ledger.len() as u64;
         }
         self.line.talk.account_mut().power_goes(&self.units[0].ledger, true);

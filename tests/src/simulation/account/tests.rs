@@ -1,8 +1,7 @@
 //! The judge judged: what a reader must be told, and what must not pass.
 
-use chrono::DateTime;
 use ser_node::Debounce;
-use ser_proto::{Command, Inputs, Model, Reply, TimeStamp};
+use ser_proto::{Command, Inputs, Model, Reply};
 
 use super::*;
 use crate::simulation::ledger::Port;
@@ -38,7 +37,7 @@ impl Case {
             self.now_ms += 1;
             self.ledger.contacts_moved(self.now_ms, 1);
             self.ledger.settle(self.now_ms);
-            self.entries.push(entry(self.ledger.latest().next().expect("one was recorded")));
+            self.entries.push(self.ledger.latest().next().expect("one was recorded").to_entry());
         }
     }
 
@@ -77,12 +76,6 @@ impl Case {
         assert_eq!(tally.accounted(), self.entries.len() as u64, "{tally:?}");
         Ok(tally)
     }
-}
-
-fn entry(event: &crate::simulation::ledger::Recorded) -> Entry {
-    let time = DateTime::from_timestamp_millis(event.stamp_ms).expect("a time").naive_utc();
-    let time = TimeStamp::try_from(time).expect("in this century");
-    Entry { changed: Inputs(event.changed), state: Inputs(event.state), time }
 }
 
 fn delivery(entry: Entry) -> Delivery {

@@ -1,0 +1,103 @@
+//! A log that is not as the books have it.
+
+use chrono::DateTime;
+use ser_proto::{Inputs, Model};
+
+use super::*;
+
+const SIZE: u16 = 8;
+
+/// So many events recorded, and as entries of a log.
+fn recorded(count: u64) -> (Ledger, Vec<Entry>) {
+    let mut ledger = Ledger::new(Model::Ser160.mask());
+    ledger.power_up(0, 0, SIZE, Debounce::OFF);
+    record(&mut ledger, 1..=count);
+    let entries = ledger.events.iter().map(|event| event.to_entry()).collect();
+    (ledger, entries)
+}
+
+fn record(ledger: &mut Ledger, at_ms: impl Iterator<Item = u64>) {
+    for at_ms in at_ms {
+        ledger.contacts_moved(at_ms, 1);
+        ledger.settle(at_ms);
+    }
+}
+
+impl Recorded {
+    /// As a recorder tells it.
+    pub(in crate::simulation) fn to_entry(self) -> Entry {
+        let time = DateTime::from_timestamp_millis(self.stamp_ms).expect("a time").naive_utc();
+        let time = TimeStamp::try_from(time).expect("in this century");
+        Entry { changed: Inputs(self.changed), state: Inputs(self.state), time }
+    }
+}
+
+/// It is refused, in these words.
+fn assert_refused(result: Result<(), String>, words: &str) {
+    let error = result.expect_err(words);
+    assert!(error.contains(words), "{error}");
+}
+
+#[test]
+fn a_log_that_holds_what_was_recorded_is_right() {
+    let (ledger, entries) = recorded(5);
+    assert_eq!(ledger.check_log(5, &entries), Ok(()));
+    let (ledger, entries) = recorded(12);
+    assert_eq!(ledger.check_log(12, &entries[4..]), Ok(()));
+}
+
+#[test]
+fn every_entry_is_looked_at() {
+    for place in 0..5 {
+        let (ledger, entries) = recorded(5);
+        let mut late = entries.clone();
+        late[place].time.millisecond += 1;
+        assert_refused(ledger.check_log(5, &late), &format!("as event {place} of 5"));
+        let mut other = entries;
+        other[place].state.0 ^= 2;
+        assert_refused(ledger.check_log(5, &other), &format!("as event {place} of 5"));
+    }
+}
+
+#[test]
+fn no_entry_is_missing_and_none_too_many() {
+    let (ledger, entries) = recorded(5);
+    assert_refused(ledger.check_log(5, &entries[1..]), "event 0 must be there");
+    assert_refused(ledger.check_log(5, &entries[..4]), "as event 4 of 5");
+    assert_refused(ledger.check_log(5, &[]), "event 0 must be there");
+    let twice: Vec<Entry> = entries.iter().chain(&entries[4..]).copied().collect();
+    assert_refused(ledger.check_log(6, &twice), "holds 6 entries of 5 events");
+}
+
+#[test]
+fn the_total_counts_from_the_latest_erase_on() {
+    let (mut ledger, entries) = recorded(5);
+    assert_refused(ledger.check_log(4, &entries), "counts 4 events");
+    ledger.command_arrived(Port::Line, &Command::Erase, u64::MAX);
+    // As long as there is no reply, it may be to come.
+    assert_eq!(ledger.check_log(5, &entries), Ok(()));
+    assert_eq!(ledger.check_log(0, &[]), Ok(()));
+    assert_refused(ledger.check_log(0, &entries), "counts 0 events");
+    assert_eq!(ledger.replied(Port::Line, &Reply::Erased), Ok(()));
+    assert_refused(ledger.check_log(5, &entries), "counts 5 events");
+    assert_eq!(ledger.check_log(0, &[]), Ok(()));
+    record(&mut ledger, 6..=7);
+    let after: Vec<Entry> = ledger.events.iter().skip(5).map(|event| event.to_entry()).collect();
+    assert_eq!(ledger.check_log(2, &after), Ok(()));
+    assert_refused(ledger.check_log(7, &after), "counts 7 events");
+    assert_refused(ledger.check_log(2, &after[1..]), "event 5 must be there");
+}
+
+#[test]
+fn an_erase_that_arrived_earlier_can_be_the_latest() {
+    let (mut ledger, entries) = recorded(3);
+    ledger.command_arrived(Port::Line, &Command::Erase, u64::MAX);
+    ledger.command_done(&Command::Erase);
+    record(&mut ledger, 4..=5);
+    assert_eq!(ledger.replied(Port::Line, &Reply::Erased), Ok(()));
+    // The line's was done with its reply, or a while before.
+    assert_eq!(ledger.check_log(0, &[]), Ok(()));
+    let after: Vec<Entry> = ledger.events.iter().skip(3).map(|event| event.to_entry()).collect();
+    assert_eq!(ledger.check_log(2, &after), Ok(()));
+    assert_refused(ledger.check_log(3, &entries), "as event");
+}
