@@ -341,6 +341,36 @@ fn a_total_that_goes_back_by_any_number_is_never_a_loss_of_65536() {
 }
 
 #[test]
+fn what_was_read_ahead_of_a_log_that_is_gone_is_not_delivered() {
+    // 128 divides 65536, so slots agree whatever the totals are.
+    let mut recorder = Recorder::new(128);
+    recorder.append_many(1);
+    let mut host = Host::new();
+    host.read(&mut recorder, |_| {});
+    recorder.append_many(60);
+    let old = recorder.history.last().map(serial).unwrap();
+
+    let mut reader = LogReader::new(host.cursor, 128);
+    for reply in 0..40 {
+        let Some(request) = reader.request() else { break };
+        let gone = reply > 2;
+        let answer = recorder.read(request.start, request.count);
+        let taken = reader.take(&answer, &mut |delivery| {
+            if let Delivery::Event { entry, .. } = delivery {
+                assert!(!gone || serial(&entry) > old, "event {} of the old log", serial(&entry));
+            }
+        });
+        assert_eq!(taken, Ok(()));
+        if reply == 2 {
+            // Full again, with a larger total: it looks as if events had come faster than they can be read.
+            recorder.erase();
+            recorder.append_many(400);
+        }
+    }
+    assert!(reader.request().is_none());
+}
+
+#[test]
 fn polling_an_idle_log_takes_one_request_when_the_position_is_known() {
     for size in [1, 7, 2048] {
         let mut recorder = Recorder::after(size, 20);

@@ -28,12 +28,6 @@ impl Ahead {
         matches!(self.entries.get(offset), Some(Some(_)))
     }
 
-    /// How many events there are before the first one that is known, if any is.
-    pub(super) fn first(&self) -> Option<u64> {
-        let first = self.entries.iter().position(Option::is_some)?;
-        u64::try_from(first).ok()
-    }
-
     /// The entry of the first event, if it is known: the one after it is the first now.
     pub(super) fn pop(&mut self) -> Option<(Entry, Model)> {
         let known = self.entries.front().copied().flatten()?;

@@ -441,9 +441,9 @@ impl LogReader {
         }
         if head.total - self.next >= self.size {
             let alive = head.total - self.size + self.margin.min(self.size - 1);
-            // What was read in time is not lost.
-            let read = self.ahead.first().map(|offset| self.next + offset);
-            self.skip_to(read.map_or(alive, |read| read.min(alive)));
+            // What was read ahead cannot be proven any more: it may be of a log that is gone.
+            self.ahead.clear();
+            self.skip_to(alive);
         }
         self.footing = Footing::Firm;
         self.deliver(on);
