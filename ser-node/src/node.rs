@@ -157,7 +157,8 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         u32::from_le_bytes([a, b, c, d])
     }
 
-    /// What a read of `count` entries (at most 10) from number `start` on would bring now, without a port and without a trace.
+    /// What a read of `count` entries (at most 10) from number `start` on would bring now, without a port and without
+    /// a trace.
     pub fn read(&self, start: u16, count: u8) -> ReadReply {
         self.recorder.read(start, count.into())
     }

@@ -347,8 +347,8 @@ impl<'a> SimNode<'a> {
         Diagnostics { samples_missed: seen.samples_missed.saturating_sub(leapt_ms), ..seen }
     }
 
-    /// The log as it is now: the total since the last erase, modulo 65536, and its entries from the oldest to the newest. Nothing
-    /// goes over the line for it.
+    /// The log as it is now: the total since the last erase, modulo 65536, and its entries from the oldest to the
+    /// newest. Nothing goes over the line for it.
     #[must_use]
     pub fn log(&self) -> (u16, Vec<Entry>) {
         const COUNT: u8 = 10;

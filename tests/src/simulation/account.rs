@@ -24,8 +24,8 @@ pub struct Tally {
     pub overwritten: u64,
     /// Went unread with an erase or the power, and that was reported.
     pub gone: u64,
-    /// Went the same way without a report. Only a reader that knows no event to miss can be left without, or one that finds the
-    /// log full again, or one that has not read since.
+    /// Went the same way without a report. Only a reader that knows no event to miss can be left without, or one that
+    /// finds the log full again, or one that has not read since.
     pub unreported: u64,
     /// Recorded while this reader's port was not connected.
     pub unwatched: u64,
@@ -214,23 +214,24 @@ impl Account {
         (self.restart_told && self.has_wrapped(ledger)).then_some(latest)
     }
 
-    /// The event after an erase of which there is no word, to a reader that knows the event before. It leaves no trace where the log
-    /// is full again; the count of what is lost is then that of two totals that have nothing to do with each other.
+    /// The event after an erase of which there is no word, to a reader that knows the event before. It leaves no
+    /// trace where the log is full again; the count of what is lost is then that of two totals that have nothing to
+    /// do with each other.
     fn after_traceless(&self, erase: Erase, ledger: &Ledger, is: impl Fn(usize) -> bool) -> Option<usize> {
         let found = || (erase.from..ledger.len()).find(|&index| is(index));
         self.may_miss(erase, ledger).then(found).flatten()
     }
 
-    /// Whether the reader finds no trace of an erase: it knows no event that is gone with it, or the log is full again and the event
-    /// would have been overwritten.
+    /// Whether the reader finds no trace of an erase: it knows no event that is gone with it, or the log is full
+    /// again and the event would have been overwritten.
     fn may_miss(&self, erase: Erase, ledger: &Ledger) -> bool {
         let full_again = ledger.overwritten_before() > erase.from
             || ledger.len() - erase.from >= ledger.smallest_size().into();
         !self.anchored || full_again
     }
 
-    /// An erase that lies between the latest delivery and the event of this index, that must have been seen and of which there is
-    /// no word.
+    /// An erase that lies between the latest delivery and the event of this index, that must have been seen and of
+    /// which there is no word.
     fn silent_erase(&self, index: usize, ledger: &Ledger) -> Option<Erase> {
         if self.restart_told {
             return None;

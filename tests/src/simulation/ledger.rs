@@ -433,8 +433,8 @@ impl Ledger {
         Ok(())
     }
 
-    /// Indices from which on the total can count: all places where the latest erase can have been. They are not done in the order in
-    /// which they arrive, as each port has its own queue.
+    /// Indices from which on the total can count: all places where the latest erase can have been. They are not done
+    /// in the order in which they arrive, as each port has its own queue.
     fn may_count_from(&self) -> impl Iterator<Item = usize> {
         let certain = self.erases.iter().filter(|erase| erase.certain);
         let earliest = certain.map(|erase| erase.from).max().unwrap_or(0);

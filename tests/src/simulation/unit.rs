@@ -114,7 +114,8 @@ impl Unit {
         }
     }
 
-    /// Checks what the recorder has counted since power-up, and every entry of its log, whether or not somebody reads it.
+    /// Checks what the recorder has counted since power-up, and every entry of its log, whether or not somebody reads
+    /// it.
     ///
     /// # Errors
     /// When it is not what it must be.
