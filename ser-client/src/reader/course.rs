@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use ser_proto::{MAX_ENTRIES, MAX_SIZE};
 
+use crate::LogPosition;
+
 use super::{Asked, Footing, Growth, Head, LogReader, Pending, Purpose, ReadRequest, low_16};
 
 /// Replies for one look at the anchor, at most: it costs one entry in so many replies.
@@ -24,7 +26,9 @@ impl LogReader {
     pub(super) fn plan(&self) -> Option<Asked> {
         let alone = |purpose, request| self.asked.is_empty().then_some(Asked { request, purpose });
         let Some(head) = self.head else {
-            let position = self.expected_slot.map_or(ReadRequest::POSITION, |slot| self.entries(slot, 2));
+            // Where the last entry that was delivered probably is.
+            let last_slot = |near: LogPosition| (u64::from(near.next_slot) + self.size - 1) % self.size;
+            let position = self.near.map_or(ReadRequest::POSITION, |near| self.entries(last_slot(near), 2));
             return alone(Purpose::Locate, position);
         };
         if self.growth == Growth::Asking {

@@ -194,8 +194,6 @@ enum Growth {
 pub struct LogReader {
     size: u64,
     cursor: Option<Cursor>,
-    /// Where the last entry that was delivered probably is.
-    expected_slot: Option<u64>,
     /// Where the log stood at the end of the reading before.
     near: Option<LogPosition>,
     head: Option<Head>,
@@ -233,7 +231,6 @@ impl LogReader {
         LogReader {
             size: size.clamp(1, MAX_SIZE).into(),
             cursor,
-            expected_slot: None,
             near: None,
             head: None,
             next: 0,
@@ -259,9 +256,8 @@ impl LogReader {
     /// [`Disturbed::Changed`]. So has one whose position belongs to another cursor.
     #[must_use]
     pub fn starting_near(mut self, position: LogPosition) -> LogReader {
-        let slot = u64::from(position.next_slot);
-        if slot < self.size && self.cursor.is_some_and(|cursor| cursor.anchor.is_some()) {
-            self.expected_slot = Some((slot + self.size - 1) % self.size);
+        let in_ring = u64::from(position.next_slot) < self.size;
+        if in_ring && self.cursor.is_some_and(|cursor| cursor.anchor.is_some()) {
             self.near = Some(position);
         }
         self
@@ -398,7 +394,7 @@ impl LogReader {
         };
         self.footing = Footing::Anchored(anchor);
         let anchor_entry = self.slot_of(head, self.next - 1) + 1;
-        if self.expected_slot.is_some() && u64::from(request.start) == anchor_entry {
+        if self.near.is_some() && u64::from(request.start) == anchor_entry {
             return self.take_events(self.next - 1, request, batch, on);
         }
         Ok(())
