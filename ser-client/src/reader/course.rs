@@ -44,7 +44,9 @@ impl LogReader {
                 alone(Purpose::Plain, self.events(head, self.next, behind))
             }
             Footing::Firm => alone(Purpose::Plain, self.events(head, self.next, behind)),
-            Footing::Uncounted | Footing::Anchored(_) | Footing::Loose => alone(Purpose::Probe, self.probe()),
+            Footing::Uncounted | Footing::Anchored(_) | Footing::Loose | Footing::Held => {
+                alone(Purpose::Probe, self.probe())
+            }
         }
     }
 

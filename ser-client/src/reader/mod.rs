@@ -32,8 +32,9 @@
 //! If another entry is in the place of the anchor, or none, the log was erased or lost its contents, and reading
 //! begins anew with [`Lost::LogRestarted`]. Where the anchor is overwritten itself, the log must be full, which the
 //! entry with the highest number shows: if it does not exist, the log was erased (or the ring was made larger; then
-//! total and next slot do not agree, and what the resize threw away is counted). What was read in time is then
-//! delivered all the same.
+//! total and next slot do not agree, and what the resize threw away is counted). Without an anchor, only the size of
+//! the ring tells which event an entry is. So what is read then is kept until the entry with the highest number has
+//! been asked for once more, and nobody can have resized the ring in between.
 //!
 //! A reading ends when everything that had happened when it began is delivered, so it ends also when events come
 //! faster than they can be read. Events that come meanwhile are delivered when they fit the same replies.
@@ -53,10 +54,10 @@
 //!   reader gives up some more of the oldest, to get ahead of the recorder. They are counted as lost like the rest.
 //! - A resize of which nobody knows, before the first reading of a program, puts another entry in the place of the
 //!   anchor, and looks as if the log had begun anew.
-//! - A resize in the middle of a reading shows when total and next slot part, or when the anchor is in another place.
-//!   Where the anchor is overwritten already, or in a ring of a few entries, both may agree by chance (next slot 0
-//!   before and after is enough), and an entry be taken for another: the events are right, and the count of the lost
-//!   ones between them is not.
+//! - A resize in the middle of a reading shows when total and next slot part, when the anchor is in another place, or
+//!   when the ring has not the size any more that it had before the anchor was given up. Where several resizes follow
+//!   each other within one reading and end where they began, all of this may agree by chance, and an entry be taken for
+//!   another: the events are right, and the count of the lost ones between them is not.
 //!
 //! The size of the ring must be right. An original unit does not tell it.
 
@@ -136,6 +137,13 @@ struct Head {
     happened: u64,
 }
 
+impl Head {
+    /// Whether there are as many entries as events, so that all are there and the ring has not gone round.
+    fn holds_all(&self) -> bool {
+        low_16(self.total) == low_16(self.slot)
+    }
+}
+
 /// What makes us believe that `next` is what follows what was delivered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Footing {
@@ -147,6 +155,8 @@ enum Footing {
     Loose,
     /// The latest reply has shown it.
     Firm,
+    /// The size of the ring. What follows has been read, and is delivered once the ring has shown its size again.
+    Held,
 }
 
 /// What was lost since the last delivery. It is delivered with the next event: if the reading ends before, the cursor
@@ -386,11 +396,17 @@ impl LogReader {
         let (Some(cursor), Some(head)) = (self.cursor, self.head) else { return Ok(()) };
         let Some(anchor) = cursor.anchor else {
             self.footing = Footing::Loose;
-            // The log was empty and has as many events as then; one that holds some has counted once around.
-            if self.behind() == 0 && cursor.total == 0 && !batch.entries.is_empty() {
-                self.restart();
-            }
-            return Ok(());
+            let behind = self.behind();
+            // Where the cursor is of an empty log, the total now tells how many entries there are, and where.
+            return match cursor.total {
+                0 if behind == 0 && !batch.entries.is_empty() => {
+                    // It has counted once around.
+                    self.restart();
+                    Ok(())
+                }
+                0 if behind < self.size && !head.holds_all() => self.not_full(head, on),
+                _ => Ok(()),
+            };
         };
         self.footing = Footing::Anchored(anchor);
         let anchor_entry = self.slot_of(head, self.next - 1) + 1;
@@ -419,7 +435,7 @@ impl LogReader {
             self.growth = Growth::Certain;
             return match self.footing {
                 Footing::Uncounted => self.count(head, head.slot, on),
-                _ => self.not_full(head),
+                _ => self.not_full(head, on),
             };
         }
         if entries > 1 {
@@ -433,16 +449,20 @@ impl LogReader {
             return self.count(head, if full { self.size } else { head.slot }, on);
         }
         if !full {
-            return self.not_full(head);
+            return self.not_full(head, on);
         }
-        if head.total - self.next >= self.size {
-            let alive = head.total - self.size + self.margin.min(self.size - 1);
-            // What was read ahead cannot be proven any more: it may be of a log that is gone.
-            self.ahead.clear();
-            self.skip_to(alive);
+        if self.footing == Footing::Held {
+            self.footing = Footing::Firm;
+            self.deliver(on);
+            if self.behind() < self.size || self.next >= self.target {
+                return Ok(());
+            }
         }
+        // What was read ahead cannot be proven any more: it may be of a log that is gone.
+        self.ahead.clear();
+        self.unproven = 0;
+        self.skip_to(head.total - self.size + self.margin.min(self.size - 1));
         self.footing = Footing::Firm;
-        self.deliver(on);
         Ok(())
     }
 
@@ -463,36 +483,42 @@ impl LogReader {
     }
 
     /// The log is not full: entries 1 … next slot exist, and no others.
-    fn not_full(&mut self, head: Head) -> Result<(), Disturbed> {
+    fn not_full(&mut self, head: Head, on: &mut dyn FnMut(Delivery)) -> Result<(), Disturbed> {
         let held = head.slot;
         let behind = head.total - self.next;
         let anchored = matches!(self.footing, Footing::Anchored(_));
-        // As many entries as events: nothing has been thrown away since the erase, so the anchor would be there.
-        if u64::from(low_16(head.total)) == held && (anchored || behind > held) {
+        // Nothing has been thrown away since the erase, so the anchor would be there.
+        if head.holds_all() && (anchored || behind > held) {
             self.restart();
             return Ok(());
         }
         if held == 0 {
             return Err(Disturbed::WrongSize);
         }
-        self.ahead.clear();
+        let all_there = self.footing == Footing::Held && behind <= held;
+        if !all_there {
+            self.ahead.clear();
+        }
         if !self.may_hold_fewer_than(head) {
+            return Ok(());
+        }
+        self.footing = Footing::Firm;
+        if all_there {
+            self.deliver(on);
             return Ok(());
         }
         // A larger ring than before, and what did not fit the smaller one is gone.
         self.skip_to(self.next.max(head.total - held));
-        self.footing = Footing::Firm;
         Ok(())
     }
 
     /// Whether a log that is not full can be believed to hold fewer entries than it has had events. If that is not
     /// known, it is asked next.
     fn may_hold_fewer_than(&mut self, head: Head) -> bool {
-        let all_held = u64::from(low_16(head.total)) == head.slot;
-        if !all_held && self.growth == Growth::Unasked {
+        if !head.holds_all() && self.growth == Growth::Unasked {
             self.growth = Growth::Asking;
         }
-        all_held || self.growth == Growth::Certain
+        head.holds_all() || self.growth == Growth::Certain
     }
 
     fn restart(&mut self) {
@@ -533,7 +559,7 @@ impl LogReader {
             let found = usize::try_from(self.next - 1 - first).ok().and_then(|at| batch.entries.get(at));
             match found {
                 // The log is shorter than it must be, or the reply is.
-                None if batch.entries.is_empty() => return self.not_full(head),
+                None if batch.entries.is_empty() => return self.not_full(head, on),
                 None => {}
                 // It was there a moment ago. Perhaps the ring was resized and the slots mean something else now.
                 Some(found) if *found != anchor && self.checked => return Err(Disturbed::Changed),
@@ -546,6 +572,9 @@ impl LogReader {
                     proven = true;
                 }
             }
+        } else if batch.entries.is_empty() {
+            // There are events in these slots, if the ring is what it was.
+            return Err(Disturbed::Changed);
         }
         self.keep(first, request, batch);
         if proven {
@@ -581,14 +610,14 @@ impl LogReader {
     ) -> Result<(), Disturbed> {
         let Some(head) = self.head else { return Ok(()) };
         if batch.entries.is_empty() {
-            return self.not_full(head);
+            return self.not_full(head, on);
         }
         self.footing = Footing::Loose;
         let overwritten = self.behind().saturating_sub(self.size);
         if overwritten < batch.entries.len() as u64 {
             self.keep(self.next, request, batch);
             self.skip_to(self.next + overwritten);
-            self.deliver(on);
+            self.deliver_or_hold(head, on);
             return Ok(());
         }
         // Everything asked for was overwritten on the way, it seems.
@@ -602,8 +631,19 @@ impl LogReader {
         let age = (head.slot + self.size - slot - 1) % self.size;
         self.skip_to(self.next.max(head.total - 1 - age));
         self.keep(self.next, request, batch);
-        self.deliver(on);
+        self.deliver_or_hold(head, on);
         Ok(())
+    }
+
+    /// Delivers what has been read without the anchor, which is gone or has never been. Where the ring has gone round,
+    /// its size has to be shown once more before: somebody may have changed it.
+    fn deliver_or_hold(&mut self, head: Head, on: &mut dyn FnMut(Delivery)) {
+        if head.holds_all() {
+            self.deliver(on);
+        } else {
+            self.footing = Footing::Held;
+            self.growth = Growth::Unasked;
+        }
     }
 
     /// Delivers what is known of event `next`, `next + 1` and so on.
