@@ -15,7 +15,8 @@ use super::script::Script;
 ///
 /// Against a recorder that tells the truth, on a line that loses, cuts and damages messages and brings some late:
 /// - no event is delivered twice, out of order, or other than it was;
-/// - while nobody erases the log, what is delivered and what is told to be lost are all events that there were.
+/// - what is delivered and what is told to be lost are all events of a log;
+/// - no erase goes untold, unless the log is full again when it is looked at, or nothing was known of it before.
 ///
 /// # Panics
 /// When one of these does not hold.

@@ -24,14 +24,24 @@ const LATEST: Duration = Duration::from_millis(150);
 /// Events between two readings of which the total can tell how many there were.
 const MAX_UNREAD: u32 = u16::MAX as u32;
 
+/// The total counts modulo this.
+const TOTAL_TURNS_AT: u32 = 1 << 16;
+
 /// What has come to the host, in order.
+#[derive(Default)]
 struct Received {
     /// The event that must come next, unless some are lost.
     next: u32,
-    /// Whether it must be exact how many are lost: nobody has erased the log, and the total has not gone round unseen.
-    exact: bool,
-    /// Whether the first reading has told how much it cannot know.
-    began: bool,
+    /// Whether the host knows the event before, so that it finds out when that is gone.
+    anchored: bool,
+    /// Whether it has been told, since the latest event, that the log began anew.
+    restart_told: bool,
+    /// So many have been told to be lost since the latest event.
+    lost: u32,
+    /// Whether the total has turned since the latest event, and cannot tell how many there were.
+    turned: bool,
+    /// Whether the log was erased since the reading began.
+    erased_meanwhile: bool,
 }
 
 struct World {
@@ -57,7 +67,7 @@ pub(super) fn follow(mut script: Script<'_>) {
         now: Duration::ZERO,
         under_way: VecDeque::new(),
         to_unit: FrameDecoder::new(),
-        received: Received { next: 0, exact: true, began: false },
+        received: Received::default(),
         size,
         cursor: None,
         position: None,
@@ -82,16 +92,13 @@ pub(super) fn follow(mut script: Script<'_>) {
 impl World {
     fn record(&mut self, count: u32) {
         self.unit.record(count);
-        self.received.exact &= self.unit.happened() - self.received.next <= MAX_UNREAD;
+        self.received.turned |= self.unit.happened() - self.received.next > MAX_UNREAD;
     }
 
-    /// Somebody erases the log, when nothing is under way: what an older log said could be taken for news of the new
-    /// one.
+    /// Somebody erases the log.
     fn erase(&mut self) {
-        self.bring_all();
-        self.take_reports();
         self.unit.erase();
-        self.received.exact = false;
+        self.received.erased_meanwhile = true;
     }
 
     /// Readings from the cursor on, until one comes to its end or the line is too bad.
@@ -121,6 +128,7 @@ impl World {
         script: &mut Script<'_>,
     ) -> Option<Result<(), Disturbed>> {
         self.session.cancel(self.now);
+        self.received.erased_meanwhile = false;
         let mut first = true;
         loop {
             while self.session.has_room()
@@ -136,8 +144,8 @@ impl World {
                 // As the client does: they tell what the log is about to be read for.
                 self.session.forget_earlier_reports();
             }
-            let received = &mut self.received;
-            if let Err(disturbed) = reader.take(&reply, &mut |delivery| received.take(delivery)) {
+            let (received, unit) = (&mut self.received, &self.unit);
+            if let Err(disturbed) = reader.take(&reply, &mut |delivery| received.take(delivery, unit)) {
                 return Some(Err(disturbed));
             }
         }
@@ -172,9 +180,11 @@ impl World {
                 Some(Decoded::Frame(body)) => Command::parse(body).expect("a session sends commands"),
                 _ => continue,
             };
-            // Events come meanwhile.
-            let meanwhile = script.byte();
-            self.record(if meanwhile < 0xE0 { 0 } else { u32::from(meanwhile - 0xE0) });
+            match script.byte() {
+                0..=0xDE => {}
+                0xDF => self.erase(),
+                meanwhile => self.record(u32::from(meanwhile - 0xE0)),
+            }
             let reply = self.unit.answer(&command);
             self.say(&frame_of(&reply.to_body()), script);
         }
@@ -232,32 +242,51 @@ impl World {
 }
 
 impl Received {
-    fn take(&mut self, delivery: Delivery) {
+    fn take(&mut self, delivery: Delivery, unit: &TruthfulUnit) {
         match delivery {
-            Delivery::Event { entry, .. } => {
-                let number = number_of(&entry);
-                if self.exact {
-                    assert_eq!(number, self.next, "events are told to be lost");
-                } else {
-                    assert!(number >= self.next, "{number} after {}", self.next);
-                }
-                self.began = true;
-                self.next = number + 1;
+            Delivery::Event { entry, .. } => self.take_event(number_of(&entry), unit),
+            Delivery::Lost(Lost::LogRestarted) => {
+                let erased = unit.log_began(unit.happened()) >= self.next;
+                assert!(self.restart_told || self.turned || erased, "nobody has erased the log");
+                self.restart_told = true;
+                self.anchored = false;
+                self.lost = 0;
             }
-            Delivery::Lost(Lost::OverwrittenAtLeast { count }) => {
-                assert!(!self.exact || !self.began, "what was read once is known");
-                // Otherwise it may count from an erase, or from the turn of the total.
-                self.next += if self.exact { count } else { 0 };
-            }
-            Delivery::Lost(Lost::Overwritten { count }) if self.exact => self.next += count,
-            Delivery::Lost(Lost::LogRestarted) => assert!(!self.exact, "nobody has erased the log"),
-            Delivery::Lost(Lost::Overwritten { .. }) => {}
+            Delivery::Lost(lost) => self.lost += lost.known_count(),
         }
     }
 
-    fn assert_complete(&self, unit: &TruthfulUnit) {
-        if self.exact {
-            assert_eq!(self.next, unit.happened(), "all that happened was delivered or told to be lost");
+    fn take_event(&mut self, number: u32, unit: &TruthfulUnit) {
+        assert!(number >= self.next, "{number} comes after {}", self.next - 1);
+        let began = unit.log_began(number);
+        let unseen = unit.was_full(began) && (self.erased_meanwhile || began >= self.next);
+        // Who knows no event of this log counts from its beginning on.
+        let from = if self.anchored { self.next } else { began };
+        if self.anchored && began >= self.next {
+            assert!(unseen, "no word of the erase before {began}");
         }
+        let right = match (from + self.lost).abs_diff(number) {
+            0 => true,
+            wrong => self.turned && wrong.is_multiple_of(TOTAL_TURNS_AT),
+        };
+        assert!(right || unseen, "after {from}, {} are told to be lost, and {number} comes", self.lost);
+        *self = Received {
+            next: number + 1,
+            anchored: true,
+            erased_meanwhile: self.erased_meanwhile,
+            ..Received::default()
+        };
+    }
+
+    /// On a line without faults everything has come.
+    fn assert_complete(&self, unit: &TruthfulUnit) {
+        let is_empty = unit.log_began(unit.happened()) == unit.happened();
+        let told = self.restart_told || !self.anchored || self.next == unit.happened();
+        assert!(
+            if is_empty { told } else { self.next == unit.happened() },
+            "of {} events, {} have come",
+            unit.happened(),
+            self.next,
+        );
     }
 }

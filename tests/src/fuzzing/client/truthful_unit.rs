@@ -10,18 +10,38 @@ pub(super) struct TruthfulUnit {
     next_slot: usize,
     total: u16,
     happened: u32,
+    /// Running numbers of the first events after each erase.
+    erased_before: Vec<u32>,
 }
 
 impl TruthfulUnit {
     /// A unit with a log of `size` entries that has counted to `total` already.
     pub(super) fn new(size: u16, total: u16) -> TruthfulUnit {
-        let mut unit = TruthfulUnit { slots: Vec::new(), size, next_slot: 0, total: 0, happened: 0 };
+        let mut unit = TruthfulUnit {
+            slots: Vec::new(),
+            size,
+            next_slot: 0,
+            total: 0,
+            happened: 0,
+            erased_before: vec![0],
+        };
         unit.record(total.into());
         unit
     }
 
     pub(super) fn happened(&self) -> u32 {
         self.happened
+    }
+
+    /// Where the log began in which this event is: the running number of the first one after an erase.
+    pub(super) fn log_began(&self, number: u32) -> u32 {
+        self.erased_before.iter().rev().copied().find(|&began| began <= number).unwrap_or(0)
+    }
+
+    /// Whether the log that began with this event has been full.
+    pub(super) fn was_full(&self, began: u32) -> bool {
+        let end = self.erased_before.iter().copied().find(|&other| other > began).unwrap_or(self.happened);
+        end - began >= self.size.into()
     }
 
     /// So many events happen.
@@ -41,6 +61,7 @@ impl TruthfulUnit {
     pub(super) fn erase(&mut self) {
         self.slots.clear();
         (self.next_slot, self.total) = (0, 0);
+        self.erased_before.push(self.happened);
     }
 
     pub(super) fn answer(&self, command: &Command) -> Reply {
