@@ -3,10 +3,12 @@
 #[cfg(test)]
 mod tests;
 
+use std::collections::VecDeque;
+
 use ser_client::{Delivery, Lost};
 use ser_proto::Entry;
 
-use super::ledger::{Erase, Ledger};
+use super::ledger::{Erase, Ledger, Recorded};
 
 /// The recorder's total counts modulo this, so that a reader may miss a multiple of it without a trace.
 const TOTAL_WRAPS_AT: usize = 65_536;
@@ -66,6 +68,8 @@ pub struct Account {
     anchored: bool,
     /// Events that went unread with the power, until it is seen whether that is reported.
     cut_off: u64,
+    /// The same events: the reading that the power cut through may have some of them in hand.
+    in_hand: VecDeque<Recorded>,
     tally: Tally,
 }
 
@@ -85,6 +89,7 @@ impl Account {
             came_meanwhile: 0,
             anchored: false,
             cut_off: 0,
+            in_hand: VecDeque::new(),
             tally: Tally::default(),
         }
     }
@@ -103,6 +108,7 @@ impl Account {
     /// A reading begins.
     pub fn begin_reading(&mut self) {
         self.read_from = None;
+        self.in_hand.clear();
     }
 
     /// A reply of the reading says that the log has had so many events. Replies may be late, so how many there are by
@@ -131,6 +137,10 @@ impl Account {
         let place = self.place(ledger).unwrap_or(0);
         let unread = (ledger.len() - place) as u64;
         *(if connected { &mut self.cut_off } else { &mut self.tally.unwatched }) += unread;
+        self.in_hand = (place..ledger.len()).filter_map(|index| ledger.event(index).copied()).collect();
+        if !connected || self.in_hand.len() as u64 != unread {
+            self.in_hand.clear();
+        }
         self.life = ledger.life() + 1;
         self.next = 0;
         self.erases_behind = 0;
@@ -178,6 +188,10 @@ impl Account {
 
     fn take_event(&mut self, entry: &Entry, ledger: &Ledger) -> Result<(), String> {
         let lost = std::mem::take(&mut self.lost_told);
+        if !self.restart_told && self.in_hand.get(lost).is_some_and(|event| event.is(entry)) {
+            self.deliver_in_hand(lost);
+            return Ok(());
+        }
         let is = |index: usize| ledger.event(index).is_some_and(|event| event.is(entry));
         if !self.restart_told || self.new_life {
             // The log goes on, or has just begun.
@@ -200,6 +214,16 @@ impl Account {
             Some((index, erase)) => self.restarted_at(index, erase, lost, ledger),
             None => Err(self.explain(entry, lost, ledger)),
         }
+    }
+
+    /// Delivers an event that was read before the power went. A small ring that is full again, and stands as if the log
+    /// had gone on, leaves no trace of that; the next reading misses the event that was delivered last.
+    fn deliver_in_hand(&mut self, lost: usize) {
+        self.in_hand.drain(..=lost);
+        self.cut_off -= lost as u64 + 1;
+        self.tally.overwritten += lost as u64;
+        self.tally.delivered += 1;
+        self.anchored = true;
     }
 
     /// Whether so much has happened since the latest delivery that the total tells little of it. It can look as if

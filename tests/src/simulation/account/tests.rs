@@ -10,6 +10,7 @@ const SIZE: u16 = 100;
 const RESTARTED: Delivery = Delivery::Lost(Lost::LogRestarted);
 
 /// A recorder's books with a reader's account; the events are numbered over all lives.
+#[derive(Clone)]
 struct Case {
     ledger: Ledger,
     account: Account,
@@ -261,4 +262,27 @@ fn the_power_takes_what_a_reader_that_is_not_connected_cannot_miss() {
     case.account.power_goes(&case.ledger, false);
     let tally = case.account.tally();
     assert_eq!(tally, Tally { delivered: 3, unwatched: 2, ..Tally::default() });
+}
+
+#[test]
+fn a_reading_through_a_power_cut_may_deliver_what_it_has_in_hand() {
+    let mut case = Case::read_up_to(3);
+    case.record(5);
+    case.read(&[]).expect("nothing yet");
+    case.power_cycle();
+    case.record(1);
+    case.account
+        .take(&overwritten(2), &case.ledger)
+        .and_then(|()| case.deliver(5, 2))
+        .expect("they were read");
+    // The next reading has nothing of before, and has to be told.
+    let next_reading = |from| {
+        let mut case = case.clone();
+        case.read(&[]).and_then(|()| case.deliver(from, 1))
+    };
+    assert_refused(next_reading(7), "never been");
+    assert_refused(next_reading(8), "no word of a restart");
+    case.read(&[RESTARTED]).and_then(|()| case.deliver(8, 1)).expect("it is told");
+    let tally = Tally { delivered: 6, overwritten: 2, gone: 1, restarts: 1, ..Tally::default() };
+    assert_eq!(case.finish(), Ok(tally));
 }
