@@ -50,14 +50,16 @@
 //!   set back, with its time, passes for it.
 //! - A log that was empty has no anchor. Events that came and were erased before the next reading leave no trace.
 //! - The first reading of a log cannot know how often the total has wrapped: [`Lost::OverwrittenAtLeast`].
-//! - When events come so fast that the oldest entries are overwritten while the request for them is on its way, the
-//!   reader gives up some more of the oldest, to get ahead of the recorder. They are counted as lost like the rest.
+//! - When events come so fast that the oldest entries are overwritten while the request for them is on its way, or
+//!   while the ring is looked at once more, the reader gives up some more of the oldest, to get ahead of the recorder.
+//!   They are counted as lost like the rest.
 //! - A resize of which nobody knows, before the first reading of a program, puts another entry in the place of the
 //!   anchor, and looks as if the log had begun anew.
 //! - A resize in the middle of a reading shows when total and next slot part, when the anchor is in another place, or
 //!   when the ring has not the size any more that it had before the anchor was given up. Where several resizes follow
 //!   each other within one reading and end where they began, all of this may agree by chance, and an entry be taken for
 //!   another: the events are right, and the count of the lost ones between them is not.
+//! - Whether the ring has its size, replies of one entry do not show. All units known make room for more.
 //!
 //! The size of the ring must be right. An original unit does not tell it.
 
@@ -79,6 +81,10 @@ const BASE: u64 = 1 << 32;
 /// Events between two replies of a reading that are believed: half of what the total can tell, half a minute at the
 /// most that a recorder can do.
 const MAX_HAPPENED: u64 = 1 << 15;
+
+/// How many times the events of one request a reader gives up that events come too fast for, to get ahead of the
+/// recorder: as many come while it reads and while it looks at the ring once more, and then it must not be behind.
+const HASTE: u64 = 4;
 
 /// A reading needs a few replies now and then that bring no event; so many in a row mean that something is wrong.
 const MAX_FRUITLESS: u32 = 32;
@@ -396,17 +402,15 @@ impl LogReader {
         let (Some(cursor), Some(head)) = (self.cursor, self.head) else { return Ok(()) };
         let Some(anchor) = cursor.anchor else {
             self.footing = Footing::Loose;
+            // The log was empty when it was read last, so the total tells how many entries there are, if it has not
+            // counted once around; and total and next slot part, if the ring has gone round, or was resized.
             let behind = self.behind();
-            // Where the cursor is of an empty log, the total now tells how many entries there are, and where.
-            return match cursor.total {
-                0 if behind == 0 && !batch.entries.is_empty() => {
-                    // It has counted once around.
-                    self.restart();
-                    Ok(())
-                }
-                0 if behind < self.size && !head.holds_all() => self.not_full(head, on),
-                _ => Ok(()),
-            };
+            if cursor.total == 0 && behind == 0 && !batch.entries.is_empty() {
+                self.restart();
+            } else if cursor.total == 0 && behind < self.size && !head.holds_all() {
+                self.footing = Footing::Uncounted;
+            }
+            return Ok(());
         };
         self.footing = Footing::Anchored(anchor);
         let anchor_entry = self.slot_of(head, self.next - 1) + 1;
@@ -457,11 +461,12 @@ impl LogReader {
             if self.behind() < self.size || self.next >= self.target {
                 return Ok(());
             }
+            self.margin = self.margin.max(HASTE * head.happened);
         }
         // What was read ahead cannot be proven any more: it may be of a log that is gone.
         self.ahead.clear();
         self.unproven = 0;
-        self.skip_to(head.total - self.size + self.margin.min(self.size - 1));
+        self.skip_to(head.total - self.size + self.margin.min(self.size / 2));
         self.footing = Footing::Firm;
         Ok(())
     }
@@ -622,8 +627,7 @@ impl LogReader {
         }
         // Everything asked for was overwritten on the way, it seems.
         if self.margin < self.size {
-            // Twice what happened during this request will do if events do not come faster still.
-            self.margin = self.margin.max(2 * head.happened);
+            self.margin = self.margin.max(HASTE * head.happened);
             return Ok(());
         }
         // The ring turns over during one request, and is still the same: whatever the reply holds is all that can be had.

@@ -13,9 +13,9 @@ use super::ledger::{Erase, Ledger, Recorded};
 /// The recorder's total counts modulo this, so that a reader may miss a multiple of it without a trace.
 const TOTAL_WRAPS_AT: usize = 65_536;
 
-/// A reader that events come too fast for gives up some of the oldest that are still there: as many as came during
-/// one of its requests, and as many again.
-const HASTE: usize = 2;
+/// A reader that events come too fast for gives up some of the oldest that are still there: so many times as many as
+/// came during one of its requests.
+const HASTE: usize = 4;
 
 /// What became of the events of a recorder, for one reader; each is in one of these.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
