@@ -42,6 +42,10 @@ struct Received {
     turned: bool,
     /// Whether the log was erased since the reading began.
     erased_meanwhile: bool,
+    /// How often it was resized since.
+    resized_meanwhile: u32,
+    /// Whether it was resized more than once during one reading, which may spoil the host's count for good.
+    muddled: bool,
 }
 
 struct World {
@@ -52,14 +56,16 @@ struct World {
     under_way: VecDeque<(Duration, Vec<u8>)>,
     to_unit: FrameDecoder<16>,
     received: Received,
-    size: u16,
     cursor: Option<Cursor>,
     position: Option<LogPosition>,
 }
 
+fn any_size(script: &mut Script<'_>) -> u16 {
+    [1, 2, 3, 7, 10, 11, 40, 300][usize::from(script.byte() % 8)]
+}
+
 pub(super) fn follow(mut script: Script<'_>) {
-    let size = [1, 2, 3, 7, 10, 11, 40, 300][usize::from(script.byte() % 8)];
-    let unit = TruthfulUnit::new(size, script.word());
+    let unit = TruthfulUnit::new(any_size(&mut script), script.word());
     let timing = Timing { timeout: TIMEOUT, retries: RETRIES, line_rate: LineRate::Instant };
     let mut world = World {
         unit,
@@ -68,7 +74,6 @@ pub(super) fn follow(mut script: Script<'_>) {
         under_way: VecDeque::new(),
         to_unit: FrameDecoder::new(),
         received: Received::default(),
-        size,
         cursor: None,
         position: None,
     };
@@ -79,6 +84,7 @@ pub(super) fn follow(mut script: Script<'_>) {
             // Now and then enough to turn the total, which has 16 bits.
             2 if script.byte() == 7 => world.record(0xFF00),
             2 if script.byte().is_multiple_of(4) => world.erase(),
+            2 if script.byte().is_multiple_of(4) => world.resize(any_size(&mut script)),
             3 => world.report(&mut script),
             _ => world.read_new(&mut script),
         }
@@ -101,10 +107,18 @@ impl World {
         self.received.erased_meanwhile = true;
     }
 
+    /// Somebody resizes the log.
+    fn resize(&mut self, size: u16) {
+        self.unit.resize(size);
+        self.received.resized_meanwhile += 1;
+        self.received.muddled |= self.received.resized_meanwhile > 1;
+    }
+
     /// Readings from the cursor on, until one comes to its end or the line is too bad.
     fn read_new(&mut self, script: &mut Script<'_>) {
         for _ in 0..=MAX_RESYNCS {
-            let mut reader = LogReader::new(self.cursor, self.size);
+            // The client asks for it.
+            let mut reader = LogReader::new(self.cursor, self.unit.size());
             if let Some(position) = self.position.take() {
                 reader = reader.starting_near(position);
             }
@@ -128,7 +142,7 @@ impl World {
         script: &mut Script<'_>,
     ) -> Option<Result<(), Disturbed>> {
         self.session.cancel(self.now);
-        self.received.erased_meanwhile = false;
+        self.received.begin_reading();
         let mut first = true;
         loop {
             while self.session.has_room()
@@ -181,7 +195,8 @@ impl World {
                 _ => continue,
             };
             match script.byte() {
-                0..=0xDE => {}
+                0..=0xDD => {}
+                0xDE => self.resize(any_size(script)),
                 0xDF => self.erase(),
                 meanwhile => self.record(u32::from(meanwhile - 0xE0)),
             }
@@ -242,8 +257,13 @@ impl World {
 }
 
 impl Received {
+    fn begin_reading(&mut self) {
+        (self.erased_meanwhile, self.resized_meanwhile) = (false, 0);
+    }
+
     fn take(&mut self, delivery: Delivery, unit: &TruthfulUnit) {
         match delivery {
+            _ if self.muddled => {}
             Delivery::Event { entry, .. } => self.take_event(number_of(&entry), unit),
             Delivery::Lost(Lost::LogRestarted) => {
                 let erased = unit.log_began(unit.happened()) >= self.next;
@@ -270,12 +290,9 @@ impl Received {
             wrong => self.turned && wrong.is_multiple_of(TOTAL_TURNS_AT),
         };
         assert!(right || unseen, "after {from}, {} are told to be lost, and {number} comes", self.lost);
-        *self = Received {
-            next: number + 1,
-            anchored: true,
-            erased_meanwhile: self.erased_meanwhile,
-            ..Received::default()
-        };
+        self.next = number + 1;
+        self.anchored = true;
+        (self.restart_told, self.lost, self.turned) = (false, 0, false);
     }
 
     /// On a line without faults everything has come.
@@ -283,7 +300,7 @@ impl Received {
         let is_empty = unit.log_began(unit.happened()) == unit.happened();
         let told = self.restart_told || !self.anchored || self.next == unit.happened();
         assert!(
-            if is_empty { told } else { self.next == unit.happened() },
+            self.muddled || if is_empty { told } else { self.next == unit.happened() },
             "of {} events, {} have come",
             unit.happened(),
             self.next,

@@ -7,6 +7,8 @@ pub(super) struct TruthfulUnit {
     /// Running numbers of the events in their slots.
     slots: Vec<u32>,
     size: u16,
+    /// The smallest size that it has had.
+    smallest: u16,
     next_slot: usize,
     total: u16,
     happened: u32,
@@ -20,6 +22,7 @@ impl TruthfulUnit {
         let mut unit = TruthfulUnit {
             slots: Vec::new(),
             size,
+            smallest: size,
             next_slot: 0,
             total: 0,
             happened: 0,
@@ -38,10 +41,10 @@ impl TruthfulUnit {
         self.erased_before.iter().rev().copied().find(|&began| began <= number).unwrap_or(0)
     }
 
-    /// Whether the log that began with this event has been full.
+    /// Whether the log that began with this event may have been full.
     pub(super) fn was_full(&self, began: u32) -> bool {
         let end = self.erased_before.iter().copied().find(|&other| other > began).unwrap_or(self.happened);
-        end - began >= self.size.into()
+        end - began >= self.smallest.into()
     }
 
     /// So many events happen.
@@ -62,6 +65,21 @@ impl TruthfulUnit {
         self.slots.clear();
         (self.next_slot, self.total) = (0, 0);
         self.erased_before.push(self.happened);
+    }
+
+    /// Gives the ring another size; the newest events stay, from the first slot on.
+    pub(super) fn resize(&mut self, size: u16) {
+        if self.slots.len() == usize::from(self.size) {
+            self.slots.rotate_left(self.next_slot);
+        }
+        self.slots.drain(..self.slots.len().saturating_sub(size.into()));
+        self.size = size;
+        self.smallest = self.smallest.min(size);
+        self.next_slot = self.slots.len() % usize::from(size);
+    }
+
+    pub(super) fn size(&self) -> u16 {
+        self.size
     }
 
     pub(super) fn answer(&self, command: &Command) -> Reply {
