@@ -47,7 +47,8 @@ pub(crate) struct ConnectionArgs {
     #[arg(short, long, global = true, env = "SER_PORT", value_name = "PORT")]
     pub(crate) port: Option<String>,
 
-    /// Rate of the serial port, 9600 if not given. Over TCP: of the terminal server's port, for `clock set` to reckon with.
+    /// Rate of the serial port, 9600 if not given. Over TCP: of the terminal server's port, for `clock set` to reckon
+    /// with.
     #[arg(long, global = true, value_name = "RATE", value_parser = values::baud)]
     pub(crate) baud: Option<Baud>,
 

@@ -365,7 +365,8 @@ fn a_bus_may_be_slow_and_noisy_and_its_host_have_any_number() {
     let rows = without_times(&bench.ok(5, "read --all --format csv"));
     let expected = (1..=30).map(|entry| format!("{entry},1,{}", entry % 2));
     assert_eq!(rows[1..], expected.collect::<Vec<_>>(), "neither lost nor doubled");
-    // Which message meets with an accident depends on when the commands above were given, so one may have to wait for it.
+    // Which message meets with an accident depends on when the commands above were given, so one may have to wait for
+    // it.
     wait_until("the board has counted a bus error", || {
         let devices = bench.command(&bench.bus(), "genius devices").output().expect("ser-cli runs");
         let told = stderr(&devices);

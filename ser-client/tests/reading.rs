@@ -267,8 +267,8 @@ fn a_download_takes_few_requests_more_than_there_are_full_replies() {
         let mut requests = 0;
         let mut host = Host { window, ..Host::new() };
         host.read(&mut recorder, |_| requests += 1);
-        // Position, whether the log is full (before the first entries and after them), ten entries at a time, once around
-        // the end of the ring, and every tenth reply or so an entry to look at.
+        // Position, whether the log is full (before the first entries and after them), ten entries at a time, once
+        // around the end of the ring, and every tenth reply or so an entry to look at.
         assert!((3 + 205 + 1..=3 + 205 + 1 + 3).contains(&requests), "{requests}");
     }
 }

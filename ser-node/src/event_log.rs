@@ -126,7 +126,8 @@ impl<'a> EventLog<'a> {
         self.storage.get(..self.len)?.get(slot)
     }
 
-    /// Sequence number of the oldest event that is still there; equal to [`next_sequence`](Self::next_sequence) when there is none.
+    /// Sequence number of the oldest event that is still there; equal to [`next_sequence`](Self::next_sequence) when
+    /// there is none.
     #[must_use]
     pub fn oldest_sequence(&self) -> u64 {
         self.next_sequence - self.len as u64

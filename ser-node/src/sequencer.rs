@@ -57,7 +57,8 @@ impl Sequencer {
         self.state = state;
     }
 
-    /// Takes a change that was accepted at `tick_ms`; every earlier one must have been taken out with [`next`](Self::next).
+    /// Takes a change that was accepted at `tick_ms`; every earlier one must have been taken out with
+    /// [`next`](Self::next).
     pub(crate) fn push(&mut self, tick_ms: u64, changed: u32, state: u32) {
         // Changes that capture had to drop are in no sample, but the states show them: they are in effect.
         let dropped = state ^ changed ^ self.accepted;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use crate::error::SimError;
 
-/// A lock file beside what is claimed. What stands under the name itself does not tell whether the simulator that put it
-/// there still runs.
+/// A lock file beside what is claimed. What stands under the name itself does not tell whether the simulator that put
+/// it there still runs.
 pub(crate) struct Claim {
     path: PathBuf,
     left_behind: bool,

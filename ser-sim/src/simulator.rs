@@ -45,8 +45,8 @@ pub struct SimOptions {
     pub debounce_ms: u8,
     /// What plays the node.
     pub backend: Backend,
-    /// The Genius bus, if the node is on one. Then `model` is of no account, and the bus's first node is the one that is
-    /// played by `backend` and has the port; the others are built in.
+    /// The Genius bus, if the node is on one. Then `model` is of no account, and the bus's first node is the one that
+    /// is played by `backend` and has the port; the others are built in.
     pub genius: Option<GeniusOptions>,
     /// Called with a sentence for the user when something is not as it should be but goes on.
     pub notice: Option<Notice>,

@@ -48,8 +48,8 @@ struct Logger;
 
 struct SharedEncoder(UnsafeCell<defmt::Encoder>);
 
-// SAFETY: touched only while `DEPTH` is 1, that is by the one whose `acquire` found 0. Contexts nest: one that interrupts
-// it has released the log again before it goes on.
+// SAFETY: touched only while `DEPTH` is 1, that is by the one whose `acquire` found 0. Contexts nest: one that
+// interrupts it has released the log again before it goes on.
 unsafe impl Sync for SharedEncoder {}
 
 static ENCODER: SharedEncoder = SharedEncoder(UnsafeCell::new(defmt::Encoder::new()));

@@ -1,13 +1,13 @@
 //! The battery-backed clock: milliseconds that the bench counts on the external bus, and what they mean.
 //!
 //! # Design
-//! The bench counts whether or not the board runs, as a clock chip does on its battery. What the clock shows is that count
-//! plus an offset, which setting the clock writes into memory that outlives the power. A fresh memory file holds no offset:
-//! the clock has never been set.
+//! The bench counts whether or not the board runs, as a clock chip does on its battery. What the clock shows is that
+//! count plus an offset, which setting the clock writes into memory that outlives the power. A fresh memory file holds
+//! no offset: the clock has never been set.
 //!
 //! # Tradeoffs
-//! The clock is as good as the bench is punctual: it writes its count every 2 ms when its computer has the time, and late when
-//! not. Setting and reading are late alike, so with an idle computer these errors cancel but for 2 ms.
+//! The clock is as good as the bench is punctual: it writes its count every 2 ms when its computer has the time, and
+//! late when not. Setting and reading are late alike, so with an idle computer these errors cancel but for 2 ms.
 //!
 //! # Notes
 //! Two words that are being written may be caught half new, half old; their check tells, and they are read again.

@@ -1,12 +1,12 @@
 //! The capture interrupt and the clock behind it.
 //!
 //! # Design
-//! Timer 0 interrupts every millisecond. Timer 1 counts without end from reset on (see `boot`), and the tick is read off
-//! it: the interrupt says *look now*, never *one more millisecond*.
+//! Timer 0 interrupts every millisecond. Timer 1 counts without end from reset on (see `boot`), and the tick is read
+//! off it: the interrupt says *look now*, never *one more millisecond*.
 //!
 //! # Tradeoffs
-//! Two timers instead of one. With a tick that counts interrupts, every interrupt that comes later than the next one is due
-//! would put the clock back for good.
+//! Two timers instead of one. With a tick that counts interrupts, every interrupt that comes later than the next one is
+//! due would put the clock back for good.
 //!
 //! # Notes
 //! The timers count down; timer 1 goes round after 172 s, which is how long the interrupt may stay away
@@ -64,7 +64,8 @@ const TIMER1: Registers = unsafe { Registers::at(base::TIMER1) };
 
 static TICK_MS: AtomicU32 = AtomicU32::new(0);
 
-/// Milliseconds since boot, wrapping. The same tick as that of the latest sample, for those who have no part in capture.
+/// Milliseconds since boot, wrapping. The same tick as that of the latest sample, for those who have no part in
+/// capture.
 pub(crate) fn tick_ms() -> u32 {
     TICK_MS.load(Ordering::Relaxed)
 }

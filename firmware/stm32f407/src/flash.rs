@@ -144,12 +144,12 @@ impl ConfigurationFlash {
     /// Writes the word at `offset`, a multiple of four less than `LEN`, into flash that is unlocked and idle.
     fn write_word(&mut self, offset: u32, word: u32) -> Result<(), FlashError> {
         self.registers.cr().modify(|_, w| w.psize().psize32().pg().set_bit());
-        // SAFETY: as memory, the word is nobody's. ram-image.x hands sectors 2 and 3 to no section, and does not link if
-        // these are others: no variable and no code is there. Nothing forms a reference to it; it is read by `read` alone,
-        // through this value, of which there is one and which is borrowed for writing. It is aligned and inside of the
-        // sectors (`check_write` has looked at the whole range), where the protection unit grants access.
-        // As hardware, unlocked flash takes a store of 32 bits with PG set and PSIZE at 32 bits. Whatever bits are written over
-        // whatever others, the worst is a cell that holds something else, and the record's check finds that. That
+        // SAFETY: as memory, the word is nobody's. ram-image.x hands sectors 2 and 3 to no section, and does not link
+        // if these are others: no variable and no code is there. Nothing forms a reference to it; it is read by `read`
+        // alone, through this value, of which there is one and which is borrowed for writing. It is aligned and inside
+        // of the sectors (`check_write` has looked at the whole range), where the protection unit grants access. As
+        // hardware, unlocked flash takes a store of 32 bits with PG set and PSIZE at 32 bits. Whatever bits are written
+        // over whatever others, the worst is a cell that holds something else, and the record's check finds that. That
         // nothing can be read from the bank meanwhile stops nobody: everything runs from RAM.
         unsafe { ptr::write_volatile(address(offset).cast::<u32>(), word) };
         asm::dsb();
@@ -177,7 +177,8 @@ impl ReadNorFlash for ConfigurationFlash {
             return Err(FlashError::TimedOut);
         }
         for (offset, word) in (offset..).step_by(WORD_LEN).zip(bytes.as_chunks_mut().0) {
-            // SAFETY: inside of the memory and aligned, as just checked; see `write_word` for whose it is. Any value is a word.
+            // SAFETY: inside of the memory and aligned, as just checked; see `write_word` for whose it is. Any value is
+            // a word.
             *word = unsafe { ptr::read_volatile(address(offset).cast::<u32>()) }.to_le_bytes();
         }
         Ok(())

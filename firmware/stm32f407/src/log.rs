@@ -2,9 +2,9 @@
 //!
 //! # Design
 //! A frame goes into a ring that the probe empties while the processor runs. Without a probe, or with one that is slow,
-//! the ring is full and the rest of the frame is dropped: the log never waits, whatever the probe asks for. No critical section
-//! guards it, so that it never delays the capture interrupt: whoever interrupts a record that is being written writes
-//! nothing.
+//! the ring is full and the rest of the frame is dropped: the log never waits, whatever the probe asks for. No critical
+//! section guards it, so that it never delays the capture interrupt: whoever interrupts a record that is being written
+//! writes nothing.
 //!
 //! # Tradeoffs
 //! `defmt-rtt` waits when a probe asks for it, or switches interrupts off, and panics when it is entered twice.
@@ -32,8 +32,8 @@ struct Logger;
 
 struct SharedEncoder(UnsafeCell<defmt::Encoder>);
 
-// SAFETY: touched only while `DEPTH` is 1, that is by the one whose `acquire` found 0. Contexts nest: one that interrupts
-// it has released the log again before it goes on.
+// SAFETY: touched only while `DEPTH` is 1, that is by the one whose `acquire` found 0. Contexts nest: one that
+// interrupts it has released the log again before it goes on.
 unsafe impl Sync for SharedEncoder {}
 
 static ENCODER: SharedEncoder = SharedEncoder(UnsafeCell::new(defmt::Encoder::new()));

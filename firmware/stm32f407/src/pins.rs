@@ -252,8 +252,8 @@ macro_rules! set_up {
     ($($port:ident: $registers:expr),* $(,)?) => {$({
         const SET_UP: SetUp = SetUp::of(Port::$port);
         let registers = $registers;
-        // SAFETY: the table's values, in registers that take any; the level and function of a pin are set before its mode,
-        // so that none ever drives what it should not.
+        // SAFETY: the table's values, in registers that take any; the level and function of a pin are set before its
+        // mode, so that none ever drives what it should not.
         unsafe {
             registers.odr().modify(|r, w| w.bits(SET_UP.data.in_place_of(r.bits())));
             registers.pupdr().modify(|r, w| w.bits(SET_UP.pull.in_place_of(r.bits())));

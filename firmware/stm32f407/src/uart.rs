@@ -127,8 +127,8 @@ impl Line for SerialLine {
         self.bytes = self.bytes.wrapping_add(1);
         // There is room, the main loop has asked.
         let _ = self.to_send.push(byte);
-        // The interrupt may clear this bit between reading and writing, because it has found the ring empty just before.
-        // Then it is set here, where it belongs; nothing else in the register ever changes.
+        // The interrupt may clear this bit between reading and writing, because it has found the ring empty just
+        // before. Then it is set here, where it belongs; nothing else in the register ever changes.
         self.uart.cr1().modify(|_, w| w.txeie().set_bit());
     }
 

@@ -73,8 +73,8 @@ enum What {
     },
     /// Tell all recorders something, and check by their last broadcast that each has received it.
     ///
-    /// A broadcast is not answered, so every recorder that is logged in is asked before and afterwards. The exit code is
-    /// 0 when all of them are known to have received it, and 1 otherwise, also when there is none.
+    /// A broadcast is not answered, so every recorder that is logged in is asked before and afterwards. The exit code
+    /// is 0 when all of them are known to have received it, and 1 otherwise, also when there is none.
     #[command(after_help = BROADCAST_EXAMPLES)]
     Broadcast {
         #[command(subcommand)]

@@ -26,8 +26,8 @@ const PACE: Duration = Duration::from_millis(1);
 /// What happens in one look is dealt with, up to so many events; more wait for the next.
 const EVENTS_PER_LOOK: usize = 16;
 
-/// From the host's turn on the bus to the recorder: about so long takes a set-clock datagram itself, with what the boards
-/// at both ends need to hand it over. Measured with the models of them.
+/// From the host's turn on the bus to the recorder: about so long takes a set-clock datagram itself, with what the
+/// boards at both ends need to hand it over. Measured with the models of them.
 const HANDOVER: Duration = Duration::from_millis(3);
 
 /// A board has its heartbeat five times a second. One that runs in the time of a busy computer gets longer.
@@ -61,8 +61,8 @@ pub struct BusDevice {
 const GENI_MODEL: u8 = 4;
 
 impl BusDevice {
-    /// The inputs of a recorder; `None` for other devices. A recorder is a GENI board that sends the state of its inputs
-    /// in every scan, and takes nothing.
+    /// The inputs of a recorder; `None` for other devices. A recorder is a GENI board that sends the state of its
+    /// inputs in every scan, and takes nothing.
     #[must_use]
     pub fn recorder_inputs(&self) -> Option<GlobalData> {
         let sends_only =

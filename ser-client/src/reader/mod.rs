@@ -383,8 +383,8 @@ impl LogReader {
         };
         let happened = u64::from(position.total.wrapping_sub(low_16(head.total)));
         let total = head.total + happened;
-        // A total that went back looks as if almost 65536 events had happened. Where so many have indeed, between two replies, a
-        // reading from the cursor on sorts it out as well.
+        // A total that went back looks as if almost 65536 events had happened. Where so many have indeed, between two
+        // replies, a reading from the cursor on sorts it out as well.
         let went_back = happened > MAX_HAPPENED || total - self.next > u16::MAX.into();
         if slot != (head.slot + happened) % self.size || went_back {
             return Err(Disturbed::Changed);
@@ -630,7 +630,8 @@ impl LogReader {
             self.margin = self.margin.max(HASTE * head.happened);
             return Ok(());
         }
-        // The ring turns over during one request, and is still the same: whatever the reply holds is all that can be had.
+        // The ring turns over during one request, and is still the same: whatever the reply holds is all that can be
+        // had.
         let slot = u64::from(request.start) - 1;
         let age = (head.slot + self.size - slot - 1) % self.size;
         self.skip_to(self.next.max(head.total - 1 - age));

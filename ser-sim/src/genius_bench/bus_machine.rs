@@ -56,8 +56,8 @@ impl<'a> BusMachine<'a> {
         Ok(true)
     }
 
-    /// Lets time run ahead of real time, so that nobody has to wait for self-tests, and for boards that ask each other who
-    /// they are. True when it was cut short.
+    /// Lets time run ahead of real time, so that nobody has to wait for self-tests, and for boards that ask each other
+    /// who they are. True when it was cut short.
     fn run_ahead(&mut self, stop: &AtomicBool) -> bool {
         let until = Instant::now() + LOG_IN_PATIENCE;
         while !self.all_logged_in() && Instant::now() < until {

@@ -42,8 +42,8 @@ struct Station {
 }
 
 impl GeniusBench {
-    /// Connects everything. The first recorder is the image, or else the built-in node as `options` say; the others differ
-    /// from that by their model, and have memory of their own.
+    /// Connects everything. The first recorder is the image, or else the built-in node as `options` say; the others
+    /// differ from that by their model, and have memory of their own.
     pub(crate) fn new(
         options: &SimNodeOptions,
         image: Option<Emulator>,

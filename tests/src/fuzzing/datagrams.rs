@@ -10,8 +10,8 @@ use super::script::Script;
 
 /// `data` is source, destination, function, subfunction, priority and then what the datagram carries.
 ///
-/// - The bus's own datagrams are understood if, and only if, `docs/genius.md` has them so, and go out as the same bytes;
-///   what is refused is refused for a reason that is there.
+/// - The bus's own datagrams are understood if, and only if, `docs/genius.md` has them so, and go out as the same
+///   bytes; what is refused is refused for a reason that is there.
 /// - A recorder's messages are those of `commands` and `replies`, and only under their own codes.
 /// - Global data go out as the bytes that came in; DIP switches are understood or refused.
 ///

@@ -67,7 +67,8 @@ fn by_the_book(stream: &[u8], longest: usize) -> Vec<Seen> {
     seen
 }
 
-/// What follows an ESC up to the next one, or to the end of the stream: what becomes of the frame, and the text behind it.
+/// What follows an ESC up to the next one, or to the end of the stream: what becomes of the frame, and the text behind
+/// it.
 fn understand(stretch: &[u8], start: u64, is_last: bool, longest: usize) -> (Option<Seen>, &[u8]) {
     let digits = stretch.iter().take_while(|byte| byte.is_ascii_hexdigit()).count();
     let drop_at = |index: usize, cause| {

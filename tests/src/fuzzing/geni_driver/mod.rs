@@ -16,16 +16,16 @@ use ram::Puppet;
 /// Milliseconds that the hostility lasts at most.
 const MAX_POLLS: u32 = 4_000;
 
-/// `data` says how the driver is set up, what changes in the RAM between two accesses and between two polls, what the host
-/// wants, and how time passes.
+/// `data` says how the driver is set up, what changes in the RAM between two accesses and between two polls, what the
+/// host wants, and how time passes.
 ///
 /// - A poll does a bounded number of accesses, and none while the board must be left alone.
-/// - Nothing is written but what belongs to the host, and nothing read from the reserved area. Lockout is asked for and given
-///   back when it may be, by what the driver has seen.
+/// - Nothing is written but what belongs to the host, and nothing read from the reserved area. Lockout is asked for and
+///   given back when it may be, by what the driver has seen.
 /// - A board without a heartbeat is not trusted any longer than agreed.
 /// - Counters never go back; each datagram that was accepted ends once, in the way that was asked for.
-/// - When a board that works takes over, the driver is ready within a bounded time, sends, keeps the board's global data
-///   up to date and breaks no rule of the board.
+/// - When a board that works takes over, the driver is ready within a bounded time, sends, keeps the board's global
+///   data up to date and breaks no rule of the board.
 ///
 /// # Panics
 /// When one of these does not hold.

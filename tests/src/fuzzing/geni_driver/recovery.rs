@@ -30,8 +30,8 @@ struct Recovery {
     window: BoardWindow,
 }
 
-/// Checks that the driver brings a board onto the bus that takes the place of the hostile RAM now: one that has just been
-/// switched on or, if it is `warm`, one that has been running for a while.
+/// Checks that the driver brings a board onto the bus that takes the place of the hostile RAM now: one that has just
+/// been switched on or, if it is `warm`, one that has been running for a while.
 pub(super) fn assert_recovers(bench: Bench, warm: bool) {
     let mut recovery = Recovery::begin(bench, warm);
     recovery.settle();
@@ -90,8 +90,8 @@ impl Recovery {
         self.bus.borrow().get(self.board).violations().len()
     }
 
-    /// What the driver believes of the board that was there before may mislead it at first, but not to requests that this
-    /// board has never had.
+    /// What the driver believes of the board that was there before may mislead it at first, but not to requests that
+    /// this board has never had.
     fn assert_lawful(&self, violations_before: usize) {
         let bus = self.bus.borrow();
         let violations = bus.get(self.board).violations();

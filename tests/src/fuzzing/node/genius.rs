@@ -30,8 +30,8 @@ impl Genius {
         Genius { port, board, reply: None, owed: VecDeque::new(), ignored: 0 }
     }
 
-    /// The port works in the present millisecond. Reports are compared with the events that are owed to `report_address`;
-    /// `is_overwritten` says which of these the ring has lost.
+    /// The port works in the present millisecond. Reports are compared with the events that are owed to
+    /// `report_address`; `is_overwritten` says which of these the ring has lost.
     pub(super) fn serve(
         &mut self,
         node: &mut SimNode<'_>,

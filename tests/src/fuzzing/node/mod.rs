@@ -19,14 +19,17 @@ use model::Recorder;
 /// How often the power goes at most.
 const MAX_POWER_CYCLES: u32 = 8;
 
-/// `data` says which model it is, what debounce times it has, whether it is on a bus and what its clock shows, and then what happens: contacts
-/// move, bytes, commands and datagrams arrive, the UART misreads a byte, time passes, the power goes.
+/// `data` says which model it is, what debounce times it has, whether it is on a bus and what its clock shows, and then
+/// what happens: contacts move, bytes, commands and datagrams arrive, the UART misreads a byte, time passes, the power
+/// goes.
 ///
 /// - What the node says is, to the byte and in its millisecond, what the model says: every reply, report and line.
 /// - The log is that of the model, with stamps by the clock of the model.
 /// - What was refused is counted.
-/// - Commands in datagrams are answered in the same way; auto reports bring every event once; global data are the inputs.
-/// - The same log comes out when the host is slow and the line has its real rate; what is said is always a whole message.
+/// - Commands in datagrams are answered in the same way; auto reports bring every event once; global data are the
+///   inputs.
+/// - The same log comes out when the host is slow and the line has its real rate; what is said is always a whole
+///   message.
 ///
 /// # Panics
 /// When one of these does not hold.

@@ -168,8 +168,8 @@ impl Recorder {
         said
     }
 
-    /// Takes the body of a good frame, or of a datagram, in millisecond `tick_ms`; what is said because of it, with at most
-    /// `max_entries` entries in a reply.
+    /// Takes the body of a good frame, or of a datagram, in millisecond `tick_ms`; what is said because of it, with at
+    /// most `max_entries` entries in a reply.
     pub(super) fn body(&mut self, body: &[u8], tick_ms: u64, max_entries: u8) -> Vec<Said> {
         match Command::parse(body) {
             Ok(command) => self.command(&command, tick_ms, max_entries),

@@ -36,7 +36,8 @@ impl Bench<'_, '_> {
         panic!("events were not reported");
     }
 
-    /// A command arrives in a datagram. Setting the clock is left out: the moment matters, and the bus does not keep it.
+    /// A command arrives in a datagram. Setting the clock is left out: the moment matters, and the bus does not keep
+    /// it.
     pub(super) fn ask_over_bus(&mut self, source: u8, body: &[u8]) {
         if self.genius.is_none() || matches!(Command::parse(body), Ok(Command::SetClock(_))) {
             return;
