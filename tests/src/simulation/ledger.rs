@@ -101,8 +101,13 @@ pub enum Port {
 enum Due {
     /// The erase of this number.
     Erase(usize),
-    /// A configuration; `None` if it leaves the size alone.
-    Size(Option<u16>),
+    /// A configuration.
+    Size {
+        /// `None` if it leaves the size alone.
+        to: Option<u16>,
+        /// Whether the size was changed over another port meanwhile, so that the answer may be of before.
+        doubtful: bool,
+    },
 }
 
 /// The books of one recorder, from power-up to power-up.
@@ -274,7 +279,7 @@ impl Ledger {
     #[must_use]
     pub fn smallest_size(&self) -> u16 {
         let sizes = self.due.iter().filter_map(|(_, _, due)| match due {
-            Due::Size(size) => *size,
+            Due::Size { to, .. } => *to,
             Due::Erase(_) => None,
         });
         sizes.fold(self.size, u16::min)
@@ -307,10 +312,12 @@ impl Ledger {
                 self.due.push_back((port, until_ms, Due::Erase(self.erases.len() - 1)));
             }
             // Its answer looks the same.
-            Command::QueryConfiguration => self.due.push_back((port, until_ms, Due::Size(None))),
+            Command::QueryConfiguration => {
+                self.due.push_back((port, until_ms, Due::Size { to: None, doubtful: false }));
+            }
             Command::Configure(configure) => {
                 self.forget_configuration(port);
-                self.due.push_back((port, until_ms, Due::Size(configure.size)));
+                self.due.push_back((port, until_ms, Due::Size { to: configure.size, doubtful: false }));
                 self.note_overwritten();
             }
             _ => {}
@@ -325,7 +332,10 @@ impl Ledger {
             }
             Command::Configure(configure) => {
                 self.forget_configuration(Port::Bus);
-                self.size = configure.size.unwrap_or(self.size);
+                if let Some(size) = configure.size {
+                    self.size = size;
+                    self.doubt_answers(|_| true);
+                }
                 self.note_overwritten();
             }
             _ => {}
@@ -352,8 +362,9 @@ impl Ledger {
                 }
             }
             Reply::Configuration(configuration) => {
-                self.finish(|of, _, due| of == port && matches!(due, Due::Size(_)));
-                self.size = configuration.size;
+                let done = self.finish(|of, _, due| of == port && matches!(due, Due::Size { .. }));
+                let certain = matches!(done, Some(Due::Size { doubtful: false, .. }));
+                self.size = if certain { configuration.size } else { self.size.min(configuration.size) };
                 self.note_overwritten();
                 if port == Port::Line {
                     self.see_configuration(*configuration)?;
@@ -368,7 +379,7 @@ impl Ledger {
         if let Some(known) = self.configuration.filter(|known| *known != configuration) {
             return Err(format!("the recorder tells {configuration:?}, and {known:?} was set last"));
         }
-        let others_due = self.due.iter().any(|(_, _, due)| matches!(due, Due::Size(_)));
+        let others_due = self.due.iter().any(|(_, _, due)| matches!(due, Due::Size { .. }));
         let settled = !others_due && self.now_ms >= self.known_from_ms;
         self.configuration = settled.then_some(configuration);
         Ok(())
@@ -384,15 +395,27 @@ impl Ledger {
     /// The oldest of these has been done, or never will be. Gives what it was.
     fn finish(&mut self, is: impl Fn(Port, u64, &Due) -> bool) -> Option<Due> {
         let index = self.due.iter().position(|(of, until_ms, due)| is(*of, *until_ms, due))?;
-        let (_, _, due) = self.due.remove(index)?;
+        let (port, _, due) = self.due.remove(index)?;
         match due {
             Due::Erase(number) => self.erases[number].to = self.len(),
-            // Which of the two it is, the next configuration tells.
-            Due::Size(Some(size)) => self.size = self.size.min(size),
-            Due::Size(None) => {}
+            Due::Size { to: Some(size), .. } => {
+                // Which of the two it is, the next configuration tells.
+                self.size = self.size.min(size);
+                self.doubt_answers(|other| other != port);
+            }
+            Due::Size { to: None, .. } => {}
         }
         self.note_overwritten();
         Some(due)
+    }
+
+    /// The size is another one now. Answers that are waiting in the queue of a port may be of before.
+    fn doubt_answers(&mut self, of: impl Fn(Port) -> bool) {
+        for (_, _, due) in self.due.iter_mut().filter(|(port, ..)| of(*port)) {
+            if let Due::Size { doubtful, .. } = due {
+                *doubtful = true;
+            }
+        }
     }
 
     /// Checks what a recorder holds in its log: the total, and its entries from the oldest to the newest.

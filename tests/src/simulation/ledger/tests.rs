@@ -1,7 +1,7 @@
 //! A log that is not as the books have it.
 
 use chrono::DateTime;
-use ser_proto::{Inputs, Model};
+use ser_proto::{AutoReport, Configure, Inputs, Model};
 
 use super::*;
 
@@ -100,4 +100,31 @@ fn an_erase_that_arrived_earlier_can_be_the_latest() {
     let after: Vec<Entry> = ledger.events.iter().skip(3).map(|event| event.to_entry()).collect();
     assert_eq!(ledger.check_log(2, &after), Ok(()));
     assert_refused(ledger.check_log(3, &entries), "as event");
+}
+
+#[test]
+fn an_answer_that_waited_in_its_queue_does_not_undo_a_resize_over_the_other_port() {
+    let configuration = |size| Reply::Configuration(Configuration { size, ..Configuration::default() });
+    let resize = |size| {
+        let (auto_report, report_address) = (AutoReport::Off, 31);
+        Command::Configure(Configure {
+            size: Some(size),
+            baud: None,
+            auto_report,
+            report_address,
+            auto_print: false,
+        })
+    };
+    let (mut ledger, _) = recorded(5);
+    ledger.command_arrived(Port::Line, &Command::QueryConfiguration, u64::MAX);
+    ledger.command_arrived(Port::Bus, &resize(3), u64::MAX);
+    ledger.replied(Port::Bus, &configuration(3)).expect("a reply");
+    ledger.replied(Port::Line, &configuration(SIZE)).expect("a reply of before");
+    assert_eq!(ledger.smallest_size(), 3);
+    record(&mut ledger, 6..=10);
+    assert_eq!(ledger.overwritten_before(), 7);
+    // What is asked afterwards tells what is.
+    ledger.command_arrived(Port::Line, &Command::QueryConfiguration, u64::MAX);
+    ledger.replied(Port::Line, &configuration(3)).expect("a reply");
+    assert_eq!(ledger.smallest_size(), 3);
 }
