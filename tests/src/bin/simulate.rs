@@ -17,24 +17,29 @@ Examples:
 
 A bus is lived through scan by scan, and everything else from one event to the next: the hours with a bus are told apart.";
 
+const MS_PER_HOUR: f64 = 3_600_000.0;
+
+/// A longer run is better given as more seeds: they go more ways, and what fails is sooner repeated.
+const MAX_HOURS: f64 = 100_000.0;
+
 /// Run the whole system in virtual time, with random operations and faults, and account for every event.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask simulate", bin_name = "cargo xtask simulate", version, after_help = EXAMPLES)]
 struct Arguments {
     /// Everything follows from this number.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = at_least::<0>, allow_negative_numbers = true)]
     seed: u64,
 
-    /// Virtual time per seed, in hours.
-    #[arg(long, default_value_t = 100.0)]
-    hours: f64,
+    /// Virtual time per seed, in hours: more than 0, at most 100000, which are eleven years.
+    #[arg(long = "hours", value_name = "HOURS", default_value = "100", value_parser = duration_ms, allow_negative_numbers = true)]
+    duration_ms: u64,
 
-    /// So many seeds, one after the other.
-    #[arg(long, default_value_t = 1)]
+    /// So many seeds, one after the other; after the largest there is comes 0.
+    #[arg(long, default_value_t = 1, value_parser = at_least::<1>, allow_negative_numbers = true)]
     seeds: u64,
 
     /// One life in so many, from power-up to power cut, is on a Genius bus.
-    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, default_value_t = 8, value_parser = at_least::<1>, allow_negative_numbers = true)]
     bus_one_in: u64,
 
     /// All inputs toggle in every millisecond, and everybody reads, prints and reports as fast as it goes.
@@ -42,10 +47,32 @@ struct Arguments {
     load: bool,
 }
 
+impl Arguments {
+    /// The seeds to run, of which there is at least one.
+    fn seeds(&self) -> impl Iterator<Item = u64> {
+        (0..self.seeds).map(|count| self.seed.wrapping_add(count))
+    }
+}
+
+/// A whole number that is not smaller than `LEAST`.
+fn at_least<const LEAST: u64>(text: &str) -> Result<u64, String> {
+    let number = text.parse().ok().filter(|number| *number >= LEAST);
+    number.ok_or_else(|| format!("must be a whole number from {LEAST} to {}", u64::MAX))
+}
+
+/// Hours as milliseconds, at least one: a run of none would find nothing wrong.
+fn duration_ms(text: &str) -> Result<u64, String> {
+    let hours = text.parse().ok().filter(|hours| *hours > 0.0 && *hours <= MAX_HOURS);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive, and bounded")]
+    let ms = hours.map(|hours: f64| (hours * MS_PER_HOUR).round() as u64);
+    let ms = ms.filter(|ms| *ms > 0);
+    ms.ok_or_else(|| format!("must be hours, from a millisecond (0.0000003) to {MAX_HOURS}"))
+}
+
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let mut total = Pace::default();
-    for seed in arguments.seed..arguments.seed.saturating_add(arguments.seeds) {
+    for seed in arguments.seeds() {
         match run(seed, &arguments) {
             Some(pace) => total = total.and(pace),
             None => return ExitCode::FAILURE,
@@ -73,7 +100,7 @@ impl Pace {
 impl fmt::Display for Pace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         #[expect(clippy::cast_precision_loss, reason = "for people")]
-        let hours = self.virtual_ms as f64 / 3_600_000.0;
+        let hours = self.virtual_ms as f64 / MS_PER_HOUR;
         let minutes = self.real.as_secs_f64() / 60.0;
         write!(f, "{hours:.2} virtual hours in {minutes:.2} min, {:.0} per minute", hours / minutes)
     }
@@ -82,14 +109,9 @@ impl fmt::Display for Pace {
 /// Runs a seed and says what became of it; nothing when it failed.
 fn run(seed: u64, arguments: &Arguments) -> Option<Pace> {
     let began = Instant::now();
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "too large or small is as good as the end of the range"
-    )]
-    let duration_ms = (arguments.hours * 3_600_000.0).round() as u64;
+    let Arguments { duration_ms, bus_one_in, .. } = *arguments;
     let simulate = if arguments.load { simulation::run_flat_out } else { simulation::run };
-    match simulate(Options { seed, duration_ms, bus_one_in: arguments.bus_one_in }) {
+    match simulate(Options { seed, duration_ms, bus_one_in }) {
         Ok(report) => {
             let pace = Pace { virtual_ms: report.hours.total_ms, real: began.elapsed() };
             println!("{report}\n  {pace}\n");
@@ -98,6 +120,67 @@ fn run(seed: u64, arguments: &Arguments) -> Option<Pace> {
         Err(failure) => {
             eprintln!("{failure}");
             None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(arguments: &[&str]) -> Result<Arguments, clap::Error> {
+        Arguments::try_parse_from([&["simulate"], arguments].concat())
+    }
+
+    fn parsed(arguments: &[&str]) -> Arguments {
+        parse(arguments).unwrap_or_else(|error| panic!("{arguments:?}: {error}"))
+    }
+
+    /// It is refused for its value, in these words.
+    fn assert_refused(arguments: &[&str], words: &str) {
+        let error = parse(arguments).expect_err(words);
+        assert_eq!(error.kind(), clap::error::ErrorKind::ValueValidation, "{error}");
+        assert!(error.to_string().contains(words), "{error}");
+    }
+
+    #[test]
+    fn without_arguments_it_is_a_hundred_hours_of_seed_1() {
+        let arguments = parsed(&[]);
+        assert_eq!(arguments.seeds().collect::<Vec<_>>(), [1]);
+        assert_eq!(arguments.duration_ms, 360_000_000);
+    }
+
+    #[test]
+    fn hours_become_milliseconds() {
+        for (hours, ms) in [("0.5", 1_800_000), ("0.0000003", 1), ("100000", 360_000_000_000)] {
+            assert_eq!(parsed(&["--hours", hours]).duration_ms, ms);
+        }
+    }
+
+    #[test]
+    fn a_time_in_which_nothing_can_happen_or_that_never_ends_is_refused() {
+        for hours in ["0", "0.0000001", "-1", "nan", "inf", "100000.1", "1e300", "ten", ""] {
+            assert_refused(&["--hours", hours], "must be hours, from a millisecond (0.0000003) to 100000");
+        }
+    }
+
+    #[test]
+    fn seeds_go_on_behind_the_largest() {
+        let largest = u64::MAX.to_string();
+        assert_eq!(parsed(&["--seed", &largest]).seeds().collect::<Vec<_>>(), [u64::MAX]);
+        let seeds: Vec<u64> = parsed(&["--seed", &largest, "--seeds", "3"]).seeds().collect();
+        assert_eq!(seeds, [u64::MAX, 0, 1]);
+    }
+
+    #[test]
+    fn numbers_that_leave_nothing_to_run_are_refused() {
+        for option in ["--seeds", "--bus-one-in"] {
+            for number in ["0", "-1", "1.5", "18446744073709551616"] {
+                assert_refused(&[option, number], "must be a whole number from 1 to 18446744073709551615");
+            }
+        }
+        for number in ["-1", "x", "18446744073709551616"] {
+            assert_refused(&["--seed", number], "must be a whole number from 0 to 18446744073709551615");
         }
     }
 }
