@@ -8,8 +8,15 @@ use ser_tests::simulation::{Options, Report, run, run_flat_out};
 const HOUR_MS: u64 = 3_600_000;
 const MINUTE_MS: u64 = 60_000;
 
+/// No life is on a bus.
+const NO_BUS: u64 = 0;
+
 fn lived(seed: u64, duration_ms: u64, bus_one_in: u64) -> Report {
-    run(Options { seed, duration_ms, bus_one_in }).unwrap_or_else(|failure| panic!("{failure}"))
+    let lived = run(Options { seed, duration_ms, bus_one_in });
+    let (report, paces) = lived.unwrap_or_else(|failure| panic!("{failure}"));
+    assert_eq!(paces.on_bus.virtual_ms, report.hours.bus_ms);
+    assert_eq!(paces.on_bus.virtual_ms + paces.without_bus.virtual_ms, report.hours.total_ms);
+    report
 }
 
 /// Checks that nothing is left over: each edge and each event is in one of the columns.
@@ -45,7 +52,7 @@ fn sum(reports: &[Report], reader: usize) -> Tally {
 
 #[test]
 fn days_without_a_bus() {
-    let reports: Vec<Report> = (1..=6).map(|seed| lived(seed, 24 * HOUR_MS, u64::MAX)).collect();
+    let reports: Vec<Report> = (1..=6).map(|seed| lived(seed, 24 * HOUR_MS, NO_BUS)).collect();
     for report in &reports {
         assert_accounted(report);
         assert_eq!(report.hours.bus_ms, 0);
@@ -75,8 +82,16 @@ fn minutes_on_a_bus() {
 }
 
 #[test]
+fn each_seed_is_on_a_bus_for_a_while() {
+    for seed in [1, 5] {
+        let hours = lived(seed, 2 * HOUR_MS, u64::MAX).hours;
+        assert!(hours.bus_ms >= 20_000 && hours.bus_ms < hours.total_ms, "seed {seed}: {hours:?}");
+    }
+}
+
+#[test]
 fn the_same_seed_gives_the_same_run() {
-    for (seed, duration_ms, bus_one_in) in [(7, 12 * HOUR_MS, u64::MAX), (107, 2 * MINUTE_MS, 1)] {
+    for (seed, duration_ms, bus_one_in) in [(7, 12 * HOUR_MS, NO_BUS), (107, 2 * MINUTE_MS, 1)] {
         let report = lived(seed, duration_ms, bus_one_in);
         assert_eq!(report, lived(seed, duration_ms, bus_one_in));
         assert_ne!(report.digest, lived(seed + 1, duration_ms, bus_one_in).digest);
@@ -87,7 +102,7 @@ fn the_same_seed_gives_the_same_run() {
 /// in it.
 fn all_inputs_toggle_for(duration_ms: u64) {
     let options = Options { seed: 1, duration_ms, bus_one_in: 1 };
-    let report = run_flat_out(options).unwrap_or_else(|failure| panic!("{failure}"));
+    let (report, _) = run_flat_out(options).unwrap_or_else(|failure| panic!("{failure}"));
     assert_accounted(&report);
     for (edges, &events) in report.edges.iter().zip(&report.recorded) {
         assert_eq!(events, duration_ms, "{report}");

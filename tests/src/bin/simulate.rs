@@ -1,21 +1,21 @@
 //! Whole-system simulation in virtual time: see `ser_tests::simulation`.
 
-use std::fmt;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
 
 use clap::Parser;
-use ser_tests::simulation::{self, Options};
+use ser_tests::simulation::{self, Options, Paces};
 
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask simulate                          a hundred hours of seed 1
   cargo xtask simulate --seed 7 --hours 5000    one long run
   cargo xtask simulate --seeds 50               seeds 1 to 50, up to the first that fails
-  cargo xtask simulate --bus-one-in 1           always on a bus
+  cargo xtask simulate --hours 1 --bus-one-in 1 always on a bus
   cargo xtask simulate --load --hours 1         a change of all inputs in every millisecond
 
-A bus is lived through scan by scan, and everything else from one event to the next: the hours with a bus are told apart.";
+A bus is lived through scan by scan, and everything else from one event to the next, hundreds of times as fast. A life
+on a bus is over in minutes, and another one may take days: of a hundred hours, a few minutes are on a bus. So both
+paces are told apart.";
 
 const MS_PER_HOUR: f64 = 3_600_000.0;
 
@@ -38,8 +38,9 @@ struct Arguments {
     #[arg(long, default_value_t = 1, value_parser = at_least::<1>, allow_negative_numbers = true)]
     seeds: u64,
 
-    /// One life in so many, from power-up to power cut, is on a Genius bus.
-    #[arg(long, default_value_t = 8, value_parser = at_least::<1>, allow_negative_numbers = true)]
+    /// Of the lives, from power-up to power cut, the first and one in so many of the others are on a Genius bus; with 0
+    /// there is no bus at all.
+    #[arg(long, value_name = "LIVES", default_value_t = 8, value_parser = at_least::<0>, allow_negative_numbers = true)]
     bus_one_in: u64,
 
     /// All inputs toggle in every millisecond, and everybody reads, prints and reports as fast as it goes.
@@ -71,51 +72,27 @@ fn duration_ms(text: &str) -> Result<u64, String> {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let mut total = Pace::default();
+    let mut total = Paces::default();
     for seed in arguments.seeds() {
         match run(seed, &arguments) {
-            Some(pace) => total = total.and(pace),
+            Some(paces) => total += paces,
             None => return ExitCode::FAILURE,
         }
     }
     if arguments.seeds > 1 {
-        println!("{} seeds, nothing unaccounted for: {total}", arguments.seeds);
+        println!("{} seeds, nothing unaccounted for\n  {total}", arguments.seeds);
     }
     ExitCode::SUCCESS
 }
 
-/// Virtual time, and how long it took.
-#[derive(Clone, Copy, Default)]
-struct Pace {
-    virtual_ms: u64,
-    real: Duration,
-}
-
-impl Pace {
-    fn and(self, other: Pace) -> Pace {
-        Pace { virtual_ms: self.virtual_ms + other.virtual_ms, real: self.real + other.real }
-    }
-}
-
-impl fmt::Display for Pace {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        #[expect(clippy::cast_precision_loss, reason = "for people")]
-        let hours = self.virtual_ms as f64 / MS_PER_HOUR;
-        let minutes = self.real.as_secs_f64() / 60.0;
-        write!(f, "{hours:.2} virtual hours in {minutes:.2} min, {:.0} per minute", hours / minutes)
-    }
-}
-
 /// Runs a seed and says what became of it; nothing when it failed.
-fn run(seed: u64, arguments: &Arguments) -> Option<Pace> {
-    let began = Instant::now();
+fn run(seed: u64, arguments: &Arguments) -> Option<Paces> {
     let Arguments { duration_ms, bus_one_in, .. } = *arguments;
     let simulate = if arguments.load { simulation::run_flat_out } else { simulation::run };
     match simulate(Options { seed, duration_ms, bus_one_in }) {
-        Ok(report) => {
-            let pace = Pace { virtual_ms: report.hours.total_ms, real: began.elapsed() };
-            println!("{report}\n  {pace}\n");
-            Some(pace)
+        Ok((report, paces)) => {
+            println!("{report}\n  {paces}\n");
+            Some(paces)
         }
         Err(failure) => {
             eprintln!("{failure}");
@@ -174,13 +151,13 @@ mod tests {
 
     #[test]
     fn numbers_that_leave_nothing_to_run_are_refused() {
-        for option in ["--seeds", "--bus-one-in"] {
-            for number in ["0", "-1", "1.5", "18446744073709551616"] {
-                assert_refused(&[option, number], "must be a whole number from 1 to 18446744073709551615");
-            }
+        for number in ["0", "-1", "1.5", "18446744073709551616"] {
+            assert_refused(&["--seeds", number], "must be a whole number from 1 to 18446744073709551615");
         }
-        for number in ["-1", "x", "18446744073709551616"] {
-            assert_refused(&["--seed", number], "must be a whole number from 0 to 18446744073709551615");
+        for option in ["--seed", "--bus-one-in"] {
+            for number in ["-1", "x", "18446744073709551616"] {
+                assert_refused(&[option, number], "must be a whole number from 0 to 18446744073709551615");
+            }
         }
     }
 }

@@ -9,8 +9,8 @@
 //! - [`account`] holds what a reader was told against the ledger: every event once and in order, or reported as lost
 //!   with the right count.
 //!
-//! Everything follows from one seed. [`run`] gives a [`Report`] with a digest of all that happened, or a [`Failure`] that says how to
-//! repeat it.
+//! Everything follows from one seed. [`run`] gives a [`Report`] with a digest of all that happened, and the [`Paces`]
+//! at which it did; or a [`Failure`] that says how to repeat it.
 
 pub mod account;
 pub mod activity;
@@ -23,6 +23,7 @@ pub mod ledger;
 pub mod line_host;
 pub mod noise;
 pub mod orders;
+pub mod pace;
 pub mod printout;
 pub mod report;
 pub mod taps;
@@ -33,6 +34,7 @@ pub mod world;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+pub use pace::Paces;
 pub use report::Report;
 pub use trail::{Trail, VirtualTime};
 pub use world::{Options, World};
@@ -69,7 +71,7 @@ impl std::error::Error for Failure {}
 ///
 /// # Errors
 /// When something is not as it must be, a panic included.
-pub fn run(options: Options) -> Result<Report, Box<Failure>> {
+pub fn run(options: Options) -> Result<(Report, Paces), Box<Failure>> {
     live(options, "", World::run)
 }
 
@@ -77,15 +79,15 @@ pub fn run(options: Options) -> Result<Report, Box<Failure>> {
 ///
 /// # Errors
 /// As [`run`].
-pub fn run_flat_out(options: Options) -> Result<Report, Box<Failure>> {
+pub fn run_flat_out(options: Options) -> Result<(Report, Paces), Box<Failure>> {
     live(options, " --load", World::run_flat_out)
 }
 
 fn live(
     options: Options,
     load: &'static str,
-    live: impl FnOnce(World) -> Result<Report, String>,
-) -> Result<Report, Box<Failure>> {
+    live: impl FnOnce(World) -> Result<(Report, Paces), String>,
+) -> Result<(Report, Paces), Box<Failure>> {
     let trail = Trail::default();
     let world = World::new(options, trail.clone());
     let result = catch_unwind(AssertUnwindSafe(|| live(world))).unwrap_or_else(|panic| Err(words(&*panic)));

@@ -1,6 +1,8 @@
 //! Recorders, hosts, lines and bus in one virtual time, life after life: a life is what lies between power-up and
 //! power cut.
 
+use std::time::Instant;
+
 use ser_node::Debounce;
 use ser_proto::{AutoReport, Baud, Command, Configure, Model};
 use ser_sim::genius::Noise;
@@ -11,6 +13,7 @@ use super::bus::{BusHost, BusLife, HOST, any_noise};
 use super::chance::Chance;
 use super::conversation::{Conversation, Order};
 use super::line_host::{Errand, LineHost};
+use super::pace::{Pace, Paces};
 use super::report::{Hours, Report};
 use super::trail::Trail;
 use super::unit::{SETTLING_MS, Unit};
@@ -43,7 +46,7 @@ pub struct Options {
     pub seed: u64,
     /// How long it lasts, in virtual time; the last life is lived to its end.
     pub duration_ms: u64,
-    /// One life in so many is on a bus.
+    /// The first life is on a bus, and one in so many of the others; with 0 there is no bus at all.
     pub bus_one_in: u64,
 }
 
@@ -57,6 +60,7 @@ pub struct World {
     bus_host: BusHost,
     now_ms: u64,
     hours: Hours,
+    paces: Paces,
     /// Events of all earlier lives, per unit.
     recorded: Vec<u64>,
 }
@@ -81,19 +85,22 @@ impl World {
         let line = LineHost::new(chance.branch());
         let bus_host = BusHost::new(chance.branch(), units.len());
         let recorded = vec![0; units.len()];
-        World { options, chance, trail, units, line, bus_host, now_ms: 0, hours: Hours::default(), recorded }
+        let (hours, paces) = (Hours::default(), Paces::default());
+        World { options, chance, trail, units, line, bus_host, now_ms: 0, hours, paces, recorded }
     }
 
     /// Lives as long as the options say.
     ///
     /// # Errors
     /// The first thing that is not as it must be.
-    pub fn run(mut self) -> Result<Report, String> {
+    pub fn run(mut self) -> Result<(Report, Paces), String> {
         let mut off: Vec<PoweredOff> =
             self.units.iter().map(|unit| PoweredOff::new(unit.options())).collect();
         while self.now_ms < self.options.duration_ms {
             let mut rams: Vec<Ram> = self.units.iter().map(|_| Ram::new()).collect();
+            let (began, before) = (Instant::now(), self.hours);
             off = self.live(off, &mut rams)?;
+            self.clock_life(began, before);
         }
         self.report()
     }
@@ -103,10 +110,11 @@ impl World {
     ///
     /// # Errors
     /// The first thing that is not as it must be.
-    pub fn run_flat_out(mut self) -> Result<Report, String> {
+    pub fn run_flat_out(mut self) -> Result<(Report, Paces), String> {
         self.units.iter_mut().for_each(|unit| unit.debounce = Debounce::OFF);
         let off: Vec<PoweredOff> = self.units.iter().map(|unit| PoweredOff::new(unit.options())).collect();
         let mut rams: Vec<Ram> = self.units.iter().map(|_| Ram::new()).collect();
+        let (began, before) = (Instant::now(), self.hours);
         let mut life = self.power_up(off, &mut rams);
         let models: Vec<Model> = self.units.iter().map(|unit| unit.model).collect();
         life.bus = Some(BusLife::new(self.chance.branch(), &models, self.now_ms, Noise::default()));
@@ -119,11 +127,20 @@ impl World {
         }
         self.settle(&mut life)?;
         self.power_cut(life)?;
+        self.clock_life(began, before);
         self.report()
     }
 
-    fn report(self) -> Result<Report, String> {
-        let World { trail, units, line, bus_host, hours, recorded, .. } = self;
+    /// A life has ended that began then; it was on a bus all the time or never.
+    fn clock_life(&mut self, began: Instant, before: Hours) {
+        let pace = Pace { virtual_ms: self.hours.total_ms - before.total_ms, real: began.elapsed() };
+        let on_bus = self.hours.bus_ms > before.bus_ms;
+        let of = if on_bus { &mut self.paces.on_bus } else { &mut self.paces.without_bus };
+        *of = *of + pace;
+    }
+
+    fn report(self) -> Result<(Report, Paces), String> {
+        let World { trail, units, line, bus_host, hours, paces, recorded, .. } = self;
         let accounts =
             [line.talk.account()].into_iter().chain(bus_host.talks.iter().map(Conversation::account));
         // The line is the first recorder's, and then each has its conversation on the bus.
@@ -137,7 +154,7 @@ impl World {
         for (unit, recorded) in units.iter().zip(&recorded) {
             trail.mark(format!("{:?} {recorded}", unit.ledger.edges()).as_bytes());
         }
-        Ok(Report {
+        let report = Report {
             seed: self.options.seed,
             digest: trail.digest(),
             operations: trail.operations(),
@@ -149,7 +166,8 @@ impl World {
             bus: bus_host.talks.iter().map(Conversation::talk).collect(),
             printed: line.printed(),
             forged: line.forged(),
-        })
+        };
+        Ok((report, paces))
     }
 
     fn live(&mut self, off: Vec<PoweredOff>, rams: &mut [Ram]) -> Result<Vec<PoweredOff>, String> {
@@ -166,7 +184,9 @@ impl World {
     }
 
     fn power_up<'r>(&mut self, off: Vec<PoweredOff>, rams: &'r mut [Ram]) -> Life<'r> {
-        let on_bus = self.chance.one_in(self.options.bus_one_in);
+        let drawn = self.chance.one_in(self.options.bus_one_in.max(1));
+        let first = self.now_ms == 0;
+        let on_bus = self.options.bus_one_in > 0 && (first || drawn);
         let busy = on_bus || self.chance.one_in(8);
         let duration_ms = match (on_bus, busy) {
             (true, _) => self.chance.spread(20_000..=400_000),
