@@ -1,14 +1,18 @@
 //! What one reader was told, held against the ledger: each event once and in order, and each loss for what it was.
 
+mod silence;
 #[cfg(test)]
 mod tests;
 
 use std::collections::VecDeque;
+use std::ops::Range;
 
 use ser_client::{Delivery, Lost};
 use ser_proto::Entry;
 
 use super::ledger::{Erase, Ledger, Recorded};
+use silence::Silence;
+pub use silence::{Known, Unreported};
 
 /// The recorder's total counts modulo this, so that a reader may miss a multiple of it without a trace.
 const TOTAL_WRAPS_AT: usize = 65_536;
@@ -26,9 +30,8 @@ pub struct Tally {
     pub overwritten: u64,
     /// Went unread with an erase or the power, and that was reported.
     pub gone: u64,
-    /// Went the same way without a report. Only a reader that knows no event to miss can be left without, or one that
-    /// finds the log full again, or one that has not read since.
-    pub unreported: u64,
+    /// Went the same way without a report, for one of the reasons that there can be.
+    pub unreported: Unreported,
     /// Recorded while this reader's port was not connected.
     pub unwatched: u64,
     /// Restarts of the log that were reported.
@@ -43,7 +46,7 @@ impl Tally {
     /// All events that are in one of the columns.
     #[must_use]
     pub fn accounted(&self) -> u64 {
-        self.delivered + self.overwritten + self.gone + self.unreported + self.unwatched
+        self.delivered + self.overwritten + self.gone + self.unreported.all() + self.unwatched
     }
 }
 
@@ -60,12 +63,14 @@ pub struct Account {
     new_life: bool,
     /// What was told and belongs before the next event.
     restart_told: bool,
+    /// If that was told of an empty log: events from this one on came later, and are not what was told of.
+    told_up_to: usize,
     lost_told: usize,
     /// The total in the first reply of its reading, and how far it has gone on since.
     read_from: Option<u16>,
     came_meanwhile: u16,
-    /// Whether the reader knows the last event that it was given, and so would miss it.
-    anchored: bool,
+    /// What the reader knows, and so would miss.
+    known: Known,
     /// Events that went unread with the power, until it is seen whether that is reported.
     cut_off: u64,
     /// The same events: the reading that the power cut through may have some of them in hand.
@@ -84,10 +89,11 @@ impl Account {
             erases_behind: 0,
             new_life: true,
             restart_told: false,
+            told_up_to: 0,
             lost_told: 0,
             read_from: None,
             came_meanwhile: 0,
-            anchored: false,
+            known: Known::Nothing,
             cut_off: 0,
             in_hand: VecDeque::new(),
             tally: Tally::default(),
@@ -100,9 +106,9 @@ impl Account {
         self.name
     }
 
-    /// Whether the reader knows the last event that it was given, or found an empty log.
-    pub fn set_anchored(&mut self, anchored: bool) {
-        self.anchored = anchored;
+    /// What the reader has to go by.
+    pub fn set_known(&mut self, known: Known) {
+        self.known = known;
     }
 
     /// A reading begins.
@@ -120,7 +126,8 @@ impl Account {
     /// What became of all events up to the reader's place.
     #[must_use]
     pub fn tally(&self) -> Tally {
-        Tally { unreported: self.tally.unreported + self.cut_off, ..self.tally }
+        let unreported = Unreported { not_read_since: self.cut_off, ..self.tally.unreported };
+        Tally { unreported, ..self.tally }
     }
 
     /// The next event to be delivered, if the reader has read in this life.
@@ -131,10 +138,12 @@ impl Account {
 
     /// The power goes. What is unread is gone; if this reader was connected, it has to be told.
     pub fn power_goes(&mut self, ledger: &Ledger, connected: bool) {
+        let mut place = self.place(ledger).unwrap_or(0);
         if self.restart_told {
+            self.tally.gone += std::mem::take(&mut self.cut_off) + told(place..ledger.len(), self.told_up_to);
+            place = place.max(self.told_up_to);
             self.end_restart();
         }
-        let place = self.place(ledger).unwrap_or(0);
         let unread = (ledger.len() - place) as u64;
         *(if connected { &mut self.cut_off } else { &mut self.tally.unwatched }) += unread;
         self.in_hand = (place..ledger.len()).filter_map(|index| ledger.event(index).copied()).collect();
@@ -176,6 +185,8 @@ impl Account {
             ));
         }
         self.restart_told = true;
+        self.told_up_to =
+            self.erases_ahead(ledger).last().map_or(self.next, |erase| erase.from.max(self.next));
         self.lost_told = 0;
         Ok(())
     }
@@ -203,7 +214,7 @@ impl Account {
         let power_up = self.new_life.then_some(Erase::POWER_UP);
         let erases = self.erases_ahead(ledger).rev().chain(power_up).chain(self.looks_erased(ledger));
         let after_erase = { erases }.find_map(|erase| {
-            let index = if self.anchored && !self.restart_told {
+            let index = if self.known == Known::Event && !self.restart_told {
                 self.after_traceless(erase, ledger, is)
             } else {
                 after_exactly(erase, lost, ledger, is)
@@ -223,7 +234,7 @@ impl Account {
         self.cut_off -= lost as u64 + 1;
         self.tally.overwritten += lost as u64;
         self.tally.delivered += 1;
-        self.anchored = true;
+        self.known = Known::Event;
     }
 
     /// Whether so much has happened since the latest delivery that the total tells little of it. It can look as if
@@ -243,15 +254,14 @@ impl Account {
     /// do with each other.
     fn after_traceless(&self, erase: Erase, ledger: &Ledger, is: impl Fn(usize) -> bool) -> Option<usize> {
         let found = || (erase.from..ledger.len()).find(|&index| is(index));
-        self.may_miss(erase, ledger).then(found).flatten()
+        self.silence(erase, ledger).and_then(|_| found())
     }
 
-    /// Whether the reader finds no trace of an erase: it knows no event that is gone with it, or the log is full
-    /// again and the event would have been overwritten.
-    fn may_miss(&self, erase: Erase, ledger: &Ledger) -> bool {
+    /// Why the reader finds no trace of an erase, if it may find none.
+    fn silence(&self, erase: Erase, ledger: &Ledger) -> Option<Silence> {
         let full_again = ledger.overwritten_before() > erase.from
             || ledger.len() - erase.from >= ledger.smallest_size().into();
-        !self.anchored || full_again
+        self.known.silence(full_again)
     }
 
     /// An erase that lies between the latest delivery and the event of this index, that must have been seen and of
@@ -263,7 +273,7 @@ impl Account {
         let between = |erase: &Erase| erase.certain && erase.from >= self.next && erase.to <= index;
         let erases =
             self.erases_ahead(ledger).filter(between).chain(self.new_life.then_some(Erase::POWER_UP));
-        { erases }.find(|&erase| !self.may_miss(erase, ledger))
+        { erases }.find(|&erase| self.silence(erase, ledger).is_none())
     }
 
     /// How many times the total has wrapped unseen before the event at `index` or so many rings further on.
@@ -283,8 +293,7 @@ impl Account {
         }
         self.tally.wrapped += u64::from(wraps > 0);
         self.tally.overwritten += missing as u64;
-        self.deliver(index, ledger);
-        Ok(())
+        self.deliver(index, ledger)
     }
 
     /// Delivers the first event after an erase.
@@ -295,14 +304,16 @@ impl Account {
         lost: usize,
         ledger: &Ledger,
     ) -> Result<(), String> {
+        if let Some(erase) = self.silent_erase(index, ledger) {
+            return Err(self.explain_silence(index, erase));
+        }
         if lost > 0 || index > erase.to {
             self.check_overwritten(index, lost, ledger)?;
         }
         let overwritten = if self.restart_told { lost.min(index - self.next) } else { 0 };
         self.tally.overwritten += overwritten as u64;
-        self.count_gone((index - self.next - overwritten) as u64);
-        self.deliver(index, ledger);
-        Ok(())
+        self.count_gone(self.next..index - overwritten, erase, ledger)?;
+        self.deliver(index, ledger)
     }
 
     /// Checks that the events before this one, which the reader was not given, can have been overwritten.
@@ -321,29 +332,57 @@ impl Account {
         ))
     }
 
-    /// So many events are gone with the log, with or without a word.
-    fn count_gone(&mut self, events: u64) {
-        *(if self.restart_told { &mut self.tally.gone } else { &mut self.tally.unreported }) += events;
+    /// These events are gone with this erase, with or without a word.
+    fn count_gone(&mut self, events: Range<usize>, erase: Erase, ledger: &Ledger) -> Result<(), String> {
+        let all = events.len() as u64;
+        let told = match (self.restart_told, self.known) {
+            (false, _) => 0,
+            // It was told right before an event.
+            (true, Known::Event) => all,
+            (true, _) => told(events, self.told_up_to),
+        };
+        self.tally.gone += told;
+        self.count_unreported(all - told, erase, ledger)
+    }
+
+    /// What went unread with the power is gone, with or without a word.
+    fn count_cut_off(&mut self, ledger: &Ledger) -> Result<(), String> {
+        let cut_off = std::mem::take(&mut self.cut_off);
+        if self.restart_told {
+            self.tally.gone += cut_off;
+            return Ok(());
+        }
+        self.count_unreported(cut_off, Erase::POWER_UP, ledger)
+    }
+
+    fn count_unreported(&mut self, events: u64, erase: Erase, ledger: &Ledger) -> Result<(), String> {
+        if events > 0 {
+            let silence = self.silence(erase, ledger).ok_or_else(|| {
+                format!("{}: {events} events are gone without a word, and nothing excuses that", self.name)
+            })?;
+            self.tally.unreported.count(events, silence);
+        }
+        Ok(())
     }
 
     /// What was told of a restart, or was not, has been accounted for.
     fn end_restart(&mut self) {
-        let cut_off = std::mem::take(&mut self.cut_off);
-        self.count_gone(cut_off);
         self.tally.restarts += u64::from(self.restart_told);
         self.restart_told = false;
     }
 
-    fn deliver(&mut self, index: usize, ledger: &Ledger) {
+    fn deliver(&mut self, index: usize, ledger: &Ledger) -> Result<(), String> {
         let passed = self.erases_ahead(ledger).filter(|erase| erase.to <= index).count();
         self.tally.traceless += passed.saturating_sub(self.restart_told.into()) as u64;
+        self.count_cut_off(ledger)?;
         self.end_restart();
         let rest = &ledger.erases()[self.erases_behind..];
         self.erases_behind += rest.iter().take_while(|erase| erase.to <= index).count();
         self.new_life = false;
-        self.anchored = true;
+        self.known = Known::Event;
         self.tally.delivered += 1;
         self.next = index + 1;
+        Ok(())
     }
 
     fn explain_silence(&self, index: usize, erase: Erase) -> String {
@@ -382,19 +421,17 @@ impl Account {
         let len = ledger.len();
         let place = self.place(ledger).unwrap_or(0);
         // An erase with nothing after it; that one need not be the last to have arrived.
-        let emptied = || self.erases_ahead(ledger).any(|erase| erase.to >= len);
-        let gone = place < len && emptied();
-        if (self.new_life || gone) && self.anchored && !self.restart_told {
+        let emptied = self.erases_ahead(ledger).find(|erase| erase.to >= len).filter(|_| place < len);
+        if (self.new_life || emptied.is_some()) && self.known == Known::Event && !self.restart_told {
             return Err(format!(
                 "{}: nothing has come of a log that began anew, nor a word of a restart",
                 self.name
             ));
         }
-        if place == len || gone {
+        if place == len || emptied.is_some() {
             self.life = ledger.life();
-            self.count_gone((len - place) as u64);
-            let cut_off = std::mem::take(&mut self.cut_off);
-            self.count_gone(cut_off);
+            self.count_gone(place..len, emptied.unwrap_or(Erase::POWER_UP), ledger)?;
+            self.count_cut_off(ledger)?;
             self.next = len;
             return Ok(());
         }
@@ -405,6 +442,11 @@ impl Account {
             self.erases_ahead(ledger).collect::<Vec<_>>(),
         ))
     }
+}
+
+/// How many of these events are before the one up to which a restart was told of.
+fn told(events: Range<usize>, up_to: usize) -> u64 {
+    events.end.min(up_to).saturating_sub(events.start) as u64
 }
 
 /// The event after an erase with so many reported as lost before it, or a multiple of 65536 more.

@@ -7,7 +7,7 @@ use ser_client::{
 };
 use ser_proto::{Command, Configuration, ReadReply, Reply, TimeStamp};
 
-use super::account::Account;
+use super::account::{Account, Known};
 use super::ledger::Ledger;
 
 /// How often a reading begins anew because the log was changed under it, as the client has it.
@@ -328,7 +328,11 @@ impl Conversation {
     }
 
     fn deliver(&mut self, deliveries: &[Delivery], ledger: &Ledger) -> Result<(), String> {
-        self.account.set_anchored(self.cursor.is_some_and(|cursor| cursor.anchor.is_some()));
+        self.account.set_known(match self.cursor {
+            None => Known::Nothing,
+            Some(Cursor { anchor: None, .. }) => Known::EmptyLog,
+            Some(Cursor { anchor: Some(_), .. }) => Known::Event,
+        });
         deliveries.iter().try_for_each(|delivery| self.account.take(delivery, ledger))
     }
 

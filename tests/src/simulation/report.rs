@@ -82,7 +82,10 @@ impl Report {
             row("= delivered, once and in order", |tally| tally.delivered),
             row("+ overwritten, reported", |tally| tally.overwritten),
             row("+ gone with the log, reported", |tally| tally.gone),
-            row("+ gone without a trace", |tally| tally.unreported),
+            row("+ gone before the first reading", |tally| tally.unreported.first_reading),
+            row("+ gone, empty at the last look", |tally| tally.unreported.empty_log),
+            row("+ gone, full again at the next look", |tally| tally.unreported.full_again),
+            row("+ gone, not read since", |tally| tally.unreported.not_read_since),
             row("+ not connected", |tally| tally.unwatched),
             row("log restarts reported", |tally| tally.restarts),
             row("log restarts without a trace", |tally| tally.traceless),
@@ -117,10 +120,10 @@ impl Row {
 }
 
 fn table<'a>(f: &mut fmt::Formatter<'_>, heads: impl Iterator<Item = &'a str>, rows: &[Row]) -> fmt::Result {
-    write!(f, "\n  {:30}", "")?;
+    write!(f, "\n  {:36}", "")?;
     heads.into_iter().try_for_each(|head| write!(f, "  {head:>15}"))?;
     for row in rows {
-        write!(f, "\n  {:30}", row.what)?;
+        write!(f, "\n  {:36}", row.what)?;
         row.counts.iter().try_for_each(|count| write!(f, "  {count:>15}"))?;
     }
     writeln!(f)
@@ -140,6 +143,7 @@ impl fmt::Display for Report {
         )?;
         table(f, ["recorder 1", "recorder 2"].into_iter(), &self.edge_rows())?;
         table(f, self.tallies.iter().map(|&(name, _)| name), &self.event_rows())?;
+        writeln!(f, "  why some of what is gone leaves no trace: docs/guarantees.md, \"Losses\"")?;
         table(f, self.tallies.iter().map(|&(name, _)| name), &self.talk_rows())?;
         let (printed, missing) = self.printed;
         write!(

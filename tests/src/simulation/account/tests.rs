@@ -58,8 +58,11 @@ impl Case {
     fn read(&mut self, deliveries: &[Delivery]) -> Result<(), String> {
         self.account.begin_reading();
         // It knows the last event that it was given, unless it has found the log empty since.
-        let anchored = self.account.tally.delivered > 0 && !self.account.restart_told;
-        self.account.set_anchored(anchored);
+        let known = match self.account.known {
+            Known::Event if self.account.restart_told => Known::EmptyLog,
+            known => known,
+        };
+        self.account.set_known(known);
         deliveries.iter().try_for_each(|delivery| self.account.take(delivery, &self.ledger))
     }
 
@@ -233,8 +236,43 @@ fn a_reader_that_knows_no_event_can_miss_an_erase() {
     case.erase();
     case.record(2);
     case.read(&[]).and_then(|()| case.deliver(3, 2)).expect("it has nothing to go by");
-    let expected = Tally { delivered: 2, unreported: 3, traceless: 1, ..Tally::default() };
+    let unreported = Unreported { first_reading: 3, ..Unreported::default() };
+    let expected = Tally { delivered: 2, unreported, traceless: 1, ..Tally::default() };
     assert_eq!(case.finish(), Ok(expected));
+}
+
+#[test]
+fn a_reader_that_found_the_log_empty_can_miss_what_came_and_went() {
+    for how in [Case::erase, Case::power_cycle] {
+        let mut case = Case::new();
+        case.account.set_known(Known::EmptyLog);
+        case.record(3);
+        how(&mut case);
+        case.record(2);
+        case.read(&[]).and_then(|()| case.deliver(3, 2)).expect("it has nothing to go by");
+        let tally = case.finish().expect("nor at the end");
+        let unreported = Unreported { empty_log: 3, ..Unreported::default() };
+        assert_eq!(Tally { traceless: 0, ..tally }, Tally { delivered: 2, unreported, ..Tally::default() });
+    }
+}
+
+#[test]
+fn what_comes_and_goes_after_a_restart_was_told_of_an_empty_log_is_not_reported_with_it() {
+    for how in [Case::erase, Case::power_cycle] {
+        let mut case = Case::read_up_to(3);
+        case.record(4);
+        case.erase();
+        case.read(&[RESTARTED]).expect("it is empty");
+        case.account.set_known(Known::EmptyLog);
+        case.record(5);
+        how(&mut case);
+        case.record(2);
+        case.read(&[]).and_then(|()| case.deliver(12, 2)).expect("it has nothing to go by");
+        let tally = case.finish().expect("nor at the end");
+        let unreported = Unreported { empty_log: 5, ..Unreported::default() };
+        let expected = Tally { delivered: 5, gone: 4, unreported, restarts: 1, ..Tally::default() };
+        assert_eq!(Tally { traceless: 0, ..tally }, expected);
+    }
 }
 
 #[test]
@@ -243,7 +281,48 @@ fn a_log_that_is_full_again_can_hide_an_erase() {
     case.record(SIZE.into());
     // Two totals, 3 and 105, and the log holds the latest 100.
     case.read(&[overwritten(2)]).and_then(|()| case.deliver(11, SIZE.into())).expect("it cannot know");
-    let expected = Tally { delivered: 103, unreported: 8, traceless: 1, ..Tally::default() };
+    let unreported = Unreported { full_again: 8, ..Unreported::default() };
+    let expected = Tally { delivered: 103, unreported, traceless: 1, ..Tally::default() };
+    assert_eq!(case.finish(), Ok(expected));
+}
+
+#[test]
+fn a_log_that_is_full_again_can_hide_that_the_power_went() {
+    let mut case = began_anew(Case::power_cycle);
+    case.record(SIZE.into());
+    case.read(&[overwritten(5)]).and_then(|()| case.deliver(11, SIZE.into())).expect("it cannot know");
+    let tally = case.finish().expect("nor at the end");
+    assert_eq!(tally.unreported.all() + tally.overwritten, 8);
+    assert_eq!(tally.unreported, Unreported { full_again: 3, ..Unreported::default() });
+}
+
+#[test]
+fn nothing_else_excuses_silence() {
+    // Full again since an erase is not full again since a later one.
+    let mut case = began_anew(Case::erase);
+    case.record(SIZE.into());
+    case.erase();
+    case.record(1);
+    let last = case.entries.len() - 1;
+    assert_refused(case.read(&[]).and_then(|()| case.deliver(last, 1)), "no word");
+    // Nor does anything in the books: events that are gone need a reason.
+    let mut case = began_anew(Case::erase);
+    let erase = case.ledger.erases()[0];
+    assert_refused(case.account.count_gone(3..6, erase, &case.ledger), "nothing excuses that");
+    case.account.power_goes(&case.ledger, true);
+    case.ledger.power_up(case.now_ms, 0, SIZE, Debounce::OFF);
+    assert_refused(case.account.count_cut_off(&case.ledger), "nothing excuses that");
+}
+
+#[test]
+fn what_the_power_took_is_open_until_the_next_reading() {
+    let mut case = Case::read_up_to(3);
+    case.record(2);
+    case.power_cycle();
+    let unreported = Unreported { not_read_since: 2, ..Unreported::default() };
+    assert_eq!(case.account.tally(), Tally { delivered: 3, unreported, ..Tally::default() });
+    case.read(&[RESTARTED]).expect("it did");
+    let expected = Tally { delivered: 3, gone: 2, ..Tally::default() };
     assert_eq!(case.finish(), Ok(expected));
 }
 
