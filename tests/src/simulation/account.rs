@@ -11,6 +11,7 @@ use ser_client::{Delivery, Lost};
 use ser_proto::Entry;
 
 use super::ledger::{Erase, Ledger, Recorded};
+use super::wrong::{Told, Wrong, erases};
 use silence::Silence;
 pub use silence::{Known, Unreported};
 
@@ -176,13 +177,13 @@ impl Account {
     fn take_restart(&mut self, ledger: &Ledger) -> Result<(), String> {
         let explained = self.new_life || self.restart_told || self.has_wrapped(ledger);
         if !explained && self.erases_ahead(ledger).next().is_none() {
-            return Err(format!(
-                "{}: a restart of the log is reported after event {} of {} and there was none; erases: {:?}",
-                self.name,
-                self.next,
-                ledger.len(),
-                ledger.erases(),
-            ));
+            return Wrong::new(format!(
+                "{}: a restart of the log is reported, and there was none",
+                self.name
+            ))
+            .fact("due", ledger.numbered(self.next))
+            .fact("erases", erases(ledger.erases().iter().copied()))
+            .err();
         }
         self.restart_told = true;
         self.told_up_to =
@@ -285,7 +286,7 @@ impl Account {
     /// Delivers an event of the same log, after so many that were reported as lost.
     fn go_on(&mut self, index: usize, wraps: usize, lost: usize, ledger: &Ledger) -> Result<(), String> {
         if let Some(erase) = self.silent_erase(index, ledger) {
-            return Err(self.explain_silence(index, erase));
+            return Err(self.explain_silence(index, erase, ledger));
         }
         let missing = index - self.next;
         if missing > 0 {
@@ -305,7 +306,7 @@ impl Account {
         ledger: &Ledger,
     ) -> Result<(), String> {
         if let Some(erase) = self.silent_erase(index, ledger) {
-            return Err(self.explain_silence(index, erase));
+            return Err(self.explain_silence(index, erase, ledger));
         }
         if lost > 0 || index > erase.to {
             self.check_overwritten(index, lost, ledger)?;
@@ -323,13 +324,14 @@ impl Account {
         if index <= may_be_lost {
             return Ok(());
         }
-        Err(format!(
-            "{}: {lost} events before number {index} are reported as lost and are still there: of {}, those before {} may be \
-             overwritten, and {came} came during the reading",
-            self.name,
-            ledger.len(),
-            ledger.overwritten_before(),
-        ))
+        let what = format!("{}: events are reported as lost, or passed over, and are still there", self.name);
+        Wrong::new(what)
+            .fact("came", ledger.numbered(index))
+            .fact("due", ledger.numbered(self.next))
+            .fact("reported lost", format_args!("{lost} events"))
+            .fact("overwritten", format_args!("at most those before {}", ledger.overwritten_before()))
+            .fact("meanwhile", format_args!("{came} events came during the reading"))
+            .err()
     }
 
     /// These events are gone with this erase, with or without a word.
@@ -385,32 +387,36 @@ impl Account {
         Ok(())
     }
 
-    fn explain_silence(&self, index: usize, erase: Erase) -> String {
-        format!(
-            "{}: event {} was due, event {index} comes, and there is no word of a restart between: {erase:?}, new life: {}",
-            self.name, self.next, self.new_life,
-        )
+    fn explain_silence(&self, index: usize, erase: Erase, ledger: &Ledger) -> String {
+        let began_anew = if self.new_life { "with the power" } else { "with an erase" };
+        Wrong::new(format!("{}: the log began anew, and there is no word of a restart", self.name))
+            .fact("came", ledger.numbered(index))
+            .fact("due", ledger.numbered(self.next))
+            .fact("began anew", format_args!("{began_anew}, {erase}"))
+            .to_string()
     }
 
     fn explain(&self, entry: &Entry, lost: usize, ledger: &Ledger) -> String {
         let found =
             (0..ledger.len()).rev().find(|&index| ledger.event(index).is_some_and(|event| event.is(entry)));
-        let what = match found {
-            Some(index) if index < self.next => format!("event {index} comes twice or too late"),
-            Some(index) => format!("event {index} comes too early"),
-            None => "this event has never been".to_owned(),
+        let (what, came) = match found {
+            Some(index) if index < self.next => {
+                (format!("event {index} comes twice or too late"), ledger.numbered(index).to_string())
+            }
+            Some(index) => (format!("event {index} comes too early"), ledger.numbered(index).to_string()),
+            None => ("this event has never been".to_owned(), Told(entry).to_string()),
         };
-        format!(
-            "{}: {what}: {entry:?}; after {lost} lost, event {} of {} was due: {:?}; restart told: {}, new life: {}, \
-             erases ahead: {:?}",
-            self.name,
-            self.next + lost,
-            ledger.len(),
-            ledger.event(self.next + lost),
-            self.restart_told,
-            self.new_life,
-            self.erases_ahead(ledger).collect::<Vec<_>>(),
-        )
+        let restart = if self.restart_told { ", a restart of the log" } else { "" };
+        Wrong::new(format!("{}: {what}", self.name))
+            .fact("came", came)
+            .fact("due", ledger.numbered(self.next + lost))
+            .fact("told before", format_args!("{lost} events lost{restart}"))
+            .fact(
+                "power went",
+                if self.new_life { "since the last event" } else { "not since the last event" },
+            )
+            .fact("erases ahead", erases(self.erases_ahead(ledger)))
+            .to_string()
     }
 
     /// Checks that a reader that has read to the end has been told of everything.
@@ -435,12 +441,11 @@ impl Account {
             self.next = len;
             return Ok(());
         }
-        Err(format!(
-            "{}: events {place} to {len} have not been delivered; the last one: {:?}; erases ahead: {:?}",
-            self.name,
-            ledger.event(len - 1),
-            self.erases_ahead(ledger).collect::<Vec<_>>(),
-        ))
+        Wrong::new(format!("{}: events {place} to {} have not been delivered", self.name, len - 1))
+            .fact("first", ledger.numbered(place))
+            .fact("last", ledger.numbered(len - 1))
+            .fact("erases ahead", erases(self.erases_ahead(ledger)))
+            .err()
     }
 }
 

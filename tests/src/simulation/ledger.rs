@@ -15,6 +15,7 @@ use ser_node::capture::QUEUE_LEN;
 use ser_proto::{Command, Configuration, Entry, MAX_SIZE, Reply, TimeStamp};
 
 use super::debounce_model::{Accepted, DebounceModel};
+use super::wrong::{Numbered, Told, Wrong, erases};
 
 /// A hundred years, 1970–2069: what two-digit years can tell apart.
 const CENTURY_MS: i64 = 36_525 * 86_400_000;
@@ -48,7 +49,8 @@ impl Recorded {
     }
 }
 
-fn stamp_ms(time: TimeStamp) -> Option<i64> {
+/// Milliseconds since 1970; nothing if there is no such time.
+pub(super) fn stamp_ms(time: TimeStamp) -> Option<i64> {
     NaiveDateTime::try_from(time).ok().map(|time| time.and_utc().timestamp_millis())
 }
 
@@ -377,7 +379,10 @@ impl Ledger {
 
     fn see_configuration(&mut self, configuration: Configuration) -> Result<(), String> {
         if let Some(known) = self.configuration.filter(|known| *known != configuration) {
-            return Err(format!("the recorder tells {configuration:?}, and {known:?} was set last"));
+            return Wrong::new("the recorder tells other settings than were set last")
+                .fact("tells", format_args!("{configuration:?}"))
+                .fact("set last", format_args!("{known:?}"))
+                .err();
         }
         let others_due = self.due.iter().any(|(_, _, due)| matches!(due, Due::Size { .. }));
         let settled = !others_due && self.now_ms >= self.known_from_ms;
@@ -432,22 +437,26 @@ impl Ledger {
             !event.is_some_and(|event| event.is(entry))
         });
         if let Some((place, entry)) = wrong {
-            let (index, event) = (first + place, self.event(first + place));
-            return Err(format!("the log holds {entry:?} as event {index} of {len}, which was {event:?}"));
+            let index = first + place;
+            return Wrong::new(format!("the log holds another entry as event {index} of {len}"))
+                .fact("holds", Told(entry))
+                .fact("due", self.numbered(index))
+                .err();
         }
         let counts_from = |from: usize| from <= first && low_16(len - from) == total;
         let Some(from) = self.may_count_from().find(|&from| counts_from(from)) else {
-            let erases = &self.erases;
-            return Err(format!(
-                "the log counts {total} events and holds {}, of {len}; erases: {erases:?}",
-                entries.len()
-            ));
+            return Wrong::new(format!("the log counts {total} events, and cannot have had so many"))
+                .fact("recorded", format_args!("{len} events since power-up"))
+                .fact("holds", format_args!("{} entries", entries.len()))
+                .fact("erases", erases(self.erases.iter().copied()))
+                .err();
         };
         let oldest_kept = self.overwritten_before.max(from);
         if first > oldest_kept {
-            return Err(format!(
-                "the log begins with event {first} of {len}, and event {oldest_kept} must be there"
-            ));
+            return Wrong::new(format!("event {oldest_kept} must be there, and is not in the log"))
+                .fact("due", self.numbered(oldest_kept))
+                .fact("log begins with", self.numbered(first))
+                .err();
         }
         let most = self.configuration.map_or(MAX_SIZE, |configuration| configuration.size);
         if entries.len() > most.into() {
@@ -482,6 +491,12 @@ impl Ledger {
     #[must_use]
     pub fn event(&self, index: usize) -> Option<&Recorded> {
         self.events.get(index.checked_sub(self.forgotten)?)
+    }
+
+    /// The event of this index, for people.
+    #[must_use]
+    pub fn numbered(&self, number: usize) -> Numbered<'_> {
+        Numbered { number, of: self.len(), event: self.event(number) }
     }
 
     /// The events that are remembered, from the newest on.

@@ -30,6 +30,7 @@ pub mod taps;
 pub mod trail;
 pub mod unit;
 pub mod world;
+pub mod wrong;
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -56,10 +57,11 @@ impl fmt::Display for Failure {
         #[expect(clippy::cast_precision_loss, reason = "exact up to a quarter of a million years")]
         let hours = duration_ms as f64 / 3_600_000.0;
         let load = self.load;
-        writeln!(f, "seed {seed} fails at {}: {}", VirtualTime(self.at_ms), self.what)?;
+        writeln!(f, "seed {seed} fails at {}", VirtualTime(self.at_ms))?;
+        writeln!(f, "{}\n", self.what)?;
         writeln!(
             f,
-            "to repeat it: cargo xtask simulate --seed {seed} --hours {hours} --bus-one-in {bus_one_in}{load}"
+            "to repeat it:\n  cargo xtask simulate --seed {seed} --hours {hours} --bus-one-in {bus_one_in}{load}\n"
         )?;
         write!(f, "what was done last:\n{}", self.trail)
     }

@@ -17,6 +17,7 @@ use super::pace::{Pace, Paces};
 use super::report::{Hours, Report};
 use super::trail::Trail;
 use super::unit::{SETTLING_MS, Unit};
+use super::wrong::Wrong;
 
 /// Readers are at the end of the log by then, even at the lowest rate.
 const CATCH_UP_MS: u64 = 8 * 3_600_000;
@@ -148,7 +149,12 @@ impl World {
             let tally = account.tally();
             let accounted = tally.accounted();
             if accounted != recorded[unit] {
-                return Err(format!("{}: {} events, and {tally:?}", account.name(), recorded[unit]));
+                let what = format!("{}: not every event is in one of the columns", account.name());
+                return Wrong::new(what)
+                    .fact("recorded", format_args!("{} events", recorded[unit]))
+                    .fact("accounted", format_args!("{accounted} events"))
+                    .fact("columns", format_args!("{tally:?}"))
+                    .err();
             }
         }
         for (unit, recorded) in units.iter().zip(&recorded) {

@@ -145,7 +145,7 @@ fn events_come_once_in_order_and_as_recorded() {
     let late = Entry { time, ..case.entries[3] };
     assert_refused(case.read(&[delivery(late)]), "this event has never been");
     case.deliver(3, 2).expect("they are next");
-    assert_refused(case.finish(), "events 5 to 6 have not been delivered");
+    assert_refused(case.finish(), "events 5 to 5 have not been delivered");
 }
 
 /// Three events read, three unread, and then the log begins anew and has five more.
