@@ -44,8 +44,9 @@
 //! - The total counts modulo 65536. If more than 65,535 events happen between two readings, the count of lost ones is
 //!   too low by a multiple of 65536; and where the total makes it seem that the anchor must still be there, the log
 //!   seems to have begun anew.
-//! - An erase that is followed by at least as many events as the log holds, before the next look at the anchor, looks
-//!   like overwriting. The events are delivered; the count of lost ones is that of the totals, whatever it is worth.
+//! - An erase, or a loss of power, that is followed by at least as many events as the log holds, before the next look
+//!   at the anchor, looks like overwriting. The events are delivered; the count of lost ones is that of the totals,
+//!   whatever it is worth.
 //! - An event that is recorded after an erase, in the slot of the anchor, with its inputs and, since the clock was
 //!   set back, with its time, passes for it.
 //! - A log that was empty has no anchor. Events that came and were erased before the next reading leave no trace.
