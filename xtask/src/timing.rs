@@ -1,11 +1,19 @@
 //! `timing`: the instructions of the ARM image, counted in the emulator.
 
-use std::ffi::OsString;
 use std::path::PathBuf;
 
 use crate::setup::emulator;
 use crate::steps::{self, Failure, Result, heading};
 use crate::{firmware, places};
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask timing                      all of it, with ten seconds of load
+  cargo xtask timing --load-seconds 60    with a minute of load
+
+Seconds are of virtual time, which counts instructions: the numbers are the same in every run
+and on every machine. Exit code 1 when something is over budget, the capture interrupt late,
+or an event unaccounted for.";
 
 /// What QEMU loads to tell of instructions.
 const PLUGIN: &str = "ser-qemu-plugin";
@@ -16,11 +24,17 @@ const SECOND_INTERFACE: u32 = 9;
 /// Count the instructions of the ARM image in the emulator, hold them against the budgets, and account for every
 /// event of a load.
 #[derive(Debug, clap::Args)]
-#[command(disable_help_flag = true)]
+#[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
-    /// Options of the measurement; `--help` lists them.
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-    options: Vec<OsString>,
+    /// How long all inputs change in every millisecond, in seconds.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 10,
+        allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(1..=86_400)
+    )]
+    load_seconds: u32,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
@@ -28,8 +42,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let plugin = build_plugin()?;
     heading("Timing");
     let mut timing = steps::cargo();
-    timing.args(["run", "--release", "--quiet", "-p", "ser-tests", "--bin", "timing", "--", "--image"]);
-    timing.arg(image).arg("--plugin").arg(plugin).args(&arguments.options);
+    timing.args([
+        "run",
+        "--release",
+        "--quiet",
+        "-p",
+        "ser-tests",
+        "--bin",
+        "timing",
+        "--",
+        "--load-seconds",
+    ]);
+    timing.arg(arguments.load_seconds.to_string()).arg("--image").arg(image).arg("--plugin").arg(plugin);
     steps::become_program(&mut timing)
 }
 
@@ -46,4 +70,34 @@ pub(crate) fn build_plugin() -> Result<PathBuf> {
     build.env("SER_QEMU_PLUGIN_API", interface).args(["build", "--release", "--package", PLUGIN]);
     steps::run(&mut build)?;
     Ok(places::host_target().join("release/libser_qemu_plugin.so"))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use clap::error::ErrorKind;
+
+    use super::Arguments;
+
+    #[derive(Debug, Parser)]
+    struct Alone {
+        #[command(flatten)]
+        arguments: Arguments,
+    }
+
+    fn understood(line: &[&str]) -> Result<u32, clap::Error> {
+        Alone::try_parse_from([&["timing"], line].concat()).map(|alone| alone.arguments.load_seconds)
+    }
+
+    #[test]
+    fn options_are_understood_before_anything_is_built() {
+        assert_eq!(understood(&[]).unwrap(), 10);
+        assert_eq!(understood(&["--load-seconds", "60"]).unwrap(), 60);
+        assert_eq!(understood(&["--help"]).unwrap_err().kind(), ErrorKind::DisplayHelp);
+        assert_eq!(understood(&["--bogus"]).unwrap_err().kind(), ErrorKind::UnknownArgument);
+        for wrong in ["0", "-5", "86401", "soon"] {
+            let error = understood(&["--load-seconds", wrong]).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::ValueValidation, "{error}");
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! Timing of the ARM image in the emulator: see `ser_tests::timing`.
+//! Timing of the ARM image in the emulator, for `cargo xtask timing`: see `ser_tests::timing`.
 
 use std::process::ExitCode;
 
@@ -15,6 +15,7 @@ fn main() -> ExitCode {
 
 #[cfg(unix)]
 mod measured {
+    use std::num::NonZeroU32;
     use std::path::PathBuf;
     use std::process::ExitCode;
     use std::time::Instant;
@@ -23,37 +24,29 @@ mod measured {
     use ser_tests::timing::bench::Parts;
     use ser_tests::timing::report::Report;
 
-    const EXAMPLES: &str = "\
-Examples:
-  cargo xtask timing                      all of it, with ten seconds of load
-  cargo xtask timing --load-seconds 60    with a minute of load
-
-Seconds are of virtual time, which counts instructions: the numbers are the same in every run and on every machine.
-Exit code 1 when something is over budget, the capture interrupt late, or an event unaccounted for.";
-
-    /// Count the instructions of the ARM image in the emulator, hold them against the budgets, and account for every
-    /// event of a load.
+    /// What `cargo xtask timing` runs when it has understood its options and built image and plugin.
     #[derive(Debug, Parser)]
-    #[command(name = "cargo xtask timing", bin_name = "cargo xtask timing", version, after_help = EXAMPLES)]
+    #[command(version)]
     struct Arguments {
         /// How long all inputs change in every millisecond, in seconds.
-        #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=86_400))]
-        load_seconds: u64,
+        #[arg(long, value_name = "N")]
+        load_seconds: NonZeroU32,
 
         /// The image.
-        #[arg(long, hide = true)]
+        #[arg(long, value_name = "ELF")]
         image: PathBuf,
 
         /// The emulator's plugin.
-        #[arg(long, hide = true)]
+        #[arg(long, value_name = "FILE")]
         plugin: PathBuf,
     }
 
     pub(super) fn main() -> ExitCode {
         let Arguments { load_seconds, image, plugin } = Arguments::parse();
+        let load_ms = u64::from(load_seconds.get()) * 1000;
         let began = Instant::now();
         let next = |what: &str| eprintln!("    {:3} s  {what}", began.elapsed().as_secs());
-        match Report::measure(&Parts { image, plugin }, load_seconds * 1000, &next) {
+        match Report::measure(&Parts { image, plugin }, load_ms, &next) {
             Ok(report) => {
                 println!("\n{report}");
                 let wrong = report.wrong();
