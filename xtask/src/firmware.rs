@@ -17,8 +17,8 @@ Examples:
   cargo xtask firmware --board mps2-an385 --stack    and where the stack goes
   DEFMT_LOG=debug cargo xtask firmware               with more in the log
 
-What an image has to keep to, read off the image itself: its budgets of flash and variables;
-a stack that holds the worst case, and an overflow that ends in a fault; no way to a panic;
+What an image has to keep to, read off the image itself: its budgets of flash and variables; \
+a stack that holds the worst case, and an overflow that ends in a fault; no way to a panic; \
 nothing in flash that is wanted while the flash is being erased.";
 
 /// Build the images for the boards and check whether they may be flashed.

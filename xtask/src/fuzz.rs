@@ -10,13 +10,16 @@ use crate::steps::{self, Failure, Result, heading};
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask fuzz --list
-  cargo xtask fuzz                         every target, a minute each
-  cargo xtask fuzz --seconds 600 node      one target, ten minutes
+  cargo xtask fuzz --list                      the names of the targets
+  cargo xtask fuzz                             every target, a minute each
+  cargo xtask fuzz --seconds 600 node          one target, ten minutes
   cargo test -p ser-tests --test fuzz_seeds    what is known already: needs no fuzzer
 
-Needs the nightly toolchain, cargo-fuzz and a C++ compiler. What was found on the way is kept in tests/fuzz/corpus and used
-again the next time; see tests/fuzz/README.md.";
+Needs the nightly toolchain, cargo-fuzz and a C++ compiler. What was found on the way is kept in \
+tests/fuzz/corpus and used again the next time; see tests/fuzz/README.md.";
+
+/// The longest search, in seconds: libFuzzer keeps it in an `int`.
+const MAX_SECONDS: i64 = i32::MAX as i64;
 
 /// The toolchain that knows how to instrument.
 const TOOLCHAIN: &str = "nightly";
@@ -35,8 +38,14 @@ pub(crate) struct Arguments {
     #[arg(value_name = "TARGET")]
     targets: Vec<String>,
 
-    /// How long to look, for each target.
-    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
+    /// How long to look, in seconds, for each target.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 60,
+        allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(1..=MAX_SECONDS)
+    )]
     seconds: u32,
 
     /// Name the targets and do nothing else.
@@ -45,18 +54,14 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let all = targets()?;
+    let chosen = chosen(&arguments.targets, targets()?)?;
     if arguments.list {
-        all.iter().for_each(|target| println!("{target}"));
+        chosen.iter().for_each(|target| println!("{target}"));
         return Ok(());
-    }
-    let chosen = if arguments.targets.is_empty() { &all } else { &arguments.targets };
-    if let Some(unknown) = chosen.iter().find(|target| !all.contains(target)) {
-        return Err(Failure::new(format!("there is no target {unknown}; there are {}", all.join(", "))));
     }
     check_tools()?;
     let mut broken = Vec::new();
-    for target in chosen {
+    for target in &chosen {
         heading(&format!("{target}, {} s", arguments.seconds));
         plant_seeds(target)?;
         let known = artifacts(target);
@@ -72,6 +77,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     }
     Err(Failure::new(format!("input was found that breaks a property.\n{}", broken.concat())))
+}
+
+/// The targets that are meant: those that are named, or all there are.
+fn chosen(named: &[String], all: Vec<String>) -> Result<Vec<String>> {
+    match named.iter().find(|target| !all.contains(target)) {
+        Some(unknown) => {
+            Err(Failure::new(format!("there is no target {unknown}; there are {}", all.join(", "))))
+        }
+        None if named.is_empty() => Ok(all),
+        None => Ok(named.to_vec()),
+    }
 }
 
 fn folder() -> PathBuf {
@@ -163,4 +179,35 @@ fn describe(target: &str, found: &[PathBuf]) -> String {
         );
     }
     text + "  Once it is understood, a test in the crate and a seed with a telling name keep it from coming back.\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use clap::error::ErrorKind;
+
+    use super::{Arguments, chosen};
+
+    #[derive(Debug, Parser)]
+    struct Alone {
+        #[command(flatten)]
+        arguments: Arguments,
+    }
+
+    #[test]
+    fn a_target_that_there_is_not_is_refused_and_the_others_are_named() {
+        let all = || vec!["client".to_owned(), "node".to_owned()];
+        assert_eq!(chosen(&[], all()).unwrap(), all());
+        assert_eq!(chosen(&all()[1..], all()).unwrap(), ["node"]);
+        let refused = chosen(&["node".to_owned(), "bogus".to_owned()], all()).unwrap_err().to_string();
+        assert!(refused.contains("bogus") && refused.contains("client, node"), "{refused}");
+    }
+
+    #[test]
+    fn a_time_that_is_none_is_refused_as_a_number() {
+        for wrong in ["0", "-5", "2147483648", "soon"] {
+            let error = Alone::try_parse_from(["fuzz", "--seconds", wrong]).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::ValueValidation, "{error}");
+        }
+    }
 }

@@ -29,7 +29,7 @@ use clap::{Parser, Subcommand};
 
 /// Everything about the project that is one command. Missing tools are installed where that can be done.
 #[derive(Debug, Parser)]
-#[command(name = "cargo xtask", bin_name = "cargo xtask", version)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", version, max_term_width = 100)]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,
@@ -67,6 +67,28 @@ fn main() -> ExitCode {
         Err(failure) => {
             eprintln!("{failure}");
             ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::Arguments;
+
+    /// Prose is for clap to break, which knows how wide the terminal is: a line that is broken by hand at more than
+    /// that is broken twice.
+    #[test]
+    fn examples_fit_the_narrowest_width_that_help_is_printed_in() {
+        const WIDTH: usize = 100;
+        let mut command = Arguments::command();
+        command.build();
+        for verb in command.get_subcommands() {
+            let after = verb.get_after_help().map(ToString::to_string).unwrap_or_default();
+            for line in after.lines().filter(|line| line.starts_with(' ')) {
+                assert!(line.len() <= WIDTH, "{}: {line}", verb.get_name());
+            }
         }
     }
 }

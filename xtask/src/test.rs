@@ -8,9 +8,9 @@ use crate::{firmware, lint, timing};
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask test
-  cargo test                only the tests that need neither emulator nor cross compiler, nor minutes
+  cargo test          only the tests that need neither emulator nor cross compiler, nor minutes
 
-What cannot be built or run here is left out, and it is said what is missing: the checks of an image,
+What cannot be built or run here is left out, and it is said what is missing: the checks of an image, \
 the tests in the emulator.";
 
 /// Where the tests in the emulator look for the image.

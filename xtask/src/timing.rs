@@ -11,8 +11,8 @@ Examples:
   cargo xtask timing                      all of it, with ten seconds of load
   cargo xtask timing --load-seconds 60    with a minute of load
 
-Seconds are of virtual time, which counts instructions: the numbers are the same in every run
-and on every machine. Exit code 1 when something is over budget, the capture interrupt late,
+Seconds are of virtual time, which counts instructions: the numbers are the same in every run \
+and on every machine. Exit code 1 when something is over budget, the capture interrupt late, \
 or an event unaccounted for.";
 
 /// What QEMU loads to tell of instructions.
