@@ -114,12 +114,8 @@ impl Capture<'_> {
             None => self.begin(tick_ms, inputs),
             Some(_) => {
                 let elapsed = tick_ms.wrapping_sub(self.tick_ms);
-                if elapsed != 1 {
-                    if elapsed == 0 || elapsed > u32::MAX / 2 {
-                        // There is one sample to a millisecond, and none to one that is past.
-                        return;
-                    }
-                    self.make_up(tick_ms, elapsed - 1);
+                if elapsed != 1 && !self.catch_up(tick_ms, elapsed) {
+                    return;
                 }
                 self.step(tick_ms, inputs);
             }
@@ -148,8 +144,21 @@ impl Capture<'_> {
         }
     }
 
-    /// Runs the filter over samples that were missed, so that debounce times stay times and do not become counts.
+    /// Makes up for the samples between the latest one and that of `tick_ms`. False when that one is none.
+    ///
+    /// Apart from the rest, so that a sample that is on time pays for one comparison.
     #[cold]
+    #[inline(never)]
+    fn catch_up(&mut self, tick_ms: u32, elapsed: u32) -> bool {
+        if elapsed == 0 || elapsed > u32::MAX / 2 {
+            // There is one sample to a millisecond, and none to one that is past.
+            return false;
+        }
+        self.make_up(tick_ms, elapsed - 1);
+        true
+    }
+
+    /// Runs the filter over samples that were missed, so that debounce times stay times and do not become counts.
     fn make_up(&mut self, tick_ms: u32, missed: u32) {
         let count = &self.shared.samples_missed;
         count.store(count.load(Ordering::Relaxed).saturating_add(missed), Ordering::Relaxed);
