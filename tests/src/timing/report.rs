@@ -28,8 +28,8 @@ const PORTS: [&str; 2] = ["both ports quiet", "both ports busy"];
 /// What was measured.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Report {
-    /// A run of the capture interrupt, without debounce and with it.
-    pub capture: Vec<(&'static str, [u64; 2])>,
+    /// Runs of the capture interrupt.
+    pub capture: Vec<Capture>,
     /// What commands cost on RS-232 and on Genius.
     pub commands: Vec<(&'static str, [Cost; 2])>,
     /// A pass with nothing to do, without and with a GENI board.
@@ -40,6 +40,31 @@ pub struct Report {
     pub lateness: [Lateness; 2],
     /// Under load.
     pub load: Loaded,
+}
+
+/// What runs of the capture interrupt cost, in instructions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Capture {
+    /// What the inputs do.
+    pub what: &'static str,
+    /// Without debounce.
+    pub without: u64,
+    /// With this debounce time of all inputs, in milliseconds.
+    pub with: (u8, u64),
+}
+
+impl Capture {
+    fn measure(
+        what: &'static str,
+        debounce_ms: u8,
+        cost: impl Fn(u8) -> Result<u64, String>,
+    ) -> Result<Capture, String> {
+        Ok(Capture { what, without: cost(0)?, with: (debounce_ms, cost(debounce_ms)?) })
+    }
+
+    fn most(&self) -> u64 {
+        self.without.max(self.with.1)
+    }
 }
 
 /// What a load came to.
@@ -69,10 +94,10 @@ impl Report {
         let mut capture = Vec::new();
         for change in Change::ALL {
             let cost = |debounce_ms| costs::capture(parts, program, change, debounce_ms);
-            capture.push((words(change), [cost(0)?, cost(LONGEST_DEBOUNCE_MS)?]));
+            capture.push(Capture::measure(words(change), LONGEST_DEBOUNCE_MS, cost)?);
         }
         let cost = |debounce_ms| costs::capture_beyond_queue(parts, program, debounce_ms);
-        capture.push(("all 32, and the queue full", [cost(0)?, cost(SHORTEST_DEBOUNCE_MS)?]));
+        capture.push(Capture::measure("all 32, and the queue full", SHORTEST_DEBOUNCE_MS, cost)?);
         next("commands");
         let mut ways = [Way::Line, Way::Bus].map(|way| Commands::start(parts, program, way));
         let [Ok(line), Ok(bus)] = &mut ways else {
@@ -108,8 +133,8 @@ impl Report {
                 wrong.push(format!("{what}: {} of {} instructions", grouped(instructions), grouped(budget)));
             }
         };
-        for &(what, [without, with]) in &self.capture {
-            keep(&format!("capture interrupt, {what}"), without.max(with), CAPTURE_INSTRUCTIONS);
+        for capture in &self.capture {
+            keep(&format!("capture interrupt, {}", capture.what), capture.most(), CAPTURE_INSTRUCTIONS);
         }
         keep("capture interrupt under load", self.load.capture, CAPTURE_INSTRUCTIONS);
         keep("longest pass of the main loop", self.longest_pass().0, PASS_BUDGET);
@@ -184,18 +209,22 @@ impl Report {
     fn show_capture(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{:<28}{:>12}{:>18}{:>9}",
-            "Capture interrupt", "no debounce", "with debounce", "budget"
+            "{:<28}{:>12}{:>20}{:>9}",
+            "Capture interrupt", "no debounce", "with debounce of", "budget"
         )?;
-        for &(what, [without, with]) in &self.capture {
-            let mark = mark(without.max(with), CAPTURE_INSTRUCTIONS);
-            writeln!(f, "  {what:<26}{without:>12}{with:>18}{CAPTURE_INSTRUCTIONS:>9}  {mark}")?;
+        for capture in &self.capture {
+            let Capture { what, without, with: (debounce_ms, with) } = capture;
+            let mark = mark(capture.most(), CAPTURE_INSTRUCTIONS);
+            writeln!(
+                f,
+                "  {what:<26}{without:>12}{debounce_ms:>10} ms{with:>7}{CAPTURE_INSTRUCTIONS:>9}  {mark}"
+            )?;
         }
         let under_load = self.load.capture;
         let mark = mark(under_load, CAPTURE_INSTRUCTIONS);
         writeln!(
             f,
-            "  {:<26}{under_load:>12}{:>18}{CAPTURE_INSTRUCTIONS:>9}  {mark}",
+            "  {:<26}{under_load:>12}{:>20}{CAPTURE_INSTRUCTIONS:>9}  {mark}",
             "the longest under load", ""
         )
     }
@@ -318,7 +347,7 @@ mod tests {
             lasted_ms: 3,
         };
         Report {
-            capture: vec![("all 32 inputs change", [92, 148])],
+            capture: vec![Capture { what: "all 32 inputs change", without: 92, with: (255, 148) }],
             commands: vec![("E  erase", [Cost::default(); 2])],
             idle_passes: [661, 2772],
             masked: [(Masked::default(), String::new()), (Masked::default(), String::new())],
@@ -331,13 +360,14 @@ mod tests {
     fn what_keeps_to_the_budgets_is_not_wrong() {
         assert_eq!(report().wrong(), Vec::<String>::new());
         let text = report().to_string();
+        assert!(text.contains("92       255 ms    148      150  ✓"), "{text}");
         assert!(text.contains("37,110") && text.contains("5.7 %") && !text.contains('✗'), "{text}");
     }
 
     #[test]
     fn what_is_over_budget_or_missing_is_wrong_and_shown() {
         let mut report = report();
-        report.capture[0].1[1] = 151;
+        report.capture[0].with.1 = 151;
         report.commands[0].1[1].longest_pass = PASS_BUDGET + 1;
         report.load.account.hosts[0].1.overwritten -= 1;
         let wrong = report.wrong();
