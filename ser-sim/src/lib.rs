@@ -25,7 +25,7 @@ pub mod genius;
 mod genius_bench;
 mod genius_options;
 mod line;
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 mod lockstep;
 mod machine;
 mod native;
@@ -48,7 +48,7 @@ pub use emulated_board::{EmulatedBoard, ForcedFault};
 pub use error::SimError;
 pub use genius_options::{GeniusOptions, MAX_NODES};
 pub use line::Port;
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 pub use lockstep::{INSTRUCTIONS_PER_MS, Lockstep, LockstepOptions};
 pub use non_volatile::{MemoryStorage, NonVolatile, SimRtc};
 pub use player::{Played, STREAM_LEAD_MS};

@@ -7,6 +7,8 @@
 //!
 //! Inputs, clock and GENI board are in the memory that both sides map. Bytes for the board's UART go through QEMU's
 //! standard input; the UART's state, read by way of QEMU's test interface (`-qtest`), tells that they have arrived.
+//! QEMU keeps no line rate, but it does keep a byte that its standard output does not take, and that is a pipe for one
+//! byte: the transmitter is busy for as long as the bench leaves it so.
 //!
 //! # Tradeoffs
 //! One instruction lasts 2⁵ ns: 31.25 million in a second, less than any chip that one would flash. At 2⁰ ns the
@@ -16,15 +18,16 @@
 //! An idle processor makes QEMU 7.2 jump two timer periods ahead instead of one. The bench therefore has to see that
 //! the processor never sleeps, with a `nop` in place of each `wfi`: see [`Lockstep::patch`].
 
+mod line_out;
 mod probe;
 mod tracer;
 
 use std::ffi::OsString;
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::os::unix::net::UnixListener;
 use std::path::{Path, PathBuf};
-use std::process::{ChildStdin, ChildStdout, Command as Process, Stdio};
+use std::process::{ChildStdin, Command as Process, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -32,12 +35,13 @@ use ser_proto::Model;
 use tempfile::TempDir;
 
 use crate::emulated_board::ForcedFault;
-use crate::emulator::{PROGRAM, Qemu, arguments, doubled_commas, is_temporary, never_wait, spawn};
+use crate::emulator::{PROGRAM, Qemu, arguments, doubled_commas, is_temporary, spawn};
 use crate::error::SimError;
 use crate::external_bus::ExternalBus;
 use crate::genius::Board;
 use crate::simulator::EmulatorOptions;
 
+use line_out::LineOut;
 use probe::Probe;
 use tracer::Tracer;
 
@@ -78,7 +82,7 @@ pub struct Lockstep {
     tracer: Tracer,
     probe: Probe,
     input: ChildStdin,
-    output: ChildStdout,
+    output: LineOut,
     qemu: Qemu,
     /// Holds memory, sockets, and what QEMU prints. Goes last.
     directory: TempDir,
@@ -108,12 +112,12 @@ impl Lockstep {
             File::create(directory.path().join(PRINTED)).map_err(SimError::io("make a temporary file"))?;
         let mut process = Process::new(&program);
         process.args(arguments(&options.emulator, &memory)).args(extra(options, &plugin_at, &probe_at));
-        process.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(printed);
+        let (output, qemus) = LineOut::new().map_err(SimError::io("make a pipe for the emulator"))?;
+        process.stdin(Stdio::piped()).stdout(qemus).stderr(printed);
         let mut qemu = spawn(&mut process, &program)?;
-        let (Some(input), Some(output)) = (qemu.0.stdin.take(), qemu.0.stdout.take()) else {
-            return Err(SimError::Ended);
-        };
-        never_wait(&output).map_err(SimError::io("talk to the emulator"))?;
+        // It has our copy of its end of the pipe.
+        drop(process);
+        let input = qemu.0.stdin.take().ok_or(SimError::Ended)?;
         let mut accept = |listener| accept(listener, &mut qemu, directory.path());
         let (tracer, probe) = (Tracer::new(accept(&plugin)?), Probe::new(accept(&probe)?));
         let geni_reset = bus.geni_reset();
@@ -192,30 +196,38 @@ impl Lockstep {
         }
         self.input.write_all(&[byte])?;
         self.input.flush()?;
+        self.until(Probe::uart_is_full)?;
+        Ok(true)
+    }
+
+    /// Lets the byte in the transmitter's shift register out, if there is one; the next one takes its place, if there
+    /// is one. The transmitter is busy until then.
+    ///
+    /// # Errors
+    /// When the emulator has ended or hangs.
+    pub fn take_sent(&mut self) -> Result<Option<u8>, SimError> {
+        let taken = self.try_take_sent();
+        taken.map_err(|error| self.explain(error))
+    }
+
+    fn try_take_sent(&mut self) -> io::Result<Option<u8>> {
+        let next = self.probe.uart_is_sending()?;
+        let byte = self.output.take()?;
+        if byte.is_some() && next {
+            self.until(|probe| probe.uart_is_sending().map(|sending| !sending))?;
+        }
+        Ok(byte)
+    }
+
+    /// Waits for QEMU to have moved a byte.
+    fn until(&mut self, mut moved: impl FnMut(&mut Probe) -> io::Result<bool>) -> io::Result<()> {
         let deadline = Instant::now() + PATIENCE;
-        while !self.probe.uart_is_full()? {
+        while !moved(&mut self.probe)? {
             if Instant::now() > deadline {
                 return Err(io::Error::from(io::ErrorKind::TimedOut));
             }
         }
-        Ok(true)
-    }
-
-    /// Takes what the UART has sent. QEMU keeps no line rate: it has left at once.
-    ///
-    /// # Errors
-    /// When the emulator has ended.
-    pub fn take_sent(&mut self) -> Result<Vec<u8>, SimError> {
-        let mut sent = Vec::new();
-        let mut buffer = [0; 1024];
-        loop {
-            match self.output.read(&mut buffer) {
-                Ok(0) => return Err(self.explain(io::ErrorKind::UnexpectedEof.into())),
-                Ok(read) => sent.extend(&buffer[..read]),
-                Err(error) if is_temporary(&error) => return Ok(sent),
-                Err(error) => return Err(self.explain(error)),
-            }
-        }
+        Ok(())
     }
 
     /// Shows the GENI board what the image has done to its shared RAM and its reset line.

@@ -8,6 +8,6 @@ pub mod pages;
 #[cfg(unix)]
 pub mod recorder;
 pub mod simulation;
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 pub mod timing;
 pub mod vectors;

@@ -4,8 +4,10 @@
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 
-/// UART0's state register, and its bit for a byte that waits to be taken.
+/// UART0's state register, and its bits for a byte that waits for the shift register, and for one that waits to be
+/// taken.
 const UART_STATE: u32 = 0x4000_4004;
+const TRANSMIT_FULL: u64 = 1 << 0;
 const RECEIVE_FULL: u64 = 1 << 1;
 
 /// The socket of the test interface.
@@ -20,8 +22,16 @@ impl Probe {
 
     /// Whether the UART has a byte that has not been taken. Reading the state changes nothing.
     pub(super) fn uart_is_full(&mut self) -> io::Result<bool> {
-        let answer = self.ask(&format!("readl {UART_STATE:#x}"))?;
-        Ok(value(&answer)? & RECEIVE_FULL != 0)
+        Ok(self.uart_state()? & RECEIVE_FULL != 0)
+    }
+
+    /// Whether the UART has a byte that waits for the shift register.
+    pub(super) fn uart_is_sending(&mut self) -> io::Result<bool> {
+        Ok(self.uart_state()? & TRANSMIT_FULL != 0)
+    }
+
+    fn uart_state(&mut self) -> io::Result<u64> {
+        value(&self.ask(&format!("readl {UART_STATE:#x}"))?)
     }
 
     /// Writes to memory.

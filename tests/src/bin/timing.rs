@@ -2,18 +2,18 @@
 
 use std::process::ExitCode;
 
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 fn main() -> ExitCode {
     measured::main()
 }
 
-#[cfg(not(unix))]
+#[cfg(not(target_os = "linux"))]
 fn main() -> ExitCode {
     eprintln!("the emulator is driven through local sockets and shared memory: it takes Linux");
     ExitCode::FAILURE
 }
 
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 mod measured {
     use std::num::NonZeroU32;
     use std::path::PathBuf;

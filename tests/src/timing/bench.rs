@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use ser_board::serial_line::CHARACTER_BITS;
 use ser_proto::{Baud, Command, FrameEncoder, Model};
-use ser_sim::{EmulatorOptions, ForcedFault, Lockstep, LockstepOptions};
+use ser_sim::{EmulatorOptions, ForcedFault, Lockstep, LockstepOptions, SimError};
 
 use super::genius::Genius;
 use super::program::{Handler, Kind, Program};
@@ -23,6 +23,32 @@ const BYTE: u32 = 1000;
 
 /// What the battery-backed clock shows first: 2026-11-22 10:00.
 pub const FIRST_MS: u64 = 1_795_341_600_000;
+
+/// What one direction of the line could have carried by now and did not.
+#[derive(Clone, Copy, Debug, Default)]
+struct Credit(u32);
+
+impl Credit {
+    /// A millisecond passes. A line that waits for an interrupt catches up with that and no more.
+    fn pass_ms(&mut self) {
+        self.0 = (self.0 + RATE).min(4 * BYTE);
+    }
+
+    /// Whether a byte is due.
+    fn is_due(self) -> bool {
+        self.0 >= BYTE
+    }
+
+    /// Carries a byte.
+    fn carry(&mut self) {
+        self.0 -= BYTE;
+    }
+
+    /// There is nothing to carry: an idle line saves nothing up.
+    fn idle(&mut self) {
+        self.0 = self.0.min(BYTE);
+    }
+}
 
 /// Files that it takes.
 #[derive(Clone, Debug)]
@@ -56,9 +82,11 @@ pub struct Bench<'p> {
     now_ms: u64,
     inputs: u32,
     to_board: VecDeque<u8>,
-    /// What the line could have brought by now and did not.
-    credit: u32,
+    credit_to: Credit,
+    credit_from: Credit,
     sent: Vec<u8>,
+    /// Whether the board had nothing to send when a byte from it was due.
+    silent: bool,
     carried: Carried,
 }
 
@@ -78,7 +106,7 @@ impl<'p> Bench<'p> {
     /// When the emulator does not start.
     pub fn start(parts: &Parts, program: &'p Program, setup: Setup) -> Result<Bench<'p>, String> {
         let mut stops = vec![program.reset(), program.entry(Handler::Capture)];
-        stops.extend(program.returns(Handler::Receive));
+        stops.extend([Handler::Receive, Handler::Transmit].into_iter().flat_map(|it| program.returns(it)));
         let options = LockstepOptions {
             emulator: EmulatorOptions::new(&parts.image),
             plugin: parts.plugin.clone(),
@@ -102,8 +130,10 @@ impl<'p> Bench<'p> {
             now_ms: 0,
             inputs: 0,
             to_board: VecDeque::new(),
-            credit: 0,
+            credit_to: Credit::default(),
+            credit_from: Credit::default(),
             sent: Vec::new(),
+            silent: true,
             carried: Carried::default(),
         })
     }
@@ -130,7 +160,7 @@ impl<'p> Bench<'p> {
     pub fn pass_ms(&mut self) -> Result<(), String> {
         let capture = self.program.entry(Handler::Capture);
         while self.run()? != capture {
-            self.feed()?;
+            self.carry()?;
         }
         if u64::from(self.board.tick_ms()) != self.now_ms {
             return Err(format!(
@@ -144,8 +174,9 @@ impl<'p> Bench<'p> {
         if let Some(genius) = &mut self.genius {
             genius.advance(self.now_ms, &mut self.board);
         }
-        self.credit = (self.credit + RATE).min(4 * BYTE);
-        self.feed()
+        self.credit_to.pass_ms();
+        self.credit_from.pass_ms();
+        self.carry()
     }
 
     fn run(&mut self) -> Result<u32, String> {
@@ -156,9 +187,6 @@ impl<'p> Bench<'p> {
             self.board.run()
         };
         let stop = stop.map_err(|error| error.to_string())?;
-        let sent = self.board.take_sent().map_err(|error| error.to_string())?;
-        self.carried.from += sent.len() as u64;
-        self.sent.extend(sent);
         if stop == self.program.reset() {
             return Err("the image has started anew".to_owned());
         }
@@ -169,17 +197,38 @@ impl<'p> Bench<'p> {
         Ok(stop)
     }
 
-    /// Brings the next byte, if it is due and there is room for it.
-    fn feed(&mut self) -> Result<(), String> {
+    /// Carries the next byte of each direction, if it is due.
+    fn carry(&mut self) -> Result<(), String> {
+        self.bring().and_then(|()| self.take()).map_err(|error| error.to_string())
+    }
+
+    /// Brings the board a byte, if there is room for it.
+    fn bring(&mut self) -> Result<(), SimError> {
         let Some(&byte) = self.to_board.front() else {
-            // An idle line saves nothing up.
-            self.credit = self.credit.min(BYTE);
+            self.credit_to.idle();
             return Ok(());
         };
-        if self.credit >= BYTE && self.board.receive(byte).map_err(|error| error.to_string())? {
-            self.credit -= BYTE;
+        if self.credit_to.is_due() && self.board.receive(byte)? {
+            self.credit_to.carry();
             self.carried.to += 1;
             self.to_board.pop_front();
+        }
+        Ok(())
+    }
+
+    /// Takes a byte from the board; its transmitter is busy until then.
+    fn take(&mut self) -> Result<(), SimError> {
+        if !self.credit_from.is_due() {
+            return Ok(());
+        }
+        let byte = self.board.take_sent()?;
+        self.silent = byte.is_none();
+        if let Some(byte) = byte {
+            self.credit_from.carry();
+            self.carried.from += 1;
+            self.sent.push(byte);
+        } else {
+            self.credit_from.idle();
         }
         Ok(())
     }
@@ -215,6 +264,12 @@ impl<'p> Bench<'p> {
     #[must_use]
     pub fn waiting(&self) -> usize {
         self.to_board.len()
+    }
+
+    /// Whether the board says nothing on the line.
+    #[must_use]
+    pub fn is_silent(&self) -> bool {
+        self.silent
     }
 
     /// Takes what the board has said on the line.

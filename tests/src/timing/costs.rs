@@ -28,6 +28,9 @@ const SETTLED_MS: u64 = 1_500;
 /// Nothing takes longer, in milliseconds of virtual time.
 const LIMIT_MS: u64 = 30_000;
 
+/// Nobody says anything for so long when everything is said, in milliseconds.
+const SILENT_MS: u64 = 10;
+
 /// So long an idle board is looked at, in milliseconds.
 const IDLE_MS: u64 = 50;
 
@@ -135,7 +138,8 @@ pub enum Way {
 /// What a command cost, from its first byte to the last one of its reply, beyond what an idle board does meanwhile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
-    /// Instructions of the main loop.
+    /// Instructions of the main loop. A pass that costs less than an idle one counts for nothing: with a full ring in
+    /// front of the transmitter it does not look for what could be sent.
     pub main_loop: u64,
     /// Instructions of the serial interrupts.
     pub handlers: u64,
@@ -227,7 +231,11 @@ impl<'p> Commands<'p> {
             _ => holds_frame(decoder, &bench.take_sent()).then_some(()),
         })?;
         // What the reply leaves to be done is done by then, printed lines included.
-        pass(&mut self.bench, 10)?;
+        let mut silent_ms = 0;
+        until(&mut self.bench, "the line falls silent", |bench| {
+            silent_ms = if bench.take_sent().is_empty() { silent_ms + 1 } else { 0 };
+            (silent_ms >= SILENT_MS).then_some(())
+        })?;
         let ready = |bench: &mut Bench<'_>| bench.genius.as_ref().is_none_or(Genius::is_ready).then_some(());
         until(&mut self.bench, "the host is ready", ready)?;
         let ms = self.bench.now_ms() - began_ms;

@@ -4,6 +4,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use ser_board::budget::MAX_BITS_PER_SECOND;
 use ser_client::LineRate;
 use ser_node::Debounce;
 use ser_proto::{AutoReport, Command, Configure, MAX_SIZE, Model, Reply};
@@ -32,6 +33,9 @@ const REPORT: Configure = Configure {
 
 /// Bytes that are never missing on the line: more than it takes in a millisecond.
 const LINE_AHEAD: usize = 4;
+
+/// A byte of noise: one that stands outside every frame.
+const NOISE: u8 = 0x55;
 
 /// The GENI boards have started by then.
 const START_LIMIT_MS: u64 = 30_000;
@@ -103,7 +107,7 @@ impl<'p> Load<'p> {
         }
         let mut ledger = Ledger::new(Model::Ser320.mask());
         ledger.power_up(0, NEVER_SET_MS, MAX_SIZE, Debounce::OFF);
-        let mut line = Conversation::new("RS-232", LineRate::Instant);
+        let mut line = Conversation::new("RS-232", LineRate::BitsPerSecond(MAX_BITS_PER_SECOND));
         line.begin(Order::Ask(Command::Configure(REPORT)), bench.now_ms());
         Ok(Load {
             bench,
@@ -174,9 +178,13 @@ impl<'p> Load<'p> {
         if let Some(outgoing) = next(&mut self.line, now_ms, self.still_since_ms, &self.ledger)? {
             self.bench.send(&outgoing.frame);
         }
-        // The line never rests: while the host thinks, it asks for the mode besides.
-        while self.bench.waiting() < LINE_AHEAD {
+        // The line never rests. Where the board has nothing to answer, it is asked for the mode besides; more questions
+        // would have answers for which the way back has no room, so it is noise that fills the rest.
+        if self.bench.waiting() < LINE_AHEAD && self.bench.is_silent() {
             self.bench.send_command(&Command::QueryMode);
+        }
+        while self.bench.waiting() < LINE_AHEAD {
+            self.bench.send(&[NOISE]);
         }
         Ok(())
     }

@@ -317,7 +317,11 @@ impl Report {
         }
         let [to, from] = [carried.to, carried.from].map(|bytes| grouped(bytes * 1000 / ms));
         let rate = grouped(RATE.into());
-        writeln!(f, "  {:<26}{to:>12} of {rate} to the board, {from} from it", "bytes a second on RS-232")?;
+        writeln!(
+            f,
+            "  {:<26}{to:>12} to the board and {from} from it, of {rate} each",
+            "bytes a second on RS-232"
+        )?;
         writeln!(
             f,
             "  {:<26}{:>12} in interrupts, {} in the main loop's busy passes",
