@@ -22,7 +22,7 @@ const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";
 const REST_MS: u64 = 100;
 
 /// So long all inputs change in every millisecond: more events than the log holds. `cargo xtask timing --load-seconds
-/// 60` goes on for a minute, which takes some three of real time.
+/// 60` goes on for a minute, which takes more than one of real time.
 const LOAD_MS: u64 = 3_000;
 
 /// Bytes that a direction of the line may have been behind with when the load began.
