@@ -76,6 +76,8 @@ pub struct Account {
     cut_off: u64,
     /// The same events: the reading that the power cut through may have some of them in hand.
     in_hand: VecDeque<Recorded>,
+    /// Whether the log of that life had begun unseen, so that its count of losses is worth nothing.
+    in_hand_uncounted: bool,
     tally: Tally,
 }
 
@@ -97,6 +99,7 @@ impl Account {
             known: Known::Nothing,
             cut_off: 0,
             in_hand: VecDeque::new(),
+            in_hand_uncounted: false,
             tally: Tally::default(),
         }
     }
@@ -151,6 +154,7 @@ impl Account {
         if !connected || self.in_hand.len() as u64 != unread {
             self.in_hand.clear();
         }
+        self.in_hand_uncounted = self.new_life && self.known == Known::Event;
         self.life = ledger.life() + 1;
         self.next = 0;
         self.erases_behind = 0;
@@ -200,8 +204,8 @@ impl Account {
 
     fn take_event(&mut self, entry: &Entry, ledger: &Ledger) -> Result<(), String> {
         let lost = std::mem::take(&mut self.lost_told);
-        if !self.restart_told && self.in_hand.get(lost).is_some_and(|event| event.is(entry)) {
-            self.deliver_in_hand(lost);
+        if let Some(skipped) = self.in_hand_before(entry, lost) {
+            self.deliver_in_hand(skipped);
             return Ok(());
         }
         let is = |index: usize| ledger.event(index).is_some_and(|event| event.is(entry));
@@ -228,12 +232,19 @@ impl Account {
         }
     }
 
+    /// How many of the events in hand come before this one, if it is one of them and these are reported as lost.
+    fn in_hand_before(&self, entry: &Entry, lost: usize) -> Option<usize> {
+        let first = if self.in_hand_uncounted { 0 } else { lost };
+        let is = |skipped: &usize| self.in_hand.get(*skipped).is_some_and(|event| event.is(entry));
+        (first..=lost.min(self.in_hand.len())).find(is).filter(|_| !self.restart_told)
+    }
+
     /// Delivers an event that was read before the power went. A small ring that is full again, and stands as if the log
     /// had gone on, leaves no trace of that; the next reading misses the event that was delivered last.
-    fn deliver_in_hand(&mut self, lost: usize) {
-        self.in_hand.drain(..=lost);
-        self.cut_off -= lost as u64 + 1;
-        self.tally.overwritten += lost as u64;
+    fn deliver_in_hand(&mut self, skipped: usize) {
+        self.in_hand.drain(..=skipped);
+        self.cut_off -= skipped as u64 + 1;
+        self.tally.overwritten += skipped as u64;
         self.tally.delivered += 1;
         self.known = Known::Event;
     }

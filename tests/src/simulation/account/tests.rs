@@ -365,3 +365,21 @@ fn a_reading_through_a_power_cut_may_deliver_what_it_has_in_hand() {
     let tally = Tally { delivered: 6, overwritten: 2, gone: 1, restarts: 1, ..Tally::default() };
     assert_eq!(case.finish(), Ok(tally));
 }
+
+#[test]
+fn what_is_in_hand_of_a_life_that_began_unseen_has_a_count_worth_nothing() {
+    let mut case = Case::read_up_to(3);
+    case.power_cycle();
+    case.record(5);
+    case.read(&[]).expect("nothing yet");
+    case.power_cycle();
+    case.record(1);
+    assert_refused(case.clone().deliver(5, 1), "never been");
+    case.account
+        .take(&overwritten(60_000), &case.ledger)
+        .and_then(|()| case.deliver(5, 3))
+        .expect("they were read");
+    case.read(&[RESTARTED]).and_then(|()| case.deliver(8, 1)).expect("it is told");
+    let tally = Tally { delivered: 7, overwritten: 2, restarts: 1, ..Tally::default() };
+    assert_eq!(case.finish(), Ok(tally));
+}
