@@ -186,13 +186,8 @@ mod tests {
     use clap::Parser;
     use clap::error::ErrorKind;
 
-    use super::{Arguments, chosen};
-
-    #[derive(Debug, Parser)]
-    struct Alone {
-        #[command(flatten)]
-        arguments: Arguments,
-    }
+    use super::chosen;
+    use crate::Arguments;
 
     #[test]
     fn a_target_that_there_is_not_is_refused_and_the_others_are_named() {
@@ -206,7 +201,7 @@ mod tests {
     #[test]
     fn a_time_that_is_none_is_refused_as_a_number() {
         for wrong in ["0", "-5", "2147483648", "soon"] {
-            let error = Alone::try_parse_from(["fuzz", "--seconds", wrong]).unwrap_err();
+            let error = Arguments::try_parse_from(["xtask", "fuzz", "--seconds", wrong]).unwrap_err();
             assert_eq!(error.kind(), ErrorKind::ValueValidation, "{error}");
         }
     }

@@ -77,16 +77,13 @@ mod tests {
     use clap::Parser;
     use clap::error::ErrorKind;
 
-    use super::Arguments;
-
-    #[derive(Debug, Parser)]
-    struct Alone {
-        #[command(flatten)]
-        arguments: Arguments,
-    }
+    use crate::{Arguments, Verb};
 
     fn understood(line: &[&str]) -> Result<u32, clap::Error> {
-        Alone::try_parse_from([&["timing"], line].concat()).map(|alone| alone.arguments.load_seconds)
+        match Arguments::try_parse_from([&["xtask", "timing"], line].concat())?.verb {
+            Verb::Timing(arguments) => Ok(arguments.load_seconds),
+            other => panic!("{other:?}"),
+        }
     }
 
     #[test]
