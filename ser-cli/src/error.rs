@@ -15,6 +15,9 @@ pub(crate) const EXIT_FAILURE: u8 = 1;
 /// The command line asks for something that cannot be; clap uses the same code.
 const EXIT_USAGE: u8 = 2;
 
+/// Everything went well, and events are missing in what was delivered; only if the user asked for that.
+const EXIT_INCOMPLETE: u8 = 3;
+
 /// Why a command ended early.
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -47,6 +50,12 @@ impl Failure {
     /// A command line that makes no sense, found after clap has had its look: exit code 2.
     pub(crate) fn usage(message: impl Display) -> Failure {
         Failure::with_exit(message, EXIT_USAGE)
+    }
+
+    /// Events are missing in what was delivered: exit code 3.
+    pub(crate) fn incomplete(message: impl Display) -> Failure {
+        Failure::with_exit(message, EXIT_INCOMPLETE)
+            .hint("everything that could be read was delivered; each loss is in the output where it belongs")
     }
 
     fn with_exit(message: impl Display, exit: u8) -> Failure {

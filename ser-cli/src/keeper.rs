@@ -8,7 +8,7 @@ use ser_client::Cursor;
 use crate::cli::ConnectionArgs;
 use crate::connection;
 use crate::error::Result;
-use crate::output;
+use crate::output::{self, Life};
 use crate::state::{Delivered, StateFile, StateLock};
 
 /// How much a crash may repeat, in time: writing the file after every event would wear a memory card.
@@ -43,7 +43,15 @@ impl Keeper {
 
     /// Where reading goes on.
     pub(crate) fn cursor(&self) -> Option<Cursor> {
-        self.saved.map(|Delivered { total, last, .. }| Cursor { total, anchor: last })
+        self.saved.map(|delivered| delivered.cursor)
+    }
+
+    /// The life of the log that was read; a new one where nothing is remembered.
+    pub(crate) fn life(&self) -> Result<Life> {
+        match self.saved.and_then(|delivered| delivered.life) {
+            Some(life) => Ok(life),
+            None => Ok(Life::begin()?),
+        }
     }
 
     /// The size that the log had.
@@ -51,12 +59,16 @@ impl Keeper {
         self.saved.map(|delivered| delivered.size)
     }
 
-    /// Everything up to `cursor` has reached standard output.
-    pub(crate) fn delivered(&mut self, cursor: Option<Cursor>, size: u16) -> Result<()> {
-        let Some(Cursor { total, anchor }) = cursor else { return Ok(()) };
-        let delivered = Delivered { total, last: anchor, size };
+    /// Everything up to `cursor`, in a log of this life, has reached standard output.
+    pub(crate) fn delivered(&mut self, cursor: Option<Cursor>, size: u16, life: Life) -> Result<()> {
+        let Some(cursor) = cursor else { return Ok(()) };
+        let delivered = Delivered { cursor, size, life: Some(life) };
         self.unsaved = (self.saved != Some(delivered)).then_some(delivered);
-        self.save_if_due()
+        // The name of a new life must not get lost: the next run would give the same events another one.
+        match self.saved {
+            Some(saved) if saved.life == Some(life) => self.save_if_due(),
+            _ => self.save(),
+        }
     }
 
     /// Writes what is not written yet, unless that was done a moment ago.
@@ -69,7 +81,7 @@ impl Keeper {
         if let Some(delivered) = self.unsaved.take() {
             // The events have to be on the disk before it is remembered that they are: after a power cut it is better
             // to get some twice than to miss some.
-            output::sync_stdout();
+            output::sync_stdout()?;
             self.file.save(&delivered)?;
             self.saved = Some(delivered);
             self.saved_at = Instant::now();

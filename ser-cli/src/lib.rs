@@ -21,6 +21,7 @@ mod values;
 use std::process::ExitCode;
 
 pub use decoding::{CaptureFormat, CaptureOptions, Listing, Side, Tally};
+pub use output::Life;
 pub use state::{Delivered, NotDelivered};
 
 /// Does what the command line says.

@@ -6,23 +6,28 @@ use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use ser_client::Cursor;
 use ser_proto::{Entry, Inputs, TimeStamp};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Failure, Result};
+use crate::output::Life;
 
 /// The layout of the file. A change that old versions would misread gets the next number.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
+
+/// The layout without sequence and life. What it remembers is still good.
+const VERSION_WITHOUT_LIFE: u32 = 1;
 
 /// Where a unit's log had been read to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Delivered {
-    /// The unit's total after the last delivered event.
-    pub total: u16,
-    /// The last delivered event itself, to tell the log from another one with the same total.
-    pub last: Option<Entry>,
+    /// Behind the last event that was delivered.
+    pub cursor: Cursor,
     /// Entries that the log could hold then.
     pub size: u16,
+    /// The life of the log; `None` in files of before lives had names.
+    pub life: Option<Life>,
 }
 
 /// A text that does not say what was delivered, and why.
@@ -45,10 +50,18 @@ impl Delivered {
     pub fn from_text(text: &[u8]) -> std::result::Result<Delivered, NotDelivered> {
         let content: Content =
             serde_json::from_slice(text).map_err(|error| NotDelivered(error.to_string()))?;
-        if content.version != VERSION {
-            return Err(NotDelivered(format!("version {} is not {VERSION}", content.version)));
-        }
-        Ok(Delivered { total: content.total, last: content.last.map(Entry::from), size: content.size })
+        let (sequence, life) = match content.version {
+            VERSION_WITHOUT_LIFE => (content.total.map(u64::from), None),
+            VERSION => (content.sequence, Some(content.life()?)),
+            version => return Err(NotDelivered(format!("version {version} is not {VERSION}"))),
+        };
+        let sequence = sequence.ok_or_else(|| NotDelivered("it has no total".to_owned()))?;
+        let cursor = Cursor {
+            sequence,
+            is_exact: content.exact.unwrap_or(false),
+            anchor: content.last.map(Entry::from),
+        };
+        Ok(Delivered { cursor, size: content.size, life })
     }
 
     /// The content of the state file of this unit.
@@ -56,9 +69,17 @@ impl Delivered {
     /// # Errors
     /// None that is known: there is nothing here that JSON does not have.
     pub fn to_text(&self, unit: &str) -> io::Result<String> {
-        let Delivered { total, last, size } = *self;
-        let last = last.as_ref().map(LastEntry::from);
-        let content = Content { version: VERSION, unit: unit.to_owned(), total, size, last };
+        let Delivered { cursor: Cursor { sequence, is_exact, anchor }, size, life } = *self;
+        let content = Content {
+            version: VERSION,
+            unit: unit.to_owned(),
+            total: None,
+            sequence: Some(sequence),
+            exact: Some(is_exact),
+            life: Some(life.unwrap_or(Life::UNKNOWN).to_string()),
+            size,
+            last: anchor.as_ref().map(LastEntry::from),
+        };
         Ok(serde_json::to_string(&content)? + "\n")
     }
 }
@@ -82,9 +103,25 @@ struct Content {
     version: u32,
     /// The `--port` text, for whoever looks into the file.
     unit: String,
-    total: u16,
+    /// The recorder's total after the last event, in version 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    total: Option<u16>,
+    #[serde(default)]
+    sequence: Option<u64>,
+    /// Whether the sequence counts from the beginning of the log.
+    #[serde(default)]
+    exact: Option<bool>,
+    #[serde(default)]
+    life: Option<String>,
     size: u16,
     last: Option<LastEntry>,
+}
+
+impl Content {
+    fn life(&self) -> std::result::Result<Life, NotDelivered> {
+        let name = self.life.as_deref().unwrap_or_default();
+        Life::from_name(name).ok_or_else(|| NotDelivered("it names no life of the log".to_owned()))
+    }
 }
 
 /// An entry, field by field: its time need not be a date that exists.
@@ -234,6 +271,18 @@ mod tests {
         StateFile::of_unit("/dev/ttyUSB0", Some(&directory.path().join("new"))).unwrap()
     }
 
+    fn delivered(sequence: u64) -> Delivered {
+        let cursor = Cursor { sequence, is_exact: false, anchor: None };
+        Delivered { cursor, size: 2048, life: Some(Life::UNKNOWN) }
+    }
+
+    #[test]
+    fn a_file_of_before_lives_had_names_is_read() {
+        let text = br#"{"version":1,"unit":"/dev/ttyUSB0","total":7,"size":2048,"last":null}"#;
+        let read = Delivered::from_text(text).unwrap();
+        assert_eq!(read, Delivered { life: None, ..delivered(7) });
+    }
+
     #[test]
     fn what_is_saved_is_loaded_again() {
         let directory = tempfile::tempdir().unwrap();
@@ -241,9 +290,10 @@ mod tests {
         assert_eq!(state.load().unwrap(), None);
         let mut last = entry("00.250", &[3, 32], &[32]);
         last.time.month = 200;
+        let cursor = |sequence, is_exact, anchor| Cursor { sequence, is_exact, anchor };
         for delivered in [
-            Delivered { total: 65_535, last: Some(last), size: 2048 },
-            Delivered { total: 0, last: None, size: 1 },
+            Delivered { cursor: cursor(u64::MAX, false, Some(last)), size: 2048, life: Life::from_name("0") },
+            Delivered { cursor: cursor(0, true, None), size: 1, life: Some(Life::begin().unwrap()) },
         ] {
             state.save(&delivered).unwrap();
             assert_eq!(state.load().unwrap(), Some(delivered));
@@ -256,14 +306,16 @@ mod tests {
     fn a_damaged_file_is_named_with_what_to_do() {
         let directory = tempfile::tempdir().unwrap();
         let state = state_in(&directory);
-        state.save(&Delivered { total: 7, last: None, size: 2048 }).unwrap();
+        state.save(&delivered(7)).unwrap();
         let good = fs::read_to_string(&state.path).unwrap();
         let wrong = [
             String::new(),
             "{".to_string(),
             good[..good.len() / 2].to_string(),
-            good.replace("\"version\":1", "\"version\":2"),
-            good.replace(":7", ":70000"),
+            good.replace("\"version\":2", "\"version\":3"),
+            good.replace("\"version\":2", "\"version\":1"),
+            good.replace(":7", ":-7"),
+            good.replace("\"life\":\"0\"", "\"life\":\"x\""),
         ];
         for content in wrong {
             fs::write(&state.path, content).unwrap();
@@ -288,8 +340,7 @@ mod tests {
     fn a_directory_that_cannot_be_made_is_an_error_with_advice() {
         let directory = tempfile::tempdir().unwrap();
         fs::write(directory.path().join("new"), "a file in the way").unwrap();
-        let text =
-            state_in(&directory).save(&Delivered { total: 7, last: None, size: 1 }).unwrap_err().text();
+        let text = state_in(&directory).save(&delivered(7)).unwrap_err().text();
         assert!(text.contains("--state-dir"), "{text}");
     }
 

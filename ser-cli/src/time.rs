@@ -48,7 +48,12 @@ pub(crate) fn time_after(time: TimeStamp, elapsed: std::time::Duration) -> TimeS
     NaiveDateTime::try_from(time).map_or(time, |start| stamp(start + elapsed).unwrap_or(time))
 }
 
+/// Milliseconds of the hundred years that two digits tell apart, 1970–2069.
+const CENTURY_MS: i64 = 36_525 * 86_400_000;
+
 /// The time between two events, with its sign.
+///
+/// 2069 is followed by 1970, so it is the shorter way around the hundred years: within ±50 years.
 ///
 /// As `+0.001 s`, `+1m02.003 s`, `+3h01m02 s`, `+2d03h01m`: the further apart, the coarser, so that it is taken in at
 /// a glance and fits a narrow column. The times themselves always show the millisecond.
@@ -60,9 +65,38 @@ pub(crate) struct Delta {
 impl Delta {
     /// From `earlier` to `later`; `None` when one of them is no date.
     pub(crate) fn between(earlier: TimeStamp, later: TimeStamp) -> Option<Delta> {
-        let earlier = NaiveDateTime::try_from(earlier).ok()?;
-        let later = NaiveDateTime::try_from(later).ok()?;
-        Some(Delta { ms: (later - earlier).num_milliseconds() })
+        let straight_ms = straight_ms(earlier, later)?;
+        Some(Delta { ms: (straight_ms + CENTURY_MS / 2).rem_euclid(CENTURY_MS) - CENTURY_MS / 2 })
+    }
+}
+
+/// From `earlier` to `later` as their years are written.
+fn straight_ms(earlier: TimeStamp, later: TimeStamp) -> Option<i64> {
+    let earlier = NaiveDateTime::try_from(earlier).ok()?;
+    let later = NaiveDateTime::try_from(later).ok()?;
+    Some((later - earlier).num_milliseconds())
+}
+
+/// How a recorder's clock went from one event to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ClockStep {
+    /// As time does.
+    Forward,
+    /// It was set back in between.
+    Back,
+    /// From 2069 to 1970: the two digits of the year began anew.
+    YearsBeganAnew,
+}
+
+impl ClockStep {
+    /// From `earlier` to `later`; `None` when one of them is no date.
+    pub(crate) fn between(earlier: TimeStamp, later: TimeStamp) -> Option<ClockStep> {
+        let Delta { ms } = Delta::between(earlier, later)?;
+        Some(match straight_ms(earlier, later)? {
+            _ if ms < 0 => ClockStep::Back,
+            straight if straight < 0 => ClockStep::YearsBeganAnew,
+            _ => ClockStep::Forward,
+        })
     }
 }
 
@@ -136,6 +170,22 @@ mod tests {
         ] {
             assert_eq!(Delta { ms }.to_string(), text);
         }
+    }
+
+    #[test]
+    fn the_last_moment_of_2069_is_a_millisecond_before_the_first_of_1970() {
+        let last = parse_time("2069-12-31T23:59:59.999").unwrap();
+        let first = parse_time("1970-01-01T00:00:00.000").unwrap();
+        assert_eq!(Delta::between(last, first), Some(Delta { ms: 1 }));
+        assert_eq!(Delta::between(first, last), Some(Delta { ms: -1 }));
+        assert_eq!(ClockStep::between(last, first), Some(ClockStep::YearsBeganAnew));
+        assert_eq!(ClockStep::between(first, last), Some(ClockStep::Back));
+        assert_eq!(ClockStep::between(first, first), Some(ClockStep::Forward));
+        // At the turn of 1999 to 2000 nothing happens.
+        let before = parse_time("1999-12-31T23:59:59.999").unwrap();
+        let after = parse_time("2000-01-01T00:00:00.000").unwrap();
+        assert_eq!(Delta::between(before, after), Some(Delta { ms: 1 }));
+        assert_eq!(ClockStep::between(before, after), Some(ClockStep::Forward));
     }
 
     #[test]

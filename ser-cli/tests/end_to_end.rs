@@ -5,94 +5,14 @@ mod common;
 
 use std::fs;
 use std::io::{Read, Write};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::path::Path;
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
+use common::bench::{Bench, text};
 use common::{Running, ser_cli, wait_until};
 use ser_tests::recorder::{Kind, PATIENCE, image};
 use ser_tests::with_both_kinds;
-use tempfile::TempDir;
-
-/// A unit made with `ser-cli sim`, whose contacts are moved through its standard input.
-struct Bench {
-    folder: TempDir,
-    sim: Running,
-}
-
-impl Bench {
-    fn start(kind: Kind, options: &[&str]) -> Bench {
-        let folder = tempfile::tempdir().expect("a folder");
-        let mut command = ser_cli();
-        command
-            .arg("sim")
-            .arg("--pty")
-            .arg(folder.path().join("unit"))
-            .args(["--contacts", "-"])
-            .args(options);
-        if kind == Kind::Emulated {
-            command.arg("--image").arg(image());
-        }
-        let sim = Running::start(command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()));
-        let bench = Bench { folder, sim };
-        wait_until("the link appears", || bench.link().exists());
-        bench
-    }
-
-    fn link(&self) -> PathBuf {
-        self.folder.path().join("unit")
-    }
-
-    fn command(&self, arguments: &str) -> Command {
-        let mut command = ser_cli();
-        command
-            .env("SER_PORT", self.link())
-            .env("SER_STATE_DIR", self.folder.path().join("state"))
-            .args(["--timeout", "20s"])
-            .args(arguments.split_whitespace());
-        command
-    }
-
-    fn run(&self, arguments: &str) -> Output {
-        self.command(arguments).output().expect("ser-cli runs")
-    }
-
-    /// Standard output of a command that must go well.
-    fn ok(&self, arguments: &str) -> String {
-        let output = self.run(arguments);
-        assert_eq!(output.status.code(), Some(0), "{arguments}: {}", text(&output.stderr));
-        text(&output.stdout)
-    }
-
-    /// Standard error of a command that must end with this code, and with nothing on standard output.
-    fn fails(&self, code: i32, arguments: &str) -> String {
-        let output = self.run(arguments);
-        assert_eq!((output.status.code(), text(&output.stdout)), (Some(code), String::new()), "{arguments}");
-        text(&output.stderr)
-    }
-
-    /// Moves contacts and waits until so many entries more have been recorded.
-    fn contacts(&mut self, lines: &str, entries: usize) {
-        let before = self.entries();
-        let input = self.sim.0.stdin.as_mut().expect("piped");
-        write!(input, "ms,input,state\n{lines}\n\n").expect("the simulator reads");
-        wait_until("the contacts have moved", || self.entries() == before + entries);
-    }
-
-    fn entries(&self) -> usize {
-        let entries: std::collections::BTreeSet<_> = self
-            .ok("read --format csv")
-            .lines()
-            .skip(1)
-            .map(|line| line.split(',').next().map(str::to_owned))
-            .collect();
-        entries.len()
-    }
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("UTF-8")
-}
 
 with_both_kinds! {
     contacts_are_recorded_and_read_back_in_every_format,
@@ -103,23 +23,25 @@ with_both_kinds! {
 
 fn contacts_are_recorded_and_read_back_in_every_format(kind: Kind) {
     let mut bench = Bench::start(kind, &["--model", "ser160"]);
-    assert_eq!(bench.ok("read --format csv"), "entry,time,input,state\n");
+    assert_eq!(bench.ok("read --format csv"), "entry,time,input,state,sequence,life,note\n");
     let set = bench.ok("clock set --at 2026-11-22T10:00:00");
     assert_eq!(set, "2026-11-22T10:00:00.000\n");
     bench.contacts("0,3,1\n250,16,1\n250,1,1\n251,3,0", 3);
 
     let csv = bench.ok("read --format csv");
     let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
-    assert_eq!(rows[0], ["entry", "time", "input", "state"]);
-    let changes: Vec<_> = rows[1..].iter().map(|row| (row[0], row[2], row[3])).collect();
-    assert_eq!(changes, [("1", "3", "1"), ("2", "1", "1"), ("2", "16", "1"), ("3", "3", "0")]);
+    assert_eq!(rows[0], ["entry", "time", "input", "state", "sequence", "life", "note"]);
+    let changes: Vec<_> = rows[1..].iter().map(|row| (row[0], row[2], row[3], row[4])).collect();
+    let expected = [("1", "3", "1", "1"), ("2", "1", "1", "2"), ("2", "16", "1", "2"), ("3", "3", "0", "3")];
+    assert_eq!(changes, expected);
+    assert!(rows[1..].iter().all(|row| row[5..] == ["0", ""]), "no memory, no life: {csv}");
     assert!(rows[1][1].starts_with("2026-11-22T10:0"), "{csv}");
 
     let times: Vec<_> = [1, 2, 4].map(|row: usize| rows[row][1]).to_vec();
     let jsonl = bench.ok("read --format jsonl --from 2 --count 2");
     let expected = format!(
-        "{{\"entry\":2,\"time\":\"{}\",\"changed\":[1,16],\"state\":[1,3,16]}}\n\
-         {{\"entry\":3,\"time\":\"{}\",\"changed\":[3],\"state\":[1,16]}}\n",
+        "{{\"entry\":2,\"time\":\"{}\",\"changed\":[1,16],\"state\":[1,3,16],\"sequence\":null,\"life\":\"0\"}}\n\
+         {{\"entry\":3,\"time\":\"{}\",\"changed\":[3],\"state\":[1,16],\"sequence\":null,\"life\":\"0\"}}\n",
         times[1], times[2]
     );
     assert_eq!(jsonl, expected);
@@ -147,7 +69,11 @@ fn read_new_delivers_each_event_once_and_says_what_is_lost(kind: Kind) {
     bench.contacts(&steps.join("\n"), 5);
     wait_until("all have moved", || bench.ok("status").contains("23 since"));
     let output = bench.run("read --new --format jsonl");
-    assert_eq!((output.status.code(), text(&output.stdout).lines().count()), (Some(0), 8));
+    let stdout = text(&output.stdout);
+    assert_eq!((output.status.code(), stdout.lines().count()), (Some(0), 1 + 8));
+    let first = stdout.lines().next().unwrap_or_default();
+    let loss = "{\"lost\":12,\"count\":\"exactly\",\"after\":3,\"why\":\"overwritten\",";
+    assert!(first.starts_with(loss), "{first}");
     let lost = "12 events were overwritten before they were read";
     assert!(text(&output.stderr).contains(lost), "{}", text(&output.stderr));
     assert_eq!(bench.ok("read --new --format jsonl"), "");
@@ -206,12 +132,13 @@ fn watch_shows_events_as_they_happen_and_puts_the_configuration_back(kind: Kind)
         Running::start(bench.command("watch --format csv").stdout(Stdio::piped()).stderr(Stdio::null()));
     let lines = watch.lines();
     let next = || lines.recv_timeout(PATIENCE).expect("a line of watch");
-    assert_eq!(next(), "entry,time,input,state");
-    assert!(next().ends_with(",1,1"));
+    assert_eq!(next(), "entry,time,input,state,sequence,life,note");
+    let change = || next().split(',').skip(2).take(3).collect::<Vec<_>>().join(",");
+    assert_eq!(change(), "1,1,1");
     let input = bench.sim.0.stdin.as_mut().expect("piped");
     input.write_all(b"ms,input,state\n0,2,1\n3,1,0\n\n").expect("the simulator reads");
-    assert!(next().ends_with(",2,1"));
-    assert!(next().ends_with(",1,0"));
+    assert_eq!(change(), "2,1,2");
+    assert_eq!(change(), "1,0,3");
     assert_eq!(watch.interrupt(), Some(0));
     assert_eq!(bench.ok("config"), before);
     // What watch has shown is not new any more.
@@ -358,7 +285,7 @@ fn scenarios_on_standard_input_follow_each_other_until_a_line_is_wrong() {
         let csv = text(&read.expect("ser-cli runs").stdout);
         csv.lines()
             .skip(1)
-            .map(|row| row.split(',').skip(2).collect::<Vec<_>>().join(" "))
+            .map(|row| row.split(',').skip(2).take(2).collect::<Vec<_>>().join(" "))
             .collect::<Vec<_>>()
     };
     wait_until("both scenarios are over", || changes().len() >= 4);

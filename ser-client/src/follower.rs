@@ -74,15 +74,16 @@ impl LogFollower {
         unit: &mut Unit,
         take: &mut dyn FnMut(&Step<'_>) -> Result<(), E>,
     ) -> Result<Summary, E> {
-        let (mut delivered, mut lost, mut restarted) = (0_u32, 0_u32, false);
+        let (mut delivered, mut lost, mut unrecorded, mut restarted) = (0_u32, 0_u32, 0_u32, false);
         let mut resyncs = 0;
         loop {
             let (summary, end) = self.read_once(unit, take)?;
             delivered = delivered.saturating_add(summary.delivered);
             lost = lost.saturating_add(summary.lost);
+            unrecorded = unrecorded.saturating_add(summary.unrecorded);
             restarted |= summary.restarted;
             match end {
-                Ok(()) => return Ok(Summary { delivered, lost, restarted, ..summary }),
+                Ok(()) => return Ok(Summary { delivered, lost, unrecorded, restarted, ..summary }),
                 // Somebody erased or resized the log: what is still there is sorted out from the cursor.
                 Err(Disturbed::Changed | Disturbed::WrongSize) if resyncs < MAX_RESYNCS => {
                     resyncs += 1;

@@ -1,8 +1,8 @@
 //! Reading entries by their physical numbers, as they stand in the ring.
 
-use ser_proto::{MAX_ENTRIES, MAX_SIZE, ReadReply};
+use ser_proto::{Entry, MAX_ENTRIES, MAX_SIZE, ReadReply};
 
-use crate::{Delivery, LogPosition, ReadRequest};
+use crate::{Delivery, LogPosition, Lost, ReadRequest};
 
 /// Reads a range of entries. Events that are recorded meanwhile may overwrite entries of the range between two
 /// replies; [`LogReader`](crate::LogReader) follows them, this only tells: [`is_mixed`](Self::is_mixed).
@@ -15,6 +15,8 @@ pub struct RangeReader {
     /// Where the log stood in the first reply.
     first: Option<LogPosition>,
     position: Option<LogPosition>,
+    /// The entry before `next`, while no event has come since it was read.
+    before: Option<Entry>,
     delivered: u16,
 }
 
@@ -26,7 +28,7 @@ impl RangeReader {
         let size = size.clamp(1, MAX_SIZE);
         let end = start.saturating_add(count).min(size + 1);
         let next = if start == 0 { end } else { start };
-        RangeReader { start, next, end, first: None, position: None, delivered: 0 }
+        RangeReader { start, next, end, first: None, position: None, before: None, delivered: 0 }
     }
 
     /// The entries to ask for next; `None` when all have come, or those that exist.
@@ -40,7 +42,11 @@ impl RangeReader {
     /// Takes the reply to [`request`](Self::request) and delivers its entries.
     pub fn take(&mut self, reply: &ReadReply, on: &mut dyn FnMut(Delivery)) {
         let Some(request) = self.request().filter(|request| request.start == reply.start) else { return };
-        self.position = Some(LogPosition::from(reply));
+        let position = LogPosition::from(reply);
+        if self.position != Some(position) {
+            self.before = None;
+        }
+        self.position = Some(position);
         self.first = self.first.or(self.position);
         let Some(model) = reply.model else {
             // The log ends here.
@@ -48,7 +54,13 @@ impl RangeReader {
             return;
         };
         for &entry in reply.entries.iter().take(request.count.into()) {
-            on(Delivery::Event { entry_number: self.next, entry, model });
+            // The oldest entry of a full ring stands right behind the newest.
+            let before = self.before.filter(|_| self.next != position.next_slot + 1);
+            if let Some(lost) = before.and_then(|before| Lost::between(&before, &entry)) {
+                on(Delivery::Lost { after: None, lost });
+            }
+            on(Delivery::Event { entry_number: self.next, sequence: None, entry, model });
+            self.before = Some(entry);
             self.next += 1;
             self.delivered += 1;
         }
@@ -86,7 +98,7 @@ impl RangeReader {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ser_proto::{Entry, Inputs, Model, TimeStamp};
+    use ser_proto::{Inputs, Model, TimeStamp};
 
     fn reply(start: u16, count: usize, total: u16, next_slot: u16) -> ReadReply {
         let time =
@@ -103,6 +115,22 @@ mod tests {
         reader.take(&reply(21, 10, last.0, last.1), &mut drop);
         assert_eq!((reader.delivered(), reader.request()), (20, None));
         reader.is_mixed()
+    }
+
+    #[test]
+    fn a_change_without_an_entry_is_told_between_neighbours_only() {
+        let mut reply = reply(11, 4, 215, 13);
+        // Input 2 is on all of a sudden in entry 12, and again in 14, which is the oldest of the ring.
+        for (entry, state) in reply.entries.iter_mut().zip([0b01, 0b10, 0b11, 0b00]) {
+            entry.changed = Inputs(0b01);
+            entry.state = Inputs(state);
+        }
+        let mut told = Vec::new();
+        RangeReader::new(11, 4, 100).take(&reply, &mut |delivery| told.push(delivery));
+        let lost: Vec<_> = told.iter().filter(|told| matches!(told, Delivery::Lost { .. })).collect();
+        let input_2 = Lost::Unrecorded { inputs: Inputs(0b10) };
+        assert_eq!(lost, [&Delivery::Lost { after: None, lost: input_2 }]);
+        assert!(matches!(told[1], Delivery::Lost { .. }), "before entry 12");
     }
 
     #[test]

@@ -6,7 +6,8 @@ use std::collections::VecDeque;
 
 use common::{Recorder, Told, serial, told};
 use proptest::prelude::*;
-use ser_client::{Cursor, Delivery, Disturbed, LogReader, Summary};
+use ser_client::{Cursor, Delivery, Disturbed, LogReader, Lost, Summary};
+use ser_proto::Inputs;
 
 /// A host that keeps its cursor from reading to reading, and a judge that knows what really happened.
 struct Host {
@@ -66,6 +67,7 @@ impl Host {
         // What is asked again is asked alone.
         let mut again = VecDeque::new();
         let mut lost = self.lost.iter().cycle();
+        let mut last = self.cursor.map(|cursor| cursor.sequence);
         let in_a_row = self.lost.repeat(2).split(|lost| !lost).map(<[bool]>::len).max().unwrap_or(0);
         let rate = self.rate * u32::try_from(1 + in_a_row).unwrap();
         loop {
@@ -90,7 +92,8 @@ impl Host {
                 continue;
             }
             let result = reader.take(&reply, &mut |delivery| {
-                if let Delivery::Event { entry_number, entry, model } = delivery {
+                check_sequence(delivery, &mut last, recorder);
+                if let Delivery::Event { entry_number, entry, model, .. } = delivery {
                     let given_up = serial(&entry).saturating_sub(oldest_serial(recorder));
                     // It may have been overwritten between its reply and the one that proves it.
                     if serial(&entry) >= oldest_serial(recorder) {
@@ -100,7 +103,7 @@ impl Host {
                     assert_eq!(model, recorder.model);
                     assert!(!after_loss || given_up <= 4 * rate, "{given_up} could have been read");
                 }
-                after_loss = matches!(delivery, Delivery::Lost(_));
+                after_loss = matches!(delivery, Delivery::Lost { .. });
                 all.push(told(delivery));
             });
             self.cursor = reader.cursor();
@@ -122,7 +125,30 @@ impl Host {
                     self.expected = self.expected.map(|expected| expected + count);
                 }
                 Told::Restarted => self.expected = Some(first_of_life),
+                Told::Unrecorded(inputs) => panic!("inputs {inputs:#x} did not change without an entry"),
             }
+        }
+    }
+}
+
+/// Sequences go on from the last one, a loss takes as many as were lost, and they are the recorder's own totals, except
+/// for a multiple of 65536.
+fn check_sequence(delivery: Delivery, last: &mut Option<u64>, recorder: &Recorder) {
+    match delivery {
+        Delivery::Event { sequence, entry, .. } => {
+            assert_eq!(sequence, Some(last.unwrap_or(0) + 1), "not the sequence that comes next");
+            if let Some(actual) = recorder.sequence(serial(&entry)) {
+                assert_eq!(sequence.map(|sequence| sequence % 65_536), Some(actual % 65_536));
+            }
+            *last = sequence;
+        }
+        Delivery::Lost { lost: Lost::LogRestarted, after } => {
+            assert_eq!(after, *last);
+            *last = None;
+        }
+        Delivery::Lost { lost, after } => {
+            assert_eq!(after, Some(last.unwrap_or(0)), "the place of {lost:?}");
+            *last = Some(last.unwrap_or(0) + u64::from(lost.known_count()));
         }
     }
 }
@@ -188,6 +214,57 @@ fn what_was_overwritten_is_counted() {
 }
 
 #[test]
+fn a_sequence_goes_on_where_the_total_wraps_and_is_exact_from_the_beginning_of_a_log() {
+    for (past, exact) in [(0, true), (3, true), (9, true), (10, false), (65_540, false), (200_000, false)] {
+        let mut recorder = Recorder::after(10, past);
+        let mut host = Host::new();
+        host.read(&mut recorder, |_| {});
+        // A log that has just become full may have become so often.
+        let cursor = host.cursor.unwrap();
+        assert_eq!(cursor.is_exact, exact, "{past} events");
+        let unseen = recorder.count() - cursor.sequence;
+        assert!(if exact { unseen == 0 } else { unseen.is_multiple_of(65_536) }, "{unseen}");
+        for _ in 0..70 {
+            recorder.append_many(1000);
+            host.read(&mut recorder, |_| {});
+        }
+        let cursor = host.cursor.unwrap();
+        assert_eq!((cursor.sequence + unseen, cursor.is_exact), (recorder.count(), exact));
+        recorder.erase();
+        recorder.append_many(4);
+        host.read(&mut recorder, |_| {});
+        let cursor = host.cursor.unwrap();
+        assert_eq!((cursor.sequence, cursor.is_exact), (4, true), "a new log counts from its beginning");
+    }
+}
+
+#[test]
+fn a_change_that_no_entry_shows_is_told_where_it_happened() {
+    let mut recorder = Recorder::new(20);
+    let mut host = Host::new();
+    recorder.append_many(5);
+    host.read(&mut recorder, |_| {});
+    // Recording is stopped for two changes, then one is recorded.
+    let states = [recorder.skip(2), recorder.history.last().unwrap().state.0];
+    recorder.append_many(3);
+    let inputs = Inputs(states[0] ^ states[1]);
+    let mut told = Vec::new();
+    let mut reader = LogReader::new(host.cursor, 20);
+    while let Some(request) = reader.request() {
+        reader
+            .take(&recorder.read(request.start, request.count), &mut |delivery| told.push(delivery))
+            .unwrap();
+    }
+    assert_eq!(told[0], Delivery::Lost { after: Some(5), lost: Lost::Unrecorded { inputs } });
+    assert_eq!(told.len(), 4);
+    assert_eq!((reader.summary().unrecorded, reader.summary().lost), (1, 0));
+    // Where events were overwritten between two, they are no neighbours.
+    recorder.append_many(30);
+    host.cursor = reader.cursor();
+    assert_eq!(host.read(&mut recorder, |_| {}).0[0], Told::Overwritten(10));
+}
+
+#[test]
 fn an_erased_log_is_noticed_whatever_its_total_is() {
     for before in [1, 5, 6, 7, 8, 20] {
         for after in 0..7 {
@@ -213,7 +290,7 @@ fn an_empty_log_that_gets_events_has_lost_none() {
     let mut recorder = Recorder::new(10);
     let mut host = Host::new();
     assert_eq!(host.read(&mut recorder, |_| {}).0, []);
-    assert_eq!(host.cursor, Some(Cursor { total: 0, anchor: None }));
+    assert_eq!(host.cursor, Some(Cursor { sequence: 0, is_exact: true, anchor: None }));
     recorder.append_many(10);
     assert_eq!(host.read(&mut recorder, |_| {}).0, events(1..=10));
 }
@@ -317,12 +394,12 @@ fn a_total_that_goes_back_by_any_number_is_never_a_loss_of_65536() {
         let mut recorder = Recorder::new(4);
         recorder.append_many(8);
         // The log was empty when it was read last: there is no anchor.
-        let mut reader = LogReader::new(Some(Cursor { total: 0, anchor: None }), 4);
+        let mut reader = LogReader::new(Some(Cursor { sequence: 0, is_exact: true, anchor: None }), 4);
         let mut lost = 0;
         for reply in 1..=8 {
             let Some(request) = reader.request() else { break };
             let taken = reader.take(&recorder.read(request.start, request.count), &mut |delivery| {
-                if let Delivery::Lost(what) = delivery {
+                if let Delivery::Lost { lost: what, .. } = delivery {
                     lost += what.known_count();
                 }
             });
@@ -426,7 +503,8 @@ fn a_log_that_was_empty_and_has_had_more_events_than_the_total_can_tell_is_read(
     // Where the size divides 65536, total and next slot show nothing of it.
     for size in [7, 100, 1000] {
         for new_events in [65_536, 65_537, 65_541, 65_600, 66_500] {
-            let mut host = Host { cursor: Some(Cursor { total: 0, anchor: None }), ..Host::new() };
+            let mut host =
+                Host { cursor: Some(Cursor { sequence: 0, is_exact: true, anchor: None }), ..Host::new() };
             let mut recorder = Recorder::after(size, new_events);
             let newest = serial(recorder.history.last().unwrap());
             let (told, _) = host.read(&mut recorder, |_| {});
@@ -504,12 +582,13 @@ fn a_size_that_is_too_large_is_noticed_before_anything_is_called_lost() {
     for (size, with_cursor) in [(101, false), (2048, false), (101, true), (2048, true)] {
         let mut recorder = Recorder::new(100);
         recorder.append_many(250);
-        let cursor = with_cursor.then(|| Cursor { total: 160, anchor: anchored(&recorder) });
+        let cursor =
+            with_cursor.then(|| Cursor { sequence: 160, is_exact: true, anchor: anchored(&recorder) });
         let mut reader = LogReader::new(cursor, size);
         let mut result = Ok(());
         while let (Ok(()), Some(request)) = (result, reader.request()) {
             let reply = recorder.read(request.start, request.count);
-            result = reader.take(&reply, &mut |delivery| assert!(!matches!(delivery, Delivery::Lost(_))));
+            result = reader.take(&reply, &mut |delivery| assert!(!matches!(delivery, Delivery::Lost { .. })));
             // The ring goes on turning under the questions.
             recorder.append();
         }
@@ -521,7 +600,7 @@ fn a_size_that_is_too_large_is_noticed_before_anything_is_called_lost() {
 fn replies_that_make_no_sense_end_the_reading() {
     // Always the same reply, with a total and no entries.
     let recorder = Recorder::new(5);
-    let mut reader = LogReader::new(Some(Cursor { total: 3, anchor: None }), 100);
+    let mut reader = LogReader::new(Some(Cursor { sequence: 3, is_exact: true, anchor: None }), 100);
     let mut result = Ok(());
     for _ in 0..1000 {
         let Some(request) = reader.request() else { break };
@@ -739,10 +818,13 @@ proptest! {
     #[test]
     fn no_reply_can_break_the_reader(
         size in any::<u16>(),
-        cursor in prop::option::of((any::<u16>(), any::<bool>())),
+        cursor in prop::option::of((any::<u64>(), any::<bool>())),
         replies in prop::collection::vec((any::<u16>(), 0_u16..2048, 0_usize..=10, any::<u32>()), 1..200),
     ) {
-        let cursor = cursor.map(|(total, anchored)| Cursor { total, anchor: anchored.then(|| common::event(0)) });
+        let cursor = cursor.map(|(sequence, anchored)| {
+            let anchor = anchored.then(|| common::event(0));
+            Cursor { sequence, is_exact: anchored, anchor }
+        });
         let mut reader = LogReader::new(cursor, size);
         for (total, next_slot, count, event) in replies {
             let Some(request) = reader.request() else { break };

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use ser_client::{Delivery, GeniHost, Lost, Options, Unit, Unsolicited};
+use ser_client::{Delivery, GeniHost, Options, Unit, Unsolicited};
 use ser_proto::genius::{ForceTable, GlobalData};
 use ser_proto::{
     AutoReport, Code, Command, Configuration, Entry, Inputs, Model, ReadReply, Reply, TimeStamp,
@@ -44,7 +44,7 @@ fn read_all(unit: &mut Unit) -> Vec<Entry> {
     let mut entries = Vec::new();
     unit.read_new(&mut None, 2048, &mut |delivery| match delivery {
         Delivery::Event { entry, .. } => entries.push(entry),
-        Delivery::Lost(lost) => panic!("{lost:?}"),
+        Delivery::Lost { lost, .. } => panic!("{lost:?}"),
     })
     .expect("the log is read");
     entries
@@ -192,11 +192,7 @@ fn a_full_log_is_read_over_both_ports_while_events_keep_arriving(kind: Kind) {
         for (unit, cursor, entries) in units {
             unit.read_new(cursor, 2048, &mut |delivery| match delivery {
                 Delivery::Event { entry, .. } => entries.push(entry),
-                Delivery::Lost(
-                    Lost::LogRestarted | Lost::Overwritten { .. } | Lost::OverwrittenAtLeast { .. },
-                ) => {
-                    panic!("{delivery:?}")
-                }
+                Delivery::Lost { lost, .. } => panic!("{lost:?}"),
             })
             .expect("the log is read");
         }

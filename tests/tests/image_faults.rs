@@ -32,7 +32,7 @@ fn read_all(unit: &mut Unit) -> Vec<Entry> {
     let mut entries = Vec::new();
     unit.read_new(&mut None, 2048, &mut |delivery| match delivery {
         Delivery::Event { entry, .. } => entries.push(entry),
-        Delivery::Lost(lost) => panic!("{lost:?}"),
+        Delivery::Lost { lost, .. } => panic!("{lost:?}"),
     })
     .expect("the log is read");
     entries

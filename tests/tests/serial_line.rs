@@ -33,7 +33,7 @@ fn read_all(unit: &mut Unit) -> Vec<Entry> {
     let mut entries = Vec::new();
     unit.read_new(&mut None, 2048, &mut |delivery| match delivery {
         Delivery::Event { entry, .. } => entries.push(entry),
-        Delivery::Lost(lost) => panic!("{lost:?}"),
+        Delivery::Lost { lost, .. } => panic!("{lost:?}"),
     })
     .expect("the log is read");
     entries
@@ -244,11 +244,13 @@ fn full_log_while_events_keep_arriving(kind: Kind, model: Model) {
                 entries.push(entry);
                 delivered += 1;
             }
-            Delivery::Lost(Lost::Overwritten { count } | Lost::OverwrittenAtLeast { count }) => {
+            Delivery::Lost {
+                lost: Lost::Overwritten { count } | Lost::OverwrittenAtLeast { count }, ..
+            } => {
                 entries.clear();
                 lost += count;
             }
-            Delivery::Lost(Lost::LogRestarted) => panic!("nobody erased the log"),
+            Delivery::Lost { lost, .. } => panic!("nobody erased the log or stopped recording: {lost:?}"),
         })
         .expect("the log is read");
         if !last {
@@ -279,12 +281,12 @@ fn an_overrun_log_says_exactly_how_many_are_lost(kind: Kind) {
     let summary =
         unit.read_new(&mut cursor, size, &mut |delivery| log.push(delivery)).expect("the log is read");
     assert_eq!((summary.delivered, summary.lost, summary.restarted), (100, 150, false));
-    assert_eq!(log[0], Delivery::Lost(Lost::Overwritten { count: 150 }));
+    assert!(matches!(log[0], Delivery::Lost { lost: Lost::Overwritten { count: 150 }, .. }));
     let entries: Vec<_> = log[1..]
         .iter()
         .map(|delivery| match delivery {
             Delivery::Event { entry, .. } => *entry,
-            Delivery::Lost(lost) => panic!("{lost:?}"),
+            Delivery::Lost { lost, .. } => panic!("{lost:?}"),
         })
         .collect();
     assert_entries_are(&entries, &recorder.played()[170..]);
@@ -299,7 +301,7 @@ fn a_full_printout_keeps_the_recorder_from_nothing(kind: Kind) {
     let mut entries = Vec::new();
     let mut deliver = |delivery: Delivery| match delivery {
         Delivery::Event { entry, .. } => entries.push(entry),
-        Delivery::Lost(lost) => panic!("{lost:?}"),
+        Delivery::Lost { lost, .. } => panic!("{lost:?}"),
     };
     unit.read_new(&mut cursor, 2048, &mut deliver).expect("the log is read");
     for _ in 0..4 {

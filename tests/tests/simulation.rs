@@ -43,6 +43,7 @@ fn sum(reports: &[Report], reader: usize) -> Tally {
             delivered: sum.delivered + tally.delivered,
             overwritten: sum.overwritten + tally.overwritten,
             gone: sum.gone + tally.gone,
+            unrecorded: sum.unrecorded + tally.unrecorded,
             restarts: sum.restarts + tally.restarts,
             ..sum
         }

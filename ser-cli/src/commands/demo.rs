@@ -4,13 +4,13 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use ser_client::{Delivery, Endpoint, LogFollower, Options, Unit};
+use ser_client::{Endpoint, LogFollower, Options, Unit};
 use ser_proto::{Baud, Configuration, Model};
 use ser_sim::{Backend, LineRate, Port, Scenario, SimOptions, Simulator, Step};
 
 use super::sim;
 use crate::error::{Failure, Result};
-use crate::output::{EventWriter, Palette, PointNames, Sequence};
+use crate::output::{Annotator, EventWriter, Life, Palette, PointNames, Sequence};
 use crate::time::local_time_in;
 
 const EXAMPLES: &str = "\
@@ -132,13 +132,11 @@ fn download(
     story: &mut Story<impl Write>,
 ) -> Result<Download> {
     let mut table = Sequence::new(&mut story.out, story.palette, names);
+    let mut annotator = Annotator::new(Life::UNKNOWN);
     let (bytes, began) = (unit.counters().bytes, Instant::now());
     let summary = LogFollower::new(None, configuration.size).read_new(unit, &mut |step| -> Result<()> {
         for delivery in step.deliveries {
-            match delivery {
-                Delivery::Event { entry_number, entry, .. } => table.event(*entry_number, entry)?,
-                Delivery::Lost(lost) => table.lost(&format!("{} events lost", lost.known_count()))?,
-            }
+            annotator.write(delivery, &mut table)?;
         }
         Ok(table.flush()?)
     })?;

@@ -12,7 +12,7 @@ use crate::delivery::Outlet;
 use crate::error::{Failure, Result, advise, inform, warn};
 use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
-use crate::output::Format;
+use crate::output::{Format, Life};
 use crate::values;
 
 const EXAMPLES: &str = "\
@@ -25,11 +25,15 @@ Examples:
 
 Formats:
   table   entry, time, time since previous and first event, changes
-  csv     a row per change, as in 17,2026-11-22T10:00:00.250,3,1
-  jsonl   an object per event: entry, time, changed, state (inputs on)
+  csv     a row per change: entry,time,input,state,sequence,life,note
+  jsonl   an object per event: entry, time, changed, state (inputs on), sequence, life
 
-Events that were overwritten before they were read are reported on standard error, in the table also at their \
-place. The exit code stays 0.";
+A sequence number counts the events of a log since it was erased. The life names that log; \
+it is 0 where nothing is remembered (without --new). A file that is continued (>>) gets no second header.
+
+What is missing is in the output where it belongs, in every format, and on standard error: how many events were \
+overwritten, that the log began anew, which inputs changed while nothing was recorded. The exit code then is 0, \
+with --fail-on-loss it is 3: read --new --fail-on-loss >> log && erase --yes loses nothing unseen.";
 
 /// Read events.
 #[derive(Debug, clap::Args)]
@@ -55,6 +59,10 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 
+    /// End with exit code 3 if events are known to be missing in what was delivered.
+    #[arg(long)]
+    fail_on_loss: bool,
+
     /// How many entries the unit's log holds; then the unit is not asked (original units do not answer).
     #[arg(long, value_name = "N", value_parser = values::entries())]
     log_size: Option<u16>,
@@ -70,22 +78,27 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     };
     let stop = interrupt::catch()?;
     let mut unit = connection::open(connection)?;
-    let mut outlet = Outlet::new(args.format);
+    let life = keeper.as_ref().map_or(Ok(Life::UNKNOWN), Keeper::life)?;
+    let mut outlet = Outlet::new(args.format, life);
+    let check_complete = |outlet: &Outlet| match args.fail_on_loss {
+        true => outlet.require_complete(),
+        false => Ok(()),
+    };
     if let (Some(from), Some(count)) = (args.from, args.count) {
-        return read_range(&mut unit, &mut outlet, (from, count), args.log_size, &stop);
+        read_range(&mut unit, &mut outlet, (from, count), args.log_size, &stop)?;
+        return check_complete(&outlet);
     }
     let remembered = keeper.as_ref().and_then(Keeper::size);
     let size = connection::log_size(&mut unit, args.log_size, remembered)?;
     let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), size, &stop);
     // What did reach standard output is remembered also when the unit fell silent in the middle, or after Ctrl-C.
     let saved = keeper.as_mut().map_or(Ok(()), Keeper::save);
-    drop(outlet);
     let delivered = result?;
     saved?;
     if delivered == 0 {
         inform(if args.new { "nothing new" } else { "the log is empty" });
     }
-    Ok(())
+    check_complete(&outlet)
 }
 
 fn read_by_cursor(
@@ -100,7 +113,7 @@ fn read_by_cursor(
     let summary = follower.read_new(unit, &mut |step| -> Result<()> {
         outlet.take(step.deliveries, step.pending)?;
         if let Some(keeper) = &mut keeper {
-            keeper.delivered(step.cursor, step.size)?;
+            keeper.delivered(step.cursor, step.size, outlet.life())?;
         }
         check_interrupt(stop)
     })?;
@@ -124,6 +137,7 @@ fn read_range(
     }
     outlet.finish()?;
     if reader.is_mixed() {
+        outlet.miss();
         warn(
             "events were recorded meanwhile and may have overwritten entries of this range: old and new are mixed",
         );

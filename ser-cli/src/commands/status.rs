@@ -53,7 +53,7 @@ fn latest_event(
     };
     let mut latest = None;
     unit.read_range(number, 1, size.unwrap_or(number), &mut |delivery| {
-        if let Delivery::Event { entry_number, entry, model } = delivery {
+        if let Delivery::Event { entry_number, entry, model, .. } = delivery {
             latest = Some((entry_number, entry, model));
         }
     })?;

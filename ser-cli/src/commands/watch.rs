@@ -45,6 +45,10 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 
+    /// End with exit code 3 if events are known to be missing in what was delivered.
+    #[arg(long)]
+    fail_on_loss: bool,
+
     /// Ask the unit again and again instead of letting it report.
     #[arg(long)]
     poll: bool,
@@ -76,7 +80,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         None => Ok(()),
     };
     let follower = LogFollower::new(keeper.cursor(), plan.size);
-    let outlet = Outlet::endless(args.format);
+    let outlet = Outlet::endless(args.format, keeper.life()?);
     let outage = Outage::new(connection::options(connection).timeout);
     let mut watch = Watch { unit, follower, outlet, keeper, stop, interval: plan.interval, outage };
     let result = switched.map_err(Failure::from).and_then(|()| watch.run());
@@ -84,7 +88,10 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let restored = plan.restore.map_or(Ok(()), |found| restore(&mut watch.unit, found));
     interrupt::leaves_behind(None);
     match (result, restored) {
-        (Err(Failure::Interrupted | Failure::OutputClosed) | Ok(()), restored) => saved.and(restored),
+        (Err(Failure::Interrupted | Failure::OutputClosed) | Ok(()), restored) => {
+            saved.and(restored)?;
+            if args.fail_on_loss { watch.outlet.require_complete() } else { Ok(()) }
+        }
         // The first failure is the one to tell; most often the second has the same cause.
         (Err(failure), Err(_)) => Err(failure.hint(STILL_REPORTING)),
         (Err(failure), Ok(())) => Err(failure),
@@ -214,7 +221,7 @@ impl Watch {
         let Watch { unit, follower, outlet, keeper, stop, .. } = self;
         follower.read_new(unit, &mut |step| -> Result<()> {
             outlet.take(step.deliveries, 0)?;
-            keeper.delivered(step.cursor, step.size)?;
+            keeper.delivered(step.cursor, step.size, outlet.life())?;
             if stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
         })?;
         Ok(())

@@ -3,20 +3,24 @@
 mod csv;
 mod elapsed;
 mod jsonl;
+mod life;
 mod palette;
+mod record;
+mod rows;
 mod sequence;
 mod table;
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 
 use clap::ValueEnum;
-use ser_proto::Entry;
 
 pub(crate) use csv::Csv;
 pub(crate) use elapsed::Elapsed;
 pub(crate) use jsonl::JsonLines;
+pub use life::Life;
 pub(crate) use palette::Palette;
+pub(crate) use record::{Annotator, Event, Loss, Record};
+pub(crate) use rows::{Rows, sync_stdout};
 pub(crate) use sequence::{PointNames, Sequence};
 pub(crate) use table::Table;
 
@@ -26,57 +30,37 @@ pub(crate) enum Format {
     /// For people: with the time since the previous and since the first event.
     #[default]
     Table,
-    /// One row per input that changed: entry,time,input,state.
+    /// One row per input that changed: entry,time,input,state,sequence,life,note.
     Csv,
-    /// One JSON object per event: entry, time, changed, state.
+    /// One JSON object per event or loss.
     Jsonl,
 }
 
-/// Takes events in the order in which they happened.
+/// Takes events and losses in the order in which they happened.
 pub(crate) trait EventWriter {
-    /// Writes the event that the unit has under entry `number`.
-    fn event(&mut self, number: u16, entry: &Entry) -> io::Result<()>;
+    /// Writes an event.
+    fn event(&mut self, event: &Event) -> io::Result<()>;
 
-    /// Marks the place of lost events, in formats for people. Programs get data only.
-    fn lost(&mut self, what: &str) -> io::Result<()>;
+    /// Writes that events are missing here.
+    fn lost(&mut self, loss: &Loss) -> io::Result<()>;
 
-    /// Passes on what has been written so far.
+    /// Passes on what has been written so far: whole rows.
     fn flush(&mut self) -> io::Result<()>;
 }
 
-/// The writer of `format` on standard output.
+/// The writer of `format` on standard output. A file that is continued gets no second header.
 pub(crate) fn to_stdout(format: Format) -> Box<dyn EventWriter> {
-    let out = BufWriter::new(io::stdout());
     match format {
-        Format::Table => Box::new(Table::new(out, Palette::of_stdout())),
-        Format::Csv => Box::new(Csv::new(out)),
-        Format::Jsonl => Box::new(JsonLines::new(out)),
+        Format::Table => {
+            let (rows, has_header) = Rows::to_stdout(&table::header());
+            Box::new(Table::new(rows, Palette::of_stdout(), has_header))
+        }
+        Format::Csv => {
+            let (rows, has_header) = Rows::to_stdout(csv::HEADER);
+            Box::new(Csv::new(rows, has_header))
+        }
+        Format::Jsonl => Box::new(JsonLines::new(Rows::to_stdout("").0)),
     }
-}
-
-/// Sees to it that what was written to standard output is on the disk, if it is a file there.
-pub(crate) fn sync_stdout() {
-    if let Ok(file) = stdout_file() {
-        // Terminals and pipes cannot, and need not, do this.
-        let _ = file.sync_data();
-    }
-}
-
-#[cfg(unix)]
-fn stdout_file() -> io::Result<File> {
-    use std::os::fd::AsFd;
-    Ok(File::from(io::stdout().as_fd().try_clone_to_owned()?))
-}
-
-#[cfg(windows)]
-fn stdout_file() -> io::Result<File> {
-    use std::os::windows::io::AsHandle;
-    Ok(File::from(io::stdout().as_handle().try_clone_to_owned()?))
-}
-
-#[cfg(not(any(unix, windows)))]
-fn stdout_file() -> io::Result<File> {
-    Err(io::ErrorKind::Unsupported.into())
 }
 
 /// Writes `name` and what it is in two columns, as `status` and `config` do.
@@ -88,8 +72,11 @@ pub(crate) fn field(out: &mut dyn Write, name: &str, value: impl std::fmt::Displ
 pub(crate) mod testing {
     //! Events that every writer is tested with.
 
+    use ser_client::Lost;
     use ser_proto::{Entry, Inputs};
 
+    use super::record::Note;
+    use super::{Event, Life, Loss};
     use crate::time::parse_time;
 
     /// An event at 10:00 plus `time`, given as `00.250`.
@@ -100,5 +87,23 @@ pub(crate) mod testing {
             state: set(state),
             time: parse_time(&format!("2026-11-22T10:00:{time}")).expect("a time"),
         }
+    }
+
+    /// The same as event 5000 of a log whose life is known.
+    pub(crate) fn event(number: u16, entry: Entry) -> Event {
+        let life = Life::from_name("00000000000000ab").expect("a name");
+        Event { number, sequence: Some(5000), life, entry, notes: Vec::new() }
+    }
+
+    /// The same with a note.
+    pub(crate) fn odd(mut event: Event) -> Event {
+        event.notes = vec![Note::Odd("there is no month 13".to_string()), Note::ClockWentBack];
+        event
+    }
+
+    /// Four overwritten events.
+    pub(crate) fn four_lost() -> Loss {
+        let life = Life::from_name("00000000000000ab").expect("a name");
+        Loss { after: Some(4996), life, lost: Lost::Overwritten { count: 4 } }
     }
 }

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use ser_proto::{Entry, TimeStamp};
 
-use super::{Elapsed, EventWriter, Palette};
+use super::{Elapsed, Event, EventWriter, Loss, Palette};
 
 /// What the inputs are called.
 pub(crate) type PointNames = BTreeMap<u8, String>;
@@ -44,6 +44,9 @@ impl<W: Write> Sequence<W> {
     }
 
     fn changes(&mut self, entry: &Entry) -> io::Result<()> {
+        if entry.changed.is_empty() {
+            return writeln!(self.out);
+        }
         for (position, input) in entry.changed.numbers().enumerate() {
             let indent = if position == 0 { 0 } else { INDENT };
             let name = self.names.get(&input).map_or("", String::as_str);
@@ -56,10 +59,16 @@ impl<W: Write> Sequence<W> {
         }
         Ok(())
     }
+
+    fn remark(&mut self, what: &str) -> io::Result<()> {
+        let alarm = self.palette.alarm;
+        writeln!(self.out, "{alarm}    - {what}{alarm:#}")
+    }
 }
 
 impl<W: Write> EventWriter for Sequence<W> {
-    fn event(&mut self, number: u16, entry: &Entry) -> io::Result<()> {
+    fn event(&mut self, event: &Event) -> io::Result<()> {
+        let Event { number, entry, .. } = event;
         self.header()?;
         let time = time_of_day(entry.time);
         match self.elapsed.at(entry.time) {
@@ -72,13 +81,16 @@ impl<W: Write> EventWriter for Sequence<W> {
                 write!(self.out, "{number:>5} {time}  {previous:>WIDTH$} {first:>WIDTH$}  ")?;
             }
         }
-        self.changes(entry)
+        self.changes(entry)?;
+        match event.note() {
+            Some(note) => self.remark(&note),
+            None => Ok(()),
+        }
     }
 
-    fn lost(&mut self, what: &str) -> io::Result<()> {
+    fn lost(&mut self, loss: &Loss) -> io::Result<()> {
         self.header()?;
-        let alarm = self.palette.alarm;
-        writeln!(self.out, "{alarm}    - {what}{alarm:#}")
+        self.remark(&loss.sentence())
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -93,16 +105,16 @@ fn time_of_day(time: TimeStamp) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::testing::entry;
+    use crate::output::testing::{entry, event, four_lost, odd};
 
     #[test]
     fn every_change_has_a_line_with_its_name_and_the_first_event_is_marked() {
         let mut out = Vec::new();
         let names = PointNames::from([(3, "52-1 closed".to_string()), (17, "87T trip".to_string())]);
         let mut sequence = Sequence::new(&mut out, Palette::plain(), names);
-        sequence.event(1, &entry("00.250", &[17], &[3, 17])).unwrap();
-        sequence.event(2, &entry("00.290", &[3, 4], &[4, 17])).unwrap();
-        sequence.lost("4 events lost").unwrap();
+        sequence.event(&event(1, entry("00.250", &[17], &[3, 17]))).unwrap();
+        sequence.event(&odd(event(2, entry("00.290", &[3, 4], &[4, 17])))).unwrap();
+        sequence.lost(&four_lost()).unwrap();
         assert_eq!(
             String::from_utf8(out).unwrap().lines().collect::<Vec<_>>(),
             [
@@ -110,7 +122,8 @@ mod tests {
                 "    1 10:00:00.250            first-out  17 ON  87T trip",
                 "    2 10:00:00.290   +0.040 s  +0.040 s   3 OFF 52-1 closed",
                 "                                          4 ON",
-                "    - 4 events lost",
+                "    - there is no month 13; the clock went back",
+                "    - 4 events were overwritten before they were read",
             ]
         );
     }

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use ser_proto::Entry;
 
-use super::{Elapsed, EventWriter, Palette};
+use super::{Elapsed, Event, EventWriter, Loss, Palette};
 
 /// Wide enough for a delta of less than an hour, and for a shorter text of more.
 const WIDTH: usize = "+59m59.999 s".len();
@@ -18,8 +18,9 @@ pub(crate) struct Table<W> {
 }
 
 impl<W: Write> Table<W> {
-    pub(crate) fn new(out: W, palette: Palette) -> Table<W> {
-        Table { out, palette, header_due: true, elapsed: Elapsed::default() }
+    /// After a header that is there already, or not.
+    pub(crate) fn new(out: W, palette: Palette, has_header: bool) -> Table<W> {
+        Table { out, palette, header_due: !has_header, elapsed: Elapsed::default() }
     }
 
     fn header(&mut self) -> io::Result<()> {
@@ -27,14 +28,10 @@ impl<W: Write> Table<W> {
             return Ok(());
         }
         let title = self.palette.title;
-        let (time, previous, first) = ("time", "Δ previous", "Δ first");
-        writeln!(self.out, "{title}entry  {time:<23}  {previous:>WIDTH$}  {first:>WIDTH$}  changes{title:#}")
+        writeln!(self.out, "{title}{}{title:#}", header())
     }
 
     fn changes(&mut self, entry: &Entry) -> io::Result<()> {
-        if entry.changed.is_empty() {
-            return writeln!(self.out, "none");
-        }
         let on = self.palette.on;
         for (position, input) in entry.changed.numbers().enumerate() {
             let gap = if position == 0 { "" } else { "  " };
@@ -43,12 +40,19 @@ impl<W: Write> Table<W> {
                 false => write!(self.out, "{gap}{input} OFF")?,
             }
         }
-        writeln!(self.out)
+        Ok(())
     }
 }
 
+/// The titles of the columns.
+pub(super) fn header() -> String {
+    let (time, previous, first) = ("time", "Δ previous", "Δ first");
+    format!("entry  {time:<23}  {previous:>WIDTH$}  {first:>WIDTH$}  changes")
+}
+
 impl<W: Write> EventWriter for Table<W> {
-    fn event(&mut self, number: u16, entry: &Entry) -> io::Result<()> {
+    fn event(&mut self, event: &Event) -> io::Result<()> {
+        let Event { number, entry, .. } = event;
         self.header()?;
         let [previous, first] = self.elapsed.at(entry.time);
         write!(
@@ -56,13 +60,19 @@ impl<W: Write> EventWriter for Table<W> {
             "{number:>5}  {:<23}  {previous:>WIDTH$}  {first:>WIDTH$}  ",
             entry.time.to_string()
         )?;
-        self.changes(entry)
+        self.changes(entry)?;
+        let alarm = self.palette.alarm;
+        match event.note() {
+            Some(note) if entry.changed.is_empty() => writeln!(self.out, "{alarm}({note}){alarm:#}"),
+            Some(note) => writeln!(self.out, "  {alarm}({note}){alarm:#}"),
+            None => writeln!(self.out),
+        }
     }
 
-    fn lost(&mut self, what: &str) -> io::Result<()> {
+    fn lost(&mut self, loss: &Loss) -> io::Result<()> {
         self.header()?;
         let alarm = self.palette.alarm;
-        writeln!(self.out, "{alarm}    -  {what}{alarm:#}")
+        writeln!(self.out, "{alarm}    -  {}{alarm:#}", loss.sentence())
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -73,21 +83,21 @@ impl<W: Write> EventWriter for Table<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::testing::entry;
+    use crate::output::testing::{entry, event, four_lost, odd};
 
     fn written(write: impl FnOnce(&mut Table<&mut Vec<u8>>) -> io::Result<()>) -> String {
         let mut out = Vec::new();
-        write(&mut Table::new(&mut out, Palette::plain())).unwrap();
+        write(&mut Table::new(&mut out, Palette::plain(), false)).unwrap();
         String::from_utf8(out).unwrap()
     }
 
     #[test]
     fn a_line_tells_what_changed_and_when() {
         let text = written(|table| {
-            table.event(9, &entry("00.250", &[3, 17], &[3]))?;
-            table.event(10, &entry("00.262", &[17], &[3, 17]))?;
-            table.lost("4 events were overwritten")?;
-            table.event(2048, &entry("59.250", &[3], &[17]))
+            table.event(&event(9, entry("00.250", &[3, 17], &[3])))?;
+            table.event(&event(10, entry("00.262", &[17], &[3, 17])))?;
+            table.lost(&four_lost())?;
+            table.event(&event(2048, entry("59.250", &[3], &[17])))
         });
         assert_eq!(
             text.lines().collect::<Vec<_>>(),
@@ -95,7 +105,7 @@ mod tests {
                 "entry  time                       Δ previous       Δ first  changes",
                 "    9  2026-11-22T10:00:00.250                              3 ON  17 OFF",
                 "   10  2026-11-22T10:00:00.262      +0.012 s      +0.012 s  17 ON",
-                "    -  4 events were overwritten",
+                "    -  4 events were overwritten before they were read",
                 " 2048  2026-11-22T10:00:59.250     +58.988 s     +59.000 s  3 OFF",
             ]
         );
@@ -108,18 +118,24 @@ mod tests {
 
     #[test]
     fn an_impossible_date_has_no_delta_and_an_event_may_be_empty() {
-        let mut odd = entry("00.000", &[], &[]);
-        odd.time.month = 0;
+        let mut never = entry("00.000", &[], &[]);
+        never.time.month = 13;
         let text = written(|table| {
-            table.event(1, &entry("00.000", &[1], &[1]))?;
-            table.event(2, &odd)
+            table.event(&event(1, entry("00.000", &[1], &[1])))?;
+            table.event(&odd(event(2, never)))?;
+            table.event(&odd(event(3, entry("00.000", &[1], &[1]))))
         });
-        let last = text.lines().last().unwrap();
-        assert_eq!(last, "    2  2026-00-22T10:00:00.000             ?             ?  none");
+        assert_eq!(
+            text.lines().skip(2).collect::<Vec<_>>(),
+            [
+                "    2  2026-13-22T10:00:00.000             ?             ?  (there is no month 13; the clock went back)",
+                "    3  2026-11-22T10:00:00.000             ?      +0.000 s  1 ON  (there is no month 13; the clock went back)",
+            ]
+        );
     }
 
     #[test]
     fn colours_come_from_the_palette_only() {
-        assert!(!written(|table| table.lost("1 event")).contains('\x1B'));
+        assert!(!written(|table| table.lost(&four_lost())).contains('\x1B'));
     }
 }

@@ -1,6 +1,9 @@
 //! A running `ser-cli`, for the tests that use it as a user does.
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
+#[cfg(unix)]
+pub(crate) mod bench;
+
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};

@@ -79,6 +79,12 @@ use ahead::Ahead;
 /// The index that total 0 gets in the arithmetic here, large enough that nothing ever goes below zero.
 const BASE: u64 = 1 << 32;
 
+/// Totals are shown modulo this.
+const TOTAL_WRAPS_AT: u64 = 1 << 16;
+
+/// Sequences that leave room for the arithmetic here: no recorder will ever count so far.
+const MAX_SEQUENCE: u64 = 1 << 62;
+
 /// Events between two replies of a reading that are believed: half of what the total can tell, half a minute at the
 /// most that a recorder can do.
 const MAX_HAPPENED: u64 = 1 << 15;
@@ -129,6 +135,8 @@ pub struct Summary {
     pub delivered: u32,
     /// Events that are known to be lost.
     pub lost: u32,
+    /// Places at which inputs had changed and nothing was recorded.
+    pub unrecorded: u32,
     /// Whether the log began anew, so that an unknown number is lost besides.
     pub restarted: bool,
     /// Where the log stood in the latest reply.
@@ -171,6 +179,8 @@ enum Footing {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Pending {
     restarted: bool,
+    /// The log is read for the first time, from its beginning or from the oldest event that it holds.
+    begun: bool,
     /// Overwritten before the log was first seen.
     at_least: u64,
     overwritten: u64,
@@ -237,7 +247,10 @@ pub struct LogReader {
     fruitless: u32,
     delivered: u32,
     lost: u32,
+    unrecorded: u32,
     restarted: bool,
+    /// Whether the events of this log are counted from its beginning.
+    is_exact: bool,
 }
 
 impl LogReader {
@@ -264,7 +277,9 @@ impl LogReader {
             fruitless: 0,
             delivered: 0,
             lost: 0,
+            unrecorded: 0,
             restarted: false,
+            is_exact: cursor.is_some_and(|cursor| cursor.is_exact),
         }
     }
 
@@ -344,6 +359,7 @@ impl LogReader {
         Summary {
             delivered: self.delivered,
             lost: self.lost,
+            unrecorded: self.unrecorded,
             restarted: self.restarted,
             position: self.head.map_or(LogPosition { total: 0, next_slot: 0 }, |head| LogPosition {
                 total: low_16(head.total),
@@ -375,9 +391,10 @@ impl LogReader {
             if !self.near.is_none_or(goes_on) {
                 return Err(Disturbed::Changed);
             }
-            let cursor_total = self.cursor.map_or(position.total, |cursor| cursor.total);
-            self.next = BASE + u64::from(cursor_total);
-            let total = self.next + u64::from(position.total.wrapping_sub(cursor_total));
+            let read_up_to = self.cursor.map_or(position.total.into(), |cursor| cursor.sequence);
+            // A sequence from outside may be anything.
+            self.next = BASE + read_up_to.min(MAX_SEQUENCE);
+            let total = self.next + u64::from(position.total.wrapping_sub(low_16(self.next)));
             self.head = Some(Head { total, slot, happened: 0 });
             self.target = total;
             return Ok(());
@@ -406,9 +423,9 @@ impl LogReader {
             // The log was empty when it was read last, so the total tells how many entries there are, if it has not
             // counted once around; and total and next slot part, if the ring has gone round, or was resized.
             let behind = self.behind();
-            if cursor.total == 0 && behind == 0 && !batch.entries.is_empty() {
+            if cursor.total() == 0 && behind == 0 && !batch.entries.is_empty() {
                 self.restart();
-            } else if cursor.total == 0 && behind < self.size && !head.holds_all() {
+            } else if cursor.total() == 0 && behind < self.size && !head.holds_all() {
                 self.footing = Footing::Uncounted;
             }
             return Ok(());
@@ -477,13 +494,20 @@ impl LogReader {
         if held == 0 && low_16(head.total) != 0 {
             return Err(Disturbed::WrongSize);
         }
-        self.next = head.total - held;
-        self.target = head.total;
-        self.pending.at_least = low_16(self.next).into();
+        // Of a log that is seen for the first time only the total is known. Where it is less than what the log holds,
+        // it has wrapped.
+        let shown = u64::from(low_16(head.total));
+        let total = BASE + if shown < held { shown + TOTAL_WRAPS_AT } else { shown };
+        self.head = Some(Head { total, ..head });
+        self.next = total - held;
+        self.target = total;
+        self.is_exact = held < self.size && shown == held;
+        self.pending.begun = true;
+        self.pending.at_least = self.next - BASE;
         self.footing = Footing::Firm;
         if held == 0 {
             self.deliver_losses(on);
-            self.cursor = Some(Cursor { total: low_16(head.total), anchor: None });
+            self.cursor = Some(Cursor { sequence: total - BASE, is_exact: self.is_exact, anchor: None });
         }
         Ok(())
     }
@@ -531,6 +555,7 @@ impl LogReader {
         // What was counted for the log that is gone is worth nothing.
         self.pending = Pending { restarted: self.cursor.is_some(), ..Pending::default() };
         self.footing = Footing::Uncounted;
+        self.is_exact = false;
         self.margin = 0;
         self.ahead.clear();
         self.unproven = 0;
@@ -657,29 +682,44 @@ impl LogReader {
         let Some(head) = self.head else { return };
         self.unproven = 0;
         while let Some((entry, model)) = self.ahead.pop() {
+            self.find_unrecorded(&entry, on);
             self.deliver_losses(on);
             let entry_number = low_16(self.slot_of(head, self.next) + 1);
-            on(Delivery::Event { entry_number, entry, model });
             self.next += 1;
+            let sequence = self.next - BASE;
+            on(Delivery::Event { entry_number, sequence: Some(sequence), entry, model });
             self.delivered = self.delivered.saturating_add(1);
-            self.cursor = Some(Cursor { total: low_16(self.next), anchor: Some(entry) });
+            self.cursor = Some(Cursor { sequence, is_exact: self.is_exact, anchor: Some(entry) });
             self.footing = Footing::Anchored(entry);
             self.checked = true;
         }
     }
 
+    /// Tells of what changed between the last event and the one that is delivered next, if that is its neighbour.
+    fn find_unrecorded(&mut self, next: &Entry, on: &mut dyn FnMut(Delivery)) {
+        let Some(Cursor { sequence, anchor: Some(anchor), .. }) = self.cursor else { return };
+        if self.pending == Pending::default()
+            && let Some(lost) = Lost::between(&anchor, next)
+        {
+            self.unrecorded = self.unrecorded.saturating_add(1);
+            on(Delivery::Lost { after: Some(sequence), lost });
+        }
+    }
+
     fn deliver_losses(&mut self, on: &mut dyn FnMut(Delivery)) {
-        let Pending { restarted, at_least, overwritten } = std::mem::take(&mut self.pending);
+        let Pending { restarted, begun, at_least, overwritten } = std::mem::take(&mut self.pending);
+        let last_read = self.cursor.map_or(0, |cursor| cursor.sequence);
         if restarted {
             self.restarted = true;
-            on(Delivery::Lost(Lost::LogRestarted));
+            on(Delivery::Lost { after: Some(last_read), lost: Lost::LogRestarted });
         }
+        let after = Some(if begun { 0 } else { last_read });
         let count = u32::try_from(at_least + overwritten).unwrap_or(u32::MAX);
         self.lost = self.lost.saturating_add(count);
         if at_least > 0 {
-            on(Delivery::Lost(Lost::OverwrittenAtLeast { count }));
+            on(Delivery::Lost { after, lost: Lost::OverwrittenAtLeast { count } });
         } else if overwritten > 0 {
-            on(Delivery::Lost(Lost::Overwritten { count }));
+            on(Delivery::Lost { after, lost: Lost::Overwritten { count } });
         }
     }
 }

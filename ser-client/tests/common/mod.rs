@@ -65,6 +65,12 @@ impl Recorder {
         self.history.push(entry);
     }
 
+    /// Lets changes happen that are not recorded; gives the state after them.
+    pub(crate) fn skip(&mut self, changes: u32) -> u32 {
+        self.serial += changes;
+        event(self.serial).state.0
+    }
+
     pub(crate) fn append_many(&mut self, count: usize) {
         for _ in 0..count {
             self.append();
@@ -97,6 +103,12 @@ impl Recorder {
         (self.offset == 0).then_some(1)
     }
 
+    /// The sequence of an event of the present life, if the list goes back to it.
+    pub(crate) fn sequence(&self, serial_number: u32) -> Option<u64> {
+        let index = self.history.binary_search_by_key(&serial_number, serial).ok()?;
+        Some(self.offset + u64::try_from(index).unwrap() + 1)
+    }
+
     /// Events since the erase, not modulo anything.
     pub(crate) fn count(&self) -> u64 {
         self.offset + u64::try_from(self.history.len()).unwrap()
@@ -121,16 +133,26 @@ impl Recorder {
     }
 }
 
-/// Event number `serial`, different from every other one.
+/// Event number `serial`, different from every other one: the state is its Gray code, so that from each event to the
+/// next one input changes.
 pub(crate) fn event(serial: u32) -> Entry {
     let time = TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 0 };
-    Entry { changed: Inputs(serial), state: Inputs(!serial), time }
+    let changed = gray(serial) ^ gray(serial.wrapping_sub(1));
+    Entry { changed: Inputs(changed), state: Inputs(gray(serial)), time }
 }
 
 /// The serial number of an event made by [`event`].
 pub(crate) fn serial(entry: &Entry) -> u32 {
-    assert_eq!(entry.state.0, !entry.changed.0);
-    entry.changed.0
+    let mut serial = entry.state.0;
+    for shift in [1, 2, 4, 8, 16] {
+        serial ^= serial >> shift;
+    }
+    assert_eq!(*entry, event(serial));
+    serial
+}
+
+const fn gray(serial: u32) -> u32 {
+    serial ^ serial >> 1
 }
 
 /// A delivery in a form that compares and prints well.
@@ -140,13 +162,17 @@ pub(crate) enum Told {
     Overwritten(u32),
     AtLeast(u32),
     Restarted,
+    Unrecorded(u32),
 }
 
 pub(crate) fn told(delivery: Delivery) -> Told {
     match delivery {
         Delivery::Event { entry, .. } => Told::Event(serial(&entry)),
-        Delivery::Lost(Lost::Overwritten { count }) => Told::Overwritten(count),
-        Delivery::Lost(Lost::OverwrittenAtLeast { count }) => Told::AtLeast(count),
-        Delivery::Lost(Lost::LogRestarted) => Told::Restarted,
+        Delivery::Lost { lost, .. } => match lost {
+            Lost::Overwritten { count } => Told::Overwritten(count),
+            Lost::OverwrittenAtLeast { count } => Told::AtLeast(count),
+            Lost::LogRestarted => Told::Restarted,
+            Lost::Unrecorded { inputs } => Told::Unrecorded(inputs.0),
+        },
     }
 }

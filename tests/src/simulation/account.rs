@@ -35,6 +35,8 @@ pub struct Tally {
     pub unreported: Unreported,
     /// Recorded while this reader's port was not connected.
     pub unwatched: u64,
+    /// Places at which inputs had changed unrecorded, and that was reported.
+    pub unrecorded: u64,
     /// Restarts of the log that were reported.
     pub restarts: u64,
     /// Restarts of the log that left no trace which a reader could have found.
@@ -67,6 +69,8 @@ pub struct Account {
     /// If that was told of an empty log: events from this one on came later, and are not what was told of.
     told_up_to: usize,
     lost_told: usize,
+    /// Inputs that were told to have changed unrecorded.
+    unrecorded_told: u32,
     /// The total in the first reply of its reading, and how far it has gone on since.
     read_from: Option<u16>,
     came_meanwhile: u16,
@@ -94,6 +98,7 @@ impl Account {
             restart_told: false,
             told_up_to: 0,
             lost_told: 0,
+            unrecorded_told: 0,
             read_from: None,
             came_meanwhile: 0,
             known: Known::Nothing,
@@ -170,8 +175,12 @@ impl Account {
         self.life = ledger.life();
         match *delivery {
             Delivery::Event { entry, .. } => self.take_event(&entry, ledger),
-            Delivery::Lost(Lost::LogRestarted) => self.take_restart(ledger),
-            Delivery::Lost(lost) => {
+            Delivery::Lost { lost: Lost::LogRestarted, .. } => self.take_restart(ledger),
+            Delivery::Lost { lost: Lost::Unrecorded { inputs }, .. } => {
+                self.unrecorded_told = inputs.0;
+                Ok(())
+            }
+            Delivery::Lost { lost, .. } => {
                 self.lost_told += lost.known_count() as usize;
                 Ok(())
             }
@@ -204,6 +213,7 @@ impl Account {
 
     fn take_event(&mut self, entry: &Entry, ledger: &Ledger) -> Result<(), String> {
         let lost = std::mem::take(&mut self.lost_told);
+        let unrecorded = std::mem::take(&mut self.unrecorded_told);
         if let Some(skipped) = self.in_hand_before(entry, lost) {
             self.deliver_in_hand(skipped);
             return Ok(());
@@ -213,6 +223,9 @@ impl Account {
             // The log goes on, or has just begun.
             let straight = self.next + lost;
             if let Some(wraps) = self.wraps_until(straight, ledger, is) {
+                if lost == 0 && wraps == 0 {
+                    self.check_unrecorded(straight, unrecorded, ledger)?;
+                }
                 return self.go_on(straight + wraps * TOTAL_WRAPS_AT, wraps, lost, ledger);
             }
         }
@@ -230,6 +243,22 @@ impl Account {
             Some((index, erase)) => self.restarted_at(index, erase, lost, ledger),
             None => Err(self.explain(entry, lost, ledger)),
         }
+    }
+
+    /// Checks what was told of changes between the latest delivery and the event right after it. Where an erase can
+    /// have been between them, the reader need not know that event before.
+    fn check_unrecorded(&mut self, index: usize, inputs: u32, ledger: &Ledger) -> Result<(), String> {
+        let erased = self.erases_ahead(ledger).any(|erase| erase.from <= index);
+        let actual = ledger.event(index).map_or(0, |event| event.unrecorded);
+        self.tally.unrecorded += u64::from(inputs != 0);
+        if inputs == actual || self.new_life || self.known != Known::Event || erased {
+            return Ok(());
+        }
+        Wrong::new(format!("{}: changes that were not recorded are told wrongly", self.name))
+            .fact("before", ledger.numbered(index))
+            .fact("told", format_args!("{inputs:08x}"))
+            .fact("not recorded", format_args!("{actual:08x}"))
+            .err()
     }
 
     /// How many of the events in hand come before this one, if it is one of them and these are reported as lost.

@@ -168,7 +168,7 @@ impl Conversation {
             Job::SetClock(_) => "setting the clock",
         };
         let Conversation { account, failures, size, cursor, talk, .. } = self;
-        let (name, cursor) = (account.name(), cursor.map(|cursor| cursor.total));
+        let (name, cursor) = (account.name(), cursor.map(|cursor| cursor.total()));
         format!("{name} ({job}; {failures} failures, size {size}, total at cursor {cursor:?}, {talk:?})")
     }
 

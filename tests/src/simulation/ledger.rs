@@ -38,6 +38,8 @@ pub struct Recorded {
     pub state: u32,
     /// When it happened.
     pub at_ms: u64,
+    /// Inputs that changed since the event before, and of which no event tells; those that changed back are not in it.
+    pub unrecorded: u32,
 }
 
 impl Recorded {
@@ -123,6 +125,8 @@ pub struct Ledger {
     /// Contacts, and inputs as the latest event has them.
     contacts: u32,
     state: u32,
+    /// Inputs that changed since the latest event, with recording stopped or beyond the capture queue.
+    unrecorded: u32,
     /// From which millisecond on the clock shows that much more than the simulation's time.
     clock: Vec<(u64, i64)>,
     recording: Vec<(u64, bool)>,
@@ -158,6 +162,7 @@ impl Ledger {
             waiting: BTreeMap::new(),
             contacts: 0,
             state: 0,
+            unrecorded: 0,
             clock: Vec::new(),
             recording: Vec::new(),
             events: VecDeque::new(),
@@ -184,6 +189,7 @@ impl Ledger {
         self.debounce = DebounceModel::new(debounce, self.contacts);
         self.waiting.clear();
         self.state = self.contacts & self.mask;
+        self.unrecorded = 0;
         self.clock = vec![(0, time_ms - signed(now_ms))];
         self.recording = vec![(0, true)];
         self.events.clear();
@@ -231,6 +237,7 @@ impl Ledger {
             self.contacts ^= changed;
             let changed = changed & self.mask;
             self.state ^= changed;
+            self.unrecorded ^= changed;
             self.debounce.follow(changed);
             self.edges.applied += u64::from(changed.count_ones());
             self.edges.queue_full += u64::from(changed.count_ones());
@@ -263,11 +270,13 @@ impl Ledger {
         let edges = u64::from(changed.count_ones());
         if !in_force(&self.recording, at_ms) {
             self.edges.stopped += edges;
+            self.unrecorded ^= changed;
             return;
         }
         self.edges.recorded += edges;
         let stamp_ms = (in_force(&self.clock, at_ms) + signed(at_ms)).rem_euclid(CENTURY_MS);
-        self.events.push_back(Recorded { stamp_ms, changed, state: self.state, at_ms });
+        let unrecorded = std::mem::take(&mut self.unrecorded);
+        self.events.push_back(Recorded { stamp_ms, changed, state: self.state, at_ms, unrecorded });
         self.note_overwritten();
     }
 

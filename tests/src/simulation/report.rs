@@ -87,6 +87,7 @@ impl Report {
             row("+ gone, full again at the next look", |tally| tally.unreported.full_again),
             row("+ gone, not read since", |tally| tally.unreported.not_read_since),
             row("+ not connected", |tally| tally.unwatched),
+            row("changes not recorded, reported", |tally| tally.unrecorded),
             row("log restarts reported", |tally| tally.restarts),
             row("log restarts without a trace", |tally| tally.traceless),
             row("total wrapped unseen", |tally| tally.wrapped),

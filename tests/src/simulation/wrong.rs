@@ -68,7 +68,9 @@ impl Display for Told<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Entry { changed, state, time } = *self.0;
         match stamp_ms(time) {
-            Some(stamp_ms) => Recorded { stamp_ms, changed: changed.0, state: state.0, at_ms: 0 }.fmt(f),
+            Some(stamp_ms) => {
+                Recorded { stamp_ms, changed: changed.0, state: state.0, at_ms: 0, unrecorded: 0 }.fmt(f)
+            }
             None => write!(f, "{time}, which is no date  changed {:08x}  on {:08x}", changed.0, state.0),
         }
     }
@@ -127,7 +129,8 @@ mod tests {
     use super::*;
     use ser_proto::{Inputs, TimeStamp};
 
-    const EVENT: Recorded = Recorded { stamp_ms: 1_795_341_600_250, changed: 0x20_0001, state: 1, at_ms: 7 };
+    const EVENT: Recorded =
+        Recorded { stamp_ms: 1_795_341_600_250, changed: 0x20_0001, state: 1, at_ms: 7, unrecorded: 0 };
 
     #[test]
     fn facts_are_told_one_a_line_and_in_a_column() {

@@ -55,7 +55,7 @@ fn states(deliveries: &[Delivery]) -> Seen {
         .iter()
         .map(|delivery| match delivery {
             Delivery::Event { entry, .. } => entry.changed,
-            Delivery::Lost(lost) => panic!("{lost:?}"),
+            Delivery::Lost { lost, .. } => panic!("{lost:?}"),
         })
         .collect()
 }

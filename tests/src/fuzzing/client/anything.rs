@@ -161,7 +161,7 @@ struct Readers {
 impl Readers {
     fn new(script: &mut Script<'_>) -> Readers {
         let size = script.word() % 2100;
-        let cursor = Cursor { total: script.word(), anchor: None };
+        let cursor = Cursor { sequence: script.word().into(), is_exact: false, anchor: None };
         let choice = script.byte();
         let cursor = (choice % 2 == 1).then_some(cursor);
         let position = LogPosition { total: script.word(), next_slot: script.word() % 2048 };

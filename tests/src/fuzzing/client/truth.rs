@@ -265,14 +265,20 @@ impl Received {
         match delivery {
             _ if self.muddled => {}
             Delivery::Event { entry, .. } => self.take_event(number_of(&entry), unit),
-            Delivery::Lost(Lost::LogRestarted) => {
+            Delivery::Lost { lost: Lost::LogRestarted, .. } => {
                 let erased = unit.log_began(unit.happened()) >= self.next;
                 assert!(self.restart_told || self.turned || erased, "nobody has erased the log");
                 self.restart_told = true;
                 self.anchored = false;
                 self.lost = 0;
             }
-            Delivery::Lost(lost) => self.lost += lost.known_count(),
+            Delivery::Lost { lost: Lost::Unrecorded { .. }, .. } => {
+                assert!(
+                    self.turned || self.erased_meanwhile || self.resized_meanwhile > 0,
+                    "everything was recorded"
+                );
+            }
+            Delivery::Lost { lost, .. } => self.lost += lost.known_count(),
         }
     }
 

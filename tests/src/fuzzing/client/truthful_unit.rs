@@ -111,10 +111,10 @@ impl TruthfulUnit {
     }
 }
 
-/// The event with that running number.
+/// The event with that running number. What changed goes together with the state before.
 fn entry(number: u32) -> Entry {
     let time = TimeStamp { year: 26, month: 1, day: 1, hour: 0, minute: 0, second: 0, millisecond: 0 };
-    Entry { changed: Inputs(1), state: Inputs(number), time }
+    Entry { changed: Inputs(number ^ number.wrapping_sub(1)), state: Inputs(number), time }
 }
 
 /// The running number of an event.

@@ -7,7 +7,7 @@ use super::*;
 use crate::simulation::ledger::Port;
 
 const SIZE: u16 = 100;
-const RESTARTED: Delivery = Delivery::Lost(Lost::LogRestarted);
+const RESTARTED: Delivery = Delivery::Lost { after: None, lost: Lost::LogRestarted };
 
 /// A recorder's books with a reader's account; the events are numbered over all lives.
 #[derive(Clone)]
@@ -83,11 +83,11 @@ impl Case {
 }
 
 fn delivery(entry: Entry) -> Delivery {
-    Delivery::Event { entry_number: 1, entry, model: Model::Ser160 }
+    Delivery::Event { entry_number: 1, sequence: None, entry, model: Model::Ser160 }
 }
 
 fn overwritten(count: u32) -> Delivery {
-    Delivery::Lost(Lost::Overwritten { count })
+    Delivery::Lost { after: None, lost: Lost::Overwritten { count } }
 }
 
 /// It is refused, in these words.
@@ -102,6 +102,32 @@ fn events_in_order_are_delivered() {
     case.record(2);
     case.read(&[]).and_then(|()| case.deliver(3, 2)).expect("they are all there");
     assert_eq!(case.finish(), Ok(Tally { delivered: 5, ..Tally::default() }));
+}
+
+#[test]
+fn changes_that_were_not_recorded_are_told_before_the_event_after_them() {
+    let stopped_for_one = || {
+        let mut case = Case::read_up_to(3);
+        case.ledger.set_recording(case.now_ms, false);
+        case.now_ms += 1;
+        case.ledger.contacts_moved(case.now_ms, 0b10);
+        case.ledger.settle(case.now_ms);
+        case.ledger.set_recording(case.now_ms, true);
+        case.record(2);
+        case
+    };
+    let told = |inputs| Delivery::Lost { after: None, lost: Lost::Unrecorded { inputs: Inputs(inputs) } };
+    let mut case = stopped_for_one();
+    case.read(&[told(0b10)]).and_then(|()| case.deliver(3, 2)).expect("that is how it was");
+    assert_eq!(case.finish(), Ok(Tally { delivered: 5, unrecorded: 1, ..Tally::default() }));
+    let wrongly = "not recorded are told wrongly";
+    let mut case = stopped_for_one();
+    assert_refused(case.read(&[]).and_then(|()| case.deliver(3, 2)), wrongly);
+    let mut case = stopped_for_one();
+    assert_refused(case.read(&[told(0b11)]).and_then(|()| case.deliver(3, 2)), wrongly);
+    let mut case = Case::read_up_to(3);
+    case.record(1);
+    assert_refused(case.read(&[told(0b10)]).and_then(|()| case.deliver(3, 1)), wrongly);
 }
 
 #[test]
@@ -222,7 +248,8 @@ fn what_follows_a_restart_can_be_overwritten() {
     for how in [Case::erase, Case::power_cycle] {
         let mut case = began_anew(how);
         case.record(SIZE.into());
-        let told = case.read(&[RESTARTED, Delivery::Lost(Lost::OverwrittenAtLeast { count: 5 })]);
+        let told = case
+            .read(&[RESTARTED, Delivery::Lost { after: None, lost: Lost::OverwrittenAtLeast { count: 5 } }]);
         told.and_then(|()| case.deliver(11, SIZE.into())).expect("it was told");
         let expected = Tally { delivered: 103, overwritten: 5, gone: 3, restarts: 1, ..Tally::default() };
         assert_eq!(case.finish(), Ok(expected));

@@ -1,0 +1,291 @@
+//! What the writers of all formats are given: events and losses, each with its place in the log.
+
+use std::fmt;
+use std::io;
+
+use ser_client::{Delivery, Lost};
+use ser_proto::{Entry, Model};
+
+use super::{EventWriter, Life};
+use crate::time::ClockStep;
+
+/// An event, and what is to be said about it.
+#[derive(Clone, Debug)]
+pub(crate) struct Event {
+    /// The number under which the recorder has it.
+    pub(crate) number: u16,
+    /// The recorder's total after it, from 1; `None` where that is not known.
+    pub(crate) sequence: Option<u64>,
+    pub(crate) life: Life,
+    /// What was read.
+    pub(crate) entry: Entry,
+    /// What a reader of the entry has to know; mostly nothing.
+    pub(crate) notes: Vec<Note>,
+}
+
+/// What is remarkable about an event.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Note {
+    /// The entry cannot be what the recorder meant; this is why.
+    Odd(String),
+    /// Its clock shows an earlier time than at the event before, which came first all the same.
+    ClockWentBack,
+    /// The two digits of the year have begun anew since the event before: 1970 follows 2069.
+    YearsBeganAnew,
+}
+
+/// Events that are missing.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Loss {
+    /// The sequence of the last event before; 0 at the beginning of a log.
+    pub(crate) after: Option<u64>,
+    pub(crate) life: Life,
+    pub(crate) lost: Lost,
+}
+
+impl Loss {
+    /// How many: a number and how sure it is.
+    pub(crate) fn count(&self) -> (Option<u32>, &'static str) {
+        match self.lost {
+            Lost::Overwritten { count } => (Some(count), "exactly"),
+            Lost::OverwrittenAtLeast { count } => (Some(count), "at least"),
+            Lost::LogRestarted | Lost::Unrecorded { .. } => (None, "unknown"),
+        }
+    }
+
+    /// Why they are missing.
+    pub(crate) fn why(&self) -> &'static str {
+        match self.lost {
+            Lost::Overwritten { .. } | Lost::OverwrittenAtLeast { .. } => "overwritten",
+            Lost::LogRestarted => "log began anew",
+            Lost::Unrecorded { .. } => "not recorded",
+        }
+    }
+
+    /// For a person.
+    pub(crate) fn sentence(&self) -> String {
+        let events = |count: u32| match count {
+            1 => "1 event was".to_string(),
+            _ => format!("{count} events were"),
+        };
+        match self.lost {
+            Lost::Overwritten { count } => format!("{} overwritten before they were read", events(count)),
+            Lost::OverwrittenAtLeast { count } => {
+                format!("{} overwritten already (or a multiple of 65536 more)", events(count))
+            }
+            Lost::LogRestarted => "the log began anew (it was erased, or the power failed); \
+                 unread events of the old log are lost, how many is not known"
+                .to_string(),
+            Lost::Unrecorded { inputs } => {
+                let many = if inputs.numbers().count() == 1 { "input" } else { "inputs" };
+                format!("{many} {inputs} changed while nothing was recorded; how often is not known")
+            }
+        }
+    }
+}
+
+/// As `lost 37 (exactly) after 120: overwritten`, for a column of notes.
+impl fmt::Display for Loss {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.count() {
+            (Some(count), sure) => write!(f, "lost {count} ({sure})")?,
+            (None, sure) => write!(f, "lost ({sure})")?,
+        }
+        if let Some(after) = self.after {
+            write!(f, " after {after}")?;
+        }
+        write!(f, ": {}", self.why())?;
+        match self.lost {
+            Lost::Unrecorded { inputs } => write!(f, ", inputs {inputs}"),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Note::Odd(why) => why,
+            Note::ClockWentBack => "the clock went back",
+            Note::YearsBeganAnew => "the two-digit year began anew after 2069",
+        })
+    }
+}
+
+impl Event {
+    /// All notes in one text, if there are any.
+    pub(crate) fn note(&self) -> Option<String> {
+        let notes: Vec<String> = self.notes.iter().map(Note::to_string).collect();
+        (!notes.is_empty()).then(|| notes.join("; "))
+    }
+
+    /// Whether the entry cannot be what the recorder meant.
+    pub(crate) fn is_odd(&self) -> bool {
+        self.notes.iter().any(|note| matches!(note, Note::Odd(_)))
+    }
+}
+
+/// Turns deliveries into records, one after the other.
+pub(crate) struct Annotator {
+    life: Life,
+    previous: Option<Entry>,
+}
+
+impl Annotator {
+    /// Of a log of this life.
+    pub(crate) fn new(life: Life) -> Annotator {
+        Annotator { life, previous: None }
+    }
+
+    /// The life of the log that is being read.
+    pub(crate) fn life(&self) -> Life {
+        self.life
+    }
+
+    /// Hands a delivery to a writer as the record that it is, and gives that back.
+    pub(crate) fn write(&mut self, delivery: &Delivery, writer: &mut dyn EventWriter) -> io::Result<Record> {
+        let record = self.record(delivery)?;
+        match &record {
+            Record::Event(event) => writer.event(event)?,
+            Record::Loss(loss) => writer.lost(loss)?,
+        }
+        Ok(record)
+    }
+
+    fn record(&mut self, delivery: &Delivery) -> io::Result<Record> {
+        let life = self.life;
+        Ok(match *delivery {
+            Delivery::Event { entry_number, sequence, entry, model } => {
+                let notes = notes(&entry, model, self.previous.as_ref());
+                self.previous = Some(entry);
+                Record::Event(Event { number: entry_number, sequence, life, entry, notes })
+            }
+            Delivery::Lost { after, lost } => {
+                if lost == Lost::LogRestarted {
+                    self.previous = None;
+                    if life != Life::UNKNOWN {
+                        self.life = Life::begin()?;
+                    }
+                }
+                Record::Loss(Loss { after, life, lost })
+            }
+        })
+    }
+}
+
+/// One of the things that a reading brings.
+pub(crate) enum Record {
+    Event(Event),
+    Loss(Loss),
+}
+
+fn notes(entry: &Entry, model: Model, previous: Option<&Entry>) -> Vec<Note> {
+    let mut notes = Vec::new();
+    if let Err(invalid) = entry.time.check() {
+        notes.push(Note::Odd(invalid.to_string()));
+    }
+    if entry.changed.is_empty() {
+        notes.push(Note::Odd(match entry.state.is_empty() {
+            true => "no input changed, none is on".to_string(),
+            false => format!("no input changed, on: {}", entry.state),
+        }));
+    }
+    if (entry.changed.0 | entry.state.0) & !model.mask() != 0 {
+        let inputs = ser_proto::Inputs((entry.changed.0 | entry.state.0) & !model.mask());
+        notes.push(Note::Odd(format!("a recorder of {} inputs has no input {inputs}", model.inputs())));
+    }
+    notes.extend(previous.and_then(|previous| match ClockStep::between(previous.time, entry.time)? {
+        ClockStep::Back => Some(Note::ClockWentBack),
+        ClockStep::YearsBeganAnew => Some(Note::YearsBeganAnew),
+        ClockStep::Forward => None,
+    }));
+    notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::testing::entry;
+    use ser_proto::{Inputs, TimeStamp};
+
+    fn loss(lost: Lost) -> Loss {
+        Loss { after: Some(120), life: Life::UNKNOWN, lost }
+    }
+
+    #[test]
+    fn a_loss_is_exact_where_it_can_be() {
+        for (lost, note, sentence) in [
+            (
+                Lost::Overwritten { count: 37 },
+                "lost 37 (exactly) after 120: overwritten",
+                "37 events were overwritten before they were read",
+            ),
+            (
+                Lost::OverwrittenAtLeast { count: 1 },
+                "lost 1 (at least) after 120: overwritten",
+                "1 event was overwritten already (or a multiple of 65536 more)",
+            ),
+            (
+                Lost::LogRestarted,
+                "lost (unknown) after 120: log began anew",
+                "the log began anew (it was erased, or the power failed); unread events of the old log are \
+                 lost, how many is not known",
+            ),
+            (
+                Lost::Unrecorded { inputs: Inputs(0b101) },
+                "lost (unknown) after 120: not recorded, inputs 1 3",
+                "inputs 1 3 changed while nothing was recorded; how often is not known",
+            ),
+        ] {
+            assert_eq!(loss(lost).to_string(), note);
+            assert_eq!(loss(lost).sentence(), sentence);
+        }
+        let nowhere = Loss { after: None, ..loss(Lost::Overwritten { count: 2 }) };
+        assert_eq!(nowhere.to_string(), "lost 2 (exactly): overwritten");
+    }
+
+    #[test]
+    fn what_cannot_be_is_named_field_by_field() {
+        let good = entry("00.250", &[3], &[3]);
+        let texts = |entry: &Entry| -> Vec<String> {
+            notes(entry, Model::Ser160, None).iter().map(Note::to_string).collect()
+        };
+        assert_eq!(texts(&good), [""; 0]);
+        let time = TimeStamp { month: 13, ..good.time };
+        assert_eq!(texts(&Entry { time, ..good }), ["there is no month 13 in such a date"]);
+        let time = TimeStamp { millisecond: 1000, ..good.time };
+        assert_eq!(texts(&Entry { time, ..good }), ["there is no millisecond 1000 in such a date"]);
+        assert_eq!(texts(&Entry { changed: Inputs(0), ..good }), ["no input changed, on: 3"]);
+        assert_eq!(
+            texts(&Entry { state: Inputs(1 << 16), ..good }),
+            ["a recorder of 16 inputs has no input 17"]
+        );
+    }
+
+    #[test]
+    fn a_step_of_the_clock_is_noted_at_the_event_after_it() {
+        let later = entry("00.251", &[3], &[3]);
+        let earlier = entry("00.250", &[3], &[]);
+        let at = |entry: Entry, previous: Entry| notes(&entry, Model::Ser160, Some(&previous));
+        assert_eq!(at(later, earlier), []);
+        assert_eq!(at(earlier, later), [Note::ClockWentBack]);
+        let year = |year| Entry { time: TimeStamp { year, ..later.time }, ..later };
+        assert_eq!(at(year(70), year(69)), [Note::YearsBeganAnew]);
+        assert_eq!(at(year(69), year(70)), [Note::ClockWentBack]);
+        let never = Entry { time: TimeStamp { month: 0, ..later.time }, ..later };
+        assert_eq!(at(later, never), []);
+    }
+
+    #[test]
+    fn a_log_that_begins_anew_gets_a_name_of_its_own_if_it_has_one() {
+        let restart = Delivery::Lost { after: Some(7), lost: Lost::LogRestarted };
+        let life = Life::begin().unwrap();
+        let mut recorder = Annotator::new(life);
+        let Record::Loss(loss) = recorder.record(&restart).unwrap() else { panic!() };
+        assert_eq!(loss.life, life, "the loss belongs to the log of before");
+        assert!(![life, Life::UNKNOWN].contains(&recorder.life()));
+        let mut recorder = Annotator::new(Life::UNKNOWN);
+        recorder.record(&restart).unwrap();
+        assert_eq!(recorder.life(), Life::UNKNOWN);
+    }
+}

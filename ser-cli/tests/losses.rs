@@ -1,0 +1,139 @@
+//! What is missing is in the file, and in the exit code where that is wanted.
+#![cfg(unix)]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use common::bench::{Bench, text};
+use ser_tests::recorder::Kind;
+
+/// Six columns and a note.
+fn columns(row: &str) -> Vec<&str> {
+    row.splitn(7, ',').collect()
+}
+
+/// A recorder of 8 entries whose first three events have been read, and that has had twenty more since.
+fn overrun() -> Bench {
+    let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
+    bench.ok("config --size 8");
+    bench.contacts("0,1,1\n1,2,1\n2,3,1", 3);
+    assert_eq!(bench.ok("read --new --format csv --fail-on-loss").lines().count(), 1 + 3);
+    let steps: Vec<_> = (0..20).map(|index| format!("{index},5,{}", (index + 1) % 2)).collect();
+    bench.contacts(&steps.join("\n"), 5);
+    common::wait_until("all have moved", || bench.ok("status").contains("23 since"));
+    bench
+}
+
+/// Runs a command with its standard output appended to a file, as `>>` does.
+fn append(bench: &Bench, arguments: &str, file: &Path) -> Output {
+    let file = fs::File::options().append(true).create(true).open(file).expect("a file");
+    bench.command(arguments).stdout(file).output().expect("ser-cli runs")
+}
+
+#[test]
+fn a_loss_is_in_the_table_too_and_in_the_exit_code_if_that_is_wanted() {
+    let bench = overrun();
+    let output = bench.run("read --new --fail-on-loss");
+    let (table, told) = (text(&output.stdout), text(&output.stderr));
+    assert_eq!(output.status.code(), Some(3), "{told}");
+    assert_eq!(table.lines().count(), 1 + 1 + 8, "everything that is there was delivered: {table}");
+    let loss = "12 events were overwritten before they were read";
+    assert!(table.lines().nth(1).is_some_and(|line| line.ends_with(loss)), "{table}");
+    assert!(told.contains(loss) && told.contains("error: events are missing at 1 place"), "{told}");
+    // It has been told. What comes now is complete.
+    assert_eq!(bench.run("read --new --fail-on-loss").status.code(), Some(0));
+}
+
+#[test]
+fn the_rows_of_a_log_and_its_losses_go_on_from_run_to_run() {
+    let mut bench = overrun();
+    let file = bench.folder.path().join("events.csv");
+    assert_eq!(append(&bench, "read --new --format csv", &file).status.code(), Some(0));
+    bench.ok("erase --yes");
+    bench.contacts("0,1,0", 1);
+    assert_eq!(append(&bench, "read --new --format csv --fail-on-loss", &file).status.code(), Some(3));
+
+    let csv = fs::read_to_string(&file).expect("text");
+    let rows: Vec<_> = csv.lines().map(columns).collect();
+    assert_eq!(rows[0].join(","), "entry,time,input,state,sequence,life,note");
+    assert_eq!(csv.matches("entry,time").count(), 1, "one header: {csv}");
+    let (old, new) = (rows[1][5], rows[11][5]);
+    assert_eq!(rows[1], ["", "", "", "", "3", old, "lost 12 (exactly) after 3: overwritten"]);
+    let sequences: Vec<_> = rows[2..10].iter().map(|row| (row[4], row[5])).collect();
+    let expected: Vec<_> = (16..=23).map(|sequence| sequence.to_string()).collect();
+    assert_eq!(sequences, expected.iter().map(|sequence| (&sequence[..], old)).collect::<Vec<_>>());
+    assert_eq!(rows[10], ["", "", "", "", "23", old, "lost (unknown) after 23: log began anew"]);
+    assert_eq!((rows[11][0], rows[11][4]), ("1", "1"), "the new log counts from its beginning");
+    assert!(old.len() == 16 && new.len() == 16 && old != new, "each log has its name: {csv}");
+}
+
+#[test]
+fn inputs_that_change_while_recording_is_stopped_are_named() {
+    let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
+    bench.contacts("0,1,1", 1);
+    bench.ok("stop");
+    bench.contacts("0,7,1\n1,9,1", 0);
+    bench.ok("start");
+    bench.contacts("0,1,0", 1);
+    let output = bench.run("read --format jsonl --fail-on-loss");
+    let lines = text(&output.stdout);
+    let loss = "{\"lost\":null,\"count\":\"unknown\",\"after\":1,\"why\":\"not recorded\",\"inputs\":[7,9],\"life\":\"0\"}";
+    assert_eq!(lines.lines().nth(1), Some(loss), "{lines}");
+    assert_eq!((lines.lines().count(), output.status.code()), (3, Some(3)));
+    assert!(text(&output.stderr).contains("before entry 2: inputs 7 9 changed while nothing was recorded"));
+    // By number, too.
+    let range = bench.run("read --from 1 --count 2 --format csv --fail-on-loss");
+    assert!(text(&range.stdout).contains(",,,,,0,\"lost (unknown): not recorded, inputs 7 9\""));
+    assert_eq!(range.status.code(), Some(3));
+}
+
+/// `ser-cli` with a limit to the size of files, in blocks of 512 bytes: as good as a full disk.
+fn limited(bench: &Bench, arguments: &str, file: &Path, blocks: u32) -> Output {
+    let ser_cli = bench.command(arguments);
+    let mut shell = Command::new("sh");
+    shell.arg("-c").arg(format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\" >> \"$0\"")).arg(file);
+    shell.arg(ser_cli.get_program()).args(ser_cli.get_args());
+    for (name, value) in ser_cli.get_envs() {
+        match value {
+            Some(value) => shell.env(name, value),
+            None => shell.env_remove(name),
+        };
+    }
+    shell.output().expect("sh runs")
+}
+
+#[test]
+fn a_file_that_is_full_ends_with_a_whole_row_and_the_next_run_goes_on_there() {
+    let mut bench = Bench::start(Kind::Native, &[]);
+    let steps: Vec<_> = (0..60).map(|index| format!("{index},5,{}", (index + 1) % 2)).collect();
+    bench.contacts(&steps.join("\n"), 60);
+    let file = bench.folder.path().join("events.csv");
+    // Sixty rows of 54 bytes: three blocks of 512, or of 1024, are not enough.
+    let output = limited(&bench, "read --new --format csv", &file, 3);
+    assert_eq!(output.status.code(), Some(1));
+    let told = text(&output.stderr);
+    assert!(told.contains("cannot write standard output") && told.contains("hint: "), "{told}");
+    let csv = fs::read_to_string(&file).expect("text");
+    assert!(csv.len() > 500 && csv.ends_with('\n'), "{csv}");
+
+    assert_eq!(append(&bench, "read --new --format csv", &file).status.code(), Some(0));
+    let csv = fs::read_to_string(&file).expect("text");
+    let sequences: Vec<_> = csv.lines().skip(1).map(|row| columns(row)[4].to_owned()).collect();
+    assert_eq!(sequences, (1..=60).map(|sequence| sequence.to_string()).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_file_that_ends_in_a_row_gets_a_line_end_first() {
+    let mut bench = Bench::start(Kind::Native, &[]);
+    bench.contacts("0,5,1", 1);
+    let file = bench.folder.path().join("events.csv");
+    fs::write(&file, "entry,time,input,state,sequence,life,note\n1,2026-11-2").expect("written");
+    assert_eq!(append(&bench, "read --format csv", &file).status.code(), Some(0));
+    let csv = fs::read_to_string(&file).expect("text");
+    let rows: Vec<_> = csv.lines().collect();
+    assert_eq!((rows.len(), rows[1]), (3, "1,2026-11-2"), "{csv}");
+    assert!(rows[2].starts_with("1,") && rows[2].ends_with(",5,1,1,0,"), "{csv}");
+}
