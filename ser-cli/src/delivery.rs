@@ -73,16 +73,19 @@ impl Outlet {
         })
     }
 
-    /// Passes on what is due also when nothing was delivered, such as the header of a file, and tells what was only
-    /// counted.
+    /// Passes on what is due also when nothing was delivered, such as the header of a file.
+    pub(crate) fn flush(&mut self) -> Result<()> {
+        Ok(self.writer.flush()?)
+    }
+
+    /// The same at the end, and tells what was only counted.
     pub(crate) fn finish(&mut self) -> Result<()> {
         self.progress.finish();
         if let Some(more) = self.odd.checked_sub(ODD_TOLD).filter(|&more| more > 0) {
             let entries = if more == 1 { "entry" } else { "entries" };
             warn(format_args!("{more} more {entries} cannot be as read; all are delivered, with a note"));
         }
-        self.odd = self.odd.min(ODD_TOLD);
-        Ok(self.writer.flush()?)
+        self.flush()
     }
 
     /// Counts a place at which something may be missing that no delivery tells of.

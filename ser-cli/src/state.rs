@@ -52,7 +52,7 @@ impl Delivered {
             serde_json::from_slice(text).map_err(|error| NotDelivered(error.to_string()))?;
         let (sequence, life) = match content.version {
             VERSION_WITHOUT_LIFE => (content.total.map(u64::from), None),
-            VERSION => (content.sequence, Some(content.life()?)),
+            VERSION => (content.sequence, content.life()?),
             version => return Err(NotDelivered(format!("version {version} is not {VERSION}"))),
         };
         let sequence = sequence.ok_or_else(|| NotDelivered("it has no total".to_owned()))?;
@@ -76,7 +76,7 @@ impl Delivered {
             total: None,
             sequence: Some(sequence),
             exact: Some(is_exact),
-            life: Some(life.unwrap_or(Life::UNKNOWN).to_string()),
+            life: life.as_ref().map(Life::to_string),
             size,
             last: anchor.as_ref().map(LastEntry::from),
         };
@@ -111,16 +111,17 @@ struct Content {
     /// Whether the sequence counts from the beginning of the log.
     #[serde(default)]
     exact: Option<bool>,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     life: Option<String>,
     size: u16,
     last: Option<LastEntry>,
 }
 
 impl Content {
-    fn life(&self) -> std::result::Result<Life, NotDelivered> {
-        let name = self.life.as_deref().unwrap_or_default();
-        Life::from_name(name).ok_or_else(|| NotDelivered("it names no life of the log".to_owned()))
+    fn life(&self) -> std::result::Result<Option<Life>, NotDelivered> {
+        let Some(name) = &self.life else { return Ok(None) };
+        let life = Life::from_name(name);
+        life.map(Some).ok_or_else(|| NotDelivered("it names no life of the log".to_owned()))
     }
 }
 

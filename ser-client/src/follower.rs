@@ -29,13 +29,14 @@ pub struct LogFollower {
     size: u16,
     cursor: Option<Cursor>,
     position: Option<LogPosition>,
+    keeps_up: bool,
 }
 
 impl LogFollower {
     /// Begins behind `cursor`, or with the oldest event. `size` is how many entries the log holds.
     #[must_use]
     pub fn new(cursor: Option<Cursor>, size: u16) -> LogFollower {
-        LogFollower { size, cursor, position: None }
+        LogFollower { size, cursor, position: None, keeps_up: false }
     }
 
     /// How many entries the log holds, as far as is known.
@@ -55,6 +56,12 @@ impl LogFollower {
     pub fn starting_near(mut self, position: Option<LogPosition>) -> LogFollower {
         self.position = position;
         self
+    }
+
+    /// Whether a reading that events come too fast for goes on until it has caught up, instead of ending when it has come
+    /// past what had happened when it began.
+    pub fn set_keeps_up(&mut self, keeps_up: bool) {
+        self.keeps_up = keeps_up;
     }
 
     /// Where the log stood at the end of the last reading.
@@ -99,7 +106,7 @@ impl LogFollower {
         unit: &mut Unit,
         take: &mut dyn FnMut(&Step<'_>) -> Result<(), E>,
     ) -> Result<(Summary, Result<(), Disturbed>), E> {
-        let mut reader = LogReader::new(self.cursor, self.size);
+        let mut reader = LogReader::new(self.cursor, self.size).keeping_up(self.keeps_up);
         if let Some(position) = self.position.take() {
             reader = reader.starting_near(position);
         }

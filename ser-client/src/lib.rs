@@ -12,6 +12,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
 )]
 
+mod clock;
 mod counters;
 mod cursor;
 mod diagnosis;
@@ -33,7 +34,9 @@ mod text_line;
 mod transport;
 mod unit;
 mod unsolicited;
+mod watcher;
 
+pub use clock::{Clock, RealTime};
 pub use counters::Counters;
 pub use cursor::{Cursor, Delivery, Lost};
 pub use diagnosis::Diagnosis;
@@ -41,7 +44,7 @@ pub use endpoint::{Endpoint, EndpointError, GeniWindow};
 pub use follower::{LogFollower, Step};
 pub use genius::{BlockKind, BoardStatus, DeviceRecord, GeniusError};
 #[cfg(unix)]
-pub use genius::{BusDevice, Clock, GeniHost, RealTime};
+pub use genius::{BusDevice, GeniHost};
 pub use line_rate::LineRate;
 pub use log_position::LogPosition;
 pub use open::{OpenError, open};
@@ -56,3 +59,4 @@ pub use text_line::{LineAssembler, MAX_LINE_LEN, TextLine};
 pub use transport::{Transport, TransportError};
 pub use unit::{Options, Unit};
 pub use unsolicited::Unsolicited;
+pub use watcher::{LogWatcher, ReportSwitch};

@@ -1,8 +1,9 @@
 //! What lies between a session and its unit: a line, or a Genius bus.
 
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::time::Duration;
 
-use crate::{Attempt, Diagnosis, Session, Transport, TransportError};
+use crate::{Attempt, Clock, Diagnosis, Session, Transport, TransportError};
 
 /// How much is taken from a line in one go, at most: a peer that never stops must not keep us from asking.
 const MAX_WAITING_BYTES: usize = 64 * 1024;
@@ -40,12 +41,12 @@ pub(crate) trait Link: Send {
 /// A serial line, or TCP: frames between bytes of text.
 pub(crate) struct SerialLink {
     transport: Box<dyn Transport>,
-    epoch: Instant,
+    clock: Arc<dyn Clock>,
 }
 
 impl SerialLink {
-    pub(crate) fn new(transport: Box<dyn Transport>) -> SerialLink {
-        SerialLink { transport, epoch: Instant::now() }
+    pub(crate) fn new(transport: Box<dyn Transport>, clock: Arc<dyn Clock>) -> SerialLink {
+        SerialLink { transport, clock }
     }
 }
 
@@ -73,7 +74,7 @@ impl Link for SerialLink {
     }
 
     fn now(&self) -> Duration {
-        self.epoch.elapsed()
+        self.clock.now()
     }
 
     fn delay(&self, attempt: &Attempt<'_>) -> Duration {

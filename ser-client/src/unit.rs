@@ -1,5 +1,6 @@
 //! A unit behind a line: blocking calls, one per thing that a recorder can do.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use ser_proto::{
@@ -10,8 +11,8 @@ use ser_proto::{
 use crate::link::{Link, SerialLink};
 use crate::session::NoReply;
 use crate::{
-    Counters, Cursor, Delivery, Endpoint, LineRate, LogFollower, LogPosition, OpenError, RangeReader,
-    ReadRequest, RequestError, Session, Summary, Timing, Transport, Unsolicited, open,
+    Clock, Counters, Cursor, Delivery, Endpoint, LineRate, LogFollower, LogPosition, OpenError, RangeReader,
+    ReadRequest, RealTime, RequestError, Session, Summary, Timing, Transport, Unsolicited, open,
 };
 
 /// A unit changes its rate when the reply is out; what arrives in that moment it would not understand.
@@ -49,10 +50,16 @@ impl Unit {
     /// A unit behind `transport`. Nothing is sent yet.
     #[must_use]
     pub fn new(transport: Box<dyn Transport>, options: Options) -> Unit {
+        Unit::with_clock(transport, options, Arc::new(RealTime::new()))
+    }
+
+    /// A unit behind a transport whose time is not that of this computer.
+    #[must_use]
+    pub fn with_clock(transport: Box<dyn Transport>, options: Options, clock: Arc<dyn Clock>) -> Unit {
         let Options { timeout, retries } = options;
         let line_rate = LineRate::from(transport.bits_per_second());
         let session = Session::new(Timing { timeout, retries, line_rate });
-        Unit { link: Box::new(SerialLink::new(transport)), session, last_position: None }
+        Unit { link: Box::new(SerialLink::new(transport, clock)), session, last_position: None }
     }
 
     #[cfg(unix)]
@@ -449,7 +456,9 @@ impl Unit {
         Ok(self.link.receive(&mut self.session, timeout)?)
     }
 
-    fn now(&self) -> Duration {
+    /// The time by which this unit is waited for; it begins at any moment.
+    #[must_use]
+    pub fn now(&self) -> Duration {
         self.link.now()
     }
 }

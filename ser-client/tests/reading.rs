@@ -20,6 +20,8 @@ struct Host {
     window: usize,
     /// Which replies are lost, the first of them first, over and over; their requests are asked again.
     lost: Vec<bool>,
+    /// Whether readings go on until they have caught up.
+    keeps_up: bool,
 }
 
 /// What happens to the recorder behind the host's back.
@@ -33,7 +35,7 @@ enum Change {
 
 impl Host {
     fn new() -> Host {
-        Host { cursor: None, expected: None, rate: 0, window: 1, lost: Vec::new() }
+        Host { cursor: None, expected: None, rate: 0, window: 1, lost: Vec::new(), keeps_up: false }
     }
 
     /// One reading, as `Unit::read_new` does it; `meanwhile` is called after each reply.
@@ -44,7 +46,8 @@ impl Host {
     ) -> (Vec<Told>, Summary) {
         let mut all = Vec::new();
         for _ in 0..6 {
-            let mut reader = LogReader::new(self.cursor, u16::try_from(recorder.size).unwrap());
+            let size = u16::try_from(recorder.size).unwrap();
+            let mut reader = LogReader::new(self.cursor, size).keeping_up(self.keeps_up);
             match self.read_with(&mut reader, recorder, &mut meanwhile, &mut all) {
                 Ok(()) => return (all, reader.summary()),
                 Err(Disturbed::NoProgress) => panic!("no progress: {reader:?}"),
@@ -716,17 +719,23 @@ proptest! {
         rate in prop_oneof![Just(0_usize), Just(1), Just(3), Just(12), 0_usize..100],
         rounds in prop::collection::vec((0_usize..50, prop::collection::vec(0_usize..=100, 1..8)), 1..8),
         (window, lost) in any_window(),
+        keeps_up in any::<bool>(),
     ) {
         let mut recorder = Recorder::after(size, past);
-        let mut host = Host { window, lost, ..Host::new() };
+        let mut host = Host { window, lost, keeps_up, ..Host::new() };
         host.expected = recorder.first_serial_known();
         host.rate = u32::try_from(rate).unwrap();
         for (before, meanwhile) in rounds {
             recorder.append_many(before);
             let due = recorder.history.last().map(serial);
             let mut percents = meanwhile.iter().cycle();
+            let mut replies = 0;
             let (told, _) = host.read(&mut recorder, |recorder| {
-                recorder.append_many(rate * percents.next().unwrap() / 100);
+                replies += 1;
+                // A reading that keeps up would go on for ever.
+                if replies < 300 {
+                    recorder.append_many(rate * percents.next().unwrap() / 100);
+                }
             });
             host.judge(&told, 1);
             if let Some(due) = due {

@@ -11,3 +11,4 @@ pub mod simulation;
 #[cfg(target_os = "linux")]
 pub mod timing;
 pub mod vectors;
+pub mod watching;

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ser_client::{LogFollower, Unit, Unsolicited};
+use ser_client::{LogFollower, LogWatcher, ReportSwitch, Unit};
 use ser_proto::{AutoReport, Configuration, Configure};
 
 use crate::cli::ConnectionArgs;
@@ -29,6 +29,8 @@ First comes what has not been delivered yet (as read --new), then every event as
 report by itself (auto report on RS-232); on the way out, also after Ctrl-C or an error, it gets back the setting \
 it had. Units that report to the Genius bus keep doing so and are asked every second instead, and so are original \
 units. Every now and then the log itself is looked at, so that a report lost on the line is an event late, not lost.
+While events come so fast that reports and readings are more than the line carries, the unit is told not to report \
+and is read without a pause. What is overwritten all the same is counted, where it belongs.
 On a Genius bus a board or a unit that fails is waited for, a minute or as long as --timeout says.";
 
 /// How often the unit is asked when it does not report by itself.
@@ -70,22 +72,25 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let stop = interrupt::catch()?;
     let mut unit = connection::open(connection)?;
     let plan = plan(args, &mut unit, keeper.size())?;
-    // From the first try on: the unit may have carried out what it did not answer.
-    let switched = match plan.restore {
-        Some(found) => {
-            inform("the unit reports by itself until Ctrl-C");
-            interrupt::leaves_behind(Some(STILL_REPORTING));
-            unit.configure(reporting_here(&unit, found)).map(drop)
-        }
-        None => Ok(()),
-    };
     let follower = LogFollower::new(keeper.cursor(), plan.size);
+    let watcher = match plan.reports {
+        Some(Reports { switch, found }) => {
+            if !switch.is_on {
+                inform("the unit reports by itself until Ctrl-C");
+            }
+            // From the first try on: the unit may have carried out what it did not answer.
+            interrupt::leaves_behind(Some(not_put_back(&found)));
+            LogWatcher::reporting(follower, plan.interval, switch)
+        }
+        None => LogWatcher::polling(follower, plan.interval, args.interval.is_none()),
+    };
     let outlet = Outlet::endless(args.format, keeper.life()?);
     let outage = Outage::new(connection::options(connection).timeout);
-    let mut watch = Watch { unit, follower, outlet, keeper, stop, interval: plan.interval, outage };
-    let result = switched.map_err(Failure::from).and_then(|()| watch.run());
-    let saved = watch.keeper.save();
-    let restored = plan.restore.map_or(Ok(()), |found| restore(&mut watch.unit, found));
+    let mut watch = Watch { unit, watcher, outlet, keeper, stop, outage };
+    let result = watch.run();
+    let saved = watch.outlet.finish().and_then(|()| watch.keeper.save());
+    let found = plan.reports.map(|reports| reports.found).filter(|_| watch.watcher.has_switched());
+    let restored = found.map_or(Ok(()), |found| restore(&mut watch.unit, found));
     interrupt::leaves_behind(None);
     match (result, restored) {
         (Err(Failure::Interrupted | Failure::OutputClosed) | Ok(()), restored) => {
@@ -93,24 +98,44 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             if args.fail_on_loss { watch.outlet.require_complete() } else { Ok(()) }
         }
         // The first failure is the one to tell; most often the second has the same cause.
-        (Err(failure), Err(_)) => Err(failure.hint(STILL_REPORTING)),
+        (Err(failure), Err(_)) => Err(found.iter().map(not_put_back).fold(failure, Failure::hint)),
         (Err(failure), Ok(())) => Err(failure),
     }
 }
 
-const STILL_REPORTING: &str =
-    "the unit may still report by itself; ser-cli config --auto-report off puts that back";
+/// What to tell when the setting that was found could not be put back.
+const fn not_put_back(found: &Configuration) -> &'static str {
+    match found.auto_report {
+        AutoReport::Off => {
+            "the unit may still report by itself; ser-cli config --auto-report off puts that back"
+        }
+        AutoReport::Rs232 => {
+            "the unit may have stopped reporting; ser-cli config --auto-report rs232 puts that back"
+        }
+        AutoReport::Genius => {
+            "the unit may have stopped reporting; ser-cli config --auto-report genius puts that back"
+        }
+    }
+}
 
 /// How the unit is going to be watched.
 struct Plan {
     size: u16,
-    /// The settings to put back, if any are changed.
-    restore: Option<Configuration>,
+    /// Auto reports, if they come to this computer or may be made to.
+    reports: Option<Reports>,
     interval: Duration,
 }
 
+/// Auto reports to this computer.
+#[derive(Clone, Copy)]
+struct Reports {
+    switch: ReportSwitch,
+    /// The settings to put back.
+    found: Configuration,
+}
+
 fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
-    let polling = |size| Plan { size, restore: None, interval: args.interval.unwrap_or(POLL_EVERY) };
+    let polling = |size| Plan { size, reports: None, interval: args.interval.unwrap_or(POLL_EVERY) };
     if let (true, Some(size)) = (args.poll, args.log_size) {
         return Ok(polling(size));
     }
@@ -120,19 +145,27 @@ fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
         return Ok(polling(size));
     };
     let size = args.log_size.unwrap_or(found.size);
-    let reporting = |restore| Plan { size, restore, interval: args.interval.unwrap_or(CHECK_EVERY) };
+    let switch = |is_on| {
+        let off = Configure { auto_report: AutoReport::Off, ..keep_size_and_rate(found) };
+        ReportSwitch { on: reporting_here(unit, found), off, is_on }
+    };
+    let reporting = |is_on| Plan {
+        size,
+        reports: Some(Reports { switch: switch(is_on), found }),
+        interval: args.interval.unwrap_or(CHECK_EVERY),
+    };
     match found.auto_report {
         _ if args.poll => Ok(polling(size)),
         auto_report if unit.bus_address().is_some() => match auto_report {
-            AutoReport::Genius if unit.bus_address() == Some(found.report_address) => Ok(reporting(None)),
-            AutoReport::Off => Ok(reporting(Some(found))),
+            AutoReport::Genius if unit.bus_address() == Some(found.report_address) => Ok(reporting(true)),
+            AutoReport::Off => Ok(reporting(false)),
             AutoReport::Genius | AutoReport::Rs232 => {
                 inform("the unit reports elsewhere and goes on doing so: it is asked for events");
                 Ok(polling(size))
             }
         },
-        AutoReport::Rs232 => Ok(reporting(None)),
-        AutoReport::Off => Ok(reporting(Some(found))),
+        AutoReport::Rs232 => Ok(reporting(true)),
+        AutoReport::Off => Ok(reporting(false)),
         AutoReport::Genius => {
             inform("the unit reports to the Genius bus and goes on doing so: it is asked for events");
             Ok(polling(size))
@@ -157,74 +190,45 @@ fn keep_size_and_rate(settings: Configuration) -> Configure {
 fn restore(unit: &mut Unit, found: Configuration) -> Result<()> {
     unit.configure(keep_size_and_rate(found))
         .map(drop)
-        .map_err(|error| Failure::from(error).hint(STILL_REPORTING))
+        .map_err(|error| Failure::from(error).hint(not_put_back(&found)))
 }
 
 struct Watch {
     unit: Unit,
-    follower: LogFollower,
+    watcher: LogWatcher,
     outlet: Outlet,
     keeper: Keeper,
     stop: Arc<AtomicBool>,
-    interval: Duration,
     outage: Outage,
 }
 
 impl Watch {
     /// Goes on until an interrupt, or a failure that does not pass.
     fn run(&mut self) -> Result<()> {
-        self.read_new()?;
-        self.outlet.finish()?;
         loop {
-            if let Err(failure) = self.look() {
-                self.outage.bear(failure, Instant::now())?;
-                self.come_back()?;
+            match self.step() {
+                Ok(()) => self.outage.end(),
+                Err(failure) => {
+                    self.outage.bear(failure, Instant::now())?;
+                    // All is well when that goes well.
+                    self.watcher.read_next();
+                    thread::sleep(HEARTBEAT);
+                }
             }
+            self.check_interrupt()?;
             self.keeper.save_if_due()?;
         }
     }
 
-    fn look(&mut self) -> Result<()> {
-        self.wait()?;
-        self.read_new()
-    }
-
-    /// Tries until the log can be read again, with all that has happened meanwhile.
-    fn come_back(&mut self) -> Result<()> {
-        while let Err(failure) = self.read_new() {
-            self.outage.bear(failure, Instant::now())?;
-            self.check_interrupt()?;
-            thread::sleep(HEARTBEAT);
-        }
-        self.outage.end();
-        Ok(())
-    }
-
-    /// Waits for a report, or for the time to look at the log. Which it was makes no difference: only a reading shows
-    /// whether it is still the same log, and one takes the place of all reports that are waiting.
-    fn wait(&mut self) -> Result<()> {
-        let until = Instant::now() + self.interval;
-        loop {
-            self.check_interrupt()?;
-            let left = until.saturating_duration_since(Instant::now());
-            match self.unit.wait_event(left.min(HEARTBEAT))? {
-                Some(Unsolicited::Report(_)) => return Ok(()),
-                // What the unit prints says nothing that the log does not.
-                Some(Unsolicited::Line(_)) => {}
-                None if left.is_zero() => return Ok(()),
-                None => self.keeper.save_if_due()?,
-            }
-        }
-    }
-
-    fn read_new(&mut self) -> Result<()> {
-        let Watch { unit, follower, outlet, keeper, stop, .. } = self;
-        follower.read_new(unit, &mut |step| -> Result<()> {
+    fn step(&mut self) -> Result<()> {
+        let Watch { unit, watcher, outlet, keeper, stop, .. } = self;
+        watcher.step(unit, HEARTBEAT, &mut |step| -> Result<()> {
             outlet.take(step.deliveries, 0)?;
             keeper.delivered(step.cursor, step.size, outlet.life())?;
             if stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
         })?;
-        Ok(())
+        // Also when there is nothing to deliver, a file gets its header.
+        outlet.flush()
     }
 
     fn check_interrupt(&self) -> Result<()> {

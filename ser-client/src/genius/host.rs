@@ -15,9 +15,10 @@ use ser_proto::genius::{
     Subfunction,
 };
 
+use super::GeniusError;
 use super::inboxes::Inboxes;
 use super::window::Window;
-use super::{Clock, GeniusError, RealTime};
+use crate::{Clock, RealTime};
 use crate::{GeniWindow, OpenError, Unit};
 
 /// Nothing tells when a file has changed, so it is looked at this often.

@@ -1,7 +1,5 @@
 //! A host on a Genius bus, through the window that it shares with its GENI board.
 
-#[cfg(unix)]
-mod clock;
 mod error;
 #[cfg(unix)]
 mod host;
@@ -12,8 +10,6 @@ mod link;
 #[cfg(unix)]
 mod window;
 
-#[cfg(unix)]
-pub use clock::{Clock, RealTime};
 pub use error::GeniusError;
 pub use geni::{BlockKind, Device as DeviceRecord, Status as BoardStatus};
 #[cfg(unix)]

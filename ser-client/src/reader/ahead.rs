@@ -35,6 +35,16 @@ impl Ahead {
         Some(known)
     }
 
+    /// How many events come before the first that is known.
+    pub(super) fn first_known(&self) -> Option<u64> {
+        self.entries.iter().position(Option::is_some).map(|offset| offset as u64)
+    }
+
+    /// Whether no event is known.
+    pub(super) fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
     /// Passes over so many events.
     pub(super) fn skip(&mut self, count: u64) {
         let count = usize::try_from(count).unwrap_or(usize::MAX).min(self.entries.len());

@@ -23,7 +23,7 @@ struct Course {
 }
 
 impl LogReader {
-    pub(super) fn plan(&self) -> Option<Asked> {
+    pub(super) fn plan(&mut self) -> Option<Asked> {
         let alone = |purpose, request| self.asked.is_empty().then_some(Asked { request, purpose });
         let Some(head) = self.head else {
             // Where the last entry that was delivered probably is.
@@ -33,6 +33,9 @@ impl LogReader {
         };
         if self.growth == Growth::Asking {
             return alone(Purpose::Probe, self.entries(head.slot, MAX_ENTRIES as u64));
+        }
+        if self.is_in_haste() && self.footing != Footing::Uncounted {
+            return self.plan_in_haste(head);
         }
         let behind = head.total - self.next;
         let at_target = self.next >= self.target && self.pending == Pending::default();
@@ -101,11 +104,14 @@ impl LogReader {
     fn depth(&self, head: Head, next: u64) -> u64 {
         let oldest = head.total - self.size;
         let least = if self.with_anchor(head, next) == 0 { 2 } else { 1 };
-        ((next - 1).saturating_sub(oldest) / MAX_ENTRIES as u64).clamp(least, DEPTH)
+        // What is read ahead is lost with the anchor: the faster events come, the less is risked.
+        let most = MAX_ENTRIES as u64;
+        let per_reply = if self.pace > most { 2 * self.pace } else { most };
+        ((next - 1).saturating_sub(oldest) / per_reply).clamp(least, DEPTH)
     }
 
     /// The first event from `index` on that is neither known nor asked for by the first `requests`.
-    fn unasked_from(&self, index: u64, requests: usize) -> u64 {
+    pub(super) fn unasked_from(&self, index: u64, requests: usize) -> u64 {
         (index..).find(|&index| !self.is_known_or_asked(index, requests)).unwrap_or(index)
     }
 
@@ -116,12 +122,12 @@ impl LogReader {
     }
 
     /// Asks for `count` events from `index` on, as far as one request goes.
-    fn events(&self, head: Head, index: u64, count: u64) -> ReadRequest {
+    pub(super) fn events(&self, head: Head, index: u64, count: u64) -> ReadRequest {
         self.entries(self.slot_of(head, index), count.min(self.most))
     }
 
     /// Asks for the last entry of the ring, and for one more that must not exist.
-    fn probe(&self) -> ReadRequest {
+    pub(super) fn probe(&self) -> ReadRequest {
         let count = if self.size < MAX_SIZE.into() { 2 } else { 1 };
         ReadRequest { start: low_16(self.size), count }
     }

@@ -37,7 +37,20 @@
 //! been asked for once more, and nobody can have resized the ring in between.
 //!
 //! A reading ends when everything that had happened when it began is delivered, so it ends also when events come
-//! faster than they can be read. Events that come meanwhile are delivered when they fit the same replies.
+//! faster than they can be read. Events that come meanwhile are delivered when they fit the same replies. A program
+//! that follows a log without end [keeps up](LogReader::keeping_up) instead.
+//!
+//! # When events come faster than they can be read
+//!
+//! Then the anchor is overwritten again and again, and to look for it would be all that the line does. So the reader
+//! takes whatever the ring holds: it asks for ten entries some way ahead of the oldest, and while these are on the
+//! line, for the entry with the highest number. From total and next slot in each reply follows which events the
+//! entries are; from the highest number that the ring still has its size. About one byte in seven goes into the
+//! proof, the rest into events. They are delivered in stretches, and what is missing between them is counted.
+//!
+//! Between two neighbouring entries the inputs that changed must lead from one state to the other. Where they do not,
+//! something changed without an entry, because recording was stopped or the recorder could not take all changes:
+//! [`Lost::Unrecorded`].
 //!
 //! # What cannot be known
 //!
@@ -66,6 +79,7 @@
 
 mod ahead;
 mod course;
+mod haste;
 
 use std::collections::VecDeque;
 use std::error::Error;
@@ -196,6 +210,8 @@ enum Purpose {
     Plain,
     /// Events from this index on. Those from `next` on are kept until an answer brings the anchor, too.
     Events(u64),
+    /// Events that come faster than they can be read: whatever is in these slots by then.
+    Haste,
     /// Nothing any more: the log has begun anew.
     Nothing,
 }
@@ -244,6 +260,12 @@ pub struct LogReader {
     most: u64,
     /// How far ahead of the oldest entry reading goes on after a loss; above 0 once the recorder was faster.
     margin: u64,
+    /// Events that came between two of the latest replies.
+    pace: u64,
+    /// Events before this index are not waited for, whether they are still there or not.
+    given_up: u64,
+    /// Whether a reading that is overrun goes on until it has caught up.
+    keeps_up: bool,
     fruitless: u32,
     delivered: u32,
     lost: u32,
@@ -274,6 +296,9 @@ impl LogReader {
             unproven: 0,
             most: MAX_ENTRIES as u64,
             margin: 0,
+            pace: 0,
+            given_up: 0,
+            keeps_up: false,
             fruitless: 0,
             delivered: 0,
             lost: 0,
@@ -293,6 +318,13 @@ impl LogReader {
             self.near = Some(position);
         }
         self
+    }
+
+    /// A reading that events come too fast for ends when it has come past what had happened when it began. With this it
+    /// goes on until it has caught up, and so does not have to find its place again and again.
+    #[must_use]
+    pub fn keeping_up(self, keeps_up: bool) -> LogReader {
+        LogReader { keeps_up, ..self }
     }
 
     /// The entries to ask for next, each time others: several requests may be under way. `None` if there are none
@@ -334,6 +366,7 @@ impl LogReader {
             Purpose::Locate => self.located(request, batch, on)?,
             Purpose::Probe => self.probed(request, entries.len(), on)?,
             Purpose::Plain => self.take_plain(request, batch, on)?,
+            Purpose::Haste => self.take_in_haste(request, batch),
             Purpose::Events(first) => self.take_events(first, request, batch, on)?,
         }
         self.fruitless = if self.delivered == delivered_before { self.fruitless + 1 } else { 0 };
@@ -407,7 +440,11 @@ impl LogReader {
         if slot != (head.slot + happened) % self.size || went_back {
             return Err(Disturbed::Changed);
         }
+        self.pace = happened.max(head.happened);
         self.head = Some(Head { total, slot, happened });
+        if self.keeps_up && self.margin > 0 {
+            self.target = total;
+        }
         Ok(())
     }
 
@@ -473,13 +510,19 @@ impl LogReader {
         if !full {
             return self.not_full(head, on);
         }
-        if self.footing == Footing::Held {
+        if self.footing == Footing::Held || self.is_in_haste() {
             self.footing = Footing::Firm;
-            self.deliver(on);
-            if self.behind() < self.size || self.next >= self.target {
+            self.deliver_past_gaps(on);
+            if self.behind() < self.size || self.next >= self.target || self.is_in_haste() {
                 return Ok(());
             }
             self.margin = self.margin.max(HASTE * head.happened);
+        } else if self.behind() < self.size {
+            // It was asked in haste, which is over.
+            return Ok(());
+        } else if self.checked || self.keeps_up {
+            // A moment ago nothing was lost.
+            self.margin = self.margin.max(HASTE * self.pace);
         }
         // What was read ahead cannot be proven any more: it may be of a log that is gone.
         self.ahead.clear();
@@ -557,6 +600,7 @@ impl LogReader {
         self.footing = Footing::Uncounted;
         self.is_exact = false;
         self.margin = 0;
+        self.given_up = 0;
         self.ahead.clear();
         self.unproven = 0;
         self.most = MAX_ENTRIES as u64;
@@ -610,6 +654,8 @@ impl LogReader {
         self.keep(first, request, batch);
         if proven {
             self.deliver(on);
+        } else if self.is_in_haste() {
+            self.footing = Footing::Held;
         } else {
             self.unproven += 1;
         }
@@ -690,7 +736,8 @@ impl LogReader {
             on(Delivery::Event { entry_number, sequence: Some(sequence), entry, model });
             self.delivered = self.delivered.saturating_add(1);
             self.cursor = Some(Cursor { sequence, is_exact: self.is_exact, anchor: Some(entry) });
-            self.footing = Footing::Anchored(entry);
+            // In haste there is no time to look whether the anchor is still there.
+            self.footing = if self.is_in_haste() { Footing::Firm } else { Footing::Anchored(entry) };
             self.checked = true;
         }
     }

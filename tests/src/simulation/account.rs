@@ -71,9 +71,9 @@ pub struct Account {
     lost_told: usize,
     /// Inputs that were told to have changed unrecorded.
     unrecorded_told: u32,
-    /// The total in the first reply of its reading, and how far it has gone on since.
-    read_from: Option<u16>,
-    came_meanwhile: u16,
+    /// The total in the latest reply of its reading, and how far it has gone on since the first.
+    seen_total: Option<u16>,
+    came_meanwhile: usize,
     /// What the reader knows, and so would miss.
     known: Known,
     /// Events that went unread with the power, until it is seen whether that is reported.
@@ -99,7 +99,7 @@ impl Account {
             told_up_to: 0,
             lost_told: 0,
             unrecorded_told: 0,
-            read_from: None,
+            seen_total: None,
             came_meanwhile: 0,
             known: Known::Nothing,
             cut_off: 0,
@@ -122,14 +122,16 @@ impl Account {
 
     /// A reading begins.
     pub fn begin_reading(&mut self) {
-        self.read_from = None;
+        self.seen_total = None;
+        self.came_meanwhile = 0;
         self.in_hand.clear();
     }
 
     /// A reply of the reading says that the log has had so many events. Replies may be late, so how many there are by
     /// now is not what the reader goes by.
     pub fn see_total(&mut self, total: u16) {
-        self.came_meanwhile = total.wrapping_sub(*self.read_from.get_or_insert(total));
+        let before = self.seen_total.replace(total).unwrap_or(total);
+        self.came_meanwhile += usize::from(total.wrapping_sub(before));
     }
 
     /// What became of all events up to the reader's place.
@@ -360,7 +362,7 @@ impl Account {
     /// Checks that the events before this one, which the reader was not given, can have been overwritten.
     fn check_overwritten(&self, index: usize, lost: usize, ledger: &Ledger) -> Result<(), String> {
         let came = self.came_meanwhile;
-        let may_be_lost = ledger.overwritten_before() + HASTE * usize::from(came);
+        let may_be_lost = ledger.overwritten_before() + HASTE * came;
         if index <= may_be_lost {
             return Ok(());
         }

@@ -209,7 +209,9 @@ impl Conversation {
 
     fn begin_reading(&mut self, resyncs: u32, now_ms: u64) {
         self.account.begin_reading();
-        let mut reader = LogReader::new(self.cursor, self.size);
+        // Every other reading goes on for as long as events come too fast for it.
+        let keeps_up = self.talk.readings % 2 == 1;
+        let mut reader = LogReader::new(self.cursor, self.size).keeping_up(keeps_up);
         if let Some(position) = self.position.take() {
             reader = reader.starting_near(position);
         }

@@ -231,7 +231,9 @@ impl Readers {
     fn take_range(&mut self, reply: &ReadReply) {
         let before = self.range.delivered();
         let mut delivered = 0;
-        self.range.take(reply, &mut |_| delivered += 1);
+        self.range.take(reply, &mut |delivery| {
+            delivered += u16::from(matches!(delivery, Delivery::Event { .. }));
+        });
         assert_eq!(self.range.delivered(), before + delivered);
         let _ = self.range.is_mixed();
     }

@@ -118,7 +118,8 @@ impl World {
     fn read_new(&mut self, script: &mut Script<'_>) {
         for _ in 0..=MAX_RESYNCS {
             // The client asks for it.
-            let mut reader = LogReader::new(self.cursor, self.unit.size());
+            let keeps_up = self.unit.happened() % 2 == 1;
+            let mut reader = LogReader::new(self.cursor, self.unit.size()).keeping_up(keeps_up);
             if let Some(position) = self.position.take() {
                 reader = reader.starting_near(position);
             }

@@ -1,12 +1,12 @@
-//! How time passes for a host on a bus.
+//! How time passes for a host.
 
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// How time passes for a host, which looks at its board again and again and does nothing else meanwhile.
+/// How time passes for a host.
 ///
-/// Everything here but tests wants [`RealTime`]. A test that plays board and bus lets their time pass in
-/// [`wait`](Clock::wait), and so need not wait for anything.
+/// Everything here but tests wants [`RealTime`]. A test that plays the other end lets its time pass in
+/// [`wait`](Clock::wait), or in what it does for a transport, and so need not wait for anything.
 pub trait Clock: Send + Sync {
     /// The time since some moment in the past.
     fn now(&self) -> Duration;
