@@ -28,6 +28,20 @@ fn the_reply_comes_into_the_read_buffer_and_not_into_the_queue() {
 }
 
 #[test]
+fn a_table_of_128_bytes_comes_whole() {
+    let (mut rig, [host]) = Rig::started([31]);
+    let data = StationData { discrete_bytes: 128, channels: 0 };
+    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, StationData::default()));
+    rig.bus.get_mut(unit).force_point(Side::Inputs, 8 * 128 - 1, Some(true));
+    rig.advance_ms(200);
+    rig.write(host, 0x08D2, 0);
+    assert_eq!(rig.command(host, 3, &[3, 0x20, 0x40, 0x41, 0, 1, 0]), COMPLETE);
+    assert_eq!(rig.read(host, 0x08CA), 129);
+    let reply: [u8; 129] = rig.read_array(host, 0x09C2);
+    assert_eq!((reply[0], &reply[1..128], reply[128]), (0, &[0; 127][..], 0x80));
+}
+
+#[test]
 fn it_cannot_be_broadcast() {
     let (mut rig, [host]) = Rig::started([31]);
     assert_eq!(rig.command(host, 3, &[255, 0x20, 0x02, 0x03, 0, 0, 0]), SYNTAX_ERROR);
