@@ -7,6 +7,7 @@ use crate::checks::{self, Outcome};
 use crate::image::Image;
 use crate::image::calls::Calls;
 use crate::setup::cross::{self, CrossToolchain};
+use crate::setup::demand::Installing;
 use crate::setup::emulator;
 use crate::steps::{self, Failure, Result, heading, note};
 use crate::{stack_paths, table};
@@ -40,12 +41,12 @@ pub(crate) fn board(name: &str) -> std::result::Result<&'static Board, String> {
     Board::named(name).ok_or_else(|| format!("the boards are {}", names.join(", ")))
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
     let boards: Vec<&Board> = match arguments.board {
         Some(board) => vec![board],
         None => BOARDS.iter().collect(),
     };
-    let (found, missing) = toolchains(&boards);
+    let (found, missing) = toolchains(&boards, installing);
     let checked = build_and_check(&found, arguments.stack);
     // The other images have been built and checked all the same.
     match (checked, missing.into_iter().next()) {
@@ -58,10 +59,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
 pub(crate) type Toolchains<'a> = (Vec<(&'a Board, CrossToolchain)>, Vec<Failure>);
 
 /// Finds a toolchain for each board.
-pub(crate) fn toolchains<'a>(boards: &[&'a Board]) -> Toolchains<'a> {
+pub(crate) fn toolchains<'a>(boards: &[&'a Board], installing: Installing) -> Toolchains<'a> {
     let (mut found, mut missing) = (Vec::new(), Vec::new());
     let targets: Vec<_> = boards.iter().map(|board| board.target).collect();
-    for (&board, toolchain) in boards.iter().zip(cross::find(&targets)) {
+    for (&board, toolchain) in boards.iter().zip(cross::find(&targets, installing)) {
         match toolchain {
             Ok(toolchain) => found.push((board, toolchain)),
             Err(failure) => {
@@ -74,9 +75,9 @@ pub(crate) fn toolchains<'a>(boards: &[&'a Board]) -> Toolchains<'a> {
 }
 
 /// Builds the image for the emulator, which has to be there; gives its file.
-pub(crate) fn build_emulated() -> Result<PathBuf> {
-    emulator::find()?;
-    let toolchain = cross::find_one(MPS2_AN385.target)?;
+pub(crate) fn build_emulated(installing: Installing) -> Result<PathBuf> {
+    emulator::find(installing)?;
+    let toolchain = cross::find_one(MPS2_AN385.target, installing)?;
     heading("Firmware");
     build(&toolchain, &MPS2_AN385)
 }

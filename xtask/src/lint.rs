@@ -1,11 +1,12 @@
 //! `lint`: format, clippy and documentation.
 
-use crate::boards::{BOARDS, Board};
+use crate::boards::{self, Board};
 use crate::firmware::toolchains;
 use crate::places;
 use crate::setup::components;
 use crate::setup::cross::CrossToolchain;
-use crate::steps::{self, Result, heading, note};
+use crate::setup::demand::Installing;
+use crate::steps::{self, Failure, Result, heading, note};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -17,15 +18,15 @@ Examples:
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {}
 
-pub(crate) fn run(_arguments: &Arguments) -> Result<()> {
+pub(crate) fn run(_arguments: &Arguments, installing: Installing) -> Result<()> {
+    components::find(installing)?;
     host()?;
-    let (found, _) = toolchains(&BOARDS.each_ref());
-    firmware(&found)
+    let (found, _) = toolchains(&boards::BOARDS.each_ref(), installing);
+    firmware(&found, false)
 }
 
-/// All that needs no cross toolchain.
+/// All that needs no cross toolchain, but rustfmt and clippy.
 pub(crate) fn host() -> Result<()> {
-    components::find()?;
     heading("Format");
     steps::run(steps::cargo().args(["fmt", "--all", "--check"]))?;
     steps::run(steps::cargo().current_dir(places::firmware()).args(["fmt", "--all", "--check"]))?;
@@ -39,8 +40,8 @@ pub(crate) fn host() -> Result<()> {
     steps::run(steps::cargo().env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--no-deps", "--workspace"]))
 }
 
-/// What is flashed.
-pub(crate) fn firmware(boards: &[(&Board, CrossToolchain)]) -> Result<()> {
+/// What is flashed. A toolchain without clippy is a failure where nothing may be left out.
+pub(crate) fn firmware(boards: &[(&Board, CrossToolchain)], strict: bool) -> Result<()> {
     for (board, toolchain) in boards {
         heading(&format!("Clippy on the firmware for {}", board.name));
         match toolchain.clippy() {
@@ -48,6 +49,7 @@ pub(crate) fn firmware(boards: &[(&Board, CrossToolchain)]) -> Result<()> {
                 let package = ["--release", "--package", board.package];
                 steps::run(clippy.args(package).args(["--", "-D", "warnings"]))?;
             }
+            None if strict => return Err(Failure::new("this cross toolchain has no clippy")),
             None => note("left out: this cross toolchain has no clippy"),
         }
     }
