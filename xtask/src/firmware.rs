@@ -50,8 +50,8 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
     let checked = build_and_check(&found, arguments.stack);
     // The other images have been built and checked all the same.
     match (checked, missing.into_iter().next()) {
-        (Ok(()), Some(missing)) => Err(missing),
-        (checked, _) => checked,
+        (Ok(_), Some(missing)) => Err(missing),
+        (checked, _) => checked.map(drop),
     }
 }
 
@@ -88,25 +88,38 @@ fn build(toolchain: &CrossToolchain, board: &Board) -> Result<PathBuf> {
     Ok(board.image())
 }
 
+/// An image that may be flashed.
+#[derive(Debug)]
+pub(crate) struct Checked {
+    /// The board's name.
+    pub(crate) board: &'static str,
+    /// How deep its stack can get at most, in bytes.
+    pub(crate) stack_bytes: u32,
+}
+
 /// Builds images and checks them. One that may not be flashed is a failure.
-pub(crate) fn build_and_check(boards: &[(&Board, CrossToolchain)], stack: bool) -> Result<()> {
+pub(crate) fn build_and_check(boards: &[(&Board, CrossToolchain)], stack: bool) -> Result<Vec<Checked>> {
     if boards.is_empty() {
-        return Ok(());
+        return Ok(Vec::new());
     }
     heading("Firmware");
-    let mut columns = Vec::new();
+    let (mut columns, mut checked) = (Vec::new(), Vec::new());
     let mut paths = String::new();
     for (board, toolchain) in boards {
         let image = Image::read(&build(toolchain, board)?)?;
         let calls = Calls::of(&image, &checks::forced(board, &image));
         columns.push((*board, checks::all(board, &image, &calls)));
+        // Where there is no bound, one of the checks has failed.
+        let stack_bytes = checks::bound(&image, &calls).unwrap_or(0);
+        checked.push(Checked { board: board.name, stack_bytes });
         if stack {
             paths += &stack_paths::shown(board, &image, &calls);
         }
     }
     table::print(&columns);
     print!("{paths}");
-    verdict(&columns)
+    verdict(&columns)?;
+    Ok(checked)
 }
 
 fn verdict(columns: &[(&Board, Vec<Outcome>)]) -> Result<()> {

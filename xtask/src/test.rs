@@ -2,8 +2,9 @@
 
 use std::process::Command;
 
-use crate::boards::{BOARDS, Board, MPS2_AN385};
-use crate::setup::cross::{CrossToolchain, Target};
+use crate::boards::{BOARDS, MPS2_AN385};
+use crate::firmware::Checked;
+use crate::setup::cross::Target;
 use crate::setup::demand::{self, Demand, Installing};
 use crate::setup::{self, emulator, programs};
 use crate::steps::{self, Failure, Result, heading, note};
@@ -21,6 +22,9 @@ that is said, too; with --strict, and where CI is \"true\", it is a failure.";
 
 /// Where the tests in the emulator look for the image.
 const IMAGE_VARIABLE: &str = "SER_IMAGE_MPS2_AN385";
+
+/// Where they look for the bound of its stack, in bytes.
+const STACK_VARIABLE: &str = "SER_STACK_BOUND_MPS2_AN385";
 
 /// Where those that count instructions look for the emulator's plugin.
 const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";
@@ -46,27 +50,25 @@ fn everything(demand: Demand) -> Result<()> {
     lint::host()?;
     let (found, missing) = firmware::toolchains(&BOARDS.each_ref(), Installing::Forbidden);
     lint::firmware(&found, demand.is_strict())?;
-    firmware::build_and_check(&found, false)?;
+    let checked = firmware::build_and_check(&found, false)?;
     if let Some(missing) = missing.into_iter().next().filter(|_| demand.is_strict()) {
         return Err(missing);
     }
-    tests(demand, &found)
+    tests(demand, checked.iter().find(|image| image.board == MPS2_AN385.name))
 }
 
 /// Builds and runs the tests; those in the emulator where it is there and its image was built above.
-fn tests(demand: Demand, found: &[(&Board, CrossToolchain)]) -> Result<()> {
+fn tests(demand: Demand, image: Option<&Checked>) -> Result<()> {
     heading("Building the tests");
     steps::run(steps::cargo().args(["test", "--workspace", "--no-run"]))?;
-    let has_image = found.iter().any(|(board, _)| board.name == MPS2_AN385.name);
-    let emulated = has_image && emulator::there();
-    if !emulated {
+    let Some(image) = image.filter(|_| emulator::there()) else {
         if demand.is_strict() {
             return Err(Failure::new("the tests in the emulator cannot be run here"));
         }
         heading("Tests, without those in the emulator");
         steps::run(steps::cargo().args(["test", "--workspace"]))?;
         return ignored_tests();
-    }
+    };
     let plugin = match timing::build_plugin() {
         Ok(plugin) => Some(plugin),
         // Those that need it are built for Linux only.
@@ -79,6 +81,7 @@ fn tests(demand: Demand, found: &[(&Board, CrossToolchain)]) -> Result<()> {
     heading("Tests, with those in the emulator");
     let mut tests = all_tests();
     tests.env(IMAGE_VARIABLE, MPS2_AN385.image());
+    tests.env(STACK_VARIABLE, image.stack_bytes.to_string());
     if let Some(plugin) = plugin {
         tests.env(PLUGIN_VARIABLE, plugin);
     }
