@@ -41,7 +41,7 @@ pub use endpoint::{Endpoint, EndpointError, GeniWindow};
 pub use follower::{LogFollower, Step};
 pub use genius::{BlockKind, BoardStatus, DeviceRecord, GeniusError};
 #[cfg(unix)]
-pub use genius::{BusDevice, Clock, GeniHost, RealTime};
+pub use genius::{BusDevice, BusRecorders, Clock, GeniHost, RealTime, Recognition};
 pub use line_rate::LineRate;
 pub use log_position::LogPosition;
 pub use open::{OpenError, open};

@@ -10,6 +10,8 @@ mod inboxes;
 #[cfg(unix)]
 mod link;
 #[cfg(unix)]
+mod recognition;
+#[cfg(unix)]
 mod window;
 
 #[cfg(unix)]
@@ -20,3 +22,5 @@ pub use geni::{BlockKind, Device as DeviceRecord, Status as BoardStatus};
 pub use host::{BusDevice, GeniHost};
 #[cfg(unix)]
 pub(crate) use link::GeniusLink;
+#[cfg(unix)]
+pub use recognition::{BusRecorders, Recognition};
