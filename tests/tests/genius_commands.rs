@@ -165,6 +165,36 @@ fn read_io_forces_shows_that_nothing_is_forced() {
 }
 
 #[test]
+fn a_command_of_another_length_is_not_carried_out() {
+    let mut world = started(Model::Ser160);
+    world.ask(UNIT, &Command::SetClock(NOON));
+    events(&mut world, 3);
+    let Reply::Configuration(before) = world.ask(UNIT, &Command::QueryConfiguration) else { panic!() };
+    let wrong = [
+        &b"E\0"[..],
+        b"M\0\0\0",
+        b"S\x1A\x0B\x16\x17\0\0\0",
+        b"S\x1A\x0B\x16\x17\0\0\0\0\0",
+        b"C\0\x64\x06\x02",
+        b"C\0\x64\x06\x02\x01\x01\0",
+    ];
+    for data in wrong {
+        for to in [Device(UNIT), Broadcast] {
+            world.transmit(to, 0x40, 0x50, data);
+            world.run(50);
+        }
+    }
+    assert_eq!(world.take_message(UNIT), None);
+    assert_eq!(world.ask(UNIT, &Command::QueryConfiguration), Reply::Configuration(before));
+    assert!(matches!(world.ask(UNIT, &Command::QueryMode), Reply::Mode(Mode { recording: true, .. })));
+    assert_eq!(world.ask(UNIT, &Command::LastBroadcast), Reply::LastBroadcast(None));
+    world.recorders[0].contact(1, false);
+    world.step();
+    let after = read(&mut world, 4, 1);
+    assert_eq!((after.total, after.entries[0].time.hour), (4, NOON.hour), "neither erased nor set");
+}
+
+#[test]
 fn datagrams_of_any_content_and_length_are_counted_and_ignored() {
     let mut world = started(Model::Ser160);
     let before = world.recorders[0].node.diagnostics();
