@@ -1,17 +1,18 @@
 //! `lint`: format, clippy and documentation.
 
-use crate::boards::{self, Board};
+use crate::boards::{BOARDS, Board};
 use crate::firmware::toolchains;
 use crate::places;
-use crate::setup::components;
 use crate::setup::cross::CrossToolchain;
-use crate::setup::demand::Installing;
+use crate::setup::demand::{Demand, Installing, Kind, Options};
+use crate::setup::{self, components};
 use crate::steps::{self, Failure, Result, heading, note};
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask lint
-  cargo fmt --all           mends the format; in firmware/, too";
+  cargo xtask lint              installs what is missing of rustfmt, clippy and the cross toolchain
+  cargo xtask lint --offline    installs nothing
+  cargo fmt --all               mends the format; in firmware/, too";
 
 /// Check format, clippy and documentation of both workspaces; warnings are errors.
 #[derive(Debug, clap::Args)]
@@ -19,14 +20,18 @@ Examples:
 pub(crate) struct Arguments {}
 
 pub(crate) fn run(_arguments: &Arguments, installing: Installing) -> Result<()> {
-    components::find(installing)?;
+    heading("Tools");
+    let demand = Demand::here(Options::default(), installing);
+    let targets = BOARDS.each_ref().map(|board| board.target);
+    setup::make_ready(demand, &targets, &Kind::OF_LINT)?;
     host()?;
-    let (found, _) = toolchains(&boards::BOARDS.each_ref(), installing);
-    firmware(&found, false)
+    let (found, _) = toolchains(&BOARDS.each_ref(), Installing::Forbidden);
+    firmware(&found, demand.is_strict())
 }
 
-/// All that needs no cross toolchain, but rustfmt and clippy.
+/// All that needs no cross toolchain.
 pub(crate) fn host() -> Result<()> {
+    components::find(Installing::Forbidden)?;
     heading("Format");
     steps::run(steps::cargo().args(["fmt", "--all", "--check"]))?;
     steps::run(steps::cargo().current_dir(places::firmware()).args(["fmt", "--all", "--check"]))?;

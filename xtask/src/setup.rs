@@ -16,15 +16,20 @@ use cross::Target;
 use demand::{Demand, Installing, Kind, Plan, Tool};
 
 /// Makes ready what tests, checks and images need: says first what is missing and what will be installed, installs it,
-/// and says what is left out for want of a tool.
+/// and says what is left out for want of a tool. Only tools of these kinds count.
 ///
 /// # Errors
 /// Something is left out and the demand is strict.
-pub(crate) fn make_ready(demand: Demand, targets: &[Target]) -> Result<()> {
-    let plan = demand.plan(&missing(targets));
+pub(crate) fn make_ready(demand: Demand, targets: &[Target], kinds: &[Kind]) -> Result<()> {
+    let missing = || {
+        let mut missing = missing(targets);
+        missing.retain(|tool| kinds.contains(&tool.kind));
+        missing
+    };
+    let plan = demand.plan(&missing());
     plan.announcement().iter().for_each(|line| note(line));
     install(&plan, targets);
-    let left_out = missing(targets);
+    let left_out = missing();
     demand.verdict(&left_out)?;
     Plan::remarks(&left_out).iter().for_each(|line| note(line));
     Ok(())

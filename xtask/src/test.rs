@@ -4,8 +4,7 @@ use std::process::Command;
 
 use crate::boards::{BOARDS, MPS2_AN385};
 use crate::firmware::Checked;
-use crate::setup::cross::Target;
-use crate::setup::demand::{self, Demand, Installing};
+use crate::setup::demand::{self, Demand, Installing, Kind};
 use crate::setup::{self, emulator, programs};
 use crate::steps::{self, Failure, Result, heading, note};
 use crate::{firmware, lint, timing};
@@ -45,8 +44,8 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
 
 fn everything(demand: Demand) -> Result<()> {
     heading("Tools");
-    let targets: Vec<Target> = BOARDS.iter().map(|board| board.target).collect();
-    setup::make_ready(demand, &targets)?;
+    let targets = BOARDS.each_ref().map(|board| board.target);
+    setup::make_ready(demand, &targets, &Kind::ALL)?;
     lint::host()?;
     let (found, missing) = firmware::toolchains(&BOARDS.each_ref(), Installing::Forbidden);
     lint::firmware(&found, demand.is_strict())?;

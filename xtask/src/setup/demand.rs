@@ -36,6 +36,13 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
+    /// All of them.
+    pub(crate) const ALL: [Kind; 5] =
+        [Kind::Components, Kind::CrossRust, Kind::CrossClippy, Kind::Emulator, Kind::Program];
+
+    /// What the checks of the sources need.
+    pub(crate) const OF_LINT: [Kind; 3] = [Kind::Components, Kind::CrossRust, Kind::CrossClippy];
+
     /// Whether it is installed unasked: the project itself is built, checked and run with it.
     const fn is_usual(self) -> bool {
         !matches!(self, Kind::Program)
