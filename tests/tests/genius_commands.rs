@@ -1,9 +1,13 @@
 //! Every command of a host over Genius, and what is no command.
 
+use std::rc::Rc;
+
 use geni::Destination::{Broadcast, Device};
+use geni::{Configuration, Driver, Event, Options, Received, Start};
 use ser_proto::{
     AutoReport, Baud, Code, Command, Configure, Entry, Inputs, LastBroadcast, Mode, Model, Reply, TimeStamp,
 };
+use ser_sim::genius::{Board, BoardOptions, BoardWindow};
 use ser_tests::genius_world::{HOST, World};
 
 const UNIT: u8 = 5;
@@ -287,6 +291,64 @@ fn recorders_that_report_without_end_leave_everybody_a_turn() {
     let reports = world.recorders.iter().map(|recorder| recorder.port.diagnostics().reports_sent);
     assert!(reports.clone().all(|sent| sent > 1_000), "{:?}", reports.collect::<Vec<_>>());
     assert_eq!(world.host.driver.counters().commands_timed_out, 0);
+    world.assert_lawful();
+}
+
+/// Another host on the bus, which knows the recorder.
+fn second_host(world: &mut World, number: u8) -> Driver<BoardWindow> {
+    let board = world.bus.borrow_mut().connect(Board::new(BoardOptions::at(number)));
+    let window = BoardWindow::new(Rc::clone(&world.bus), board);
+    let options = Options { start: Start::Reset { hold_ms: 20 }, ..Options::new(Configuration::DEFAULT) };
+    let mut host = Driver::new(window, options);
+    world.until("the second host knows the recorder", |world| {
+        look(&mut host, world);
+        (host.device(UNIT).is_ok() && host.can_transmit()).then_some(())
+    });
+    host
+}
+
+/// What a host has received, if something has happened.
+fn look(host: &mut Driver<BoardWindow>, world: &World) -> Option<Received> {
+    let event = host.poll(u32::try_from(world.now_ms).expect("less than 49 days"));
+    let held = host.reset_held();
+    host.ram_mut().drive_reset(held);
+    match event {
+        Some(Event::Received(received)) => Some(received),
+        _ => None,
+    }
+}
+
+#[test]
+fn of_two_hosts_that_ask_each_gets_the_answer_to_its_own_question() {
+    let mut world = started(Model::Ser160);
+    let mut second = second_host(&mut world, 30);
+    for _ in 0..10 {
+        world.send(Device(UNIT), &Command::QueryConfiguration);
+        let question = geni::Transmission {
+            destination: Device(UNIT),
+            function: 0x40,
+            subfunction: 0x50,
+            priority: geni::Priority::Normal,
+            completion: geni::Completion::Acknowledged,
+            data: geni::Data::from_slice(b"M").expect("a byte"),
+        };
+        second.transmit(question).expect("the board is free");
+        let (mut first_got, mut second_got) = (Vec::new(), Vec::new());
+        for _ in 0..200 {
+            world.step();
+            second_got.extend(look(&mut second, &world).map(|received| received.data));
+            first_got.extend(world.take_message(UNIT).map(|(_, data)| data));
+        }
+        let [Ok(Reply::Configuration(_))] =
+            first_got.iter().map(|data| Reply::parse(data)).collect::<Vec<_>>()[..]
+        else {
+            panic!("{first_got:?}")
+        };
+        let [Ok(Reply::Mode(_))] = second_got.iter().map(|data| Reply::parse(data)).collect::<Vec<_>>()[..]
+        else {
+            panic!("{second_got:?}")
+        };
+    }
     world.assert_lawful();
 }
 

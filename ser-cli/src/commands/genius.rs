@@ -11,7 +11,7 @@ use ser_proto::genius::{Device, ForceTable};
 
 use crate::cli::ConnectionArgs;
 use crate::connection;
-use crate::error::{Failure, Result, inform};
+use crate::error::{Failure, Result};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -147,16 +147,27 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
 }
 
-/// Says who might be a recorder and does not answer as one.
-fn tell_of_silent(silent: &[u8]) {
-    if !silent.is_empty() {
-        let numbers: Vec<_> = silent.iter().map(u8::to_string).collect();
-        inform(format_args!("asked, and no answer as from a recorder: device {}", numbers.join(", ")));
-    }
+/// Who might be a recorder and does not answer as one, in words; none when there is nobody.
+fn silent_candidates(silent: &[u8]) -> Option<String> {
+    let numbers: Vec<_> = silent.iter().map(u8::to_string).collect();
+    let numbers = Some(numbers.join(", ")).filter(|numbers| !numbers.is_empty())?;
+    Some(format!("no answer from device {numbers}: no recorder, or one that hangs"))
 }
 
 fn no_recorder() -> Failure {
     Failure::new("no recorder is logged in")
         .hint("ser-cli genius devices lists what is; check numbers and bus rate")
         .hint("a recorder that cannot answer is taken for one with --model-number")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_does_not_answer_is_named() {
+        assert_eq!(silent_candidates(&[]), None);
+        let said = silent_candidates(&[7, 12]).expect("two of them");
+        assert_eq!(said, "no answer from device 7, 12: no recorder, or one that hangs");
+    }
 }

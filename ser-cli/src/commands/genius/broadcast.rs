@@ -6,10 +6,10 @@ use std::io::{self, Write};
 use ser_client::{GeniHost, Recognition};
 use ser_proto::{Command, LastBroadcast, TimeStamp};
 
-use super::{no_recorder, tell_of_silent};
+use super::{no_recorder, silent_candidates};
 use crate::cli::ConnectionArgs;
 use crate::connection;
-use crate::error::{Failure, Result, inform};
+use crate::error::{Failure, Result, inform, warn};
 use crate::time::{local_time_in, parse_time};
 
 #[derive(Clone, Copy, Debug, clap::Subcommand)]
@@ -40,7 +40,10 @@ pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> 
     }
     let host = connection::open_bus(connection)?;
     let found = host.recorders(how)?;
-    tell_of_silent(&found.silent);
+    // It is not asked whether such a device has heard it.
+    if let Some(silent) = silent_candidates(&found.silent) {
+        warn(&silent);
+    }
     let nodes: Vec<u8> = found.recorders.into_iter().map(|(node, _)| node).collect();
     if nodes.is_empty() {
         return Err(no_recorder());

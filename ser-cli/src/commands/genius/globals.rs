@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use ser_client::{BusRecorders, GeniHost, Recognition};
 use ser_proto::genius::GlobalData;
 
-use super::{no_recorder, tell_of_silent};
+use super::{no_recorder, silent_candidates};
 use crate::cli::ConnectionArgs;
 use crate::connection;
 use crate::error::{Result, advise, inform};
@@ -28,7 +28,9 @@ pub(super) fn run(connection: &ConnectionArgs, follow: bool, how: Recognition) -
     let stop = if follow { Some(interrupt::catch()?) } else { None };
     let host = connection::open_bus(connection)?;
     let BusRecorders { recorders, silent } = host.recorders(how)?;
-    tell_of_silent(&silent);
+    if let Some(silent) = silent_candidates(&silent) {
+        inform(&silent);
+    }
     let globals: Globals = recorders.into_iter().collect();
     let mut out = io::stdout().lock();
     match stop {
