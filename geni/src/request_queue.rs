@@ -16,8 +16,9 @@ pub const READ_DEVICE: u8 = 0x1E;
 /// Command of a request that writes memory (the subfunction code of the Write Device datagram).
 pub const WRITE_DEVICE: u8 = 0x20;
 
-/// Command of a request that changes single bits of memory (the subfunction code of the Write Point datagram). The
-/// manual names this datagram and prints no code: this one is from general knowledge of Genius, unchecked.
+/// Command of a request that changes single bits of memory (the subfunction code of the Write Point
+/// datagram). The manual names this datagram and prints no code: this one is from general knowledge
+/// of Genius, unchecked.
 pub const WRITE_POINT: u8 = 0x0B;
 
 /// What a host says to a request.

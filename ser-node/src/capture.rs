@@ -281,8 +281,9 @@ mod tests {
         let (mut capture, mut reader) = channel.split(Debounce::OFF.with(1, 5));
         capture.sample(10, 0);
         capture.sample(11, 1);
-        // Nine samples are missed; input 1 was seen to change at 11, so the change is accepted as of 16. Input 2 has no
-        // debounce: the late sample is the first to see it, and its tick is the stamp.
+        // Nine samples are missed; input 1 was seen to change at 11, so the change is accepted as
+        // of 16. Input 2 has no debounce: the late sample is the first to see it, and its tick is
+        // the stamp.
         capture.sample(21, 0b11);
         capture.sample(22, 0b01);
         assert_eq!(drain(&mut reader), [(10, 0, 0), (16, 0b01, 0b01), (21, 0b10, 0b11), (22, 0b10, 0b01)]);

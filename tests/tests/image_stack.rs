@@ -11,7 +11,8 @@ use ser_tests::recorder::{Kind, NODE, PATIENCE, PATIENT, Recorder};
 /// As the image's memory map has it.
 const STACK_LEN: u32 = 8 * 1024;
 
-/// Where the bound is that the checks of the image have found by walking through it, in bytes: set by `cargo xtask test`.
+/// Where the bound is that the checks of the image have found by walking through it, in bytes: set
+/// by `cargo xtask test`.
 const BOUND_VARIABLE: &str = "SER_STACK_BOUND_MPS2_AN385";
 
 /// How deep the stack of the image can get, by its instructions.

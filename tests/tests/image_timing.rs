@@ -50,7 +50,8 @@ fn the_capture_interrupt_keeps_to_its_budget() {
             cases.push((format!("{change:?}, debounce of {debounce_ms} ms"), instructions));
         }
     }
-    // With a longer debounce time the watchdog ends the main loop that hangs before the queue is full.
+    // With a longer debounce time the watchdog ends the main loop that hangs before the queue is
+    // full.
     for debounce_ms in [0, SHORTEST_DEBOUNCE_MS] {
         let instructions = costs::capture_beyond_queue(&parts, &program, debounce_ms).unwrap();
         cases.push((format!("queue full, debounce of {debounce_ms} ms"), instructions));

@@ -1,7 +1,7 @@
 //! Finds the tools that do not come with Rust, and installs what is missing where that can be done unasked.
 //!
-//! [`demand`] says what a run wants: what may be installed, and whether anything may be left out. Each other file knows
-//! one kind of tool: whether it is there, and how to install it.
+//! [`demand`] says what a run wants: what may be installed, and whether anything may be left out.
+//! Each other file knows one kind of tool: whether it is there, and how to install it.
 
 mod apt;
 pub(crate) mod components;
@@ -15,8 +15,9 @@ use crate::steps::{Result, note};
 use cross::Target;
 use demand::{Demand, Installing, Kind, Plan, Tool};
 
-/// Makes ready what tests, checks and images need: says first what is missing and what will be installed, installs it,
-/// and says what is left out for want of a tool. Only tools of these kinds count.
+/// Makes ready what tests, checks and images need: says first what is missing and what will be
+/// installed, installs it, and says what is left out for want of a tool. Only tools of these kinds
+/// count.
 ///
 /// # Errors
 /// Something is left out and the demand is strict.

@@ -56,7 +56,8 @@ fn everything(demand: Demand) -> Result<()> {
     tests(demand, checked.iter().find(|image| image.board == MPS2_AN385.name))
 }
 
-/// Builds and runs the tests; those in the emulator where it is there and its image was built above.
+/// Builds and runs the tests; those in the emulator where it is there and its image was built
+/// above.
 fn tests(demand: Demand, image: Option<&Checked>) -> Result<()> {
     heading("Building the tests");
     steps::run(steps::cargo().args(["test", "--workspace", "--no-run"]))?;

@@ -94,8 +94,8 @@ enum What {
 /// Who is taken for a recorder.
 #[derive(Clone, Copy, Debug, clap::Args)]
 struct Who {
-    /// Take the devices with this model number for recorders, and ask nobody. Without it every device that sends as
-    /// much as a recorder is asked.
+    /// Take the devices with this model number for recorders, and ask nobody. Without it every
+    /// device that sends as much as a recorder is asked.
     #[arg(long, value_name = "N", global = true)]
     model_number: Option<u8>,
 }

@@ -1,9 +1,10 @@
 //! Which of the devices on a bus are recorders.
 //!
-//! A recorder is behind a GENI board, and so may other things be; what the bus tells of a device does not say which. So
-//! every device that sends as much as a recorder does, and takes nothing, is asked a question that only recorders
-//! answer: what they heard last by broadcast (`L`, which original units answer, too, and which changes nothing). What
-//! came out is remembered until the device logs in anew.
+//! A recorder is behind a GENI board, and so may other things be; what the bus tells of a device
+//! does not say which. So every device that sends as much as a recorder does, and takes nothing, is
+//! asked a question that only recorders answer: what they heard last by broadcast (`L`, which
+//! original units answer, too, and which changes nothing). What came out is remembered until the
+//! device logs in anew.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -23,8 +24,8 @@ const QUESTION: Command = Command::LastBroadcast;
 /// How recorders are told from other devices with as many inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Recognition {
-    /// They are asked, all at the same time and each once for each log-in. A device that does not answer in time is
-    /// asked again, as often as the options say.
+    /// They are asked, all at the same time and each once for each log-in. A device that does not
+    /// answer in time is asked again, as often as the options say.
     Asking(Options),
     /// By the model number that their GENI boards have. Nobody is asked.
     ModelNumber(u8),
@@ -35,14 +36,14 @@ pub enum Recognition {
 pub struct BusRecorders {
     /// Their numbers and inputs, all of the same bus scan.
     pub recorders: Vec<(u8, GlobalData)>,
-    /// Numbers of devices that send as much as a recorder does, and did not answer. Such a device is something else, or a
-    /// recorder that hangs.
+    /// Numbers of devices that send as much as a recorder does, and did not answer. Such a device
+    /// is something else, or a recorder that hangs.
     pub silent: Vec<u8>,
 }
 
 impl BusDevice {
-    /// What its inputs would be if it were a recorder; `None` when it cannot be one: a recorder sends 2 or 4 bytes in
-    /// every scan, and takes nothing.
+    /// What its inputs would be if it were a recorder; `None` when it cannot be one: a recorder
+    /// sends 2 or 4 bytes in every scan, and takes nothing.
     #[must_use]
     pub fn candidate_inputs(&self) -> Option<GlobalData> {
         let sends_only =
@@ -82,8 +83,9 @@ impl Answers {
 }
 
 impl GeniHost {
-    /// The recorders that are logged in. While devices come and go this waits as [`devices`](Self::devices) does; asking
-    /// takes as long as the options say where somebody does not answer.
+    /// The recorders that are logged in. While devices come and go this waits as
+    /// [`devices`](Self::devices) does; asking takes as long as the options say where somebody does
+    /// not answer.
     ///
     /// # Errors
     /// When the board fails.

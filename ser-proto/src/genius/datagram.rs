@@ -6,8 +6,9 @@ use heapless::Vec;
 
 use super::{Address, Device, FUNCTION_GENIUS, FUNCTION_HORNER, Priority, SUBFUNCTION_SER, Subfunction};
 
-/// The most data bytes of a datagram: what the buffers of a GENI board hold (GENI manual, chapter 10, tables of the
-/// Transmit Datagram commands). Messages of the recorder have at most [`MAX_SER_DATA`](super::MAX_SER_DATA).
+/// The most data bytes of a datagram: what the buffers of a GENI board hold (GENI manual, chapter
+/// 10, tables of the Transmit Datagram commands). Messages of the recorder have at most
+/// [`MAX_SER_DATA`](super::MAX_SER_DATA).
 pub const MAX_DATA: usize = 134;
 
 /// The data of a datagram.

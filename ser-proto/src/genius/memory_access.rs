@@ -18,8 +18,8 @@ use super::{Data, MAX_DATA, MessageError, Subfunction};
 /// Bytes before the contents.
 const HEADER_LEN: usize = 4;
 
-/// The most bytes of memory that one datagram carries along with the header (GENI manual, chapter 13: a buffer of the
-/// request queue has so many for data).
+/// The most bytes of memory that one datagram carries along with the header (GENI manual, chapter
+/// 13: a buffer of the request queue has so many for data).
 pub const MAX_MEMORY_DATA: usize = 128;
 const _: () = assert!(HEADER_LEN + MAX_MEMORY_DATA <= MAX_DATA);
 

@@ -1,9 +1,10 @@
 //! The Genius bus as a recorder sees it: datagrams, global data, a PLC's `COMM_REQ` blocks and the DIP switches.
 //!
-//! A [`Datagram`] carries up to 134 bytes from one device to another, or to all. A message of the recorder is a
-//! datagram whose data are the body, without frame: [`Datagram::from_command`], [`Datagram::from_reply`] and back.
-//! The datagrams of the bus itself are [`Message`]s. The state of all inputs goes out in every bus scan as
-//! [`GlobalData`]. A PLC sends and fetches datagrams with the word blocks in [`CommReq`].
+//! A [`Datagram`] carries up to 134 bytes from one device to another, or to all. A message of the
+//! recorder is a datagram whose data are the body, without frame: [`Datagram::from_command`],
+//! [`Datagram::from_reply`] and back. The datagrams of the bus itself are [`Message`]s. The state
+//! of all inputs goes out in every bus scan as [`GlobalData`]. A PLC sends and fetches datagrams
+//! with the word blocks in [`CommReq`].
 
 mod address;
 mod bus_rate;

@@ -15,8 +15,8 @@ pub const FUNCTION_HORNER: u8 = 0x40;
 /// Subfunction code of the recorder.
 pub const SUBFUNCTION_SER: u8 = 0x50;
 
-/// The most bytes of a message of the recorder (GENI manual, chapter 10, "Maximum Datagram Length"). Other datagrams may
-/// be longer: see [`MAX_DATA`](super::MAX_DATA).
+/// The most bytes of a message of the recorder (GENI manual, chapter 10, "Maximum Datagram
+/// Length"). Other datagrams may be longer: see [`MAX_DATA`](super::MAX_DATA).
 pub const MAX_SER_DATA: usize = 128;
 
 /// The most entries that one read reply brings over the bus: 10 with 16 inputs, 7 with 32.
@@ -101,7 +101,8 @@ pub enum SerDatagramError {
         /// The code found.
         subfunction: u8,
     },
-    /// The message has more than the [`MAX_SER_DATA`] bytes that a message of the recorder may have.
+    /// The message has more than the [`MAX_SER_DATA`] bytes that a message of the recorder may
+    /// have.
     TooLong {
         /// Bytes of the message.
         length: usize,

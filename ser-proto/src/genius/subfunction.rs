@@ -1,7 +1,7 @@
 //! Function code 20h: the datagrams that every Genius device speaks, and their subfunction codes.
 //!
-//! The manuals at hand name most of these datagrams and print few of the codes. A code marked *unchecked* is from general
-//! knowledge of Genius: no page was there to check it against.
+//! The manuals at hand name most of these datagrams and print few of the codes. A code marked
+//! *unchecked* is from general knowledge of Genius: no page was there to check it against.
 
 use core::fmt;
 

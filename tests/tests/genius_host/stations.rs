@@ -32,7 +32,8 @@ fn connect_blocks(desk: &Desk) {
     desk.run(1_000);
 }
 
-/// The numbers of the recorders, those of candidates that said nothing, and how long it took to find out.
+/// The numbers of the recorders, those of candidates that said nothing, and how long it took to
+/// find out.
 fn recorders(desk: &Desk, host: &GeniHost, how: Recognition) -> (Vec<u8>, Vec<u8>, u64) {
     let before_ms = desk.now_ms();
     let found = host.recorders(how).expect("the board is well");

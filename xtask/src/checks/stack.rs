@@ -71,7 +71,8 @@ pub(crate) fn shares(image: &Image, calls: &Calls<'_>) -> Result<Vec<Share>, Vec
     if unbounded.is_empty() { Ok(shares) } else { Err(unbounded) }
 }
 
-/// The worst case in bytes: the main program at its deepest, interrupted there by every handler at its deepest.
+/// The worst case in bytes: the main program at its deepest, interrupted there by every handler at
+/// its deepest.
 ///
 /// # Errors
 /// What cannot be bounded, in words.

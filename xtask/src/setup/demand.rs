@@ -1,7 +1,9 @@
-//! What a run demands of the machine: which missing tools may be installed, and whether anything may be left out.
+//! What a run demands of the machine: which missing tools may be installed, and whether anything
+//! may be left out.
 //!
-//! On a newcomer's machine the usual tools are installed and the rest is left out, and both are said. Where `CI` is
-//! `true`, or with `--strict`, everything is installed and nothing may be left out.
+//! On a newcomer's machine the usual tools are installed and the rest is left out, and both are
+//! said. Where `CI` is `true`, or with `--strict`, everything is installed and nothing may be left
+//! out.
 
 use std::ffi::OsStr;
 
@@ -87,8 +89,8 @@ enum Scope {
 /// What the command line says about it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::Args)]
 pub(crate) struct Options {
-    /// Leave nothing out: install everything that a check or a test needs, and fail where that does not work. So it is
-    /// where the variable CI is "true", too.
+    /// Leave nothing out: install everything that a check or a test needs, and fail where that does
+    /// not work. So it is where the variable CI is "true", too.
     #[arg(long)]
     pub(crate) strict: bool,
 

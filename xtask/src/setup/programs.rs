@@ -1,8 +1,9 @@
-//! Programs of others that single tests need: they read what this project writes, as users have them do.
+//! Programs of others that single tests need: they read what this project writes, as users have
+//! them do.
 //!
-//! Such a test stands in a module `needs_NAME` and is ignored with the reason `needs NAME: cargo xtask test`, so that
-//! `cargo test` shows it as left out. `cargo xtask test` runs it where the program is there; a test that runs without its
-//! program fails.
+//! Such a test stands in a module `needs_NAME` and is ignored with the reason `needs NAME: cargo
+//! xtask test`, so that `cargo test` shows it as left out. `cargo xtask test` runs it where the
+//! program is there; a test that runs without its program fails.
 
 use crate::setup::apt;
 use crate::setup::demand::{Kind, Size, Tool};
