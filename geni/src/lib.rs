@@ -82,7 +82,7 @@ pub use options::{Options, Requests, Start};
 pub use ram::{ArrayRam, RAM_LEN, SharedRam};
 pub use request_queue::{
     AnswerError, MAX_REQUEST_DATA_LEN, MemoryRequest, READ_DEVICE, RequestAnswer, RequestHeader,
-    RequestStatus, WRITE_DEVICE,
+    RequestStatus, WRITE_DEVICE, WRITE_POINT,
 };
 pub use setup_table::{BusRate, Configuration, DipSwitches, InvalidConfiguration};
 pub use status_table::Status;

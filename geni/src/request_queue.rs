@@ -16,6 +16,11 @@ pub const READ_DEVICE: u8 = 0x1E;
 /// Command of a request that writes memory (the subfunction code of the Write Device datagram).
 pub const WRITE_DEVICE: u8 = 0x20;
 
+/// Command of a request that changes single bits of memory (the subfunction code of the Write Point
+/// datagram). The manual names this datagram and prints no code: this one is from general knowledge
+/// of Genius, unchecked.
+pub const WRITE_POINT: u8 = 0x0B;
+
 /// What a host says to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -45,7 +50,7 @@ impl RequestStatus {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RequestHeader {
-    /// [`READ_DEVICE`], [`WRITE_DEVICE`] or another subfunction code.
+    /// [`READ_DEVICE`], [`WRITE_DEVICE`], [`WRITE_POINT`] or another subfunction code.
     pub command: u8,
     /// Number of data bytes, as the asker gave it.
     pub len: u8,

@@ -122,6 +122,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_local_time_ahead_is_the_one_that_this_computer_will_show_then() {
+        for ahead in [std::time::Duration::ZERO, std::time::Duration::from_millis(23_456)] {
+            let now = || (Local::now() + TimeDelta::from_std(ahead).unwrap()).naive_local();
+            let before = now();
+            let told = NaiveDateTime::try_from(local_time_in(ahead).unwrap()).unwrap();
+            let after = now();
+            // A stamp has whole milliseconds.
+            assert!((before - TimeDelta::milliseconds(1)..=after).contains(&told), "{before} {told} {after}");
+        }
+    }
+
+    #[test]
     fn a_time_goes_on_from_where_it_is() {
         let time = parse_time("2026-12-31T23:59:59.990").unwrap();
         let later = time_after(time, std::time::Duration::from_millis(2040));

@@ -6,7 +6,7 @@ mod common;
 use std::fs;
 use std::io::{Read, Write};
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use common::bench::{Bench, text};
@@ -491,4 +491,34 @@ fn a_folder_is_no_capture() {
     let output = ser_cli().arg("decode").arg(Path::new("/")).output().expect("ser-cli runs");
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stderr).contains("hint: "), "{}", text(&output.stderr));
+}
+
+/// A database reads what a user gives it.
+mod needs_sqlite3 {
+    use super::*;
+
+    /// What `SQLite` says to a question about the table that a CSV file makes.
+    fn asked(csv: &Path, question: &str) -> String {
+        let import = format!(".import --csv '{}' events", csv.display());
+        let output = Command::new("sqlite3").args([":memory:", &import, question]).output();
+        let output = output.expect("sqlite3 runs: cargo xtask test --all installs it");
+        assert!(output.status.success() && output.stderr.is_empty(), "{}", text(&output.stderr));
+        text(&output.stdout)
+    }
+
+    #[test]
+    #[ignore = "needs sqlite3: cargo xtask test"]
+    fn a_log_in_csv_is_imported_with_every_event_and_its_columns() {
+        let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
+        bench.contacts("0,1,1\n0,16,1\n7,1,0\n9,16,0", 3);
+        let csv = bench.folder.path().join("events.csv");
+        fs::write(&csv, bench.ok("read --all --format csv")).expect("written");
+        assert_eq!(
+            asked(&csv, "select entry, input, state from events order by entry + 0, input + 0"),
+            "1|1|1\n1|16|1\n2|1|0\n3|16|0\n"
+        );
+        // Both stamps are times to `SQLite`, too, and as far apart as the contacts moved.
+        let apart = "select round((max(julianday(time)) - min(julianday(time))) * 86400000) from events";
+        assert_eq!(asked(&csv, apart), "9.0\n");
+    }
 }

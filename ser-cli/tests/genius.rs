@@ -165,7 +165,14 @@ fn the_bus_is_seen_and_spoken_to_as_a_whole() {
          \u{20}  5      4   4    0       none  recorder, 32 inputs\n\
          \u{20}  9      4   2    0       none  recorder, 16 inputs\n"
     );
-    assert_eq!(bench.on_bus("genius globals"), "node  inputs  on\n   5      32  3 17\n   9      16  16\n");
+    let globals = "node  inputs  on\n   5      32  3 17\n   9      16  16\n";
+    assert_eq!(bench.on_bus("genius globals"), globals);
+    assert_eq!(bench.on_bus("genius globals --model-number 4"), globals);
+    for command in ["genius globals --model-number 3", "genius broadcast --model-number 3 stop"] {
+        let (code, told) = told(bench.command(&bench.bus(), command));
+        assert_eq!(code, Some(1), "{told}");
+        assert!(told.contains("no recorder is logged in") && told.contains("--model-number"), "{told}");
+    }
     assert_eq!(
         bench.on_bus("genius forces --node 9 --table input-enable"),
         "input enable: 00 00 (points none)\n"

@@ -44,7 +44,7 @@ pub use endpoint::{Endpoint, EndpointError, GeniWindow};
 pub use follower::{LogFollower, Step};
 pub use genius::{BlockKind, BoardStatus, DeviceRecord, GeniusError};
 #[cfg(unix)]
-pub use genius::{BusDevice, GeniHost};
+pub use genius::{BusDevice, BusRecorders, GeniHost, Recognition};
 pub use line_rate::LineRate;
 pub use log_position::LogPosition;
 pub use open::{OpenError, open};

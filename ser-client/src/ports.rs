@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use serialport::SerialPortType;
+use serialport::{SerialPortInfo, SerialPortType};
 
 /// A serial port that can be opened by its path.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,11 +23,14 @@ pub fn ports() -> Vec<PortInfo> {
     if cfg!(target_os = "linux") && !std::path::Path::new("/sys/class/tty").is_dir() {
         return Vec::new();
     }
-    let mut ports: Vec<PortInfo> = serialport::available_ports()
-        .unwrap_or_default()
-        .into_iter()
-        .map(|port| PortInfo { path: port.port_name, description: describe(&port.port_type) })
-        .collect();
+    listed(serialport::available_ports().unwrap_or_default())
+}
+
+/// The ports that a system names, in whatever order.
+fn listed(found: Vec<SerialPortInfo>) -> Vec<PortInfo> {
+    let named =
+        |port: SerialPortInfo| PortInfo { path: port.port_name, description: describe(&port.port_type) };
+    let mut ports: Vec<PortInfo> = found.into_iter().map(named).collect();
     ports.sort_by(|a, b| a.path.cmp(&b.path));
     ports
 }
@@ -60,8 +63,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn listing_ports_never_fails() {
-        let _ = ports();
+    fn ports_are_listed_by_path() {
+        let found = [("/dev/ttyUSB0", SerialPortType::Unknown), ("/dev/ttyS1", SerialPortType::PciPort)];
+        let found = found.map(|(name, port_type)| SerialPortInfo { port_name: name.to_owned(), port_type });
+        let texts: Vec<_> = listed(found.to_vec()).iter().map(PortInfo::to_string).collect();
+        assert_eq!(texts, ["/dev/ttyS1  PCI", "/dev/ttyUSB0"]);
     }
 
     #[test]

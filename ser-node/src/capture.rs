@@ -278,12 +278,15 @@ mod tests {
     #[test]
     fn a_late_interrupt_is_counted_and_debounce_times_stay_times() {
         let mut channel = CaptureChannel::new();
-        let (mut capture, mut reader) = channel.split(Debounce::uniform(5));
+        let (mut capture, mut reader) = channel.split(Debounce::OFF.with(1, 5));
         capture.sample(10, 0);
         capture.sample(11, 1);
-        // Nine samples are missed; the input was seen to change at 11, so the change is accepted as of 16.
-        capture.sample(21, 1);
-        assert_eq!(drain(&mut reader), [(10, 0, 0), (16, 1, 1)]);
+        // Nine samples are missed; input 1 was seen to change at 11, so the change is accepted as
+        // of 16. Input 2 has no debounce: the late sample is the first to see it, and its tick is
+        // the stamp.
+        capture.sample(21, 0b11);
+        capture.sample(22, 0b01);
+        assert_eq!(drain(&mut reader), [(10, 0, 0), (16, 0b01, 0b01), (21, 0b10, 0b11), (22, 0b10, 0b01)]);
         assert_eq!(reader.samples_missed(), 9);
     }
 

@@ -115,9 +115,16 @@ impl World {
     /// The same on a noisy bus.
     #[must_use]
     pub fn with_noise(recorders: &[(u8, Model)], noise: Noise) -> World {
+        World::with_boards(recorders, noise, BoardOptions::default().model)
+    }
+
+    /// The same with boards of this model number.
+    #[must_use]
+    pub fn with_boards(recorders: &[(u8, Model)], noise: Noise, board_model: u8) -> World {
         let bus = Rc::new(RefCell::new(Bus::with_noise(BusRate::default(), noise)));
         let connect = |number| {
-            let board = bus.borrow_mut().connect(Board::new(BoardOptions::at(number)));
+            let options = BoardOptions { model: board_model, ..BoardOptions::at(number) };
+            let board = bus.borrow_mut().connect(Board::new(options));
             (board, BoardWindow::new(Rc::clone(&bus), board))
         };
         let recorders = recorders

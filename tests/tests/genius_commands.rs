@@ -1,9 +1,13 @@
 //! Every command of a host over Genius, and what is no command.
 
+use std::rc::Rc;
+
 use geni::Destination::{Broadcast, Device};
+use geni::{Configuration, Driver, Event, Options, Received, Start};
 use ser_proto::{
-    AutoReport, Baud, Code, Command, Configure, Inputs, LastBroadcast, Mode, Model, Reply, TimeStamp,
+    AutoReport, Baud, Code, Command, Configure, Entry, Inputs, LastBroadcast, Mode, Model, Reply, TimeStamp,
 };
+use ser_sim::genius::{Board, BoardOptions, BoardWindow};
 use ser_tests::genius_world::{HOST, World};
 
 const UNIT: u8 = 5;
@@ -28,6 +32,16 @@ fn read(world: &mut World, start: u16, count: u8) -> ser_proto::ReadReply {
         Reply::Read(reply) => reply,
         other => panic!("{other:?}"),
     }
+}
+
+/// So many entries of the log.
+fn log(world: &mut World, start: u16, count: u16) -> Vec<Entry> {
+    let mut entries = Vec::new();
+    for at in start..start + count {
+        entries.extend(read(world, at, 1).entries);
+    }
+    assert_eq!(entries.len(), usize::from(count));
+    entries
 }
 
 const fn unchanged() -> Configure {
@@ -155,6 +169,36 @@ fn read_io_forces_shows_that_nothing_is_forced() {
 }
 
 #[test]
+fn a_command_of_another_length_is_not_carried_out() {
+    let mut world = started(Model::Ser160);
+    world.ask(UNIT, &Command::SetClock(NOON));
+    events(&mut world, 3);
+    let Reply::Configuration(before) = world.ask(UNIT, &Command::QueryConfiguration) else { panic!() };
+    let wrong = [
+        &b"E\0"[..],
+        b"M\0\0\0",
+        b"S\x1A\x0B\x16\x17\0\0\0",
+        b"S\x1A\x0B\x16\x17\0\0\0\0\0",
+        b"C\0\x64\x06\x02",
+        b"C\0\x64\x06\x02\x01\x01\0",
+    ];
+    for data in wrong {
+        for to in [Device(UNIT), Broadcast] {
+            world.transmit(to, 0x40, 0x50, data);
+            world.run(50);
+        }
+    }
+    assert_eq!(world.take_message(UNIT), None);
+    assert_eq!(world.ask(UNIT, &Command::QueryConfiguration), Reply::Configuration(before));
+    assert!(matches!(world.ask(UNIT, &Command::QueryMode), Reply::Mode(Mode { recording: true, .. })));
+    assert_eq!(world.ask(UNIT, &Command::LastBroadcast), Reply::LastBroadcast(None));
+    world.recorders[0].contact(1, false);
+    world.step();
+    let after = read(&mut world, 4, 1);
+    assert_eq!((after.total, after.entries[0].time.hour), (4, NOON.hour), "neither erased nor set");
+}
+
+#[test]
 fn datagrams_of_any_content_and_length_are_counted_and_ignored() {
     let mut world = started(Model::Ser160);
     let before = world.recorders[0].node.diagnostics();
@@ -190,7 +234,8 @@ fn auto_reports_go_to_the_configured_address_once_each() {
         let Ok(Reply::Read(report)) = Reply::parse(&data) else { panic!() };
         entries.extend(report.entries);
     }
-    assert_eq!(entries.len(), 26);
+    // Those from before are not reported.
+    assert_eq!(entries, log(&mut world, 5, 26));
     // Recorded while nobody is there to hear: reported when somebody is.
     let fault = ser_sim::genius::Fault::Disconnect { device: world.host.board.id(), for_us: 5_000_000 };
     world.bus.borrow_mut().inject(fault);
@@ -198,12 +243,12 @@ fn auto_reports_go_to_the_configured_address_once_each() {
     world.run(5_000);
     assert_eq!(world.take_message(UNIT), None);
     world.run(5_000);
-    let mut late = 0;
+    let mut late = Vec::new();
     while let Some((_, data)) = world.take_message(UNIT) {
         let Ok(Reply::Read(report)) = Reply::parse(&data) else { panic!() };
-        late += report.entries.len();
+        late.extend(report.entries);
     }
-    assert_eq!(late, 26);
+    assert_eq!(late, log(&mut world, 31, 26));
     assert!(world.recorders[0].port.diagnostics().reports_failed > 0);
     assert_eq!(world.recorders[0].node.diagnostics().events_unreported, 0);
     world.assert_lawful();
@@ -246,6 +291,64 @@ fn recorders_that_report_without_end_leave_everybody_a_turn() {
     let reports = world.recorders.iter().map(|recorder| recorder.port.diagnostics().reports_sent);
     assert!(reports.clone().all(|sent| sent > 1_000), "{:?}", reports.collect::<Vec<_>>());
     assert_eq!(world.host.driver.counters().commands_timed_out, 0);
+    world.assert_lawful();
+}
+
+/// Another host on the bus, which knows the recorder.
+fn second_host(world: &mut World, number: u8) -> Driver<BoardWindow> {
+    let board = world.bus.borrow_mut().connect(Board::new(BoardOptions::at(number)));
+    let window = BoardWindow::new(Rc::clone(&world.bus), board);
+    let options = Options { start: Start::Reset { hold_ms: 20 }, ..Options::new(Configuration::DEFAULT) };
+    let mut host = Driver::new(window, options);
+    world.until("the second host knows the recorder", |world| {
+        look(&mut host, world);
+        (host.device(UNIT).is_ok() && host.can_transmit()).then_some(())
+    });
+    host
+}
+
+/// What a host has received, if something has happened.
+fn look(host: &mut Driver<BoardWindow>, world: &World) -> Option<Received> {
+    let event = host.poll(u32::try_from(world.now_ms).expect("less than 49 days"));
+    let held = host.reset_held();
+    host.ram_mut().drive_reset(held);
+    match event {
+        Some(Event::Received(received)) => Some(received),
+        _ => None,
+    }
+}
+
+#[test]
+fn of_two_hosts_that_ask_each_gets_the_answer_to_its_own_question() {
+    let mut world = started(Model::Ser160);
+    let mut second = second_host(&mut world, 30);
+    for _ in 0..10 {
+        world.send(Device(UNIT), &Command::QueryConfiguration);
+        let question = geni::Transmission {
+            destination: Device(UNIT),
+            function: 0x40,
+            subfunction: 0x50,
+            priority: geni::Priority::Normal,
+            completion: geni::Completion::Acknowledged,
+            data: geni::Data::from_slice(b"M").expect("a byte"),
+        };
+        second.transmit(question).expect("the board is free");
+        let (mut first_got, mut second_got) = (Vec::new(), Vec::new());
+        for _ in 0..200 {
+            world.step();
+            second_got.extend(look(&mut second, &world).map(|received| received.data));
+            first_got.extend(world.take_message(UNIT).map(|(_, data)| data));
+        }
+        let [Ok(Reply::Configuration(_))] =
+            first_got.iter().map(|data| Reply::parse(data)).collect::<Vec<_>>()[..]
+        else {
+            panic!("{first_got:?}")
+        };
+        let [Ok(Reply::Mode(_))] = second_got.iter().map(|data| Reply::parse(data)).collect::<Vec<_>>()[..]
+        else {
+            panic!("{second_got:?}")
+        };
+    }
     world.assert_lawful();
 }
 

@@ -11,6 +11,17 @@ use ser_tests::recorder::{Kind, NODE, PATIENCE, PATIENT, Recorder};
 /// As the image's memory map has it.
 const STACK_LEN: u32 = 8 * 1024;
 
+/// Where the bound is that the checks of the image have found by walking through it, in bytes: set
+/// by `cargo xtask test`.
+const BOUND_VARIABLE: &str = "SER_STACK_BOUND_MPS2_AN385";
+
+/// How deep the stack of the image can get, by its instructions.
+fn bound() -> u32 {
+    let bound = std::env::var(BOUND_VARIABLE);
+    let bound = bound.unwrap_or_else(|_| panic!("{BOUND_VARIABLE} is not set: run `cargo xtask test`"));
+    bound.parse().expect("a number of bytes")
+}
+
 /// Every so often the image looks at its stack.
 const LOOK_EVERY_MS: u32 = 1000;
 
@@ -81,7 +92,8 @@ fn assert_log_is(entries: &[Entry], played: &[Played]) {
 
 #[test]
 #[ignore = "needs the emulator and the image: cargo xtask test"]
-fn a_quarter_of_the_stack_is_never_in_use() {
+fn a_quarter_of_the_stack_is_never_in_use_nor_more_than_the_bound_found_in_the_image() {
+    let bound = bound();
     let recorder = Recorder::start_on_bus(Kind::Emulated, Model::Ser320);
     let (host, board, port) = (recorder.host(), recorder.board(), recorder.port().to_owned());
     let mut on_bus = host.unit(NODE, PATIENT);
@@ -126,6 +138,10 @@ fn a_quarter_of_the_stack_is_never_in_use() {
     println!("{used} of {STACK_LEN} bytes of the stack have been in use ({} %)", used * 100 / STACK_LEN);
     assert!(used > 0, "the image has not looked");
     assert!(used <= STACK_LEN / 4 * 3, "{used} of {STACK_LEN} bytes");
+    assert!(
+        used <= bound,
+        "{used} bytes in use, and no more than {bound} can be by the image's instructions"
+    );
     assert_eq!(board.boots(), 1);
     recorder.assert_lawful();
 

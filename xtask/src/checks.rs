@@ -14,7 +14,7 @@ use crate::boards::Board;
 use crate::image::Image;
 use crate::image::calls::Calls;
 
-pub(crate) use stack::{Share, shares};
+pub(crate) use stack::{Share, bound, shares};
 
 /// What came out of one check of one image.
 #[derive(Clone, Debug, PartialEq, Eq)]

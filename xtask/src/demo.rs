@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 
+use crate::setup::demand::Installing;
 use crate::steps::{self, Result};
 use crate::{firmware, qemu};
 
@@ -23,10 +24,10 @@ pub(crate) struct Arguments {
     options: Vec<OsString>,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
     let mut demo = qemu::ser_cli("demo");
     if arguments.qemu {
-        demo.arg("--image").arg(firmware::build_emulated()?);
+        demo.arg("--image").arg(firmware::build_emulated(installing)?);
     }
     qemu::build_ser_cli()?;
     steps::become_program(demo.args(&arguments.options))

@@ -7,6 +7,7 @@ use crate::checks::{self, Outcome};
 use crate::image::Image;
 use crate::image::calls::Calls;
 use crate::setup::cross::{self, CrossToolchain};
+use crate::setup::demand::Installing;
 use crate::setup::emulator;
 use crate::steps::{self, Failure, Result, heading, note};
 use crate::{stack_paths, table};
@@ -40,17 +41,17 @@ pub(crate) fn board(name: &str) -> std::result::Result<&'static Board, String> {
     Board::named(name).ok_or_else(|| format!("the boards are {}", names.join(", ")))
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
     let boards: Vec<&Board> = match arguments.board {
         Some(board) => vec![board],
         None => BOARDS.iter().collect(),
     };
-    let (found, missing) = toolchains(&boards);
+    let (found, missing) = toolchains(&boards, installing);
     let checked = build_and_check(&found, arguments.stack);
     // The other images have been built and checked all the same.
     match (checked, missing.into_iter().next()) {
-        (Ok(()), Some(missing)) => Err(missing),
-        (checked, _) => checked,
+        (Ok(_), Some(missing)) => Err(missing),
+        (checked, _) => checked.map(drop),
     }
 }
 
@@ -58,10 +59,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
 pub(crate) type Toolchains<'a> = (Vec<(&'a Board, CrossToolchain)>, Vec<Failure>);
 
 /// Finds a toolchain for each board.
-pub(crate) fn toolchains<'a>(boards: &[&'a Board]) -> Toolchains<'a> {
+pub(crate) fn toolchains<'a>(boards: &[&'a Board], installing: Installing) -> Toolchains<'a> {
     let (mut found, mut missing) = (Vec::new(), Vec::new());
     let targets: Vec<_> = boards.iter().map(|board| board.target).collect();
-    for (&board, toolchain) in boards.iter().zip(cross::find(&targets)) {
+    for (&board, toolchain) in boards.iter().zip(cross::find(&targets, installing)) {
         match toolchain {
             Ok(toolchain) => found.push((board, toolchain)),
             Err(failure) => {
@@ -74,9 +75,9 @@ pub(crate) fn toolchains<'a>(boards: &[&'a Board]) -> Toolchains<'a> {
 }
 
 /// Builds the image for the emulator, which has to be there; gives its file.
-pub(crate) fn build_emulated() -> Result<PathBuf> {
-    emulator::find()?;
-    let toolchain = cross::find_one(MPS2_AN385.target)?;
+pub(crate) fn build_emulated(installing: Installing) -> Result<PathBuf> {
+    emulator::find(installing)?;
+    let toolchain = cross::find_one(MPS2_AN385.target, installing)?;
     heading("Firmware");
     build(&toolchain, &MPS2_AN385)
 }
@@ -87,25 +88,38 @@ fn build(toolchain: &CrossToolchain, board: &Board) -> Result<PathBuf> {
     Ok(board.image())
 }
 
+/// An image that may be flashed.
+#[derive(Debug)]
+pub(crate) struct Checked {
+    /// The board's name.
+    pub(crate) board: &'static str,
+    /// How deep its stack can get at most, in bytes.
+    pub(crate) stack_bytes: u32,
+}
+
 /// Builds images and checks them. One that may not be flashed is a failure.
-pub(crate) fn build_and_check(boards: &[(&Board, CrossToolchain)], stack: bool) -> Result<()> {
+pub(crate) fn build_and_check(boards: &[(&Board, CrossToolchain)], stack: bool) -> Result<Vec<Checked>> {
     if boards.is_empty() {
-        return Ok(());
+        return Ok(Vec::new());
     }
     heading("Firmware");
-    let mut columns = Vec::new();
+    let (mut columns, mut checked) = (Vec::new(), Vec::new());
     let mut paths = String::new();
     for (board, toolchain) in boards {
         let image = Image::read(&build(toolchain, board)?)?;
         let calls = Calls::of(&image, &checks::forced(board, &image));
         columns.push((*board, checks::all(board, &image, &calls)));
+        // Where there is no bound, one of the checks has failed.
+        let stack_bytes = checks::bound(&image, &calls).unwrap_or(0);
+        checked.push(Checked { board: board.name, stack_bytes });
         if stack {
             paths += &stack_paths::shown(board, &image, &calls);
         }
     }
     table::print(&columns);
     print!("{paths}");
-    verdict(&columns)
+    verdict(&columns)?;
+    Ok(checked)
 }
 
 fn verdict(columns: &[(&Board, Vec<Outcome>)]) -> Result<()> {

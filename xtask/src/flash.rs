@@ -5,6 +5,7 @@ use std::ffi::OsString;
 use crate::boards::{BOARDS, Board};
 use crate::firmware::{self, build_and_check};
 use crate::setup::cross;
+use crate::setup::demand::Installing;
 use crate::steps::{self, Failure, Result, heading, unrelated, works};
 
 const EXAMPLES: &str = "\
@@ -34,13 +35,13 @@ pub(crate) struct Arguments {
     options: Vec<OsString>,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
     let board = arguments.board;
     let chip = board.chip.ok_or_else(|| emulated(board))?;
     if !works(unrelated(PROBE_RS).arg("--version")) {
         return Err(missing());
     }
-    build_and_check(&[(board, cross::find_one(board.target)?)], false)?;
+    build_and_check(&[(board, cross::find_one(board.target, installing)?)], false)?;
     heading(&format!("Flashing {}", board.name));
     let mut flash = unrelated(PROBE_RS);
     flash.args(["download", "--chip", chip, "--verify"]);

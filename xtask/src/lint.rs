@@ -3,29 +3,35 @@
 use crate::boards::{BOARDS, Board};
 use crate::firmware::toolchains;
 use crate::places;
-use crate::setup::components;
 use crate::setup::cross::CrossToolchain;
-use crate::steps::{self, Result, heading, note};
+use crate::setup::demand::{Demand, Installing, Kind, Options};
+use crate::setup::{self, components};
+use crate::steps::{self, Failure, Result, heading, note};
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask lint
-  cargo fmt --all           mends the format; in firmware/, too";
+  cargo xtask lint              installs what is missing of rustfmt, clippy and the cross toolchain
+  cargo xtask lint --offline    installs nothing
+  cargo fmt --all               mends the format; in firmware/, too";
 
 /// Check format, clippy and documentation of both workspaces; warnings are errors.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {}
 
-pub(crate) fn run(_arguments: &Arguments) -> Result<()> {
+pub(crate) fn run(_arguments: &Arguments, installing: Installing) -> Result<()> {
+    heading("Tools");
+    let demand = Demand::here(Options::default(), installing);
+    let targets = BOARDS.each_ref().map(|board| board.target);
+    setup::make_ready(demand, &targets, &Kind::OF_LINT)?;
     host()?;
-    let (found, _) = toolchains(&BOARDS.each_ref());
-    firmware(&found)
+    let (found, _) = toolchains(&BOARDS.each_ref(), Installing::Forbidden);
+    firmware(&found, demand.is_strict())
 }
 
 /// All that needs no cross toolchain.
 pub(crate) fn host() -> Result<()> {
-    components::find()?;
+    components::find(Installing::Forbidden)?;
     heading("Format");
     steps::run(steps::cargo().args(["fmt", "--all", "--check"]))?;
     steps::run(steps::cargo().current_dir(places::firmware()).args(["fmt", "--all", "--check"]))?;
@@ -39,8 +45,8 @@ pub(crate) fn host() -> Result<()> {
     steps::run(steps::cargo().env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--no-deps", "--workspace"]))
 }
 
-/// What is flashed.
-pub(crate) fn firmware(boards: &[(&Board, CrossToolchain)]) -> Result<()> {
+/// What is flashed. A toolchain without clippy is a failure where nothing may be left out.
+pub(crate) fn firmware(boards: &[(&Board, CrossToolchain)], strict: bool) -> Result<()> {
     for (board, toolchain) in boards {
         heading(&format!("Clippy on the firmware for {}", board.name));
         match toolchain.clippy() {
@@ -48,6 +54,7 @@ pub(crate) fn firmware(boards: &[(&Board, CrossToolchain)]) -> Result<()> {
                 let package = ["--release", "--package", board.package];
                 steps::run(clippy.args(package).args(["--", "-D", "warnings"]))?;
             }
+            None if strict => return Err(Failure::new("this cross toolchain has no clippy")),
             None => note("left out: this cross toolchain has no clippy"),
         }
     }

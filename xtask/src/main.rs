@@ -27,10 +27,16 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use setup::demand::Installing;
+
 /// Everything about the project that is one command. Missing tools are installed where that can be done.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", version, max_term_width = 100)]
 struct Arguments {
+    /// Install no tools; say what is missing.
+    #[arg(long, global = true)]
+    offline: bool,
+
     #[command(subcommand)]
     verb: Verb,
 }
@@ -50,17 +56,19 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
-    let done = match Arguments::parse().verb {
-        Verb::Demo(arguments) => demo::run(&arguments),
-        Verb::Qemu(arguments) => qemu::run(&arguments),
-        Verb::Test(arguments) => test::run(&arguments),
-        Verb::Firmware(arguments) => firmware::run(&arguments),
-        Verb::Flash(arguments) => flash::run(&arguments),
+    let Arguments { offline, verb } = Arguments::parse();
+    let installing = if offline { Installing::Forbidden } else { Installing::Allowed };
+    let done = match verb {
+        Verb::Demo(arguments) => demo::run(&arguments, installing),
+        Verb::Qemu(arguments) => qemu::run(&arguments, installing),
+        Verb::Test(arguments) => test::run(&arguments, installing),
+        Verb::Firmware(arguments) => firmware::run(&arguments, installing),
+        Verb::Flash(arguments) => flash::run(&arguments, installing),
         Verb::Fuzz(arguments) => fuzz::run(&arguments),
-        Verb::Lint(arguments) => lint::run(&arguments),
+        Verb::Lint(arguments) => lint::run(&arguments, installing),
         Verb::Log(arguments) => log::run(&arguments),
         Verb::Simulate(arguments) => simulate::run(&arguments),
-        Verb::Timing(arguments) => timing::run(&arguments),
+        Verb::Timing(arguments) => timing::run(&arguments, installing),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -4,6 +4,7 @@ use std::ffi::OsString;
 use std::process::Command;
 
 use crate::firmware;
+use crate::setup::demand::Installing;
 use crate::steps::{self, Result, heading};
 
 const EXAMPLES: &str = "\
@@ -24,8 +25,8 @@ pub(crate) struct Arguments {
     options: Vec<OsString>,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let image = firmware::build_emulated()?;
+pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
+    let image = firmware::build_emulated(installing)?;
     build_ser_cli()?;
     steps::become_program(ser_cli("sim").arg("--image").arg(image).args(&arguments.options))
 }

@@ -4,8 +4,8 @@ use std::ffi::OsStr;
 use std::fmt;
 use std::path::Path;
 use std::process::Command;
-use std::sync::OnceLock;
-use std::time::Instant;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 /// Why a verb ended early; says what to do.
 #[derive(Debug)]
@@ -25,11 +25,39 @@ impl fmt::Display for Failure {
 
 pub(crate) type Result<T> = std::result::Result<T, Failure>;
 
+/// The steps so far, each with its beginning.
+static STEPS: Mutex<Vec<(String, Instant)>> = Mutex::new(Vec::new());
+
 /// Announces the next step, with the time since the first one.
 pub(crate) fn heading(text: &str) {
-    static BEGAN: OnceLock<Instant> = OnceLock::new();
-    let seconds = BEGAN.get_or_init(Instant::now).elapsed().as_secs();
-    eprintln!("\n==> {}:{:02}  {text}", seconds / 60, seconds % 60);
+    let mut steps = STEPS.lock().unwrap_or_else(PoisonError::into_inner);
+    steps.push((text.to_owned(), Instant::now()));
+    let since_first = steps.first().map_or(Duration::ZERO, |(_, began)| began.elapsed());
+    eprintln!("\n==> {}  {text}", minutes(since_first));
+}
+
+/// Prints how long each step took.
+pub(crate) fn print_durations() {
+    let steps = STEPS.lock().unwrap_or_else(PoisonError::into_inner);
+    eprintln!("\n==> Minutes of each step");
+    durations(&steps, Instant::now()).iter().for_each(|line| eprintln!("{line}"));
+}
+
+/// A line for each step, and one for all together.
+fn durations(steps: &[(String, Instant)], end: Instant) -> Vec<String> {
+    let ends = steps.iter().skip(1).map(|&(_, began)| began).chain([end]);
+    let line = |took, text: &str| format!("{:>8}  {text}", minutes(took));
+    let mut lines: Vec<String> =
+        steps.iter().zip(ends).map(|((text, began), end)| line(end - *began, text)).collect();
+    let total = steps.first().map_or(Duration::ZERO, |&(_, began)| end - began);
+    lines.push(line(total, "together"));
+    lines
+}
+
+/// As `3:07`.
+fn minutes(time: Duration) -> String {
+    let seconds = time.as_secs();
+    format!("{}:{:02}", seconds / 60, seconds % 60)
 }
 
 /// A remark on what is not done, and why.
@@ -142,6 +170,17 @@ fn quoted(text: &OsStr) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_step_lasts_until_the_next_one_begins() {
+        let began = Instant::now();
+        let at = |seconds| began + Duration::from_secs(seconds);
+        let steps = [("Format".to_owned(), at(0)), ("Tests".to_owned(), at(5)), ("More".to_owned(), at(130))];
+        assert_eq!(
+            durations(&steps, at(131)),
+            ["    0:05  Format", "    2:05  Tests", "    0:01  More", "    2:11  together"]
+        );
+    }
 
     #[test]
     fn a_command_is_repeated_as_one_would_type_it() {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::setup::demand::Installing;
 use crate::setup::emulator;
 use crate::steps::{self, Failure, Result, heading};
 use crate::{firmware, places};
@@ -37,8 +38,8 @@ pub(crate) struct Arguments {
     load_seconds: u32,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let image = firmware::build_emulated()?;
+pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
+    let image = firmware::build_emulated(installing)?;
     let plugin = build_plugin()?;
     heading("Timing");
     let mut timing = steps::cargo();

@@ -2,7 +2,7 @@
 
 use geni::{
     AnswerError, Configuration, Event, Options, READ_DEVICE, RequestAnswer, RequestHeader, RequestStatus,
-    Requests, Start, WRITE_DEVICE,
+    Requests, Start, WRITE_DEVICE, WRITE_POINT,
 };
 
 use crate::world::World;
@@ -45,6 +45,18 @@ fn a_full_queue_is_emptied_and_noticed_and_goes_around() {
     }
     let board = world.board();
     assert_eq!((board.ram[0x0880], board.ram[0x0881]), (45 % 16, 45 % 16));
+}
+
+#[test]
+fn a_write_point_brings_its_masks() {
+    let mut world = asking();
+    world.board().request(&[WRITE_POINT, 0, 4, 0x34, 0x12, 0, 30, 0, 0xFE, 0x01, 0xFF, 0x00]);
+    let (_, events) = world.until(10, is_request);
+    let Some(Event::Request(request)) = events.last() else { panic!("{events:?}") };
+    assert_eq!((request.header.command, request.header.address), (0x0B, 0x1234));
+    assert_eq!(request.data, [0xFE, 0x01, 0xFF, 0x00]);
+    world.driver.answer_request(RequestAnswer::Status(RequestStatus::Complete)).expect("done");
+    assert_eq!((world.peek(1), world.peek(0x0880)), (1, 1));
 }
 
 #[test]

@@ -6,10 +6,11 @@ mod forces;
 mod globals;
 
 use clap::ValueEnum;
-use ser_client::GeniHost;
-use ser_proto::genius::{Device, ForceTable, GlobalData};
+use ser_client::Recognition;
+use ser_proto::genius::{Device, ForceTable};
 
 use crate::cli::ConnectionArgs;
+use crate::connection;
 use crate::error::{Failure, Result};
 
 const EXAMPLES: &str = "\
@@ -17,6 +18,7 @@ Examples:
   ser-cli genius devices --port geni:/dev/shm/host
   ser-cli genius globals --port geni:/dev/shm/host
   ser-cli genius globals --follow
+  ser-cli genius globals --model-number 4
   ser-cli genius forces --node 5 --table input-values
   ser-cli genius broadcast clock
   ser-cli genius broadcast erase --yes
@@ -53,13 +55,18 @@ pub(crate) struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum What {
     /// List the devices that are logged in.
-    Devices,
+    Devices {
+        #[command(flatten)]
+        who: Who,
+    },
     /// Show the live inputs of every recorder, all of one and the same bus scan. The exit code is 1 when there is none.
     #[command(after_help = GLOBALS_EXAMPLES)]
     Globals {
         /// Go on and show every recorder again whose inputs have changed, until Ctrl-C.
         #[arg(long)]
         follow: bool,
+        #[command(flatten)]
+        who: Who,
     },
     /// Show which inputs or outputs of a device are forced, and to what.
     #[command(after_help = FORCES_EXAMPLES)]
@@ -79,7 +86,27 @@ enum What {
     Broadcast {
         #[command(subcommand)]
         what: broadcast::What,
+        #[command(flatten)]
+        who: Who,
     },
+}
+
+/// Who is taken for a recorder.
+#[derive(Clone, Copy, Debug, clap::Args)]
+struct Who {
+    /// Take the devices with this model number for recorders, and ask nobody. Without it every
+    /// device that sends as much as a recorder is asked.
+    #[arg(long, value_name = "N", global = true)]
+    model_number: Option<u8>,
+}
+
+impl Who {
+    fn recognition(self, connection: &ConnectionArgs) -> Recognition {
+        match self.model_number {
+            Some(model) => Recognition::ModelNumber(model),
+            None => Recognition::Asking(connection::options(connection)),
+        }
+    }
 }
 
 /// One of the four tables of a device.
@@ -113,20 +140,34 @@ fn device(text: &str) -> std::result::Result<Device, String> {
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     match args.what {
-        What::Devices => devices::run(connection),
-        What::Globals { follow } => globals::run(connection, follow),
+        What::Devices { who } => devices::run(connection, who.recognition(connection)),
+        What::Globals { follow, who } => globals::run(connection, follow, who.recognition(connection)),
         What::Forces { node, table } => forces::run(connection, node.number(), table.into()),
-        What::Broadcast { what } => broadcast::run(connection, what),
+        What::Broadcast { what, who } => broadcast::run(connection, what, who.recognition(connection)),
     }
 }
 
-/// All recorders that are logged in, and what their inputs are.
-fn recorders(host: &GeniHost) -> Result<Vec<(u8, GlobalData)>> {
-    let devices = host.devices()?;
-    Ok(devices.iter().filter_map(|device| Some((device.number, device.recorder_inputs()?))).collect())
+/// Who might be a recorder and does not answer as one, in words; none when there is nobody.
+fn silent_candidates(silent: &[u8]) -> Option<String> {
+    let numbers: Vec<_> = silent.iter().map(u8::to_string).collect();
+    let numbers = Some(numbers.join(", ")).filter(|numbers| !numbers.is_empty())?;
+    Some(format!("no answer from device {numbers}: no recorder, or one that hangs"))
 }
 
 fn no_recorder() -> Failure {
     Failure::new("no recorder is logged in")
         .hint("ser-cli genius devices lists what is; check numbers and bus rate")
+        .hint("a recorder that cannot answer is taken for one with --model-number")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_does_not_answer_is_named() {
+        assert_eq!(silent_candidates(&[]), None);
+        let said = silent_candidates(&[7, 12]).expect("two of them");
+        assert_eq!(said, "no answer from device 7, 12: no recorder, or one that hangs");
+    }
 }

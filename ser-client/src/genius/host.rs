@@ -5,24 +5,24 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use geni::{
-    BlockKind, Completion, Configuration, Data, Destination, Device, DeviceChange, Driver, Event, Failure,
-    Identity, MAX_DEVICE_NUMBER, Options, Priority, Received, SharedRam, Start, Status, TableError,
-    Transmission, TransmitError, map,
+    Completion, Configuration, Data, Destination, Device, DeviceChange, Driver, Event, Failure, Identity,
+    MAX_DEVICE_NUMBER, Options, Priority, Received, SharedRam, Start, Status, TableError, Transmission,
+    TransmitError, map,
 };
 use ser_proto::Command;
 use ser_proto::genius::{
-    Datagram, FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, GlobalData, IoForces, Message, SUBFUNCTION_SER,
-    Subfunction,
+    Datagram, FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, IoForces, Message, SUBFUNCTION_SER, Subfunction,
 };
 
 use super::GeniusError;
 use super::inboxes::Inboxes;
+use super::recognition::Answers;
 use super::window::Window;
 use crate::{Clock, RealTime};
 use crate::{GeniWindow, OpenError, Unit};
 
 /// Nothing tells when a file has changed, so it is looked at this often.
-const PACE: Duration = Duration::from_millis(1);
+pub(super) const PACE: Duration = Duration::from_millis(1);
 
 /// What happens in one look is dealt with, up to so many events; more wait for the next.
 const EVENTS_PER_LOOK: usize = 16;
@@ -57,27 +57,11 @@ pub struct BusDevice {
     pub inputs: Vec<u8>,
 }
 
-/// The model number of a GENI board, which is what the bus sees of a recorder. The manuals at hand do not print it; it
-/// is that of the simulated board, and blocks have others.
-const GENI_MODEL: u8 = 4;
-
-impl BusDevice {
-    /// The inputs of a recorder; `None` for other devices. A recorder is a GENI board that sends the state of its
-    /// inputs in every scan, and takes nothing.
-    #[must_use]
-    pub fn recorder_inputs(&self) -> Option<GlobalData> {
-        let sends_only =
-            self.device.output_len == 0 && matches!(self.device.kind, BlockKind::Inputs | BlockKind::Unknown);
-        let inputs = GlobalData::parse(&self.inputs).ok();
-        inputs.filter(|_| self.device.model == GENI_MODEL && sends_only)
-    }
-}
-
 /// A host on a Genius bus. Clones are the same host; each can be in another [`Unit`].
 #[derive(Clone)]
 pub struct GeniHost {
     shared: Arc<Mutex<Host>>,
-    clock: Arc<dyn Clock>,
+    pub(super) clock: Arc<dyn Clock>,
 }
 
 impl GeniHost {
@@ -226,7 +210,7 @@ impl GeniHost {
         self.clock.now()
     }
 
-    fn lock(&self) -> MutexGuard<'_, Host> {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Host> {
         self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -239,7 +223,7 @@ impl fmt::Debug for GeniHost {
 
 /// A message in a datagram whose acknowledgement is waited for. The reply comes as a datagram of its own: a board that
 /// is told to wait for it does nothing else meanwhile, and would take an auto report for it.
-fn ser_message(destination: Destination, command: &Command) -> Result<Transmission, GeniusError> {
+pub(super) fn ser_message(destination: Destination, command: &Command) -> Result<Transmission, GeniusError> {
     let data = Data::from_slice(&command.to_body());
     Ok(Transmission {
         destination,
@@ -264,13 +248,14 @@ const fn bit(number: u8) -> u32 {
 }
 
 /// The board, and what it has said.
-struct Host {
+pub(super) struct Host {
     driver: Driver<Window>,
     clock: Arc<dyn Clock>,
     patience: Duration,
     identity: Option<Identity>,
     failure: Option<Failure>,
-    inboxes: Inboxes,
+    pub(super) inboxes: Inboxes,
+    pub(super) answers: Answers,
     sent: Option<Result<(), geni::CommandError>>,
     replied: Option<Result<Received, geni::CommandError>>,
     tables: Option<Vec<BusDevice>>,
@@ -306,6 +291,7 @@ impl Host {
             identity: None,
             failure: None,
             inboxes: Inboxes::default(),
+            answers: Answers::default(),
             sent: None,
             replied: None,
             tables: None,
@@ -415,7 +401,7 @@ impl Host {
     }
 
     /// Sends a datagram and waits until it is out.
-    fn deliver(&mut self, transmission: Transmission) -> Result<(), GeniusError> {
+    pub(super) fn deliver(&mut self, transmission: Transmission) -> Result<(), GeniusError> {
         self.start()?;
         self.transmit(transmission)?;
         self.wait(self.datagram_patience(), |host| host.sent.is_some())?;
@@ -449,7 +435,7 @@ impl Host {
         }
     }
 
-    fn look(&mut self) -> Result<(), GeniusError> {
+    pub(super) fn look(&mut self) -> Result<(), GeniusError> {
         for _ in 0..EVENTS_PER_LOOK {
             let now_ms = self.clock.now().as_millis();
             #[expect(clippy::cast_possible_truncation, reason = "the count wraps")]
@@ -470,10 +456,14 @@ impl Host {
         match event {
             Event::Ready(identity) => {
                 self.identity = Some(identity);
+                self.answers.forget_all();
                 self.know(0);
             }
-            Event::Device { number, change: DeviceChange::LoggedOut } => self.know(self.known & !bit(number)),
-            Event::Device { number, .. } => self.know(self.known | bit(number)),
+            Event::Device { number, change } => {
+                self.answers.forget(number);
+                let others = self.known & !bit(number);
+                self.know(if change == DeviceChange::LoggedOut { others } else { others | bit(number) });
+            }
             Event::Failed(failure) => self.failure = Some(failure),
             Event::Received(received) => self.inboxes.put(received),
             Event::Sent(result) => self.sent = Some(result),

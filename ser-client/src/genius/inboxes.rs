@@ -38,6 +38,13 @@ impl Inboxes {
         self.boxes.get_mut(&node)?.pop_front()
     }
 
+    /// The oldest message of a device whose data are of some kind; the others stay.
+    pub(super) fn take_if(&mut self, node: u8, fits: impl Fn(&[u8]) -> bool) -> Option<Received> {
+        let inbox = self.boxes.get_mut(&node)?;
+        let place = inbox.iter().position(|received| fits(&received.data))?;
+        inbox.remove(place)
+    }
+
     /// Empties all boxes.
     pub(super) fn throw_away(&mut self) {
         let thrown_away: usize = self.boxes.values().map(VecDeque::len).sum();
@@ -72,6 +79,19 @@ mod tests {
         let taken = [5, 5, 5, 6, 7].map(|node| data(inboxes.take(node)));
         assert_eq!(taken, [Some(1), Some(5), None, Some(2), None]);
         assert_eq!(inboxes.lost(), (2, 0));
+    }
+
+    #[test]
+    fn one_kind_of_message_is_taken_from_among_others() {
+        let mut inboxes = Inboxes::default();
+        for data in [1, 2, 3, 2] {
+            inboxes.put(received(5, false, SUBFUNCTION_SER, data));
+        }
+        let taken = inboxes.take_if(5, |data| data == [2]).map(|received| received.data[0]);
+        assert_eq!((taken, inboxes.take_if(5, |data| data == [4])), (Some(2), None));
+        let left = [5; 4].map(|node| inboxes.take(node).map(|received| received.data[0]));
+        assert_eq!(left, [Some(1), Some(3), Some(2), None]);
+        assert_eq!(inboxes.take_if(9, |_| true), None);
     }
 
     #[test]

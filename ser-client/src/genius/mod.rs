@@ -8,6 +8,8 @@ mod inboxes;
 #[cfg(unix)]
 mod link;
 #[cfg(unix)]
+mod recognition;
+#[cfg(unix)]
 mod window;
 
 pub use error::GeniusError;
@@ -16,3 +18,5 @@ pub use geni::{BlockKind, Device as DeviceRecord, Status as BoardStatus};
 pub use host::{BusDevice, GeniHost};
 #[cfg(unix)]
 pub(crate) use link::GeniusLink;
+#[cfg(unix)]
+pub use recognition::{BusRecorders, Recognition};

@@ -1,4 +1,4 @@
-//! A datagram: up to 128 bytes from one device to another, or to all.
+//! A datagram: up to 134 bytes from one device to another, or to all.
 
 use core::fmt;
 
@@ -6,8 +6,10 @@ use heapless::Vec;
 
 use super::{Address, Device, FUNCTION_GENIUS, FUNCTION_HORNER, Priority, SUBFUNCTION_SER, Subfunction};
 
-/// The most data bytes of a datagram.
-pub const MAX_DATA: usize = 128;
+/// The most data bytes of a datagram: what the buffers of a GENI board hold (GENI manual, chapter
+/// 10, tables of the Transmit Datagram commands). Messages of the recorder have at most
+/// [`MAX_SER_DATA`](super::MAX_SER_DATA).
+pub const MAX_DATA: usize = 134;
 
 /// The data of a datagram.
 pub type Data = Vec<u8, MAX_DATA>;
@@ -123,10 +125,10 @@ mod tests {
     const UNIT: Device = Device::new(5).unwrap();
 
     #[test]
-    fn data_of_128_bytes_fit_and_129_do_not() {
+    fn data_of_134_bytes_fit_and_135_do_not() {
         let datagram = |data| Datagram::new(UNIT, Address::Broadcast, 0x20, 0x20, data);
-        assert_eq!(datagram(&[7; 128]).unwrap().data, [7; 128]);
-        assert_eq!(datagram(&[7; 129]), Err(TooMuchData { length: 129 }));
+        assert_eq!(datagram(&[7; 134]).unwrap().data, [7; 134]);
+        assert_eq!(datagram(&[7; 135]), Err(TooMuchData { length: 135 }));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! request: | table |                     1 byte
-//! reply:   | table | its contents … |    at most 128 bytes
+//! reply:   | table | its contents … |    1 byte, and at most 128 of contents
 //! ```
 //!
 //! A table has a byte for every eight discrete points, then a word for every analog channel.
@@ -12,11 +12,11 @@ use core::fmt;
 use heapless::Vec;
 
 use super::packing::gather;
-use super::{Data, GlobalData, MAX_DATA, MessageError, Subfunction};
+use super::{Data, GlobalData, MessageError, Subfunction};
 use crate::Model;
 
-/// The most bytes of a force table that one reply carries.
-pub const MAX_FORCE_TABLE: usize = MAX_DATA - 1;
+/// The most bytes of a force table that one reply carries, after the byte that names the table.
+pub const MAX_FORCE_TABLE: usize = 128;
 
 /// The four force tables of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -131,14 +131,14 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_table_survives_and_a_larger_one_is_refused() {
-        let mut data = vec![3; 128];
+    fn a_table_of_128_bytes_survives_and_one_of_129_is_refused() {
+        let mut data = vec![3; 129];
         let forces = IoForces::parse(&data).unwrap();
-        assert_eq!((forces.table, forces.contents.len()), (ForceTable::OutputValues, 127));
+        assert_eq!((forces.table, forces.contents.len()), (ForceTable::OutputValues, 128));
         assert_eq!(forces.to_data(), &data[..]);
         data.push(0);
         let subfunction = Subfunction::ReadIoForcesReply;
-        assert_eq!(IoForces::parse(&data), Err(MessageError::WrongLength { subfunction, length: 129 }));
+        assert_eq!(IoForces::parse(&data), Err(MessageError::WrongLength { subfunction, length: 130 }));
     }
 
     #[test]

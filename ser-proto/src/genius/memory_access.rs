@@ -18,8 +18,10 @@ use super::{Data, MAX_DATA, MessageError, Subfunction};
 /// Bytes before the contents.
 const HEADER_LEN: usize = 4;
 
-/// The most bytes of memory that one datagram carries along with the header.
-pub const MAX_MEMORY_DATA: usize = MAX_DATA - HEADER_LEN;
+/// The most bytes of memory that one datagram carries along with the header (GENI manual, chapter
+/// 13: a buffer of the request queue has so many for data).
+pub const MAX_MEMORY_DATA: usize = 128;
+const _: () = assert!(HEADER_LEN + MAX_MEMORY_DATA <= MAX_DATA);
 
 /// A place in a host's memory: 24 bits whose meaning is the host's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -62,7 +64,7 @@ impl fmt::Display for MemoryAddress {
 pub struct MemoryRange {
     /// Where.
     pub address: MemoryAddress,
-    /// How many bytes, 0–128. A reply carries at most [`MAX_MEMORY_DATA`] of them.
+    /// How many bytes, 0–[`MAX_MEMORY_DATA`].
     pub length: u8,
 }
 
@@ -70,7 +72,7 @@ impl MemoryRange {
     pub(super) fn parse(data: &[u8]) -> Result<MemoryRange, MessageError> {
         let subfunction = Subfunction::ReadDevice;
         match *data {
-            [length, a, b, c] if usize::from(length) <= MAX_DATA => {
+            [length, a, b, c] if usize::from(length) <= MAX_MEMORY_DATA => {
                 Ok(MemoryRange { address: MemoryAddress::from_le_bytes([a, b, c]), length })
             }
             [value, _, _, _] => Err(MessageError::BadValue { subfunction, offset: 0, value }),
@@ -100,13 +102,11 @@ impl MemoryContents {
         let Some((&[length, a, b, c], contents)) = data.split_first_chunk() else {
             return Err(wrong_length);
         };
+        let contents = Vec::from_slice(contents).map_err(|_| wrong_length)?;
         if usize::from(length) != contents.len() {
             return Err(MessageError::BadValue { subfunction, offset: 0, value: length });
         }
-        Ok(MemoryContents {
-            address: MemoryAddress::from_le_bytes([a, b, c]),
-            contents: Vec::from_slice(contents).map_err(|_| wrong_length)?,
-        })
+        Ok(MemoryContents { address: MemoryAddress::from_le_bytes([a, b, c]), contents })
     }
 
     pub(super) fn to_data(&self) -> Data {
@@ -145,11 +145,15 @@ mod tests {
             contents: core::iter::repeat_n(0x55, MAX_MEMORY_DATA).collect(),
         };
         let mut data = contents.to_data();
-        assert_eq!(data.len(), MAX_DATA);
+        assert_eq!(data.len(), 132);
         assert_eq!(MemoryContents::parse(subfunction, &data), Ok(contents));
         data[0] -= 1;
-        let bad = MessageError::BadValue { subfunction, offset: 0, value: 123 };
+        let bad = MessageError::BadValue { subfunction, offset: 0, value: 127 };
         assert_eq!(MemoryContents::parse(subfunction, &data), Err(bad));
+        data[0] = 129;
+        data.push(0x55).unwrap();
+        let long = MessageError::WrongLength { subfunction, length: 133 };
+        assert_eq!(MemoryContents::parse(subfunction, &data), Err(long));
         let short = MessageError::WrongLength { subfunction, length: 3 };
         assert_eq!(MemoryContents::parse(subfunction, &[0, 0, 0]), Err(short));
     }

@@ -141,7 +141,7 @@ mod tests {
 
     use super::*;
     use crate::Model;
-    use crate::genius::MemoryAddress;
+    use crate::genius::{MAX_DATA, MemoryAddress};
 
     const HOST: Device = Device::new(31).unwrap();
     const UNIT: Device = Device::new(5).unwrap();
@@ -164,8 +164,8 @@ mod tests {
             (Just(0x01), bytes(12..=12)),
             (Just(0x0B), bytes(8..=8)),
             (Just(0x1E), bytes(4..=4)),
-            (prop::sample::select(vec![0x1F, 0x20, 0x41]), bytes(4..=128)),
-            (any::<u8>(), bytes(0..=128)),
+            (prop::sample::select(vec![0x1F, 0x20, 0x41]), bytes(4..=132)),
+            (any::<u8>(), bytes(0..=MAX_DATA)),
         ]
     }
 
@@ -184,6 +184,10 @@ mod tests {
                 Message::Unknown { subfunction: Subfunction::Unknown(0x33), data: Data::new() },
                 "datagram 33h, no data",
             ),
+            (
+                Message::Unknown { subfunction: Subfunction::ReportFault, data: Data::from_array([1, 2, 3]) },
+                "Report Fault, 3 bytes",
+            ),
         ];
         for (message, text) in texts {
             assert_eq!(message.to_string(), text);
@@ -198,16 +202,16 @@ mod tests {
             (0x00, 0..=0),
             (0x01, 12..=12),
             (0x40, 1..=1),
-            (0x41, 1..=128),
+            (0x41, 1..=129),
             (0x1E, 4..=4),
-            (0x1F, 4..=128),
-            (0x20, 4..=128),
+            (0x1F, 4..=132),
+            (0x20, 4..=132),
             (0x0B, 8..=8),
         ];
         for (code, allowed) in allowed {
             let subfunction = Subfunction::from_code(code);
-            for length in 0..=128 {
-                let parsed = Message::parse(&datagram(code, &[0; 128][..length]));
+            for length in 0..=MAX_DATA {
+                let parsed = Message::parse(&datagram(code, &[0; MAX_DATA][..length]));
                 let refused = parsed == Err(MessageError::WrongLength { subfunction, length });
                 assert_eq!(refused, !allowed.contains(&length), "{subfunction} with {length} bytes");
             }

@@ -1,9 +1,10 @@
 //! The Genius bus as a recorder sees it: datagrams, global data, a PLC's `COMM_REQ` blocks and the DIP switches.
 //!
-//! A [`Datagram`] carries up to 128 bytes from one device to another, or to all. A message of the recorder is a
-//! datagram whose data are the body, without frame: [`Datagram::from_command`], [`Datagram::from_reply`] and back.
-//! The datagrams of the bus itself are [`Message`]s. The state of all inputs goes out in every bus scan as
-//! [`GlobalData`]. A PLC sends and fetches datagrams with the word blocks in [`CommReq`].
+//! A [`Datagram`] carries up to 134 bytes from one device to another, or to all. A message of the
+//! recorder is a datagram whose data are the body, without frame: [`Datagram::from_command`],
+//! [`Datagram::from_reply`] and back. The datagrams of the bus itself are [`Message`]s. The state
+//! of all inputs goes out in every bus scan as [`GlobalData`]. A PLC sends and fetches datagrams
+//! with the word blocks in [`CommReq`].
 
 mod address;
 mod bus_rate;
@@ -43,6 +44,6 @@ pub use plc_reference::{MemoryType, PlcReference};
 pub use priority::Priority;
 pub use read_id::{DeviceStatus, Directions, ReadIdReply};
 pub use send_datagram::SendDatagram;
-pub use ser_datagram::{FUNCTION_HORNER, SUBFUNCTION_SER, SerDatagramError, max_entries};
+pub use ser_datagram::{FUNCTION_HORNER, MAX_SER_DATA, SUBFUNCTION_SER, SerDatagramError, max_entries};
 pub use subfunction::{FUNCTION_GENIUS, HIGHEST_FUNCTION, Subfunction};
 pub use write_point::{PointMask, WritePoint};

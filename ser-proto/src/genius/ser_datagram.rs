@@ -6,7 +6,7 @@
 
 use core::fmt;
 
-use super::{Address, Data, Datagram, Device, MAX_DATA, Priority, TooMuchData};
+use super::{Address, Data, Datagram, Device, Priority};
 use crate::{Command, MAX_ENTRIES, Model, ParseError, READ_REPLY_HEADER_LEN, Reply};
 
 /// Function code of the recorder's maker.
@@ -15,10 +15,14 @@ pub const FUNCTION_HORNER: u8 = 0x40;
 /// Subfunction code of the recorder.
 pub const SUBFUNCTION_SER: u8 = 0x50;
 
+/// The most bytes of a message of the recorder (GENI manual, chapter 10, "Maximum Datagram
+/// Length"). Other datagrams may be longer: see [`MAX_DATA`](super::MAX_DATA).
+pub const MAX_SER_DATA: usize = 128;
+
 /// The most entries that one read reply brings over the bus: 10 with 16 inputs, 7 with 32.
 #[must_use]
 pub const fn max_entries(model: Model) -> usize {
-    let fit = (MAX_DATA - READ_REPLY_HEADER_LEN) / model.entry_len();
+    let fit = (MAX_SER_DATA - READ_REPLY_HEADER_LEN) / model.entry_len();
     if fit < MAX_ENTRIES { fit } else { MAX_ENTRIES }
 }
 
@@ -40,8 +44,10 @@ impl Datagram {
         destination: Device,
         reply: &Reply,
     ) -> Result<Datagram, SerDatagramError> {
-        let data = TooMuchData::check(&reply.to_body())
-            .map_err(|TooMuchData { length }| SerDatagramError::TooLong { length })?;
+        let body = reply.to_body();
+        let too_long = SerDatagramError::TooLong { length: body.len() };
+        let body = body.get(..).filter(|body| body.len() <= MAX_SER_DATA).ok_or(too_long)?;
+        let data = Data::from_slice(body).map_err(|_| too_long)?;
         Ok(ser_datagram(source, destination.into(), data))
     }
 
@@ -95,7 +101,8 @@ pub enum SerDatagramError {
         /// The code found.
         subfunction: u8,
     },
-    /// The message has more than the [`MAX_DATA`] bytes that fit a datagram.
+    /// The message has more than the [`MAX_SER_DATA`] bytes that a message of the recorder may
+    /// have.
     TooLong {
         /// Bytes of the message.
         length: usize,
@@ -116,7 +123,9 @@ impl fmt::Display for SerDatagramError {
                     "subfunction code {subfunction:02X}h is not the recorder's ({SUBFUNCTION_SER:02X}h)"
                 )
             }
-            SerDatagramError::TooLong { length } => TooMuchData { length }.fmt(f),
+            SerDatagramError::TooLong { length } => {
+                write!(f, "a message of {length} bytes does not fit a datagram: {MAX_SER_DATA} do")
+            }
             SerDatagramError::Message(error) => error.fmt(f),
         }
     }

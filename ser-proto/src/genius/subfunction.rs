@@ -1,4 +1,7 @@
 //! Function code 20h: the datagrams that every Genius device speaks, and their subfunction codes.
+//!
+//! The manuals at hand name most of these datagrams and print few of the codes. A code marked
+//! *unchecked* is from general knowledge of Genius: no page was there to check it against.
 
 use core::fmt;
 
@@ -28,10 +31,18 @@ pub enum Subfunction {
     BeginPacketSequence,
     /// 07h: and ends here.
     EndPacketSequence,
-    /// 0Bh: set and clear single bits of a host's memory.
+    /// 08h (unchecked): what is wrong with you?
+    ReadDiagnostics,
+    /// 09h (unchecked): the answer.
+    ReadDiagnosticsReply,
+    /// 0Bh (unchecked): set and clear single bits of a host's memory.
     WritePoint,
+    /// 0Fh (unchecked): a block tells its controllers of a fault.
+    ReportFault,
     /// 10h: check the outputs with a pulse.
     PulseTest,
+    /// 12h (unchecked): forget the faults of one circuit.
+    ClearCircuitFault,
     /// 13h: forget all faults.
     ClearAllFaults,
     /// 1Eh: what is in a host's memory?
@@ -40,6 +51,8 @@ pub enum Subfunction {
     ReadDeviceReply,
     /// 20h: change a host's memory.
     WriteDevice,
+    /// 22h (unchecked): a device tells its controllers that it was configured anew.
+    ConfigurationChange,
     /// 2Ah: which references does a station use?
     ReadMap,
     /// 2Bh: the answer.
@@ -56,7 +69,7 @@ pub enum Subfunction {
 
 impl Subfunction {
     /// Those that have a name, in the order of their codes.
-    pub const NAMED: [Subfunction; 19] = [
+    pub const NAMED: [Subfunction; 24] = [
         Subfunction::ReadId,
         Subfunction::ReadIdReply,
         Subfunction::ReadConfiguration,
@@ -65,12 +78,17 @@ impl Subfunction {
         Subfunction::AssignMonitor,
         Subfunction::BeginPacketSequence,
         Subfunction::EndPacketSequence,
+        Subfunction::ReadDiagnostics,
+        Subfunction::ReadDiagnosticsReply,
         Subfunction::WritePoint,
+        Subfunction::ReportFault,
         Subfunction::PulseTest,
+        Subfunction::ClearCircuitFault,
         Subfunction::ClearAllFaults,
         Subfunction::ReadDevice,
         Subfunction::ReadDeviceReply,
         Subfunction::WriteDevice,
+        Subfunction::ConfigurationChange,
         Subfunction::ReadMap,
         Subfunction::ReadMapReply,
         Subfunction::WriteMap,
@@ -99,12 +117,17 @@ impl Subfunction {
             Subfunction::AssignMonitor => 0x05,
             Subfunction::BeginPacketSequence => 0x06,
             Subfunction::EndPacketSequence => 0x07,
+            Subfunction::ReadDiagnostics => 0x08,
+            Subfunction::ReadDiagnosticsReply => 0x09,
             Subfunction::WritePoint => 0x0B,
+            Subfunction::ReportFault => 0x0F,
             Subfunction::PulseTest => 0x10,
+            Subfunction::ClearCircuitFault => 0x12,
             Subfunction::ClearAllFaults => 0x13,
             Subfunction::ReadDevice => 0x1E,
             Subfunction::ReadDeviceReply => 0x1F,
             Subfunction::WriteDevice => 0x20,
+            Subfunction::ConfigurationChange => 0x22,
             Subfunction::ReadMap => 0x2A,
             Subfunction::ReadMapReply => 0x2B,
             Subfunction::WriteMap => 0x2C,
@@ -120,6 +143,7 @@ impl Subfunction {
         match self {
             Subfunction::ReadId => Some(Subfunction::ReadIdReply),
             Subfunction::ReadConfiguration => Some(Subfunction::ReadConfigurationReply),
+            Subfunction::ReadDiagnostics => Some(Subfunction::ReadDiagnosticsReply),
             Subfunction::ReadDevice => Some(Subfunction::ReadDeviceReply),
             Subfunction::ReadMap => Some(Subfunction::ReadMapReply),
             Subfunction::ReadIoForces => Some(Subfunction::ReadIoForcesReply),
@@ -145,12 +169,17 @@ impl Subfunction {
             Subfunction::AssignMonitor => "Assign Monitor",
             Subfunction::BeginPacketSequence => "Begin Packet Sequence",
             Subfunction::EndPacketSequence => "End Packet Sequence",
+            Subfunction::ReadDiagnostics => "Read Diagnostics",
+            Subfunction::ReadDiagnosticsReply => "Read Diagnostics reply",
             Subfunction::WritePoint => "Write Point",
+            Subfunction::ReportFault => "Report Fault",
             Subfunction::PulseTest => "Pulse Test",
+            Subfunction::ClearCircuitFault => "Clear Circuit Fault",
             Subfunction::ClearAllFaults => "Clear All Faults",
             Subfunction::ReadDevice => "Read Device",
             Subfunction::ReadDeviceReply => "Read Device reply",
             Subfunction::WriteDevice => "Write Device",
+            Subfunction::ConfigurationChange => "Configuration Change",
             Subfunction::ReadMap => "Read Map",
             Subfunction::ReadMapReply => "Read Map reply",
             Subfunction::WriteMap => "Write Map",
@@ -190,12 +219,17 @@ mod tests {
             (Subfunction::AssignMonitor, 0x05),
             (Subfunction::BeginPacketSequence, 0x06),
             (Subfunction::EndPacketSequence, 0x07),
+            (Subfunction::ReadDiagnostics, 0x08),
+            (Subfunction::ReadDiagnosticsReply, 0x09),
             (Subfunction::WritePoint, 0x0B),
+            (Subfunction::ReportFault, 0x0F),
             (Subfunction::PulseTest, 0x10),
+            (Subfunction::ClearCircuitFault, 0x12),
             (Subfunction::ClearAllFaults, 0x13),
             (Subfunction::ReadDevice, 0x1E),
             (Subfunction::ReadDeviceReply, 0x1F),
             (Subfunction::WriteDevice, 0x20),
+            (Subfunction::ConfigurationChange, 0x22),
             (Subfunction::ReadMap, 0x2A),
             (Subfunction::ReadMapReply, 0x2B),
             (Subfunction::WriteMap, 0x2C),

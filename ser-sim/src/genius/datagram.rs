@@ -1,9 +1,11 @@
 //! Datagrams and the few of them that boards and blocks deal with themselves.
 
+use ser_proto::genius::{FUNCTION_GENIUS, HIGHEST_FUNCTION};
+
 /// The function code of the standard datagrams.
-pub const STANDARD: u8 = 0x20;
+pub const STANDARD: u8 = FUNCTION_GENIUS;
 /// A GENI refuses to send function codes above this one.
-pub const MAX_FUNCTION: u8 = 112;
+pub const MAX_FUNCTION: u8 = HIGHEST_FUNCTION;
 /// The most data a datagram carries; 128 bytes and, for memory accesses, a header.
 pub const MAX_DATAGRAM_LEN: usize = 134;
 /// The device number that means all of them.
@@ -11,24 +13,26 @@ pub const BROADCAST: u8 = 255;
 
 /// Subfunction codes of standard datagrams.
 pub mod subfunction {
+    use ser_proto::genius::Subfunction;
+
     /// Who are you?
-    pub const READ_ID: u8 = 0x00;
+    pub const READ_ID: u8 = Subfunction::ReadId.code();
     /// The answer.
-    pub const READ_ID_REPLY: u8 = 0x01;
+    pub const READ_ID_REPLY: u8 = Subfunction::ReadIdReply.code();
     /// Sets or resets bits in a host's memory.
-    pub const WRITE_POINT: u8 = 0x0B;
+    pub const WRITE_POINT: u8 = Subfunction::WritePoint.code();
     /// Reads a host's memory.
-    pub const READ_DEVICE: u8 = 0x1E;
+    pub const READ_DEVICE: u8 = Subfunction::ReadDevice.code();
     /// The answer.
-    pub const READ_DEVICE_REPLY: u8 = 0x1F;
+    pub const READ_DEVICE_REPLY: u8 = Subfunction::ReadDeviceReply.code();
     /// Writes a host's memory.
-    pub const WRITE_DEVICE: u8 = 0x20;
+    pub const WRITE_DEVICE: u8 = Subfunction::WriteDevice.code();
     /// A device was configured anew.
-    pub const CONFIGURATION_CHANGE: u8 = 0x22;
+    pub const CONFIGURATION_CHANGE: u8 = Subfunction::ConfigurationChange.code();
     /// Which points of a bus interface unit are forced?
-    pub const READ_IO_FORCES: u8 = 0x40;
+    pub const READ_IO_FORCES: u8 = Subfunction::ReadIoForces.code();
     /// The answer.
-    pub const READ_IO_FORCES_REPLY: u8 = 0x41;
+    pub const READ_IO_FORCES_REPLY: u8 = Subfunction::ReadIoForcesReply.code();
 }
 
 /// A message that is sent once, on request.

@@ -44,7 +44,7 @@ fn is_block(words: &[u16]) -> bool {
                 && is_byte(function)
                 && is_byte(subfunction)
                 && priority <= 1
-                && bytes <= 128
+                && bytes <= 134
                 && [count + 6, count + 7].contains(length)
                 && (usize::from(count)..=usize::from(count) + 1).contains(&data.len())
         }

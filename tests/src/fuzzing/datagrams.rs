@@ -80,9 +80,9 @@ fn is_bus_message(datagram: &Datagram) -> bool {
             0x01 => data.len() == 12 && data[11] < 0x40,
             0x0B => data.len() == 8 && data[0] == 4,
             0x1E => data.len() == 4 && data[0] <= 128,
-            0x1F | 0x20 => data.len() >= 4 && usize::from(data[0]) == data.len() - 4,
+            0x1F | 0x20 => (4..=132).contains(&data.len()) && usize::from(data[0]) == data.len() - 4,
             0x40 => matches!(data, [0..=3]),
-            0x41 => matches!(data, [0..=3, ..]),
+            0x41 => matches!(data, [0..=3, ..]) && data.len() <= 129,
             _ => true,
         }
 }

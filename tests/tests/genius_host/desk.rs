@@ -127,12 +127,26 @@ impl Desk {
 
     /// The same on a noisy bus.
     pub(crate) fn with_noise(recorders: &[(u8, Model)], noise: Noise) -> Desk {
+        Desk::of_world(recorders, move |recorders| World::with_noise(recorders, noise))
+    }
+
+    /// The same with GENI boards of this model number.
+    pub(crate) fn with_boards(recorders: &[(u8, Model)], board_model: u8) -> Desk {
+        Desk::of_world(recorders, move |recorders| {
+            World::with_boards(recorders, Noise::default(), board_model)
+        })
+    }
+
+    fn of_world(
+        recorders: &[(u8, Model)],
+        world: impl FnOnce(&[(u8, Model)]) -> World + Send + 'static,
+    ) -> Desk {
         let folder = tempfile::tempdir().expect("a folder");
         let (orders, received) = channel::<Order>();
         let path = folder.path().join("host");
         let recorders = recorders.to_vec();
         thread::spawn(move || {
-            let world = World::with_noise(&recorders, noise);
+            let world = world(&recorders);
             let window = window(&path);
             let mut bench =
                 Bench { world, window, in_reset: false, paused: None, stall: None, stalled_ms: 0 };

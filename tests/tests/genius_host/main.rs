@@ -5,5 +5,6 @@
 mod desk;
 mod failures;
 mod stale;
+mod stations;
 mod timing;
 mod windows;

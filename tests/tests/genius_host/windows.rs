@@ -7,7 +7,7 @@ use std::thread;
 
 use ser_client::{Delivery, GeniWindow, GeniusError, OpenError};
 use ser_proto::Model;
-use ser_sim::genius::{BlockKind, BusRate, Circuits, DiscreteBlock, Fault, RAM_LEN};
+use ser_sim::genius::{Fault, RAM_LEN};
 
 use crate::desk::{Desk, unit};
 
@@ -68,24 +68,6 @@ fn a_window_belongs_to_one_host() {
     unit(&first, 5).mode().expect("the first host is not disturbed");
     drop(first);
     unit(&desk.host(), 5).mode().expect("the window is free again");
-}
-
-#[test]
-fn a_block_with_as_many_inputs_is_no_recorder() {
-    let desk = Desk::new(&ONE);
-    desk.with(|bench| {
-        let mut bus = bench.world.bus.borrow_mut();
-        for (number, circuits) in [(7, Circuits::Sixteen), (8, Circuits::ThirtyTwo)] {
-            bus.connect(DiscreteBlock::new(number, BusRate::default(), circuits, BlockKind::Inputs));
-        }
-    });
-    desk.run(1_000);
-    let devices = desk.host().devices().expect("the board is well");
-    let seen: Vec<_> = devices
-        .iter()
-        .map(|device| (device.number, device.inputs.len(), device.recorder_inputs().is_some()))
-        .collect();
-    assert_eq!(seen, [(5, 2, true), (7, 2, false), (8, 4, false)]);
 }
 
 #[test]

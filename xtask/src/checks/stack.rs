@@ -71,14 +71,23 @@ pub(crate) fn shares(image: &Image, calls: &Calls<'_>) -> Result<Vec<Share>, Vec
     if unbounded.is_empty() { Ok(shares) } else { Err(unbounded) }
 }
 
+/// The worst case in bytes: the main program at its deepest, interrupted there by every handler at
+/// its deepest.
+///
+/// # Errors
+/// What cannot be bounded, in words.
+pub(crate) fn bound(image: &Image, calls: &Calls<'_>) -> Result<u32, Vec<String>> {
+    Ok(shares(image, calls)?.iter().map(Share::bytes).sum())
+}
+
 /// The worst case against what the memory map sets aside.
 pub(super) fn depth(image: &Image, calls: &Calls<'_>) -> Outcome {
     const WHAT: &str = "stack at its deepest";
     let (Some(start), Some(end)) = (image.symbol("_stack_start"), image.symbol("_stack_end")) else {
         return Outcome::new(WHAT, "?", vec!["_stack_start or _stack_end is missing".to_owned()]);
     };
-    match shares(image, calls) {
-        Ok(shares) => against(WHAT, shares.iter().map(Share::bytes).sum(), start.saturating_sub(end)),
+    match bound(image, calls) {
+        Ok(bound) => against(WHAT, bound, start.saturating_sub(end)),
         Err(unbounded) => Outcome::new(WHAT, "no bound", unbounded),
     }
 }
@@ -154,6 +163,7 @@ mod tests {
         let bytes: Vec<_> = shares.iter().map(|share| (share.saved, share.deepest.bytes)).collect();
         assert_eq!(bytes, [(0, 8), (36, 0), (36, 16)]);
         assert_eq!(depth_of(&image).result, "0.1 of 0.3 KiB (38 %)");
+        assert_eq!(bound(&image, &Calls::of(&image, &BTreeSet::new())), Ok(8 + 36 + 36 + 16));
     }
 
     #[test]

@@ -1,16 +1,32 @@
 //! rustfmt and clippy: a minimal Rust comes without them.
 
+use crate::setup::demand::{Installing, Kind, Size, Tool};
 use crate::steps::{self, Failure, Result, heading, works};
 
+/// Both. The size is that of Rust 1.95.
+pub(crate) static TOOL: Tool = Tool {
+    name: "rustfmt and clippy",
+    serves: "the checks of format and code",
+    size: Size { download_mb: None, disk_mb: 31 },
+    instead: None,
+    kind: Kind::Components,
+};
+
+/// Whether both are there.
+pub(crate) fn there() -> bool {
+    ["fmt", "clippy"].into_iter().all(|tool| works(steps::cargo().args([tool, "--version"])))
+}
+
 /// Finds both, or has rustup install them.
-pub(crate) fn find() -> Result<()> {
-    let there = || ["fmt", "clippy"].into_iter().all(|tool| works(steps::cargo().args([tool, "--version"])));
+pub(crate) fn find(installing: Installing) -> Result<()> {
     if there() {
         return Ok(());
     }
-    heading("Installing rustfmt and clippy");
-    if works(steps::unrelated("rustup").args(["component", "add", "rustfmt", "clippy"])) && there() {
-        return Ok(());
+    if installing == Installing::Allowed {
+        heading(&format!("Installing rustfmt and clippy ({})", TOOL.size));
+        if works(steps::unrelated("rustup").args(["component", "add", "rustfmt", "clippy"])) && there() {
+            return Ok(());
+        }
     }
     Err(Failure::new("rustfmt and clippy are missing; get them with\n  rustup component add rustfmt clippy"))
 }

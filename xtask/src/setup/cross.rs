@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use crate::places;
 use crate::setup::apt;
+use crate::setup::demand::{Installing, Kind, Size, Tool};
 use crate::steps::{self, Failure, Result, heading, note, output, unrelated, works};
 
 /// What a board's processor is called by Rust.
@@ -34,6 +35,27 @@ const DEBIAN_CLIPPY: [&str; 2] = ["rust-web-clippy", "rust-clippy"];
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 const DEBIAN_CARGO_CLIPPY: &str = "/usr/bin/cargo-clippy";
+
+/// The libraries of both targets. The size is that of rustup's for Rust 1.95.
+pub(crate) static TOOL: Tool = Tool {
+    name: "Rust's libraries for the boards",
+    serves: "the images, their checks and the tests in the emulator",
+    size: Size { download_mb: None, disk_mb: 123 },
+    instead: Some(("Debian's Rust", DEBIAN_RUST_SIZE)),
+    kind: Kind::CrossRust,
+};
+
+/// Clippy for that, which rustup's toolchains have.
+pub(crate) static CLIPPY: Tool = Tool {
+    name: "clippy for the boards",
+    serves: "the check of the firmware's code",
+    size: Size { download_mb: Some(4), disk_mb: 14 },
+    instead: None,
+    kind: Kind::CrossClippy,
+};
+
+/// Debian's Rust with the source of its library, as of Debian 12.
+const DEBIAN_RUST_SIZE: Size = Size { download_mb: Some(143), disk_mb: 778 };
 
 /// A Rust that builds for a target.
 #[derive(Clone, Debug)]
@@ -97,10 +119,26 @@ fn linker_variable(target: Target) -> String {
     format!("CARGO_TARGET_{}_LINKER", target.to_uppercase().replace('-', "_"))
 }
 
+/// Whether there is a toolchain for each target.
+pub(crate) fn there(targets: &[Target]) -> bool {
+    find(targets, Installing::Forbidden).iter().all(Result::is_ok)
+}
+
+/// Whether each toolchain that is there has clippy.
+pub(crate) fn clippy_there(targets: &[Target]) -> bool {
+    let found = find(targets, Installing::Forbidden);
+    found.iter().flatten().all(|toolchain| toolchain.clippy().is_some())
+}
+
 /// Finds a toolchain for each target, or installs one.
-pub(crate) fn find(targets: &[Target]) -> Vec<Result<CrossToolchain>> {
+pub(crate) fn find(targets: &[Target], installing: Installing) -> Vec<Result<CrossToolchain>> {
     let lacking: Vec<Target> = targets.iter().copied().filter(|target| !has_library(target)).collect();
-    let debian = if lacking.is_empty() || added(&lacking) { None } else { found_or_installed_debian() };
+    let debian = match installing {
+        _ if lacking.is_empty() => None,
+        Installing::Allowed if added(&lacking) => None,
+        Installing::Allowed => found_or_installed_debian(),
+        Installing::Forbidden => debian_rust(),
+    };
     let toolchain = |&target: &Target| {
         if has_library(target) {
             return Ok(CrossToolchain { target, rust: Rust::InUse });
@@ -112,8 +150,8 @@ pub(crate) fn find(targets: &[Target]) -> Vec<Result<CrossToolchain>> {
 }
 
 /// A toolchain for one target.
-pub(crate) fn find_one(target: Target) -> Result<CrossToolchain> {
-    find(&[target]).pop().unwrap_or_else(|| Err(missing(target)))
+pub(crate) fn find_one(target: Target, installing: Installing) -> Result<CrossToolchain> {
+    find(&[target], installing).pop().unwrap_or_else(|| Err(missing(target)))
 }
 
 fn missing(target: Target) -> Failure {
@@ -131,7 +169,7 @@ fn added(targets: &[Target]) -> bool {
     if !works(unrelated("rustup").arg("--version")) {
         return false;
     }
-    heading(&format!("Adding {} to the toolchain", targets.join(" and ")));
+    heading(&format!("Adding {} to the toolchain (together {})", targets.join(" and "), TOOL.size));
     let lacking: Vec<_> =
         targets.iter().filter(|target| !(add_target(target) && has_library(target))).collect();
     for target in &lacking {
@@ -148,7 +186,7 @@ fn found_or_installed_debian() -> Option<PathBuf> {
     if let Some(linker) = debian_rust() {
         return Some(linker);
     }
-    heading("Installing Debian's Rust for the firmware");
+    heading(&format!("Installing Debian's Rust for the firmware ({DEBIAN_RUST_SIZE})"));
     for packages in DEBIAN_RUST {
         match apt::install(&packages) {
             Ok(()) => break,
@@ -156,11 +194,23 @@ fn found_or_installed_debian() -> Option<PathBuf> {
         }
     }
     // Nothing depends on it but how much is checked.
-    let _ = DEBIAN_CLIPPY.into_iter().any(|package| apt::install(&[package]).is_ok());
+    let _ = install_clippy();
     if rust_lld().is_none() && !on_path("ld.lld") {
         let _ = apt::install(&["lld"]).map_err(|why| note(&why));
     }
     debian_rust()
+}
+
+/// Debian's clippy, for Debian's Rust.
+pub(crate) fn install_clippy() -> Result<()> {
+    let mut why = "there is no apt".to_owned();
+    for package in DEBIAN_CLIPPY.into_iter().filter(|_| apt::there()) {
+        match apt::install(&[package]) {
+            Ok(()) => return Ok(()),
+            Err(reason) => why = reason,
+        }
+    }
+    Err(Failure::new(format!("no clippy for Debian's Rust: {why}")))
 }
 
 /// Whether the toolchain in use has the target's library.

@@ -1,12 +1,22 @@
 //! QEMU for ARM.
 
 use crate::setup::apt;
+use crate::setup::demand::{Installing, Kind, Size, Tool};
 use crate::steps::{Failure, Result, heading, note, output, unrelated, works};
 
 const PROGRAM: &str = "qemu-system-arm";
 
+/// The emulator. The size is that of Debian 12's package with what it depends on.
+pub(crate) static TOOL: Tool = Tool {
+    name: PROGRAM,
+    serves: "the tests in the emulator",
+    size: Size { download_mb: Some(16), disk_mb: 69 },
+    instead: None,
+    kind: Kind::Emulator,
+};
+
 /// Finds the emulator or installs it.
-pub(crate) fn find() -> Result<()> {
+pub(crate) fn find(installing: Installing) -> Result<()> {
     if cfg!(not(unix)) {
         return Err(Failure::new(
             "the emulator is driven through a pseudo-terminal and shared memory: it takes Linux or macOS",
@@ -15,8 +25,8 @@ pub(crate) fn find() -> Result<()> {
     if there() {
         return Ok(());
     }
-    let why = if apt::there() {
-        heading(&format!("Installing {PROGRAM}"));
+    let why = if installing == Installing::Allowed && apt::there() {
+        heading(&format!("Installing {PROGRAM} ({})", TOOL.size));
         match apt::install(&[PROGRAM]) {
             Ok(()) if there() => return Ok(()),
             Ok(()) => None,
@@ -36,8 +46,9 @@ pub(crate) fn find() -> Result<()> {
     Err(Failure::new(format!("{PROGRAM} is missing; get it with\n  {how}")))
 }
 
-fn there() -> bool {
-    works(unrelated(PROGRAM).arg("--version"))
+/// Whether the emulator is there and can be driven.
+pub(crate) fn there() -> bool {
+    cfg!(unix) && works(unrelated(PROGRAM).arg("--version"))
 }
 
 /// The first part of its version.

@@ -3,13 +3,13 @@
 use std::fmt;
 use std::io::{self, Write};
 
-use ser_client::GeniHost;
+use ser_client::{GeniHost, Recognition};
 use ser_proto::{Command, LastBroadcast, TimeStamp};
 
-use super::{no_recorder, recorders};
+use super::{no_recorder, silent_candidates};
 use crate::cli::ConnectionArgs;
 use crate::connection;
-use crate::error::{Failure, Result, inform};
+use crate::error::{Failure, Result, inform, warn};
 use crate::time::{local_time_in, parse_time};
 
 #[derive(Clone, Copy, Debug, clap::Subcommand)]
@@ -32,14 +32,19 @@ pub(super) enum What {
     },
 }
 
-pub(super) fn run(connection: &ConnectionArgs, what: What) -> Result<()> {
+pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> Result<()> {
     if let What::Erase { yes: false } = what {
         return Err(Failure::usage("this erases all events of all recorders on the bus for good")
             .hint("keep them first: ser-cli read --all --format csv > events.csv, for each of them")
             .hint("then add --yes"));
     }
     let host = connection::open_bus(connection)?;
-    let nodes: Vec<u8> = recorders(&host)?.into_iter().map(|(node, _)| node).collect();
+    let found = host.recorders(how)?;
+    // It is not asked whether such a device has heard it.
+    if let Some(silent) = silent_candidates(&found.silent) {
+        warn(&silent);
+    }
+    let nodes: Vec<u8> = found.recorders.into_iter().map(|(node, _)| node).collect();
     if nodes.is_empty() {
         return Err(no_recorder());
     }

@@ -1,21 +1,24 @@
 //! `genius devices`: who is on the bus.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::io::{self, Write};
 
-use ser_client::{BlockKind, BusDevice, GeniHost};
+use ser_client::{BlockKind, BusDevice, GeniHost, Recognition};
+use ser_proto::genius::GlobalData;
 
 use crate::cli::ConnectionArgs;
 use crate::connection;
 use crate::error::{Result, advise, inform, warn};
 
-pub(super) fn run(connection: &ConnectionArgs) -> Result<()> {
+pub(super) fn run(connection: &ConnectionArgs, how: Recognition) -> Result<()> {
     let host = connection::open_bus(connection)?;
+    let recorders: BTreeMap<u8, GlobalData> = host.recorders(how)?.recorders.into_iter().collect();
     let devices = host.devices()?;
     let mut out = io::stdout().lock();
     writeln!(out, "node  model  in  out  reference  kind")?;
     for device in &devices {
-        writeln!(out, "{}", Row(device))?;
+        writeln!(out, "{}", Row { device, recorder: recorders.get(&device.number) })?;
     }
     out.flush()?;
     tell_about_board(&host);
@@ -43,18 +46,22 @@ fn tell_about_board(host: &GeniHost) {
 const NO_REFERENCE: u16 = 0xFFFF;
 
 /// A device as a row of the table.
-struct Row<'a>(&'a BusDevice);
+struct Row<'a> {
+    device: &'a BusDevice,
+    /// What it sends, if it is a recorder.
+    recorder: Option<&'a GlobalData>,
+}
 
 impl fmt::Display for Row<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let BusDevice { number, device, .. } = self.0;
+        let BusDevice { number, device, .. } = self.device;
         let reference = match device.reference {
             NO_REFERENCE => "none".to_string(),
             reference => reference.to_string(),
         };
         let (model, inputs, outputs) = (device.model, device.input_len, device.output_len);
         write!(f, "{number:>4}  {model:>5}  {inputs:>2}  {outputs:>3}  {reference:>9}  ")?;
-        match (self.0.recorder_inputs(), device.kind) {
+        match (self.recorder, device.kind) {
             (Some(global), _) => write!(f, "recorder, {} inputs", global.model.inputs()),
             (None, BlockKind::Unknown) => f.write_str("not told"),
             (None, BlockKind::Inputs) => f.write_str("inputs"),

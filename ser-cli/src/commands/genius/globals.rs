@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ser_client::GeniHost;
+use ser_client::{BusRecorders, GeniHost, Recognition};
 use ser_proto::genius::GlobalData;
 
-use super::{no_recorder, recorders};
+use super::{no_recorder, silent_candidates};
 use crate::cli::ConnectionArgs;
 use crate::connection;
 use crate::error::{Result, advise, inform};
@@ -24,10 +24,14 @@ const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// What the recorders say, by their numbers.
 type Globals = BTreeMap<u8, GlobalData>;
 
-pub(super) fn run(connection: &ConnectionArgs, follow: bool) -> Result<()> {
+pub(super) fn run(connection: &ConnectionArgs, follow: bool, how: Recognition) -> Result<()> {
     let stop = if follow { Some(interrupt::catch()?) } else { None };
     let host = connection::open_bus(connection)?;
-    let globals = look(&host)?;
+    let BusRecorders { recorders, silent } = host.recorders(how)?;
+    if let Some(silent) = silent_candidates(&silent) {
+        inform(&silent);
+    }
+    let globals: Globals = recorders.into_iter().collect();
     let mut out = io::stdout().lock();
     match stop {
         Some(stop) => {
@@ -36,7 +40,7 @@ pub(super) fn run(connection: &ConnectionArgs, follow: bool) -> Result<()> {
             }
             inform("the bus is followed until Ctrl-C");
             let outage = Outage::new(connection::options(connection).timeout);
-            Follow { host, stop, outage }.run(globals, &mut out)
+            Follow { host, how, stop, outage }.run(globals, &mut out)
         }
         None if globals.is_empty() => Err(no_recorder()),
         None => {
@@ -47,13 +51,10 @@ pub(super) fn run(connection: &ConnectionArgs, follow: bool) -> Result<()> {
     }
 }
 
-fn look(host: &GeniHost) -> Result<Globals> {
-    Ok(recorders(host)?.into_iter().collect())
-}
-
 /// A bus that is followed.
 struct Follow {
     host: GeniHost,
+    how: Recognition,
     stop: Arc<AtomicBool>,
     outage: Outage,
 }
@@ -81,12 +82,12 @@ impl Follow {
     fn next(&mut self) -> Result<Option<Globals>> {
         while !self.stop.load(Ordering::Relaxed) {
             thread::sleep(LOOK_EVERY);
-            match look(&self.host) {
-                Ok(globals) => {
+            match self.host.recorders(self.how) {
+                Ok(found) => {
                     self.outage.end();
-                    return Ok(Some(globals));
+                    return Ok(Some(found.recorders.into_iter().collect()));
                 }
-                Err(failure) => self.outage.bear(failure, Instant::now())?,
+                Err(error) => self.outage.bear(error.into(), Instant::now())?,
             }
         }
         Ok(None)

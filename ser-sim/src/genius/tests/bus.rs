@@ -1,6 +1,6 @@
 //! The bus: published scan times, turns in order of device numbers, one datagram per scan.
 
-use std::any::Any;
+use std::thread;
 
 use super::rig::{Rig, SECOND_US};
 use crate::genius::{
@@ -134,9 +134,23 @@ fn an_empty_bus_has_nothing_to_do() {
 }
 
 #[test]
-fn devices_may_move_to_another_thread() {
-    fn check<T: Send + Any>() {}
-    check::<Bus>();
+fn a_bus_goes_on_in_another_thread_as_it_does_in_this_one() {
+    let started = || {
+        let mut bus = Bus::new(BusRate::default());
+        for number in [30, 31] {
+            bus.connect(Board::powered(BoardOptions::at(number)));
+        }
+        bus.advance_to(2 * SECOND_US);
+        bus
+    };
+    let goes_on = |mut bus: Bus| {
+        bus.advance_to(10 * SECOND_US);
+        (bus.traffic(), bus.scan_time_ns())
+    };
+    let (here, there) = (started(), started());
+    let there = thread::spawn(move || goes_on(there)).join().expect("the bus is well");
+    assert_eq!(goes_on(here), there);
+    assert!(there.1.is_some(), "the bus is up");
 }
 
 #[test]

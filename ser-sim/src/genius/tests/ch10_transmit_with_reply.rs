@@ -28,6 +28,37 @@ fn the_reply_comes_into_the_read_buffer_and_not_into_the_queue() {
 }
 
 #[test]
+fn each_of_the_four_force_tables_is_another_one() {
+    let (mut rig, [host]) = Rig::started([31]);
+    let data = StationData { discrete_bytes: 1, channels: 1 };
+    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, data));
+    rig.bus.get_mut(unit).force_point(Side::Inputs, 0, Some(true));
+    rig.bus.get_mut(unit).force_channel(Side::Outputs, 0, Some(0x1234));
+    rig.bus.get_mut(unit).force_point(Side::Outputs, 7, Some(false));
+    rig.advance_ms(200);
+    let expected = [[0, 1, 0, 0], [1, 0x80, 0xFF, 0xFF], [2, 1, 0, 0], [3, 0, 0x34, 0x12]];
+    for (table, expected) in (0..).zip(expected) {
+        rig.write(host, 0x08D2, table);
+        assert_eq!(rig.command(host, 3, &[3, 0x20, 0x40, 0x41, 0, 1, 0]), COMPLETE);
+        assert_eq!((rig.read(host, 0x08CA), rig.read_array(host, 0x09C2)), (4, expected));
+    }
+}
+
+#[test]
+fn a_table_of_128_bytes_comes_whole() {
+    let (mut rig, [host]) = Rig::started([31]);
+    let data = StationData { discrete_bytes: 128, channels: 0 };
+    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, StationData::default()));
+    rig.bus.get_mut(unit).force_point(Side::Inputs, 8 * 128 - 1, Some(true));
+    rig.advance_ms(200);
+    rig.write(host, 0x08D2, 0);
+    assert_eq!(rig.command(host, 3, &[3, 0x20, 0x40, 0x41, 0, 1, 0]), COMPLETE);
+    assert_eq!(rig.read(host, 0x08CA), 129);
+    let reply: [u8; 129] = rig.read_array(host, 0x09C2);
+    assert_eq!((reply[0], &reply[1..128], reply[128]), (0, &[0; 127][..], 0x80));
+}
+
+#[test]
 fn it_cannot_be_broadcast() {
     let (mut rig, [host]) = Rig::started([31]);
     assert_eq!(rig.command(host, 3, &[255, 0x20, 0x02, 0x03, 0, 0, 0]), SYNTAX_ERROR);
