@@ -58,8 +58,8 @@ impl LogFollower {
         self
     }
 
-    /// Whether a reading that events come too fast for goes on until it has caught up, instead of ending when it has come
-    /// past what had happened when it began.
+    /// Whether a reading goes on for as long as there is enough for a full reply, instead of ending when it has come past
+    /// what had happened when it began.
     pub fn set_keeps_up(&mut self, keeps_up: bool) {
         self.keeps_up = keeps_up;
     }

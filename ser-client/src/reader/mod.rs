@@ -320,8 +320,8 @@ impl LogReader {
         self
     }
 
-    /// A reading that events come too fast for ends when it has come past what had happened when it began. With this it
-    /// goes on until it has caught up, and so does not have to find its place again and again.
+    /// A reading ends when it has come past what had happened when it began. With this it goes on for as long as there
+    /// is enough for a full reply, and so does not have to find its place again and again while events come fast.
     #[must_use]
     pub fn keeping_up(self, keeps_up: bool) -> LogReader {
         LogReader { keeps_up, ..self }
@@ -442,7 +442,8 @@ impl LogReader {
         }
         self.pace = happened.max(head.happened);
         self.head = Some(Head { total, slot, happened });
-        if self.keeps_up && self.margin > 0 {
+        // A new reading would cost a look at the anchor.
+        if self.keeps_up && (self.margin > 0 || total - self.next > MAX_ENTRIES as u64) {
             self.target = total;
         }
         Ok(())
