@@ -226,6 +226,39 @@ fn the_link_goes_with_the_simulator() {
 }
 
 #[test]
+fn what_a_killed_simulator_has_left_behind_is_taken_over() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (link, window) = (folder.path().join("ser"), folder.path().join("host"));
+    let mut command = ser_cli();
+    command.args(["sim", "--node", "5", "--pty"]).arg(&link).arg("--genius").arg(&window);
+    command.stdout(Stdio::null()).stderr(Stdio::piped());
+    let start = |command: &mut Command| {
+        let mut sim = Running::start(command);
+        assert_eq!(
+            sim.told().recv_timeout(PATIENCE).ok().as_deref(),
+            Some("the simulated unit answers; Ctrl-C switches it off")
+        );
+        sim
+    };
+    for _ in 0..3 {
+        let mut sim = start(&mut command);
+        sim.signal("-KILL");
+        sim.wait();
+        assert!(fs::symlink_metadata(&link).is_ok() && window.exists());
+    }
+    // Unless somebody else has it by now.
+    fs::remove_file(&window).expect("removed");
+    fs::write(&window, [0xA5; 16_384]).expect("written");
+    let refused = command.output().expect("ser-cli runs");
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(text(&refused.stderr).contains("host exists already"), "{}", text(&refused.stderr));
+    assert!(fs::read(&window).expect("read").iter().all(|&byte| byte == 0xA5));
+    fs::remove_file(&window).expect("removed");
+    assert_eq!(start(&mut command).interrupt(), Some(0));
+    assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 0);
+}
+
+#[test]
 fn a_unit_over_tcp_answers_like_one_on_a_port() {
     let mut sim = Running::start(
         ser_cli().args(["sim", "--tcp", "127.0.0.1:0"]).stdout(Stdio::piped()).stderr(Stdio::null()),

@@ -112,7 +112,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "ELF")]
     image: Option<PathBuf>,
 
-    /// Write what the image logs to this file.
+    /// Write what the image logs to this file, which must not exist yet; a pipe or a terminal may.
     #[arg(long, value_name = "FILE", requires = "image")]
     log: Option<PathBuf>,
 }
@@ -223,6 +223,7 @@ impl From<SimError> for Failure {
             SimError::WindowTaken(_) | SimError::WindowInUse(_) => {
                 "choose a name that does not exist, as in --genius /tmp/host"
             }
+            SimError::LogTaken(_) => "a log overwrites nothing: choose a name that does not exist",
             SimError::EmulatorMissing { .. } => "or leave --image out: the built-in node needs no emulator",
             SimError::EmulatorEnded { .. } | SimError::NoAnswer { .. } => {
                 "is this an image for mps2-an385? Build it with cargo xtask firmware"
