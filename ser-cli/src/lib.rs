@@ -16,6 +16,7 @@ mod output;
 mod progress;
 mod state;
 mod time;
+mod unit_name;
 mod values;
 
 use std::process::ExitCode;

@@ -433,6 +433,31 @@ fn a_second_reader_of_what_is_new_is_told_of_the_first() {
 }
 
 #[test]
+fn a_unit_is_the_same_however_its_port_is_spelled() {
+    let mut bench = Bench::start(Kind::Native, &[]);
+    fs::create_dir(bench.folder.path().join("sub")).expect("a folder");
+    bench.contacts("0,1,1", 1);
+    let read = |port: &Path| {
+        let output = bench.command("read --new --format jsonl").arg("--port").arg(port).output();
+        let output = output.expect("ser-cli runs");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        text(&output.stdout).lines().count()
+    };
+    assert_eq!(read(&bench.link()), 1);
+    for spelled in ["sub/../unit", "./unit"] {
+        assert_eq!(read(&bench.folder.path().join(spelled)), 0, "{spelled}");
+    }
+    // One file and its lock.
+    assert_eq!(fs::read_dir(bench.folder.path().join("state")).expect("a folder").count(), 2);
+    // A name that no file can have makes no difference.
+    let deep = bench.folder.path().join(format!("{}sub/../unit", "./".repeat(200)));
+    assert_eq!(read(&deep), 0);
+    let long = bench.folder.path().join("n".repeat(240));
+    std::os::unix::fs::symlink(bench.link(), &long).expect("a link");
+    assert_eq!([read(&long), read(&long)], [0, 0]);
+}
+
+#[test]
 fn a_polite_kill_lets_watch_put_the_configuration_back() {
     let bench = Bench::start(Kind::Native, &[]);
     let before = bench.ok("config");

@@ -209,3 +209,71 @@ fn lock_record(folder: &File, name: &str) -> io::Result<Option<File>> {
     }
     Ok(None)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::thread;
+
+    use super::*;
+
+    #[test]
+    fn a_name_never_has_two_owners_however_they_come_and_go() {
+        let folder = tempfile::tempdir().unwrap();
+        let name = folder.path().join("ser");
+        let owned = AtomicBool::new(false);
+        let claim_often = || {
+            let mut times = 0;
+            for _ in 0..2000 {
+                let Ok(claim) = Claim::on(&name, SimError::LinkInUse) else { continue };
+                assert!(!owned.swap(true, Ordering::SeqCst), "two owners");
+                assert_eq!(claim.holder().unwrap(), Holder::Nobody);
+                symlink("/nonexistent", &name).unwrap();
+                claim.remember().unwrap();
+                assert_eq!(claim.holder().unwrap(), Holder::Simulator);
+                times += 1;
+                owned.store(false, Ordering::SeqCst);
+            }
+            times
+        };
+        let times: u32 = thread::scope(|scope| {
+            let claiming = [(); 4].map(|()| scope.spawn(claim_often));
+            claiming.into_iter().map(|thread| thread.join().unwrap()).sum()
+        });
+        assert!(times > 0);
+        assert!(fs::symlink_metadata(&name).is_err(), "the last one has tidied up");
+    }
+
+    #[test]
+    fn a_name_that_ends_nowhere_cannot_be_claimed() {
+        for name in ["/", "..", "/tmp/..", ""] {
+            assert!(matches!(Claim::on(Path::new(name), SimError::LinkInUse), Err(SimError::Io { .. })));
+        }
+    }
+
+    #[test]
+    fn a_folder_that_others_could_have_prepared_is_not_used() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join("ser-sim");
+        open_own_folder(&folder).unwrap();
+        open_own_folder(&folder).unwrap();
+        let link = place.path().join("link");
+        symlink(&folder, &link).unwrap();
+        assert!(open_own_folder(&link).is_err());
+        fs::set_permissions(&folder, fs::Permissions::from_mode(0o777)).unwrap();
+        let refused = open_own_folder(&folder).unwrap_err().to_string();
+        assert!(refused.ends_with("is not a directory of this user alone"), "{refused}");
+        let file = place.path().join("file");
+        fs::write(&file, "").unwrap();
+        assert!(open_own_folder(&file).is_err());
+    }
+
+    #[test]
+    fn a_record_that_is_damaged_makes_nothing_ours() {
+        assert_eq!(Identity::parse(b"1 2 3\n"), Some(Identity { device: 1, inode: 2, born_ns: 3 }));
+        for damaged in ["", "\n", "1 2 3", "1 2\n", "1 2 x\n", "-1 2 3\n", "18446744073709551616 2 3\n"] {
+            assert_eq!(Identity::parse(damaged.as_bytes()), None, "{damaged:?}");
+        }
+    }
+}
