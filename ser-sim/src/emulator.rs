@@ -443,6 +443,10 @@ impl Machine for Emulator {
         self.player.stream(self.pace.now_ms(), items)
     }
 
+    fn waiting_steps(&self) -> usize {
+        self.player.waiting()
+    }
+
     fn is_idle(&self) -> bool {
         self.player.is_idle() && self.moving.is_none()
     }

@@ -14,7 +14,8 @@ use ser_proto::{AutoReport, Baud, Command, Configure, Model, Reply};
 use ser_sim::{Backend, LineRate, NonVolatile, Port, Scenario, SimError, SimOptions, Simulator, Step};
 
 fn on(link: &Path) -> SimOptions {
-    SimOptions::new(Model::Ser160, Port::Pty { link: Some(link.to_owned()) })
+    let port = Port::Pty { link: Some(link.to_owned()) };
+    SimOptions { keep_played: true, ..SimOptions::new(Model::Ser160, port) }
 }
 
 /// A place for a link.
