@@ -95,12 +95,9 @@ impl Cli {
         })
     }
 
-    /// Reads the command line, or ends the program with help or a usage error.
-    pub(crate) fn from_command_line() -> Cli {
-        match Cli::try_from_words(std::env::args_os()) {
-            Ok(cli) => cli,
-            Err(error) => error.exit(),
-        }
+    /// Reads the command line; help is an error, too.
+    pub(crate) fn from_command_line() -> Result<Cli, clap::Error> {
+        Cli::try_from_words(std::env::args_os())
     }
 
     fn try_from_words<W>(words: impl IntoIterator<Item = W>) -> Result<Cli, clap::Error>

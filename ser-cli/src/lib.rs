@@ -27,8 +27,8 @@ pub use state::{Delivered, NotDelivered};
 /// Does what the command line says.
 #[must_use]
 pub fn run() -> ExitCode {
-    match cli::Cli::from_command_line().run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(),
+    match cli::Cli::from_command_line() {
+        Ok(cli) => cli.run().map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS),
+        Err(error) => ser_console::explain(&error),
     }
 }

@@ -50,7 +50,11 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
-    let done = match Arguments::parse().verb {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return ser_console::explain(&error),
+    };
+    let done = match arguments.verb {
         Verb::Demo(arguments) => demo::run(&arguments),
         Verb::Qemu(arguments) => qemu::run(&arguments),
         Verb::Test(arguments) => test::run(&arguments),
@@ -64,10 +68,7 @@ fn main() -> ExitCode {
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("{failure}");
-            ExitCode::FAILURE
-        }
+        Err(failure) => failure.report(),
     }
 }
 

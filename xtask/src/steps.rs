@@ -2,25 +2,55 @@
 
 use std::ffi::OsStr;
 use std::fmt;
+use std::io::{self, Write};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, ExitCode};
 use std::sync::OnceLock;
 use std::time::Instant;
 
+use ser_console::Harmless;
+
 /// Why a verb ended early; says what to do.
 #[derive(Debug)]
-pub(crate) struct Failure(String);
+pub(crate) enum Failure {
+    /// What is to be told.
+    Told(String),
+    /// Standard output takes nothing more.
+    Unwritten(io::Error),
+}
 
 impl Failure {
     pub(crate) fn new(text: impl Into<String>) -> Failure {
-        Failure(text.into())
+        Failure::Told(text.into())
+    }
+
+    /// Tells the user; gives the exit code.
+    pub(crate) fn report(&self) -> ExitCode {
+        if let Failure::Unwritten(error) = self {
+            return ser_console::unwritten(error);
+        }
+        say(self);
+        ExitCode::FAILURE
     }
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "\nxtask: {}", self.0)
+        match self {
+            Failure::Told(text) => write!(f, "\nxtask: {}", Harmless(text)),
+            Failure::Unwritten(error) => write!(f, "\nxtask: cannot write standard output: {error}"),
+        }
     }
+}
+
+/// On standard error. Nobody is left to be told when that is gone.
+pub(crate) fn say(line: &dyn fmt::Display) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// Prints on standard output.
+pub(crate) fn print(text: impl fmt::Display) -> Result<()> {
+    ser_console::print(text).map_err(Failure::Unwritten)
 }
 
 pub(crate) type Result<T> = std::result::Result<T, Failure>;
@@ -29,12 +59,12 @@ pub(crate) type Result<T> = std::result::Result<T, Failure>;
 pub(crate) fn heading(text: &str) {
     static BEGAN: OnceLock<Instant> = OnceLock::new();
     let seconds = BEGAN.get_or_init(Instant::now).elapsed().as_secs();
-    eprintln!("\n==> {}:{:02}  {text}", seconds / 60, seconds % 60);
+    say(&format_args!("\n==> {}:{:02}  {}", seconds / 60, seconds % 60, Harmless(text)));
 }
 
 /// A remark on what is not done, and why.
 pub(crate) fn note(text: &str) {
-    eprintln!("    {text}");
+    say(&format_args!("    {}", Harmless(text)));
 }
 
 /// Variables that cargo and rustup set for xtask, and that mislead other toolchains.

@@ -3,10 +3,12 @@
 mod bus;
 
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 use clap::ValueEnum;
+use ser_console::Harmless;
 use ser_proto::Model;
 use ser_proto::genius::Device;
 use ser_sim::{
@@ -119,7 +121,12 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let stop = interrupt::catch()?;
-    Ok(ser_sim::run(options(args)?, &stop, announce)?)
+    let mut announced = Ok(());
+    ser_sim::run(options(args)?, &stop, |ports| {
+        announced = announce(ports);
+        stop.fetch_or(announced.is_err(), Ordering::Relaxed);
+    })?;
+    announced
 }
 
 fn options(args: &Args) -> Result<SimOptions> {
@@ -205,11 +212,20 @@ fn tcp_address(text: &str) -> std::result::Result<String, String> {
     }
 }
 
-fn announce(port: &str) {
-    // A script that has read the port may close our output; the unit goes on.
-    let mut out = io::stdout();
-    let _ = writeln!(out, "{port}").and_then(|()| out.flush());
+/// Tells all the ways to reach the units, one a line.
+fn announce(ports: &str) -> Result<()> {
+    let mut out = io::stdout().lock();
+    // A script gets them letter by letter; a terminal would obey some.
+    let is_terminal = out.is_terminal();
+    let shown = |port: &str| if is_terminal { Harmless(port).line() } else { port.to_owned() };
+    let written = ports.lines().try_for_each(|port| writeln!(out, "{}", shown(port)));
+    match written.and_then(|()| out.flush()) {
+        // A script that has read the port may close our output; the unit goes on.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {}
+        written => written?,
+    }
     inform("the simulated unit answers; Ctrl-C switches it off");
+    Ok(())
 }
 
 /// What went wrong in the simulator, with advice.
