@@ -229,6 +229,8 @@ mod tests {
             "sim --genius /tmp/host --node 5 --bus-noise nan",
             "sim --genius /tmp/host --node 5 --seed 1",
             "sim --bus-rate 38.4K",
+            "sim --tcp 127.0.0.1:0 --tcp-idle 0",
+            "sim --tcp 127.0.0.1:0 --tcp-idle sometimes",
             "sim --host-number 1",
             "sim --bus-noise 1",
             "",

@@ -5,8 +5,10 @@ mod common;
 
 use std::fs;
 use std::io::{Read, Write};
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use common::{Running, ser_cli, wait_until};
@@ -268,6 +270,47 @@ fn a_unit_over_tcp_answers_like_one_on_a_port() {
     let status =
         ser_cli().args(["--timeout", "20s", "--port", &port, "status"]).output().expect("ser-cli runs");
     assert!(text(&status.stdout).contains("recording"), "{}", text(&status.stderr));
+}
+
+/// A simulator on TCP, its port, and what it tells.
+fn sim_on_tcp(options: &[&str]) -> (Running, String, Receiver<String>) {
+    let mut command = ser_cli();
+    command.args(["sim", "--tcp", "127.0.0.1:0"]).args(options);
+    let mut sim = Running::start(command.stdout(Stdio::piped()).stderr(Stdio::piped()));
+    let port = sim.lines().recv_timeout(PATIENCE).expect("a port");
+    let told = sim.told();
+    (sim, port, told)
+}
+
+fn status_of(port: &str) -> Output {
+    ser_cli().args(["status", "--port", port]).output().expect("ser-cli runs")
+}
+
+fn connected(port: &str) -> TcpStream {
+    TcpStream::connect(port.strip_prefix("tcp://").expect("TCP")).expect("connected")
+}
+
+#[test]
+fn a_second_client_hears_of_the_first() {
+    let (_sim, port, told) = sim_on_tcp(&[]);
+    let first = connected(&port);
+    let refused = status_of(&port);
+    let why = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(why.contains("before the first answer") && why.contains("another client"), "{why}");
+    let has = format!("{} has the line", first.local_addr().expect("an address"));
+    wait_until("the notice", || told.try_iter().any(|line| line.ends_with(&has)));
+    drop(first);
+    wait_until("the place is free", || status_of(&port).status.success());
+}
+
+#[test]
+fn a_client_that_says_nothing_gives_way_in_the_end() {
+    let (_sim, port, told) = sim_on_tcp(&["--tcp-idle", "1s"]);
+    let silent = connected(&port);
+    wait_until("the place is free", || status_of(&port).status.success());
+    let gives_way = format!("warning: {} has been silent", silent.local_addr().expect("an address"));
+    wait_until("the notice", || told.try_iter().any(|line| line.starts_with(&gives_way)));
 }
 
 #[test]

@@ -163,6 +163,7 @@ impl Service {
         let room = self.wire.room().min(buffer.len());
         if room > 0 {
             let received = self.line.read(&mut buffer[..room])?;
+            self.line.take_notices().iter().for_each(|notice| self.notify(notice));
             let received = &mut buffer[..received];
             let host_rate = self.line.host_bits_per_second();
             if !rates_agree(host_rate, machine.baud()) {

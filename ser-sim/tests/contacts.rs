@@ -13,11 +13,7 @@ use ser_proto::Model;
 use ser_sim::{Contacts, Notice, Played, Port, Scenario, SimError, SimOptions, Simulator, Step};
 
 fn options(contacts: Contacts) -> SimOptions {
-    SimOptions {
-        contacts,
-        keep_played: true,
-        ..SimOptions::new(Model::Ser160, Port::Tcp { address: "127.0.0.1:0".to_owned() })
-    }
+    SimOptions { contacts, keep_played: true, ..SimOptions::new(Model::Ser160, Port::tcp("127.0.0.1:0")) }
 }
 
 /// A simulator whose contacts come through a pipe.

@@ -6,6 +6,7 @@ use std::fs::File;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use clap::ValueEnum;
 use ser_console::Harmless;
@@ -18,6 +19,7 @@ use ser_sim::{
 
 use crate::error::{Failure, Result, inform, warn};
 use crate::interrupt;
+use crate::values;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -92,9 +94,15 @@ pub(crate) struct Args {
     #[command(flatten)]
     bus: bus::BusArgs,
 
-    /// Listen on this address instead; port 0 takes a free one.
+    /// Listen on this address instead, for one client at a time; port 0 takes a free one.
+    ///
+    /// Whoever reaches the address may do everything, erase included: on 127.0.0.1 this computer, on 0.0.0.0 anybody.
     #[arg(long, value_name = "HOST:PORT", value_parser = tcp_address)]
     tcp: Option<String>,
+
+    /// A client that has sent nothing for so long gives way when another one comes; or never.
+    #[arg(long, value_name = "TIME", default_value = "600s", value_parser = patience)]
+    tcp_idle: Patience,
 
     /// Move the unit's contacts as this CSV file says; `-` is standard input.
     #[arg(long, value_name = "FILE")]
@@ -132,7 +140,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 fn options(args: &Args) -> Result<SimOptions> {
     let model = args.model.into();
     let port = match &args.tcp {
-        Some(address) => Port::Tcp { address: address.clone() },
+        Some(address) => Port::Tcp { address: address.clone(), gives_way_after: args.tcp_idle.0 },
         None if args.genius.is_some() && args.pty.is_none() => Port::Unconnected,
         None => Port::Pty { link: args.pty.clone() },
     };
@@ -204,6 +212,15 @@ fn contacts_failure(contacts: std::result::Result<Contacts, SimError>) -> Result
     })
 }
 
+/// How long a client may be silent while another one waits; `None` is for ever.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Patience(Option<Duration>);
+
+fn patience(text: &str) -> std::result::Result<Patience, String> {
+    let time = if text == "never" { Ok(None) } else { values::duration(text).map(Some) };
+    time.map(Patience).map_err(|why| format!("{why}; or never"))
+}
+
 /// An address to listen on, as far as one can tell without asking the system.
 fn tcp_address(text: &str) -> std::result::Result<String, String> {
     match text.rsplit_once(':') {
@@ -251,7 +268,7 @@ impl From<SimError> for Failure {
                 }
                 io::ErrorKind::AddrInUse => "another program listens there: port 0 takes a free one",
                 io::ErrorKind::AddrNotAvailable => {
-                    "that is not this computer: 127.0.0.1 or 0.0.0.0 (from everywhere) are"
+                    "that is not this computer: 127.0.0.1 is; 0.0.0.0 is, too, and there anybody may erase"
                 }
                 _ => "check names, rights, and that no other simulator runs there",
             },
