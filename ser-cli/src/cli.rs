@@ -5,6 +5,7 @@ use std::time::Duration;
 use clap::{Args as _, CommandFactory, FromArgMatches, Parser, Subcommand};
 use ser_proto::Baud;
 
+use crate::closed_stdout;
 use crate::commands;
 use crate::connection;
 use crate::error;
@@ -84,6 +85,13 @@ enum Command {
     Completions(commands::completions::Args),
 }
 
+impl Command {
+    /// Whether it does nothing but bring data.
+    fn is_for_its_output(&self) -> bool {
+        matches!(self, Command::Read(_) | Command::Print(_) | Command::Watch(_) | Command::Decode(_))
+    }
+}
+
 impl Cli {
     /// The definition of all arguments.
     pub(crate) fn definition() -> clap::Command {
@@ -120,6 +128,9 @@ impl Cli {
 
     fn run_command(&self) -> error::Result<()> {
         let connection = &self.connection;
+        if self.command.is_for_its_output() {
+            closed_stdout::check()?;
+        }
         match &self.command {
             Command::Ports(args) => commands::ports::run(args),
             Command::Status(args) => commands::status::run(args, connection),

@@ -7,7 +7,7 @@ use ser_client::Cursor;
 
 use crate::cli::ConnectionArgs;
 use crate::connection;
-use crate::error::{Failure, Result};
+use crate::error::Result;
 use crate::output;
 use crate::state::{Delivered, StateFile, StateLock};
 
@@ -39,10 +39,6 @@ pub(crate) struct Keeper {
 impl Keeper {
     /// Loads what has been delivered from this unit.
     pub(crate) fn load(args: &StateArgs, connection: &ConnectionArgs) -> Result<Keeper> {
-        if stdout_was_closed() {
-            return Err(Failure::new("standard output is closed: what is new would be delivered to nobody")
-                .hint("send it to a file or to a program; > /dev/null passes over what is new"));
-        }
         let mut file = StateFile::of_unit(&connection::unit_name(connection)?, args.state_dir.as_deref())?;
         let lock = file.lock()?;
         let saved = file.load()?;
@@ -84,29 +80,4 @@ impl Keeper {
         }
         Ok(())
     }
-}
-
-/// Whether this program was started without a standard output.
-///
-/// It has one all the same: Rust opens `/dev/null` in its place, for reading and writing, before `main`. Who sends
-/// output there on purpose (`> /dev/null`) opens it for writing.
-#[cfg(unix)]
-fn stdout_was_closed() -> bool {
-    use std::fs::metadata;
-    use std::io::stdout;
-    use std::os::unix::fs::MetadataExt;
-
-    use rustix::fs::{FileType, OFlags, fcntl_getfl, fstat};
-
-    let both_ways = fcntl_getfl(stdout()).is_ok_and(|flags| flags & OFlags::RWMODE == OFlags::RDWR);
-    let (Ok(found), Ok(null)) = (fstat(stdout()), metadata("/dev/null")) else { return false };
-    both_ways
-        && FileType::from_raw_mode(found.st_mode) == FileType::CharacterDevice
-        && found.st_rdev == null.rdev()
-}
-
-/// Where closed outputs are not told apart.
-#[cfg(not(unix))]
-fn stdout_was_closed() -> bool {
-    false
 }

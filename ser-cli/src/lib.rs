@@ -4,6 +4,7 @@
 //! ([`CaptureOptions`]), and what a run before has noted down ([`Delivered`]).
 
 mod cli;
+mod closed_stdout;
 mod commands;
 mod connection;
 mod decoding;

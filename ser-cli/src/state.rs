@@ -200,7 +200,7 @@ fn load_from(path: &Path) -> Result<Option<Delivered>> {
     let damaged = |why: &dyn fmt::Display| {
         Failure::new(format!("{} does not say what was delivered: {why}", path.display()))
             .hint("read --all delivers everything the unit has and needs no state")
-            .hint("delete the file to begin anew: the next --new then delivers everything")
+            .hint("move the file away to begin anew: the next --new then delivers everything")
     };
     let text = match read_ours(path) {
         Ok(text) => text,
@@ -361,7 +361,7 @@ mod tests {
             fs::write(&state.path, content).unwrap();
             let text = state.load().unwrap_err().text();
             assert!(text.contains("_dev_ttyUSB0.json does not say what was delivered"), "{text}");
-            assert!(text.contains("--all") && text.contains("delete the file"), "{text}");
+            assert!(text.contains("--all") && text.contains("move the file away"), "{text}");
         }
     }
 
@@ -427,7 +427,7 @@ mod tests {
         let endless = fs::File::create(&state.path).unwrap();
         endless.set_len(2 << 30).unwrap();
         let text = state.load().unwrap_err().text();
-        assert!(text.contains("longer than 65536 bytes") && text.contains("delete the file"), "{text}");
+        assert!(text.contains("longer than 65536 bytes") && text.contains("move the file away"), "{text}");
         assert!(state.save(&delivered).is_err());
         assert_eq!(endless.metadata().unwrap().len(), 2 << 30);
 

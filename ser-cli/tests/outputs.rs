@@ -128,27 +128,26 @@ fn what_goes_on_until_it_is_stopped_ends_on_a_full_disk() {
 }
 
 #[test]
-fn what_is_new_is_not_delivered_into_a_closed_output() {
+fn nothing_is_delivered_into_a_closed_output() {
     let unit = Unit::start();
     let state = unit.folder.path().join("state");
-    let new = |output: &str| {
+    let run = |line: &str| {
         let mut shell = Command::new("sh");
-        shell.args([
-            "-c",
-            &format!("exec \"$0\" read --new --format jsonl {output}"),
-            env!("CARGO_BIN_EXE_ser-cli"),
-        ]);
+        shell.args(["-c", &format!("exec \"$0\" {line}"), env!("CARGO_BIN_EXE_ser-cli")]);
         shell.env("SER_PORT", unit.folder.path().join("unit")).env("SER_STATE_DIR", &state);
-        shell.output().expect("sh runs")
+        shell.stdin(Stdio::null()).output().expect("sh runs")
     };
-    let closed = new(">&-");
-    assert_eq!(closed.status.code(), Some(1));
-    assert!(text(&closed.stderr).contains("standard output is closed"), "{}", text(&closed.stderr));
-    // It is still new.
-    assert_eq!(text(&new("").stdout).lines().count(), 3);
+    for line in ["read", "read --new", "watch", "print --from 1 --count 1", "decode -"] {
+        let Output { status, stderr, .. } = run(&format!("{line} >&-"));
+        assert_eq!(status.code(), Some(1), "{line}");
+        assert!(text(&stderr).contains("standard output is closed"), "{line}: {}", text(&stderr));
+    }
+    // What is new still is.
+    let new = "read --new --format jsonl";
+    assert_eq!(text(&run(new).stdout).lines().count(), 3);
     fs::remove_dir_all(&state).expect("removed");
-    assert_eq!(new("> /dev/null").status.code(), Some(0));
-    assert_eq!(text(&new("").stdout), "", "passed over");
+    assert_eq!(run(&format!("{new} > /dev/null")).status.code(), Some(0));
+    assert_eq!(text(&run(new).stdout), "", "passed over");
 }
 
 /// Neither a control character nor one that turns text around, line ends apart.

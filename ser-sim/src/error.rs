@@ -71,14 +71,10 @@ impl fmt::Display for SimError {
                 write!(f, "another simulator has {}", path.display())
             }
             SimError::LinkTaken(path) => {
-                write!(
-                    f,
-                    "{} exists already and is no link of a simulator: remove it or name another",
-                    path.display()
-                )
+                write!(f, "{} exists already and is no link of a simulator: it is left alone", path.display())
             }
             SimError::WindowTaken(path) | SimError::LogTaken(path) => {
-                write!(f, "{} exists already: remove it or name another", path.display())
+                write!(f, "{} exists already: it is left alone", path.display())
             }
             SimError::EmulatorMissing { program } => write!(
                 f,

@@ -256,7 +256,7 @@ impl From<SimError> for Failure {
             SimError::WindowTaken(_) | SimError::WindowInUse(_) => {
                 "choose a name that does not exist, as in --genius /tmp/host"
             }
-            SimError::LogTaken(_) => "a log overwrites nothing: choose a name that does not exist",
+            SimError::LogTaken(_) => "choose a name that does not exist, as in --log /tmp/ser.log",
             SimError::EmulatorMissing { .. } => "or leave --image out: the built-in node needs no emulator",
             SimError::EmulatorEnded { .. } | SimError::NoAnswer { .. } => {
                 "is this an image for mps2-an385? Build it with cargo xtask firmware"
