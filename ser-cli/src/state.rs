@@ -188,7 +188,7 @@ impl StateFile {
         temporary.write_all(text.as_bytes())?;
         temporary.as_file().sync_all()?;
         temporary.persist(&self.path)?;
-        if let Some(other) = self.moves_from.take() {
+        if let Some(other) = self.moves_from.take().filter(|other| matches!(load_from(other), Ok(Some(_)))) {
             // Found again, it would be taken for what another unit has delivered.
             let _ = fs::remove_file(other);
         }
