@@ -71,7 +71,11 @@ impl fmt::Display for SimError {
                 write!(f, "another simulator has {}", path.display())
             }
             SimError::LinkTaken(path) => {
-                write!(f, "{} exists already and is no link of a simulator: it is left alone", path.display())
+                write!(
+                    f,
+                    "{} exists already, and no simulator of yours has made it: it is left alone",
+                    path.display()
+                )
             }
             SimError::WindowTaken(path) | SimError::LogTaken(path) => {
                 write!(f, "{} exists already: it is left alone", path.display())
