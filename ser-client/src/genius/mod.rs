@@ -11,6 +11,8 @@ mod inboxes;
 mod link;
 #[cfg(unix)]
 mod window;
+#[cfg(unix)]
+mod window_file;
 
 #[cfg(unix)]
 pub use clock::{Clock, RealTime};
