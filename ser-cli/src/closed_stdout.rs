@@ -1,8 +1,9 @@
 //! Standard output that was closed before this program was started.
 //!
-//! It has one all the same: Rust opens `/dev/null` in its place, for reading and writing, before `main`, and writing
-//! there succeeds. Who sends output there on purpose (`> /dev/null`) opens it for writing. A few programs open it for
-//! both for those that they start; so only commands that are there for their output mind.
+//! It has one all the same: Rust opens `/dev/null` in its place, for reading and writing, before
+//! `main`, and writing there succeeds. Who sends output there on purpose (`> /dev/null`) opens it
+//! for writing. A few programs open it for both for those that they start; so only commands that
+//! are there for their output mind.
 
 use crate::error::{Failure, Result};
 

@@ -1,7 +1,8 @@
 //! What has been delivered already, kept in the user's state directory between two runs: one file per unit.
 //!
-//! A unit that was called otherwise before has its file under that name; it moves when it is written. Files are
-//! replaced as a whole, and only files of ours are: no link is followed, and nothing else is read to its end.
+//! A unit that was called otherwise before has its file under that name; it moves when it is
+//! written. Files are replaced as a whole, and only files of ours are: no link is followed, and
+//! nothing else is read to its end.
 
 use std::error::Error;
 use std::fmt;
@@ -166,7 +167,8 @@ impl StateFile {
         Ok(None)
     }
 
-    /// Remembers what has been delivered. After a crash the file holds either the old or the new content.
+    /// Remembers what has been delivered. After a crash the file holds either the old or the new
+    /// content.
     pub(crate) fn save(&mut self, delivered: &Delivered) -> Result<()> {
         self.try_save(delivered).map_err(|error| {
             Failure::new(format!("cannot remember in {} what was delivered: {error}", self.path.display()))
@@ -238,7 +240,8 @@ fn open_ours(path: &Path, options: &mut fs::OpenOptions) -> io::Result<File> {
     {
         use rustix::fs::OFlags;
         use std::os::unix::fs::OpenOptionsExt;
-        // Something else may come between looking and opening, even a pipe that waits for its other end.
+        // Something else may come between looking and opening, even a pipe that waits for its other
+        // end.
         options.custom_flags((OFlags::NOFOLLOW | OFlags::NONBLOCK).bits().cast_signed());
     }
     let file = options.open(path)?;

@@ -1,16 +1,20 @@
-//! What a unit is called: one name however the way to it is spelled, and the names that it may have had.
+//! What a unit is called: one name however the way to it is spelled, and the names that it may have
+//! had.
 //!
 //! # Design
-//! Under its name is kept what was delivered from a unit, so the name has to be the same from one run to the next.
+//! Under its name is kept what was delivered from a unit, so the name has to be the same from one
+//! run to the next.
 //!
-//! - A link is a name that somebody has chosen because it lasts (`/dev/serial/by-id/…`, `/dev/recorder1`), and stays.
-//! - The number of a USB adapter does not last. `/dev/ttyUSB0` is called what is in `/dev/serial/by-id` for it, as
-//!   long as that has the adapter's serial number: two adapters without one would take turns at the same name.
+//! - A link is a name that somebody has chosen because it lasts (`/dev/serial/by-id/…`,
+//!   `/dev/recorder1`), and stays.
+//! - The number of a USB adapter does not last. `/dev/ttyUSB0` is called what is in
+//!   `/dev/serial/by-id` for it, as long as that has the adapter's serial number: two adapters
+//!   without one would take turns at the same name.
 //! - The computer itself is `localhost`, also as `127.0.0.1` and `[::1]`.
 //!
-//! All other names of the unit are looked under when there is nothing under this one: they are those of other
-//! spellings, and of versions before this one. The number of a pseudo-terminal is none of them, for the next program
-//! that wants one gets it.
+//! All other names of the unit are looked under when there is nothing under this one: they are
+//! those of other spellings, and of versions before this one. The number of a pseudo-terminal is
+//! none of them, for the next program that wants one gets it.
 
 use std::fs;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};

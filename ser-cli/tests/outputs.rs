@@ -1,4 +1,5 @@
-//! Standard output that is full or that nobody reads, and text from outside on its way to a terminal.
+//! Standard output that is full or that nobody reads, and text from outside on its way to a
+//! terminal.
 #![cfg(unix)]
 
 mod common;

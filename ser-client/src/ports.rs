@@ -10,8 +10,8 @@ use serialport::SerialPortType;
 pub struct PortInfo {
     /// Path or name.
     pub path: String,
-    /// What it is, in a few words: maker and product of a USB adapter, `PCI`, `Bluetooth`; may be empty. An adapter
-    /// may call itself anything; what a terminal would obey is escaped.
+    /// What it is, in a few words: maker and product of a USB adapter, `PCI`, `Bluetooth`; may be
+    /// empty. An adapter may call itself anything; what a terminal would obey is escaped.
     pub description: String,
 }
 

@@ -12,8 +12,9 @@ pub trait Transport: Send {
     /// Waits up to `timeout` for bytes and takes those that are there. 0 means that none came in time.
     ///
     /// # Errors
-    /// A line that has ended is an error, never 0: `NotConnected` for a device that was unplugged, `UnexpectedEof`
-    /// or one of the connection kinds for a peer that went away; `ConnectionRefused` if it has not said anything before.
+    /// A line that has ended is an error, never 0: `NotConnected` for a device that was unplugged,
+    /// `UnexpectedEof` or one of the connection kinds for a peer that went away;
+    /// `ConnectionRefused` if it has not said anything before.
     fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize>;
 
     /// Sends all bytes; they may still be on the line when this returns.

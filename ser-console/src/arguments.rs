@@ -6,10 +6,12 @@ use std::process::ExitCode;
 
 use crate::Harmless;
 
-/// Prints what clap says instead of the arguments: help, a version, or what is wrong. Gives the exit code.
+/// Prints what clap says instead of the arguments: help, a version, or what is wrong. Gives the
+/// exit code.
 ///
-/// clap repeats arguments and variables as they came. Where one of them has something that a terminal would obey, the
-/// text is printed without colours, and with that escaped: in a text with colours nobody can tell theirs from ours.
+/// clap repeats arguments and variables as they came. Where one of them has something that a
+/// terminal would obey, the text is printed without colours, and with that escaped: in a text with
+/// colours nobody can tell theirs from ours.
 #[must_use]
 pub fn explain(error: &clap::Error) -> ExitCode {
     let arguments = std::env::args_os().chain(std::env::vars_os().map(|(_, value)| value));
@@ -39,8 +41,8 @@ pub fn print(text: impl Display) -> io::Result<()> {
     out.flush()
 }
 
-/// The exit code of a program whose standard output has failed. That nobody reads any more (`| head`) is none of its
-/// business; anything else it tells.
+/// The exit code of a program whose standard output has failed. It is none of its business that
+/// nobody reads any more (`| head`); anything else it tells.
 #[must_use]
 pub fn unwritten(error: &io::Error) -> ExitCode {
     if error.kind() == ErrorKind::BrokenPipe {

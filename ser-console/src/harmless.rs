@@ -2,9 +2,9 @@
 
 use std::fmt::{self, Display, Write};
 
-/// Shows a text with everything escaped that a terminal would obey instead of showing it: control characters, also
-/// those above 7Fh, and what sets the direction of text. Tabs and line ends pass; lines after the first are indented,
-/// so that none of them passes for a message of its own.
+/// Shows a text with everything escaped that a terminal would obey instead of showing it: control
+/// characters, also those above 7Fh, and what sets the direction of text. Tabs and line ends pass;
+/// lines after the first are indented, so that none of them passes for a message of its own.
 ///
 /// ```
 /// use ser_console::Harmless;
@@ -76,7 +76,8 @@ fn is_obeyed(letter: char) -> bool {
     letter.is_control()
         || matches!(
             letter,
-            // Marks and overrides of direction, which make text read otherwise than it is; ends of lines and paragraphs.
+            // Marks and overrides of direction, which make text read otherwise than it is; ends of
+            // lines and paragraphs.
             '\u{061C}' | '\u{200E}' | '\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2066}'..='\u{2069}'
         )
 }

@@ -1,16 +1,19 @@
 //! A name in the file system that one simulator has for itself, and what it has put there.
 //!
 //! # Design
-//! What stands under a name does not tell who made it, nor whether that simulator still runs. Both are in a file of
-//! our own: its lock says that the simulator runs, and its content says what it has made. The file is in a directory
-//! of the user's that nobody else can write to, and never beside the name: there it could be anything of anybody's.
+//! What stands under a name does not tell who made it, nor whether that simulator still runs. Both
+//! are in a file of our own: its lock says that the simulator runs, and its content says what it
+//! has made. The file is in a directory of the user's that nobody else can write to, and never
+//! beside the name: there it could be anything of anybody's.
 //!
-//! The directory does not depend on the environment, as `$XDG_RUNTIME_DIR` does: one who starts a simulator from a
-//! terminal and one who does so from a timer must meet. It outlives a restart of the computer, as the name does.
+//! The directory does not depend on the environment, as `$XDG_RUNTIME_DIR` does: one who starts a
+//! simulator from a terminal and one who does so from a timer must meet. It outlives a restart of
+//! the computer, as the name does.
 //!
 //! # Notes
-//! Other users have directories of their own. Between two users it is the making of the thing itself that decides,
-//! which fails where something is, and neither replaces what the other has made.
+//! Other users have directories of their own. Between two users it is the making of the thing
+//! itself that decides, which fails where something is, and neither replaces what the other has
+//! made.
 
 use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, ErrorKind};
@@ -28,7 +31,8 @@ use crate::error::SimError;
 /// Where the user's directory for records may be, in order of preference.
 const PLACES: [&str; 2] = ["/var/tmp", "/tmp"];
 
-/// How often a record may go between its opening and its locking: each time a simulator ends at that moment.
+/// How often a record may go between its opening and its locking: each time a simulator ends at
+/// that moment.
 const MAX_TRIES: u32 = 100;
 
 /// No record is longer.
@@ -50,7 +54,8 @@ impl Claim {
         let file_name = record_name(name).map_err(SimError::io(format!("make {}", name.display())))?;
         let doing = || format!("note that {} is in use", name.display());
         let folder = open_folder().map_err(SimError::io(doing()))?;
-        // Programs that tidy up leave a locked folder alone; without the lock it works all the same.
+        // Programs that tidy up leave a locked folder alone; without the lock it works all the
+        // same.
         let _ = folder.try_lock_shared();
         match lock_record(&folder, &file_name).map_err(SimError::io(doing()))? {
             Some(record) => Ok(Claim { name: name.to_owned(), record, file_name, folder }),
@@ -58,8 +63,8 @@ impl Claim {
         }
     }
 
-    /// Whether something stands under the name, and if so, whether a simulator has made it: this one, or one that
-    /// did not end as it should.
+    /// Whether something stands under the name, and if so, whether a simulator has made it: this
+    /// one, or one that did not end as it should.
     pub(crate) fn holder(&self) -> io::Result<Holder> {
         match fs::symlink_metadata(&self.name) {
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(Holder::Nobody),
@@ -127,7 +132,8 @@ pub(crate) enum Holder {
 struct Identity {
     device: u64,
     inode: u64,
-    /// When it was made, in nanoseconds since 1970: file systems use inodes again. 0 where that is not kept.
+    /// When it was made, in nanoseconds since 1970: file systems use inodes again. 0 where that is
+    /// not kept.
     born_ns: u128,
 }
 

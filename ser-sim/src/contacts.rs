@@ -81,8 +81,8 @@ pub(crate) type Arrived = Result<Vec<Item>, ScenarioError>;
 /// How many reads from a stream may wait to be taken.
 const MAX_ARRIVED: usize = 4;
 
-/// Reads a stream in a thread of its own, as fast as what it brings is taken. The channel closes at the end of the
-/// stream and after an error.
+/// Reads a stream in a thread of its own, as fast as what it brings is taken. The channel closes at
+/// the end of the stream and after an error.
 pub(crate) fn read_stream(
     name: &str,
     source: Box<dyn Read + Send>,

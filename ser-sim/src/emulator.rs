@@ -516,7 +516,8 @@ pub(crate) fn arguments(options: &EmulatorOptions, memory: &Path) -> Vec<OsStrin
     arguments
 }
 
-/// Makes the file for the log. A pipe or a terminal may be there already: writing to one destroys nothing.
+/// Makes the file for the log. A pipe or a terminal may be there already: writing to one destroys
+/// nothing.
 pub(crate) fn make_log(options: &EmulatorOptions) -> Result<(), SimError> {
     let Some(path) = &options.log else { return Ok(()) };
     let made = match fs::metadata(path) {

@@ -22,15 +22,18 @@ pub enum Port {
     Unconnected,
     /// A TCP port for one client at a time.
     Tcp {
-        /// Address to listen on, as in `127.0.0.1:4000`; port 0 takes a free one. Whoever reaches it may do everything.
+        /// Address to listen on, as in `127.0.0.1:4000`; port 0 takes a free one. Whoever reaches
+        /// it may do everything.
         address: String,
-        /// A client that has sent nothing for so long gives way when another one comes; `None` is never.
+        /// A client that has sent nothing for so long gives way when another one comes; `None` is
+        /// never.
         gives_way_after: Option<Duration>,
     },
 }
 
 impl Port {
-    /// How long a TCP client may be silent by default: `ser-cli watch` says something every ten seconds.
+    /// How long a TCP client may be silent by default: `ser-cli watch` says something every ten
+    /// seconds.
     pub const GIVES_WAY_AFTER: Duration = Duration::from_secs(600);
 
     /// A TCP port with what is usual.

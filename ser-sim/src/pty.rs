@@ -55,7 +55,8 @@ enum Place {
 }
 
 impl Place {
-    /// Whether what stands there is a link that we, or a simulator before us, have made; nothing is no link.
+    /// Whether what stands there is a link that we, or a simulator before us, have made; nothing is
+    /// no link.
     fn holds_ours(&self) -> io::Result<bool> {
         match self {
             Place::Shared(claim) => Ok(claim.holder()? == Holder::Simulator),
@@ -243,7 +244,8 @@ impl PtyLine {
     }
 }
 
-/// Claims the place of the link and clears it of a link that a simulator has left behind; anything else is refused.
+/// Claims the place of the link and clears it of a link that a simulator has left behind; anything
+/// else is refused.
 fn claim(link: &Path) -> Result<Claim, SimError> {
     let claim = Claim::on(link, SimError::LinkInUse)?;
     let looking = || SimError::io(format!("look at {}", link.display()));

@@ -18,8 +18,9 @@ use crate::wire::Wire;
 /// Contacts of the emulated board move when this computer has time; less than this is not worth a word.
 const NOTICEABLE_MS: u64 = 3;
 
-/// While so many steps wait for their time, the stream that brings them has to wait, too: it may bring them faster
-/// than time passes, and without end. At 32 steps a millisecond, which is every contact, they last two seconds.
+/// While so many steps wait for their time, the stream that brings them has to wait, too: it may
+/// bring them faster than time passes, and without end. At 32 steps a millisecond, which is every
+/// contact, they last two seconds.
 const MAX_WAITING_STEPS: usize = 65_536;
 
 /// What the owner of a simulator wants from it.

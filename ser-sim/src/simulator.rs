@@ -50,7 +50,8 @@ pub struct SimOptions {
     pub genius: Option<GeniusOptions>,
     /// Called with a sentence for the user when something is not as it should be but goes on.
     pub notice: Option<Notice>,
-    /// Whether [`Simulator::played`] is wanted. It takes memory with every move, as long as the simulator runs.
+    /// Whether [`Simulator::played`] is wanted. It takes memory with every move, as long as the
+    /// simulator runs.
     pub keep_played: bool,
 }
 

@@ -4,10 +4,11 @@
 //! A slow client slows down what the node sends and nothing else.
 //!
 //! # Design
-//! Nobody keeps the place for ever. A client whose computer is gone, or the way to it, does not answer the probes of
-//! TCP and is given up within two minutes. One that is there and says nothing may be listening, as long as it likes;
-//! but when another one comes, and it has not said anything for ten minutes, it gives way. A second client is told
-//! nothing: whatever it was, it would be taken for a word of the recorder's.
+//! Nobody keeps the place for ever. A client whose computer is gone, or the way to it, does not
+//! answer the probes of TCP and is given up within two minutes. One that is there and says nothing
+//! may be listening, as long as it likes; but when another one comes, and it has not said anything
+//! for ten minutes, it gives way. A second client is told nothing: whatever it was, it would be
+//! taken for a word of the recorder's.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::mem;
@@ -22,7 +23,8 @@ use crate::line::Line;
 /// How long a client that has said its last word may wait for answers.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
-/// How soon a client that is silent is asked by TCP whether it is there, and how often if it does not answer.
+/// How soon a client that is silent is asked by TCP whether it is there, and how often if it does
+/// not answer.
 #[cfg(unix)]
 const PROBE_AFTER: Duration = Duration::from_secs(60);
 #[cfg(unix)]
@@ -35,7 +37,8 @@ pub(crate) struct TcpLine {
     address: SocketAddr,
     gives_way_after: Option<Duration>,
     client: Option<Client>,
-    /// A connection that came while there was a client. Whether that client is gone shows when it is read next.
+    /// A connection that came while there was a client. Whether that client is gone shows when it
+    /// is read next.
     candidate: Option<(TcpStream, SocketAddr)>,
     client_changed: bool,
     notices: Vec<String>,

@@ -1,5 +1,6 @@
-//! Programs touch no file that they have not made, and do not panic when nobody reads what they print: every call in
-//! the source that could is here, with the reason why it does not. A new one has to be judged, and a line added.
+//! Programs touch no file that they have not made, and do not panic when nobody reads what they
+//! print: every call in the source that could is here, with the reason why it does not. A new one
+//! has to be judged, and a line added.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,4 +1,5 @@
-//! What `xtask` prints, on a full disk, for a reader that has gone, and with arguments that a terminal would obey.
+//! What `xtask` prints, on a full disk, for a reader that has gone, and with arguments that a
+//! terminal would obey.
 #![cfg(unix)]
 
 use std::fs::File;

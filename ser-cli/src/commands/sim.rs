@@ -96,7 +96,8 @@ pub(crate) struct Args {
 
     /// Listen on this address instead, for one client at a time; port 0 takes a free one.
     ///
-    /// Whoever reaches the address may do everything, erase included: on 127.0.0.1 this computer, on 0.0.0.0 anybody.
+    /// Whoever reaches the address may do everything, erase included: on 127.0.0.1 this computer,
+    /// on 0.0.0.0 anybody.
     #[arg(long, value_name = "HOST:PORT", value_parser = tcp_address)]
     tcp: Option<String>,
 

@@ -1,5 +1,5 @@
-//! A file as a window. It has the right size, and may be anything all the same until a board answers in it: a file of
-//! somebody's that was named by mistake gets back what was written to it.
+//! A file as a window. It has the right size, and may be anything all the same until a board
+//! answers in it: a file of somebody's that was named by mistake gets back what was written to it.
 
 use std::cell::RefCell;
 use std::fs::File;

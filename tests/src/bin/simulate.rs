@@ -80,7 +80,8 @@ fn main() -> ExitCode {
     run_all(&arguments).map_or_else(|code| code, |()| ExitCode::SUCCESS)
 }
 
-/// Runs all seeds, up to the first that fails or that nobody wants to hear of any more: then the exit code.
+/// Runs all seeds, up to the first that fails or that nobody wants to hear of any more: then the
+/// exit code.
 fn run_all(arguments: &Arguments) -> Result<(), ExitCode> {
     let mut total = Paces::default();
     for seed in arguments.seeds() {
