@@ -5,6 +5,7 @@ use std::time::Duration;
 use clap::{Args as _, CommandFactory, FromArgMatches, Parser, Subcommand};
 use ser_proto::Baud;
 
+use crate::closed_stdout;
 use crate::commands;
 use crate::connection;
 use crate::error;
@@ -84,6 +85,13 @@ enum Command {
     Completions(commands::completions::Args),
 }
 
+impl Command {
+    /// Whether it does nothing but bring data.
+    fn is_for_its_output(&self) -> bool {
+        matches!(self, Command::Read(_) | Command::Print(_) | Command::Watch(_) | Command::Decode(_))
+    }
+}
+
 impl Cli {
     /// The definition of all arguments.
     pub(crate) fn definition() -> clap::Command {
@@ -95,12 +103,9 @@ impl Cli {
         })
     }
 
-    /// Reads the command line, or ends the program with help or a usage error.
-    pub(crate) fn from_command_line() -> Cli {
-        match Cli::try_from_words(std::env::args_os()) {
-            Ok(cli) => cli,
-            Err(error) => error.exit(),
-        }
+    /// Reads the command line; help is an error, too.
+    pub(crate) fn from_command_line() -> Result<Cli, clap::Error> {
+        Cli::try_from_words(std::env::args_os())
     }
 
     fn try_from_words<W>(words: impl IntoIterator<Item = W>) -> Result<Cli, clap::Error>
@@ -123,6 +128,9 @@ impl Cli {
 
     fn run_command(&self) -> error::Result<()> {
         let connection = &self.connection;
+        if self.command.is_for_its_output() {
+            closed_stdout::check()?;
+        }
         match &self.command {
             Command::Ports(args) => commands::ports::run(args),
             Command::Status(args) => commands::status::run(args, connection),
@@ -232,6 +240,8 @@ mod tests {
             "sim --genius /tmp/host --node 5 --bus-noise nan",
             "sim --genius /tmp/host --node 5 --seed 1",
             "sim --bus-rate 38.4K",
+            "sim --tcp 127.0.0.1:0 --tcp-idle 0",
+            "sim --tcp 127.0.0.1:0 --tcp-idle sometimes",
             "sim --host-number 1",
             "sim --bus-noise 1",
             "",

@@ -3,15 +3,15 @@
 use std::time::Duration;
 
 use ser_client::{
-    Diagnosis, Endpoint, GeniWindow, GeniusError, LineRate, OpenError, Options, RequestError, TransportError,
-    Unit,
+    Diagnosis, Endpoint, GeniusError, LineRate, OpenError, Options, RequestError, TransportError, Unit,
 };
 use ser_proto::{Baud, Configuration};
 
 use crate::cli::ConnectionArgs;
 use crate::error::{Failure, Result, advise, inform, warn};
+use crate::unit_name::UnitName;
 
-/// What the user calls the unit: names its state file and appears in hints.
+/// What the user calls the unit.
 pub(crate) fn port_text(connection: &ConnectionArgs) -> Result<&str> {
     connection.port.as_deref().map(str::trim).filter(|port| !port.is_empty()).ok_or_else(no_port)
 }
@@ -26,27 +26,9 @@ fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint> {
     })
 }
 
-/// What the unit is called wherever this program is started: a relative path is made absolute. Links stay as they
-/// are: they are names that last.
-pub(crate) fn unit_name(connection: &ConnectionArgs) -> Result<String> {
-    let text = port_text(connection)?;
-    // Elsewhere the names of ports are no paths.
-    if cfg!(unix)
-        && let Endpoint::Geni { window, node } = endpoint(connection)?
-        && let Ok(path) = std::path::absolute(&window.file)
-        && let Some(path) = path.to_str()
-    {
-        let window = GeniWindow { file: path.to_owned(), ..window };
-        return Ok(Endpoint::Geni { window, node }.to_string());
-    }
-    if cfg!(unix)
-        && matches!(endpoint(connection)?, Endpoint::Serial { .. })
-        && let Ok(path) = std::path::absolute(text)
-        && let Some(path) = path.to_str()
-    {
-        return Ok(path.to_owned());
-    }
-    Ok(text.to_owned())
+/// What the unit is called wherever this program is started, and however the user spells it.
+pub(crate) fn unit_name(connection: &ConnectionArgs) -> Result<UnitName> {
+    Ok(UnitName::of(port_text(connection)?, &endpoint(connection)?))
 }
 
 /// Opens the line to the unit. Nothing is sent yet.

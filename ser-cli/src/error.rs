@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use anstyle::{AnsiColor, Style};
+use ser_console::Harmless;
 
 /// The result of everything that a command does.
 pub(crate) type Result<T> = std::result::Result<T, Failure>;
@@ -171,10 +172,10 @@ pub(crate) fn advise(message: impl Display) {
 /// Tells the user something that is no problem.
 pub(crate) fn inform(message: impl Display) {
     // Nobody is left to be told when standard error is gone.
-    let _ = writeln!(anstream::stderr(), "{message}");
+    let _ = writeln!(anstream::stderr(), "{}", Harmless(message));
 }
 
 fn note(label: &str, color: AnsiColor, message: impl Display) {
     let style = Style::new().bold().fg_color(Some(color.into()));
-    let _ = writeln!(anstream::stderr(), "{style}{label}:{style:#} {message}");
+    let _ = writeln!(anstream::stderr(), "{style}{label}:{style:#} {}", Harmless(message));
 }

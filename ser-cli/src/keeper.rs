@@ -18,6 +18,10 @@ const SAVE_EVERY: Duration = Duration::from_secs(1);
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct StateArgs {
     /// Where to remember what was delivered; without it, the user's state directory (~/.local/state/ser-cli).
+    ///
+    /// A unit is the same however its port is spelled: by a relative path, a link, the device
+    /// behind it, or by another name of this computer. A USB adapter that has a serial number is
+    /// known by that (/dev/serial/by-id), not by the number that it gets when it is plugged in.
     #[arg(long, env = "SER_STATE_DIR", value_name = "DIR")]
     state_dir: Option<PathBuf>,
 }
@@ -35,7 +39,7 @@ pub(crate) struct Keeper {
 impl Keeper {
     /// Loads what has been delivered from this unit.
     pub(crate) fn load(args: &StateArgs, connection: &ConnectionArgs) -> Result<Keeper> {
-        let file = StateFile::of_unit(&connection::unit_name(connection)?, args.state_dir.as_deref())?;
+        let mut file = StateFile::of_unit(&connection::unit_name(connection)?, args.state_dir.as_deref())?;
         let lock = file.lock()?;
         let saved = file.load()?;
         Ok(Keeper { file, saved, unsaved: None, saved_at: Instant::now(), _lock: lock })

@@ -4,6 +4,7 @@
 //! ([`CaptureOptions`]), and what a run before has noted down ([`Delivered`]).
 
 mod cli;
+mod closed_stdout;
 mod commands;
 mod connection;
 mod decoding;
@@ -16,6 +17,7 @@ mod output;
 mod progress;
 mod state;
 mod time;
+mod unit_name;
 mod values;
 
 use std::process::ExitCode;
@@ -27,8 +29,8 @@ pub use state::{Delivered, NotDelivered};
 /// Does what the command line says.
 #[must_use]
 pub fn run() -> ExitCode {
-    match cli::Cli::from_command_line().run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(),
+    match cli::Cli::from_command_line() {
+        Ok(cli) => cli.run().map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS),
+        Err(error) => ser_console::explain(&error),
     }
 }

@@ -1,23 +1,38 @@
 //! What has been delivered already, kept in the user's state directory between two runs: one file per unit.
+//!
+//! A unit that was called otherwise before has its file under that name; it moves when it is
+//! written. Files are replaced as a whole, and only files of ours are: no link is followed, and
+//! nothing else is read to its end.
 
 use std::error::Error;
 use std::fmt;
 use std::fs::{self, File, TryLockError};
-use std::io::{self, Write};
+use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
+use crc::{CRC_64_XZ, Crc};
 use ser_client::Cursor;
 use ser_proto::{Entry, Inputs, TimeStamp};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Failure, Result};
 use crate::output::Life;
+use crate::unit_name::UnitName;
 
 /// The layout of the file. A change that old versions would misread gets the next number.
 const VERSION: u32 = 2;
 
 /// The layout without sequence and life. What it remembers is still good.
 const VERSION_WITHOUT_LIFE: u32 = 1;
+
+/// No file of ours comes near this.
+const MAX_LEN: u64 = 65_536;
+
+/// The longest name that file systems take, in bytes.
+const MAX_NAME_LEN: usize = 255;
+
+/// So much of a name that is too long is kept for people.
+const TELLING_LEN: usize = 100;
 
 /// Where a unit's log had been read to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,6 +104,10 @@ impl Delivered {
 pub(crate) struct StateFile {
     path: PathBuf,
     unit: String,
+    /// Where the file may be from when the unit was called otherwise.
+    others: Vec<PathBuf>,
+    /// Of these, the one that was loaded.
+    moves_from: Option<PathBuf>,
 }
 
 /// Keeps other runs away from a state file, until it is dropped or the program ends.
@@ -101,7 +120,7 @@ pub(crate) struct StateLock {
 #[derive(Serialize, Deserialize)]
 struct Content {
     version: u32,
-    /// The `--port` text, for whoever looks into the file.
+    /// The unit's name, for whoever looks into the file.
     unit: String,
     /// The recorder's total after the last event, in version 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -136,13 +155,15 @@ struct LastEntry {
 }
 
 impl StateFile {
-    /// The file for the unit behind `port`, in `directory` or where the system wants state to be.
-    pub(crate) fn of_unit(port: &str, directory: Option<&Path>) -> Result<StateFile> {
+    /// The file for this unit, in `directory` or where the system wants state to be.
+    pub(crate) fn of_unit(unit: &UnitName, directory: Option<&Path>) -> Result<StateFile> {
         let directory = match directory {
             Some(directory) => directory.to_path_buf(),
             None => default_directory()?,
         };
-        Ok(StateFile { path: directory.join(file_name(port)), unit: port.to_string() })
+        let path = |name: &String| directory.join(file_name(name));
+        let others = unit.others.iter().map(path).collect();
+        Ok(StateFile { path: path(&unit.name), unit: unit.name.clone(), others, moves_from: None })
     }
 
     /// Takes the file for this run alone.
@@ -156,7 +177,8 @@ impl StateFile {
         if let Some(directory) = path.parent() {
             fs::create_dir_all(directory).map_err(cannot)?;
         }
-        let file = File::options().write(true).create(true).truncate(false).open(&path).map_err(cannot)?;
+        let file =
+            open_ours(&path, File::options().write(true).create(true).truncate(false)).map_err(cannot)?;
         match file.try_lock() {
             Ok(()) => Ok(StateLock { _file: file }),
             Err(TryLockError::WouldBlock) => Err(Failure::new(format!(
@@ -170,17 +192,22 @@ impl StateFile {
     }
 
     /// What had been delivered; `None` when nothing has yet.
-    pub(crate) fn load(&self) -> Result<Option<Delivered>> {
-        let text = match fs::read(&self.path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(Failure::reading(self.path.display(), &error)),
-        };
-        Delivered::from_text(&text).map(Some).map_err(|why| self.damaged(&why))
+    pub(crate) fn load(&mut self) -> Result<Option<Delivered>> {
+        if let Some(delivered) = load_from(&self.path)? {
+            return Ok(Some(delivered));
+        }
+        for other in &self.others {
+            if let Some(delivered) = load_from(other)? {
+                self.moves_from = Some(other.clone());
+                return Ok(Some(delivered));
+            }
+        }
+        Ok(None)
     }
 
-    /// Remembers what has been delivered. After a crash the file holds either the old or the new content.
-    pub(crate) fn save(&self, delivered: &Delivered) -> Result<()> {
+    /// Remembers what has been delivered. After a crash the file holds either the old or the new
+    /// content.
+    pub(crate) fn save(&mut self, delivered: &Delivered) -> Result<()> {
         self.try_save(delivered).map_err(|error| {
             Failure::new(format!("cannot remember in {} what was delivered: {error}", self.path.display()))
                 .hint("the next --new will deliver the same events again")
@@ -188,31 +215,87 @@ impl StateFile {
         })
     }
 
-    fn try_save(&self, delivered: &Delivered) -> io::Result<()> {
+    fn try_save(&mut self, delivered: &Delivered) -> io::Result<()> {
         let text = delivered.to_text(&self.unit)?;
-        if let Some(directory) = self.path.parent() {
-            fs::create_dir_all(directory)?;
+        let directory = self.path.parent().unwrap_or(Path::new("."));
+        fs::create_dir_all(directory)?;
+        // It may have been exchanged since it was loaded.
+        if read_ours(&self.path)?.is_some_and(|found| Delivered::from_text(&found).is_err()) {
+            return Err(io::Error::new(ErrorKind::AlreadyExists, "it is something else by now"));
         }
-        let temporary = self.path.with_extension("tmp");
-        let result = write_whole(&temporary, &text).and_then(|()| fs::rename(&temporary, &self.path));
-        if result.is_err() {
-            // The first error is the one to tell.
-            let _ = fs::remove_file(&temporary);
+        // Under a name that nobody can foresee; removed where what follows fails.
+        let mut temporary = temporary_file(directory)?;
+        temporary.write_all(text.as_bytes())?;
+        temporary.as_file().sync_all()?;
+        temporary.persist(&self.path)?;
+        if let Some(other) = self.moves_from.take().filter(|other| matches!(load_from(other), Ok(Some(_)))) {
+            // Found again, it would be taken for what another unit has delivered.
+            let _ = fs::remove_file(other);
         }
-        result
-    }
-
-    fn damaged(&self, why: &NotDelivered) -> Failure {
-        Failure::new(format!("{} does not say what was delivered: {why}", self.path.display()))
-            .hint("read --all delivers everything the unit has and needs no state")
-            .hint("delete the file to begin anew: the next --new then delivers everything")
+        Ok(())
     }
 }
 
-fn write_whole(path: &Path, text: &str) -> io::Result<()> {
-    let mut file = fs::File::create(path)?;
-    file.write_all(text.as_bytes())?;
-    file.sync_all()
+fn load_from(path: &Path) -> Result<Option<Delivered>> {
+    let damaged = |why: &dyn fmt::Display| {
+        Failure::new(format!("{} does not say what was delivered: {why}", path.display()))
+            .hint("read --all delivers everything the unit has and needs no state")
+            .hint("move the file away to begin anew: the next --new then delivers everything")
+    };
+    let text = match read_ours(path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == ErrorKind::InvalidData => return Err(damaged(&error)),
+        Err(error) => return Err(Failure::reading(path.display(), &error)),
+    };
+    text.map(|text| Delivered::from_text(&text)).transpose().map_err(|why| damaged(&why))
+}
+
+/// Reads a file that is no longer than ours are; nothing where there is none.
+///
+/// # Errors
+/// `InvalidData` where it cannot be one of ours.
+fn read_ours(path: &Path) -> io::Result<Option<Vec<u8>>> {
+    let file = match open_ours(path, File::options().read(true)) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        file => file?,
+    };
+    let mut text = Vec::new();
+    if file.take(MAX_LEN + 1).read_to_end(&mut text)? as u64 > MAX_LEN {
+        return Err(io::Error::new(ErrorKind::InvalidData, format!("it is longer than {MAX_LEN} bytes")));
+    }
+    Ok(Some(text))
+}
+
+/// Opens a plain file. A link is not followed: what it leads to is not ours.
+fn open_ours(path: &Path, options: &mut fs::OpenOptions) -> io::Result<File> {
+    let no_file = || io::Error::new(ErrorKind::InvalidData, "it is a link, or no file at all");
+    match fs::symlink_metadata(path) {
+        Ok(found) if !found.is_file() => return Err(no_file()),
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    #[cfg(unix)]
+    {
+        use rustix::fs::OFlags;
+        use std::os::unix::fs::OpenOptionsExt;
+        // Something else may come between looking and opening, even a pipe that waits for its other
+        // end.
+        options.custom_flags((OFlags::NOFOLLOW | OFlags::NONBLOCK).bits().cast_signed());
+    }
+    let file = options.open(path)?;
+    if file.metadata()?.is_file() { Ok(file) } else { Err(no_file()) }
+}
+
+/// With the rights that the user gives to new files.
+fn temporary_file(directory: &Path) -> io::Result<tempfile::NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".ser-cli-").suffix(".tmp");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(directory)
 }
 
 fn default_directory() -> Result<PathBuf> {
@@ -225,11 +308,12 @@ fn default_directory() -> Result<PathBuf> {
     Ok(base.join("ser-cli"))
 }
 
-/// A name that any file system takes, that people can read, and that no other port text gives.
-fn file_name(port: &str) -> String {
+/// A name that any file system takes, that people can read, and that no other unit's name gives.
+fn file_name(unit: &str) -> String {
+    const SUFFIX: &str = ".json";
     // Windows takes COM3.json for the port itself.
     let mut name = String::from("port-");
-    for byte in port.bytes() {
+    for byte in unit.bytes() {
         match byte {
             b'/' => name.push('_'),
             // `_` is taken.
@@ -237,7 +321,13 @@ fn file_name(port: &str) -> String {
             other => name.push_str(&format!("%{other:02X}")),
         }
     }
-    name + ".json"
+    if name.len() + SUFFIX.len() > MAX_NAME_LEN {
+        let hash = Crc::<u64>::new(&CRC_64_XZ).checksum(unit.as_bytes());
+        name.truncate(TELLING_LEN);
+        // `+` is in no other name.
+        name.push_str(&format!("+{hash:016X}"));
+    }
+    name + SUFFIX
 }
 
 impl From<&Entry> for LastEntry {
@@ -268,8 +358,13 @@ mod tests {
     use super::*;
     use crate::output::testing::entry;
 
+    fn of_unit(name: &str, others: &[&str], directory: &Path) -> StateFile {
+        let others = others.iter().map(|&other| other.to_owned()).collect();
+        StateFile::of_unit(&UnitName { name: name.to_owned(), others }, Some(directory)).unwrap()
+    }
+
     fn state_in(directory: &tempfile::TempDir) -> StateFile {
-        StateFile::of_unit("/dev/ttyUSB0", Some(&directory.path().join("new"))).unwrap()
+        of_unit("/dev/ttyUSB0", &[], &directory.path().join("new"))
     }
 
     fn delivered(sequence: u64) -> Delivered {
@@ -287,7 +382,7 @@ mod tests {
     #[test]
     fn what_is_saved_is_loaded_again() {
         let directory = tempfile::tempdir().unwrap();
-        let state = state_in(&directory);
+        let mut state = state_in(&directory);
         assert_eq!(state.load().unwrap(), None);
         let mut last = entry("00.250", &[3, 32], &[32]);
         last.time.month = 200;
@@ -306,7 +401,7 @@ mod tests {
     #[test]
     fn a_damaged_file_is_named_with_what_to_do() {
         let directory = tempfile::tempdir().unwrap();
-        let state = state_in(&directory);
+        let mut state = state_in(&directory);
         state.save(&delivered(7)).unwrap();
         let good = fs::read_to_string(&state.path).unwrap();
         let wrong = [
@@ -322,7 +417,7 @@ mod tests {
             fs::write(&state.path, content).unwrap();
             let text = state.load().unwrap_err().text();
             assert!(text.contains("_dev_ttyUSB0.json does not say what was delivered"), "{text}");
-            assert!(text.contains("--all") && text.contains("delete the file"), "{text}");
+            assert!(text.contains("--all") && text.contains("move the file away"), "{text}");
         }
     }
 
@@ -332,7 +427,7 @@ mod tests {
         let lock = state_in(&directory).lock().unwrap();
         let text = state_in(&directory).lock().unwrap_err().text();
         assert!(text.contains("another ser-cli") && text.contains("/dev/ttyUSB0"), "{text}");
-        StateFile::of_unit("/dev/ttyUSB1", Some(directory.path())).unwrap().lock().unwrap();
+        of_unit("/dev/ttyUSB1", &[], directory.path()).lock().unwrap();
         drop(lock);
         state_in(&directory).lock().unwrap();
     }
@@ -354,8 +449,88 @@ mod tests {
             ("/dev/a_b", "port-_dev_a%5Fb.json"),
             ("../x", "port-.._x.json"),
             ("./\u{e4} *", "port-._%C3%A4%20%2A.json"),
+            (&"x".repeat(245), &format!("port-{}.json", "x".repeat(245))),
+            (&"x".repeat(246), &format!("port-{}+D7B58F3AD0FF8BFB.json", "x".repeat(95))),
         ] {
             assert_eq!(file_name(port), name);
         }
+        let long = ["/a", "/b"].map(|end| file_name(&("/\u{e4}".repeat(200) + end)));
+        assert_ne!(long[0], long[1]);
+    }
+
+    #[test]
+    fn a_unit_that_was_called_otherwise_is_known_and_moves() {
+        let directory = tempfile::tempdir().unwrap();
+        let (old, new) = ("tcp://127.0.0.1:4000", "tcp://localhost:4000");
+        of_unit(old, &[], directory.path()).save(&delivered(7)).unwrap();
+        let mut state = of_unit(new, &["tcp://[::1]:4000", old], directory.path());
+        assert_eq!(state.load().unwrap(), Some(delivered(7)));
+        assert_eq!(of_unit(old, &[], directory.path()).load().unwrap(), Some(delivered(7)), "not yet");
+        for total in [8, 9] {
+            state.save(&delivered(total)).unwrap();
+            assert_eq!(of_unit(old, &[], directory.path()).load().unwrap(), None);
+            assert_eq!(of_unit(new, &[old], directory.path()).load().unwrap(), Some(delivered(total)));
+        }
+    }
+
+    #[test]
+    fn what_is_not_ours_is_neither_read_to_its_end_nor_replaced() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut state = of_unit("/dev/ttyUSB0", &[], directory.path());
+        let delivered = delivered(7);
+        let endless = fs::File::create(&state.path).unwrap();
+        endless.set_len(2 << 30).unwrap();
+        let text = state.load().unwrap_err().text();
+        assert!(text.contains("longer than 65536 bytes") && text.contains("move the file away"), "{text}");
+        assert!(state.save(&delivered).is_err());
+        assert_eq!(endless.metadata().unwrap().len(), 2 << 30);
+
+        fs::write(&state.path, "a letter").unwrap();
+        let text = state.save(&delivered).unwrap_err().text();
+        assert!(text.contains("something else by now"), "{text}");
+        assert_eq!(fs::read_to_string(&state.path).unwrap(), "a letter");
+
+        fs::remove_file(&state.path).unwrap();
+        fs::create_dir(&state.path).unwrap();
+        assert!(state.load().is_err() && state.save(&delivered).is_err());
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1, "no temporary files are left");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn no_link_is_followed_and_no_pipe_waited_for() {
+        use std::os::unix::fs::symlink;
+
+        let directory = tempfile::tempdir().unwrap();
+        let mut state = of_unit("/dev/ttyUSB0", &[], directory.path());
+        let delivered = delivered(7);
+        let victim = directory.path().join("victim");
+        fs::write(&victim, delivered.to_text("/dev/ttyUSB0").unwrap()).unwrap();
+        let lock = state.path.with_extension("lock");
+        for path in [&state.path, &lock] {
+            symlink(&victim, path).unwrap();
+        }
+        let before = fs::read(&victim).unwrap();
+        for text in [
+            state.load().unwrap_err().text(),
+            state.save(&super::tests::delivered(8)).unwrap_err().text(),
+            state.lock().unwrap_err().text(),
+        ] {
+            assert!(text.contains("it is a link"), "{text}");
+        }
+        assert_eq!(fs::read(&victim).unwrap(), before);
+        assert!(state.path.is_symlink() && lock.is_symlink());
+        // Planted where the temporary file used to be.
+        let former = state.path.with_extension("tmp");
+        symlink(&victim, &former).unwrap();
+        fs::remove_file(&state.path).unwrap();
+        state.save(&delivered).unwrap();
+        assert!(former.is_symlink() && !state.path.is_symlink());
+        assert_eq!(fs::read(&victim).unwrap(), before);
+
+        fs::remove_file(&state.path).unwrap();
+        let made = std::process::Command::new("mkfifo").arg(&state.path).status().unwrap();
+        assert!(made.success());
+        assert!(state.load().is_err() && state.save(&delivered).is_err());
     }
 }

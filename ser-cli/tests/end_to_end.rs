@@ -5,8 +5,10 @@ mod common;
 
 use std::fs;
 use std::io::{Read, Write};
+use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use common::bench::{Bench, text};
@@ -153,6 +155,39 @@ fn the_link_goes_with_the_simulator() {
 }
 
 #[test]
+fn what_a_killed_simulator_has_left_behind_is_taken_over() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (link, window) = (folder.path().join("ser"), folder.path().join("host"));
+    let mut command = ser_cli();
+    command.args(["sim", "--node", "5", "--pty"]).arg(&link).arg("--genius").arg(&window);
+    command.stdout(Stdio::null()).stderr(Stdio::piped());
+    let start = |command: &mut Command| {
+        let mut sim = Running::start(command);
+        assert_eq!(
+            sim.told().recv_timeout(PATIENCE).ok().as_deref(),
+            Some("the simulated unit answers; Ctrl-C switches it off")
+        );
+        sim
+    };
+    for _ in 0..3 {
+        let mut sim = start(&mut command);
+        sim.signal("-KILL");
+        sim.wait();
+        assert!(fs::symlink_metadata(&link).is_ok() && window.exists());
+    }
+    // Unless somebody else has it by now.
+    fs::remove_file(&window).expect("removed");
+    fs::write(&window, [0xA5; 16_384]).expect("written");
+    let refused = command.output().expect("ser-cli runs");
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(text(&refused.stderr).contains("host exists already"), "{}", text(&refused.stderr));
+    assert!(fs::read(&window).expect("read").iter().all(|&byte| byte == 0xA5));
+    fs::remove_file(&window).expect("removed");
+    assert_eq!(start(&mut command).interrupt(), Some(0));
+    assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 0);
+}
+
+#[test]
 fn a_unit_over_tcp_answers_like_one_on_a_port() {
     let mut sim = Running::start(
         ser_cli().args(["sim", "--tcp", "127.0.0.1:0"]).stdout(Stdio::piped()).stderr(Stdio::null()),
@@ -162,6 +197,47 @@ fn a_unit_over_tcp_answers_like_one_on_a_port() {
     let status =
         ser_cli().args(["--timeout", "20s", "--port", &port, "status"]).output().expect("ser-cli runs");
     assert!(text(&status.stdout).contains("recording"), "{}", text(&status.stderr));
+}
+
+/// A simulator on TCP, its port, and what it tells.
+fn sim_on_tcp(options: &[&str]) -> (Running, String, Receiver<String>) {
+    let mut command = ser_cli();
+    command.args(["sim", "--tcp", "127.0.0.1:0"]).args(options);
+    let mut sim = Running::start(command.stdout(Stdio::piped()).stderr(Stdio::piped()));
+    let port = sim.lines().recv_timeout(PATIENCE).expect("a port");
+    let told = sim.told();
+    (sim, port, told)
+}
+
+fn status_of(port: &str) -> Output {
+    ser_cli().args(["status", "--port", port]).output().expect("ser-cli runs")
+}
+
+fn connected(port: &str) -> TcpStream {
+    TcpStream::connect(port.strip_prefix("tcp://").expect("TCP")).expect("connected")
+}
+
+#[test]
+fn a_second_client_hears_of_the_first() {
+    let (_sim, port, told) = sim_on_tcp(&[]);
+    let first = connected(&port);
+    let refused = status_of(&port);
+    let why = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(why.contains("before the first answer") && why.contains("another client"), "{why}");
+    let has = format!("{} has the line", first.local_addr().expect("an address"));
+    wait_until("the notice", || told.try_iter().any(|line| line.ends_with(&has)));
+    drop(first);
+    wait_until("the place is free", || status_of(&port).status.success());
+}
+
+#[test]
+fn a_client_that_says_nothing_gives_way_in_the_end() {
+    let (_sim, port, told) = sim_on_tcp(&["--tcp-idle", "1s"]);
+    let silent = connected(&port);
+    wait_until("the place is free", || status_of(&port).status.success());
+    let gives_way = format!("warning: {} has been silent", silent.local_addr().expect("an address"));
+    wait_until("the notice", || told.try_iter().any(|line| line.starts_with(&gives_way)));
 }
 
 #[test]
@@ -324,6 +400,31 @@ fn a_second_reader_of_what_is_new_is_told_of_the_first() {
     watch.lines().recv_timeout(PATIENCE).expect("watch has the state");
     let error = bench.fails(1, "read --new");
     assert!(error.contains("another ser-cli") && error.contains("hint: "), "{error}");
+}
+
+#[test]
+fn a_unit_is_the_same_however_its_port_is_spelled() {
+    let mut bench = Bench::start(Kind::Native, &[]);
+    fs::create_dir(bench.folder.path().join("sub")).expect("a folder");
+    bench.contacts("0,1,1", 1);
+    let read = |port: &Path| {
+        let output = bench.command("read --new --format jsonl").arg("--port").arg(port).output();
+        let output = output.expect("ser-cli runs");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        text(&output.stdout).lines().count()
+    };
+    assert_eq!(read(&bench.link()), 1);
+    for spelled in ["sub/../unit", "./unit"] {
+        assert_eq!(read(&bench.folder.path().join(spelled)), 0, "{spelled}");
+    }
+    // One file and its lock.
+    assert_eq!(fs::read_dir(bench.folder.path().join("state")).expect("a folder").count(), 2);
+    // A name that no file can have makes no difference.
+    let deep = bench.folder.path().join(format!("{}sub/../unit", "./".repeat(200)));
+    assert_eq!(read(&deep), 0);
+    let long = bench.folder.path().join("n".repeat(240));
+    std::os::unix::fs::symlink(bench.link(), &long).expect("a link");
+    assert_eq!([read(&long), read(&long)], [0, 0]);
 }
 
 #[test]

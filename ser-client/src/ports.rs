@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use ser_console::Harmless;
 use serialport::{SerialPortInfo, SerialPortType};
 
 /// A serial port that can be opened by its path.
@@ -9,7 +10,8 @@ use serialport::{SerialPortInfo, SerialPortType};
 pub struct PortInfo {
     /// Path or name.
     pub path: String,
-    /// What it is, in a few words: maker and product of a USB adapter, `PCI`, `Bluetooth`; may be empty.
+    /// What it is, in a few words: maker and product of a USB adapter, `PCI`, `Bluetooth`; may be
+    /// empty. An adapter may call itself anything; what a terminal would obey is escaped.
     pub description: String,
 }
 
@@ -41,7 +43,7 @@ fn describe(port_type: &SerialPortType) -> String {
             let words = [&usb.manufacturer, &usb.product, &usb.serial_number];
             let words: Vec<&str> = words.into_iter().flatten().map(String::as_str).collect();
             let ids = format!("USB {:04x}:{:04x}", usb.vid, usb.pid);
-            if words.is_empty() { ids } else { format!("{} ({ids})", words.join(" ")) }
+            if words.is_empty() { ids } else { format!("{} ({ids})", Harmless(words.join(" ")).line()) }
         }
         SerialPortType::PciPort => "PCI".to_owned(),
         SerialPortType::BluetoothPort => "Bluetooth".to_owned(),
@@ -51,7 +53,7 @@ fn describe(port_type: &SerialPortType) -> String {
 
 impl fmt::Display for PortInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.path)?;
+        write!(f, "{}", Harmless(&self.path))?;
         if self.description.is_empty() { Ok(()) } else { write!(f, "  {}", self.description) }
     }
 }
@@ -81,5 +83,22 @@ mod tests {
         });
         assert_eq!(describe(&named), "FTDI FT232R USB UART (USB 0403:6001)");
         assert_eq!(describe(&SerialPortType::Unknown), "");
+    }
+
+    #[test]
+    fn an_adapter_that_calls_itself_something_else_does_nothing_to_a_terminal() {
+        let hostile = SerialPortType::UsbPort(UsbPortInfo {
+            vid: 1,
+            pid: 2,
+            serial_number: Some("\u{9B}2J".to_owned()),
+            manufacturer: Some("\u{1B}]0;root\u{7}".to_owned()),
+            product: Some("UART\n/dev/ttyS9\u{202E}".to_owned()),
+        });
+        assert_eq!(
+            describe(&hostile),
+            r"\u{1b}]0;root\u{7} UART\n/dev/ttyS9\u{202e} \u{9b}2J (USB 0001:0002)"
+        );
+        let named = PortInfo { path: "/dev/tty\u{1B}c".to_owned(), description: String::new() };
+        assert_eq!(named.to_string(), r"/dev/tty\u{1b}c");
     }
 }

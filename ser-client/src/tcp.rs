@@ -17,6 +17,8 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 #[derive(Debug)]
 pub struct TcpTransport {
     stream: TcpStream,
+    /// Whether the other end has said anything.
+    heard: bool,
 }
 
 impl TcpTransport {
@@ -30,7 +32,7 @@ impl TcpTransport {
         let mut last_error = None;
         for candidate in candidates {
             match TcpStream::connect_timeout(&candidate, CONNECT_TIMEOUT).and_then(prepare) {
-                Ok(stream) => return Ok(TcpTransport { stream }),
+                Ok(stream) => return Ok(TcpTransport { stream, heard: false }),
                 Err(error) => last_error = Some(error),
             }
         }
@@ -38,6 +40,20 @@ impl TcpTransport {
             || OpenError::HostNotFound { address: address.to_owned() },
             |error| why_not_connected(address, error),
         ))
+    }
+}
+
+impl TcpTransport {
+    /// An end before the first word has another cause than one in the middle of a conversation.
+    fn ended(&self, error: io::Error) -> io::Error {
+        let is_end = matches!(
+            error.kind(),
+            ErrorKind::UnexpectedEof
+                | ErrorKind::BrokenPipe
+                | ErrorKind::ConnectionReset
+                | ErrorKind::ConnectionAborted
+        );
+        if is_end && !self.heard { ErrorKind::ConnectionRefused.into() } else { error }
     }
 }
 
@@ -67,12 +83,14 @@ impl Transport for TcpTransport {
             self.stream.set_read_timeout(Some(timeout.max(Duration::from_millis(1))))?;
         }
         let read = self.stream.read(buf);
-        bytes_read(read, buf.len(), ErrorKind::UnexpectedEof)
+        let read = bytes_read(read, buf.len(), ErrorKind::UnexpectedEof);
+        self.heard |= read.as_ref().is_ok_and(|&read| read > 0);
+        read.map_err(|error| self.ended(error))
     }
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.stream.set_nonblocking(false)?;
-        self.stream.write_all(bytes)
+        self.stream.write_all(bytes).map_err(|error| self.ended(error))
     }
 
     fn set_baud(&mut self, _: u32) -> io::Result<()> {

@@ -12,8 +12,9 @@ pub trait Transport: Send {
     /// Waits up to `timeout` for bytes and takes those that are there. 0 means that none came in time.
     ///
     /// # Errors
-    /// A line that has ended is an error, never 0: `NotConnected` for a device that was unplugged, `UnexpectedEof`
-    /// or one of the connection kinds for a peer that went away.
+    /// A line that has ended is an error, never 0: `NotConnected` for a device that was unplugged,
+    /// `UnexpectedEof` or one of the connection kinds for a peer that went away;
+    /// `ConnectionRefused` if it has not said anything before.
     fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize>;
 
     /// Sends all bytes; they may still be on the line when this returns.
@@ -56,6 +57,8 @@ pub enum TransportError {
     Unplugged,
     /// The other end of the connection went away.
     Closed,
+    /// It did so before it said anything.
+    TurnedAway,
     /// The GENI board, or the bus behind it.
     Genius(GeniusError),
     /// Anything else.
@@ -70,6 +73,9 @@ impl TransportError {
             TransportError::Unplugged => Some("plug the adapter in again; its name may have changed"),
             TransportError::Closed => {
                 Some("is the program or the terminal server at the other end still running?")
+            }
+            TransportError::TurnedAway => {
+                Some("perhaps another client has the unit: most terminal servers serve one at a time")
             }
             TransportError::Genius(error) => Some(error.hint()),
             TransportError::Io(_) => None,
@@ -87,6 +93,7 @@ impl From<io::Error> for TransportError {
     fn from(error: io::Error) -> TransportError {
         match error.kind() {
             ErrorKind::NotConnected => TransportError::Unplugged,
+            ErrorKind::ConnectionRefused => TransportError::TurnedAway,
             ErrorKind::UnexpectedEof
             | ErrorKind::BrokenPipe
             | ErrorKind::ConnectionReset
@@ -101,6 +108,9 @@ impl fmt::Display for TransportError {
         match self {
             TransportError::Unplugged => write!(f, "the serial port is gone"),
             TransportError::Closed => write!(f, "the connection was closed by the other end"),
+            TransportError::TurnedAway => {
+                write!(f, "the connection was closed by the other end before the first answer")
+            }
             TransportError::Genius(error) => error.fmt(f),
             TransportError::Io(error) => write!(f, "the line failed: {error}"),
         }
@@ -111,7 +121,10 @@ impl Error for TransportError {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
             TransportError::Io(error) => Some(error),
-            TransportError::Unplugged | TransportError::Closed | TransportError::Genius(_) => None,
+            TransportError::Unplugged
+            | TransportError::Closed
+            | TransportError::TurnedAway
+            | TransportError::Genius(_) => None,
         }
     }
 }

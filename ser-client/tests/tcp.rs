@@ -43,7 +43,7 @@ fn a_request_and_its_answer() {
 }
 
 #[test]
-fn a_peer_that_is_silent_or_goes_away() {
+fn a_peer_that_goes_away_before_it_has_said_anything_serves_somebody_else() {
     let (mut client, peer) = connect(Options { timeout: Duration::from_millis(1), retries: 1 });
     let error = client.mode().unwrap_err();
     assert!(
@@ -52,9 +52,38 @@ fn a_peer_that_is_silent_or_goes_away() {
     );
     drop(peer);
     let error = client.wait_event(Duration::from_secs(20)).unwrap_err();
-    assert!(matches!(error, RequestError::Transport(TransportError::Closed)), "{error:?}");
+    assert!(matches!(error, RequestError::Transport(TransportError::TurnedAway)), "{error:?}");
     let error = client.mode().unwrap_err();
+    assert!(matches!(error, RequestError::Transport(TransportError::TurnedAway)), "{error:?}");
+    assert!(error.to_string().ends_with("before the first answer"), "{error}");
+    assert!(error.hint().is_some_and(|hint| hint.contains("another client")), "{:?}", error.hint());
+}
+
+#[test]
+fn a_peer_that_goes_away_in_the_middle_has_ended() {
+    let (mut client, mut peer) = connect(Options { timeout: Duration::from_millis(1), retries: 0 });
+    peer.write_all(b"a line\r\n").unwrap();
+    client.wait_event(Duration::from_secs(20)).unwrap();
+    drop(peer);
+    let error = client.wait_event(Duration::from_secs(20)).unwrap_err();
     assert!(matches!(error, RequestError::Transport(TransportError::Closed)), "{error:?}");
+}
+
+#[test]
+fn a_question_to_a_peer_that_has_hung_up_says_the_same_whichever_way_it_is_noticed() {
+    // With something unread, closing resets the connection.
+    for read in [false, true] {
+        let (mut client, mut peer) = connect(Options { timeout: Duration::from_secs(20), retries: 0 });
+        let closing = std::thread::spawn(move || {
+            peer.peek(&mut [0]).unwrap();
+            if read {
+                peer.read_exact(&mut [0; 7]).unwrap();
+            }
+        });
+        let error = client.mode().unwrap_err();
+        closing.join().unwrap();
+        assert!(matches!(error, RequestError::Transport(TransportError::TurnedAway)), "{error:?}");
+    }
 }
 
 #[test]

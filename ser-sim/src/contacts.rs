@@ -4,7 +4,7 @@ use std::fmt;
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use ser_proto::Model;
@@ -78,21 +78,25 @@ impl fmt::Debug for Contacts {
 /// milliseconds however long it takes until they are looked at.
 pub(crate) type Arrived = Result<Vec<Item>, ScenarioError>;
 
-/// Reads a stream in a thread of its own. The channel closes at the end of the stream and after an error.
+/// How many reads from a stream may wait to be taken.
+const MAX_ARRIVED: usize = 4;
+
+/// Reads a stream in a thread of its own, as fast as what it brings is taken. The channel closes at
+/// the end of the stream and after an error.
 pub(crate) fn read_stream(
     name: &str,
     source: Box<dyn Read + Send>,
     model: Model,
     nodes: &[(u8, Model)],
 ) -> Receiver<Arrived> {
-    let (sender, receiver) = channel();
+    let (sender, receiver) = sync_channel(MAX_ARRIVED);
     let lines = ScenarioLines::new(name, model, Scenarios::Many).on_bus(nodes);
     // Nobody waits for this thread: a read from a terminal cannot be cut short.
     thread::spawn(move || forward(lines, source, &sender));
     receiver
 }
 
-fn forward(mut lines: ScenarioLines, mut source: Box<dyn Read + Send>, sender: &Sender<Arrived>) {
+fn forward(mut lines: ScenarioLines, mut source: Box<dyn Read + Send>, sender: &SyncSender<Arrived>) {
     let mut chunk = [0; 65_536];
     loop {
         let mut items = Vec::new();

@@ -141,8 +141,8 @@ mod tests {
 
     /// The board's side is played by the test.
     fn board(words: &[(usize, u32)]) -> EmulatedBoard {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        let bus = ExternalBus::open(file.path()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let bus = ExternalBus::open(&folder.path().join("memory")).unwrap();
         for &(offset, value) in words {
             bus.write(offset, value);
         }

@@ -22,6 +22,7 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
+use std::os::unix::fs::FileTypeExt;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command as Process, Stdio};
@@ -53,6 +54,9 @@ const ASK_EVERY: Duration = Duration::from_millis(250);
 
 /// Bytes that may wait for the board, and for the host.
 const WAITING_LIMIT: usize = 4096;
+
+/// So much of what QEMU prints is shown: more than it has to say about itself.
+const MAX_PRINTED_LEN: u64 = 16_384;
 
 /// How soon the board is looked after when nothing is going on, and when contacts move.
 const PATIENCE: Duration = Duration::from_millis(2);
@@ -126,6 +130,7 @@ impl Emulator {
         // QEMU's own words for a missing image are less clear.
         File::open(&options.image)
             .map_err(SimError::io(format!("open the image {}", options.image.display())))?;
+        make_log(options)?;
         let directory = TempDir::with_prefix("ser-sim-")
             .map_err(SimError::io("make a temporary directory for the emulator"))?;
         let memory = options.memory.clone().unwrap_or_else(|| directory.path().join("memory"));
@@ -300,8 +305,7 @@ impl Emulator {
     }
 
     fn printed(&self) -> String {
-        let printed = fs::read(self.printed_path()).unwrap_or_default();
-        String::from_utf8_lossy(&printed).trim().to_owned()
+        read_printed(&self.printed_path())
     }
 }
 
@@ -439,6 +443,10 @@ impl Machine for Emulator {
         self.player.stream(self.pace.now_ms(), items)
     }
 
+    fn waiting_steps(&self) -> usize {
+        self.player.waiting()
+    }
+
     fn is_idle(&self) -> bool {
         self.player.is_idle() && self.moving.is_none()
     }
@@ -481,14 +489,12 @@ pub(crate) fn arguments(options: &EmulatorOptions, memory: &Path) -> Vec<OsStrin
         crate::external_bus::MEMORY_LEN
     ));
     backend.push(doubled_commas(memory));
-    let log = match &options.log {
-        Some(log) => {
-            let mut log_to = OsString::from("file:");
-            log_to.push(log);
-            log_to
-        }
-        None => "null".into(),
-    };
+    let mut log = OsString::from("null,id=log");
+    if let Some(path) = &options.log {
+        // Behind what it has logged already: the board may have been off in between.
+        log = OsString::from("file,id=log,append=on,path=");
+        log.push(doubled_commas(path));
+    }
     let mut arguments: Vec<OsString> = [
         "-M",
         "mps2-an385,memory-backend=ext",
@@ -501,11 +507,37 @@ pub(crate) fn arguments(options: &EmulatorOptions, memory: &Path) -> Vec<OsStrin
         "-serial",
         "chardev:rs232",
         "-serial",
+        "chardev:log",
+        "-chardev",
     ]
     .map(OsString::from)
     .to_vec();
     arguments.extend([log, "-object".into(), backend, "-kernel".into(), options.image.clone().into()]);
     arguments
+}
+
+/// Makes the file for the log. A pipe or a terminal may be there already: writing to one destroys
+/// nothing.
+pub(crate) fn make_log(options: &EmulatorOptions) -> Result<(), SimError> {
+    let Some(path) = &options.log else { return Ok(()) };
+    let made = match fs::metadata(path) {
+        Ok(found) if found.file_type().is_fifo() || found.file_type().is_char_device() => return Ok(()),
+        Ok(_) => return Err(SimError::LogTaken(path.to_owned())),
+        Err(_) => File::options().write(true).create_new(true).open(path),
+    };
+    made.map(drop).map_err(|error| match error.kind() {
+        // A link that leads nowhere.
+        ErrorKind::AlreadyExists => SimError::LogTaken(path.to_owned()),
+        _ => SimError::io(format!("make the log {}", path.display()))(error),
+    })
+}
+
+/// What the emulator has printed, or its beginning.
+pub(crate) fn read_printed(path: &Path) -> String {
+    let mut printed = Vec::new();
+    // It is an addition to a failure that is told in any case.
+    let _ = File::open(path).and_then(|file| file.take(MAX_PRINTED_LEN).read_to_end(&mut printed));
+    String::from_utf8_lossy(&printed).trim().to_owned()
 }
 
 /// Milliseconds since 1970, as this computer has it.
@@ -564,6 +596,36 @@ mod tests {
     #[test]
     fn commas_in_paths_do_not_end_qemus_options() {
         assert_eq!(doubled_commas(Path::new("/a,b/c")), "/a,,b/c");
+    }
+
+    #[test]
+    fn a_log_takes_the_place_of_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let (log, link) = (folder.path().join("log"), folder.path().join("link"));
+        std::os::unix::fs::symlink(&log, &link).unwrap();
+        let make_log = |path: &Path| {
+            make_log(&EmulatorOptions { log: Some(path.to_owned()), ..EmulatorOptions::new("image") })
+        };
+        assert!(matches!(make_log(&link), Err(SimError::LogTaken(_))));
+        assert!(!log.exists());
+        make_log(&log).unwrap();
+        for text in ["", "a report"] {
+            fs::write(&log, text).unwrap();
+            for path in [&log, &link, &folder.path().to_owned()] {
+                assert!(matches!(make_log(path), Err(SimError::LogTaken(_))), "{}", path.display());
+            }
+            assert_eq!(fs::read_to_string(&log).unwrap(), text);
+        }
+        make_log(Path::new("/dev/null")).unwrap();
+        let nowhere = make_log(Path::new("/nonexistent/log")).unwrap_err().to_string();
+        assert!(nowhere.starts_with("cannot make the log /nonexistent/log"), "{nowhere}");
+    }
+
+    #[test]
+    fn of_what_the_emulator_prints_without_end_the_beginning_is_shown() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        file.as_file().set_len(1 << 40).unwrap();
+        assert_eq!(read_printed(file.path()).len() as u64, MAX_PRINTED_LEN);
     }
 
     #[test]

@@ -26,6 +26,8 @@ pub enum SimError {
     WindowTaken(PathBuf),
     /// Another simulator has the GENI window.
     WindowInUse(PathBuf),
+    /// There is something already under the name of the log.
+    LogTaken(PathBuf),
     /// The emulator is not installed.
     EmulatorMissing {
         /// The program looked for.
@@ -71,12 +73,12 @@ impl fmt::Display for SimError {
             SimError::LinkTaken(path) => {
                 write!(
                     f,
-                    "{} exists already and is no link to a terminal: remove it or name another",
+                    "{} exists already, and no simulator of yours has made it: it is left alone",
                     path.display()
                 )
             }
-            SimError::WindowTaken(path) => {
-                write!(f, "{} exists already: remove it or name another", path.display())
+            SimError::WindowTaken(path) | SimError::LogTaken(path) => {
+                write!(f, "{} exists already: it is left alone", path.display())
             }
             SimError::EmulatorMissing { program } => write!(
                 f,

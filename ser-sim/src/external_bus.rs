@@ -5,8 +5,9 @@
 //! writes to the file would show up on the board as well, but the kernel copies a few bytes one by one, and an input
 //! latch caught between two of its bytes would be a contact change that never was.
 
-use std::fs::{File, OpenOptions};
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, ErrorKind};
+use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
@@ -53,6 +54,24 @@ const LAST_WORDS: usize = 0x8080;
 /// How many starts ago that was; 0 for never.
 const LAST_WORDS_AGE: usize = 0x80E0;
 
+/// Two words that tell a file of ours from any other; written here.
+const MARK: usize = 0x80F0;
+/// `SER bus1`.
+const MADE_BY_US: [u32; 2] = [u32::from_le_bytes(*b"SER "), u32::from_le_bytes(*b"bus1")];
+
+/// Opens a memory that was made before; nothing where the file is something else.
+fn open_memory(path: &Path) -> io::Result<Option<File>> {
+    // Before it is opened: a pipe would wait for its other end.
+    let found = fs::symlink_metadata(path)?;
+    if !found.is_file() || found.len() != MEMORY_LEN {
+        return Ok(None);
+    }
+    let file = File::options().read(true).write(true).open(path)?;
+    let mut mark = [0; 8];
+    file.read_exact_at(&mut mark, MARK as u64)?;
+    Ok((mark == *MADE_BY_US.map(u32::to_le_bytes).as_flattened()).then_some(file))
+}
+
 /// The mapped memory.
 pub(crate) struct ExternalBus {
     memory: MmapRaw,
@@ -62,17 +81,31 @@ pub(crate) struct ExternalBus {
 }
 
 impl ExternalBus {
-    /// Opens the file, makes it if need be, and gives it the size of the memory.
+    /// Makes the file with the size of the memory, or opens one that was made so.
+    ///
+    /// # Errors
+    /// `AlreadyExists` where something else is, which is left as it is.
     pub(crate) fn open(path: &Path) -> io::Result<ExternalBus> {
-        let file: File = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
-        if file.metadata()?.len() != MEMORY_LEN {
-            file.set_len(MEMORY_LEN)?;
+        let bus = |file: &File| {
+            Ok(ExternalBus {
+                memory: MmapRaw::map_raw(file)?,
+                clock_written_ms: AtomicU64::new(0),
+                clock_gap_ms: AtomicU64::new(0),
+            })
+        };
+        match File::options().read(true).write(true).create_new(true).open(path) {
+            Ok(file) => {
+                file.set_len(MEMORY_LEN)?;
+                let bus = bus(&file)?;
+                (0..).step_by(4).zip(MADE_BY_US).for_each(|(at, word)| bus.write(MARK + at, word));
+                Ok(bus)
+            }
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                let file = open_memory(path)?.ok_or(ErrorKind::AlreadyExists)?;
+                bus(&file)
+            }
+            Err(error) => Err(error),
         }
-        Ok(ExternalBus {
-            memory: MmapRaw::map_raw(&file)?,
-            clock_written_ms: AtomicU64::new(0),
-            clock_gap_ms: AtomicU64::new(0),
-        })
     }
 
     pub(crate) fn set_straps(&self, model: Model, debounce_ms: u8) {
@@ -227,8 +260,6 @@ impl ExternalBus {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
     use super::*;
 
     #[test]
@@ -247,7 +278,8 @@ mod tests {
     fn the_geni_window_is_the_beginning_of_the_file_and_begins_as_zeros() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("memory");
-        fs::write(&path, [0xA5; RAM_LEN]).unwrap();
+        let before = ExternalBus::open(&path).unwrap();
+        (0..RAM_LEN).step_by(4).for_each(|at| before.write(at, 0xA5A5_A5A5));
         let bus = ExternalBus::open(&path).unwrap();
         bus.fit_geni(true);
         bus.write_geni(0x3FFF, 7);
@@ -277,6 +309,25 @@ mod tests {
             assert_eq!(is_sealed(mixed), mix == 0 || mix == 7, "{mix:03b}");
         }
         assert_eq!(bus.clock_gap_ms(), 1);
+    }
+
+    #[test]
+    fn somebody_elses_file_is_left_alone_whatever_its_size() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("photo");
+        for len in [0, 1, MEMORY_LEN] {
+            fs::write(&path, vec![0xA5; usize::try_from(len).unwrap()]).unwrap();
+            let refused = ExternalBus::open(&path).err().map(|error| error.kind());
+            assert_eq!(refused, Some(ErrorKind::AlreadyExists), "{len}");
+            let file = fs::read(&path).unwrap();
+            assert!(file.len() as u64 == len && file.iter().all(|&byte| byte == 0xA5));
+        }
+        let (memory, link) = (directory.path().join("memory"), directory.path().join("link"));
+        std::os::unix::fs::symlink(&memory, &link).unwrap();
+        for _ in 0..2 {
+            assert!(ExternalBus::open(&link).is_err());
+            ExternalBus::open(&memory).unwrap();
+        }
     }
 
     #[test]

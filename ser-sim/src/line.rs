@@ -4,6 +4,7 @@ use std::io;
 #[cfg(unix)]
 use std::os::fd::BorrowedFd;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use ser_proto::Baud;
 
@@ -21,9 +22,25 @@ pub enum Port {
     Unconnected,
     /// A TCP port for one client at a time.
     Tcp {
-        /// Address to listen on, as in `127.0.0.1:4000`; port 0 takes a free one.
+        /// Address to listen on, as in `127.0.0.1:4000`; port 0 takes a free one. Whoever reaches
+        /// it may do everything.
         address: String,
+        /// A client that has sent nothing for so long gives way when another one comes; `None` is
+        /// never.
+        gives_way_after: Option<Duration>,
     },
+}
+
+impl Port {
+    /// How long a TCP client may be silent by default: `ser-cli watch` says something every ten
+    /// seconds.
+    pub const GIVES_WAY_AFTER: Duration = Duration::from_secs(600);
+
+    /// A TCP port with what is usual.
+    #[must_use]
+    pub fn tcp(address: impl Into<String>) -> Port {
+        Port::Tcp { address: address.into(), gives_way_after: Some(Port::GIVES_WAY_AFTER) }
+    }
 }
 
 /// A medium that carries the bytes of a line. Nothing here waits.
@@ -46,6 +63,11 @@ pub(crate) trait Line: Send {
     /// What to give to a host to reach this line.
     fn name(&self) -> String;
 
+    /// Sentences for the user about hosts that come and go, since this was last asked.
+    fn take_notices(&mut self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Descriptors that become readable when [`read`](Self::read) has something to do; the one of a host comes first.
     #[cfg(unix)]
     fn descriptors(&self) -> Vec<BorrowedFd<'_>>;
@@ -59,7 +81,9 @@ pub(crate) fn open(port: &Port) -> Result<Box<dyn Line>, SimError> {
         #[cfg(not(unix))]
         Port::Pty { .. } => Err(SimError::Unsupported("a pseudo-terminal")),
         Port::Unconnected => Ok(Box::new(NoLine)),
-        Port::Tcp { address } => Ok(Box::new(crate::tcp::TcpLine::listen(address)?)),
+        Port::Tcp { address, gives_way_after } => {
+            Ok(Box::new(crate::tcp::TcpLine::listen(address, *gives_way_after)?))
+        }
     }
 }
 

@@ -23,7 +23,7 @@ mod probe;
 mod tracer;
 
 use std::ffi::OsString;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, Write};
 use std::os::unix::net::UnixListener;
 use std::path::{Path, PathBuf};
@@ -35,7 +35,9 @@ use ser_proto::Model;
 use tempfile::TempDir;
 
 use crate::emulated_board::ForcedFault;
-use crate::emulator::{PROGRAM, Qemu, arguments, doubled_commas, is_temporary, spawn};
+use crate::emulator::{
+    PROGRAM, Qemu, arguments, doubled_commas, is_temporary, make_log, read_printed, spawn,
+};
 use crate::error::SimError;
 use crate::external_bus::ExternalBus;
 use crate::genius::Board;
@@ -94,6 +96,7 @@ impl Lockstep {
     /// # Errors
     /// When the emulator or the plugin cannot be started.
     pub fn start(options: &LockstepOptions) -> Result<Lockstep, SimError> {
+        make_log(&options.emulator)?;
         let directory = TempDir::with_prefix("ser-sim-")
             .map_err(SimError::io("make a temporary directory for the emulator"))?;
         let memory = directory.path().join("memory");
@@ -307,8 +310,7 @@ fn accept(
 }
 
 fn explain(error: io::Error, qemu: &mut Qemu, directory: &Path) -> SimError {
-    let printed = fs::read(directory.join(PRINTED)).unwrap_or_default();
-    let printed = String::from_utf8_lossy(&printed).trim().to_owned();
+    let printed = read_printed(&directory.join(PRINTED));
     let lost = matches!(
         error.kind(),
         io::ErrorKind::UnexpectedEof | io::ErrorKind::BrokenPipe | io::ErrorKind::ConnectionReset

@@ -37,6 +37,9 @@ pub(crate) trait Machine {
     /// Plays what arrived on a stream; says by how much it was late.
     fn stream(&mut self, items: &[Item]) -> Option<u64>;
 
+    /// How many steps of scenarios wait for their time.
+    fn waiting_steps(&self) -> usize;
+
     /// Whether no contact is going to move.
     fn is_idle(&self) -> bool;
 

@@ -58,6 +58,10 @@ impl Machine for Native<'_> {
         self.node.stream(items)
     }
 
+    fn waiting_steps(&self) -> usize {
+        self.node.waiting_steps()
+    }
+
     fn is_idle(&self) -> bool {
         self.node.is_idle()
     }

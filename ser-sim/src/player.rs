@@ -155,6 +155,11 @@ impl Player {
         self.waiting.front().map(Waiting::due_ms)
     }
 
+    /// How many steps wait for their time.
+    pub(crate) fn waiting(&self) -> usize {
+        self.waiting.len()
+    }
+
     /// Whether every step laid out so far has been handed over and no scenario is half known.
     pub(crate) fn is_idle(&self) -> bool {
         self.waiting.is_empty() && self.stream_start_ms.is_none()

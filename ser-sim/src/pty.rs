@@ -25,7 +25,7 @@ use rustix::termios::{OptionalActions, QueueSelector, Termios};
 use rustix::{fs as rfs, termios};
 use tempfile::TempDir;
 
-use crate::claim::Claim;
+use crate::claim::{Claim, Holder};
 use crate::error::SimError;
 use crate::line::Line;
 
@@ -36,16 +36,41 @@ const INITIAL_BITS_PER_SECOND: u32 = 9600;
 const FREE_EVERY: Duration = Duration::from_millis(100);
 
 pub(crate) struct PtyLine {
+    /// Goes first, so that the link never leads to somebody else's terminal.
+    place: Place,
     pair: Pair,
     link: PathBuf,
     published: bool,
     host_present: bool,
     host_changed: bool,
     freed: Instant,
-    /// Keeps other simulators from taking the link.
-    _claim: Claim,
-    /// Holds the link, where no place was given for it.
-    _directory: Option<TempDir>,
+}
+
+/// What the link is in.
+enum Place {
+    /// A place that others use, too. The link goes with the claim.
+    Shared(Claim),
+    /// A directory that has nothing else, made because no place was given, and goes with the link.
+    Own(#[expect(dead_code, reason = "held until the end")] TempDir),
+}
+
+impl Place {
+    /// Whether what stands there is a link that we, or a simulator before us, have made; nothing is
+    /// no link.
+    fn holds_ours(&self) -> io::Result<bool> {
+        match self {
+            Place::Shared(claim) => Ok(claim.holder()? == Holder::Simulator),
+            Place::Own(_) => Ok(true),
+        }
+    }
+
+    /// Notes that the link has just been made.
+    fn remember(&self) -> io::Result<()> {
+        match self {
+            Place::Shared(claim) => claim.remember(),
+            Place::Own(_) => Ok(()),
+        }
+    }
 }
 
 /// A pseudo-terminal: the open master and the name of its slave.
@@ -96,26 +121,23 @@ impl Pair {
 
 impl PtyLine {
     pub(crate) fn open(link: Option<&Path>) -> Result<PtyLine, SimError> {
-        let (link, directory) = match link {
-            Some(link) => (link.to_owned(), None),
+        let (link, place) = match link {
+            Some(link) => (link.to_owned(), Place::Shared(claim(link)?)),
             None => {
                 let directory = TempDir::with_prefix("ser-sim-")
                     .map_err(SimError::io("make a temporary directory for the pseudo-terminal"))?;
-                (directory.path().join("port"), Some(directory))
+                (directory.path().join("port"), Place::Own(directory))
             }
         };
-        let claim = Claim::on(&link, SimError::LinkInUse)?;
-        check_replaceable(&link)?;
         let pair = Pair::new().map_err(SimError::io("open a pseudo-terminal"))?;
         Ok(PtyLine {
+            place,
             pair,
             link,
             published: false,
             host_present: false,
             host_changed: false,
             freed: Instant::now(),
-            _claim: claim,
-            _directory: directory,
         })
     }
 
@@ -132,8 +154,10 @@ impl PtyLine {
             // Taken and nobody there to have it: see the notes above.
             Err(Errno::BUSY) if !self.pair.has_host() => {
                 self.pair = Pair::new()?;
-                if self.published {
+                // Somebody may have put something else there meanwhile.
+                if self.published && self.place.holds_ours()? {
                     replace_link(&self.pair.slave, &self.link)?;
+                    self.place.remember()?;
                 }
             }
             Err(_) => {}
@@ -186,10 +210,9 @@ impl Line for PtyLine {
         let doing = || format!("make the link {}", self.link.display());
         match symlink(&self.pair.slave, &self.link) {
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-                check_replaceable(&self.link)?;
-                replace_link(&self.pair.slave, &self.link).map_err(SimError::io(doing()))?;
+                return Err(SimError::LinkTaken(self.link.clone()));
             }
-            made => made.map_err(SimError::io(doing()))?,
+            made => made.and_then(|()| self.place.remember()).map_err(SimError::io(doing()))?,
         }
         self.published = true;
         Ok(())
@@ -221,29 +244,15 @@ impl PtyLine {
     }
 }
 
-impl Drop for PtyLine {
-    fn drop(&mut self) {
-        // Somebody may have put another link in the place meanwhile.
-        if self.published && fs::read_link(&self.link).is_ok_and(|target| target == self.pair.slave) {
-            let _ = fs::remove_file(&self.link);
-        }
-    }
-}
-
-/// Refuses a place that holds anything but a link that a simulator may have left behind.
-fn check_replaceable(link: &Path) -> Result<(), SimError> {
-    match fs::symlink_metadata(link) {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(SimError::io(format!("look at {}", link.display()))(error)),
-        Ok(_) => {
-            let target = fs::read_link(link).map_err(|_| SimError::LinkTaken(link.to_owned()))?;
-            // Terminal numbers are used again: a link left behind may well lead to somebody's terminal today.
-            if target.starts_with("/dev/pts") || !link.exists() {
-                Ok(())
-            } else {
-                Err(SimError::LinkTaken(link.to_owned()))
-            }
-        }
+/// Claims the place of the link and clears it of a link that a simulator has left behind; anything
+/// else is refused.
+fn claim(link: &Path) -> Result<Claim, SimError> {
+    let claim = Claim::on(link, SimError::LinkInUse)?;
+    let looking = || SimError::io(format!("look at {}", link.display()));
+    match claim.holder().map_err(looking())? {
+        Holder::Nobody => Ok(claim),
+        Holder::Simulator => claim.remove().map(|()| claim).map_err(looking()),
+        Holder::Foreign => Err(SimError::LinkTaken(link.to_owned())),
     }
 }
 

@@ -18,6 +18,11 @@ use crate::wire::Wire;
 /// Contacts of the emulated board move when this computer has time; less than this is not worth a word.
 const NOTICEABLE_MS: u64 = 3;
 
+/// While so many steps wait for their time, the stream that brings them has to wait, too: it may
+/// bring them faster than time passes, and without end. At 32 steps a millisecond, which is every
+/// contact, they last two seconds.
+const MAX_WAITING_STEPS: usize = 65_536;
+
 /// What the owner of a simulator wants from it.
 pub(crate) enum Request {
     /// Play this; the answer is the millisecond in which it begins.
@@ -73,6 +78,8 @@ pub(crate) struct Service {
     pub(crate) requests: Receiver<Request>,
     pub(crate) stream: Option<Receiver<Arrived>>,
     pub(crate) notice: Option<Notice>,
+    /// Whether somebody wants to know what has moved, which has no end.
+    pub(crate) keeps_played: bool,
     pub(crate) shared: Arc<Shared>,
 }
 
@@ -95,6 +102,9 @@ impl Service {
 
     fn take_stream(&mut self, machine: &mut dyn Machine) -> Result<(), SimError> {
         while let Some(stream) = &self.stream {
+            if machine.waiting_steps() >= MAX_WAITING_STEPS {
+                return Ok(());
+            }
             match stream.try_recv() {
                 Ok(arrived) => {
                     if let Some(late_ms) = machine.stream(&arrived?) {
@@ -132,7 +142,10 @@ impl Service {
     /// Lets the owner see how far the contacts are, and what is wrong.
     pub(crate) fn report(&self, machine: &mut dyn Machine) {
         machine.take_complaints().iter().for_each(|complaint| self.notify(complaint));
-        let played = machine.take_played();
+        let mut played = machine.take_played();
+        if !self.keeps_played {
+            played.clear();
+        }
         let idle = machine.is_idle() && self.stream.is_none();
         let newly_idle = idle && !self.shared.status().idle;
         if newly_idle && let late_ms @ NOTICEABLE_MS.. = machine.take_lateness_ms() {
@@ -151,6 +164,7 @@ impl Service {
         let room = self.wire.room().min(buffer.len());
         if room > 0 {
             let received = self.line.read(&mut buffer[..room])?;
+            self.line.take_notices().iter().for_each(|notice| self.notify(notice));
             let received = &mut buffer[..received];
             let host_rate = self.line.host_bits_per_second();
             if !rates_agree(host_rate, machine.baud()) {
@@ -306,6 +320,7 @@ mod tests {
             requests: channel().1,
             stream: None,
             notice: None,
+            keeps_played: false,
             shared: Arc::default(),
         };
         let mut ram = Ram::new();

@@ -186,6 +186,10 @@ impl<'a> SimNode<'a> {
         self.player.stream(self.now_ms, items)
     }
 
+    pub(crate) fn waiting_steps(&self) -> usize {
+        self.player.waiting()
+    }
+
     pub(crate) fn player_mut(&mut self) -> &mut Player {
         &mut self.player
     }

@@ -50,6 +50,9 @@ pub struct SimOptions {
     pub genius: Option<GeniusOptions>,
     /// Called with a sentence for the user when something is not as it should be but goes on.
     pub notice: Option<Notice>,
+    /// Whether [`Simulator::played`] is wanted. It takes memory with every move, as long as the
+    /// simulator runs.
+    pub keep_played: bool,
 }
 
 /// Takes a sentence for the user.
@@ -73,6 +76,7 @@ impl SimOptions {
             backend: Backend::default(),
             genius: None,
             notice: None,
+            keep_played: false,
         }
     }
 }
@@ -143,13 +147,15 @@ impl Simulator {
         let (requests, request_receiver) = channel();
         let shared = Arc::new(Shared::default());
         let (ready_sender, ready) = channel();
-        let SimOptions { model, contacts, debounce_ms, backend, genius, notice, port: _ } = options;
+        let SimOptions { model, contacts, debounce_ms, backend, genius, notice, keep_played, port: _ } =
+            options;
         let mut service = Service {
             line,
             wire: Wire::new(),
             requests: request_receiver,
             stream: None,
             notice,
+            keeps_played: keep_played,
             shared: Arc::clone(&shared),
         };
         let thread = thread::Builder::new()
@@ -255,7 +261,8 @@ impl Simulator {
         }
     }
 
-    /// Every move of contacts so far that changed anything.
+    /// Every move of contacts so far that changed anything; none without
+    /// [`keep_played`](SimOptions::keep_played).
     #[must_use]
     pub fn played(&self) -> Vec<Played> {
         self.shared.status().played.clone()

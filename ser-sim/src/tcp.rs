@@ -2,8 +2,16 @@
 //!
 //! A second client is closed at once, so that it notices; a client that goes makes room for the next.
 //! A slow client slows down what the node sends and nothing else.
+//!
+//! # Design
+//! Nobody keeps the place for ever. A client whose computer is gone, or the way to it, does not
+//! answer the probes of TCP and is given up within two minutes. One that is there and says nothing
+//! may be listening, as long as it likes; but when another one comes, and it has not said anything
+//! for ten minutes, it gives way. A second client is told nothing: whatever it was, it would be
+//! taken for a word of the recorder's.
 
 use std::io::{self, ErrorKind, Read, Write};
+use std::mem;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream};
 #[cfg(unix)]
 use std::os::fd::{AsFd, BorrowedFd};
@@ -15,23 +23,41 @@ use crate::line::Line;
 /// How long a client that has said its last word may wait for answers.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
+/// How soon a client that is silent is asked by TCP whether it is there, and how often if it does
+/// not answer.
+#[cfg(unix)]
+const PROBE_AFTER: Duration = Duration::from_secs(60);
+#[cfg(unix)]
+const PROBE_EVERY: Duration = Duration::from_secs(10);
+#[cfg(unix)]
+const PROBES: u32 = 6;
+
 pub(crate) struct TcpLine {
     listener: TcpListener,
     address: SocketAddr,
+    gives_way_after: Option<Duration>,
     client: Option<Client>,
-    /// A connection that came while there was a client. Whether that client is gone shows when it is read next.
-    candidate: Option<TcpStream>,
+    /// A connection that came while there was a client. Whether that client is gone shows when it
+    /// is read next.
+    candidate: Option<(TcpStream, SocketAddr)>,
     client_changed: bool,
+    notices: Vec<String>,
 }
 
 struct Client {
     stream: TcpStream,
+    address: SocketAddr,
+    /// When it has sent something, or connected.
+    heard: Instant,
+    /// Whether it was told that others want its place: once is enough.
+    has_turned_away: bool,
     /// When it closed its sending side: `nc` does so at the end of its input and still listens.
     last_word: Option<Instant>,
 }
 
 impl TcpLine {
-    pub(crate) fn listen(address: &str) -> Result<TcpLine, SimError> {
+    /// Listens; see [`Port::Tcp`](crate::Port::Tcp).
+    pub(crate) fn listen(address: &str, gives_way_after: Option<Duration>) -> Result<TcpLine, SimError> {
         let listen = || {
             let listener = TcpListener::bind(address)?;
             listener.set_nonblocking(true)?;
@@ -39,7 +65,15 @@ impl TcpLine {
             Ok((listener, address))
         };
         let (listener, address) = listen().map_err(SimError::io(format!("listen on {address}")))?;
-        Ok(TcpLine { listener, address, client: None, candidate: None, client_changed: false })
+        Ok(TcpLine {
+            listener,
+            address,
+            gives_way_after,
+            client: None,
+            candidate: None,
+            client_changed: false,
+            notices: Vec::new(),
+        })
     }
 
     /// Reads from the client; `None` when it is there and silent.
@@ -53,7 +87,10 @@ impl TcpLine {
         }
         match client.stream.read(buffer) {
             Ok(0) => client.last_word = Some(Instant::now()),
-            Ok(read) => return Some(read),
+            Ok(read) => {
+                client.heard = Instant::now();
+                return Some(read);
+            }
             Err(error) if is_temporary(&error) => {}
             Err(_) => self.client = None,
         }
@@ -62,16 +99,55 @@ impl TcpLine {
 
     /// Lets the candidate in, or turns it away.
     fn decide(&mut self) -> io::Result<()> {
-        let Some(stream) = self.candidate.take() else { return Ok(()) };
-        if self.client.as_ref().is_none_or(|client| client.last_word.is_some()) {
-            stream.set_nonblocking(true)?;
-            // Answers are short and a host waits for each.
-            stream.set_nodelay(true)?;
-            self.client = Some(Client { stream, last_word: None });
-            self.client_changed = true;
+        let Some((stream, address)) = self.candidate.take() else { return Ok(()) };
+        if let Some(client) = self.client.as_mut().filter(|client| client.last_word.is_none()) {
+            let silent = client.heard.elapsed();
+            if self.gives_way_after.is_none_or(|patience| silent < patience) {
+                if !mem::replace(&mut client.has_turned_away, true) {
+                    let has = format!("{address} was turned away: {} has the line", client.address);
+                    self.notices.push(has);
+                }
+                return Ok(());
+            }
+            let seconds = silent.as_secs();
+            self.notices.push(format!(
+                "{} has been silent for {seconds} s and gives way to {address}",
+                client.address
+            ));
         }
+        prepare(&stream)?;
+        let heard = Instant::now();
+        self.client = Some(Client { stream, address, heard, has_turned_away: false, last_word: None });
+        self.client_changed = true;
         Ok(())
     }
+}
+
+fn prepare(stream: &TcpStream) -> io::Result<()> {
+    stream.set_nonblocking(true)?;
+    // Answers are short and a host waits for each.
+    stream.set_nodelay(true)?;
+    // Without, it is only noticed later that a client is gone.
+    #[cfg(unix)]
+    let _ = probe(stream);
+    Ok(())
+}
+
+/// Has TCP ask whether a silent client is still there, and give up one that is not.
+#[cfg(unix)]
+fn probe(stream: &TcpStream) -> rustix::io::Result<()> {
+    use rustix::net::sockopt;
+    sockopt::set_socket_keepalive(stream, true)?;
+    sockopt::set_tcp_keepidle(stream, PROBE_AFTER)?;
+    sockopt::set_tcp_keepintvl(stream, PROBE_EVERY)?;
+    sockopt::set_tcp_keepcnt(stream, PROBES)?;
+    // Where something sent to it is not acknowledged, there are no probes.
+    #[cfg(target_os = "linux")]
+    {
+        let given_up = PROBE_AFTER + PROBE_EVERY * PROBES;
+        sockopt::set_tcp_user_timeout(stream, u32::try_from(given_up.as_millis()).unwrap_or(u32::MAX))?;
+    }
+    Ok(())
 }
 
 impl Line for TcpLine {
@@ -82,7 +158,7 @@ impl Line for TcpLine {
         // A candidate that cannot be set up has gone again.
         let _ = self.decide();
         // So has one that cannot be accepted.
-        self.candidate = self.listener.accept().ok().map(|(stream, _)| stream);
+        self.candidate = self.listener.accept().ok();
         Ok(0)
     }
 
@@ -103,7 +179,11 @@ impl Line for TcpLine {
     }
 
     fn take_host_change(&mut self) -> bool {
-        std::mem::take(&mut self.client_changed)
+        mem::take(&mut self.client_changed)
+    }
+
+    fn take_notices(&mut self) -> Vec<String> {
+        mem::take(&mut self.notices)
     }
 
     fn publish(&mut self) -> Result<(), SimError> {
@@ -130,4 +210,27 @@ impl Line for TcpLine {
 
 fn is_temporary(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use rustix::net::sockopt;
+
+    use super::*;
+
+    #[test]
+    fn a_client_that_is_gone_is_given_up_within_two_minutes() {
+        let mut line = TcpLine::listen("127.0.0.1:0", None).unwrap();
+        let _host = TcpStream::connect(line.address).unwrap();
+        while line.client.is_none() {
+            assert_eq!(line.read(&mut [0; 8]).unwrap(), 0);
+        }
+        let stream = &line.client.as_ref().unwrap().stream;
+        assert!(sockopt::socket_keepalive(stream).unwrap());
+        let probing = sockopt::tcp_keepintvl(stream).unwrap() * sockopt::tcp_keepcnt(stream).unwrap();
+        let within = Duration::from_secs(120);
+        assert!(sockopt::tcp_keepidle(stream).unwrap() + probing <= within);
+        let unacknowledged = sockopt::tcp_user_timeout(stream).unwrap();
+        assert!((1..=within.as_millis()).contains(&unacknowledged.into()));
+    }
 }

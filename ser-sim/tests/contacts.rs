@@ -3,17 +3,17 @@
 
 mod common;
 
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use common::{LONG, wait_for};
 use ser_proto::Model;
-use ser_sim::{Contacts, Notice, Played, Port, SimError, SimOptions, Simulator};
+use ser_sim::{Contacts, Notice, Played, Port, Scenario, SimError, SimOptions, Simulator, Step};
 
 fn options(contacts: Contacts) -> SimOptions {
-    SimOptions { contacts, ..SimOptions::new(Model::Ser160, Port::Tcp { address: "127.0.0.1:0".to_owned() }) }
+    SimOptions { contacts, keep_played: true, ..SimOptions::new(Model::Ser160, Port::tcp("127.0.0.1:0")) }
 }
 
 /// A simulator whose contacts come through a pipe.
@@ -49,6 +49,56 @@ fn scenarios_from_a_stream_play_one_after_the_other() {
     drop(stream);
     simulator.wait_played(LONG).unwrap();
     assert_eq!(summary(&simulator.played()[3..]), owned(&[(0, "")]));
+}
+
+/// A scenario without end, and how much of it was taken. Input 1 toggles in every millisecond.
+struct Endless {
+    lines: Arc<AtomicU64>,
+    rest: Vec<u8>,
+}
+
+impl Read for Endless {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        while self.rest.len() < buffer.len() {
+            let line = self.lines.fetch_add(1, Ordering::Relaxed);
+            let text =
+                if line == 0 { "ms,input,state\n".to_owned() } else { format!("{line},1,{}\n", line % 2) };
+            self.rest.extend(text.bytes());
+        }
+        buffer.copy_from_slice(&self.rest[..buffer.len()]);
+        self.rest.drain(..buffer.len());
+        Ok(buffer.len())
+    }
+}
+
+#[test]
+fn a_stream_that_is_faster_than_time_has_to_wait() {
+    let lines = Arc::new(AtomicU64::new(0));
+    let source = Box::new(Endless { lines: Arc::clone(&lines), rest: Vec::new() });
+    let contacts = Contacts::Stream { name: "endless".to_owned(), source };
+    let late = Arc::new(Mutex::new(Vec::new()));
+    let heard = Arc::clone(&late);
+    let notice = Notice(Box::new(move |text| heard.lock().unwrap().push(text.to_owned())));
+    let simulator = Simulator::start(SimOptions { notice: Some(notice), ..options(contacts) }).unwrap();
+    let played = wait_for("a thousand moves", || {
+        // What waits for its time, and some reads of 64 KiB.
+        assert!(lines.load(Ordering::Relaxed) < 300_000);
+        Some(simulator.played()).filter(|played| played.len() >= 1000)
+    });
+    for (index, played) in (1..).zip(&played) {
+        assert_eq!(played.at_ms, index);
+        assert_eq!(u64::from(played.tick_after), played.start_ms + index);
+    }
+    assert_eq!(*late.lock().unwrap(), Vec::<String>::new());
+}
+
+#[test]
+fn what_nobody_asks_for_is_not_kept() {
+    let scenario = Scenario::from_steps([Step { at_ms: 0, input: 1, on: true }]);
+    let options = SimOptions { keep_played: false, ..options(Contacts::Scenario(scenario)) };
+    let simulator = Simulator::start(options).unwrap();
+    simulator.wait_played(LONG).unwrap();
+    assert_eq!(simulator.played(), []);
 }
 
 #[test]

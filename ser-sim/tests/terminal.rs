@@ -6,6 +6,7 @@ mod common;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
+use std::thread;
 use std::time::Duration;
 
 use common::{Terminal, wait_for};
@@ -13,7 +14,8 @@ use ser_proto::{AutoReport, Baud, Command, Configure, Model, Reply};
 use ser_sim::{Backend, LineRate, NonVolatile, Port, Scenario, SimError, SimOptions, Simulator, Step};
 
 fn on(link: &Path) -> SimOptions {
-    SimOptions::new(Model::Ser160, Port::Pty { link: Some(link.to_owned()) })
+    let port = Port::Pty { link: Some(link.to_owned()) };
+    SimOptions { keep_played: true, ..SimOptions::new(Model::Ser160, port) }
 }
 
 /// A place for a link.
@@ -78,31 +80,68 @@ fn the_link_of_a_simulator_that_runs_is_left_to_it() {
 }
 
 #[test]
-fn a_link_left_behind_is_replaced_and_anything_else_is_refused() {
+fn whatever_stands_under_the_name_is_refused_unharmed() {
     let place = Place::new();
     let link = place.link();
-    for stale in ["/dev/pts/4000000", "/nonexistent/terminal"] {
-        symlink(stale, &link).unwrap();
-        let simulator = Simulator::start(on(&link)).unwrap();
-        Terminal::open(&link, 9600).ask(&Command::QueryMode);
-        drop(simulator);
-        assert!(!exists(&link));
-    }
-
     fs::write(&link, "a report").unwrap();
     let error = Simulator::start(on(&link)).unwrap_err();
     assert!(matches!(&error, SimError::LinkTaken(path) if *path == link), "{error}");
     assert!(error.to_string().contains("exists already"), "{error}");
     assert_eq!(fs::read_to_string(&link).unwrap(), "a report");
 
-    let other = place.0.path().join("link to a file");
-    symlink(&link, &other).unwrap();
-    assert!(matches!(Simulator::start(on(&other)), Err(SimError::LinkTaken(_))));
-    assert!(exists(&other));
+    // Links of others, whether they lead to a terminal, to a file or nowhere.
+    for (name, target) in [
+        ("of another program", Path::new("/dev/pts/4000000")),
+        ("to a disk that is not there", Path::new("/nonexistent/disk")),
+        ("to a file", &link),
+    ] {
+        let other = place.0.path().join(name);
+        symlink(target, &other).unwrap();
+        assert!(matches!(Simulator::start(on(&other)), Err(SimError::LinkTaken(_))), "{name}");
+        assert_eq!(fs::read_link(&other).unwrap(), target);
+    }
 
     let nowhere = place.0.path().join("no such directory/ser");
     let error = Simulator::start(on(&nowhere)).unwrap_err().to_string();
     assert!(error.contains("no such directory/ser") && error.contains("os error 2"), "{error}");
+}
+
+#[test]
+fn nothing_beside_the_link_is_touched() {
+    let place = Place::new();
+    let (lock, precious) = (place.0.path().join("ser.lock"), place.0.path().join("precious"));
+    fs::write(&precious, "a password").unwrap();
+    // A lock file of a package manager, and one that somebody has planted.
+    for plant in [false, true] {
+        if plant {
+            fs::remove_file(&lock).unwrap();
+            symlink(&precious, &lock).unwrap();
+        } else {
+            fs::write(&lock, "version = 4").unwrap();
+        }
+        drop(Simulator::start(on(&place.link())).unwrap());
+        let expected = if plant { "a password" } else { "version = 4" };
+        assert_eq!(fs::read_to_string(&lock).unwrap(), expected);
+    }
+    assert_eq!(fs::read_dir(place.0.path()).unwrap().count(), 2);
+}
+
+#[test]
+fn of_simulators_that_start_together_under_different_spellings_one_has_the_link() {
+    let place = Place::new();
+    fs::create_dir(place.0.path().join("sub")).unwrap();
+    let spellings = [place.link(), place.0.path().join("sub/../ser"), place.0.path().join("./ser")];
+    for _ in 0..10 {
+        let started: Vec<_> = thread::scope(|scope| {
+            let starting: Vec<_> =
+                spellings.iter().map(|link| scope.spawn(|| Simulator::start(on(link)).ok())).collect();
+            starting.into_iter().filter_map(|starting| starting.join().unwrap()).collect()
+        });
+        assert_eq!(started.len(), 1);
+        assert!(matches!(Simulator::start(on(&spellings[1])), Err(SimError::LinkInUse(_))));
+        Terminal::open(place.link(), 9600).ask(&Command::QueryMode);
+    }
+    assert!(!exists(&place.link()));
 }
 
 #[test]

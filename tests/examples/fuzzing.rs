@@ -2,10 +2,12 @@
 //! ordinary build.
 
 use std::error::Error;
-use std::fs;
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
+use ser_console::Harmless;
 use ser_tests::fuzzing::{TARGETS, Target, seeds};
 
 const USAGE: &str = "\
@@ -26,7 +28,8 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("{error}");
+            // Nobody is left to be told when standard error is gone.
+            let _ = writeln!(io::stderr(), "{}", Harmless(error));
             ExitCode::FAILURE
         }
     }
@@ -41,15 +44,34 @@ fn find(name: &str) -> Result<Target, Box<dyn Error>> {
 fn plant(target: Target, folder: &Path) -> Result<(), Box<dyn Error>> {
     fs::create_dir_all(folder)?;
     for seed in seeds::of(target.name)? {
-        fs::write(folder.join(seed.name), seed.bytes)?;
+        write_new(&folder.join(seed.name), &seed.bytes)?;
     }
     Ok(())
 }
 
+/// Writes a file unless it is there already. One that is something else stays: it may be anybody's.
+fn write_new(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
+    match File::options().write(true).create_new(true).open(path) {
+        Ok(mut file) => Ok(file.write_all(bytes)?),
+        Err(error) if error.kind() == ErrorKind::AlreadyExists && is(path, bytes) => Ok(()),
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(format!(
+            "{} is something else than this seed: remove it, or name another folder",
+            path.display()
+        )
+        .into()),
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn is(path: &Path, bytes: &[u8]) -> bool {
+    let len = fs::metadata(path).map(|found| found.len());
+    len.is_ok_and(|len| len == bytes.len() as u64) && fs::read(path).is_ok_and(|found| found == bytes)
+}
+
 fn replay(target: Target, file: &Path) -> Result<(), Box<dyn Error>> {
     let seed = seeds::read(file)?;
-    println!("{} on {} bytes of {}", target.name, seed.bytes.len(), file.display());
+    let what = format!("{} on {} bytes of {}", target.name, seed.bytes.len(), file.display());
+    ser_console::print(Harmless(what).line() + "\n")?;
     (target.run)(&seed.bytes);
-    println!("holds");
-    Ok(())
+    Ok(ser_console::print("holds\n")?)
 }

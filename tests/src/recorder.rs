@@ -240,7 +240,7 @@ impl Recorder {
 }
 
 fn options(model: Model) -> SimOptions {
-    SimOptions::new(model, Port::Pty { link: None })
+    SimOptions { keep_played: true, ..SimOptions::new(model, Port::Pty { link: None }) }
 }
 
 fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {

@@ -116,8 +116,7 @@ pub(crate) fn build_and_check(boards: &[(&Board, CrossToolchain)], stack: bool) 
             paths += &stack_paths::shown(board, &image, &calls);
         }
     }
-    table::print(&columns);
-    print!("{paths}");
+    steps::print(table::lines(&columns).join("\n") + "\n" + &paths)?;
     verdict(&columns)?;
     Ok(checked)
 }

@@ -56,8 +56,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let chosen = chosen(&arguments.targets, targets()?)?;
     if arguments.list {
-        chosen.iter().for_each(|target| println!("{target}"));
-        return Ok(());
+        return steps::print(chosen.join("\n") + "\n");
     }
     check_tools()?;
     let mut broken = Vec::new();

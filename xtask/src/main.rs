@@ -56,7 +56,10 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
-    let Arguments { offline, verb } = Arguments::parse();
+    let Arguments { offline, verb } = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return ser_console::explain(&error),
+    };
     let installing = if offline { Installing::Forbidden } else { Installing::Allowed };
     let done = match verb {
         Verb::Demo(arguments) => demo::run(&arguments, installing),
@@ -72,10 +75,7 @@ fn main() -> ExitCode {
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("{failure}");
-            ExitCode::FAILURE
-        }
+        Err(failure) => failure.report(),
     }
 }
 

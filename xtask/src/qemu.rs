@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
 pub(crate) fn build_ser_cli() -> Result<()> {
     heading("ser-cli");
     steps::run(steps::cargo().args(["build", "--package", "ser-cli"]))?;
-    eprintln!();
+    steps::say(&"");
     Ok(())
 }
 

@@ -2,25 +2,55 @@
 
 use std::ffi::OsStr;
 use std::fmt;
+use std::io::{self, Write};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, ExitCode};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use ser_console::Harmless;
+
 /// Why a verb ended early; says what to do.
 #[derive(Debug)]
-pub(crate) struct Failure(String);
+pub(crate) enum Failure {
+    /// What is to be told.
+    Told(String),
+    /// Standard output takes nothing more.
+    Unwritten(io::Error),
+}
 
 impl Failure {
     pub(crate) fn new(text: impl Into<String>) -> Failure {
-        Failure(text.into())
+        Failure::Told(text.into())
+    }
+
+    /// Tells the user; gives the exit code.
+    pub(crate) fn report(&self) -> ExitCode {
+        if let Failure::Unwritten(error) = self {
+            return ser_console::unwritten(error);
+        }
+        say(self);
+        ExitCode::FAILURE
     }
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "\nxtask: {}", self.0)
+        match self {
+            Failure::Told(text) => write!(f, "\nxtask: {}", Harmless(text)),
+            Failure::Unwritten(error) => write!(f, "\nxtask: cannot write standard output: {error}"),
+        }
     }
+}
+
+/// On standard error. Nobody is left to be told when that is gone.
+pub(crate) fn say(line: &dyn fmt::Display) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// Prints on standard output.
+pub(crate) fn print(text: impl fmt::Display) -> Result<()> {
+    ser_console::print(text).map_err(Failure::Unwritten)
 }
 
 pub(crate) type Result<T> = std::result::Result<T, Failure>;
@@ -33,14 +63,14 @@ pub(crate) fn heading(text: &str) {
     let mut steps = STEPS.lock().unwrap_or_else(PoisonError::into_inner);
     steps.push((text.to_owned(), Instant::now()));
     let since_first = steps.first().map_or(Duration::ZERO, |(_, began)| began.elapsed());
-    eprintln!("\n==> {}  {text}", minutes(since_first));
+    say(&format_args!("\n==> {}  {}", minutes(since_first), Harmless(text)));
 }
 
 /// Prints how long each step took.
 pub(crate) fn print_durations() {
     let steps = STEPS.lock().unwrap_or_else(PoisonError::into_inner);
-    eprintln!("\n==> Minutes of each step");
-    durations(&steps, Instant::now()).iter().for_each(|line| eprintln!("{line}"));
+    say(&"\n==> Minutes of each step");
+    durations(&steps, Instant::now()).iter().for_each(|line| say(line));
 }
 
 /// A line for each step, and one for all together.
@@ -62,7 +92,7 @@ fn minutes(time: Duration) -> String {
 
 /// A remark on what is not done, and why.
 pub(crate) fn note(text: &str) {
-    eprintln!("    {text}");
+    say(&format_args!("    {}", Harmless(text)));
 }
 
 /// Variables that cargo and rustup set for xtask, and that mislead other toolchains.

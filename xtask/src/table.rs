@@ -9,14 +9,8 @@ const KEPT: Style = AnsiColor::Green.on_default();
 const BROKEN: Style = AnsiColor::Red.on_default().bold();
 const FAINT: Style = Style::new().dimmed();
 
-/// Prints the table, what is wrong, and where the images are.
-pub(crate) fn print(columns: &[(&Board, Vec<Outcome>)]) {
-    for line in lines(columns) {
-        anstream::println!("{line}");
-    }
-}
-
-fn lines(columns: &[(&Board, Vec<Outcome>)]) -> Vec<String> {
+/// The table, what is wrong, and where the images are.
+pub(crate) fn lines(columns: &[(&Board, Vec<Outcome>)]) -> Vec<String> {
     let mut lines = vec![String::new()];
     let Some((_, first)) = columns.first() else { return lines };
     let label = width(first.iter().map(|outcome| outcome.what));

@@ -25,6 +25,7 @@
 //! | 8080h         | length of the latest fault's last words, in bytes      | recorder   |
 //! | 8084h–80DFh   | these words, UTF-8                                     | recorder   |
 //! | 80E0h         | how many starts ago that was; 0 for never              | recorder   |
+//! | 80F0h–80F7h   | mark of the bench's file                               | bench      |
 //! | 9000h–91FFh   | configuration memory, see `configuration`              | recorder   |
 //!
 //! Words have 32 bits, little-endian.

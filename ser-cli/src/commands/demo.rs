@@ -71,8 +71,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 }
 
 fn options(args: &Args) -> Result<SimOptions> {
-    let port =
-        if cfg!(unix) { Port::Pty { link: None } } else { Port::Tcp { address: "127.0.0.1:0".to_string() } };
+    let port = if cfg!(unix) { Port::Pty { link: None } } else { Port::tcp("127.0.0.1:0") };
     let backend: Backend = sim::backend(args.image.as_deref(), None, LineRate::Real)?;
     Ok(SimOptions { backend, ..SimOptions::new(Model::Ser320, port) })
 }

@@ -3,10 +3,13 @@
 mod bus;
 
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use clap::ValueEnum;
+use ser_console::Harmless;
 use ser_proto::Model;
 use ser_proto::genius::Device;
 use ser_sim::{
@@ -16,6 +19,7 @@ use ser_sim::{
 
 use crate::error::{Failure, Result, inform, warn};
 use crate::interrupt;
+use crate::values;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -90,9 +94,16 @@ pub(crate) struct Args {
     #[command(flatten)]
     bus: bus::BusArgs,
 
-    /// Listen on this address instead; port 0 takes a free one.
+    /// Listen on this address instead, for one client at a time; port 0 takes a free one.
+    ///
+    /// Whoever reaches the address may do everything, erase included: on 127.0.0.1 this computer,
+    /// on 0.0.0.0 anybody.
     #[arg(long, value_name = "HOST:PORT", value_parser = tcp_address)]
     tcp: Option<String>,
+
+    /// A client that has sent nothing for so long gives way when another one comes; or never.
+    #[arg(long, value_name = "TIME", default_value = "600s", value_parser = patience)]
+    tcp_idle: Patience,
 
     /// Move the unit's contacts as this CSV file says; `-` is standard input.
     #[arg(long, value_name = "FILE")]
@@ -112,20 +123,25 @@ pub(crate) struct Args {
     #[arg(long, value_name = "ELF")]
     image: Option<PathBuf>,
 
-    /// Write what the image logs to this file.
+    /// Write what the image logs to this file, which must not exist yet; a pipe or a terminal may.
     #[arg(long, value_name = "FILE", requires = "image")]
     log: Option<PathBuf>,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let stop = interrupt::catch()?;
-    Ok(ser_sim::run(options(args)?, &stop, announce)?)
+    let mut announced = Ok(());
+    ser_sim::run(options(args)?, &stop, |ports| {
+        announced = announce(ports);
+        stop.fetch_or(announced.is_err(), Ordering::Relaxed);
+    })?;
+    announced
 }
 
 fn options(args: &Args) -> Result<SimOptions> {
     let model = args.model.into();
     let port = match &args.tcp {
-        Some(address) => Port::Tcp { address: address.clone() },
+        Some(address) => Port::Tcp { address: address.clone(), gives_way_after: args.tcp_idle.0 },
         None if args.genius.is_some() && args.pty.is_none() => Port::Unconnected,
         None => Port::Pty { link: args.pty.clone() },
     };
@@ -197,6 +213,15 @@ fn contacts_failure(contacts: std::result::Result<Contacts, SimError>) -> Result
     })
 }
 
+/// How long a client may be silent while another one waits; `None` is for ever.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Patience(Option<Duration>);
+
+fn patience(text: &str) -> std::result::Result<Patience, String> {
+    let time = if text == "never" { Ok(None) } else { values::duration(text).map(Some) };
+    time.map(Patience).map_err(|why| format!("{why}; or never"))
+}
+
 /// An address to listen on, as far as one can tell without asking the system.
 fn tcp_address(text: &str) -> std::result::Result<String, String> {
     match text.rsplit_once(':') {
@@ -205,11 +230,20 @@ fn tcp_address(text: &str) -> std::result::Result<String, String> {
     }
 }
 
-fn announce(port: &str) {
-    // A script that has read the port may close our output; the unit goes on.
-    let mut out = io::stdout();
-    let _ = writeln!(out, "{port}").and_then(|()| out.flush());
+/// Tells all the ways to reach the units, one a line.
+fn announce(ports: &str) -> Result<()> {
+    let mut out = io::stdout().lock();
+    // A script gets them letter by letter; a terminal would obey some.
+    let is_terminal = out.is_terminal();
+    let shown = |port: &str| if is_terminal { Harmless(port).line() } else { port.to_owned() };
+    let written = ports.lines().try_for_each(|port| writeln!(out, "{}", shown(port)));
+    match written.and_then(|()| out.flush()) {
+        // A script that has read the port may close our output; the unit goes on.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {}
+        written => written?,
+    }
     inform("the simulated unit answers; Ctrl-C switches it off");
+    Ok(())
 }
 
 /// What went wrong in the simulator, with advice.
@@ -223,6 +257,7 @@ impl From<SimError> for Failure {
             SimError::WindowTaken(_) | SimError::WindowInUse(_) => {
                 "choose a name that does not exist, as in --genius /tmp/host"
             }
+            SimError::LogTaken(_) => "choose a name that does not exist, as in --log /tmp/ser.log",
             SimError::EmulatorMissing { .. } => "or leave --image out: the built-in node needs no emulator",
             SimError::EmulatorEnded { .. } | SimError::NoAnswer { .. } => {
                 "is this an image for mps2-an385? Build it with cargo xtask firmware"
@@ -234,7 +269,7 @@ impl From<SimError> for Failure {
                 }
                 io::ErrorKind::AddrInUse => "another program listens there: port 0 takes a free one",
                 io::ErrorKind::AddrNotAvailable => {
-                    "that is not this computer: 127.0.0.1 or 0.0.0.0 (from everywhere) are"
+                    "that is not this computer: 127.0.0.1 is; 0.0.0.0 is, too, and there anybody may erase"
                 }
                 _ => "check names, rights, and that no other simulator runs there",
             },

@@ -11,6 +11,8 @@ mod link;
 mod recognition;
 #[cfg(unix)]
 mod window;
+#[cfg(unix)]
+mod window_file;
 
 pub use error::GeniusError;
 pub use geni::{BlockKind, Device as DeviceRecord, Status as BoardStatus};

@@ -4,15 +4,16 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 
-use geni::{FileRam, MappedRam, RAM_LEN, SharedRam};
+use geni::{MappedRam, RAM_LEN, SharedRam};
 use rustix::fs::OFlags;
 
+use super::window_file::WindowFile;
 use crate::{GeniWindow, OpenError};
 
 /// Shared RAM, however it is reached.
 pub(super) enum Window {
     /// A program on the other side, through a file. Should the file get shorter, that is an error and nothing worse.
-    File(FileRam),
+    File(WindowFile),
     /// A board.
     Memory(MappedRam),
 }
@@ -51,7 +52,7 @@ impl Window {
         let other = |error| OpenError::Other { name: place.file.clone(), error };
         let len = file.metadata().map_err(other)?.len();
         match place.offset {
-            None if len == RAM_LEN as u64 => FileRam::new(file, 0).map(Window::File).map_err(other),
+            None if len == RAM_LEN as u64 => WindowFile::new(file).map(Window::File).map_err(other),
             Some(offset) if offset.checked_add(RAM_LEN as u64).is_some_and(|end| end <= len) => {
                 Window::of_memory(&file, place)
             }

@@ -223,6 +223,10 @@ impl Machine for BusMachine<'_> {
         scenarios.fold(None, |late_ms, items| late_ms.max(self.stream_part(items)))
     }
 
+    fn waiting_steps(&self) -> usize {
+        self.recorders.iter().map(|recorder| recorder.unit().waiting_steps()).sum()
+    }
+
     fn is_idle(&self) -> bool {
         self.recorders.iter().all(|recorder| recorder.unit().is_idle())
     }

@@ -1,11 +1,11 @@
 //! The file between the host's board and the host, which is another process.
 
-use std::fs::{self, File, OpenOptions};
-use std::io;
+use std::fs::File;
+use std::io::{self, ErrorKind};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
-use crate::claim::Claim;
+use crate::claim::{Claim, Holder};
 use crate::error::SimError;
 use crate::genius::{Board, RAM_LEN};
 
@@ -17,28 +17,31 @@ pub(super) struct HostWindow {
     path: PathBuf,
     file: File,
     image: Box<[u8; RAM_LEN]>,
-    /// Whether the file is ours to remove.
-    made: bool,
-    /// Keeps other simulators from taking the window.
+    /// Keeps other simulators from taking the window; the file goes with it.
     _claim: Claim,
 }
 
 impl HostWindow {
-    /// Makes the file, or takes one that is empty or that a simulator has left behind, and fills it with zeros.
+    /// Makes the file, or takes one that a simulator has left behind, and fills it with zeros.
     pub(super) fn create(path: &Path) -> Result<HostWindow, SimError> {
-        let doing = || format!("make the GENI window {}", path.display());
+        let doing = || SimError::io(format!("make the GENI window {}", path.display()));
         let claim = Claim::on(path, SimError::WindowInUse)?;
-        let made = !path.exists() || claim.was_left_behind();
-        let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
-        let file = file.map_err(SimError::io(doing()))?;
-        let metadata = file.metadata().map_err(SimError::io(doing()))?;
-        let ours = claim.was_left_behind() && metadata.len() == RAM_LEN as u64;
-        if !metadata.is_file() || !(ours || metadata.len() == 0) {
-            return Err(SimError::WindowTaken(path.to_owned()));
+        match claim.holder().map_err(doing())? {
+            Holder::Nobody => {}
+            Holder::Simulator => claim.remove().map_err(doing())?,
+            Holder::Foreign => return Err(SimError::WindowTaken(path.to_owned())),
         }
-        let emptied = file.set_len(RAM_LEN as u64).and_then(|()| file.write_all_at(&[0; RAM_LEN], 0));
-        emptied.map_err(SimError::io(doing()))?;
-        Ok(HostWindow { path: path.to_owned(), file, image: Box::new([0; RAM_LEN]), made, _claim: claim })
+        // Fails where something has come meanwhile, and follows no link.
+        let file = File::options().read(true).write(true).create_new(true).open(path);
+        let file = match file {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                return Err(SimError::WindowTaken(path.to_owned()));
+            }
+            file => file.map_err(doing())?,
+        };
+        let ready = claim.remember().and_then(|()| file.write_all_at(&[0; RAM_LEN], 0));
+        ready.map_err(doing())?;
+        Ok(HostWindow { path: path.to_owned(), file, image: Box::new([0; RAM_LEN]), _claim: claim })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -91,17 +94,11 @@ fn read_rest(file: &File, image: &mut [u8; RAM_LEN], result: &mut io::Result<()>
     }
 }
 
-impl Drop for HostWindow {
-    fn drop(&mut self) {
-        if self.made {
-            // It may be gone already.
-            let _ = fs::remove_file(&self.path);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs;
+    use std::os::unix::fs::symlink;
+
     use super::*;
 
     #[test]
@@ -119,7 +116,7 @@ mod tests {
     fn somebody_elses_file_is_left_alone_whatever_its_size() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("photo");
-        for len in [1, RAM_LEN] {
+        for len in [0, 1, RAM_LEN] {
             fs::write(&path, vec![0xA5; len]).unwrap();
             assert!(matches!(HostWindow::create(&path), Err(SimError::WindowTaken(_))));
             assert_eq!(fs::read(&path).unwrap(), vec![0xA5; len]);
@@ -127,19 +124,26 @@ mod tests {
     }
 
     #[test]
-    fn the_window_of_a_simulator_that_was_killed_is_taken_over() {
+    fn no_link_is_followed() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("host");
-        fs::write(&path, [0xA5; RAM_LEN]).unwrap();
-        fs::write(folder.path().join("host.lock"), []).unwrap();
-        drop(HostWindow::create(&path).unwrap());
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        let (path, victim) = (folder.path().join("host"), folder.path().join("victim"));
+        symlink(&victim, &path).unwrap();
+        assert!(matches!(HostWindow::create(&path), Err(SimError::WindowTaken(_))));
+        assert!(!victim.exists());
+        fs::write(&victim, []).unwrap();
+        assert!(matches!(HostWindow::create(&path), Err(SimError::WindowTaken(_))));
+        assert_eq!((fs::read(&victim).unwrap(), fs::read_link(&path).unwrap()), (vec![], victim));
     }
 
     #[test]
-    fn an_empty_file_is_used_and_stays() {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        drop(HostWindow::create(file.path()).unwrap());
-        assert_eq!(fs::read(file.path()).unwrap().len(), RAM_LEN);
+    fn what_has_come_into_the_place_of_the_window_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("host");
+        let window = HostWindow::create(&path).unwrap();
+        let other = folder.path().join("other");
+        fs::write(&other, [0xA5; RAM_LEN]).unwrap();
+        fs::rename(&other, &path).unwrap();
+        drop(window);
+        assert_eq!(fs::read(&path).unwrap(), [0xA5; RAM_LEN]);
     }
 }

@@ -1,5 +1,7 @@
 //! Whole-system simulation in virtual time: see `ser_tests::simulation`.
 
+use std::fmt::Display;
+use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -71,32 +73,43 @@ fn duration_ms(text: &str) -> Result<u64, String> {
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    let mut total = Paces::default();
-    for seed in arguments.seeds() {
-        match run(seed, &arguments) {
-            Some(paces) => total += paces,
-            None => return ExitCode::FAILURE,
-        }
-    }
-    if arguments.seeds > 1 {
-        println!("{} seeds, nothing unaccounted for\n  {total}", arguments.seeds);
-    }
-    ExitCode::SUCCESS
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return ser_console::explain(&error),
+    };
+    run_all(&arguments).map_or_else(|code| code, |()| ExitCode::SUCCESS)
 }
 
-/// Runs a seed and says what became of it; nothing when it failed.
-fn run(seed: u64, arguments: &Arguments) -> Option<Paces> {
+/// Runs all seeds, up to the first that fails or that nobody wants to hear of any more: then the
+/// exit code.
+fn run_all(arguments: &Arguments) -> Result<(), ExitCode> {
+    let mut total = Paces::default();
+    for seed in arguments.seeds() {
+        total += run(seed, arguments)?;
+    }
+    if arguments.seeds > 1 {
+        print(format_args!("{} seeds, nothing unaccounted for\n  {total}\n", arguments.seeds))?;
+    }
+    Ok(())
+}
+
+fn print(text: impl Display) -> Result<(), ExitCode> {
+    ser_console::print(text).map_err(|error| ser_console::unwritten(&error))
+}
+
+/// Runs a seed and says what became of it.
+fn run(seed: u64, arguments: &Arguments) -> Result<Paces, ExitCode> {
     let Arguments { duration_ms, bus_one_in, .. } = *arguments;
     let simulate = if arguments.load { simulation::run_flat_out } else { simulation::run };
     match simulate(Options { seed, duration_ms, bus_one_in }) {
         Ok((report, paces)) => {
-            println!("{report}\n  {paces}\n");
-            Some(paces)
+            print(format_args!("{report}\n  {paces}\n\n"))?;
+            Ok(paces)
         }
         Err(failure) => {
-            eprintln!("{failure}");
-            None
+            // Nobody is left to be told when standard error is gone.
+            let _ = writeln!(io::stderr(), "{failure}");
+            Err(ExitCode::FAILURE)
         }
     }
 }

@@ -9,12 +9,17 @@ fn main() -> ExitCode {
 
 #[cfg(not(target_os = "linux"))]
 fn main() -> ExitCode {
-    eprintln!("the emulator is driven through local sockets and shared memory: it takes Linux");
+    use std::io::Write;
+    // Nobody is left to be told when standard error is gone.
+    let _ = std::io::stderr()
+        .write_all(b"the emulator is driven through local sockets and shared memory: it takes Linux\n");
     ExitCode::FAILURE
 }
 
 #[cfg(target_os = "linux")]
 mod measured {
+    use std::fmt;
+    use std::io::{self, Write};
     use std::num::NonZeroU32;
     use std::path::PathBuf;
     use std::process::ExitCode;
@@ -42,21 +47,33 @@ mod measured {
     }
 
     pub(super) fn main() -> ExitCode {
-        let Arguments { load_seconds, image, plugin } = Arguments::parse();
+        let Arguments { load_seconds, image, plugin } = match Arguments::try_parse() {
+            Ok(arguments) => arguments,
+            Err(error) => return ser_console::explain(&error),
+        };
         let load_ms = u64::from(load_seconds.get()) * 1000;
         let began = Instant::now();
-        let next = |what: &str| eprintln!("    {:3} s  {what}", began.elapsed().as_secs());
+        let next = |what: &str| tell(format_args!("    {:3} s  {what}", began.elapsed().as_secs()));
         match Report::measure(&Parts { image, plugin }, load_ms, &next) {
             Ok(report) => {
-                println!("\n{report}");
+                let printed = ser_console::print(format_args!("\n{report}\n"));
                 let wrong = report.wrong();
-                wrong.iter().for_each(|wrong| eprintln!("over budget, late or missing: {wrong}"));
-                if wrong.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+                wrong.iter().for_each(|wrong| tell(format_args!("over budget, late or missing: {wrong}")));
+                match printed {
+                    _ if !wrong.is_empty() => ExitCode::FAILURE,
+                    Ok(()) => ExitCode::SUCCESS,
+                    Err(error) => ser_console::unwritten(&error),
+                }
             }
             Err(what) => {
-                eprintln!("{what}");
+                tell(format_args!("{what}"));
                 ExitCode::FAILURE
             }
         }
+    }
+
+    /// On standard error. Nobody is left to be told when that is gone.
+    fn tell(what: fmt::Arguments<'_>) {
+        let _ = writeln!(io::stderr(), "{what}");
     }
 }

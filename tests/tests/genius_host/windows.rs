@@ -50,7 +50,9 @@ fn a_window_without_a_board_behind_it_is_silent() {
     let zeros = file(&desk.path("zeros"), RAM_LEN as u64);
     let ones = desk.path("ones");
     fs::write(&ones, [0xFF; RAM_LEN]).expect("written");
-    for window in [zeros, window(&ones), GeniWindow::from("/dev/zero")] {
+    let photo = desk.path("photo");
+    fs::write(&photo, [0xA5; RAM_LEN]).expect("written");
+    for window in [zeros, window(&ones), window(&photo), GeniWindow::from("/dev/zero")] {
         let began_ms = desk.now_ms();
         match desk.open(window).err() {
             Some(OpenError::Genius { error: GeniusError::BoardSilent, .. }) => {}
@@ -58,6 +60,8 @@ fn a_window_without_a_board_behind_it_is_silent() {
         }
         assert!(desk.now_ms() - began_ms <= 3_010, "{} ms", desk.now_ms() - began_ms);
     }
+    // One that was named by mistake is what it was.
+    assert!(fs::read(&photo).expect("read").iter().all(|&byte| byte == 0xA5));
 }
 
 #[test]
