@@ -139,6 +139,7 @@ pub(crate) fn read_datagram<R: SharedRam>(ram: &R) -> Option<Received> {
         function: ram.read(map::READ_FUNCTION),
         subfunction: ram.read(map::READ_SUBFUNCTION),
         broadcast: ram.read(map::READ_DIRECTED) != DIRECTED,
+        arrived_ms: None,
         data: read_data(ram, ram.read(map::READ_LEN))?,
     })
 }
@@ -153,7 +154,7 @@ pub(crate) fn read_reply<R: SharedRam>(
     subfunction: u8,
 ) -> Option<Received> {
     let data = read_data(ram, ram.read(map::REPLY_LEN))?;
-    Some(Received { source, function, subfunction, broadcast: false, data })
+    Some(Received { source, function, subfunction, broadcast: false, arrived_ms: None, data })
 }
 
 fn read_data<R: SharedRam>(ram: &R, len: u8) -> Option<Data> {

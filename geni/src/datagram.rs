@@ -149,6 +149,11 @@ pub struct Received {
     pub subfunction: u8,
     /// Whether it went to everybody.
     pub broadcast: bool,
+    /// The tick at which it was seen to arrive, by the count of
+    /// [`Driver::poll`](crate::Driver::poll), however much later it was read. Where two arrived
+    /// between two polls, see there. `None` for a reply, and for a datagram whose arrival nobody
+    /// saw.
+    pub arrived_ms: Option<u32>,
     /// The data.
     pub data: Data,
 }

@@ -9,7 +9,7 @@
 //! | capture                        | its own millisecond, of which it is the stamp | [`CAPTURE_PRIORITY`]      |
 //! | received byte                  | 520 µs                                        | [`RECEIVE_PRIORITY`]      |
 //! | transmitter has room           | as long as it likes: a pause on the line      | [`TRANSMIT_PRIORITY`]     |
-//! | line of the GENI board         | as long as it likes: the pulse is latched     | [`EXTERNAL_BUS_PRIORITY`] |
+//! | line of the GENI board         | a millisecond: its tick is that of an arrival | [`EXTERNAL_BUS_PRIORITY`] |
 //!
 //! The main loop has priority 0. A UART with one interrupt for both directions has it at that of the receiver.
 
@@ -71,9 +71,14 @@ pub const RECEIVE_PRIORITY: u8 = 2;
 /// Priority of the transmit interrupt: being late makes a pause on the line and nothing else.
 pub const TRANSMIT_PRIORITY: u8 = 1;
 
-/// Priority of the GENI board's interrupt line: its edge is latched and does no more than wake the main loop, which
-/// looks at the board's flags in every pass anyway.
+/// Priority of the GENI board's interrupt line: its edge is latched, and all that it does is to
+/// take the tick at which a datagram arrived. The interrupts above it take some 10 µs of the
+/// millisecond.
 pub const EXTERNAL_BUS_PRIORITY: u8 = 1;
+
+/// Pulses of the GENI board's interrupt line that may wait for the main loop. Each is a datagram,
+/// of which the board holds 15; one more may be on its way out.
+pub const PULSE_RING_LEN: usize = ring_len(16);
 
 /// Bytes of the log that may wait for a debug probe: all that a start has to say, some 40 records of 25 bytes at
 /// most. What finds no room is dropped; nothing else waits for the log.
@@ -102,7 +107,7 @@ mod tests {
         assert_eq!(bytes_in(MAIN_LOOP_STALL_MS), 192);
         assert_eq!((RECEIVE_RING_LEN, bytes_in(133)), (256, 256));
         assert_eq!((TRANSMIT_RING_LEN, bytes_in(TRANSMIT_AHEAD_MS)), (128, 127));
-        assert_eq!(PROBE_RING_LEN, 1024);
+        assert_eq!((PROBE_RING_LEN, PULSE_RING_LEN), (1024, 16));
         assert_eq!(CHARACTER_BITS * 1_000_000 / MAX_BITS_PER_SECOND, 520);
         let capture_cycles = CAPTURE_INSTRUCTIONS * 4;
         assert_eq!((capture_cycles, capture_cycles * 1000 / 84_000, capture_cycles / 84), (600, 7, 7));

@@ -211,7 +211,7 @@ fn log_changed_genius(before: &GeniusDiagnostics, after: &GeniusDiagnostics) {
         GeniusDiagnostics,
         before,
         after,
-        [datagrams_ignored, replies_lost, reports_failed],
+        [datagrams_ignored, clocks_refused, replies_lost, reports_failed],
         other [board, last_failure, broadcasts, reports_sent]
     );
 }

@@ -36,33 +36,51 @@ const NEVER_SET_MS: i64 = 946_684_800_000;
 /// A hundred years, 1970–2069: what two-digit years can tell apart.
 const CENTURY_MS: i64 = 36_525 * 24 * 60 * 60 * 1000;
 
+/// Milliseconds since 1970 at tick 0, within the hundred years; 42 bits of them, as many of these
+/// are remembered.
+#[derive(Clone, Copy, Debug)]
+struct Offset([u16; 3]);
+
+impl Offset {
+    /// The offset of a clock that shows `now_ms` in `tick_ms`.
+    fn new(now_ms: i64, tick_ms: u64) -> Offset {
+        let [a, b, c, d, e, f, ..] =
+            now_ms.saturating_sub_unsigned(tick_ms).rem_euclid(CENTURY_MS).to_le_bytes();
+        Offset([u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]), u16::from_le_bytes([e, f])])
+    }
+
+    fn ms(self) -> i64 {
+        let [low, middle, high] = self.0.map(i64::from);
+        high << 32 | middle << 16 | low
+    }
+}
+
 /// Turns ticks into date and time.
 #[derive(Clone, Debug)]
 pub(crate) struct Clock {
-    /// Milliseconds since 1970 at tick 0.
-    offset_ms: History<i64>,
+    offset: History<Offset>,
 }
 
 impl Clock {
     /// A clock that shows `now` at `tick_ms`; 2000-01-01 when the time is not known.
     pub(crate) fn new(tick_ms: u64, now: Option<NaiveDateTime>) -> Clock {
         let now_ms = now.map_or(NEVER_SET_MS, to_calendar_ms);
-        Clock { offset_ms: History::new(now_ms.saturating_sub_unsigned(tick_ms)) }
+        Clock { offset: History::new(Offset::new(now_ms, tick_ms)) }
     }
 
     /// In `tick_ms` the clock shows `now`.
     pub(crate) fn set(&mut self, tick_ms: u64, now: NaiveDateTime) {
-        self.offset_ms.set(tick_ms, to_calendar_ms(now).saturating_sub_unsigned(tick_ms));
+        self.offset.set(tick_ms, Offset::new(to_calendar_ms(now), tick_ms));
     }
 
     /// Calendar time of the sample of `tick_ms`, as the clock was set then.
     pub(crate) fn stamp_ms(&self, tick_ms: u64) -> i64 {
-        within_century(self.offset_ms.at_sample(tick_ms), tick_ms)
+        within_century(self.offset.at_sample(tick_ms).ms(), tick_ms)
     }
 
     /// Calendar time in `tick_ms`, as the clock is set now.
     pub(crate) fn now_ms(&self, tick_ms: u64) -> i64 {
-        within_century(self.offset_ms.latest(), tick_ms)
+        within_century(self.offset.latest().ms(), tick_ms)
     }
 }
 

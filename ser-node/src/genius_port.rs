@@ -3,9 +3,11 @@
 //! Commands come as datagrams 40h/50h, directed or by broadcast; replies go to the sender of a directed one. The board
 //! is reset when it fails, and the bus is joined again; RS-232 and recording know nothing of it.
 //!
-//! - **Time of arrival** is the tick of the [`poll`](GeniusPort::poll) in which the board handed the datagram over. It
-//!   lies behind the last bit on the bus by what the board takes to say so and to carry out Read Datagram, and by
-//!   up to two turns of the main loop; a datagram waits longer when others wait in the board before it.
+//! - **Time of arrival** is the tick at which the board raised its Receive-Queue flag: that of the
+//!   pulse that was handed in ([`interrupt`](GeniusPort::interrupt)), or, without the line, of the
+//!   [`poll`](GeniusPort::poll) that saw the flag. However long the board then takes to hand the
+//!   datagram over, clock, mode and Last Broadcast go by it, and changes that come after it wait
+//!   for it ([`HELD_BACK_MS`](crate::HELD_BACK_MS)).
 //! - **Replies** are sent once. A host that misses one asks again, as on RS-232; a repeated reply might be taken for
 //!   the answer to the next command.
 //! - **Auto reports** are repeated until their receiver has acknowledged one, with growing pauses, as a receiver that
@@ -20,7 +22,7 @@
 mod reporter;
 
 use geni::{
-    Completion, Configuration, Counters, Data, Destination, DeviceChange, Driver, Event, Failure,
+    Completion, Configuration, Counters, Data, Destination, DeviceChange, Driver, Event, Failure, Interrupts,
     MAX_DATA_LEN, Options, Priority, Received, SharedRam, Start, Status, Transmission, timing,
 };
 use heapless::{Deque, Vec};
@@ -87,6 +89,9 @@ impl GeniusOptions {
             start: self.start,
             reset_line: self.reset_line,
             heartbeat_timeout_ms: self.heartbeat_timeout_ms,
+            // A pulse of the line is a datagram, then. All else can wait until flags are looked at
+            // anyway.
+            interrupts: Interrupts::RECEIVE_QUEUE,
             ..Options::new(configuration.unwrap_or(Configuration::DEFAULT))
         }
     }
@@ -115,6 +120,8 @@ pub struct GeniusDiagnostics {
     /// Replies that the board could not send, or that went down with it before or after their commands were carried
     /// out.
     pub replies_lost: u32,
+    /// Commands that set the clock and were not carried out, because nobody saw them arrive.
+    pub clocks_refused: u32,
     /// Auto reports that arrived.
     pub reports_sent: u32,
     /// Auto reports that did not arrive, or of which it is not known; each is sent again.
@@ -144,7 +151,8 @@ enum OnItsWay {
 
 /// The Genius port of a [`Node`], over the shared RAM of its GENI board.
 ///
-/// In every turn of its main loop a board calls [`Node::poll`], then [`poll`](Self::poll) with the same tick, and then
+/// In every turn of its main loop a board hands in the pulses of the interrupt line
+/// ([`interrupt`](Self::interrupt)), calls [`Node::poll`], then [`poll`](Self::poll), and then
 /// drives the GENI board's reset line with [`reset_held`](Self::reset_held).
 pub struct GeniusPort<W> {
     driver: Driver<W>,
@@ -172,9 +180,10 @@ impl<W: SharedRam> GeniusPort<W> {
     }
 
     /// Does what is due, a bounded amount of it: global data, commands that have arrived, one datagram to be sent.
-    ///
-    /// `now_ms` is the tick with which [`Node::poll`] has just been called.
-    pub fn poll<S: Storage, R: Rtc>(&mut self, node: &mut Node<'_, S, R>, now_ms: u32) {
+    pub fn poll<S: Storage, R: Rtc>(&mut self, node: &mut Node<'_, S, R>) {
+        // Not that of `Node::poll`: what was done since may have taken long, and a flag is seen
+        // now.
+        let now_ms = node.tick_ms();
         let global = GlobalData { model: self.model, state: node.inputs() }.to_bytes();
         // As long as the model says, and that is what was configured.
         let _ = self.driver.set_global_data(&global);
@@ -182,6 +191,7 @@ impl<W: SharedRam> GeniusPort<W> {
             let Some(event) = self.driver.poll(now_ms) else { break };
             self.deal_with(event, node, now_ms);
         }
+        node.hold_after(self.driver.oldest_arrival_ms());
         if self.on_its_way.is_none() && self.driver.can_transmit() {
             self.send_next(node, now_ms);
         }
@@ -192,10 +202,12 @@ impl<W: SharedRam> GeniusPort<W> {
         self.driver.reset_held()
     }
 
-    /// The board's interrupt line was pulsed: its flags are looked at in the next [`poll`](Self::poll). A board that
+    /// The board's interrupt line was pulsed at `tick_ms`: a datagram arrived then. Called before
+    /// [`Node::poll`], so that no change after it is recorded before it has been read. A board that
     /// does not connect the line need not call this; the flags are looked at all the same.
-    pub fn interrupt(&mut self) {
-        self.driver.interrupt();
+    pub fn interrupt<S: Storage, R: Rtc>(&mut self, node: &mut Node<'_, S, R>, tick_ms: u32) {
+        self.driver.interrupt(tick_ms);
+        node.hold_after(self.driver.oldest_arrival_ms());
     }
 
     /// The shared RAM.
@@ -247,18 +259,7 @@ impl<W: SharedRam> GeniusPort<W> {
     fn receive<S: Storage, R: Rtc>(&mut self, datagram: &Received, node: &mut Node<'_, S, R>, now_ms: u32) {
         const READ_IO_FORCES: u8 = Subfunction::ReadIoForces.code();
         match (datagram.function, datagram.subfunction) {
-            (FUNCTION_HORNER, SUBFUNCTION_SER) if datagram.broadcast => {
-                let received = Command::parse(&datagram.data);
-                count(&mut self.diagnostics.broadcasts, received.is_ok().into());
-                node.genius_broadcast(received, now_ms);
-            }
-            (FUNCTION_HORNER, SUBFUNCTION_SER) => {
-                if self.replies.is_full() {
-                    count(&mut node.recorder.diagnostics.commands_overrun, 1);
-                } else if let Some(answer) = node.arrived(Command::parse(&datagram.data), now_ms) {
-                    self.reply(datagram.source, What::Answer(answer));
-                }
-            }
+            (FUNCTION_HORNER, SUBFUNCTION_SER) => self.receive_message(datagram, node, now_ms),
             (FUNCTION_GENIUS, READ_IO_FORCES) if !datagram.broadcast => {
                 let table = match *datagram.data {
                     [code] => ForceTable::from_code(code),
@@ -270,6 +271,29 @@ impl<W: SharedRam> GeniusPort<W> {
                 }
             }
             _ => count(&mut self.diagnostics.datagrams_ignored, 1),
+        }
+    }
+
+    fn receive_message<S: Storage, R: Rtc>(
+        &mut self,
+        datagram: &Received,
+        node: &mut Node<'_, S, R>,
+        now_ms: u32,
+    ) {
+        let message = Command::parse(&datagram.data);
+        // The time that it brings was that of its arrival, and no other is known to be right.
+        if datagram.arrived_ms.is_none() && matches!(message, Ok(Command::SetClock(_))) {
+            count(&mut self.diagnostics.clocks_refused, 1);
+            return;
+        }
+        let arrived_ms = datagram.arrived_ms.unwrap_or(now_ms);
+        if datagram.broadcast {
+            count(&mut self.diagnostics.broadcasts, message.is_ok().into());
+            node.genius_broadcast(message, arrived_ms);
+        } else if self.replies.is_full() {
+            count(&mut node.recorder.diagnostics.commands_overrun, 1);
+        } else if let Some(answer) = node.arrived(message, arrived_ms) {
+            self.reply(datagram.source, What::Answer(answer));
         }
     }
 

@@ -1,56 +1,120 @@
 //! A value, and what it was a short while ago.
 //!
-//! Debounce brings changes up to 255 ms after they happened, and what was in force then decides about them. A history
-//! therefore remembers the settings of the last 256 ms.
+//! Changes are recorded up to [`HELD_BACK_MS`](crate::HELD_BACK_MS) after they happened, and what
+//! was in force when they happened decides about them. A history therefore has a place for every
+//! millisecond of that span. However many settings come over both ports, and in whatever order they
+//! are read, none is forgotten that still decides about a change.
 
-use heapless::Deque;
+use crate::sequencer::{WINDOW, slot};
 
-/// How long ago a change can have happened that is recorded only now.
-const SPAN_MS: u64 = 256;
+/// Milliseconds that are remembered. The oldest change that is still to be recorded lies less far
+/// back.
+const SPAN: usize = WINDOW;
 
-/// Settings that can be remembered. A command of nine characters takes 4.7 ms at 19,200 bit/s, so no line brings
-/// more than 55 of them in the span.
-const LEN: usize = 64;
+/// Bits of a word.
+const BITS: usize = u32::BITS as usize;
 
 /// A value over time.
 #[derive(Clone, Debug)]
 pub(crate) struct History<T> {
-    /// The value before the first of the settings.
-    before: T,
-    /// When it was set to what, in the order of ticks.
-    settings: Deque<(u64, T), LEN>,
+    /// The value before the first millisecond that has a place, and when it was set.
+    before: (u64, T),
+    /// The latest setting of all. Its millisecond is the latest that has a place.
+    latest: (u64, T),
+    /// What was set last in each millisecond; where nothing was, the bit below is clear.
+    values: [T; SPAN],
+    is_set: [u32; SPAN / BITS],
 }
 
 impl<T: Copy> History<T> {
     pub(crate) const fn new(value: T) -> History<T> {
-        History { before: value, settings: Deque::new() }
+        let (before, latest) = ((0, value), (0, value));
+        History { before, latest, values: [value; SPAN], is_set: [0; SPAN / BITS] }
     }
 
     /// Sets the value in millisecond `tick_ms`. The sample of that millisecond has been taken already.
     pub(crate) fn set(&mut self, tick_ms: u64, value: T) {
-        while self.settings.is_full() || self.settings.front().is_some_and(|(at, _)| at + SPAN_MS < tick_ms) {
-            let Some((_, value)) = self.settings.pop_front() else { break };
-            self.before = value;
+        if tick_ms + SPAN as u64 <= self.latest.0 {
+            // All changes of that time have been recorded. It may still be the latest before the
+            // others.
+            if tick_ms >= self.before.0 {
+                self.before = (tick_ms, value);
+            }
+            return;
         }
-        // There is room: the loop has seen to it.
-        let _ = self.settings.push_back((tick_ms, value));
+        if tick_ms >= self.latest.0 {
+            self.go_on_to(tick_ms);
+            self.latest = (tick_ms, value);
+        }
+        let place = slot(tick_ms);
+        if let Some(at) = self.values.get_mut(place) {
+            *at = value;
+        }
+        if let Some(word) = self.is_set.get_mut(place / BITS) {
+            *word |= 1 << (place % BITS);
+        }
+    }
+
+    /// Gives the places of milliseconds that are too long ago to those up to `tick_ms`.
+    fn go_on_to(&mut self, tick_ms: u64) {
+        let begin_ms = tick_ms.saturating_sub(SPAN as u64 - 1);
+        self.before = self.setting_before(begin_ms);
+        if begin_ms > self.latest.0 {
+            self.is_set = [0; SPAN / BITS];
+            return;
+        }
+        for ms in self.latest.0 + 1..=tick_ms {
+            let place = slot(ms);
+            if let Some(word) = self.is_set.get_mut(place / BITS) {
+                *word &= !(1 << (place % BITS));
+            }
+        }
     }
 
     /// The value now.
     pub(crate) fn latest(&self) -> T {
-        self.settings.back().map_or(self.before, |&(_, value)| value)
+        self.latest.1
     }
 
     /// The value when the sample of millisecond `tick_ms` was taken.
     pub(crate) fn at_sample(&self, tick_ms: u64) -> T {
-        let in_force = self.settings.iter().rev().find(|(at, _)| *at < tick_ms);
-        in_force.map_or(self.before, |&(_, value)| value)
+        self.setting_before(tick_ms).1
+    }
+
+    /// The latest setting before this millisecond, and when it was.
+    fn setting_before(&self, tick_ms: u64) -> (u64, T) {
+        // Nearly always: clocks are seldom set.
+        if tick_ms > self.latest.0 {
+            return self.latest;
+        }
+        self.find_before(tick_ms).unwrap_or(self.before)
+    }
+
+    /// The same among those that have a place.
+    fn find_before(&self, tick_ms: u64) -> Option<(u64, T)> {
+        let mut ms = tick_ms.checked_sub(1)?;
+        while ms + SPAN as u64 > self.latest.0 {
+            let place = slot(ms);
+            let word = *self.is_set.get(place / BITS)? << (BITS - 1 - place % BITS);
+            if word != 0 {
+                let at_ms = ms.checked_sub(word.leading_zeros().into())?;
+                // Further back the places are those of the latest milliseconds.
+                let has_place = at_ms + SPAN as u64 > self.latest.0;
+                return self.values.get(slot(at_ms)).filter(|_| has_place).map(|&value| (at_ms, value));
+            }
+            ms = ms.checked_sub(place as u64 % BITS as u64 + 1)?;
+        }
+        None
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    const SPAN_MS: u64 = SPAN as u64;
 
     #[test]
     fn each_sample_finds_what_was_in_force_when_it_was_taken() {
@@ -63,15 +127,62 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_long_ago_is_forgotten() {
+    fn of_two_settings_in_a_millisecond_the_last_counts() {
+        let mut history = History::new('a');
+        history.set(10, 'b');
+        history.set(10, 'c');
+        assert_eq!((history.at_sample(10), history.at_sample(11)), ('a', 'c'));
+    }
+
+    #[test]
+    fn a_setting_that_is_read_late_has_its_place_before_those_that_came_after_it() {
+        let mut history = History::new('a');
+        history.set(20, 'c');
+        history.set(10, 'b');
+        let seen: String = [10, 11, 20, 21].map(|tick| history.at_sample(tick)).iter().collect();
+        assert_eq!(seen, "abbc");
+        assert_eq!(history.latest(), 'c');
+        // Also when there is no place for it any more.
+        history.set(5_000, 'e');
+        history.set(30, 'd');
+        history.set(15, 'x');
+        assert_eq!((history.at_sample(5_000), history.latest()), ('d', 'e'));
+    }
+
+    #[test]
+    fn a_setting_in_every_millisecond_is_remembered_for_the_whole_span() {
         let mut history = History::new(0);
-        for tick_ms in 1..=1000_u64 {
+        for tick_ms in 1..=2_000_u64 {
             history.set(tick_ms, tick_ms);
         }
-        assert_eq!(history.latest(), 1000);
-        assert_eq!(history.at_sample(1000), 999);
-        // 64 settings are remembered; before the oldest of them stands the one that was forgotten last.
-        assert_eq!(history.at_sample(937), 936);
-        assert_eq!(history.at_sample(2), 936);
+        for tick_ms in 2_000 - SPAN_MS + 2..=2_001 {
+            assert_eq!(history.at_sample(tick_ms), tick_ms - 1);
+        }
+        // Before the first of them stands the one that was forgotten last.
+        assert_eq!(history.at_sample(2), 2_000 - SPAN_MS);
+    }
+
+    proptest! {
+        /// A list that forgets nothing gives the same for all that can still be asked.
+        #[test]
+        fn it_is_a_list_of_settings(
+            start_ms in prop_oneof![Just(0_u64), Just(u64::from(u32::MAX) - 300)],
+            settings in prop::collection::vec((0..600_u64, 0..500_u64), 0..60),
+        ) {
+            let (mut now_ms, mut history, mut list) = (start_ms, History::new(0), vec![(0, 0)]);
+            for (number, (after_ms, ago_ms)) in (1..).zip(settings) {
+                now_ms += after_ms;
+                let tick_ms = now_ms.saturating_sub(ago_ms);
+                history.set(tick_ms, number);
+                let behind = list.partition_point(|&(at_ms, _)| at_ms <= tick_ms);
+                list.insert(behind, (tick_ms, number));
+                let latest_ms = list.last().expect("the first").0;
+                for tick_ms in (latest_ms + 2).saturating_sub(SPAN_MS)..=latest_ms + 1 {
+                    let behind = list.partition_point(|&(at_ms, _)| at_ms < tick_ms).max(1);
+                    prop_assert_eq!(history.at_sample(tick_ms), list[behind - 1].1, "{} {:?}", tick_ms, &list);
+                }
+                prop_assert_eq!(history.latest(), list.last().expect("the first").1);
+            }
+        }
     }
 }

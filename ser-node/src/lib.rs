@@ -46,5 +46,6 @@ pub use event_log::{Event, EventLog};
 pub use genius_port::{GeniusDiagnostics, GeniusOptions, GeniusPort};
 pub use liveness::Liveness;
 pub use node::{Node, NodeParts, VERSION};
+pub use sequencer::HELD_BACK_MS;
 pub use settings::{CopyNumber, RECORD_LEN, Storage};
 pub use tick_counter::TickCounter;

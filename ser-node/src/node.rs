@@ -79,6 +79,14 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.record_until(now_ms);
     }
 
+    /// A datagram that arrived at this tick waits to be read: changes that come after it are
+    /// recorded when it has been, as it may set clock or mode. No change waits for longer than
+    /// [`HELD_BACK_MS`](crate::HELD_BACK_MS).
+    pub(crate) fn hold_after(&mut self, arrived_ms: Option<u32>) {
+        let arrived_ms = arrived_ms.map(|tick_ms| self.ticks.extend(tick_ms));
+        self.sequencer.hold_after(arrived_ms);
+    }
+
     /// Takes a byte from the RS-232 line that arrived at `tick_ms`, and the command that it completes.
     ///
     /// Clock and mode are set at once, by that tick; everything else is done when the reply has its turn.

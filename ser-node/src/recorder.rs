@@ -94,9 +94,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
                 Answer::ClockSet
             }
             Command::SetMode { recording } => {
-                if recording != self.recording.latest() {
-                    self.recording.set(tick_ms, recording);
-                }
+                self.recording.set(tick_ms, recording);
                 self.mode()
             }
             Command::QueryMode => self.mode(),

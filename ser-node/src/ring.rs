@@ -13,7 +13,7 @@
 //! All `N` cells can be in use. On Cortex-M the loads and stores are the ordinary ones; acquire and release cost a
 //! barrier instruction each.
 
-use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU32, AtomicUsize, Ordering};
 
 /// Something that a [`Ring`] can hold.
 ///
@@ -43,6 +43,22 @@ impl Slot for u8 {
 
     #[inline]
     fn load(cell: &AtomicU8) -> u8 {
+        cell.load(Ordering::Relaxed)
+    }
+}
+
+/// A tick, for instance.
+impl Slot for u32 {
+    type Cell = AtomicU32;
+    const EMPTY: AtomicU32 = AtomicU32::new(0);
+
+    #[inline]
+    fn store(self, cell: &AtomicU32) {
+        cell.store(self, Ordering::Relaxed);
+    }
+
+    #[inline]
+    fn load(cell: &AtomicU32) -> u32 {
         cell.load(Ordering::Relaxed)
     }
 }

@@ -4,13 +4,23 @@
 //! therefore accepted in another order than they changed. The sequencer holds changes back for as long as
 //! an earlier one can still turn up, the longest debounce time, and hands them on in order; without debounce it
 //! holds nothing back.
+//!
+//! It also holds changes back that came after a datagram which has arrived and not been read: what
+//! it says about clock and mode decides about them.
 
 use ser_proto::Inputs;
 
 use crate::debounce::Debounce;
 
-/// The longest debounce time is 255 ms, so changes of 256 different milliseconds can be waiting.
-const WINDOW: usize = 256;
+/// Changes of so many different milliseconds can be waiting.
+const WINDOW_MS: u32 = 320;
+
+/// The same, as a number of places.
+pub(crate) const WINDOW: usize = WINDOW_MS as usize;
+
+/// How long a change is held back at most, in milliseconds: for debounce, and for a datagram that
+/// arrived before it. With the longest debounce time of 255 ms that leaves 64 ms for the datagram.
+pub const HELD_BACK_MS: u64 = WINDOW_MS as u64 - 1;
 
 /// Inputs that changed in the same millisecond, by the time of their first moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +41,8 @@ pub(crate) struct Sequencer {
     /// Changes by the low bits of the tick at which they began.
     waiting: [u32; WINDOW],
     waiting_count: usize,
+    /// Changes after this tick wait.
+    hold_after_ms: Option<u64>,
     /// No change that began before this tick is waiting or will come.
     front_ms: u64,
     /// The state after the changes that were accepted, and after those that were handed on.
@@ -45,6 +57,7 @@ impl Sequencer {
             hold_ms: debounce.longest_ms().into(),
             waiting: [0; WINDOW],
             waiting_count: 0,
+            hold_after_ms: None,
             front_ms: 0,
             accepted: 0,
             state: 0,
@@ -55,6 +68,11 @@ impl Sequencer {
     pub(crate) fn baseline(&mut self, state: u32) {
         self.accepted = state;
         self.state = state;
+    }
+
+    /// Holds back changes after this tick, for as long as there is room.
+    pub(crate) fn hold_after(&mut self, tick_ms: Option<u64>) {
+        self.hold_after_ms = tick_ms;
     }
 
     /// Takes a change that was accepted at `tick_ms`; every earlier one must have been taken out with
@@ -75,7 +93,11 @@ impl Sequencer {
 
     /// The next change in order, when all samples before `before_ms` have been pushed.
     pub(crate) fn next(&mut self, before_ms: u64) -> Option<Change> {
-        let end_ms = before_ms.saturating_sub(self.hold_ms);
+        let in_order_ms = before_ms.saturating_sub(self.hold_ms);
+        let end_ms = match self.hold_after_ms {
+            Some(tick_ms) => in_order_ms.min((tick_ms + 1).max(before_ms.saturating_sub(HELD_BACK_MS))),
+            None => in_order_ms,
+        };
         while self.waiting_count > 0 && self.front_ms < end_ms {
             let tick_ms = self.front_ms;
             self.front_ms += 1;
@@ -93,10 +115,16 @@ impl Sequencer {
     }
 }
 
-fn slot(tick_ms: u64) -> usize {
-    #[expect(clippy::cast_possible_truncation, reason = "reduced modulo the window")]
-    let slot = (tick_ms % WINDOW as u64) as usize;
-    slot
+/// The place of a millisecond among the latest [`WINDOW`] of them.
+///
+/// In steps of 32 bits: a Cortex-M divides those with one instruction, and 64 bits with hundreds.
+pub(crate) fn slot(tick_ms: u64) -> usize {
+    /// What 2^32 leaves.
+    const WRAP: u32 = 0_u32.wrapping_sub(WINDOW_MS) % WINDOW_MS;
+    const { assert!(WINDOW_MS <= 1 << 16, "the product fits") };
+    let [a, b, c, d, e, f, g, h] = tick_ms.to_le_bytes();
+    let (low, high) = (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]));
+    ((high % WINDOW_MS * WRAP + low % WINDOW_MS) % WINDOW_MS) as usize
 }
 
 #[cfg(test)]
@@ -112,7 +140,7 @@ mod tests {
         let mut channel = CaptureChannel::new();
         let (mut capture, mut reader) = channel.split(debounce);
         let (mut sequencer, mut ticks, mut changes) = (Sequencer::new(debounce), Ticks::new(), Vec::new());
-        let settling = std::iter::repeat_n(*samples.last().unwrap_or(&0), 2 * WINDOW);
+        let settling = std::iter::repeat_n(*samples.last().unwrap_or(&0), 2 * 256);
         for (tick_ms, inputs) in (1_u32..).zip(samples.iter().copied().chain(settling)) {
             capture.sample(tick_ms, inputs);
             if !(tick_ms as usize).is_multiple_of(every) {
@@ -172,11 +200,49 @@ mod tests {
     }
 
     #[test]
+    fn slots_are_those_of_a_division() {
+        for tick_ms in [0, 1, 319, 320, 321, (1 << 32) - 1, 1 << 32, (1 << 32) + 1, u64::MAX - 1, u64::MAX] {
+            assert_eq!(slot(tick_ms) as u64, tick_ms % WINDOW as u64, "{tick_ms}");
+        }
+    }
+
+    #[test]
     fn a_debounced_contact_that_moved_first_comes_first() {
         // Input 1 moves at tick 2 and has 5 ms of debounce; input 2 moves at tick 4 and has none.
         let changes = sequence(Debounce::OFF.with(1, 5), &[0, 1, 1, 3], 1);
         let seen: Vec<_> = changes.iter().map(|c| (c.tick_ms, c.changed, c.state)).collect();
         assert_eq!(seen, [(2, 1, 1), (4, 2, 3)]);
+    }
+
+    #[test]
+    fn changes_after_a_datagram_wait_for_it_and_no_longer_than_there_is_room() {
+        let mut sequencer = Sequencer::new(Debounce::OFF);
+        sequencer.baseline(0);
+        sequencer.hold_after(Some(10));
+        for tick_ms in [9, 10, 11, 12] {
+            sequencer.push(tick_ms, 1, u32::from(tick_ms % 2 == 0));
+        }
+        let ticks = |sequencer: &mut Sequencer, before_ms| -> Vec<u64> {
+            std::iter::from_fn(|| sequencer.next(before_ms)).map(|change| change.tick_ms).collect()
+        };
+        assert_eq!(ticks(&mut sequencer, 13), [9, 10]);
+        assert_eq!(ticks(&mut sequencer, 11 + HELD_BACK_MS), []);
+        assert_eq!(ticks(&mut sequencer, 12 + HELD_BACK_MS), [11]);
+        sequencer.hold_after(None);
+        assert_eq!(ticks(&mut sequencer, 12 + HELD_BACK_MS), [12]);
+    }
+
+    #[test]
+    fn with_the_longest_debounce_and_the_longest_hold_every_change_finds_its_place() {
+        let mut sequencer = Sequencer::new(Debounce::uniform(255).with(1, 0));
+        sequencer.hold_after(Some(0));
+        let mut seen = Vec::new();
+        for tick_ms in 1..=2_000_u64 {
+            seen.extend(std::iter::from_fn(|| sequencer.next(tick_ms)).map(|change| change.tick_ms));
+            sequencer.push(tick_ms, 1, u32::from(tick_ms % 2 == 1));
+        }
+        let expected: Vec<u64> = (1..2_000 - HELD_BACK_MS).collect();
+        assert_eq!(seen, expected);
     }
 
     #[test]

@@ -37,7 +37,7 @@ mod tests;
 mod window;
 
 pub use block::{Circuits, DiscreteBlock};
-pub use board::{Board, BoardOptions, Led, Leds, Timing, Violation, ViolationKind};
+pub use board::{Board, BoardOptions, Led, Leds, Read, Timing, Violation, ViolationKind};
 pub use bus::{ADDRESSES, Bus, DeviceId, Handle, Traffic};
 pub use bus_interface_unit::{BusInterfaceUnit, Side, StationData};
 pub use datagram::{BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, Priority, STANDARD, subfunction};

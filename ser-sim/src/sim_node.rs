@@ -294,9 +294,15 @@ impl<'a> SimNode<'a> {
 
     /// Lets a Genius port of the node work in the present millisecond: once in each that passes.
     pub fn serve<W: SharedRam>(&mut self, port: &mut GeniusPort<W>) {
-        let tick = self.tick_at(self.now_ms);
-        port.poll(&mut self.node, tick);
+        port.poll(&mut self.node);
         self.pump();
+    }
+
+    /// The GENI board has pulled its interrupt line in millisecond `at_ms`. To be said before time
+    /// passes on.
+    pub fn interrupt<W: SharedRam>(&mut self, port: &mut GeniusPort<W>, at_ms: u64) {
+        let tick = self.tick_at(at_ms);
+        port.interrupt(&mut self.node, tick);
     }
 
     /// Bytes arrive on the node's line in the present millisecond.

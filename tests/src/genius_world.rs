@@ -9,7 +9,7 @@ use chrono::NaiveDateTime;
 use geni::{
     CommandError, Completion, Configuration, Data, Destination, Driver, Event, Options, Received, Start,
 };
-use ser_node::{GeniusOptions, GeniusPort};
+use ser_node::{Debounce, GeniusOptions, GeniusPort};
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{Command, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Model, Reply};
 use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusRate, Handle, Noise, ViolationKind};
@@ -115,12 +115,16 @@ impl World {
     /// The same on a noisy bus.
     #[must_use]
     pub fn with_noise(recorders: &[(u8, Model)], noise: Noise) -> World {
-        World::with_boards(recorders, noise, BoardOptions::default().model)
+        World::of(recorders, noise, Debounce::OFF, BoardOptions::default().model)
     }
 
     /// The same with boards of this model number.
     #[must_use]
     pub fn with_boards(recorders: &[(u8, Model)], noise: Noise, board_model: u8) -> World {
+        World::of(recorders, noise, Debounce::OFF, board_model)
+    }
+
+    fn of(recorders: &[(u8, Model)], noise: Noise, debounce: Debounce, board_model: u8) -> World {
         let bus = Rc::new(RefCell::new(Bus::with_noise(BusRate::default(), noise)));
         let connect = |number| {
             let options = BoardOptions { model: board_model, ..BoardOptions::at(number) };
@@ -135,7 +139,7 @@ impl World {
                 let time = NaiveDateTime::default() + chrono::TimeDelta::days(365 * i64::from(number));
                 let non_volatile =
                     NonVolatile { storage: ser_sim::MemoryStorage::default(), rtc: SimRtc::held_at(time) };
-                let options = SimNodeOptions { non_volatile, ..SimNodeOptions::new(model) };
+                let options = SimNodeOptions { debounce, non_volatile, ..SimNodeOptions::new(model) };
                 // Memory of the test process goes when it does.
                 let node = SimNode::new(options, Box::leak(Box::new(Ram::new())));
                 let options = GeniusOptions { start: RESET, ..GeniusOptions::new(model) };
@@ -156,7 +160,20 @@ impl World {
     /// When somebody is not within five minutes.
     #[must_use]
     pub fn started(recorders: &[(u8, Model)]) -> World {
-        let mut world = World::new(recorders);
+        World::new(recorders).when_started()
+    }
+
+    /// The same with debounce.
+    ///
+    /// # Panics
+    /// When somebody is not on the bus within five minutes.
+    #[must_use]
+    pub fn started_with(recorders: &[(u8, Model)], debounce: Debounce) -> World {
+        World::of(recorders, Noise::default(), debounce, BoardOptions::default().model).when_started()
+    }
+
+    fn when_started(self) -> World {
+        let mut world = self;
         world.until("everybody is on the bus", |world| {
             let known = |recorder: &Recorder| {
                 recorder.port.is_ready() && world.host.driver.device(recorder.number).is_ok()

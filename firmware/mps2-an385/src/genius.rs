@@ -18,9 +18,9 @@ impl Genius {
         Genius { port: GeniusPort::new(window, GeniusOptions::new(model)), board }
     }
 
-    /// Does what is due; `now_ms` is what the node has just been polled with.
-    pub(crate) fn poll(&mut self, node: &mut BoardNode, now_ms: u32) {
-        self.port.poll(node, now_ms);
+    /// Does what is due, when the node has been polled.
+    pub(crate) fn poll(&mut self, node: &mut BoardNode) {
+        self.port.poll(node);
         self.board.drive_reset(self.port.reset_held());
     }
 

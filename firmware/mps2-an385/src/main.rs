@@ -185,7 +185,7 @@ mod app {
         loop {
             let now_ms = main_loop::pass(node, serial);
             if let Some(genius) = genius {
-                genius.poll(node, now_ms);
+                genius.poll(node);
             }
             lamps.show(now_ms, &condition(node, serial, genius.as_ref(), *was_fault));
             if liveness.pass(now_ms) {

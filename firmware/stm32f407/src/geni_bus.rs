@@ -54,13 +54,17 @@
 //! which its driver deals with. A pass of the main loop with 128 bytes of a datagram takes 0.15 ms for them.
 //!
 //! # Notes
-//! `/INT` pulses for 5.44 µs; its edge is latched by the interrupt controller. During the 0.5 ms after `/RST`, in which
-//! the board must be left alone, a false pulse is to be expected: the driver looks at the flags, not at the pulse.
+//! `/INT` pulses for 5.44 µs; its edge is latched by the interrupt controller. The port lets
+//! nothing but arriving datagrams pull it, and each pulse leaves its tick in a ring: however long
+//! the main loop is away, it learns when they came. During the 0.5 ms after `/RST`, in which the
+//! board must be left alone, a false pulse is to be expected: what counts is a pulse whose flag is
+//! set.
 
 use core::ptr::{self, NonNull};
-use core::sync::atomic::{AtomicBool, Ordering};
 
 use geni::WindowRam;
+use ser_board::budget::PULSE_RING_LEN;
+use ser_node::ring::{Reader, Ring, Writer};
 use stm32f4::stm32f407::{EXTI, FSMC, GPIOG, RCC, SYSCFG};
 
 use crate::{clocks, pins};
@@ -132,17 +136,23 @@ const _: () = {
     assert!(ADDRESS_SETUP < 16 && ADDRESS_HOLD < 16 && TURNAROUND < 16 && STROBE < 256);
 };
 
-/// `/INT` was pulsed and the main loop does not know yet.
-static PULSED: AtomicBool = AtomicBool::new(false);
+/// Ticks of pulses that the main loop does not know yet.
+pub(crate) type Pulses = Ring<u32, PULSE_RING_LEN>;
 
 /// The edge of `/INT`.
 pub(crate) struct InterruptLine {
     edges: EXTI,
+    pulses: Writer<'static, u32, PULSE_RING_LEN>,
 }
 
 impl InterruptLine {
     /// Listens to falling edges on pin 5 of port G.
-    pub(crate) fn start(rcc: &RCC, routing: &SYSCFG, edges: EXTI) -> InterruptLine {
+    pub(crate) fn start(
+        rcc: &RCC,
+        routing: &SYSCFG,
+        edges: EXTI,
+        pulses: Writer<'static, u32, PULSE_RING_LEN>,
+    ) -> InterruptLine {
         const PORT_G: u8 = 6;
         rcc.apb2enr().modify(|_, w| w.syscfgen().set_bit());
         clocks::settle();
@@ -150,19 +160,22 @@ impl InterruptLine {
         routing.exticr2().modify(|_, w| unsafe { w.exti5().bits(PORT_G) });
         edges.ftsr().modify(|_, w| w.tr5().set_bit());
         edges.imr().modify(|_, w| w.mr5().set_bit());
-        InterruptLine { edges }
+        InterruptLine { edges, pulses }
     }
 
-    pub(crate) fn on_interrupt(&mut self) {
+    pub(crate) fn on_interrupt(&mut self, tick_ms: u32) {
         // Written ones are cleared, the others stay.
         self.edges.pr().write(|w| w.pr5().clear_bit_by_one());
-        PULSED.store(true, Ordering::Relaxed);
+        // What finds no room has none at the board either; a line that is not connected may pulse
+        // as it likes.
+        let _ = self.pulses.push(tick_ms);
     }
 }
 
 /// A GENI board that is fitted: its reset and interrupt lines.
 pub(crate) struct GeniBoard {
     port: GPIOG,
+    pulses: Reader<'static, u32, PULSE_RING_LEN>,
 }
 
 impl GeniBoard {
@@ -170,7 +183,11 @@ impl GeniBoard {
     ///
     /// # Safety
     /// This is called once only: the window belongs to whoever has it.
-    pub(crate) unsafe fn open(rcc: &RCC, bus: &FSMC) -> Option<(GeniBoard, WindowRam)> {
+    pub(crate) unsafe fn open(
+        rcc: &RCC,
+        bus: &FSMC,
+        pulses: Reader<'static, u32, PULSE_RING_LEN>,
+    ) -> Option<(GeniBoard, WindowRam)> {
         rcc.ahb3enr().modify(|_, w| w.fsmcen().set_bit());
         clocks::settle();
         // SAFETY: the values fit into their fields, see there.
@@ -199,7 +216,7 @@ impl GeniBoard {
         let window = unsafe { WindowRam::new(window) };
         // SAFETY: its set and reset register is all that is used, for one pin.
         let port = unsafe { GPIOG::steal() };
-        Some((GeniBoard { port }, window))
+        Some((GeniBoard { port, pulses }, window))
     }
 
     /// Drives the reset line.
@@ -210,13 +227,8 @@ impl GeniBoard {
         self.port.bsrr().write(|w| unsafe { w.bits(bits) });
     }
 
-    /// Whether the interrupt line was pulsed since this was asked last.
-    pub(crate) fn was_pulsed(&mut self) -> bool {
-        // A pulse between the two steps finds the flags read after it; nothing is lost.
-        let pulsed = PULSED.load(Ordering::Relaxed);
-        if pulsed {
-            PULSED.store(false, Ordering::Relaxed);
-        }
-        pulsed
+    /// The tick of the oldest pulse of the interrupt line that has not been asked for.
+    pub(crate) fn next_pulse(&mut self) -> Option<u32> {
+        self.pulses.pop()
     }
 }

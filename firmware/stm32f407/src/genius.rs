@@ -18,12 +18,18 @@ impl Genius {
         Genius { port: GeniusPort::new(window, GeniusOptions::new(model)), board }
     }
 
-    /// Does what is due; `now_ms` is what the node has just been polled with.
-    pub(crate) fn poll(&mut self, node: &mut BoardNode, now_ms: u32) {
-        if self.board.was_pulsed() {
-            self.port.interrupt();
+    /// Hands the pulses of the interrupt line in, before the node records what came after them.
+    pub(crate) fn take_pulses(&mut self, node: &mut BoardNode) {
+        while let Some(tick_ms) = self.board.next_pulse() {
+            self.port.interrupt(node, tick_ms);
         }
-        self.port.poll(node, now_ms);
+    }
+
+    /// Does what is due, when the node has been polled.
+    pub(crate) fn poll(&mut self, node: &mut BoardNode) {
+        // Again: a flag that is seen in this pass has had its pulse.
+        self.take_pulses(node);
+        self.port.poll(node);
         self.board.drive_reset(self.port.reset_held());
     }
 

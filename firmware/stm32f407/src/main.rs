@@ -51,7 +51,7 @@ mod app {
 
     use crate::clocks::{self, Source};
     use crate::flash::{self, Configuration, ConfigurationFlash};
-    use crate::geni_bus::{GeniBoard, InterruptLine};
+    use crate::geni_bus::{GeniBoard, InterruptLine, Pulses};
     use crate::genius::Genius;
     use crate::inputs::{self, InputPins};
     use crate::lamps::Lamps;
@@ -110,10 +110,11 @@ mod app {
         channel: CaptureChannel = CaptureChannel::new(),
         events: [Event; LOG_LEN] = [Event::EMPTY; LOG_LEN],
         rings: Rings = Rings::new(),
+        pulses: Pulses = Pulses::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         boot::use_vectors_in_ram(&cx.core.SCB);
-        let init::LocalResources { channel, events, rings, .. } = cx.local;
+        let init::LocalResources { channel, events, rings, pulses, .. } = cx.local;
         let device = cx.device;
         let ports = pins::Ports {
             a: device.GPIOA,
@@ -146,10 +147,11 @@ mod app {
             rtc: ClockChip::new(clock, NOT_BEFORE, &rtc::HEALTH),
         });
         let (serial, serial_interrupt) = uart::start(&device.RCC, device.USART2, rings, node.baud());
-        let geni_line = InterruptLine::start(&device.RCC, &device.SYSCFG, device.EXTI);
+        let (pulsed, pulses) = pulses.split();
+        let geni_line = InterruptLine::start(&device.RCC, &device.SYSCFG, device.EXTI, pulsed);
         let genius = if straps.has_geni() {
             // SAFETY: `init` runs once.
-            unsafe { GeniBoard::open(&device.RCC, &device.FSMC) }
+            unsafe { GeniBoard::open(&device.RCC, &device.FSMC, pulses) }
         } else {
             None
         };
@@ -203,10 +205,10 @@ mod app {
         cx.local.serial_interrupt.on_interrupt(timer::tick_ms());
     }
 
-    /// The GENI board has something to say. Wakes the main loop.
+    /// A datagram has arrived at the GENI board. Wakes the main loop.
     #[task(binds = EXTI9_5, priority = 1, local = [geni_line])]
     fn geni(cx: geni::Context) {
-        cx.local.geni_line.on_interrupt();
+        cx.local.geni_line.on_interrupt(timer::tick_ms());
     }
 
     #[idle(local = [serial, node, genius, lamps, watchdog, start])]
@@ -215,9 +217,12 @@ mod app {
         let mut liveness = Liveness::new();
         let mut report = Report::new(node.tick_ms(), &HEALTH);
         loop {
+            if let Some(genius) = genius {
+                genius.take_pulses(node);
+            }
             let now_ms = main_loop::pass(node, serial);
             if let Some(genius) = genius {
-                genius.poll(node, now_ms);
+                genius.poll(node);
             }
             lamps.show(now_ms, &condition(node, serial, genius.as_ref(), start));
             if liveness.pass(now_ms) {

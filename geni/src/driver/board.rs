@@ -1,6 +1,6 @@
 //! The board as a whole: from reset to the bus.
 
-use super::{Done, Driver};
+use super::{Arrivals, Done, Driver};
 use crate::command_block::CommandStatus;
 use crate::counters::count;
 use crate::elapsed::elapsed_ms;
@@ -61,15 +61,18 @@ impl<R: SharedRam> Driver<R> {
             Phase::Attaching { since_ms } => self.await_heartbeat(now_ms, since_ms),
             Phase::Configuring { window_since_ms, futile } => {
                 self.watch_heart(now_ms, timing::OFF_BUS_MS)?;
+                self.look(now_ms);
                 self.configuring(now_ms, window_since_ms, futile)
             }
             Phase::Joining { since_ms, silent } => {
                 self.watch_heart(now_ms, timing::OFF_BUS_MS)?;
+                self.look(now_ms);
                 Ok(self.joining(now_ms, since_ms, silent))
             }
             Phase::Running => {
                 self.locker.end_hold(&mut self.ram, now_ms, &mut self.counters);
                 self.watch_heart(now_ms, 0)?;
+                self.look(now_ms);
                 self.serve(now_ms)
             }
             Phase::Failed { since_ms, pause_ms } if elapsed_ms(now_ms, since_ms) < pause_ms => Ok(None),
@@ -142,6 +145,7 @@ impl<R: SharedRam> Driver<R> {
     fn enter_configuring(&mut self, now_ms: u32, window_since_ms: Option<u32>) {
         self.heart.begin(now_ms);
         self.commander.forget();
+        self.arrivals = Arrivals::new();
         self.options.interrupts.enable(&mut self.ram);
         Interrupts::take(&mut self.ram);
         self.phase = Phase::Configuring { window_since_ms, futile: 0 };

@@ -14,8 +14,11 @@ use crate::timing;
 /// What a command came to.
 #[derive(Debug)]
 pub(super) enum Done {
-    Read(Received),
-    /// The receive queue is empty, or what came out of it is nothing to pass on.
+    /// A datagram came out of the receive queue; `None` when it is nothing to pass on.
+    Read(Option<Received>),
+    /// The receive queue was empty when the board looked.
+    QueueEmpty,
+    /// Nothing is known about the receive queue.
     NothingRead,
     Sent(Result<(), CommandError>),
     Replied(Result<Received, CommandError>),
@@ -101,6 +104,10 @@ impl Commander {
 
     pub(super) fn is_idle(&self) -> bool {
         matches!(self.state, State::Idle)
+    }
+
+    pub(super) fn is_reading(&self) -> bool {
+        matches!(self.state, State::Reading { .. })
     }
 
     pub(super) fn can_transmit(&self) -> bool {
@@ -202,16 +209,16 @@ impl Commander {
             CommandStatus::Complete => {
                 // There may be more.
                 self.read_due();
-                let Some(received) = read_datagram(ram) else {
+                let received = read_datagram(ram);
+                if received.is_none() {
                     count(&mut counters.datagrams_refused);
-                    return Done::NothingRead;
-                };
+                }
                 Done::Read(received)
             }
             // The receive queue is empty, or was: something may have arrived while the answer was on its way.
             CommandStatus::SyntaxError => {
                 self.queue_empty = !self.read_due;
-                Done::NothingRead
+                Done::QueueEmpty
             }
             // "Should not occur": leave it until the next flag or the next look around.
             CommandStatus::ProcessError => {

@@ -2,6 +2,7 @@
 //!
 //! Each file here looks after one thing and is asked in turn; none of them waits.
 
+mod arrivals;
 mod board;
 mod commander;
 mod device_watch;
@@ -12,7 +13,7 @@ mod request_server;
 mod status_watch;
 
 use crate::counters::{Counters, count};
-use crate::datagram::{Completion, Transmission, TransmitError};
+use crate::datagram::{Completion, Received, Transmission, TransmitError};
 use crate::device_table::{Device, write_outputs_disabled};
 use crate::elapsed::elapsed_ms;
 use crate::event::{CommandError, ConfigurationOutcome, Event, Failure, Identity};
@@ -26,6 +27,7 @@ use crate::setup_table::{Configuration, DipSwitches};
 use crate::status_table::Status;
 use crate::timing;
 
+use arrivals::Arrivals;
 use board::Phase;
 use commander::{Commander, Done};
 use device_watch::DeviceWatch;
@@ -57,7 +59,17 @@ enum Task {
 ///   more than 15 datagrams and 15 memory requests for them, and answers come as fast as this is called.
 /// - After each call, hold the reset line low if [`reset_held`](Driver::reset_held) says so, and release it
 ///   otherwise.
-/// - Call [`interrupt`](Driver::interrupt) when the interrupt line was pulsed, if it is connected at all.
+/// - Call [`interrupt`](Driver::interrupt) with the tick of each pulse of the interrupt line, if it
+///   is connected at all.
+///
+/// # When a datagram arrived
+///
+/// The board's flags are looked at in every poll, whatever command is in progress, and a datagram
+/// is handed out with the tick at which its flag was seen
+/// ([`Received::arrived_ms`](crate::Received::arrived_ms)): later than the flag by no more than
+/// lies between two polls. A host that has to know it to the millisecond although its main loop may
+/// be away connects the interrupt line and lets nothing but [`Interrupts::RECEIVE_QUEUE`] pull it:
+/// then it is the tick of the pulse.
 ///
 /// # What happens when
 ///
@@ -80,6 +92,7 @@ pub struct Driver<R> {
     configure_due: bool,
     heart: Heart,
     commander: Commander,
+    arrivals: Arrivals,
     locker: Locker,
     requests: RequestServer,
     devices: DeviceWatch,
@@ -89,6 +102,8 @@ pub struct Driver<R> {
     /// A datagram that the board took with it when it failed, still to be reported.
     lost: Option<Completion>,
     interrupted: bool,
+    /// The board has had its turn, which is still to be reported.
+    outputs_sent: bool,
     flags_taken_ms: u32,
     safety_ms: u32,
     next_task: usize,
@@ -108,6 +123,7 @@ impl<R: SharedRam> Driver<R> {
             configure_due: false,
             heart: Heart::new(),
             commander: Commander::new(options.patience_ms()),
+            arrivals: Arrivals::new(),
             locker: Locker::new(options.patience_ms()),
             requests: RequestServer::new(),
             devices: DeviceWatch::new(),
@@ -116,6 +132,7 @@ impl<R: SharedRam> Driver<R> {
             tables_wanted: false,
             lost: None,
             interrupted: false,
+            outputs_sent: false,
             flags_taken_ms: 0,
             safety_ms: 0,
             next_task: 0,
@@ -151,9 +168,19 @@ impl<R: SharedRam> Driver<R> {
         }
     }
 
-    /// The interrupt line was pulsed: flags are looked at in the next call of [`poll`](Driver::poll).
-    pub fn interrupt(&mut self) {
+    /// The interrupt line was pulsed at `tick_ms`, by the count of [`poll`](Driver::poll): flags
+    /// are looked at in its next call. Where only [`Interrupts::RECEIVE_QUEUE`] pulls the line, a
+    /// datagram arrived at that tick. Pulses are handed in in their order.
+    pub fn interrupt(&mut self, tick_ms: u32) {
         self.interrupted = true;
+        if self.options.interrupts == Interrupts::RECEIVE_QUEUE {
+            self.arrivals.pulsed(tick_ms);
+        }
+    }
+
+    /// When the oldest datagram arrived that waits to be read, as far as that is known.
+    pub fn oldest_arrival_ms(&self) -> Option<u32> {
+        if self.is_ready() { self.arrivals.oldest() } else { None }
     }
 
     /// Whether datagrams are accepted and tables can be locked.
@@ -351,7 +378,7 @@ impl<R: SharedRam> Driver<R> {
 
     fn run(&mut self, task: Task, now_ms: u32) -> Result<Option<Event>, Failure> {
         match task {
-            Task::Flags => Ok(self.take_flags(now_ms)),
+            Task::Flags => Ok(core::mem::take(&mut self.outputs_sent).then_some(Event::OutputsSent)),
             Task::Commands => self.command(now_ms),
             Task::Requests => {
                 Ok(self.requests.poll(&mut self.ram, now_ms, self.options.requests, &mut self.counters))
@@ -372,12 +399,13 @@ impl<R: SharedRam> Driver<R> {
         self.locker.due();
     }
 
-    fn take_flags(&mut self, now_ms: u32) -> Option<Event> {
+    /// Looks at the board's flags, if one of them may be set.
+    fn look(&mut self, now_ms: u32) {
         let due = self.interrupted
             || Interrupts::any(&self.ram)
             || elapsed_ms(now_ms, self.flags_taken_ms) >= timing::FLAGS_PERIOD_MS;
         if !due {
-            return None;
+            return;
         }
         self.interrupted = false;
         self.flags_taken_ms = now_ms;
@@ -391,18 +419,19 @@ impl<R: SharedRam> Driver<R> {
         if flags.contains(Interrupts::DEVICE) {
             self.devices.due();
         }
-        if flags.contains(Interrupts::RECEIVE_QUEUE) {
+        let received = flags.contains(Interrupts::RECEIVE_QUEUE);
+        self.arrivals.looked(received, now_ms);
+        if received {
             self.commander.read_due();
         }
         // A finished command and a granted lockout are seen where they are waited for.
         let outputs_sent = Interrupts::OUTPUTS_SENT;
-        (flags.contains(outputs_sent) && self.options.interrupts.contains(outputs_sent))
-            .then_some(Event::OutputsSent)
+        self.outputs_sent |= flags.contains(outputs_sent) && self.options.interrupts.contains(outputs_sent);
     }
 
     fn command(&mut self, now_ms: u32) -> Result<Option<Event>, Failure> {
         if let Some(done) = self.commander.poll(&self.ram, now_ms, self.in_force, &mut self.counters)? {
-            return Ok(self.report(done));
+            return Ok(self.report(done, now_ms));
         }
         if self.commander.is_idle() {
             if self.configure_due {
@@ -412,14 +441,22 @@ impl<R: SharedRam> Driver<R> {
             } else {
                 let scan_ms = self.status.scan_ms();
                 self.commander.start_next(&mut self.ram, now_ms, scan_ms, &mut self.counters);
+                if self.commander.is_reading() {
+                    self.arrivals.read_started();
+                }
             }
         }
         Ok(None)
     }
 
-    fn report(&mut self, done: Done) -> Option<Event> {
+    fn report(&mut self, done: Done, now_ms: u32) -> Option<Event> {
         match done {
             Done::Read(received) => {
+                // The flag of a datagram that came in the meantime was set before the command was
+                // finished.
+                self.look(now_ms);
+                let arrived_ms = self.arrivals.read();
+                let received = Received { arrived_ms, ..received? };
                 let own_number = DipSwitches::read(&self.ram).device_number;
                 if received.broadcast && received.source == own_number {
                     count(&mut self.counters.own_broadcasts);
@@ -429,6 +466,10 @@ impl<R: SharedRam> Driver<R> {
             }
             Done::Sent(result) => Some(Event::Sent(result)),
             Done::Replied(result) => Some(Event::Replied(result)),
+            Done::QueueEmpty => {
+                self.arrivals.found_empty();
+                None
+            }
             Done::NothingRead | Done::Configured(_) => None,
         }
     }
@@ -477,6 +518,7 @@ impl<R: SharedRam> Driver<R> {
     fn fail(&mut self, now_ms: u32) {
         count(&mut self.counters.failures);
         self.lost = self.commander.abandon();
+        self.arrivals = Arrivals::new();
         self.locker = Locker::new(self.options.patience_ms());
         self.requests = RequestServer::new();
         self.devices = DeviceWatch::new();

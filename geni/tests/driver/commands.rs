@@ -77,6 +77,7 @@ fn a_reply_comes_from_whom_it_was_asked() {
         function: 0x40,
         subfunction: 0x51,
         broadcast: false,
+        arrived_ms: None,
         data: Data::from_slice(&[9, 8, 7]).expect("short"),
     };
     assert_eq!(events, [Event::Replied(Ok(reply))]);

@@ -151,7 +151,10 @@ fn apply(world: &mut World, noise: &Noise) {
         Noise::Answer { len } => {
             let _ = world.driver.answer_request(RequestAnswer::Data(&[0; 200][..len]));
         }
-        Noise::Interrupt => world.driver.interrupt(),
+        Noise::Interrupt => {
+            let now_ms = world.now_ms;
+            world.driver.interrupt(now_ms);
+        }
         Noise::Pause { ms } => world.pace_ms = ms.into(),
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! Offsets are written out here as the manual has them, so that a slip in the crate's map cannot hide.
 
+mod arrivals;
 mod board;
 mod commands;
 mod failures;

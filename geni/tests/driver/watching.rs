@@ -129,7 +129,7 @@ fn a_pulse_on_the_interrupt_line_makes_flags_count_at_once() {
     // ... and at once with one.
     world.run(1);
     world.board().flag(3);
-    world.driver.interrupt();
+    world.driver.interrupt(world.now_ms);
     world.step();
     assert_eq!(world.peek(0x08A5), 0);
 }

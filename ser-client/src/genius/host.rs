@@ -27,9 +27,9 @@ pub(super) const PACE: Duration = Duration::from_millis(1);
 /// What happens in one look is dealt with, up to so many events; more wait for the next.
 const EVENTS_PER_LOOK: usize = 16;
 
-/// From the host's turn on the bus to the recorder: about so long takes a set-clock datagram itself, with what the
-/// boards at both ends need to hand it over. Measured with the models of them.
-const HANDOVER: Duration = Duration::from_millis(3);
+/// About so long takes a set-clock datagram itself, with what the host's board needs to take it
+/// over. The recorder's board raises its flag at once. Measured with the models of both.
+const HANDOVER: Duration = Duration::from_millis(2);
 
 /// A board has its heartbeat five times a second. One that runs in the time of a busy computer gets longer.
 const HEARTBEAT_PATIENCE: Duration = Duration::from_secs(3);

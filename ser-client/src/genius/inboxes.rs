@@ -64,7 +64,7 @@ mod tests {
 
     fn received(source: u8, broadcast: bool, subfunction: u8, data: u8) -> Received {
         let data = geni::Data::from_slice(&[data]).unwrap();
-        Received { source, function: FUNCTION_HORNER, subfunction, broadcast, data }
+        Received { source, function: FUNCTION_HORNER, subfunction, broadcast, arrived_ms: None, data }
     }
 
     #[test]

@@ -21,6 +21,7 @@ mod status;
 mod violations;
 
 pub use options::{BoardOptions, Timing};
+pub use receive_queue::Read;
 pub use start_up::{Led, Leds};
 pub use violations::{Violation, ViolationKind};
 
@@ -51,6 +52,8 @@ pub struct Board {
     interrupts: InterruptPin,
     violations: Violations,
     faults: BoardFaults,
+    /// Datagrams that the host has read.
+    reads: u64,
     /// Everything that a reset forgets.
     live: Live,
 }
@@ -78,6 +81,7 @@ impl Board {
             interrupts: InterruptPin::default(),
             violations: Violations::default(),
             faults: BoardFaults::default(),
+            reads: 0,
             live: Live::new(options.switches),
         };
         board.hold_reset();

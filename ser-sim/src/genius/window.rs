@@ -1,6 +1,7 @@
 //! The shared RAM of a board on a bus, as the driver for the board wants to see it.
 
 use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::rc::Rc;
 
 use geni::{RAM_LEN, SharedRam};
@@ -22,6 +23,11 @@ impl BoardWindow {
         BoardWindow { bus, board }
     }
 
+    /// The board itself, to look at it without being its host.
+    pub fn look<T>(&self, look: impl FnOnce(&Board) -> T) -> T {
+        look(self.bus.borrow().get(self.board))
+    }
+
     /// Drives the reset line.
     pub fn drive_reset(&self, held: bool) {
         let mut bus = self.bus.borrow_mut();
@@ -33,10 +39,10 @@ impl BoardWindow {
         }
     }
 
-    /// Whether the board has pulled the interrupt line since this was last asked.
+    /// When the board has pulled the interrupt line since this was last asked, in microseconds.
     #[must_use]
-    pub fn take_interrupt(&self) -> bool {
-        self.bus.borrow_mut().get_mut(self.board).take_interrupt()
+    pub fn take_interrupts(&self) -> VecDeque<u64> {
+        self.bus.borrow_mut().get_mut(self.board).take_interrupts()
     }
 }
 

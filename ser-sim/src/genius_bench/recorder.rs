@@ -172,10 +172,11 @@ impl<'a> Recorder<'a> {
 
 impl BuiltIn<'_> {
     fn advance_to(&mut self, ms: u64, board: &SharedBoard) {
-        self.native.node.advance_to(ms);
-        if board.lock().take_interrupt() {
-            self.port.interrupt();
+        // Before the node records what came after them.
+        for at_us in board.lock().take_interrupts() {
+            self.native.node.interrupt(&mut self.port, at_us.div_ceil(1000));
         }
+        self.native.node.advance_to(ms);
         self.native.node.serve(&mut self.port);
         let held = self.port.reset_held();
         if held != self.in_reset {

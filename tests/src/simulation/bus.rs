@@ -46,6 +46,9 @@ struct UnitPort {
     tap: BusTap,
     /// Whether its board has started anew without the recorder's doing, so that it was looked at too early.
     restarted: bool,
+    /// Since when datagrams had waited that a board which started anew took with it: the recorder
+    /// waits for them until it finds that out.
+    gone_since_ms: Option<u64>,
 }
 
 /// The host's conversations, over all lives.
@@ -157,7 +160,7 @@ impl BusLife {
             let tap = BusTap::default();
             let options = GeniusOptions { start: RESET, ..GeniusOptions::new(model) };
             let port = GeniusPort::new(TappedWindow::new(window, Rc::clone(&tap)), options);
-            UnitPort { number, port, board, tap, restarted: false }
+            UnitPort { number, port, board, tap, restarted: false, gone_since_ms: None }
         });
         let units = units.collect();
         let (host, window) = connect(HOST);
@@ -190,6 +193,37 @@ impl BusLife {
         self.bus.borrow_mut().advance_to((now_ms - self.begin_ms) * 1000);
     }
 
+    /// Millisecond in which a recorder's main loop can first see what happened in this microsecond
+    /// of the bus.
+    fn ms(&self, bus_us: u64) -> u64 {
+        self.begin_ms + bus_us.div_ceil(1000)
+    }
+
+    /// Hands a recorder the pulses of its board's interrupt line, before it records what came after
+    /// them.
+    pub fn hand_in_pulses(&mut self, index: usize, node: &mut SimNode<'_>, ledger: &mut Ledger) {
+        let pulses = self.units[index].port.window().inner().take_interrupts();
+        for at_us in pulses {
+            let at_ms = self.ms(at_us);
+            node.interrupt(&mut self.units[index].port, at_ms);
+        }
+        ledger.wait_after(self.untaken_since_ms(index));
+    }
+
+    /// Since when the oldest datagram waits that a recorder still has to take from its board. From
+    /// a board that has failed nothing will be taken.
+    fn untaken_since_ms(&mut self, index: usize) -> Option<u64> {
+        let UnitPort { port, board, tap, gone_since_ms, .. } = &mut self.units[index];
+        if !port.is_ready() {
+            *gone_since_ms = None;
+            return None;
+        }
+        let gone_since_ms = *gone_since_ms;
+        let bus = self.bus.borrow();
+        let untaken_us = tap.borrow().untaken_since_us(bus.get(*board));
+        gone_since_ms.or(untaken_us.map(|us| self.ms(us)))
+    }
+
     /// Lets the port of a recorder live, whose node has come to the present.
     pub fn serve(
         &mut self,
@@ -203,7 +237,9 @@ impl BusLife {
         node.serve(port);
         let held = port.reset_held();
         port.window().inner().drive_reset(held);
-        for taken in tap.borrow_mut().drain(..) {
+        let messages = std::mem::take(&mut tap.borrow_mut().messages);
+        for taken in messages {
+            let arrived_ms = self.ms(taken.arrived_us);
             match taken.received {
                 Err(error) => {
                     expected.parse_error(error);
@@ -211,12 +247,13 @@ impl BusLife {
                         ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS);
                     }
                 }
-                Ok(Command::SetClock(time)) => ledger.set_clock(now_ms, time),
-                Ok(Command::SetMode { recording }) => ledger.set_recording(now_ms, recording),
+                Ok(Command::SetClock(time)) => ledger.set_clock(arrived_ms, time),
+                Ok(Command::SetMode { recording }) => ledger.set_recording(arrived_ms, recording),
                 Ok(command) if taken.broadcast => ledger.command_done(&command),
                 Ok(command) => ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS),
             }
         }
+        ledger.wait_after(self.untaken_since_ms(index));
     }
 
     /// Lets the host look at its board and do what it wants to do now.
@@ -272,8 +309,9 @@ impl BusLife {
         trail.note(format_args!("bus: {fault:?}"));
         if let Fault::Inside { device, fault: DeviceFault::Reset } = fault {
             self.host_restarted |= device == self.host.id();
-            for unit in &mut self.units {
-                unit.restarted |= device == unit.board.id();
+            if let Some(index) = self.units.iter().position(|unit| device == unit.board.id()) {
+                self.units[index].restarted = true;
+                self.units[index].gone_since_ms = self.untaken_since_ms(index);
             }
         }
         self.bus.borrow_mut().inject(fault);

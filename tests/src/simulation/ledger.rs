@@ -10,8 +10,8 @@ mod tests;
 use std::collections::{BTreeMap, VecDeque};
 
 use chrono::NaiveDateTime;
-use ser_node::Debounce;
 use ser_node::capture::QUEUE_LEN;
+use ser_node::{Debounce, HELD_BACK_MS};
 use ser_proto::{Command, Configuration, Entry, MAX_SIZE, Reply, TimeStamp};
 
 use super::debounce_model::{Accepted, DebounceModel};
@@ -120,8 +120,13 @@ pub struct Ledger {
     mask: u32,
     hold_ms: u64,
     debounce: DebounceModel,
-    /// Accepted changes that an earlier one may still come before.
+    /// Accepted changes that an earlier one may still come before, or a datagram that has not been
+    /// read.
     waiting: BTreeMap<u64, u32>,
+    /// When the oldest datagram arrived that the recorder has not taken from its board.
+    wait_after_ms: Option<u64>,
+    /// Inputs that have changed beyond the capture queue since the latest change that was accepted.
+    dropped: u32,
     /// Contacts, and inputs as the latest event has them.
     contacts: u32,
     state: u32,
@@ -160,6 +165,8 @@ impl Ledger {
             hold_ms: 0,
             debounce: DebounceModel::new(Debounce::OFF, 0),
             waiting: BTreeMap::new(),
+            wait_after_ms: None,
+            dropped: 0,
             contacts: 0,
             state: 0,
             unrecorded: 0,
@@ -188,6 +195,8 @@ impl Ledger {
         self.hold_ms = debounce.longest_ms().into();
         self.debounce = DebounceModel::new(debounce, self.contacts);
         self.waiting.clear();
+        self.wait_after_ms = None;
+        self.dropped = 0;
         self.state = self.contacts & self.mask;
         self.unrecorded = 0;
         self.clock = vec![(0, time_ms - signed(now_ms))];
@@ -236,8 +245,7 @@ impl Ledger {
             // In effect, and in no event.
             self.contacts ^= changed;
             let changed = changed & self.mask;
-            self.state ^= changed;
-            self.unrecorded ^= changed;
+            self.dropped ^= changed;
             self.debounce.follow(changed);
             self.edges.applied += u64::from(changed.count_ones());
             self.edges.queue_full += u64::from(changed.count_ones());
@@ -251,15 +259,36 @@ impl Ledger {
         self.debounce.settle(now_ms, &mut accepted);
         self.take_accepted(&mut accepted);
         self.accepted = accepted;
-        while let Some(first) =
-            self.waiting.first_entry().filter(|first| first.key() + self.hold_ms <= now_ms)
-        {
+        self.record_until(now_ms);
+    }
+
+    /// Changes after this millisecond wait for a datagram that arrived in it, for as long as a
+    /// recorder holds any back.
+    pub fn wait_after(&mut self, arrived_ms: Option<u64>) {
+        self.wait_after_ms = arrived_ms;
+    }
+
+    /// Records what waits for nothing when the sample of this millisecond has been taken.
+    fn record_until(&mut self, now_ms: u64) {
+        while let Some(first) = self.waiting.first_entry() {
+            let at_ms = *first.key();
+            let waits = self.wait_after_ms.is_some_and(|arrived_ms| at_ms > arrived_ms);
+            if at_ms + self.hold_ms > now_ms || waits && at_ms + HELD_BACK_MS > now_ms {
+                return;
+            }
             let (at_ms, changed) = first.remove_entry();
             self.record(at_ms, changed);
         }
     }
 
     fn take_accepted(&mut self, accepted: &mut Vec<Accepted>) {
+        if let Some(&(_, at_ms)) = accepted.first().filter(|_| self.dropped != 0) {
+            // Its sample shows them.
+            self.record_until(at_ms.saturating_sub(1));
+            let dropped = std::mem::take(&mut self.dropped);
+            self.state ^= dropped;
+            self.unrecorded ^= dropped;
+        }
         for (bit, at_ms) in accepted.drain(..) {
             *self.waiting.entry(at_ms).or_default() |= 1 << bit;
         }
@@ -296,16 +325,17 @@ impl Ledger {
         sizes.fold(self.size, u16::min)
     }
 
-    /// The clock is set in this millisecond; samples after it have the new time.
-    pub fn set_clock(&mut self, now_ms: u64, time: TimeStamp) {
+    /// The clock was set in this millisecond; samples after it have the new time, those excepted
+    /// that have been recorded since.
+    pub fn set_clock(&mut self, at_ms: u64, time: TimeStamp) {
         if let Some(time_ms) = stamp_ms(time) {
-            self.clock.push((now_ms, time_ms - signed(now_ms)));
+            set(&mut self.clock, at_ms, time_ms - signed(at_ms));
         }
     }
 
-    /// Recording starts or stops in this millisecond, behind its sample.
-    pub fn set_recording(&mut self, now_ms: u64, recording: bool) {
-        self.recording.push((now_ms, recording));
+    /// Recording was started or stopped in this millisecond, behind its sample.
+    pub fn set_recording(&mut self, at_ms: u64, recording: bool) {
+        set(&mut self.recording, at_ms, recording);
     }
 
     /// The time that the clock shows.
@@ -547,6 +577,12 @@ impl Ledger {
         let filtered = self.debounce.filtered() + self.filtered_before;
         Edges { filtered, undecided, ..self.edges }
     }
+}
+
+/// Puts a setting where it belongs: those that come by the other port may have been read before it.
+fn set<T>(settings: &mut Vec<(u64, T)>, at_ms: u64, value: T) {
+    let place = settings.partition_point(|&(from_ms, _)| from_ms <= at_ms);
+    settings.insert(place, (at_ms, value));
 }
 
 /// What was set last before the sample of a millisecond was taken.

@@ -9,7 +9,7 @@ use geni::{SharedRam, map};
 use ser_node::Diagnostics;
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{Code, Command, Decoded, FrameDecoder, FrameError, MAX_BODY_LEN, ParseError, Reply};
-use ser_sim::genius::BoardWindow;
+use ser_sim::genius::{Board, BoardWindow, Read};
 
 use super::ledger::Ledger;
 use super::printout::Printout;
@@ -165,10 +165,31 @@ pub struct Taken {
     pub received: Received,
     /// Whether it was meant for all.
     pub broadcast: bool,
+    /// When the board received it, in microseconds of the bus.
+    pub arrived_us: u64,
 }
 
-/// Messages that have been taken and not been looked at.
-pub type BusTap = Rc<RefCell<Vec<Taken>>>;
+/// What is taken through a window.
+#[derive(Debug, Default)]
+pub struct Taking {
+    /// Messages that have been taken and not been looked at.
+    pub messages: Vec<Taken>,
+    /// How many datagrams the board had handed over when one was taken last.
+    handed_over: u64,
+}
+
+impl Taking {
+    /// When the oldest datagram arrived that has not been taken from this board, in microseconds of
+    /// the bus.
+    #[must_use]
+    pub fn untaken_since_us(&self, board: &Board) -> Option<u64> {
+        let in_buffer = board.latest_read().filter(|read| read.number > self.handed_over);
+        in_buffer.map(|read| read.arrived_us).or(board.unread_since_us())
+    }
+}
+
+/// A window's tap: clones are the same.
+pub type BusTap = Rc<RefCell<Taking>>;
 
 /// A board's window that tells what is taken through it.
 pub struct TappedWindow {
@@ -201,12 +222,17 @@ impl SharedRam for TappedWindow {
 
     fn read_bytes(&self, offset: u16, bytes: &mut [u8]) {
         self.inner.read_bytes(offset, bytes);
-        let is_message = offset == map::READ_BUFFER.start
-            && self.inner.read(map::READ_FUNCTION) == FUNCTION_HORNER
-            && self.inner.read(map::READ_SUBFUNCTION) == SUBFUNCTION_SER;
-        if is_message {
+        if offset != map::READ_BUFFER.start {
+            return;
+        }
+        let Some(Read { number, arrived_us }) = self.inner.look(Board::latest_read) else { return };
+        let mut taking = self.tap.borrow_mut();
+        taking.handed_over = number;
+        if self.inner.read(map::READ_FUNCTION) == FUNCTION_HORNER
+            && self.inner.read(map::READ_SUBFUNCTION) == SUBFUNCTION_SER
+        {
             let broadcast = self.inner.read(map::READ_DIRECTED) != 1;
-            self.tap.borrow_mut().push(Taken { received: Command::parse(bytes), broadcast });
+            taking.messages.push(Taken { received: Command::parse(bytes), broadcast, arrived_us });
         }
     }
 }

@@ -1,7 +1,7 @@
 //! One recorder with everything that outlives a power cut: its contacts, its books, what it keeps.
 
 use chrono::{DateTime, NaiveDateTime};
-use ser_node::{Debounce, Rtc};
+use ser_node::{Debounce, HELD_BACK_MS, Rtc};
 use ser_proto::{MAX_SIZE, Model};
 use ser_sim::{LineRate, MemoryStorage, NonVolatile, SimNode, SimNodeOptions, SimRtc};
 
@@ -16,8 +16,9 @@ const NEVER_SET_MS: i64 = 946_684_800_000;
 /// 2026-11-22 10:00.
 const FIRST_DAY_MS: i64 = 1_795_341_600_000;
 
-/// A recorder with debounce holds a change back for so long at most, twice.
-pub const SETTLING_MS: u64 = 2 * 256;
+/// A recorder holds a change back for so long at most, twice: until it is accepted, and until it is
+/// recorded.
+pub const SETTLING_MS: u64 = 2 * (HELD_BACK_MS + 1);
 
 /// A recorder.
 pub struct Unit {

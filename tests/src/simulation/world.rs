@@ -256,6 +256,9 @@ impl World {
         self.trail.set_now(to_ms);
         if let Some(bus) = &mut life.bus {
             bus.advance(to_ms);
+            for (index, (unit, node)) in self.units.iter_mut().zip(&mut life.nodes).enumerate() {
+                bus.hand_in_pulses(index, node, &mut unit.ledger);
+            }
         }
         for (unit, node) in self.units.iter_mut().zip(&mut life.nodes) {
             node.leap_to(to_ms);
@@ -336,6 +339,13 @@ impl World {
         let for_ms = self.chance.spread(1..=2_000);
         self.trail.note(format_args!("main loops held up for {for_ms} ms"));
         self.hours.count(for_ms, life.bus.is_some());
+        if let Some(bus) = &mut life.bus {
+            // Boards and their interrupts go on.
+            bus.advance(self.now_ms + for_ms);
+            for (index, (unit, node)) in self.units.iter_mut().zip(&mut life.nodes).enumerate() {
+                bus.hand_in_pulses(index, node, &mut unit.ledger);
+            }
+        }
         let all_toggle = self.chance.one_in(2);
         for (unit, node) in self.units.iter_mut().zip(&mut life.nodes) {
             if all_toggle {

@@ -1,4 +1,5 @@
-//! A Genius bus in virtual time with the emulated board's GENI and a host's.
+//! A Genius bus in virtual time with the emulated board's GENI, a host's, and those of recorders in
+//! this process.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -6,10 +7,11 @@ use std::rc::Rc;
 use geni::{
     Completion, Configuration, Data, Destination, Driver, Event, Options, Priority, Start, Transmission,
 };
-use ser_proto::Command;
+use ser_node::{GeniusOptions, GeniusPort};
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
-use ser_sim::Lockstep;
+use ser_proto::{Command, FrameEncoder, Model};
 use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusRate, Handle};
+use ser_sim::{Lockstep, Ram, Scenario, SimNode, SimNodeOptions, Step};
 
 /// Device numbers.
 pub const HOST: u8 = 31;
@@ -18,10 +20,34 @@ const RECORDER: u8 = 5;
 /// Reset line at power-up, as short as the board allows.
 const RESET: Start = Start::Reset { hold_ms: 20 };
 
+/// A recorder in this process, with its port.
+pub struct BuiltIn {
+    number: u8,
+    /// The recorder.
+    pub node: SimNode<'static>,
+    /// Its port.
+    pub port: GeniusPort<BoardWindow>,
+}
+
+impl BuiltIn {
+    /// Says something on its RS-232 line.
+    pub fn send_command(&mut self, command: &Command) {
+        self.node.receive(&FrameEncoder::new(command.to_body()).collect::<Vec<u8>>());
+        self.node.take_output();
+    }
+
+    /// Opens or closes contacts, in the sample that the emulated board is about to take.
+    pub fn contact(&mut self, input: u8, on: bool) {
+        self.node.play(&Scenario::from_steps([Step { at_ms: 0, input, on }]));
+    }
+}
+
 /// The bus.
 pub struct Genius {
     bus: Rc<RefCell<Bus>>,
     recorder: Handle<Board>,
+    /// The other recorders.
+    pub others: Vec<BuiltIn>,
     host: Driver<BoardWindow>,
     received: Vec<Data>,
 }
@@ -35,11 +61,28 @@ impl Genius {
         let (recorder, host) = (connect(RECORDER), connect(HOST));
         let window = BoardWindow::new(Rc::clone(&bus), host);
         let host = Driver::new(window, Options { start: RESET, ..Options::new(Configuration::DEFAULT) });
-        Genius { bus, recorder, host, received: Vec::new() }
+        Genius { bus, recorder, others: Vec::new(), host, received: Vec::new() }
     }
 
-    /// The recorder is held at this millisecond: lets the boards and the host live up to it.
+    /// Connects another recorder, of 32 inputs and in this process, at the beginning.
+    pub fn connect(&mut self, number: u8) {
+        let board = self.bus.borrow_mut().connect(Board::powered(BoardOptions::at(number)));
+        let window = BoardWindow::new(Rc::clone(&self.bus), board);
+        // Memory of the test process goes when it does.
+        let node = SimNode::new(SimNodeOptions::new(Model::Ser320), Box::leak(Box::new(Ram::new())));
+        let options = GeniusOptions { start: RESET, ..GeniusOptions::new(Model::Ser320) };
+        self.others.push(BuiltIn { number, node, port: GeniusPort::new(window, options) });
+    }
+
+    /// The recorder is held at this millisecond: lets the boards and the host live up to it, and
+    /// the other recorders up to the one before, whose sample it has taken.
     pub fn advance(&mut self, now_ms: u64, lockstep: &mut Lockstep) {
+        for BuiltIn { node, port, .. } in &mut self.others {
+            node.advance_to(now_ms - 1);
+            node.serve(port);
+            let held = port.reset_held();
+            port.window().drive_reset(held);
+        }
         {
             let mut bus = self.bus.borrow_mut();
             lockstep.tell_geni(bus.get_mut(self.recorder));
@@ -58,10 +101,12 @@ impl Genius {
         self.host.ram_mut().drive_reset(held);
     }
 
-    /// Whether the host knows the recorder and can send it something.
+    /// Whether the host knows all recorders and can send something.
     #[must_use]
     pub fn is_ready(&self) -> bool {
-        self.host.device(RECORDER).is_ok() && self.host.can_transmit()
+        let known = |number| self.host.device(number).is_ok();
+        let others = self.others.iter().all(|other| other.port.is_ready() && known(other.number));
+        known(RECORDER) && others && self.host.can_transmit()
     }
 
     /// Sends the recorder a command. [`is_ready`](Genius::is_ready) has said yes.
@@ -69,8 +114,20 @@ impl Genius {
     /// # Errors
     /// When the host's board does not take it.
     pub fn send(&mut self, command: &Command) -> Result<(), String> {
+        self.send_to(Destination::Device(RECORDER), command)
+    }
+
+    /// The same to all recorders.
+    ///
+    /// # Errors
+    /// When the host's board does not take it.
+    pub fn broadcast(&mut self, command: &Command) -> Result<(), String> {
+        self.send_to(Destination::Broadcast, command)
+    }
+
+    fn send_to(&mut self, destination: Destination, command: &Command) -> Result<(), String> {
         let transmission = Transmission {
-            destination: Destination::Device(RECORDER),
+            destination,
             function: FUNCTION_HORNER,
             subfunction: SUBFUNCTION_SER,
             priority: Priority::Normal,

@@ -123,7 +123,7 @@ impl Board {
     }
 
     fn read_datagram(&mut self) -> u8 {
-        let Some(received) = self.live.received.pop() else { return SYNTAX_ERROR };
+        let Some(received) = self.take_received() else { return SYNTAX_ERROR };
         let Datagram { function, subfunction, data } = received.datagram;
         let len = data.len().min(map::READ_BUFFER_LEN);
         self.ram.write(map::READ_BUFFER, &data[..len]);

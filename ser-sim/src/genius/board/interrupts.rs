@@ -1,5 +1,7 @@
 //! Interrupts to the host (chapter 6).
 
+use std::collections::VecDeque;
+
 use super::Board;
 use crate::genius::map::{INTERRUPT_DISABLE, INTERRUPT_STATUS};
 
@@ -15,16 +17,24 @@ pub(super) enum Condition {
     LockoutGrant = 7,
 }
 
+/// Pulses that are remembered for whoever has not asked for them yet; of more only the latest.
+const REMEMBERED: usize = 64;
+
 /// The pin is low for a few microseconds only: the host's side must remember that.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct InterruptPin {
     pulses: u64,
-    taken: u64,
+    /// When those were that have not been asked for.
+    untaken_us: VecDeque<u64>,
 }
 
 impl InterruptPin {
-    pub(super) fn pulse(&mut self) {
+    pub(super) fn pulse(&mut self, now_us: u64) {
         self.pulses += 1;
+        if self.untaken_us.len() == REMEMBERED {
+            self.untaken_us.pop_front();
+        }
+        self.untaken_us.push_back(now_us);
     }
 }
 
@@ -37,9 +47,12 @@ impl Board {
 
     /// Whether the board has pulled the interrupt line since this was last asked.
     pub fn take_interrupt(&mut self) -> bool {
-        let pending = self.interrupts.pulses > self.interrupts.taken;
-        self.interrupts.taken = self.interrupts.pulses;
-        pending
+        !self.take_interrupts().is_empty()
+    }
+
+    /// When it has, in microseconds.
+    pub fn take_interrupts(&mut self) -> VecDeque<u64> {
+        std::mem::take(&mut self.interrupts.untaken_us)
     }
 
     /// Sets a flag; then, unless the host disabled it, the summary flag, and pulls the line.
@@ -52,7 +65,7 @@ impl Board {
         if self.is_enabled(condition) {
             let summary = self.ram.get(INTERRUPT_STATUS);
             self.ram.set(INTERRUPT_STATUS, summary | 1);
-            self.interrupts.pulse();
+            self.interrupts.pulse(self.now_us);
         }
     }
 

@@ -11,26 +11,54 @@ const LEN: usize = 15;
 
 #[derive(Clone, Debug)]
 pub(super) struct Received {
+    at_us: u64,
     pub(super) from: u8,
     pub(super) broadcast: bool,
     pub(super) datagram: Datagram,
 }
 
-#[derive(Clone, Debug, Default)]
-pub(super) struct ReceiveQueue(VecDeque<Received>);
+/// The datagram in the read buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Read {
+    /// How many datagrams have been read from the board, this one included.
+    pub number: u64,
+    /// When the board received it, in microseconds.
+    pub arrived_us: u64,
+}
 
-impl ReceiveQueue {
-    pub(super) fn pop(&mut self) -> Option<Received> {
-        self.0.pop_front()
-    }
+#[derive(Clone, Debug, Default)]
+pub(super) struct ReceiveQueue {
+    waiting: VecDeque<Received>,
+    read: Option<Read>,
 }
 
 impl Board {
     /// Neither sender nor host learns of a datagram that finds the queue full.
     pub(super) fn queue_received(&mut self, from: u8, broadcast: bool, datagram: Datagram) {
-        if self.live.received.0.len() < LEN {
-            self.live.received.0.push_back(Received { from, broadcast, datagram });
+        if self.live.received.waiting.len() < LEN {
+            let at_us = self.now_us;
+            self.live.received.waiting.push_back(Received { at_us, from, broadcast, datagram });
             self.raise(Condition::ReceiveQueue);
         }
+    }
+
+    /// The oldest datagram goes into the read buffer.
+    pub(super) fn take_received(&mut self) -> Option<Received> {
+        let received = self.live.received.waiting.pop_front()?;
+        self.reads += 1;
+        self.live.received.read = Some(Read { number: self.reads, arrived_us: received.at_us });
+        Some(received)
+    }
+
+    /// The datagram that was read last, since the board was reset.
+    #[must_use]
+    pub fn latest_read(&self) -> Option<Read> {
+        self.live.received.read
+    }
+
+    /// When the oldest datagram arrived that has not been read, in microseconds.
+    #[must_use]
+    pub fn unread_since_us(&self) -> Option<u64> {
+        self.live.received.waiting.front().map(|received| received.at_us)
     }
 }

@@ -155,7 +155,7 @@ impl Board {
         match stage {
             Stage::Released => {
                 reach(Stage::Interrupted);
-                self.interrupts.pulse();
+                self.interrupts.pulse(self.now_us);
             }
             Stage::Interrupted => {
                 reach(Stage::SecondPattern);

@@ -154,7 +154,11 @@ impl Bench {
             }
             Event::Failed(_) => assert!(!self.driver.is_ready()),
             Event::Device { number, .. } => assert!(*number < map::DEVICE_COUNT),
-            Event::Received(received) => assert!(received.source < map::DEVICE_COUNT),
+            Event::Received(received) => {
+                assert!(received.source < map::DEVICE_COUNT);
+                let age_ms = received.arrived_ms.map(|arrived_ms| self.now_ms.wrapping_sub(arrived_ms));
+                assert!(age_ms < Some(u32::MAX / 2), "arrived {age_ms:?} ms ago");
+            }
             _ => {}
         }
     }

@@ -84,7 +84,7 @@ fn act(bench: &mut Bench, script: &mut Script<'_>) {
         }
         11 => bench.configure(configuration(script)),
         12 => answer(bench, script),
-        13 => bench.driver.interrupt(),
+        13 => bench.driver.interrupt(bench.now_ms),
         14 => bench.pass(u32::from(script.word() % 4096)),
         _ => {
             for _ in 0..script.byte() {

@@ -182,7 +182,10 @@ impl Recorder {
         match Command::parse(body) {
             Ok(command) => {
                 // What only asks one recorder for something has no effect.
-                if matches!(command, Command::Configure(_) | Command::Erase | Command::SetMode { .. }) {
+                if matches!(
+                    command,
+                    Command::Configure(_) | Command::Erase | Command::SetMode { .. } | Command::SetClock(_)
+                ) {
                     self.command(&command, tick_ms, 0);
                 }
                 Some(command)
@@ -197,6 +200,12 @@ impl Recorder {
     /// The time now, in milliseconds since 1970.
     pub(super) fn now_ms(&self, tick_ms: u64) -> i64 {
         within_century(self.offset_ms.latest(), tick_ms)
+    }
+
+    /// The battery-backed clock is set to the time of this millisecond.
+    pub(super) fn set_battery_clock(&mut self, tick_ms: u64) {
+        self.rtc =
+            DateTime::from_timestamp_millis(self.now_ms(tick_ms)).expect("within the century").naive_utc();
     }
 
     /// Whether an entry is not in the ring any more.

@@ -1,0 +1,214 @@
+//! When datagrams arrived, which is often long before they can be read: the command block has one
+//! command at a time, and a datagram that is being sent waits for its place in the scan.
+//!
+//! What a host can see of an arrival is the Receive-Queue flag, and the pulse of the interrupt
+//! line. A *notice* is the tick at which one of them was seen. The board's queue hands datagrams
+//! out in the order in which they came, so the oldest notice belongs to the next datagram. Where
+//! the two do not match:
+//!
+//! - **Two datagrams, one flag**: both came between two looks. The one that finds no notice left
+//!   has that of the one before it. When notices of later datagrams are there by then, it takes the
+//!   first of those, and the last of them finds none left. With the interrupt line each datagram
+//!   has a pulse of its own.
+//! - **A flag, and the datagram is gone**: once the board says that its queue is empty, all notices
+//!   are void that were there when it was asked.
+//! - **A datagram, and nobody saw a flag**: it came before the board was looked at, or its flag was
+//!   lost. Nobody knows when it arrived, and it is handed out so.
+//! - **The board has failed**: its queue goes with it, and so do the notices.
+
+use heapless::Deque;
+
+use crate::elapsed::elapsed_ms;
+
+/// Notices that may wait: the board's queue holds 15 datagrams, and one more may be in the read
+/// buffer. Of more notices than these the oldest have no datagram any more.
+const MAX_NOTICES: usize = 16;
+
+/// Notices of datagrams that have not been read.
+#[derive(Debug)]
+pub(super) struct Arrivals {
+    notices: Deque<u32, MAX_NOTICES>,
+    /// How many of them were there when the latest Read Datagram was started.
+    before_read: usize,
+    /// Pulses of the interrupt line since the board was last looked at.
+    pulses: Deque<u32, MAX_NOTICES>,
+    /// The flag was seen at this tick before its pulse was handed in.
+    awaits_pulse: Option<u32>,
+    /// When the datagram arrived that was read last, for as long as there may be others that came
+    /// with it.
+    latest: Option<u32>,
+}
+
+impl Arrivals {
+    pub(super) const fn new() -> Arrivals {
+        Arrivals {
+            notices: Deque::new(),
+            before_read: 0,
+            pulses: Deque::new(),
+            awaits_pulse: None,
+            latest: None,
+        }
+    }
+
+    /// The line was pulsed at this tick, for a datagram and nothing else.
+    pub(super) fn pulsed(&mut self, tick_ms: u32) {
+        // A flag that was seen a moment before its pulse has its notice already.
+        if self.awaits_pulse.take().is_some_and(|seen_ms| elapsed_ms(tick_ms, seen_ms) <= 1) {
+            return;
+        }
+        // The board takes no more datagrams than these between two looks.
+        let _ = self.pulses.push_back(tick_ms);
+    }
+
+    /// The Receive-Queue flag was looked at, and cleared if it was set.
+    pub(super) fn looked(&mut self, is_set: bool, now_ms: u32) {
+        if !is_set {
+            // A pulse without a flag says nothing: the flag has been seen before, or it is the one
+            // after a reset.
+            self.pulses.clear();
+            return;
+        }
+        if self.pulses.is_empty() {
+            self.awaits_pulse = Some(now_ms);
+            self.notice(now_ms);
+        }
+        while let Some(tick_ms) = self.pulses.pop_front() {
+            self.notice(tick_ms);
+        }
+    }
+
+    fn notice(&mut self, tick_ms: u32) {
+        if self.notices.is_full() {
+            self.notices.pop_front();
+            self.before_read = self.before_read.saturating_sub(1);
+        }
+        let _ = self.notices.push_back(tick_ms);
+    }
+
+    /// A Read Datagram is started.
+    pub(super) fn read_started(&mut self) {
+        self.before_read = self.notices.len();
+    }
+
+    /// It has brought a datagram. Gives when that arrived, if anybody knows. The flag must have
+    /// been looked at since: it may have come while the command was carried out.
+    pub(super) fn read(&mut self) -> Option<u32> {
+        self.latest = self.notices.pop_front().or(self.latest);
+        self.latest
+    }
+
+    /// It has found the queue empty.
+    pub(super) fn found_empty(&mut self) {
+        for _ in 0..self.before_read {
+            self.notices.pop_front();
+        }
+        self.before_read = 0;
+        self.latest = None;
+    }
+
+    /// When the oldest datagram arrived that is known to wait.
+    pub(super) fn oldest(&self) -> Option<u32> {
+        self.notices.front().or(self.pulses.front()).copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Looks that find the flag set.
+    fn seen(ticks_ms: impl IntoIterator<Item = u32>) -> Arrivals {
+        let mut arrivals = Arrivals::new();
+        ticks_ms.into_iter().for_each(|tick_ms| arrivals.looked(true, tick_ms));
+        arrivals
+    }
+
+    fn read_all(arrivals: &mut Arrivals, count: usize) -> Vec<Option<u32>> {
+        (0..count)
+            .map(|_| {
+                arrivals.read_started();
+                arrivals.read()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn each_datagram_has_the_tick_of_its_flag_however_late_it_is_read() {
+        let mut arrivals = seen([10, 13, 900]);
+        assert_eq!(arrivals.oldest(), Some(10));
+        assert_eq!(read_all(&mut arrivals, 3), [Some(10), Some(13), Some(900)]);
+        assert_eq!(arrivals.oldest(), None);
+    }
+
+    #[test]
+    fn two_datagrams_with_one_flag_have_its_tick_both() {
+        let mut arrivals = seen([10]);
+        assert_eq!(read_all(&mut arrivals, 2), [Some(10), Some(10)]);
+        // The board says that there is no more; what is read then came unseen.
+        arrivals.read_started();
+        arrivals.found_empty();
+        assert_eq!(read_all(&mut arrivals, 1), [None]);
+    }
+
+    #[test]
+    fn a_flag_whose_datagram_is_gone_is_not_taken_for_the_next_one() {
+        let mut arrivals = seen([10]);
+        arrivals.read_started();
+        // Meanwhile another one arrives, and the answer to the reading is of before.
+        arrivals.looked(true, 20);
+        arrivals.found_empty();
+        assert_eq!(read_all(&mut arrivals, 1), [Some(20)]);
+    }
+
+    #[test]
+    fn more_flags_than_the_board_can_have_datagrams_for_leave_the_latest() {
+        let mut arrivals = seen(1..=20);
+        assert_eq!(read_all(&mut arrivals, 1), [Some(5)]);
+        arrivals.read_started();
+        (21..=40).for_each(|tick_ms| arrivals.looked(true, tick_ms));
+        // None of those that were there is left.
+        arrivals.found_empty();
+        assert_eq!(read_all(&mut arrivals, 1), [Some(25)]);
+    }
+
+    #[test]
+    fn with_the_interrupt_line_two_datagrams_between_two_looks_have_their_own_ticks() {
+        let mut arrivals = Arrivals::new();
+        arrivals.pulsed(103);
+        arrivals.pulsed(407);
+        assert_eq!(arrivals.oldest(), Some(103));
+        arrivals.looked(true, 500);
+        assert_eq!(read_all(&mut arrivals, 2), [Some(103), Some(407)]);
+    }
+
+    #[test]
+    fn a_pulse_that_is_handed_in_after_its_flag_was_seen_counts_once() {
+        let mut arrivals = seen([100]);
+        arrivals.pulsed(100);
+        arrivals.pulsed(103);
+        arrivals.looked(true, 104);
+        assert_eq!(read_all(&mut arrivals, 2), [Some(100), Some(103)]);
+        // One that comes much later is that of another datagram.
+        arrivals.looked(true, 200);
+        arrivals.pulsed(203);
+        arrivals.looked(true, 204);
+        assert_eq!(read_all(&mut arrivals, 2), [Some(200), Some(203)]);
+    }
+
+    #[test]
+    fn a_pulse_without_a_flag_is_no_datagram() {
+        let mut arrivals = Arrivals::new();
+        arrivals.pulsed(50);
+        arrivals.looked(false, 50);
+        assert_eq!(arrivals.oldest(), None);
+        arrivals.looked(true, 90);
+        assert_eq!(read_all(&mut arrivals, 1), [Some(90)]);
+    }
+
+    #[test]
+    fn ticks_may_wrap() {
+        let mut arrivals = seen([u32::MAX]);
+        arrivals.pulsed(0);
+        assert_eq!(read_all(&mut arrivals, 2), [Some(u32::MAX), Some(u32::MAX)]);
+    }
+}

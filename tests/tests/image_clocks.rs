@@ -1,0 +1,171 @@
+//! One broadcast sets the clocks of the ARM image and of two recorders in this process, all on one
+//! bus and reporting all the time. In virtual time: the same in every run and on every machine.
+#![cfg(target_os = "linux")]
+
+use ser_proto::{
+    AutoReport, Command, Configure, Decoded, Entry, FrameDecoder, Inputs, MAX_BODY_LEN, Reply, TimeStamp,
+};
+use ser_tests::recorder::image;
+use ser_tests::timing::bench::{Bench, Parts, Setup};
+use ser_tests::timing::genius::{Genius, HOST};
+use ser_tests::timing::program::Program;
+
+/// Where the emulator's plugin is: set by `cargo xtask test`, which builds it.
+const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";
+
+const ROUNDS: u8 = 20;
+
+const CLOCKS_AGREE_WITHIN_MS: i64 = 1;
+
+/// The GENI boards have started by then, and the host knows the recorders.
+const START_LIMIT_MS: u64 = 30_000;
+
+/// All three have carried a broadcast out by then.
+const CARRIED_OUT_MS: u64 = 250;
+
+/// A reply has come over the line by then.
+const REPLY_LIMIT_MS: u64 = 2_000;
+
+/// Toggles all the time, so that every recorder has a report to send whenever it may.
+const BUSY: u8 = 1;
+const PERIOD_MS: u64 = 5;
+
+/// Moves at all recorders in the same sample; its stamps are compared.
+const COMMON: u8 = 2;
+
+const REPORT: Configure = Configure {
+    size: None,
+    baud: None,
+    auto_report: AutoReport::Genius,
+    report_address: HOST,
+    auto_print: false,
+};
+
+struct Plant<'p> {
+    bench: Bench<'p>,
+    frames: FrameDecoder<MAX_BODY_LEN>,
+    common_on: bool,
+}
+
+impl<'p> Plant<'p> {
+    fn start(parts: &Parts, program: &'p Program) -> Plant<'p> {
+        let bench = Bench::start(parts, program, Setup { debounce_ms: 0, genius: true }).unwrap();
+        let mut plant = Plant { bench, frames: FrameDecoder::new(), common_on: false };
+        for number in [1, 9] {
+            plant.genius().connect(number);
+        }
+        while !plant.genius().is_ready() {
+            assert!(plant.bench.now_ms() < START_LIMIT_MS, "not everybody is on the bus");
+            plant.bench.pass_ms().unwrap();
+        }
+        let configured = plant.ask(&Command::Configure(REPORT));
+        assert!(matches!(configured, Reply::Configuration(_)), "{configured:?}");
+        let others = &mut plant.genius().others;
+        others.iter_mut().for_each(|other| other.send_command(&Command::Configure(REPORT)));
+        plant.run(1_000, true);
+        plant
+    }
+
+    fn genius(&mut self) -> &mut Genius {
+        self.bench.genius.as_mut().expect("there is a bus")
+    }
+
+    /// Moves a contact at all recorders.
+    fn toggle(&mut self, input: u8, on: bool) {
+        self.bench.toggle(1 << (input - 1));
+        self.genius().others.iter_mut().for_each(|other| other.contact(input, on));
+    }
+
+    fn run(&mut self, ms: u64, busy: bool) {
+        for _ in 0..ms {
+            self.bench.pass_ms().unwrap();
+            let now_ms = self.bench.now_ms();
+            if busy && now_ms.is_multiple_of(PERIOD_MS) {
+                self.toggle(BUSY, now_ms.is_multiple_of(2 * PERIOD_MS));
+            }
+        }
+    }
+
+    /// Asks the image over its line.
+    fn ask(&mut self, command: &Command) -> Reply {
+        self.bench.send_command(command);
+        for _ in 0..REPLY_LIMIT_MS {
+            self.bench.pass_ms().unwrap();
+            for byte in self.bench.take_sent() {
+                if let Some(Decoded::Frame(body)) = self.frames.push(byte) {
+                    return Reply::parse(body).expect("a reply");
+                }
+            }
+        }
+        panic!("no reply to {command:?}");
+    }
+
+    fn erase_logs(&mut self) {
+        assert_eq!(self.ask(&Command::Erase), Reply::Erased);
+        let others = &mut self.genius().others;
+        others.iter_mut().for_each(|other| other.send_command(&Command::Erase));
+    }
+
+    /// What the recorders stamp the latest move of the common contact with, the image first.
+    fn stamps_ms(&mut self) -> Vec<i64> {
+        let Reply::Read(head) = self.ask(&Command::Read { start: 1, count: 1 }) else { panic!("no log") };
+        let mut image = Vec::new();
+        for start in (1..=head.total).step_by(10) {
+            let Reply::Read(reply) = self.ask(&Command::Read { start, count: 10 }) else { panic!("no log") };
+            image.extend(reply.entries);
+        }
+        let stamp = |log: Vec<Entry>| {
+            let moved = |changed: Inputs| changed.contains(COMMON);
+            milliseconds(log.into_iter().rfind(|entry| moved(entry.changed)).expect("it is recorded").time)
+        };
+        let others = self.genius().others.iter().map(|other| other.node.log().1).collect::<Vec<_>>();
+        [image].into_iter().chain(others).map(stamp).collect()
+    }
+}
+
+fn milliseconds(time: TimeStamp) -> i64 {
+    ((i64::from(time.hour) * 60 + i64::from(time.minute)) * 60 + i64::from(time.second)) * 1000
+        + i64::from(time.millisecond)
+}
+
+#[test]
+#[ignore = "needs the emulator and the image: cargo xtask test"]
+fn one_broadcast_sets_the_image_and_two_recorders_that_report_all_the_time() {
+    let plugin = std::env::var_os(PLUGIN_VARIABLE);
+    let plugin = plugin.unwrap_or_else(|| panic!("{PLUGIN_VARIABLE} is not set: run `cargo xtask test`"));
+    let parts = Parts { image: image(), plugin: plugin.into() };
+    let program = Program::read(&parts.image).unwrap_or_else(|error| panic!("{error}"));
+    let mut plant = Plant::start(&parts, &program);
+    let mut all = Vec::new();
+    for round in 0..ROUNDS {
+        plant.erase_logs();
+        // At another phase of the scan each time, while everybody is about to report.
+        plant.run(60 + 7 * u64::from(round), true);
+        while !plant.genius().is_ready() {
+            plant.run(1, true);
+        }
+        let time = TimeStamp {
+            year: 26,
+            month: 11,
+            day: 22,
+            hour: round,
+            minute: 59 - round,
+            second: 3 * (round % 20),
+            millisecond: 41 * u16::from(round),
+        };
+        plant.genius().broadcast(&Command::SetClock(time)).unwrap();
+        plant.run(CARRIED_OUT_MS, true);
+        plant.common_on ^= true;
+        plant.toggle(COMMON, plant.common_on);
+        plant.run(5, false);
+        let stamps = plant.stamps_ms();
+        let spread = stamps.iter().max().expect("three") - stamps.iter().min().expect("three");
+        assert!(spread <= CLOCKS_AGREE_WITHIN_MS, "round {round}, set to {time}: {stamps:?}");
+        let since_ms = stamps[0] - milliseconds(time);
+        assert!((0..1_000).contains(&since_ms), "round {round}: {since_ms} ms after {time}");
+        all.push(stamps.iter().map(|stamp| stamp - stamps[0]).collect::<Vec<_>>());
+    }
+    println!("stamps against those of the image: {all:?}");
+    plant.genius().check().unwrap();
+    assert!(plant.genius().others.iter().all(|other| other.port.diagnostics().reports_sent > 50));
+}
