@@ -62,16 +62,28 @@ fn days_without_a_bus() {
     // There was something to be accounted for.
     let tally = sum(&reports, 0);
     assert!(
-        tally.delivered > 1000 && tally.overwritten > 0 && tally.gone > 0 && tally.restarts > 0,
+        tally.delivered > 1000
+            && tally.overwritten > 0
+            && tally.gone > 0
+            && tally.restarts > 0
+            && tally.unrecorded > 0,
         "{tally:?}"
     );
     let edges = || reports.iter().flat_map(|report| &report.edges);
     assert!(edges().any(|edges| edges.filtered > 0) && edges().any(|edges| edges.stopped > 0));
 }
 
+/// With the days and the minutes on a bus a hundred different beginnings.
+#[test]
+fn many_beginnings_without_a_bus() {
+    for seed in 201..=284 {
+        assert_accounted(&lived(seed, 6 * MINUTE_MS, NO_BUS));
+    }
+}
+
 #[test]
 fn minutes_on_a_bus() {
-    let reports: Vec<Report> = (101..=106).map(|seed| lived(seed, 4 * MINUTE_MS, 1)).collect();
+    let reports: Vec<Report> = (101..=110).map(|seed| lived(seed, 6 * MINUTE_MS, 1)).collect();
     for report in &reports {
         assert_accounted(report);
         assert_eq!(report.hours.bus_ms, report.hours.total_ms);

@@ -57,6 +57,7 @@ pub struct Conversation {
     cursor: Option<Cursor>,
     position: Option<LogPosition>,
     size: u16,
+    may_keep_up: bool,
     account: Account,
     /// The settings in force, by the latest answer, until somebody asks.
     in_force: Option<Configuration>,
@@ -90,6 +91,7 @@ impl Conversation {
             cursor: None,
             position: None,
             size: 2048,
+            may_keep_up: false,
             account: Account::new(name),
             in_force: None,
             failures: 0,
@@ -104,6 +106,11 @@ impl Conversation {
     #[must_use]
     pub fn one_at_a_time(self) -> Conversation {
         Conversation { session: self.session.one_at_a_time(), ..self }
+    }
+
+    /// From now on every other reading goes on for as long as there is enough for a full reply, which may be for ever.
+    pub fn keep_up(&mut self) {
+        self.may_keep_up = true;
     }
 
     /// The session, where the line changes.
@@ -209,8 +216,7 @@ impl Conversation {
 
     fn begin_reading(&mut self, resyncs: u32, now_ms: u64) {
         self.account.begin_reading();
-        // Every other reading goes on for as long as events come too fast for it.
-        let keeps_up = self.talk.readings % 2 == 1;
+        let keeps_up = self.may_keep_up && self.talk.readings % 2 == 1;
         let mut reader = LogReader::new(self.cursor, self.size).keeping_up(keeps_up);
         if let Some(position) = self.position.take() {
             reader = reader.starting_near(position);

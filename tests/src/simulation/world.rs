@@ -97,6 +97,7 @@ impl World {
     pub fn run(mut self) -> Result<(Report, Paces), String> {
         let mut off: Vec<PoweredOff> =
             self.units.iter().map(|unit| PoweredOff::new(unit.options())).collect();
+        self.line.talk.keep_up();
         while self.now_ms < self.options.duration_ms {
             let mut rams: Vec<Ram> = self.units.iter().map(|_| Ram::new()).collect();
             let (began, before) = (Instant::now(), self.hours);
