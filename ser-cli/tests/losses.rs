@@ -4,10 +4,18 @@
 mod common;
 
 use std::fs;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Command, Output};
+use std::thread;
 
 use common::bench::{Bench, text};
+use common::ser_cli;
+use ser_proto::{
+    Configuration, Decoded, Entry, FrameDecoder, FrameEncoder, Inputs, MAX_BODY_LEN, Model, ReadReply, Reply,
+    TimeStamp,
+};
 use ser_tests::recorder::Kind;
 
 /// Six columns and a note.
@@ -136,4 +144,89 @@ fn a_file_that_ends_in_a_row_gets_a_line_end_first() {
     let rows: Vec<_> = csv.lines().collect();
     assert_eq!((rows.len(), rows[1]), (3, "1,2026-11-2"), "{csv}");
     assert!(rows[2].starts_with("1,") && rows[2].ends_with(",5,1,1,0,"), "{csv}");
+}
+
+/// A unit whose log holds these entries, on TCP; gives its port.
+fn unit_with(entries: Vec<Entry>) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = format!("tcp://{}", listener.local_addr().expect("an address"));
+    thread::spawn(move || {
+        while let Ok((client, _)) = listener.accept() {
+            answer(client, &entries);
+        }
+    });
+    port
+}
+
+/// Answers what is asked until the client goes.
+fn answer(mut client: TcpStream, entries: &[Entry]) {
+    let mut decoder = FrameDecoder::<MAX_BODY_LEN>::new();
+    let mut bytes = [0; 256];
+    while let Ok(count @ 1..) = client.read(&mut bytes) {
+        for &byte in &bytes[..count] {
+            let Some(Decoded::Frame(body)) = decoder.push(byte) else { continue };
+            let reply = match *body {
+                [b'C'] => Reply::Configuration(Configuration::default()),
+                [b'R', high, low, count] => {
+                    Reply::Read(read(entries, u16::from_be_bytes([high, low]), count))
+                }
+                _ => continue,
+            };
+            let frame: Vec<u8> = FrameEncoder::new(reply.to_body()).collect();
+            client.write_all(&frame).expect("the client reads");
+        }
+    }
+}
+
+fn read(entries: &[Entry], start: u16, count: u8) -> ReadReply {
+    let held = u16::try_from(entries.len()).expect("a few");
+    let asked_for = entries.iter().skip(usize::from(start) - 1).take(count.into()).copied();
+    let entries: heapless::Vec<Entry, 10> = asked_for.collect();
+    let model = (!entries.is_empty()).then_some(Model::Ser160);
+    ReadReply { start, total: held, next_slot: held, model, entries }
+}
+
+#[test]
+fn entries_that_cannot_be_are_delivered_and_marked_and_harm_no_others() {
+    let time = TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 7 };
+    let at = |time: TimeStamp, on: bool| Entry { changed: Inputs(1), state: Inputs(on.into()), time };
+    let mut entries = vec![
+        at(time, true),
+        at(TimeStamp { month: 13, ..time }, false),
+        at(TimeStamp { millisecond: 1000, ..time }, true),
+        Entry { changed: Inputs(0), state: Inputs(1), time },
+        at(TimeStamp { day: 31, ..time }, false),
+        at(TimeStamp { year: 200, ..time }, true),
+    ];
+    entries.push(at(TimeStamp { millisecond: 8, ..time }, false));
+    let port = unit_with(entries);
+    let read = |format: &str| {
+        let mut command = ser_cli();
+        command.args(["read", "--format", format, "--timeout", "20s", "--port", &port]);
+        command.output().expect("ser-cli runs")
+    };
+    let csv = read("csv");
+    assert_eq!(csv.status.code(), Some(0), "{}", text(&csv.stderr));
+    assert_eq!(
+        text(&csv.stdout).lines().skip(1).collect::<Vec<_>>(),
+        [
+            "1,2026-11-22T10:00:00.007,1,1,1,0,",
+            "2,2026-13-22T10:00:00.007,1,0,2,0,there is no month 13 in such a date",
+            "3,2026-11-22T10:00:00.1000,1,1,3,0,there is no millisecond 1000 in such a date",
+            "4,2026-11-22T10:00:00.007,,,4,0,\"no input changed, on: 1\"",
+            "5,2026-11-31T10:00:00.007,1,0,5,0,there is no day 31 in such a date",
+            "6,2100-11-22T10:00:00.007,1,1,6,0,there is no year 200 in such a date",
+            "7,2026-11-22T10:00:00.008,1,0,7,0,",
+        ]
+    );
+    let told = text(&csv.stderr);
+    let warnings: Vec<_> = told.lines().filter(|line| line.starts_with("warning: ")).collect();
+    assert_eq!(warnings.len(), 4, "{told}");
+    assert!(warnings[0].contains("entry 2") && warnings[3].contains("2 more entries"), "{told}");
+
+    let jsonl = text(&read("jsonl").stdout);
+    assert_eq!((jsonl.lines().count(), jsonl.matches("\"note\":").count()), (7, 5), "{jsonl}");
+    let table = text(&read("table").stdout);
+    let marked = table.lines().filter(|line| line.ends_with(')')).count();
+    assert_eq!((table.lines().count(), marked), (1 + 7, 5), "{table}");
 }

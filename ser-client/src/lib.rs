@@ -34,7 +34,7 @@ mod text_line;
 mod transport;
 mod unit;
 mod unsolicited;
-mod watcher;
+pub mod watcher;
 
 pub use clock::{Clock, RealTime};
 pub use counters::Counters;
