@@ -6,35 +6,35 @@ use std::fmt::Display;
 use ser_client::Delivery;
 
 use crate::error::{Failure, Result, warn};
-use crate::output::{self, Annotator, EventWriter, Format, Life, Record};
+use crate::output::{self, Annotator, Before, EventWriter, Format, Life, Loss, Record};
 use crate::progress::Progress;
 
-/// Entries that cannot be and are told of one by one; more are only counted.
-const ODD_TOLD: u32 = 3;
+/// Gaps, and entries that are not valid, that are told of one by one; more are only counted.
+const TOLD: u32 = 3;
 
 /// Writes what a reading brings.
 pub(crate) struct Outlet {
     writer: Box<dyn EventWriter>,
     annotator: Annotator,
     progress: Progress,
-    losses: u32,
-    odd: u32,
+    gaps: u32,
+    not_valid: u32,
 }
 
 impl Outlet {
     /// On standard output, with a bar if the download is long; for a log of this life.
-    pub(crate) fn new(format: Format, life: Life) -> Outlet {
-        Outlet::with_progress(format, life, Progress::new())
+    pub(crate) fn new(format: Format, life: Life, before: Before) -> Outlet {
+        Outlet::with_progress(format, life, before, Progress::new())
     }
 
     /// On standard output, without a bar: there is no end to wait for.
-    pub(crate) fn endless(format: Format, life: Life) -> Outlet {
-        Outlet::with_progress(format, life, Progress::none())
+    pub(crate) fn endless(format: Format, life: Life, before: Before) -> Outlet {
+        Outlet::with_progress(format, life, before, Progress::none())
     }
 
-    fn with_progress(format: Format, life: Life, progress: Progress) -> Outlet {
-        let (writer, annotator) = (output::to_stdout(format), Annotator::new(life));
-        Outlet { writer, annotator, progress, losses: 0, odd: 0 }
+    fn with_progress(format: Format, life: Life, before: Before, progress: Progress) -> Outlet {
+        let (writer, annotator) = (output::to_stdout(format), Annotator::new(life, before));
+        Outlet { writer, annotator, progress, gaps: 0, not_valid: 0 }
     }
 
     /// The life of the log that is being read.
@@ -42,35 +42,48 @@ impl Outlet {
         self.annotator.life()
     }
 
-    /// Writes deliveries and passes them on; `pending` more events are about to come.
-    pub(crate) fn take(&mut self, deliveries: &[Delivery], pending: u32) -> Result<()> {
+    /// Writes deliveries and passes them on; `pending` more events are about to come. Before anything is passed on,
+    /// `remember` gets the life of the log.
+    pub(crate) fn take(
+        &mut self,
+        deliveries: &[Delivery],
+        pending: u32,
+        remember: &mut dyn FnMut(Life) -> Result<()>,
+    ) -> Result<()> {
         self.progress.advance(deliveries, pending);
-        let Outlet { writer, annotator, progress, losses, odd } = self;
+        let Outlet { writer, annotator, progress, gaps, not_valid } = self;
         progress.around(|| {
             for (position, delivery) in deliveries.iter().enumerate() {
-                match annotator.write(delivery, writer.as_mut())? {
-                    Record::Event(event) if event.is_odd() => {
-                        *odd += 1;
-                        if *odd <= ODD_TOLD {
-                            let why = event.note().unwrap_or_default();
-                            warn(format_args!("entry {} cannot be as it was read: {why}", event.number));
+                for record in annotator.write(delivery, writer.as_mut())? {
+                    match record {
+                        Record::Event(event) if event.is_odd() => {
+                            *not_valid += 1;
+                            if *not_valid <= TOLD {
+                                let why = event.note().unwrap_or_default();
+                                warn(format_args!("entry {} is not valid: {why}", event.number));
+                            }
                         }
-                    }
-                    Record::Event(_) => {}
-                    Record::Loss(loss) => {
-                        *losses += 1;
-                        let place = place(&deliveries[position..]);
-                        warn(place.map_or(loss.sentence(), |entry| {
-                            format!("before entry {entry}: {}", loss.sentence())
-                        }));
+                        Record::Event(_) => {}
+                        Record::Loss(loss) => {
+                            *gaps += 1;
+                            if *gaps <= TOLD {
+                                tell(&loss, &deliveries[position..]);
+                            }
+                        }
                     }
                 }
             }
-            if !deliveries.is_empty() {
-                writer.flush()?;
+            if deliveries.is_empty() {
+                return Ok(());
             }
-            Ok(())
+            remember(annotator.life())?;
+            Ok(writer.flush()?)
         })
+    }
+
+    /// The entries that come now have nothing to do with those before.
+    pub(crate) fn begin_anew(&mut self) {
+        self.annotator.begin_anew();
     }
 
     /// Passes on what is due also when nothing was delivered, such as the header of a file.
@@ -81,27 +94,42 @@ impl Outlet {
     /// The same at the end, and tells what was only counted.
     pub(crate) fn finish(&mut self) -> Result<()> {
         self.progress.finish();
-        if let Some(more) = self.odd.checked_sub(ODD_TOLD).filter(|&more| more > 0) {
-            let entries = if more == 1 { "entry" } else { "entries" };
-            warn(format_args!("{more} more {entries} cannot be as read; all are delivered, with a note"));
+        if let Some(more) = self.not_valid.checked_sub(TOLD).filter(|&more| more > 0) {
+            let entries = if more == 1 { "entry is" } else { "entries are" };
+            warn(format_args!("{more} more {entries} not valid; all are delivered, with a note"));
+        }
+        if let Some(more) = self.gaps.checked_sub(TOLD).filter(|&more| more > 0) {
+            let gaps = if more == 1 { "gap" } else { "gaps" };
+            warn(format_args!("{more} more {gaps}; each is in the output where it belongs"));
         }
         self.flush()
     }
 
     /// Counts a place at which something may be missing that no delivery tells of.
     pub(crate) fn miss(&mut self) {
-        self.losses += 1;
+        self.gaps += 1;
     }
 
     /// Fails if something is known to be missing in what was delivered.
     pub(crate) fn require_complete(&self) -> Result<()> {
-        match self.losses {
+        match self.gaps {
             0 => Ok(()),
-            losses => {
-                let places = if losses == 1 { "at 1 place" } else { &format!("at {losses} places") };
-                Err(Failure::incomplete(format_args!("events are missing {places}")))
-            }
+            1 => Err(Failure::incomplete("the output has a gap")),
+            gaps => Err(Failure::incomplete(format_args!("the output has {gaps} gaps"))),
         }
+    }
+
+    /// Whether something is known to be missing in what was delivered.
+    pub(crate) fn has_gaps(&self) -> bool {
+        self.gaps > 0
+    }
+}
+
+/// Tells a loss, with the entry after it.
+fn tell(loss: &Loss, after: &[Delivery]) {
+    match place(after) {
+        Some(entry) => warn(format_args!("before entry {entry}: {}", loss.sentence())),
+        None => warn(loss.sentence()),
     }
 }
 

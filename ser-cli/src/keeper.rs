@@ -8,7 +8,7 @@ use ser_client::Cursor;
 use crate::cli::ConnectionArgs;
 use crate::connection;
 use crate::error::Result;
-use crate::output::{self, Life};
+use crate::output::{self, Before, Life};
 use crate::state::{Delivered, StateFile, StateLock};
 
 /// How much a crash may repeat, in time: writing the file after every event would wear a memory card.
@@ -47,7 +47,7 @@ impl Keeper {
 
     /// Where reading goes on.
     pub(crate) fn cursor(&self) -> Option<Cursor> {
-        self.saved.map(|delivered| delivered.cursor)
+        self.saved.and_then(|delivered| delivered.cursor)
     }
 
     /// The life of the log that was read; a new one where nothing is remembered.
@@ -58,21 +58,58 @@ impl Keeper {
         }
     }
 
+    /// What else is known of the log.
+    pub(crate) fn before(&self) -> Before {
+        let Some(Delivered { cursor, next_life, erased, .. }) = self.saved else { return Before::default() };
+        Before { previous: cursor.and_then(|cursor| cursor.anchor).or(erased), erased, next_life }
+    }
+
     /// The size that the log had.
     pub(crate) fn size(&self) -> Option<u16> {
-        self.saved.map(|delivered| delivered.size)
+        self.saved.map(|delivered| delivered.size).filter(|&size| size > 0)
+    }
+
+    /// Keeps the name of a life before anything of it is passed on: the next run must not give the same events another
+    /// one.
+    pub(crate) fn name(&mut self, life: Life, size: u16) -> Result<()> {
+        let nothing = Delivered { cursor: None, size, life: None, next_life: None, erased: None };
+        let known = self.unsaved.or(self.saved).unwrap_or(nothing);
+        if [known.life, known.next_life].contains(&Some(life)) {
+            return Ok(());
+        }
+        self.unsaved = Some(match known.cursor {
+            Some(_) if known.life.is_some() => Delivered { next_life: Some(life), ..known },
+            _ => Delivered { life: Some(life), ..known },
+        });
+        self.save()
     }
 
     /// Everything up to `cursor`, in a log of this life, has reached standard output.
     pub(crate) fn delivered(&mut self, cursor: Option<Cursor>, size: u16, life: Life) -> Result<()> {
-        let Some(cursor) = cursor else { return Ok(()) };
-        let delivered = Delivered { cursor, size, life: Some(life) };
-        self.unsaved = (self.saved != Some(delivered)).then_some(delivered);
-        // The name of a new life must not get lost: the next run would give the same events another one.
-        match self.saved {
-            Some(saved) if saved.life == Some(life) => self.save_if_due(),
-            _ => self.save(),
+        if cursor.is_none() {
+            return Ok(());
         }
+        // The next event still has to go on from the last one of a log that was erased.
+        let is_empty = cursor.is_some_and(|cursor| cursor.sequence == 0);
+        let erased = self.saved.and_then(|saved| saved.erased).filter(|_| is_empty);
+        let delivered = Delivered { cursor, size, life: Some(life), next_life: None, erased };
+        self.unsaved = (self.saved != Some(delivered)).then_some(delivered);
+        self.save_if_due()
+    }
+
+    /// The log was erased, and its total was this. If everything in it had been delivered, nothing is lost, and the next
+    /// reading begins a new log. Returns how many had not, as far as that is known.
+    pub(crate) fn erased(&mut self, total: u16) -> Result<u16> {
+        let Some(Delivered { cursor: Some(cursor), .. }) = self.saved else { return Ok(0) };
+        let unread = total.wrapping_sub(cursor.total());
+        if unread == 0 {
+            let erased = cursor.anchor.or(self.saved.and_then(|saved| saved.erased));
+            let cursor = Some(Cursor { sequence: 0, is_exact: true, anchor: None });
+            let (size, life) = (self.size().unwrap_or(0), Some(Life::begin()?));
+            self.unsaved = Some(Delivered { cursor, size, life, next_life: None, erased });
+            self.save()?;
+        }
+        Ok(unread)
     }
 
     /// Writes what is not written yet, unless that was done a moment ago.

@@ -37,12 +37,16 @@ const TELLING_LEN: usize = 100;
 /// Where a unit's log had been read to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Delivered {
-    /// Behind the last event that was delivered.
-    pub cursor: Cursor,
+    /// Behind the last event that was delivered; `None` while there is nothing but a name.
+    pub cursor: Option<Cursor>,
     /// Entries that the log could hold then.
     pub size: u16,
     /// The life of the log; `None` in files of before lives had names.
     pub life: Option<Life>,
+    /// The name of the next life, drawn before anything of it was delivered.
+    pub next_life: Option<Life>,
+    /// The last event of the log before, if that was erased when everything in it had been delivered.
+    pub erased: Option<Entry>,
 }
 
 /// A text that does not say what was delivered, and why.
@@ -67,16 +71,17 @@ impl Delivered {
             serde_json::from_slice(text).map_err(|error| NotDelivered(error.to_string()))?;
         let (sequence, life) = match content.version {
             VERSION_WITHOUT_LIFE => (content.total.map(u64::from), None),
-            VERSION => (content.sequence, content.life()?),
+            VERSION => (content.sequence, life_named(content.life.as_deref())?),
             version => return Err(NotDelivered(format!("version {version} is not {VERSION}"))),
         };
-        let sequence = sequence.ok_or_else(|| NotDelivered("it has no total".to_owned()))?;
-        let cursor = Cursor {
-            sequence,
-            is_exact: content.exact.unwrap_or(false),
-            anchor: content.last.map(Entry::from),
-        };
-        Ok(Delivered { cursor, size: content.size, life })
+        if sequence.is_none() && content.next_life.is_none() && life.is_none() {
+            return Err(NotDelivered("it has neither total nor sequence".to_owned()));
+        }
+        let next_life = life_named(content.next_life.as_deref())?;
+        let is_exact = content.exact.unwrap_or(false);
+        let anchor = content.last.map(Entry::from);
+        let cursor = sequence.map(|sequence| Cursor { sequence, is_exact, anchor });
+        Ok(Delivered { cursor, size: content.size, life, next_life, erased: content.erased.map(Entry::from) })
     }
 
     /// The content of the state file of this unit.
@@ -84,16 +89,18 @@ impl Delivered {
     /// # Errors
     /// None that is known: there is nothing here that JSON does not have.
     pub fn to_text(&self, unit: &str) -> io::Result<String> {
-        let Delivered { cursor: Cursor { sequence, is_exact, anchor }, size, life } = *self;
+        let Delivered { cursor, size, life, next_life, erased } = *self;
         let content = Content {
             version: VERSION,
             unit: unit.to_owned(),
             total: None,
-            sequence: Some(sequence),
-            exact: Some(is_exact),
+            sequence: cursor.map(|cursor| cursor.sequence),
+            exact: cursor.map(|cursor| cursor.is_exact),
             life: life.as_ref().map(Life::to_string),
+            next_life: next_life.as_ref().map(Life::to_string),
             size,
-            last: anchor.as_ref().map(LastEntry::from),
+            last: cursor.and_then(|cursor| cursor.anchor).as_ref().map(LastEntry::from),
+            erased: erased.as_ref().map(LastEntry::from),
         };
         Ok(serde_json::to_string(&content)? + "\n")
     }
@@ -132,16 +139,18 @@ struct Content {
     exact: Option<bool>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     life: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    next_life: Option<String>,
     size: u16,
     last: Option<LastEntry>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    erased: Option<LastEntry>,
 }
 
-impl Content {
-    fn life(&self) -> std::result::Result<Option<Life>, NotDelivered> {
-        let Some(name) = &self.life else { return Ok(None) };
-        let life = Life::from_name(name);
-        life.map(Some).ok_or_else(|| NotDelivered("it names no life of the log".to_owned()))
-    }
+fn life_named(name: Option<&str>) -> std::result::Result<Option<Life>, NotDelivered> {
+    let Some(name) = name else { return Ok(None) };
+    let life = Life::from_name(name);
+    life.map(Some).ok_or_else(|| NotDelivered("it names no life of the log".to_owned()))
 }
 
 /// An entry, field by field: its time need not be a date that exists.
@@ -369,7 +378,8 @@ mod tests {
 
     fn delivered(sequence: u64) -> Delivered {
         let cursor = Cursor { sequence, is_exact: false, anchor: None };
-        Delivered { cursor, size: 2048, life: Some(Life::UNKNOWN) }
+        let life = Some(Life::UNKNOWN);
+        Delivered { cursor: Some(cursor), size: 2048, life, next_life: None, erased: None }
     }
 
     #[test]
@@ -386,10 +396,18 @@ mod tests {
         assert_eq!(state.load().unwrap(), None);
         let mut last = entry("00.250", &[3, 32], &[32]);
         last.time.month = 200;
-        let cursor = |sequence, is_exact, anchor| Cursor { sequence, is_exact, anchor };
+        let cursor = |sequence, is_exact, anchor| Some(Cursor { sequence, is_exact, anchor });
+        let drawn = || Some(Life::begin().unwrap());
         for delivered in [
-            Delivered { cursor: cursor(u64::MAX, false, Some(last)), size: 2048, life: Life::from_name("0") },
-            Delivered { cursor: cursor(0, true, None), size: 1, life: Some(Life::begin().unwrap()) },
+            Delivered { cursor: cursor(u64::MAX, false, Some(last)), next_life: drawn(), ..delivered(0) },
+            Delivered {
+                cursor: cursor(0, true, None),
+                size: 1,
+                life: drawn(),
+                erased: Some(last),
+                ..delivered(0)
+            },
+            Delivered { cursor: None, life: drawn(), ..delivered(0) },
         ] {
             state.save(&delivered).unwrap();
             assert_eq!(state.load().unwrap(), Some(delivered));

@@ -51,9 +51,11 @@ pub(crate) fn time_after(time: TimeStamp, elapsed: std::time::Duration) -> TimeS
 /// Milliseconds of the hundred years that two digits tell apart, 1970–2069.
 const CENTURY_MS: i64 = 36_525 * 86_400_000;
 
-/// The time between two events, with its sign.
-///
-/// 2069 is followed by 1970, so it is the shorter way around the hundred years: within ±50 years.
+/// So close to each other are two stamps on either side of the end of 2069, where the two digits of the year begin
+/// anew: ten years. Further apart, a clock was set.
+const AROUND_2069_MS: i64 = 10 * 366 * 86_400_000;
+
+/// The time between two events, with its sign. 2069 is followed by 1970.
 ///
 /// As `+0.001 s`, `+1m02.003 s`, `+3h01m02 s`, `+2d03h01m`: the further apart, the coarser, so that it is taken in at
 /// a glance and fits a narrow column. The times themselves always show the millisecond.
@@ -66,7 +68,8 @@ impl Delta {
     /// From `earlier` to `later`; `None` when one of them is no date.
     pub(crate) fn between(earlier: TimeStamp, later: TimeStamp) -> Option<Delta> {
         let straight_ms = straight_ms(earlier, later)?;
-        Some(Delta { ms: (straight_ms + CENTURY_MS / 2).rem_euclid(CENTURY_MS) - CENTURY_MS / 2 })
+        let around_ms = straight_ms - straight_ms.signum() * CENTURY_MS;
+        Some(Delta { ms: if around_ms.abs() <= AROUND_2069_MS { around_ms } else { straight_ms } })
     }
 }
 
@@ -193,6 +196,10 @@ mod tests {
         assert_eq!(ClockStep::between(last, first), Some(ClockStep::YearsBeganAnew));
         assert_eq!(ClockStep::between(first, last), Some(ClockStep::Back));
         assert_eq!(ClockStep::between(first, first), Some(ClockStep::Forward));
+        // A clock that had lost its time, and was set again.
+        let today = parse_time("2026-11-22T10:00:00").unwrap();
+        assert_eq!(ClockStep::between(today, first), Some(ClockStep::Back));
+        assert_eq!(ClockStep::between(first, today), Some(ClockStep::Forward));
         // At the turn of 1999 to 2000 nothing happens.
         let before = parse_time("1999-12-31T23:59:59.999").unwrap();
         let after = parse_time("2000-01-01T00:00:00.000").unwrap();

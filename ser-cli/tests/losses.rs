@@ -50,7 +50,7 @@ fn a_loss_is_in_the_table_too_and_in_the_exit_code_if_that_is_wanted() {
     assert_eq!(table.lines().count(), 1 + 1 + 8, "everything that is there was delivered: {table}");
     let loss = "12 events were overwritten before they were read";
     assert!(table.lines().nth(1).is_some_and(|line| line.ends_with(loss)), "{table}");
-    assert!(told.contains(loss) && told.contains("error: events are missing at 1 place"), "{told}");
+    assert!(told.contains(loss) && told.contains("error: the output has a gap"), "{told}");
     // It has been told. What comes now is complete.
     assert_eq!(bench.run("read --new --fail-on-loss").status.code(), Some(0));
 }
@@ -60,7 +60,8 @@ fn the_rows_of_a_log_and_its_losses_go_on_from_run_to_run() {
     let mut bench = overrun();
     let file = bench.folder.path().join("events.csv");
     assert_eq!(append(&bench, "read --new --format csv", &file).status.code(), Some(0));
-    bench.ok("erase --yes");
+    // By somebody who knows nothing of what was read here.
+    bench.ok(&format!("erase --yes --state-dir {}", bench.folder.path().join("another").display()));
     bench.contacts("0,1,0", 1);
     assert_eq!(append(&bench, "read --new --format csv --fail-on-loss", &file).status.code(), Some(3));
 
@@ -73,7 +74,7 @@ fn the_rows_of_a_log_and_its_losses_go_on_from_run_to_run() {
     let sequences: Vec<_> = rows[2..10].iter().map(|row| (row[4], row[5])).collect();
     let expected: Vec<_> = (16..=23).map(|sequence| sequence.to_string()).collect();
     assert_eq!(sequences, expected.iter().map(|sequence| (&sequence[..], old)).collect::<Vec<_>>());
-    assert_eq!(rows[10], ["", "", "", "", "23", old, "lost (unknown) after 23: log began anew"]);
+    assert_eq!(rows[10], ["", "", "", "", "23", old, "lost an unknown number after 23: log began anew"]);
     assert_eq!((rows[11][0], rows[11][4]), ("1", "1"), "the new log counts from its beginning");
     assert!(old.len() == 16 && new.len() == 16 && old != new, "each log has its name: {csv}");
 }
@@ -94,16 +95,15 @@ fn inputs_that_change_while_recording_is_stopped_are_named() {
     assert!(text(&output.stderr).contains("before entry 2: inputs 7 9 changed while nothing was recorded"));
     // By number, too.
     let range = bench.run("read --from 1 --count 2 --format csv --fail-on-loss");
-    assert!(text(&range.stdout).contains(",,,,,0,\"lost (unknown): not recorded, inputs 7 9\""));
+    assert!(text(&range.stdout).contains(",,,,,0,\"lost an unknown number: not recorded, inputs 7 9\""));
     assert_eq!(range.status.code(), Some(3));
 }
 
-/// `ser-cli` with a limit to the size of files, in blocks of 512 bytes: as good as a full disk.
-fn limited(bench: &Bench, arguments: &str, file: &Path, blocks: u32) -> Output {
+/// `ser-cli` as a shell starts it with this, where `"$@"` stands for it.
+fn in_shell(bench: &Bench, arguments: &str, script: &str) -> Output {
     let ser_cli = bench.command(arguments);
     let mut shell = Command::new("sh");
-    shell.arg("-c").arg(format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\" >> \"$0\"")).arg(file);
-    shell.arg(ser_cli.get_program()).args(ser_cli.get_args());
+    shell.args(["-c", script, "sh"]).arg(ser_cli.get_program()).args(ser_cli.get_args());
     for (name, value) in ser_cli.get_envs() {
         match value {
             Some(value) => shell.env(name, value),
@@ -111,6 +111,12 @@ fn limited(bench: &Bench, arguments: &str, file: &Path, blocks: u32) -> Output {
         };
     }
     shell.output().expect("sh runs")
+}
+
+/// With a limit to the size of files, in blocks of 512 bytes or of 1024: as good as a full disk.
+fn limited(bench: &Bench, arguments: &str, file: &Path, blocks: u32) -> Output {
+    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\" >> '{}'", file.display());
+    in_shell(bench, arguments, &script)
 }
 
 #[test]
@@ -211,11 +217,11 @@ fn entries_that_cannot_be_are_delivered_and_marked_and_harm_no_others() {
         text(&csv.stdout).lines().skip(1).collect::<Vec<_>>(),
         [
             "1,2026-11-22T10:00:00.007,1,1,1,0,",
-            "2,2026-13-22T10:00:00.007,1,0,2,0,there is no month 13 in such a date",
-            "3,2026-11-22T10:00:00.1000,1,1,3,0,there is no millisecond 1000 in such a date",
+            "2,2026-13-22T10:00:00.007,1,0,2,0,month 13 is out of range",
+            "3,2026-11-22T10:00:00.1000,1,1,3,0,millisecond 1000 is out of range",
             "4,2026-11-22T10:00:00.007,,,4,0,\"no input changed, on: 1\"",
-            "5,2026-11-31T10:00:00.007,1,0,5,0,there is no day 31 in such a date",
-            "6,2100-11-22T10:00:00.007,1,1,6,0,there is no year 200 in such a date",
+            "5,2026-11-31T10:00:00.007,1,0,5,0,day 31 is out of range",
+            "6,2100-11-22T10:00:00.007,1,1,6,0,year 200 is out of range",
             "7,2026-11-22T10:00:00.008,1,0,7,0,",
         ]
     );
@@ -229,4 +235,79 @@ fn entries_that_cannot_be_are_delivered_and_marked_and_harm_no_others() {
     let table = text(&read("table").stdout);
     let marked = table.lines().filter(|line| line.ends_with(')')).count();
     assert_eq!((table.lines().count(), marked), (1 + 7, 5), "{table}");
+}
+
+#[test]
+fn reading_and_erasing_again_and_again_loses_nothing_and_says_so() {
+    let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
+    let file = bench.folder.path().join("events.csv");
+    for round in 0..4 {
+        bench.contacts(&format!("0,1,{}\n1,2,{}", (round + 1) % 2, (round + 1) % 2), 2);
+        let read = append(&bench, "read --new --format csv --fail-on-loss", &file);
+        assert_eq!(read.status.code(), Some(0), "round {round}: {}", text(&read.stderr));
+        let erased = bench.run("erase --yes");
+        assert!(!text(&erased.stderr).contains("warning"), "{}", text(&erased.stderr));
+    }
+    let csv = fs::read_to_string(&file).expect("text");
+    let lives: std::collections::BTreeSet<_> = csv.lines().skip(1).map(|row| columns(row)[5]).collect();
+    assert_eq!((csv.lines().count(), lives.len()), (1 + 8, 4), "{csv}");
+    assert_eq!(columns(csv.lines().last().expect("a row"))[4], "2", "each log counts from its beginning");
+}
+
+#[test]
+fn what_an_erase_takes_along_unread_is_told() {
+    let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
+    bench.contacts("0,1,1", 1);
+    bench.ok("read --new --format csv");
+    bench.contacts("0,2,1\n1,2,0", 2);
+    let erased = text(&bench.run("erase --yes").stderr);
+    assert!(erased.contains("warning: 2 events had not been delivered"), "{erased}");
+    bench.contacts("0,1,0", 1);
+    let output = bench.run("read --new --format csv --fail-on-loss");
+    assert_eq!(output.status.code(), Some(3));
+    assert!(text(&output.stdout).contains("lost an unknown number after 1: log began anew"));
+
+    // And so is a change of which the new log has no event, as one between the last look and the erase.
+    bench.ok("stop");
+    bench.contacts("0,7,1", 0);
+    bench.ok("erase --yes");
+    bench.ok("start");
+    bench.contacts("0,1,1", 1);
+    let output = bench.run("read --new --format csv --fail-on-loss");
+    assert_eq!(output.status.code(), Some(3));
+    let stdout = text(&output.stdout);
+    assert!(stdout.contains("\"lost an unknown number after 0: not recorded, inputs 7\""), "{stdout}");
+}
+
+#[test]
+fn what_cannot_be_written_is_not_delivered() {
+    let mut bench = Bench::start(Kind::Native, &[]);
+    bench.contacts("0,1,1", 1);
+    for (standard_output, why) in
+        [("1</dev/null", "cannot write"), (">&-", "closed"), (">/dev/full", "space")]
+    {
+        let script = format!("exec \"$@\" {standard_output}");
+        let output = in_shell(&bench, "read --new --format csv", &script);
+        let told = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{standard_output}: {told}");
+        assert!(told.contains(why), "{standard_output}: {told}");
+    }
+    assert_eq!(bench.ok("read --new --format csv").lines().count(), 2, "it is still to come");
+}
+
+#[test]
+fn a_step_of_the_clock_is_noted_from_run_to_run_and_not_where_the_ring_goes_around() {
+    let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
+    bench.ok("config --size 8");
+    let steps: Vec<_> = (0..11).map(|index| format!("{index},5,{}", (index + 1) % 2)).collect();
+    bench.contacts(&steps.join("\n"), 8);
+    let by_number = bench.ok("read --from 1 --count 8 --format csv");
+    assert!(!by_number.contains("went back"), "entry 4 is the oldest: {by_number}");
+    bench.ok("read --new --format csv");
+    bench.ok("clock set --at 2020-01-01T00:00:00");
+    let input = bench.sim.0.stdin.as_mut().expect("piped");
+    write!(input, "ms,input,state\n0,5,0\n\n").expect("the simulator reads");
+    common::wait_until("it has moved", || bench.ok("status").contains("12 since"));
+    let new = bench.ok("read --new --format csv");
+    assert!(new.trim_end().ends_with("the clock went back"), "{new}");
 }

@@ -89,6 +89,10 @@ impl LogFollower {
             lost = lost.saturating_add(summary.lost);
             unrecorded = unrecorded.saturating_add(summary.unrecorded);
             restarted |= summary.restarted;
+            if summary.delivered > 0 {
+                // A reading that keeps up may last for days.
+                resyncs = 0;
+            }
             match end {
                 Ok(()) => return Ok(Summary { delivered, lost, unrecorded, restarted, ..summary }),
                 // Somebody erased or resized the log: what is still there is sorted out from the cursor.

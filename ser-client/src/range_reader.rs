@@ -43,7 +43,7 @@ impl RangeReader {
     pub fn take(&mut self, reply: &ReadReply, on: &mut dyn FnMut(Delivery)) {
         let Some(request) = self.request().filter(|request| request.start == reply.start) else { return };
         let position = LogPosition::from(reply);
-        if self.position != Some(position) {
+        if self.position.is_some_and(|earlier| !self.keeps_before(earlier, position)) {
             self.before = None;
         }
         self.position = Some(position);
@@ -55,7 +55,7 @@ impl RangeReader {
         };
         for &entry in reply.entries.iter().take(request.count.into()) {
             // The oldest entry of a full ring stands right behind the newest.
-            let before = self.before.filter(|_| self.next != position.next_slot + 1);
+            let before = self.before.filter(|_| !self.is_seam(self.next));
             if let Some(lost) = before.and_then(|before| Lost::between(&before, &entry)) {
                 on(Delivery::Lost { after: None, lost });
             }
@@ -64,6 +64,19 @@ impl RangeReader {
             self.next += 1;
             self.delivered += 1;
         }
+    }
+
+    /// Whether an entry is the first after the newest: the oldest of a full ring. It has nothing to do with the entry
+    /// that comes before it by number.
+    #[must_use]
+    pub fn is_seam(&self, entry_number: u16) -> bool {
+        self.position.is_some_and(|position| entry_number.checked_sub(1) == Some(position.next_slot))
+    }
+
+    /// Whether the entry before `next` is still what it was, although the log has moved on between two replies.
+    fn keeps_before(&self, earlier: LogPosition, now: LogPosition) -> bool {
+        let Some(slot) = self.next.checked_sub(2) else { return true };
+        earlier == now || went_straight(earlier, now) && !(earlier.next_slot..now.next_slot).contains(&slot)
     }
 
     /// Where the log stood in the latest reply.
@@ -81,11 +94,8 @@ impl RangeReader {
         }
         // Slot `n - 1` holds entry `n`.
         let slots = self.start.saturating_sub(1)..self.next.saturating_sub(1);
-        let went_straight = last.total.wrapping_sub(first.total)
-            == last.next_slot.wrapping_sub(first.next_slot)
-            && first.next_slot < last.next_slot;
         // Where the ring turned, or the log was erased, every entry may have been written.
-        !went_straight || (first.next_slot < slots.end && slots.start < last.next_slot)
+        !went_straight(first, last) || (first.next_slot < slots.end && slots.start < last.next_slot)
     }
 
     /// How many entries were delivered.
@@ -93,6 +103,12 @@ impl RangeReader {
     pub const fn delivered(&self) -> u16 {
         self.delivered
     }
+}
+
+/// Whether events were appended, and nothing else happened, from one position to the other.
+fn went_straight(first: LogPosition, last: LogPosition) -> bool {
+    last.total.wrapping_sub(first.total) == last.next_slot.wrapping_sub(first.next_slot)
+        && first.next_slot < last.next_slot
 }
 
 #[cfg(test)]
@@ -103,8 +119,9 @@ mod tests {
     fn reply(start: u16, count: usize, total: u16, next_slot: u16) -> ReadReply {
         let time =
             TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 250 };
-        let entry = Entry { changed: Inputs(1), state: Inputs(1), time };
-        let entries = std::iter::repeat_n(entry, count).collect();
+        // Input 1 changes in each entry.
+        let entry = |number: u16| Entry { changed: Inputs(1), state: Inputs((number % 2).into()), time };
+        let entries = (start..).take(count).map(entry).collect();
         ReadReply { start, total, next_slot, model: Some(Model::Ser160), entries }
     }
 
@@ -131,6 +148,36 @@ mod tests {
         let input_2 = Lost::Unrecorded { inputs: Inputs(0b10) };
         assert_eq!(lost, [&Delivery::Lost { after: None, lost: input_2 }]);
         assert!(matches!(told[1], Delivery::Lost { .. }), "before entry 12");
+    }
+
+    #[test]
+    fn a_change_without_an_entry_is_told_where_two_replies_meet_although_an_event_came_elsewhere() {
+        let first = reply(1, 10, 20, 20);
+        let mut second = reply(11, 10, 21, 21);
+        // Input 2 is on all of a sudden in entry 11.
+        second.entries[0].state = Inputs(0b11);
+        let mut told = Vec::new();
+        let mut reader = RangeReader::new(1, 20, 100);
+        for reply in [&first, &second] {
+            reader.take(reply, &mut |delivery| told.push(delivery));
+        }
+        let input_2 = Lost::Unrecorded { inputs: Inputs(0b10) };
+        assert_eq!(told[10], Delivery::Lost { after: None, lost: input_2 });
+        assert!(!reader.is_mixed());
+        // What was written over the entry before is no neighbour.
+        let mut told = Vec::new();
+        let mut reader = RangeReader::new(1, 20, 100);
+        for reply in [&reply(1, 10, 109, 9), &ReadReply { total: 110, next_slot: 10, ..second }] {
+            reader.take(reply, &mut |delivery| told.push(delivery));
+        }
+        assert!(matches!(told[10], Delivery::Event { entry_number: 11, .. }), "{:?}", told[10]);
+    }
+
+    #[test]
+    fn a_position_that_cannot_be_is_none() {
+        let mut reader = RangeReader::new(1, 10, 100);
+        reader.take(&reply(1, 10, u16::MAX, u16::MAX), &mut drop);
+        assert!(!reader.is_seam(0) && !reader.is_seam(1));
     }
 
     #[test]

@@ -129,11 +129,18 @@ impl fmt::Display for TimeStamp {
     }
 }
 
+impl InvalidTime {
+    /// The name of the field: `year` … `millisecond`.
+    #[must_use]
+    pub fn field(&self) -> &'static str {
+        const FIELDS: [&str; 7] = ["year", "month", "day", "hour", "minute", "second", "millisecond"];
+        FIELDS.get(self.offset).copied().unwrap_or("field")
+    }
+}
+
 impl fmt::Display for InvalidTime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const FIELDS: [&str; 7] = ["year", "month", "day", "hour", "minute", "second", "millisecond"];
-        let field = FIELDS.get(self.offset).copied().unwrap_or("field");
-        write!(f, "there is no {field} {} in such a date", self.value)
+        write!(f, "there is no {} {} in such a date", self.field(), self.value)
     }
 }
 

@@ -10,7 +10,7 @@ use ser_sim::{Backend, LineRate, Port, Scenario, SimOptions, Simulator, Step};
 
 use super::sim;
 use crate::error::{Failure, Result};
-use crate::output::{Annotator, EventWriter, Life, Palette, PointNames, Sequence};
+use crate::output::{Annotator, Before, EventWriter, Life, Palette, PointNames, Sequence};
 use crate::time::local_time_in;
 
 const EXAMPLES: &str = "\
@@ -131,7 +131,7 @@ fn download(
     story: &mut Story<impl Write>,
 ) -> Result<Download> {
     let mut table = Sequence::new(&mut story.out, story.palette, names);
-    let mut annotator = Annotator::new(Life::UNKNOWN);
+    let mut annotator = Annotator::new(Life::UNKNOWN, Before::default());
     let (bytes, began) = (unit.counters().bytes, Instant::now());
     let summary = LogFollower::new(None, configuration.size).read_new(unit, &mut |step| -> Result<()> {
         for delivery in step.deliveries {

@@ -2,13 +2,17 @@
 
 use crate::cli::ConnectionArgs;
 use crate::connection;
-use crate::error::{Failure, Result, inform};
+use crate::error::{Failure, Result, inform, warn};
+use crate::keeper::{Keeper, StateArgs};
 
 const EXAMPLES: &str = "\
 Examples:
-  ser-cli read --all --format csv > events.csv && ser-cli erase --yes
+  ser-cli read --new --fail-on-loss >> log && ser-cli erase --yes
 
-What is recorded between a read and the erase is erased, too. If that matters, stop first (ser-cli stop).";
+What read --new and watch have delivered is remembered, and so is this erase: if everything had been delivered, the \
+next read --new goes on with the new log and tells of no loss. What is recorded between a read and the erase is erased, \
+too, and then told as a loss. In the moment of the erase itself, a change that is undone before the next event leaves \
+no trace.";
 
 /// Erase all events in the unit. There is no way back.
 #[derive(Debug, clap::Args)]
@@ -17,6 +21,9 @@ pub(crate) struct Args {
     /// Do it; without it nothing is done.
     #[arg(long)]
     yes: bool,
+
+    #[command(flatten)]
+    state: StateArgs,
 }
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
@@ -26,9 +33,17 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             .hint("keep them first: ser-cli read --all --format csv > events.csv")
             .hint("then add --yes"));
     }
+    // Without a memory of what was delivered, or with one that another run is using, the log is erased all the same.
+    let keeper = Keeper::load(&args.state, connection).ok();
     let mut unit = connection::open(connection)?;
     let total = unit.log_position()?.total;
     unit.erase()?;
     inform(format_args!("event buffer erased: {total} events since the last erase (modulo 65536)"));
+    let Some(mut keeper) = keeper else { return Ok(()) };
+    match keeper.erased(total)? {
+        0 => {}
+        1 => warn("1 event had not been delivered by read --new or watch"),
+        unread => warn(format_args!("{unread} events had not been delivered by read --new or watch")),
+    }
     Ok(())
 }

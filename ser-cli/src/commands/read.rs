@@ -79,7 +79,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let stop = interrupt::catch()?;
     let mut unit = connection::open(connection)?;
     let life = keeper.as_ref().map_or(Ok(Life::UNKNOWN), Keeper::life)?;
-    let mut outlet = Outlet::new(args.format, life);
+    let before = keeper.as_ref().map(Keeper::before).unwrap_or_default();
+    let mut outlet = Outlet::new(args.format, life, before);
     let check_complete = |outlet: &Outlet| match args.fail_on_loss {
         true => outlet.require_complete(),
         false => Ok(()),
@@ -93,9 +94,9 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), size, &stop);
     // What did reach standard output is remembered also when the unit fell silent in the middle, or after Ctrl-C.
     let saved = keeper.as_mut().map_or(Ok(()), Keeper::save);
-    let delivered = result?;
+    let delivered = outlet.finish().and(result)?;
     saved?;
-    if delivered == 0 {
+    if delivered == 0 && !outlet.has_gaps() {
         inform(if args.new { "nothing new" } else { "the log is empty" });
     }
     check_complete(&outlet)
@@ -111,13 +112,13 @@ fn read_by_cursor(
     let cursor: Option<Cursor> = keeper.as_ref().and_then(|keeper| keeper.cursor());
     let mut follower = LogFollower::new(cursor, size);
     let summary = follower.read_new(unit, &mut |step| -> Result<()> {
-        outlet.take(step.deliveries, step.pending)?;
+        let mut remember = |life| keeper.as_mut().map_or(Ok(()), |keeper| keeper.name(life, step.size));
+        outlet.take(step.deliveries, step.pending, &mut remember)?;
         if let Some(keeper) = &mut keeper {
             keeper.delivered(step.cursor, step.size, outlet.life())?;
         }
         check_interrupt(stop)
     })?;
-    outlet.finish()?;
     Ok(summary.delivered)
 }
 
@@ -132,7 +133,17 @@ fn read_range(
     let mut reader = RangeReader::new(from, count, log_size.unwrap_or(MAX_SIZE));
     while let ControlFlow::Continue(deliveries) = next_of_range(unit, &mut reader)? {
         let pending = u32::from(count - reader.delivered());
-        outlet.take(&deliveries, pending)?;
+        let is_seam = |delivery: &Delivery| match *delivery {
+            Delivery::Event { entry_number, .. } => reader.is_seam(entry_number),
+            Delivery::Lost { .. } => false,
+        };
+        // In the order of their numbers the oldest entry comes after the newest.
+        let (newest, oldest) = deliveries.split_at(deliveries.iter().position(is_seam).unwrap_or(0));
+        outlet.take(newest, pending, &mut |_| Ok(()))?;
+        if deliveries.first().is_some_and(is_seam) || !newest.is_empty() {
+            outlet.begin_anew();
+        }
+        outlet.take(oldest, pending, &mut |_| Ok(()))?;
         check_interrupt(stop)?;
     }
     outlet.finish()?;

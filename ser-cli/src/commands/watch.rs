@@ -84,7 +84,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         }
         None => LogWatcher::polling(follower, plan.interval, args.interval.is_none()),
     };
-    let outlet = Outlet::endless(args.format, keeper.life()?);
+    let outlet = Outlet::endless(args.format, keeper.life()?, keeper.before());
     let outage = Outage::new(connection::options(connection).timeout);
     let mut watch = Watch { unit, watcher, outlet, keeper, stop, outage };
     let result = watch.run();
@@ -223,7 +223,7 @@ impl Watch {
     fn step(&mut self) -> Result<()> {
         let Watch { unit, watcher, outlet, keeper, stop, .. } = self;
         watcher.step(unit, HEARTBEAT, &mut |step| -> Result<()> {
-            outlet.take(step.deliveries, 0)?;
+            outlet.take(step.deliveries, 0, &mut |life| keeper.name(life, step.size))?;
             keeper.delivered(step.cursor, step.size, outlet.life())?;
             if stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
         })?;

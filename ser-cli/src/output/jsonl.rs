@@ -122,7 +122,7 @@ mod tests {
                 ),
                 format!(
                     "{{\"entry\":1,\"time\":\"2026-11-22T10:00:00.251\",\"changed\":[],\"state\":[],\
-                     \"sequence\":5000,{life},\"note\":\"there is no month 13; the clock went back\"}}"
+                     \"sequence\":5000,{life},\"note\":\"month 13 is out of range; the clock went back\"}}"
                 ),
             ]
         );

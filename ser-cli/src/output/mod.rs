@@ -19,7 +19,7 @@ pub(crate) use elapsed::Elapsed;
 pub(crate) use jsonl::JsonLines;
 pub use life::Life;
 pub(crate) use palette::Palette;
-pub(crate) use record::{Annotator, Event, Loss, Record};
+pub(crate) use record::{Annotator, Before, Event, Loss, Record};
 pub(crate) use rows::{Rows, sync_stdout};
 pub(crate) use sequence::{PointNames, Sequence};
 pub(crate) use table::Table;
@@ -97,7 +97,7 @@ pub(crate) mod testing {
 
     /// The same with a note.
     pub(crate) fn odd(mut event: Event) -> Event {
-        event.notes = vec![Note::Odd("there is no month 13".to_string()), Note::ClockWentBack];
+        event.notes = vec![Note::Odd("month 13 is out of range".to_string()), Note::ClockWentBack];
         event
     }
 

@@ -70,8 +70,11 @@ impl Loss {
         };
         match self.lost {
             Lost::Overwritten { count } => format!("{} overwritten before they were read", events(count)),
+            Lost::OverwrittenAtLeast { count: 1 } => {
+                "at least 1 event had been overwritten before the first reading".to_string()
+            }
             Lost::OverwrittenAtLeast { count } => {
-                format!("{} overwritten already (or a multiple of 65536 more)", events(count))
+                format!("at least {count} events had been overwritten before the first reading")
             }
             Lost::LogRestarted => "the log began anew (it was erased, or the power failed); \
                  unread events of the old log are lost, how many is not known"
@@ -89,7 +92,7 @@ impl fmt::Display for Loss {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.count() {
             (Some(count), sure) => write!(f, "lost {count} ({sure})")?,
-            (None, sure) => write!(f, "lost ({sure})")?,
+            (None, _) => write!(f, "lost an unknown number")?,
         }
         if let Some(after) = self.after {
             write!(f, " after {after}")?;
@@ -128,13 +131,24 @@ impl Event {
 /// Turns deliveries into records, one after the other.
 pub(crate) struct Annotator {
     life: Life,
-    previous: Option<Entry>,
+    before: Before,
+}
+
+/// What is known from earlier of the log that is read.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Before {
+    /// The last event that was delivered.
+    pub(crate) previous: Option<Entry>,
+    /// The same, when the log was erased right after it: the first event of the new log goes on from its state.
+    pub(crate) erased: Option<Entry>,
+    /// The name of the next life, if one was drawn already.
+    pub(crate) next_life: Option<Life>,
 }
 
 impl Annotator {
     /// Of a log of this life.
-    pub(crate) fn new(life: Life) -> Annotator {
-        Annotator { life, previous: None }
+    pub(crate) fn new(life: Life, before: Before) -> Annotator {
+        Annotator { life, before }
     }
 
     /// The life of the log that is being read.
@@ -142,32 +156,49 @@ impl Annotator {
         self.life
     }
 
-    /// Hands a delivery to a writer as the record that it is, and gives that back.
-    pub(crate) fn write(&mut self, delivery: &Delivery, writer: &mut dyn EventWriter) -> io::Result<Record> {
-        let record = self.record(delivery)?;
-        match &record {
-            Record::Event(event) => writer.event(event)?,
-            Record::Loss(loss) => writer.lost(loss)?,
-        }
-        Ok(record)
+    /// The entries that come now have nothing to do with those before.
+    pub(crate) fn begin_anew(&mut self) {
+        self.before.previous = None;
     }
 
-    fn record(&mut self, delivery: &Delivery) -> io::Result<Record> {
+    /// Hands a delivery to a writer as the records that it is, and gives these back.
+    pub(crate) fn write(
+        &mut self,
+        delivery: &Delivery,
+        writer: &mut dyn EventWriter,
+    ) -> io::Result<Vec<Record>> {
+        let records = self.records(delivery)?;
+        for record in &records {
+            match record {
+                Record::Event(event) => writer.event(event)?,
+                Record::Loss(loss) => writer.lost(loss)?,
+            }
+        }
+        Ok(records)
+    }
+
+    fn records(&mut self, delivery: &Delivery) -> io::Result<Vec<Record>> {
         let life = self.life;
         Ok(match *delivery {
             Delivery::Event { entry_number, sequence, entry, model } => {
-                let notes = notes(&entry, model, self.previous.as_ref());
-                self.previous = Some(entry);
-                Record::Event(Event { number: entry_number, sequence, life, entry, notes })
+                let notes = notes(&entry, model, self.before.previous.as_ref());
+                if entry.time.check().is_ok() {
+                    self.before.previous = Some(entry);
+                }
+                let erased = self.before.erased.take().filter(|_| sequence == Some(1));
+                let lost = erased.and_then(|erased| Lost::between(&erased, &entry));
+                let loss = lost.map(|lost| Record::Loss(Loss { after: Some(0), life, lost }));
+                let event = Record::Event(Event { number: entry_number, sequence, life, entry, notes });
+                loss.into_iter().chain([event]).collect()
             }
             Delivery::Lost { after, lost } => {
                 if lost == Lost::LogRestarted {
-                    self.previous = None;
+                    self.before.previous = None;
                     if life != Life::UNKNOWN {
-                        self.life = Life::begin()?;
+                        self.life = self.before.next_life.take().map_or_else(Life::begin, Ok)?;
                     }
                 }
-                Record::Loss(Loss { after, life, lost })
+                vec![Record::Loss(Loss { after, life, lost })]
             }
         })
     }
@@ -182,7 +213,7 @@ pub(crate) enum Record {
 fn notes(entry: &Entry, model: Model, previous: Option<&Entry>) -> Vec<Note> {
     let mut notes = Vec::new();
     if let Err(invalid) = entry.time.check() {
-        notes.push(Note::Odd(invalid.to_string()));
+        notes.push(Note::Odd(format!("{} {} is out of range", invalid.field(), invalid.value)));
     }
     if entry.changed.is_empty() {
         notes.push(Note::Odd(match entry.state.is_empty() {
@@ -223,17 +254,17 @@ mod tests {
             (
                 Lost::OverwrittenAtLeast { count: 1 },
                 "lost 1 (at least) after 120: overwritten",
-                "1 event was overwritten already (or a multiple of 65536 more)",
+                "at least 1 event had been overwritten before the first reading",
             ),
             (
                 Lost::LogRestarted,
-                "lost (unknown) after 120: log began anew",
+                "lost an unknown number after 120: log began anew",
                 "the log began anew (it was erased, or the power failed); unread events of the old log are \
                  lost, how many is not known",
             ),
             (
                 Lost::Unrecorded { inputs: Inputs(0b101) },
-                "lost (unknown) after 120: not recorded, inputs 1 3",
+                "lost an unknown number after 120: not recorded, inputs 1 3",
                 "inputs 1 3 changed while nothing was recorded; how often is not known",
             ),
         ] {
@@ -252,9 +283,9 @@ mod tests {
         };
         assert_eq!(texts(&good), [""; 0]);
         let time = TimeStamp { month: 13, ..good.time };
-        assert_eq!(texts(&Entry { time, ..good }), ["there is no month 13 in such a date"]);
+        assert_eq!(texts(&Entry { time, ..good }), ["month 13 is out of range"]);
         let time = TimeStamp { millisecond: 1000, ..good.time };
-        assert_eq!(texts(&Entry { time, ..good }), ["there is no millisecond 1000 in such a date"]);
+        assert_eq!(texts(&Entry { time, ..good }), ["millisecond 1000 is out of range"]);
         assert_eq!(texts(&Entry { changed: Inputs(0), ..good }), ["no input changed, on: 3"]);
         assert_eq!(
             texts(&Entry { state: Inputs(1 << 16), ..good }),
@@ -280,12 +311,54 @@ mod tests {
     fn a_log_that_begins_anew_gets_a_name_of_its_own_if_it_has_one() {
         let restart = Delivery::Lost { after: Some(7), lost: Lost::LogRestarted };
         let life = Life::begin().unwrap();
-        let mut recorder = Annotator::new(life);
-        let Record::Loss(loss) = recorder.record(&restart).unwrap() else { panic!() };
+        let mut annotator = Annotator::new(life, Before::default());
+        let records = annotator.records(&restart).unwrap();
+        let [Record::Loss(loss)] = &records[..] else { panic!() };
         assert_eq!(loss.life, life, "the loss belongs to the log of before");
-        assert!(![life, Life::UNKNOWN].contains(&recorder.life()));
-        let mut recorder = Annotator::new(Life::UNKNOWN);
-        recorder.record(&restart).unwrap();
-        assert_eq!(recorder.life(), Life::UNKNOWN);
+        assert!(![life, Life::UNKNOWN].contains(&annotator.life()));
+        // A name that was drawn before a crash may be in a file already.
+        let next = Life::begin().unwrap();
+        let mut annotator = Annotator::new(life, Before { next_life: Some(next), ..Before::default() });
+        annotator.records(&restart).unwrap();
+        assert_eq!(annotator.life(), next);
+        let mut annotator = Annotator::new(Life::UNKNOWN, Before::default());
+        annotator.records(&restart).unwrap();
+        assert_eq!(annotator.life(), Life::UNKNOWN);
+    }
+
+    #[test]
+    fn a_step_shows_across_an_entry_without_a_date_and_from_run_to_run() {
+        let never = TimeStamp { month: 13, ..entry("00.250", &[3], &[3]).time };
+        let event =
+            |entry| Delivery::Event { entry_number: 1, sequence: Some(9), entry, model: Model::Ser160 };
+        let before = Before { previous: Some(entry("05.000", &[3], &[3])), ..Before::default() };
+        let mut annotator = Annotator::new(Life::UNKNOWN, before);
+        let mut noted = |entry| {
+            let records = annotator.records(&event(entry)).unwrap();
+            let [Record::Event(event)] = &records[..] else { panic!() };
+            event.note()
+        };
+        let odd = noted(Entry { time: never, ..entry("00.250", &[3], &[3]) });
+        assert_eq!(odd.as_deref(), Some("month 13 is out of range"));
+        assert_eq!(noted(entry("04.000", &[3], &[])).as_deref(), Some("the clock went back"));
+        assert_eq!(noted(entry("04.001", &[3], &[3])), None);
+    }
+
+    #[test]
+    fn what_changed_around_an_erase_without_an_entry_is_told() {
+        let before = Before { erased: Some(entry("00.250", &[3], &[3])), ..Before::default() };
+        let first = |state: &[u8]| {
+            let event = Delivery::Event {
+                entry_number: 1,
+                sequence: Some(1),
+                entry: entry("00.300", &[4], state),
+                model: Model::Ser160,
+            };
+            Annotator::new(Life::UNKNOWN, before).records(&event).unwrap()
+        };
+        assert!(matches!(&first(&[3, 4])[..], [Record::Event(_)]), "it goes on from there");
+        let records = first(&[4]);
+        let [Record::Loss(loss), Record::Event(_)] = &records[..] else { panic!() };
+        assert_eq!((loss.after, loss.lost), (Some(0), Lost::Unrecorded { inputs: Inputs(0b100) }));
     }
 }

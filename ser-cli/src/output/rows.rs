@@ -14,6 +14,8 @@ const FIRST_LINE: usize = 256;
 pub(crate) struct Rows {
     rows: Vec<u8>,
     file: Option<File>,
+    /// Whether what was written can be taken back.
+    is_regular: bool,
 }
 
 /// How the file that is being continued begins and ends.
@@ -28,21 +30,26 @@ impl Rows {
     pub(crate) fn to_stdout(header: &str) -> (Rows, bool) {
         match stdout_file() {
             Ok(file) if is_regular(&file) => Rows::to_file(file, header, reopen_stdout),
-            _ => (Rows { rows: Vec::new(), file: None }, false),
+            // Standard output as the library has it takes a closed one for a good one. A Windows console needs the
+            // library, because it wants other bytes.
+            file => {
+                let file = file.ok().filter(|_| cfg!(unix));
+                (Rows { rows: Vec::new(), file, is_regular: false }, false)
+            }
         }
     }
 
     fn to_file(file: File, header: &str, reopen: fn(&File) -> io::Result<File>) -> (Rows, bool) {
         let is_empty = file.metadata().map_or(true, |metadata| metadata.len() == 0);
         if is_empty {
-            return (Rows { rows: Vec::new(), file: Some(file) }, false);
+            return (Rows { rows: Vec::new(), file: Some(file), is_regular: true }, false);
         }
         // Where the file cannot be looked into, it is taken for one of ours.
         let before = reopen(&file).and_then(look);
-        let has_header = before.as_ref().map_or(true, |before| before.first_line == header.as_bytes());
+        let has_header = before.as_ref().map_or(true, |before| before.begins_with(header));
         let ends_in_row = before.is_ok_and(|before| before.ends_in_row);
         let rows = if ends_in_row { vec![b'\n'] } else { Vec::new() };
-        (Rows { rows, file: Some(file) }, has_header)
+        (Rows { rows, file: Some(file), is_regular: true }, has_header)
     }
 
     fn pass_on(&mut self) -> io::Result<()> {
@@ -53,13 +60,30 @@ impl Rows {
         let mut written = 0;
         while let Some(rest) = self.rows.get(written..).filter(|rest| !rest.is_empty()) {
             match file.write(rest) {
-                Ok(0) => return take_back(file, written, io::ErrorKind::WriteZero.into()),
+                Ok(0) => return self.fail(written, io::ErrorKind::WriteZero.into()),
                 Ok(count) => written += count,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return take_back(file, written, error),
+                Err(error) => return self.fail(written, error),
             }
         }
         Ok(())
+    }
+
+    /// Takes back what was written of rows that did not all fit.
+    fn fail(&mut self, written: usize, error: io::Error) -> io::Result<()> {
+        match &mut self.file {
+            Some(file) if self.is_regular => take_back(file, written, error),
+            _ => Err(error),
+        }
+    }
+}
+
+impl Before {
+    /// Whether the first line is this header, however spreadsheets and terminals have dressed it up.
+    fn begins_with(&self, header: &str) -> bool {
+        let text = String::from_utf8_lossy(&self.first_line);
+        let plain = anstream::adapter::strip_str(&text).to_string();
+        plain.trim_start_matches('\u{FEFF}').trim_end() == header
     }
 }
 
@@ -177,6 +201,18 @@ mod tests {
         assert_eq!(look_at(b"entry,time\n1,2\n"), before(HEADER, false));
         assert_eq!(look_at(b"\n"), before("", false));
         assert_eq!(look_at(&[b'x'; 1000]).first_line.len(), FIRST_LINE);
+    }
+
+    #[test]
+    fn a_header_is_known_whatever_a_spreadsheet_or_a_terminal_has_made_of_it() {
+        for line in ["entry,time", "entry,time\r", "\u{FEFF}entry,time\r", "\u{1B}[1mentry,time\u{1B}[0m"] {
+            let before = Before { first_line: line.into(), ends_in_row: false };
+            assert!(before.begins_with(HEADER), "{line:?}");
+        }
+        for line in ["", "entry", "entry,time,input", " entry,time"] {
+            let before = Before { first_line: line.into(), ends_in_row: false };
+            assert!(!before.begins_with(HEADER), "{line:?}");
+        }
     }
 
     #[test]

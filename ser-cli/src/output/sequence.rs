@@ -122,7 +122,7 @@ mod tests {
                 "    1 10:00:00.250            first-out  17 ON  87T trip",
                 "    2 10:00:00.290   +0.040 s  +0.040 s   3 OFF 52-1 closed",
                 "                                          4 ON",
-                "    - there is no month 13; the clock went back",
+                "    - month 13 is out of range; the clock went back",
                 "    - 4 events were overwritten before they were read",
             ]
         );

@@ -128,8 +128,8 @@ mod tests {
         assert_eq!(
             text.lines().skip(2).collect::<Vec<_>>(),
             [
-                "    2  2026-13-22T10:00:00.000             ?             ?  (there is no month 13; the clock went back)",
-                "    3  2026-11-22T10:00:00.000             ?      +0.000 s  1 ON  (there is no month 13; the clock went back)",
+                "    2  2026-13-22T10:00:00.000             ?             ?  (month 13 is out of range; the clock went back)",
+                "    3  2026-11-22T10:00:00.000             ?      +0.000 s  1 ON  (month 13 is out of range; the clock went back)",
             ]
         );
     }

@@ -149,6 +149,7 @@ impl Talk {
 /// Readers of a log of a size that may be right.
 struct Readers {
     size: u16,
+    keeps_up: bool,
     reader: LogReader,
     /// Requests of the reader that may be under way at once, and the starts of those that are.
     window: usize,
@@ -158,16 +159,26 @@ struct Readers {
     range: RangeReader,
 }
 
+/// The sequence that a cursor may have: small, or larger than any recorder will ever count.
+fn sequence(word: u16) -> u64 {
+    match word {
+        0xFF00.. => u64::MAX - u64::from(word & 0xFF),
+        word => word.into(),
+    }
+}
+
 impl Readers {
     fn new(script: &mut Script<'_>) -> Readers {
         let size = script.word() % 2100;
-        let cursor = Cursor { sequence: script.word().into(), is_exact: false, anchor: None };
+        let cursor = Cursor { sequence: sequence(script.word()), is_exact: false, anchor: None };
         let choice = script.byte();
         let cursor = (choice % 2 == 1).then_some(cursor);
+        let keeps_up = choice >= 0x80;
         let position = LogPosition { total: script.word(), next_slot: script.word() % 2048 };
         Readers {
             size,
-            reader: LogReader::new(cursor, size).starting_near(position),
+            keeps_up,
+            reader: LogReader::new(cursor, size).starting_near(position).keeping_up(keeps_up),
             window: usize::from(choice / 2 % 4) + 1,
             asked: VecDeque::new(),
             shown: Vec::new(),
@@ -224,7 +235,8 @@ impl Readers {
             // As a program does: on from where this reading stopped.
             self.asked.clear();
             self.shown.clear();
-            self.reader = LogReader::new(self.reader.cursor(), self.size).starting_near(summary.position);
+            let reader = LogReader::new(self.reader.cursor(), self.size).starting_near(summary.position);
+            self.reader = reader.keeping_up(self.keeps_up);
         }
     }
 
