@@ -26,14 +26,15 @@ Examples:
 Formats:
   table   entry, time, time since previous and first event, changes
   csv     a row per change: entry,time,input,state,sequence,life,note
-  jsonl   an object per event: entry, time, changed, state (inputs on), sequence, life
+  jsonl   an object per event: entry, time, changed, state (inputs on), sequence, life, note;
+          and per loss: lost, count, after, why, inputs, life
 
 A sequence number counts the events of a log since it was erased. The life names that log; \
 it is 0 where nothing is remembered (without --new). A file that is continued (>>) gets no second header.
 
 What is missing is in the output where it belongs, in every format, and on standard error: how many events were \
 overwritten, that the log began anew, which inputs changed while nothing was recorded. The exit code then is 0, \
-with --fail-on-loss it is 3: read --new --fail-on-loss >> log && erase --yes loses nothing unseen.";
+with --fail-on-loss it is 3, also for a ring that had gone round before it was first read.";
 
 /// Read events.
 #[derive(Debug, clap::Args)]

@@ -521,8 +521,8 @@ impl LogReader {
         } else if self.behind() < self.size {
             // It was asked in haste, which is over.
             return Ok(());
-        } else if self.checked || self.keeps_up {
-            // A moment ago nothing was lost.
+        } else if self.pace >= MAX_ENTRIES as u64 && (self.checked || self.keeps_up) {
+            // A moment ago nothing was lost, and events go on coming faster than they are read.
             self.margin = self.margin.max(HASTE * self.pace);
         }
         // What was read ahead cannot be proven any more: it may be of a log that is gone.
