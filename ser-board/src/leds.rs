@@ -45,7 +45,8 @@ pub struct Condition {
     pub lost: bool,
 }
 
-/// Whether the counters tell of something that belonged to the user and is gone.
+/// Whether the counters tell of something that belonged to the user and is gone, or of stamps that
+/// are wrong.
 ///
 /// Garbled frames and refused commands are the other side's doing and no fault of the recorder.
 #[must_use]
@@ -53,6 +54,7 @@ pub const fn has_lost(diagnostics: &Diagnostics) -> bool {
     let Diagnostics {
         edges_lost,
         samples_missed,
+        settings_late,
         events_unreported,
         events_unprinted,
         storage_errors,
@@ -70,6 +72,7 @@ pub const fn has_lost(diagnostics: &Diagnostics) -> bool {
     } = diagnostics;
     *edges_lost != 0
         || *samples_missed != 0
+        || *settings_late != 0
         || *events_unreported != 0
         || *events_unprinted != 0
         || *storage_errors != 0
@@ -296,6 +299,7 @@ mod tests {
         assert!(!has_lost(&rude));
         assert!(has_lost(&Diagnostics { edges_lost: 1, ..rude }));
         assert!(has_lost(&Diagnostics { samples_missed: 1, ..Diagnostics::default() }));
+        assert!(has_lost(&Diagnostics { settings_late: 1, ..Diagnostics::default() }));
         assert!(has_lost(&Diagnostics { storage_errors: 1, ..Diagnostics::default() }));
     }
 

@@ -146,6 +146,7 @@ fn log_changed(before: &Diagnostics, after: &Diagnostics) {
             commands_overrun,
             edges_lost,
             samples_missed,
+            settings_late,
             events_unreported,
             events_unprinted,
             storage_errors,

@@ -35,6 +35,33 @@ fn overrun() -> Bench {
     bench
 }
 
+/// A unit whose inputs can be seen, recorded or not: it is on a Genius bus, too.
+struct Seen {
+    bench: Bench,
+    window: tempfile::TempDir,
+}
+
+impl Seen {
+    fn start() -> Seen {
+        let window = tempfile::tempdir().expect("a folder");
+        let host = window.path().join("host").display().to_string();
+        let bench = Bench::start(Kind::Native, &["--model", "ser160", "--node", "5", "--genius", &host]);
+        Seen { bench, window }
+    }
+
+    /// Moves contacts while recording is stopped; afterwards these inputs are on.
+    fn contacts(&mut self, lines: &str, on: &str) {
+        let input = self.bench.sim.0.stdin.as_mut().expect("piped");
+        write!(input, "ms,input,state\n{lines}\n\n").expect("the simulator reads");
+        let port = format!("geni:{}", self.window.path().join("host").display());
+        common::wait_until("the contacts have moved", || {
+            let mut command = ser_cli();
+            let globals = command.args(["genius", "globals", "--timeout", "20s", "--port", &port]).output();
+            text(&globals.expect("ser-cli runs").stdout).lines().any(|line| line.ends_with(on))
+        });
+    }
+}
+
 /// Runs a command with its standard output appended to a file, as `>>` does.
 fn append(bench: &Bench, arguments: &str, file: &Path) -> Output {
     let file = fs::File::options().append(true).create(true).open(file).expect("a file");
@@ -81,10 +108,11 @@ fn the_rows_of_a_log_and_its_losses_go_on_from_run_to_run() {
 
 #[test]
 fn inputs_that_change_while_recording_is_stopped_are_named() {
-    let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
-    bench.contacts("0,1,1", 1);
-    bench.ok("stop");
-    bench.contacts("0,7,1\n1,9,1", 0);
+    let mut seen = Seen::start();
+    seen.bench.contacts("0,1,1", 1);
+    seen.bench.ok("stop");
+    seen.contacts("0,7,1\n1,9,1", "  1 7 9");
+    let bench = &mut seen.bench;
     bench.ok("start");
     bench.contacts("0,1,0", 1);
     let output = bench.run("read --format jsonl --fail-on-loss");
@@ -256,7 +284,8 @@ fn reading_and_erasing_again_and_again_loses_nothing_and_says_so() {
 
 #[test]
 fn what_an_erase_takes_along_unread_is_told() {
-    let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
+    let mut seen = Seen::start();
+    let bench = &mut seen.bench;
     bench.contacts("0,1,1", 1);
     bench.ok("read --new --format csv");
     bench.contacts("0,2,1\n1,2,0", 2);
@@ -269,7 +298,8 @@ fn what_an_erase_takes_along_unread_is_told() {
 
     // And so is a change of which the new log has no event, as one between the last look and the erase.
     bench.ok("stop");
-    bench.contacts("0,7,1", 0);
+    seen.contacts("0,7,1", "  7");
+    let bench = &mut seen.bench;
     bench.ok("erase --yes");
     bench.ok("start");
     bench.contacts("0,1,1", 1);

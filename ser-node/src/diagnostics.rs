@@ -32,6 +32,9 @@ pub struct Diagnostics {
     pub edges_lost: u32,
     /// Milliseconds in which no sample was taken.
     pub samples_missed: u32,
+    /// Settings of clock or mode that were read when changes after their arrival had been recorded
+    /// already: these have the clock and mode of before.
+    pub settings_late: u32,
     /// Events overwritten before auto report had sent them.
     pub events_unreported: u32,
     /// Events overwritten before auto print had printed them.

@@ -229,6 +229,10 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.record_until(tick_ms);
         match received {
             Ok(command) => {
+                let decides = matches!(command, Command::SetClock(_) | Command::SetMode { .. });
+                if decides && self.sequencer.is_past(tick_ms) {
+                    count(&mut self.recorder.diagnostics.settings_late, 1);
+                }
                 let now_ms = self.ticks.extend(self.capture.tick_ms());
                 Some(self.recorder.arrived(&command, tick_ms, now_ms))
             }

@@ -45,6 +45,8 @@ pub(crate) struct Sequencer {
     hold_after_ms: Option<u64>,
     /// No change that began before this tick is waiting or will come.
     front_ms: u64,
+    /// When the latest change that was handed on began.
+    handed_on_ms: u64,
     /// The state after the changes that were accepted, and after those that were handed on.
     accepted: u32,
     state: u32,
@@ -59,6 +61,7 @@ impl Sequencer {
             waiting_count: 0,
             hold_after_ms: None,
             front_ms: 0,
+            handed_on_ms: 0,
             accepted: 0,
             state: 0,
         }
@@ -73,6 +76,11 @@ impl Sequencer {
     /// Holds back changes after this tick, for as long as there is room.
     pub(crate) fn hold_after(&mut self, tick_ms: Option<u64>) {
         self.hold_after_ms = tick_ms;
+    }
+
+    /// Whether a change that began after this tick has been handed on.
+    pub(crate) fn is_past(&self, tick_ms: u64) -> bool {
+        self.handed_on_ms > tick_ms
     }
 
     /// Takes a change that was accepted at `tick_ms`; every earlier one must have been taken out with
@@ -104,6 +112,7 @@ impl Sequencer {
             let changed = core::mem::take(self.waiting.get_mut(slot(tick_ms))?);
             if changed != 0 {
                 self.waiting_count -= 1;
+                self.handed_on_ms = tick_ms;
                 self.state ^= changed;
                 return Some(Change { tick_ms, changed, state: self.state });
             }
@@ -227,7 +236,9 @@ mod tests {
         };
         assert_eq!(ticks(&mut sequencer, 13), [9, 10]);
         assert_eq!(ticks(&mut sequencer, 11 + HELD_BACK_MS), []);
+        assert!(!sequencer.is_past(10));
         assert_eq!(ticks(&mut sequencer, 12 + HELD_BACK_MS), [11]);
+        assert!(sequencer.is_past(10) && !sequencer.is_past(11));
         sequencer.hold_after(None);
         assert_eq!(ticks(&mut sequencer, 12 + HELD_BACK_MS), [12]);
     }

@@ -183,6 +183,9 @@ fn clocks_agree(recorders: u8, rounds: u32, soon_ms: Option<u64>) {
             );
         }
         beyond += u32::from(took_ms > HELD_BACK_MS);
+        // Who has recorded changes too early knows it.
+        let late = plant.world.recorders.iter().map(|recorder| recorder.node.diagnostics().settings_late);
+        assert_eq!(late.sum::<u32>() > 0, beyond > 0, "round {round}, {took_ms} ms");
         plant.step(true);
         let stamps = plant.stamps_ms(moved);
         widest_ms = widest_ms.max(spread(&stamps));
