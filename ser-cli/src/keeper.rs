@@ -97,19 +97,23 @@ impl Keeper {
         self.save_if_due()
     }
 
+    /// How many events of a log with this total have not been delivered; 0 as well where nobody reads what is new.
+    pub(crate) fn unread(&self, total: u16) -> u16 {
+        self.cursor().map_or(0, |cursor| total.wrapping_sub(cursor.total()))
+    }
+
     /// The log was erased, and its total was this. If everything in it had been delivered, nothing is lost, and the next
-    /// reading begins a new log. Returns how many had not, as far as that is known.
-    pub(crate) fn erased(&mut self, total: u16) -> Result<u16> {
-        let Some(Delivered { cursor: Some(cursor), .. }) = self.saved else { return Ok(0) };
-        let unread = total.wrapping_sub(cursor.total());
-        if unread == 0 {
+    /// reading begins a new log.
+    pub(crate) fn erased(&mut self, total: u16) -> Result<()> {
+        let Some(cursor) = self.cursor() else { return Ok(()) };
+        if self.unread(total) == 0 {
             let erased = cursor.anchor.or(self.saved.and_then(|saved| saved.erased));
             let cursor = Some(Cursor { sequence: 0, is_exact: true, anchor: None });
             let (size, life) = (self.size().unwrap_or(0), Some(Life::begin()?));
             self.unsaved = Some(Delivered { cursor, size, life, next_life: None, erased });
             self.save()?;
         }
-        Ok(unread)
+        Ok(())
     }
 
     /// Writes what is not written yet, unless that was done a moment ago.

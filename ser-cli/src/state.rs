@@ -171,8 +171,16 @@ impl StateFile {
             None => default_directory()?,
         };
         let path = |name: &String| directory.join(file_name(name));
-        let others = unit.others.iter().map(path).collect();
-        Ok(StateFile { path: path(&unit.name), unit: unit.name.clone(), others, moves_from: None })
+        let others: Vec<PathBuf> = unit.others.iter().map(path).collect();
+        let is_there = |path: &PathBuf| path.symlink_metadata().is_ok();
+        let own = path(&unit.name);
+        // One that is kept under another name in its own right stays there, with its lock.
+        let alias = || unit.aliases.iter().map(path).find(is_there);
+        let path = match is_there(&own) || others.iter().any(is_there) {
+            true => own,
+            false => alias().unwrap_or(own),
+        };
+        Ok(StateFile { path, unit: unit.name.clone(), others, moves_from: None })
     }
 
     /// Takes the file for this run alone.
@@ -369,7 +377,8 @@ mod tests {
 
     fn of_unit(name: &str, others: &[&str], directory: &Path) -> StateFile {
         let others = others.iter().map(|&other| other.to_owned()).collect();
-        StateFile::of_unit(&UnitName { name: name.to_owned(), others }, Some(directory)).unwrap()
+        StateFile::of_unit(&UnitName { name: name.to_owned(), others, aliases: Vec::new() }, Some(directory))
+            .unwrap()
     }
 
     fn state_in(directory: &tempfile::TempDir) -> StateFile {

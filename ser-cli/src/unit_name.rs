@@ -12,8 +12,10 @@
 //!   without one would take turns at the same name.
 //! - The computer itself is `localhost`, also as `127.0.0.1` and `[::1]`.
 //!
-//! All other names of the unit are looked under when there is nothing under this one: they are
-//! those of other spellings, and of versions before this one. The number of a pseudo-terminal is
+//! All other names of the unit are looked under when there is nothing under this one. Other
+//! spellings of the same name, and names of versions before this one, give way to it. A name in its
+//! own right, such as that of the device that a link leads to, keeps what is under it: the unit may be
+//! called by it again. The number of a pseudo-terminal is
 //! none of them, for the next program that wants one gets it.
 
 use std::fs;
@@ -27,27 +29,38 @@ use ser_client::{Endpoint, GeniWindow};
 pub(crate) struct UnitName {
     /// The name.
     pub(crate) name: String,
-    /// The others, the most telling first.
+    /// Other spellings, the most telling first.
     pub(crate) others: Vec<String>,
+    /// Names in their own right.
+    pub(crate) aliases: Vec<String>,
 }
 
 impl UnitName {
     /// Of the unit behind `text`, which has been understood as `endpoint`.
     pub(crate) fn of(text: &str, endpoint: &Endpoint) -> UnitName {
-        let (name, others) = match endpoint {
-            Endpoint::Tcp { address } => tcp_names(address),
-            Endpoint::Geni { window, node } => window_names(window, *node),
-            // Elsewhere the names of ports are no paths.
-            Endpoint::Serial { path } if cfg!(unix) => Devices::of_this_computer().names(Path::new(path)),
-            _ => (text.to_owned(), Vec::new()),
-        };
-        let mut unit = UnitName { name, others: Vec::new() };
+        let (name, others) = names(text, endpoint);
+        let mut unit = UnitName { name, others: Vec::new(), aliases: Vec::new() };
         for other in others.into_iter().chain([text.to_owned()]) {
-            if other != unit.name && !unit.others.contains(&other) {
-                unit.others.push(other);
+            let is_alias = other
+                .parse()
+                .is_ok_and(|endpoint| matches!(names(&other, &endpoint), (name, _) if name == other));
+            let list = if is_alias { &mut unit.aliases } else { &mut unit.others };
+            if other != unit.name && !list.contains(&other) {
+                list.push(other);
             }
         }
         unit
+    }
+}
+
+/// The name of a unit, and all others.
+fn names(text: &str, endpoint: &Endpoint) -> (String, Vec<String>) {
+    match endpoint {
+        Endpoint::Tcp { address } => tcp_names(address),
+        Endpoint::Geni { window, node } => window_names(window, *node),
+        // Elsewhere the names of ports are no paths.
+        Endpoint::Serial { path } if cfg!(unix) => Devices::of_this_computer().names(Path::new(path)),
+        _ => (text.to_owned(), Vec::new()),
     }
 }
 
@@ -192,7 +205,7 @@ mod tests {
             ("tcp://Server.Local:1", "tcp://server.local:1", vec!["tcp://Server.Local:1".to_owned()]),
             ("tcp://[FE80::7]:1", "tcp://[fe80::7]:1", vec!["tcp://[FE80::7]:1".to_owned()]),
         ] {
-            assert_eq!(of(text), UnitName { name: name.to_owned(), others });
+            assert_eq!(of(text), UnitName { name: name.to_owned(), others, aliases: Vec::new() });
         }
     }
 

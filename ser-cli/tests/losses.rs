@@ -290,7 +290,7 @@ fn what_an_erase_takes_along_unread_is_told() {
     bench.ok("read --new --format csv");
     bench.contacts("0,2,1\n1,2,0", 2);
     let erased = text(&bench.run("erase --yes").stderr);
-    assert!(erased.contains("warning: 2 events had not been delivered"), "{erased}");
+    assert!(erased.contains("warning: 2 events have not been delivered"), "{erased}");
     bench.contacts("0,1,0", 1);
     let output = bench.run("read --new --format csv --fail-on-loss");
     assert_eq!(output.status.code(), Some(3));
@@ -340,4 +340,37 @@ fn a_step_of_the_clock_is_noted_from_run_to_run_and_not_where_the_ring_goes_arou
     common::wait_until("it has moved", || bench.ok("status").contains("12 since"));
     let new = bench.ok("read --new --format csv");
     assert!(new.trim_end().ends_with("the clock went back"), "{new}");
+}
+
+#[test]
+fn a_unit_that_is_called_by_a_link_and_by_its_device_in_turn_delivers_each_event_once() {
+    let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
+    let link = bench.folder.path().join("another");
+    std::os::unix::fs::symlink(bench.link(), &link).expect("a link");
+    let names = [bench.link(), link];
+    for (round, name) in (0..6).zip(names.iter().cycle()) {
+        bench.contacts(&format!("0,1,{}", (round + 1) % 2), 1);
+        let read = bench.command("read --new --format csv --fail-on-loss").arg("--port").arg(name).output();
+        let read = read.expect("ser-cli runs");
+        assert_eq!(read.status.code(), Some(0), "round {round}: {}", text(&read.stderr));
+        let rows = text(&read.stdout);
+        assert_eq!(
+            rows.lines().skip(1).map(|row| columns(row)[4]).collect::<Vec<_>>(),
+            [(round + 1).to_string()]
+        );
+    }
+}
+
+#[test]
+fn nothing_is_erased_where_it_cannot_be_said_whether_it_was_delivered() {
+    let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
+    bench.contacts("0,1,1", 1);
+    bench.ok("read --new --format csv");
+    let state = bench.folder.path().join("state");
+    let file = fs::read_dir(&state).expect("a folder").map(|file| file.expect("a file").path());
+    let file = file.into_iter().find(|file| file.extension().is_some_and(|end| end == "json"));
+    fs::write(file.expect("the state"), "{").expect("written");
+    let told = bench.fails(1, "erase --yes");
+    assert!(told.contains("does not say what was delivered") && told.contains("hint: "), "{told}");
+    assert_eq!(bench.entries(), 1);
 }

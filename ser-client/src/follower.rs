@@ -89,8 +89,8 @@ impl LogFollower {
             lost = lost.saturating_add(summary.lost);
             unrecorded = unrecorded.saturating_add(summary.unrecorded);
             restarted |= summary.restarted;
-            if summary.delivered > 0 {
-                // A reading that keeps up may last for days.
+            if self.keeps_up && summary.delivered > 0 {
+                // It may last for days.
                 resyncs = 0;
             }
             match end {

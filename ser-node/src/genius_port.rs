@@ -190,6 +190,11 @@ impl<W: SharedRam> GeniusPort<W> {
         for _ in 0..EVENTS_PER_POLL {
             let Some(event) = self.driver.poll(now_ms) else { break };
             self.deal_with(event, node, now_ms);
+            // That may have taken long, as the storing of a configuration does. Pulses are handed in
+            // before flags are looked at again.
+            if node.tick_ms() != now_ms {
+                break;
+            }
         }
         node.hold_after(self.driver.oldest_arrival_ms());
         if self.on_its_way.is_none() && self.driver.can_transmit() {
@@ -285,6 +290,10 @@ impl<W: SharedRam> GeniusPort<W> {
         if datagram.arrived_ms.is_none() && matches!(message, Ok(Command::SetClock(_))) {
             count(&mut self.diagnostics.clocks_refused, 1);
             return;
+        }
+        if datagram.arrived_ms.is_none() && matches!(message, Ok(Command::SetMode { .. })) {
+            // Better late than never; but changes of that time have been judged by the mode of before.
+            count(&mut node.recorder.diagnostics.settings_late, 1);
         }
         let arrived_ms = datagram.arrived_ms.unwrap_or(now_ms);
         if datagram.broadcast {

@@ -1,6 +1,7 @@
 //! The Genius port: the node's, on the GENI board of the external bus.
 
 use geni::WindowRam;
+use ser_board::budget::PULSE_RING_LEN;
 use ser_node::{GeniusDiagnostics, GeniusOptions, GeniusPort};
 use ser_proto::Model;
 
@@ -20,7 +21,9 @@ impl Genius {
 
     /// Hands the pulses of the interrupt line in, before the node records what came after them.
     pub(crate) fn take_pulses(&mut self, node: &mut BoardNode) {
-        while let Some(tick_ms) = self.board.next_pulse() {
+        // No more than there is room for: a line that chatters must not keep the main loop.
+        for _ in 0..PULSE_RING_LEN {
+            let Some(tick_ms) = self.board.next_pulse() else { break };
             self.port.interrupt(node, tick_ms);
         }
     }

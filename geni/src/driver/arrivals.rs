@@ -11,9 +11,10 @@
 //!   first of those, and the last of them finds none left. With the interrupt line each datagram
 //!   has a pulse of its own.
 //! - **A flag, and the datagram is gone**: once the board says that its queue is empty, all notices
-//!   are void that were there when it was asked.
+//!   that were there when it was asked are void.
 //! - **A datagram, and nobody saw a flag**: it came before the board was looked at, or its flag was
-//!   lost. Nobody knows when it arrived, and it is handed out so.
+//!   lost. Nobody knows when it arrived, and it is handed out without a time, unless a later
+//!   datagram's notice waits: it takes that.
 //! - **The board has failed**: its queue goes with it, and so do the notices.
 
 use heapless::Deque;
@@ -34,6 +35,8 @@ pub(super) struct Arrivals {
     pulses: Deque<u32, MAX_NOTICES>,
     /// The flag was seen at this tick before its pulse was handed in.
     awaits_pulse: Option<u32>,
+    /// The flag was last seen set at this tick.
+    seen_ms: Option<u32>,
     /// When the datagram arrived that was read last, for as long as there may be others that came
     /// with it.
     latest: Option<u32>,
@@ -46,6 +49,7 @@ impl Arrivals {
             before_read: 0,
             pulses: Deque::new(),
             awaits_pulse: None,
+            seen_ms: None,
             latest: None,
         }
     }
@@ -63,11 +67,16 @@ impl Arrivals {
     /// The Receive-Queue flag was looked at, and cleared if it was set.
     pub(super) fn looked(&mut self, is_set: bool, now_ms: u32) {
         if !is_set {
-            // A pulse without a flag says nothing: the flag has been seen before, or it is the one
-            // after a reset.
-            self.pulses.clear();
+            while let Some(tick_ms) = self.pulses.pop_front() {
+                // It fell between the pulses that had been handed in and the look that cleared its
+                // flag. Any other pulse without a flag says nothing, such as the one after a reset.
+                if self.seen_ms.is_some_and(|seen_ms| elapsed_ms(tick_ms, seen_ms) <= 1) {
+                    self.notice(tick_ms);
+                }
+            }
             return;
         }
+        self.seen_ms = Some(now_ms);
         if self.pulses.is_empty() {
             self.awaits_pulse = Some(now_ms);
             self.notice(now_ms);
@@ -193,6 +202,17 @@ mod tests {
         arrivals.pulsed(203);
         arrivals.looked(true, 204);
         assert_eq!(read_all(&mut arrivals, 2), [Some(200), Some(203)]);
+    }
+
+    #[test]
+    fn a_pulse_whose_flag_went_with_that_of_an_earlier_one_has_its_own_tick() {
+        let mut arrivals = Arrivals::new();
+        // The first is handed in; the second falls right before the look that clears their flag.
+        arrivals.pulsed(236);
+        arrivals.looked(true, 626);
+        arrivals.pulsed(626);
+        arrivals.looked(false, 627);
+        assert_eq!(read_all(&mut arrivals, 2), [Some(236), Some(626)]);
     }
 
     #[test]

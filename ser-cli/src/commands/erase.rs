@@ -33,17 +33,16 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             .hint("keep them first: ser-cli read --all --format csv > events.csv")
             .hint("then add --yes"));
     }
-    // Without a memory of what was delivered, or with one that another run is using, the log is erased all the same.
-    let keeper = Keeper::load(&args.state, connection).ok();
+    // A memory that cannot be read, or that another run is using, is a reason to stop before anything is gone.
+    let mut keeper = Keeper::load(&args.state, connection)?;
     let mut unit = connection::open(connection)?;
     let total = unit.log_position()?.total;
+    match keeper.unread(total) {
+        0 => {}
+        1 => warn("1 event has not been delivered by read --new or watch"),
+        unread => warn(format_args!("{unread} events have not been delivered by read --new or watch")),
+    }
     unit.erase()?;
     inform(format_args!("event buffer erased: {total} events since the last erase (modulo 65536)"));
-    let Some(mut keeper) = keeper else { return Ok(()) };
-    match keeper.erased(total)? {
-        0 => {}
-        1 => warn("1 event had not been delivered by read --new or watch"),
-        unread => warn(format_args!("{unread} events had not been delivered by read --new or watch")),
-    }
-    Ok(())
+    keeper.erased(total)
 }
