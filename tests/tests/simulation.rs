@@ -122,9 +122,10 @@ fn all_inputs_toggle_for(duration_ms: u64) {
         assert!(edges.recorded == edges.applied && (edges.applied / events).is_multiple_of(16), "{report}");
     }
     assert!(report.tallies.iter().all(|(_, tally)| tally.delivered > 0 && tally.overwritten > 0), "{report}");
-    // The line carries eight full replies a second beside the printed lines, the bus some twenty datagrams to each host.
+    // The line carries nine replies a second, of which every other one is short, beside some three printed lines; the
+    // bus some twenty datagrams to each host.
     let at_least = |count: u64, per_second: u64| count > per_second * duration_ms / 1000;
-    assert!(at_least(report.line.answered, 5) && at_least(report.line.lines, 3), "{report}");
+    assert!(at_least(report.line.answered, 5) && at_least(report.line.lines, 2), "{report}");
     assert!(report.bus.iter().all(|talk| at_least(talk.answered, 10)), "{report}");
     assert!(at_least(report.bus[0].reports, 10), "{report}");
 }
