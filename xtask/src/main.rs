@@ -58,7 +58,7 @@ enum Verb {
 fn main() -> ExitCode {
     let Arguments { offline, verb } = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) => return ser_console::explain(&error),
+        Err(error) => return ser_console::explain(error),
     };
     let installing = if offline { Installing::Forbidden } else { Installing::Allowed };
     let done = match verb {

@@ -12,6 +12,7 @@ use crate::{firmware, lint, timing};
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask test              installs cross toolchain and emulator where they are missing
+  cargo xtask test --all        installs the programs of others that single tests need, too
   cargo xtask test --offline    installs nothing
   cargo xtask test --strict     as in CI: nothing is left out
   cargo test                    only the tests that need no other program, nor minutes
@@ -46,7 +47,7 @@ fn everything(demand: Demand) -> Result<()> {
     heading("Tools");
     let targets = BOARDS.each_ref().map(|board| board.target);
     setup::make_ready(demand, &targets, &Kind::ALL)?;
-    lint::host()?;
+    lint::host(demand.is_strict())?;
     let (found, missing) = firmware::toolchains(&BOARDS.each_ref(), Installing::Forbidden);
     lint::firmware(&found, demand.is_strict())?;
     let checked = firmware::build_and_check(&found, false)?;

@@ -12,19 +12,35 @@ pub(crate) static TOOL: Tool = Tool {
     kind: Kind::Components,
 };
 
-/// Whether both are there.
-pub(crate) fn there() -> bool {
-    ["fmt", "clippy"].into_iter().all(|tool| works(steps::cargo().args([tool, "--version"])))
+/// One of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Component {
+    Rustfmt,
+    Clippy,
 }
 
-/// Finds both, or has rustup install them.
+/// Whether the toolchain in use has it.
+pub(crate) fn has(component: Component) -> bool {
+    let subcommand = match component {
+        Component::Rustfmt => "fmt",
+        Component::Clippy => "clippy",
+    };
+    works(steps::cargo().args([subcommand, "--version"]))
+}
+
+/// Whether both are there.
+pub(crate) fn there() -> bool {
+    has(Component::Rustfmt) && has(Component::Clippy)
+}
+
+/// Finds both, or has rustup install them for the toolchain in use.
 pub(crate) fn find(installing: Installing) -> Result<()> {
     if there() {
         return Ok(());
     }
     if installing == Installing::Allowed {
         heading(&format!("Installing rustfmt and clippy ({})", TOOL.size));
-        if works(steps::unrelated("rustup").args(["component", "add", "rustfmt", "clippy"])) && there() {
+        if works(steps::in_use("rustup").args(["component", "add", "rustfmt", "clippy"])) && there() {
             return Ok(());
         }
     }

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use crate::places;
 use crate::setup::apt;
+use crate::setup::components::{self, Component};
 use crate::setup::demand::{Installing, Kind, Size, Tool};
 use crate::steps::{self, Failure, Result, heading, note, output, unrelated, works};
 
@@ -88,7 +89,7 @@ impl CrossToolchain {
     /// Clippy for the firmware workspace, if there is one.
     pub(crate) fn clippy(&self) -> Option<Command> {
         match &self.rust {
-            Rust::InUse => Some(self.cargo("clippy")),
+            Rust::InUse => components::has(Component::Clippy).then(|| self.cargo("clippy")),
             // Through /usr/bin/cargo, rustup's clippy would be found first.
             Rust::Debian { linker } => {
                 let there = Path::new(DEBIAN_CARGO_CLIPPY).exists();
@@ -124,7 +125,8 @@ pub(crate) fn there(targets: &[Target]) -> bool {
     find(targets, Installing::Forbidden).iter().all(Result::is_ok)
 }
 
-/// Whether each toolchain that is there has clippy.
+/// Whether each toolchain that is there has clippy. One that is missing counts as [`TOOL`] only: it
+/// may bring its clippy along.
 pub(crate) fn clippy_there(targets: &[Target]) -> bool {
     let found = find(targets, Installing::Forbidden);
     found.iter().flatten().all(|toolchain| toolchain.clippy().is_some())
@@ -194,7 +196,9 @@ fn found_or_installed_debian() -> Option<PathBuf> {
         }
     }
     // Nothing depends on it but how much is checked.
-    let _ = install_clippy();
+    if let Err(why) = install_clippy() {
+        note(&why.to_string());
+    }
     if rust_lld().is_none() && !on_path("ld.lld") {
         let _ = apt::install(&["lld"]).map_err(|why| note(&why));
     }
