@@ -28,7 +28,7 @@ const OFFLINE: [&str; 7] = ["ports", "decode", "encode", "comm-req", "sim", "dem
 
 /// Reads, configures, watches and simulates sequential event recorders (HE660SER160, HE660SER320).
 #[derive(Debug, Parser)]
-#[command(name = "ser-cli", version, after_help = EXAMPLES, max_term_width = 110)]
+#[command(name = "ser-cli", bin_name = "ser-cli", version, after_help = EXAMPLES, max_term_width = 110)]
 pub(crate) struct Cli {
     #[command(flatten)]
     pub(crate) connection: ConnectionArgs,
@@ -45,7 +45,7 @@ pub(crate) struct ConnectionArgs {
     ///
     /// FILE is the window that this computer shares with its GENI board, N the unit's number on the bus. For a board in
     /// this computer FILE is a device for memory; &offset=0x… says where in it the window begins.
-    #[arg(short, long, global = true, env = "SER_PORT", value_name = "PORT")]
+    #[arg(short, long, global = true, env = "SER_PORT", hide_env_values = true, value_name = "PORT")]
     pub(crate) port: Option<String>,
 
     /// Rate of the serial port, 9600 if not given. Over TCP: of the terminal server's port, for `clock set` to reckon
@@ -88,7 +88,8 @@ enum Command {
 impl Command {
     /// Whether it does nothing but bring data.
     fn is_for_its_output(&self) -> bool {
-        matches!(self, Command::Read(_) | Command::Print(_) | Command::Watch(_) | Command::Decode(_))
+        use Command::{CommReq, Completions, Decode, Encode, Print, Read, Watch};
+        matches!(self, Read(_) | Print(_) | Watch(_) | Decode(_) | Encode(_) | CommReq(_) | Completions(_))
     }
 }
 

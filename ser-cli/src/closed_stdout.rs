@@ -7,12 +7,12 @@
 
 use crate::error::{Failure, Result};
 
-/// Fails where what is read would be delivered to nobody.
+/// Fails where what a command prints would reach nobody.
 pub(crate) fn check() -> Result<()> {
     if !was_closed() {
         return Ok(());
     }
-    Err(Failure::new("standard output is closed: what is read would be delivered to nobody")
+    Err(Failure::new("standard output is closed: what it prints would reach nobody")
         .hint("send it to a file or to a program; > /dev/null drops it"))
 }
 

@@ -83,11 +83,13 @@ fn open_failure(error: &OpenError) -> Failure {
         OpenError::NoNode { .. } => Failure::usage(error),
         _ => Failure::new(error),
     };
+    if let OpenError::NoSuchPort { .. } = error {
+        return failure
+            .hint("ser-cli ports lists the serial ports of this computer; is the adapter plugged in?");
+    }
     let failure = failure.hint(error.hint());
     match error {
-        OpenError::NoSuchPort { .. } | OpenError::NotSerial { .. } => {
-            failure.hint("ser-cli ports lists them")
-        }
+        OpenError::NotSerial { .. } => failure.hint("ser-cli ports lists the serial ports"),
         OpenError::Genius { error: GeniusError::NotOnBus { .. }, path } | OpenError::NoNode { path } => {
             failure
                 .hint(format!("ser-cli genius devices --port geni:{path} lists the devices that are there"))

@@ -128,7 +128,7 @@ impl Outlet {
 /// Tells a loss, with the entry after it.
 fn tell(loss: &Loss, after: &[Delivery]) {
     match place(after) {
-        Some(entry) => warn(format_args!("before entry {entry}: {}", loss.sentence())),
+        Some(entry) => warn(format_args!("lost ahead of entry {entry}: {}", loss.sentence())),
         None => warn(loss.sentence()),
     }
 }

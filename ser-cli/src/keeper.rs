@@ -19,10 +19,11 @@ const SAVE_EVERY: Duration = Duration::from_secs(1);
 pub(crate) struct StateArgs {
     /// Where to remember what was delivered; without it, the user's state directory (~/.local/state/ser-cli).
     ///
-    /// A unit is the same however its port is spelled: by a relative path, a link, the device
-    /// behind it, or by another name of this computer. A USB adapter that has a serial number is
-    /// known by that (/dev/serial/by-id), not by the number that it gets when it is plugged in.
-    #[arg(long, env = "SER_STATE_DIR", value_name = "DIR")]
+    /// A unit is the same however its port is spelled: by a relative path, by a link, by the device
+    /// behind it, or, on this computer, by localhost, 127.0.0.1 or `::1`. A USB adapter that has a
+    /// serial number is known by that (/dev/serial/by-id), not by the number that it gets when it
+    /// is plugged in. Numbers in /dev/pts are given anew: name a simulated unit by its link.
+    #[arg(long, env = "SER_STATE_DIR", hide_env_values = true, value_name = "DIR")]
     state_dir: Option<PathBuf>,
 }
 

@@ -31,6 +31,6 @@ pub use state::{Delivered, NotDelivered};
 pub fn run() -> ExitCode {
     match cli::Cli::from_command_line() {
         Ok(cli) => cli.run().map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS),
-        Err(error) => ser_console::explain(&error),
+        Err(error) => ser_console::explain(error),
     }
 }

@@ -187,12 +187,13 @@ impl StateFile {
     pub(crate) fn lock(&self) -> Result<StateLock> {
         // The state file itself is replaced whenever it is saved, so the lock is on one that stays.
         let path = self.path.with_extension("lock");
-        let cannot = |error: io::Error| {
-            Failure::new(format!("cannot lock {}: {error}", path.display()))
+        let failed = |what: &str, path: &Path, error: io::Error| {
+            Failure::new(format!("cannot {what} {}: {error}", path.display()))
                 .hint("choose another directory with --state-dir DIR")
         };
+        let cannot = |error| failed("lock", &path, error);
         if let Some(directory) = path.parent() {
-            fs::create_dir_all(directory).map_err(cannot)?;
+            fs::create_dir_all(directory).map_err(|error| failed("make the directory", directory, error))?;
         }
         let file =
             open_ours(&path, File::options().write(true).create(true).truncate(false)).map_err(cannot)?;

@@ -241,6 +241,14 @@ fn a_client_that_says_nothing_gives_way_in_the_end() {
 }
 
 #[test]
+fn an_address_whose_host_is_not_known_is_told_apart() {
+    let output = ser_cli().args(["sim", "--tcp", "no-such-host.invalid:4000"]).output().expect("runs");
+    let error = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(error.contains("no host of this name") && error.contains("hint: check the spelling"), "{error}");
+}
+
+#[test]
 fn a_wrong_contacts_file_is_refused_with_file_line_and_reason() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("trip.csv");

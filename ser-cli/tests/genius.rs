@@ -175,7 +175,7 @@ fn the_bus_is_seen_and_spoken_to_as_a_whole() {
     }
     assert_eq!(
         bench.on_bus("genius forces --node 9 --table input-enable"),
-        "input enable: 00 00 (points none)\n"
+        "input enable: 00 00 (no point is on)\n"
     );
     assert_eq!(
         bench.on_bus("genius forces --node 9 --table output-values"),

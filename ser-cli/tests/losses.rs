@@ -120,7 +120,9 @@ fn inputs_that_change_while_recording_is_stopped_are_named() {
     let loss = "{\"lost\":null,\"count\":\"unknown\",\"after\":1,\"why\":\"not recorded\",\"inputs\":[7,9],\"life\":\"0\"}";
     assert_eq!(lines.lines().nth(1), Some(loss), "{lines}");
     assert_eq!((lines.lines().count(), output.status.code()), (3, Some(3)));
-    assert!(text(&output.stderr).contains("before entry 2: inputs 7 9 changed while nothing was recorded"));
+    assert!(
+        text(&output.stderr).contains("lost ahead of entry 2: inputs 7 9 changed while nothing was recorded")
+    );
     // By number, too.
     let range = bench.run("read --from 1 --count 2 --format csv --fail-on-loss");
     assert!(text(&range.stdout).contains(",,,,,0,\"lost an unknown number: not recorded, inputs 7 9\""));

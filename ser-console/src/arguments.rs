@@ -1,34 +1,66 @@
 //! Programs with arguments: what clap has to say, and standard output that is full or gone.
 
+use std::error::Error as _;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 use std::process::ExitCode;
+
+use clap::error::{ContextKind, ContextValue};
 
 use crate::Harmless;
 
 /// Prints what clap says instead of the arguments: help, a version, or what is wrong. Gives the
 /// exit code.
 ///
-/// clap repeats arguments and variables as they came. Where one of them has something that a
-/// terminal would obey, the text is printed without colours, and with that escaped: in a text with
-/// colours nobody can tell theirs from ours.
+/// clap repeats arguments as they came. Nothing in them moves a terminal or passes for a line of
+/// the program's own; the program's colours stay.
 #[must_use]
-pub fn explain(error: &clap::Error) -> ExitCode {
-    let arguments = std::env::args_os().chain(std::env::vars_os().map(|(_, value)| value));
-    let mut words = arguments.map(|word| word.to_string_lossy().into_owned());
-    let text = rendered(error, words.any(|word| Harmless(word).differs()));
-    if error.use_stderr() {
+pub fn explain(error: clap::Error) -> ExitCode {
+    let to_stderr = error.use_stderr();
+    let code = u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from);
+    let text = rendered(error);
+    if to_stderr {
         // Nobody is left to be told when standard error is gone.
         let _ = anstream::stderr().write_all(text.as_bytes());
     } else if let Err(error) = print(text) {
         return unwritten(&error);
     }
-    u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from)
+    code
 }
 
-fn rendered(error: &clap::Error, hostile: bool) -> String {
-    let text = error.render();
-    if hostile { Harmless(text).lines() } else { text.ansi().to_string() }
+fn rendered(mut error: clap::Error) -> String {
+    let repeated: Vec<_> = error.context().map(|(kind, value)| (kind, harmless(kind, value))).collect();
+    // clap would propose the words that it was given, as they came.
+    let is_hostile = repeated.iter().any(|(_, value)| value.is_some());
+    for (kind, value) in repeated {
+        if is_hostile && kind == ContextKind::Suggested {
+            error.insert(kind, ContextValue::None);
+        } else if let Some(value) = value {
+            error.insert(kind, value);
+        }
+    }
+    let mut text = error.render().ansi().to_string();
+    if let Some(source) = error.source().map(ToString::to_string) {
+        text = text.replace(&source, &Harmless(&source).to_string());
+    }
+    // Nothing of others' is left by now. Should clap ever repeat more, the colours go, too: nobody
+    // could tell theirs from ours.
+    let plain = anstream::adapter::strip_str(&text).to_string();
+    if Harmless(&plain).lines() == plain { text } else { Harmless(text).lines() }
+}
+
+/// Of what an error repeats: its harmless form, where that is another one.
+fn harmless(kind: ContextKind, value: &ContextValue) -> Option<ContextValue> {
+    let line = |word: &String| Harmless(word).line();
+    match value {
+        // Usage is the program's own.
+        _ if kind == ContextKind::Usage => None,
+        ContextValue::String(word) if line(word) != *word => Some(ContextValue::String(line(word))),
+        ContextValue::Strings(words) if words.iter().any(|word| line(word) != *word) => {
+            Some(ContextValue::Strings(words.iter().map(line).collect()))
+        }
+        _ => None,
+    }
 }
 
 /// Prints a text on standard output, with colours only where they are wanted.
@@ -54,21 +86,54 @@ pub fn unwritten(error: &io::Error) -> ExitCode {
 
 #[cfg(test)]
 mod tests {
+    use clap::builder::PossibleValuesParser;
     use clap::{Arg, Command};
 
     use super::*;
 
+    const HOSTILE: &str = "\u{1B}[2J\u{9B}2J\u{202E}\nerror: all is lost";
+
+    fn said(words: &[&str]) -> String {
+        let of_ab = Arg::new("letter").long("letter").value_parser(PossibleValuesParser::new(["a"]));
+        let refused = |text: &str| Err::<u8, _>(format!("what is {text}?"));
+        let number = Arg::new("number").short('n').long("number").value_parser(refused);
+        let command = Command::new("program").bin_name("program").args([of_ab, number]);
+        let command = command.subcommand(Command::new("read")).subcommand_required(true);
+        let words = ["program"].iter().chain(words);
+        rendered(command.try_get_matches_from(words).unwrap_err())
+    }
+
     #[test]
-    fn arguments_are_repeated_so_that_no_terminal_obeys_them() {
-        let command = || Command::new("program").arg(Arg::new("port").long("port").value_parser(["a"]));
-        let hostile = "\u{1B}[2J\u{9B}2J\u{202E}";
-        for words in [["--port", hostile], [&format!("--{hostile}"), "x"], [hostile, "x"]] {
-            let error = command().try_get_matches_from(["program"].iter().chain(&words)).unwrap_err();
-            let text = rendered(&error, true);
-            assert!(!text.contains(['\u{1B}', '\u{9B}', '\u{202E}']), "{text:?}");
-            assert!(text.contains(r"\u{9b}2J\u{202e}") && text.contains("\n\n"), "{text:?}");
+    fn nothing_in_an_argument_moves_a_terminal_or_passes_for_a_line_of_ours() {
+        let [option, with_value] = [format!("--{HOSTILE}"), format!("--letter={HOSTILE}")];
+        let cluster = format!("-n{HOSTILE}");
+        for words in [
+            &[HOSTILE][..],
+            &["read", HOSTILE],
+            &[&option],
+            &["read", &option],
+            &[&with_value],
+            &["--letter", HOSTILE],
+            &["--number", HOSTILE],
+            &[&cluster],
+            &["--a\u{1B}[31mx"],
+        ] {
+            let text = said(words);
+            let plain = anstream::adapter::strip_str(&text).to_string();
+            assert!(!text.contains("\u{1B}[2J"), "{text:?}");
+            assert!(!plain.contains(['\u{1B}', '\u{9B}', '\u{202E}']), "{text:?}");
+            assert!(!plain.contains("\nerror: all"), "{plain}");
+            assert!(plain.contains(r"\u{1b}"), "what was given is shown: {plain}");
+            assert!(text.starts_with("\u{1B}["), "the program's own colours stay: {text:?}");
         }
-        let error = command().try_get_matches_from(["program", "--port", "b"]).unwrap_err();
-        assert!(rendered(&error, false).contains("\u{1B}["), "the program's own colours stay");
+    }
+
+    #[test]
+    fn what_is_harmless_is_repeated_as_it_came_with_a_proposal() {
+        let text = said(&["--lettre", "b"]);
+        let plain = anstream::adapter::strip_str(&text).to_string();
+        assert!(plain.contains("unexpected argument '--lettre'"), "{plain}");
+        assert!(plain.contains("a similar argument exists: '--letter'"), "{plain}");
+        assert!(text.contains("\u{1B}["));
     }
 }

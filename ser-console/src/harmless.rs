@@ -44,12 +44,6 @@ impl<T: Display> Harmless<T> {
         let _ = write!(Filter { out: &mut lines, indent: false }, "{}", self.0);
         lines
     }
-
-    /// Whether anything in the text has to be escaped.
-    #[cfg(feature = "arguments")]
-    pub(crate) fn differs(&self) -> bool {
-        self.0.to_string().chars().any(is_obeyed)
-    }
 }
 
 struct Filter<W> {

@@ -18,6 +18,8 @@ pub enum SimError {
         /// Why it failed.
         source: io::Error,
     },
+    /// No host of this name is known; `HOST:PORT`.
+    NoSuchHost(String),
     /// The place of the link is taken by something that is not ours to replace.
     LinkTaken(PathBuf),
     /// Another simulator has the link.
@@ -67,6 +69,9 @@ impl fmt::Display for SimError {
         match self {
             SimError::Scenario(error) => error.fmt(f),
             SimError::Io { doing, source } => write!(f, "cannot {doing}: {source}"),
+            SimError::NoSuchHost(address) => {
+                write!(f, "cannot listen on {address}: no host of this name is known")
+            }
             SimError::LinkInUse(path) | SimError::WindowInUse(path) => {
                 write!(f, "another simulator has {}", path.display())
             }

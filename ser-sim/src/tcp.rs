@@ -12,7 +12,7 @@
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::mem;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
 #[cfg(unix)]
 use std::os::fd::{AsFd, BorrowedFd};
 use std::time::{Duration, Instant};
@@ -58,8 +58,11 @@ struct Client {
 impl TcpLine {
     /// Listens; see [`Port::Tcp`](crate::Port::Tcp).
     pub(crate) fn listen(address: &str, gives_way_after: Option<Duration>) -> Result<TcpLine, SimError> {
+        let found = address.to_socket_addrs();
+        let addresses: Vec<SocketAddr> =
+            found.map_err(|_| SimError::NoSuchHost(address.to_owned()))?.collect();
         let listen = || {
-            let listener = TcpListener::bind(address)?;
+            let listener = TcpListener::bind(&addresses[..])?;
             listener.set_nonblocking(true)?;
             let address = listener.local_addr()?;
             Ok((listener, address))

@@ -43,6 +43,13 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         unread => warn(format_args!("{unread} events have not been delivered by read --new or watch")),
     }
     unit.erase()?;
-    inform(format_args!("event buffer erased: {total} events since the last erase (modulo 65536)"));
+    inform(erased(total));
     keeper.erased(total)
+}
+
+fn erased(total: u16) -> String {
+    let events = if total == 1 { "1 event".to_owned() } else { format!("{total} events") };
+    format!(
+        "event buffer erased; {events} had been recorded since the erase before (the unit counts modulo 65536)"
+    )
 }

@@ -101,7 +101,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "HOST:PORT", value_parser = tcp_address)]
     tcp: Option<String>,
 
-    /// A client that has sent nothing for so long gives way when another one comes; or never.
+    /// How long a client may be silent before it gives way to another one; `never` lets it stay.
     #[arg(long, value_name = "TIME", default_value = "600s", value_parser = patience)]
     tcp_idle: Patience,
 
@@ -251,6 +251,7 @@ impl From<SimError> for Failure {
     fn from(error: SimError) -> Failure {
         Failure::new(&error).hint(match error {
             SimError::Scenario(_) => "see ser-cli sim --help for the format, and correct this line",
+            SimError::NoSuchHost(_) => "check the spelling, or give an IP address",
             SimError::LinkTaken(_) | SimError::LinkInUse(_) => {
                 "choose a name that does not exist, as in --pty /tmp/ser"
             }

@@ -75,7 +75,7 @@ fn duration_ms(text: &str) -> Result<u64, String> {
 fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) => return ser_console::explain(&error),
+        Err(error) => return ser_console::explain(error),
     };
     run_all(&arguments).map_or_else(|code| code, |()| ExitCode::SUCCESS)
 }

@@ -49,7 +49,7 @@ mod measured {
     pub(super) fn main() -> ExitCode {
         let Arguments { load_seconds, image, plugin } = match Arguments::try_parse() {
             Ok(arguments) => arguments,
-            Err(error) => return ser_console::explain(&error),
+            Err(error) => return ser_console::explain(error),
         };
         let load_ms = u64::from(load_seconds.get()) * 1000;
         let began = Instant::now();

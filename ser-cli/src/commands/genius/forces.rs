@@ -24,8 +24,12 @@ fn text(table: ForceTable, contents: &[u8]) -> String {
     }
     let bits = (1_usize..).zip(contents.iter().flat_map(|byte| (0..8).map(move |bit| byte >> bit & 1 != 0)));
     let points: Vec<_> = bits.filter(|(_, set)| *set).map(|(number, _)| number.to_string()).collect();
-    let points = if points.is_empty() { "none".to_string() } else { points.join(" ") };
-    format!("{table}: {} (points {points})", hex_text(contents))
+    let points = match &points[..] {
+        [] => "no point is on".to_owned(),
+        [point] => format!("point {point} is on"),
+        points => format!("points {} are on", points.join(" ")),
+    };
+    format!("{table}: {} ({points})", hex_text(contents))
 }
 
 #[cfg(test)]
@@ -34,8 +38,11 @@ mod tests {
 
     #[test]
     fn a_table_is_shown_as_bytes_and_as_points() {
-        assert_eq!(text(ForceTable::InputValues, &[0x05, 0x80]), "input values: 05 80 (points 1 3 16)");
-        assert_eq!(text(ForceTable::InputEnable, &[0, 0]), "input enable: 00 00 (points none)");
+        assert_eq!(
+            text(ForceTable::InputValues, &[0x05, 0x80]),
+            "input values: 05 80 (points 1 3 16 are on)"
+        );
+        assert_eq!(text(ForceTable::InputEnable, &[0, 0]), "input enable: 00 00 (no point is on)");
         assert_eq!(text(ForceTable::OutputEnable, &[]), "output enable: the device has no such points");
     }
 }
