@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 
 use chrono::NaiveDateTime;
-use geni::{
+use geni_board::{
     CommandError, Completion, Configuration, Data, Destination, Driver, Event, Options, Received, Start,
 };
 use ser_node::{Debounce, GeniusOptions, GeniusPort};
@@ -235,11 +235,11 @@ impl World {
     pub fn transmit(&mut self, destination: Destination, function: u8, subfunction: u8, data: &[u8]) {
         let data = Data::from_slice(data).expect("short enough");
         self.until("the host's board is free", |world| world.host.driver.can_transmit().then_some(()));
-        let transmission = geni::Transmission {
+        let transmission = geni_board::Transmission {
             destination,
             function,
             subfunction,
-            priority: geni::Priority::Normal,
+            priority: geni_board::Priority::Normal,
             completion: Completion::Acknowledged,
             data,
         };

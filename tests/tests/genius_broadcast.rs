@@ -1,7 +1,7 @@
 //! Many recorders on one bus: one broadcast sets all clocks, and everybody's inputs are seen in every scan.
 
-use geni::CommandError;
-use geni::Destination::Broadcast;
+use geni_board::CommandError;
+use geni_board::Destination::Broadcast;
 use ser_proto::{Code, Command, Model, Reply, TimeStamp};
 use ser_tests::genius_world::World;
 

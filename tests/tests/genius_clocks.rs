@@ -1,7 +1,7 @@
 //! One broadcast sets the clocks of recorders that report all the time: their boards are busy
 //! sending when it comes, and hand it over late.
 
-use geni::Destination::Broadcast;
+use geni_board::Destination::Broadcast;
 use ser_node::HELD_BACK_MS;
 use ser_proto::{
     AutoReport, Code, Command, Configure, Entry, Inputs, LastBroadcast, Model, Reply, TimeStamp,

@@ -2,8 +2,8 @@
 
 use std::rc::Rc;
 
-use geni::Destination::{Broadcast, Device};
-use geni::{Configuration, Driver, Event, Options, Received, Start};
+use geni_board::Destination::{Broadcast, Device};
+use geni_board::{Configuration, Driver, Event, Options, Received, Start};
 use ser_proto::{
     AutoReport, Baud, Code, Command, Configure, Entry, Inputs, LastBroadcast, Mode, Model, Reply, TimeStamp,
 };
@@ -324,13 +324,13 @@ fn of_two_hosts_that_ask_each_gets_the_answer_to_its_own_question() {
     let mut second = second_host(&mut world, 30);
     for _ in 0..10 {
         world.send(Device(UNIT), &Command::QueryConfiguration);
-        let question = geni::Transmission {
+        let question = geni_board::Transmission {
             destination: Device(UNIT),
             function: 0x40,
             subfunction: 0x50,
-            priority: geni::Priority::Normal,
-            completion: geni::Completion::Acknowledged,
-            data: geni::Data::from_slice(b"M").expect("a byte"),
+            priority: geni_board::Priority::Normal,
+            completion: geni_board::Completion::Acknowledged,
+            data: geni_board::Data::from_slice(b"M").expect("a byte"),
         };
         second.transmit(question).expect("the board is free");
         let (mut first_got, mut second_got) = (Vec::new(), Vec::new());

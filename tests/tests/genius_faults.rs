@@ -1,7 +1,7 @@
 //! Boards that fail, queues that fill: the recorder recovers by itself, RS-232 goes on, and no event is lost.
 
-use geni::Destination::Device;
-use geni::SharedRam;
+use geni_board::Destination::Device;
+use geni_board::SharedRam;
 use ser_proto::{AutoReport, Command, Configure, Inputs, Model, Reply};
 use ser_sim::genius::{DeviceFault, Fault};
 use ser_tests::genius_world::{HOST, World};

@@ -1,7 +1,7 @@
 //! Commands of all kinds on both ports at once, with a tenth of all messages lost or damaged: whoever reads the log
 //! gets every event once.
 
-use geni::Destination::Device;
+use geni_board::Destination::Device;
 use ser_proto::{
     AutoReport, Command, Configure, Entry, FrameEncoder, Inputs, Model, ReadReply, Reply, TimeStamp,
 };

@@ -1,7 +1,7 @@
 //! A bus and a line together set a recorder's clock and mode as fast as they can, while debounce
 //! holds changes back: what was in force when a contact moved decides about the change.
 
-use geni::{Completion, Data, Destination, Priority, Transmission};
+use geni_board::{Completion, Data, Destination, Priority, Transmission};
 use ser_node::Debounce;
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{Command, Model, TimeStamp};

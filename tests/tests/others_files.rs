@@ -35,23 +35,23 @@ const JUDGED: [(&str, &str, usize, &str); 12] = [
     ("ser-cli/src/state.rs", ".persist(", 1, "over a state file, which it was read as just before"),
     ("ser-cli/src/state.rs", "remove_file(", 1, "a state file, which it was read as just before"),
     (
-        "ser-sim/src/claim.rs",
+        "crates/ser-sim/src/claim.rs",
         "remove_file(",
         2,
         "what the claim's record says is ours, or what was just made",
     ),
     (
-        "ser-sim/src/claim.rs",
+        "crates/ser-sim/src/claim.rs",
         "set_len(",
         1,
         "the claim's record, in a directory that nobody else can write to",
     ),
-    ("ser-sim/src/emulator.rs", "File::create(", 1, "in a temporary directory of its own"),
-    ("ser-sim/src/external_bus.rs", "set_len(", 1, "a file that was just made, and by nobody else"),
-    ("ser-sim/src/lockstep.rs", "File::create(", 1, "in a temporary directory of its own"),
-    ("ser-sim/src/pty.rs", "fs::rename(", 1, "over a link that the claim's record says is ours"),
-    ("ser-sim/src/pty.rs", "remove_file(", 1, "a link that was just made"),
-    ("ser-qemu-plugin/src/lib.rs", "println!(", 1, "in QEMU, whose standard error is a file of the bench"),
+    ("crates/ser-sim/src/emulator.rs", "File::create(", 1, "in a temporary directory of its own"),
+    ("crates/ser-sim/src/external_bus.rs", "set_len(", 1, "a file that was just made, and by nobody else"),
+    ("crates/ser-sim/src/lockstep.rs", "File::create(", 1, "in a temporary directory of its own"),
+    ("crates/ser-sim/src/pty.rs", "fs::rename(", 1, "over a link that the claim's record says is ours"),
+    ("crates/ser-sim/src/pty.rs", "remove_file(", 1, "a link that was just made"),
+    ("crates/ser-qemu-plugin/src/lib.rs", "println!(", 1, "in QEMU, whose standard error is a file of the bench"),
     ("xtask/src/setup/apt.rs", "File::create(", 1, "in the build folder"),
 ];
 
@@ -85,9 +85,12 @@ fn calls(source: &str) -> BTreeMap<&'static str, usize> {
 #[test]
 fn every_call_that_could_touch_a_file_of_others_has_been_judged() {
     let mut files = Vec::new();
-    for entry in fs::read_dir(root()).expect("the repository").map(|entry| entry.expect("an entry").path()) {
-        for folder in ["src", "examples"].map(|folder| entry.join(folder)) {
-            if entry.join("Cargo.toml").exists() && folder.is_dir() {
+    let entries = |folder: PathBuf| {
+        fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path())
+    };
+    for package in entries(root()).chain(entries(root().join("crates"))) {
+        for folder in ["src", "examples"].map(|folder| package.join(folder)) {
+            if package.join("Cargo.toml").exists() && folder.is_dir() {
                 sources(&folder, &mut files);
             }
         }

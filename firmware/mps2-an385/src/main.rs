@@ -60,7 +60,7 @@ mod app {
     /// There is nothing below the stack, and nobody says so: QEMU swallows what is written there.
     const BELOW_STACK: Region = Region::nothing(0x1000_0000, 0x1000_0000);
 
-    // RTIC takes nothing but literals for priorities; `ser-board/tests/priorities.rs` sees that the tasks have these.
+    // RTIC takes nothing but literals for priorities; `crates/ser-board/tests/priorities.rs` sees that the tasks have these.
     const _: () = {
         assert!(budget::CAPTURE_PRIORITY == 3);
         assert!(budget::RECEIVE_PRIORITY == 2);

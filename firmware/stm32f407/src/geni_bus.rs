@@ -62,7 +62,7 @@
 
 use core::ptr::{self, NonNull};
 
-use geni::WindowRam;
+use geni_board::WindowRam;
 use ser_board::budget::PULSE_RING_LEN;
 use ser_node::ring::{Reader, Ring, Writer};
 use stm32f4::stm32f407::{EXTI, FSMC, GPIOG, RCC, SYSCFG};

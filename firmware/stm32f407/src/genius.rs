@@ -1,6 +1,6 @@
 //! The Genius port: the node's, on the GENI board of the external bus.
 
-use geni::WindowRam;
+use geni_board::WindowRam;
 use ser_board::budget::PULSE_RING_LEN;
 use ser_node::{GeniusDiagnostics, GeniusOptions, GeniusPort};
 use ser_proto::Model;

@@ -68,7 +68,7 @@ mod app {
     /// No clock can show an earlier day: there was no such recorder.
     const NOT_BEFORE: NaiveDate = NaiveDate::from_ymd_opt(2026, 1, 1).unwrap();
 
-    // RTIC takes nothing but literals for priorities; `ser-board/tests/priorities.rs` sees that the tasks have these.
+    // RTIC takes nothing but literals for priorities; `crates/ser-board/tests/priorities.rs` sees that the tasks have these.
     const _: () = {
         assert!(budget::CAPTURE_PRIORITY == 3);
         assert!(budget::RECEIVE_PRIORITY == 2);
@@ -207,7 +207,7 @@ mod app {
 
     /// A datagram has arrived at the GENI board. Wakes the main loop.
     #[task(binds = EXTI9_5, priority = 1, local = [geni_line])]
-    fn geni(cx: geni::Context) {
+    fn geni(cx: geni_board::Context) {
         cx.local.geni_line.on_interrupt(timer::tick_ms());
     }
 

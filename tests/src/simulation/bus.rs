@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 use std::time::Duration;
 
-use geni::{
+use geni_board::{
     Completion, Configuration, Data, Destination, Driver, Event, Options, Priority, Start, Transmission,
 };
 use ser_node::{GeniusOptions, GeniusPort};

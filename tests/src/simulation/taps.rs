@@ -5,7 +5,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use geni::{SharedRam, map};
+use geni_board::{SharedRam, map};
 use ser_node::Diagnostics;
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{Code, Command, Decoded, FrameDecoder, FrameError, MAX_BODY_LEN, ParseError, Reply};

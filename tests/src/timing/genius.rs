@@ -4,7 +4,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use geni::{
+use geni_board::{
     Completion, Configuration, Data, Destination, Driver, Event, Options, Priority, Start, Transmission,
 };
 use ser_node::{GeniusOptions, GeniusPort};

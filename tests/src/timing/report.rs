@@ -199,7 +199,7 @@ impl fmt::Display for Report {
             f,
             "\nInstructions are not cycles: a chip adds wait states of flash and bus, and a dozen cycles to enter and leave an\n\
              interrupt. Virtual time has {} instructions a second. Budgets, and the reckoning behind them, are in\n\
-             ser-board/src/budget.rs.",
+             crates/ser-board/src/budget.rs.",
             grouped(INSTRUCTIONS_PER_MS * 1000),
         )
     }

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use geni::SharedRam;
+use geni_board::SharedRam;
 use ser_client::{Clock, GeniHost, GeniWindow, OpenError, Options, Unit};
 use ser_proto::Model;
 use ser_sim::genius::{Noise, RAM_LEN};

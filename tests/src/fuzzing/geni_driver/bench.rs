@@ -3,7 +3,7 @@
 use std::cell::{RefCell, RefMut};
 use std::rc::Rc;
 
-use geni::{
+use geni_board::{
     Configuration, ConfigurationOutcome, Counters, Driver, Event, Options, Start, Transmission, map, timing,
 };
 
@@ -185,7 +185,7 @@ impl Bench {
     }
 
     pub(super) fn transmit(&mut self, transmission: Transmission) {
-        let reply = matches!(transmission.completion, geni::Completion::Reply { .. });
+        let reply = matches!(transmission.completion, geni_board::Completion::Reply { .. });
         let could = self.driver.can_transmit();
         if self.driver.transmit(transmission).is_ok() {
             assert!(could && self.on_its_way.is_none(), "two datagrams at once");

@@ -4,7 +4,7 @@ mod bench;
 mod ram;
 mod recovery;
 
-use geni::{
+use geni_board::{
     AnswerError, Completion, Configuration, Data, Destination, Options, Priority, RequestAnswer,
     RequestStatus, Requests, Start, Transmission,
 };

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use geni::{RAM_LEN, SharedRam, map};
+use geni_board::{RAM_LEN, SharedRam, map};
 use ser_sim::genius::BoardWindow;
 
 /// The driver's end.

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use geni::{Completion, Configuration, Data, Destination, Event, Priority, Transmission};
+use geni_board::{Completion, Configuration, Data, Destination, Event, Priority, Transmission};
 use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusRate, Handle, Violation, ViolationKind};
 
 use super::bench::Bench;

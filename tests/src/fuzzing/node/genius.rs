@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use geni::Start;
+use geni_board::Start;
 use ser_node::{GeniusOptions, GeniusPort};
 use ser_proto::genius::{FUNCTION_GENIUS, FUNCTION_HORNER, SUBFUNCTION_SER, Subfunction};
 use ser_proto::{Entry, Model, Reply};

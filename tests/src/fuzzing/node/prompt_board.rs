@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-use geni::{RAM_LEN, SharedRam, map};
+use geni_board::{RAM_LEN, SharedRam, map};
 
 /// A datagram on its way to the recorder.
 #[derive(Clone, Debug)]

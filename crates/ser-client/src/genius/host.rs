@@ -1,0 +1,503 @@
+//! The host's side of a GENI board: who is on the bus, what they say, and what is said to them.
+
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use geni_board::{
+    Completion, Configuration, Data, Destination, Device, DeviceChange, Driver, Event, Failure, Identity,
+    MAX_DEVICE_NUMBER, Options, Priority, Received, SharedRam, Start, Status, TableError, Transmission,
+    TransmitError, map,
+};
+use ser_proto::Command;
+use ser_proto::genius::{
+    Datagram, FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, IoForces, Message, SUBFUNCTION_SER, Subfunction,
+};
+
+use super::GeniusError;
+use super::inboxes::Inboxes;
+use super::recognition::Answers;
+use super::window::Window;
+use crate::{Clock, RealTime};
+use crate::{GeniWindow, OpenError, Unit};
+
+/// Nothing tells when a file has changed, so it is looked at this often.
+pub(super) const PACE: Duration = Duration::from_millis(1);
+
+/// What happens in one look is dealt with, up to so many events; more wait for the next.
+const EVENTS_PER_LOOK: usize = 16;
+
+/// About so long takes a set-clock datagram itself, with what the host's board needs to take it
+/// over. The recorder's board raises its flag at once. Measured with the models of both.
+const HANDOVER: Duration = Duration::from_millis(2);
+
+/// A board has its heartbeat five times a second. One that runs in the time of a busy computer gets longer.
+const HEARTBEAT_PATIENCE: Duration = Duration::from_secs(3);
+
+/// From the heartbeat to the bus, at least: the board starts up, or has just been configured.
+const BUS_PATIENCE: Duration = Duration::from_secs(5);
+
+/// A device that is on the bus is logged in within a few scans, which are not longer than 400 ms.
+const LOG_IN_PATIENCE: Duration = Duration::from_secs(2);
+
+/// When nobody has logged in or out for so many scans, everybody who is there is known.
+const QUIET_SCANS: u32 = 10;
+
+/// The driver ends every datagram before that, unless it has to be more patient itself.
+const DATAGRAM_PATIENCE: Duration = Duration::from_secs(20);
+
+/// A device that is logged in.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BusDevice {
+    /// Its number.
+    pub number: u8,
+    /// What the board knows of it.
+    pub device: Device,
+    /// Its inputs or global data.
+    pub inputs: Vec<u8>,
+}
+
+/// A host on a Genius bus. Clones are the same host; each can be in another [`Unit`].
+#[derive(Clone)]
+pub struct GeniHost {
+    shared: Arc<Mutex<Host>>,
+    pub(super) clock: Arc<dyn Clock>,
+}
+
+impl GeniHost {
+    /// Opens a window, and waits until the board in it is on the bus. `patience` is how long the board may stand still;
+    /// it gets at least three seconds. What recorders have sent while nobody had the window open is thrown away.
+    ///
+    /// # Errors
+    /// When there is no such window, or the board does not come onto the bus.
+    pub fn open(window: impl Into<GeniWindow>, patience: Duration) -> Result<GeniHost, OpenError> {
+        GeniHost::open_in(Arc::new(RealTime::new()), window, patience)
+    }
+
+    /// The same for a host in whose time board and bus live.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_in(
+        clock: Arc<dyn Clock>,
+        window: impl Into<GeniWindow>,
+        patience: Duration,
+    ) -> Result<GeniHost, OpenError> {
+        let place = window.into();
+        let patience = patience.max(HEARTBEAT_PATIENCE);
+        let mut host = Host::new(Window::open(&place)?, Arc::clone(&clock), patience);
+        host.begin().map_err(|error| OpenError::Genius { path: place.file, error })?;
+        Ok(GeniHost { shared: Arc::new(Mutex::new(host)), clock })
+    }
+
+    /// A recorder on the bus.
+    #[must_use]
+    pub fn unit(&self, node: u8, options: crate::Options) -> Unit {
+        Unit::on_genius(self.clone(), node, options)
+    }
+
+    /// The host's own number.
+    #[must_use]
+    pub fn number(&self) -> u8 {
+        self.lock().number()
+    }
+
+    /// Who the host's board is.
+    #[must_use]
+    pub fn identity(&self) -> Option<Identity> {
+        self.lock().identity
+    }
+
+    /// How long a bus scan takes.
+    #[must_use]
+    pub fn scan_time(&self) -> Option<Duration> {
+        self.lock().scan_time()
+    }
+
+    /// How board and bus are, by the board's own word; `None` before it has said anything.
+    #[must_use]
+    pub fn status(&self) -> Option<Status> {
+        self.lock().driver.status()
+    }
+
+    /// Waits until a device is logged in, as long as that takes for one that is there.
+    ///
+    /// # Errors
+    /// When it is not there, or the board fails.
+    pub fn find(&self, node: u8) -> Result<Device, GeniusError> {
+        self.lock().find(node)
+    }
+
+    /// All devices that are logged in, and what their inputs are in one and the same bus scan. While devices come and
+    /// go, as when the bus has just been started, this waits until that is over, two seconds at most.
+    ///
+    /// # Errors
+    /// When the board fails.
+    pub fn devices(&self) -> Result<Vec<BusDevice>, GeniusError> {
+        self.lock().devices()
+    }
+
+    /// Says a command to all recorders. It is carried out and not answered; each of them remembers its last broadcast.
+    ///
+    /// # Errors
+    /// When it does not get out.
+    pub fn broadcast(&self, command: &Command) -> Result<(), GeniusError> {
+        self.lock().deliver(ser_message(Destination::Broadcast, command)?).map_err(|error| match error {
+            GeniusError::Undelivered(error) => GeniusError::BroadcastFailed(error),
+            other => other,
+        })
+    }
+
+    /// Asks a device for one of its force tables.
+    ///
+    /// # Errors
+    /// When the device is not there or does not answer.
+    pub fn read_forces(&self, node: u8, table: ForceTable) -> Result<IoForces, GeniusError> {
+        self.lock().read_forces(node, table)
+    }
+
+    /// How long it takes until a short datagram that is sent now arrives, on the average: the next turn is half a scan
+    /// away. On a busy bus it takes longer, as all devices together send one datagram per scan.
+    #[must_use]
+    pub fn delay(&self) -> Duration {
+        PACE + self.scan_time().unwrap_or_default() / 2 + HANDOVER
+    }
+
+    /// Datagrams that were no message of a recorder to this host, and messages that nobody took in time. Among the
+    /// latter are those that were there before this host.
+    #[must_use]
+    pub fn lost(&self) -> (u64, u64) {
+        self.lock().inboxes.lost()
+    }
+
+    /// Begins to send a message to a recorder.
+    pub(crate) fn send(&self, node: u8, command: &Command) -> Result<(), GeniusError> {
+        let mut host = self.lock();
+        host.find(node)?;
+        host.transmit(ser_message(Destination::Device(node), command)?)
+    }
+
+    /// Whether the datagram that was sent last is known not to have arrived.
+    pub(crate) fn is_undelivered(&self) -> bool {
+        matches!(self.lock().sent, Some(Err(_)))
+    }
+
+    /// What a recorder has sent before now. The board holds some of it back until it is asked, so a look will not do.
+    pub(crate) fn take_waiting(&self, node: u8) -> Result<Vec<Received>, GeniusError> {
+        let mut host = self.lock();
+        host.empty_receive_queue()?;
+        Ok(std::iter::from_fn(|| host.inboxes.take(node)).collect())
+    }
+
+    /// Waits for messages of a recorder.
+    pub(crate) fn receive(&self, node: u8, timeout: Duration) -> Result<Vec<Received>, GeniusError> {
+        let until = self.clock.now() + timeout;
+        loop {
+            let mut host = self.lock();
+            host.look()?;
+            let received: Vec<_> = std::iter::from_fn(|| host.inboxes.take(node)).collect();
+            drop(host);
+            if !received.is_empty() || self.clock.now() >= until {
+                return Ok(received);
+            }
+            // Without the lock, so that other recorders can be asked meanwhile.
+            self.clock.wait(PACE);
+        }
+    }
+
+    /// The time that this host goes by.
+    pub(crate) fn now(&self) -> Duration {
+        self.clock.now()
+    }
+
+    pub(super) fn lock(&self) -> MutexGuard<'_, Host> {
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for GeniHost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("GeniHost").field("number", &self.number()).finish_non_exhaustive()
+    }
+}
+
+/// A message in a datagram whose acknowledgement is waited for. The reply comes as a datagram of its own: a board that
+/// is told to wait for it does nothing else meanwhile, and would take an auto report for it.
+pub(super) fn ser_message(destination: Destination, command: &Command) -> Result<Transmission, GeniusError> {
+    let data = Data::from_slice(&command.to_body());
+    Ok(Transmission {
+        destination,
+        function: FUNCTION_HORNER,
+        subfunction: SUBFUNCTION_SER,
+        priority: Priority::Normal,
+        completion: Completion::Acknowledged,
+        // No command is as long as that.
+        data: data.map_err(|_| GeniusError::BoardBusy)?,
+    })
+}
+
+/// A datagram that has arrived, as the protocol knows it.
+fn bus_datagram(received: &Received, own_number: u8) -> Option<Datagram> {
+    let source = ser_proto::genius::Device::new(received.source)?;
+    let own_number = ser_proto::genius::Device::new(own_number)?;
+    Datagram::new(source, own_number.into(), received.function, received.subfunction, &received.data).ok()
+}
+
+const fn bit(number: u8) -> u32 {
+    1 << (number & MAX_DEVICE_NUMBER)
+}
+
+/// The board, and what it has said.
+pub(super) struct Host {
+    driver: Driver<Window>,
+    clock: Arc<dyn Clock>,
+    patience: Duration,
+    identity: Option<Identity>,
+    failure: Option<Failure>,
+    pub(super) inboxes: Inboxes,
+    pub(super) answers: Answers,
+    sent: Option<Result<(), geni_board::CommandError>>,
+    replied: Option<Result<Received, geni_board::CommandError>>,
+    tables: Option<Vec<BusDevice>>,
+    /// Who is logged in by the driver's word, a bit for each.
+    known: u32,
+    /// When that changed last.
+    devices_changed: Duration,
+}
+
+impl Host {
+    fn new(ram: Window, clock: Arc<dyn Clock>, patience: Duration) -> Host {
+        // A board that is starting up has anything in its tables; this flag has no such value then.
+        let is_set_up = ram.read(map::STATUS_OK) <= 1;
+        // The board serves other programs as well, one after the other: it stays as it is configured.
+        let configuration = Configuration::new(
+            ram.read_word(map::SETUP_REFERENCE),
+            ram.read(map::SETUP_BROADCAST_LEN),
+            ram.read(map::SETUP_DIRECTED_LEN),
+            ram.read(map::SETUP_BUFFER_LEN),
+        );
+        let options = Options {
+            start: Start::Running,
+            reset_line: false,
+            heartbeat_timeout_ms: u32::try_from(patience.as_millis()).unwrap_or(u32::MAX),
+            ..Options::new(configuration.ok().filter(|_| is_set_up).unwrap_or(Configuration::DEFAULT))
+        };
+        Host {
+            driver: Driver::new(ram, options),
+            known: 0,
+            devices_changed: clock.now(),
+            clock,
+            patience,
+            identity: None,
+            failure: None,
+            inboxes: Inboxes::default(),
+            answers: Answers::default(),
+            sent: None,
+            replied: None,
+            tables: None,
+        }
+    }
+
+    fn number(&self) -> u8 {
+        self.identity.map_or(MAX_DEVICE_NUMBER, |identity| identity.switches.device_number)
+    }
+
+    fn scan_time(&self) -> Option<Duration> {
+        self.driver.status()?.scan_ms.map(|ms| Duration::from_millis(ms.into()))
+    }
+
+    /// Waits until the board is on the bus.
+    fn start(&mut self) -> Result<(), GeniusError> {
+        if !self.wait(self.patience + PACE, |host| host.driver.is_ready())? {
+            return Err(GeniusError::BoardSilent);
+        }
+        if self.wait(BUS_PATIENCE.max(self.patience), |host| host.scan_time().is_some())? {
+            Ok(())
+        } else {
+            Err(GeniusError::OffBus)
+        }
+    }
+
+    /// The same for the first time. Auto reports may have come while no program ran, and the recorder's log may have
+    /// become another one since: they are neither news nor answers.
+    fn begin(&mut self) -> Result<(), GeniusError> {
+        self.start()?;
+        self.empty_receive_queue()?;
+        self.inboxes.throw_away();
+        Ok(())
+    }
+
+    /// Takes everything that the board has received so far.
+    fn empty_receive_queue(&mut self) -> Result<(), GeniusError> {
+        self.start()?;
+        self.driver.check_receive_queue();
+        match self.wait(self.datagram_patience(), |host| host.driver.receive_queue_is_empty())? {
+            true => Ok(()),
+            false => Err(GeniusError::BoardBusy),
+        }
+    }
+
+    /// The driver takes the patience once for the datagram before, once for this one, and knows within it.
+    fn datagram_patience(&self) -> Duration {
+        DATAGRAM_PATIENCE.max(self.patience.saturating_mul(2))
+    }
+
+    fn find(&mut self, node: u8) -> Result<Device, GeniusError> {
+        self.start()?;
+        if node == self.number() {
+            return Err(GeniusError::OwnNumber { node });
+        }
+        let not_there = GeniusError::NotOnBus { node };
+        if self.wait(LOG_IN_PATIENCE, |host| host.driver.device(node).is_ok())? {
+            self.driver.device(node).map_err(|_| not_there)
+        } else {
+            Err(not_there)
+        }
+    }
+
+    fn devices(&mut self) -> Result<Vec<BusDevice>, GeniusError> {
+        self.start()?;
+        let until = self.clock.now() + LOG_IN_PATIENCE;
+        loop {
+            let left = until.saturating_sub(self.clock.now());
+            self.wait(left, Host::knows_everybody)?;
+            self.tables = None;
+            self.driver.request_tables();
+            self.wait(self.datagram_patience(), |host| host.tables.is_some())?;
+            let devices = self.tables.take().ok_or(GeniusError::BoardBusy)?;
+            // Somebody may have come meanwhile, and others with him.
+            if self.knows_everybody() || left.is_zero() {
+                return Ok(devices);
+            }
+        }
+    }
+
+    fn knows_everybody(&self) -> bool {
+        let quiet = self.clock.now().saturating_sub(self.devices_changed);
+        self.scan_time().is_some_and(|scan| quiet >= scan * QUIET_SCANS)
+    }
+
+    fn read_forces(&mut self, node: u8, table: ForceTable) -> Result<IoForces, GeniusError> {
+        self.find(node)?;
+        let reply = Subfunction::ReadIoForcesReply;
+        let question = Transmission {
+            destination: Destination::Device(node),
+            function: FUNCTION_GENIUS,
+            subfunction: Subfunction::ReadIoForces.code(),
+            priority: Priority::Normal,
+            completion: Completion::Reply { subfunction: reply.code() },
+            data: Data::from_slice(&[table.code()]).unwrap_or_default(),
+        };
+        self.replied = None;
+        self.transmit(question)?;
+        self.wait(self.datagram_patience(), |host| host.replied.is_some())?;
+        let received =
+            self.replied.take().ok_or(GeniusError::BoardBusy)?.map_err(GeniusError::Undelivered)?;
+        let datagram = bus_datagram(&received, self.number());
+        match datagram.as_ref().map(Message::parse) {
+            Some(Ok(Message::ReadIoForcesReply(forces))) if forces.table == table => Ok(forces),
+            _ => Err(GeniusError::OddReply { node }),
+        }
+    }
+
+    /// Sends a datagram and waits until it is out.
+    pub(super) fn deliver(&mut self, transmission: Transmission) -> Result<(), GeniusError> {
+        self.start()?;
+        self.transmit(transmission)?;
+        self.wait(self.datagram_patience(), |host| host.sent.is_some())?;
+        self.sent.take().ok_or(GeniusError::BoardBusy)?.map_err(GeniusError::Undelivered)
+    }
+
+    /// Hands a datagram to the board as soon as that is done with the last one.
+    fn transmit(&mut self, transmission: Transmission) -> Result<(), GeniusError> {
+        if !self.wait(self.datagram_patience(), |host| host.driver.can_transmit())? {
+            return Err(GeniusError::BoardBusy);
+        }
+        self.sent = None;
+        self.driver.transmit(transmission).map_err(|error| match error {
+            TransmitError::NoSuchDevice(node) => GeniusError::NotOnBus { node },
+            _ => GeniusError::BoardBusy,
+        })
+    }
+
+    /// Looks at the board until `done`, or until the time is over. A board that fails ends it.
+    fn wait(&mut self, timeout: Duration, done: impl Fn(&Host) -> bool) -> Result<bool, GeniusError> {
+        let until = self.clock.now() + timeout;
+        loop {
+            self.look()?;
+            if done(self) {
+                return Ok(true);
+            }
+            if self.clock.now() >= until {
+                return Ok(false);
+            }
+            self.clock.wait(PACE);
+        }
+    }
+
+    pub(super) fn look(&mut self) -> Result<(), GeniusError> {
+        for _ in 0..EVENTS_PER_LOOK {
+            let now_ms = self.clock.now().as_millis();
+            #[expect(clippy::cast_possible_truncation, reason = "the count wraps")]
+            let Some(event) = self.driver.poll(now_ms as u32) else { break };
+            self.take(event);
+        }
+        if let Some(kind) = self.driver.ram().take_error() {
+            return Err(GeniusError::Window(kind));
+        }
+        match self.failure.take() {
+            None => Ok(()),
+            Some(Failure::NoHeartbeat) => Err(GeniusError::BoardSilent),
+            Some(failure) => Err(GeniusError::BoardFailed(failure)),
+        }
+    }
+
+    fn take(&mut self, event: Event) {
+        match event {
+            Event::Ready(identity) => {
+                self.identity = Some(identity);
+                self.answers.forget_all();
+                self.know(0);
+            }
+            Event::Device { number, change } => {
+                self.answers.forget(number);
+                let others = self.known & !bit(number);
+                self.know(if change == DeviceChange::LoggedOut { others } else { others | bit(number) });
+            }
+            Event::Failed(failure) => self.failure = Some(failure),
+            Event::Received(received) => self.inboxes.put(received),
+            Event::Sent(result) => self.sent = Some(result),
+            Event::Replied(result) => self.replied = Some(result),
+            Event::TablesLocked => self.tables = self.read_tables().ok(),
+            // The driver remembers these, or has dealt with them.
+            Event::Configured(_)
+            | Event::StatusChanged(_)
+            | Event::Request(_)
+            | Event::RequestRefused(_)
+            | Event::OutputsSent => {}
+        }
+    }
+
+    fn know(&mut self, devices: u32) {
+        self.known = devices;
+        self.devices_changed = self.clock.now();
+    }
+
+    fn read_tables(&mut self) -> Result<Vec<BusDevice>, TableError> {
+        let own_number = self.number();
+        let numbers = (0..=MAX_DEVICE_NUMBER).filter(|&number| number != own_number);
+        let present: Vec<_> =
+            numbers.filter_map(|number| Some((number, self.driver.device(number).ok()?))).collect();
+        if present.iter().fold(0, |devices, (number, _)| devices | bit(*number)) != self.known {
+            // The driver is about to say who.
+            self.devices_changed = self.clock.now();
+        }
+        let tables = self.driver.tables()?;
+        let mut buffer = [0; 128];
+        let read = present.into_iter().filter_map(|(number, device)| {
+            let len = tables.inputs(number, &mut buffer).ok()?;
+            Some(BusDevice { number, device, inputs: buffer.get(..len)?.to_vec() })
+        });
+        Ok(read.collect())
+    }
+}

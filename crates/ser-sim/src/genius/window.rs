@@ -1,0 +1,63 @@
+//! The shared RAM of a board on a bus, as the driver for the board wants to see it.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use geni_board::{RAM_LEN, SharedRam};
+
+use super::board::Board;
+use super::bus::{Bus, Handle};
+
+/// The host's connector of a [`Board`]: shared RAM, reset line and interrupt line.
+#[derive(Clone)]
+pub struct BoardWindow {
+    bus: Rc<RefCell<Bus>>,
+    board: Handle<Board>,
+}
+
+impl BoardWindow {
+    /// The connector of a board on that bus.
+    #[must_use]
+    pub fn new(bus: Rc<RefCell<Bus>>, board: Handle<Board>) -> BoardWindow {
+        BoardWindow { bus, board }
+    }
+
+    /// The board itself, to look at it without being its host.
+    pub fn look<T>(&self, look: impl FnOnce(&Board) -> T) -> T {
+        look(self.bus.borrow().get(self.board))
+    }
+
+    /// Drives the reset line.
+    pub fn drive_reset(&self, held: bool) {
+        let mut bus = self.bus.borrow_mut();
+        let board = bus.get_mut(self.board);
+        match (held, board.is_in_reset()) {
+            (true, false) => board.hold_reset(),
+            (false, true) => board.release_reset(),
+            _ => {}
+        }
+    }
+
+    /// When the board has pulled the interrupt line since this was last asked, in microseconds.
+    #[must_use]
+    pub fn take_interrupts(&self) -> VecDeque<u64> {
+        self.bus.borrow_mut().get_mut(self.board).take_interrupts()
+    }
+}
+
+impl SharedRam for BoardWindow {
+    fn read(&self, offset: u16) -> u8 {
+        if usize::from(offset) < RAM_LEN {
+            self.bus.borrow_mut().get_mut(self.board).host_read(offset)
+        } else {
+            0xFF
+        }
+    }
+
+    fn write(&mut self, offset: u16, byte: u8) {
+        if usize::from(offset) < RAM_LEN {
+            self.bus.borrow_mut().get_mut(self.board).host_write(offset, byte);
+        }
+    }
+}

@@ -1,0 +1,424 @@
+//! A node in virtual time: the recorder itself, its contacts and both ends of its line.
+//!
+//! Time passes only when [`SimNode::advance_to`] says so, and then every millisecond of it, in order: contacts due in
+//! that millisecond move, all inputs are sampled, the node's main loop runs. However the caller is delayed, a contact
+//! lands on exactly the millisecond that its scenario gives. [`SimNode::leap_to`] comes to the same and passes over
+//! stretches in which nothing can happen, so that a quiet month takes no longer than a busy second.
+
+use std::collections::VecDeque;
+
+use geni_board::SharedRam;
+use ser_node::{Capture, CaptureChannel, Debounce, Diagnostics, Event, GeniusPort, Node, NodeParts};
+use ser_proto::{Baud, Entry, MAX_SIZE, Model};
+
+use crate::non_volatile::{MemoryStorage, NonVolatile, SimRtc};
+use crate::player::{Played, Player};
+use crate::scenario::Scenario;
+use crate::scenario_lines::Item;
+
+/// Bytes that may wait for the other end of the line before the node is asked for no more.
+const OUTPUT_LIMIT: usize = 4096;
+
+const NANOSECONDS_PER_MS: u64 = 1_000_000;
+
+/// Start bit, eight data bits, stop bit: what a byte takes on the line, in nanoseconds at one bit per second.
+const BYTE_AT_1_BAUD_NS: u64 = 10 * 1_000_000_000;
+
+/// The longest stretch that is passed over at once: a node tells two ticks apart that are less than 24.8 days apart.
+const LONGEST_LEAP_MS: u64 = 1 << 30;
+
+/// How fast the node's bytes leave it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LineRate {
+    /// At once.
+    #[default]
+    Unlimited,
+    /// As the configured rate allows, ten bit times per byte.
+    Real,
+}
+
+/// How a node is built.
+#[derive(Clone, Debug)]
+pub struct SimNodeOptions {
+    /// Which recorder it is.
+    pub model: Model,
+    /// Debounce times.
+    pub debounce: Debounce,
+    /// How fast the node's bytes leave it.
+    pub line_rate: LineRate,
+    /// Configuration memory and clock.
+    pub non_volatile: NonVolatile,
+}
+
+impl SimNodeOptions {
+    /// No debounce, no line delay, fresh memory, the clock of this computer.
+    #[must_use]
+    pub fn new(model: Model) -> SimNodeOptions {
+        SimNodeOptions {
+            model,
+            debounce: Debounce::OFF,
+            line_rate: LineRate::Unlimited,
+            non_volatile: NonVolatile::new(),
+        }
+    }
+}
+
+/// The memory that a node loses with its power.
+pub struct Ram {
+    channel: CaptureChannel,
+    log: Vec<Event>,
+}
+
+impl Ram {
+    /// Memory for a log of the full size.
+    #[must_use]
+    pub fn new() -> Ram {
+        Ram { channel: CaptureChannel::new(), log: vec![Event::EMPTY; MAX_SIZE.into()] }
+    }
+}
+
+impl Default for Ram {
+    fn default() -> Self {
+        Ram::new()
+    }
+}
+
+/// A node without power, and its surroundings, in which time stands still.
+pub struct PoweredOff {
+    options: SimNodeOptions,
+    player: Player,
+    now_ms: u64,
+}
+
+impl PoweredOff {
+    /// A node that has never been switched on, all contacts open, at millisecond 0.
+    #[must_use]
+    pub fn new(options: SimNodeOptions) -> PoweredOff {
+        PoweredOff { options, player: Player::default(), now_ms: 0 }
+    }
+
+    /// Switches the node on. It samples its inputs in the present millisecond already.
+    pub fn power_up(self, ram: &mut Ram) -> SimNode<'_> {
+        let PoweredOff { options, player, now_ms } = self;
+        // What memory holds after a power cut is anybody's guess; a node must not rely on it.
+        *ram = Ram::new();
+        let (mut capture, reader) = ram.channel.split(options.debounce);
+        capture.sample(0, player.state());
+        let mut node = Node::new(NodeParts {
+            model: options.model,
+            log: &mut ram.log,
+            capture: reader,
+            storage: options.non_volatile.storage.clone(),
+            rtc: options.non_volatile.rtc.clone(),
+        });
+        node.poll(0);
+        let baud = node.baud();
+        SimNode {
+            node,
+            capture,
+            player,
+            played: Vec::new(),
+            now_ms,
+            power_up_ms: now_ms,
+            moved_ms: now_ms,
+            leapt_ms: 0,
+            options,
+            baud,
+            on_the_line: None,
+            output: VecDeque::new(),
+        }
+    }
+}
+
+/// A node under power.
+pub struct SimNode<'a> {
+    node: Node<'a, MemoryStorage, SimRtc>,
+    capture: Capture<'a>,
+    player: Player,
+    played: Vec<Played>,
+    now_ms: u64,
+    power_up_ms: u64,
+    /// When a contact moved last.
+    moved_ms: u64,
+    /// Milliseconds that were passed over: the node counts them as samples that it missed.
+    leapt_ms: u64,
+    options: SimNodeOptions,
+    /// The rate at which the line runs.
+    baud: Baud,
+    /// The byte being sent at the real rate, and when its stop bit ends, in nanoseconds.
+    on_the_line: Option<(u8, u64)>,
+    /// Bytes that have left the node and not been taken.
+    output: VecDeque<u8>,
+}
+
+impl<'a> SimNode<'a> {
+    /// A node that is switched on for the first time.
+    pub fn new(options: SimNodeOptions, ram: &'a mut Ram) -> SimNode<'a> {
+        PoweredOff::new(options).power_up(ram)
+    }
+
+    /// Cuts the power. Contacts stay as they are and scenarios go on when time does.
+    #[must_use]
+    pub fn power_off(self) -> PoweredOff {
+        PoweredOff { options: self.options, player: self.player, now_ms: self.now_ms }
+    }
+
+    /// The present, in milliseconds since the first power-up.
+    #[must_use]
+    pub fn now_ms(&self) -> u64 {
+        self.now_ms
+    }
+
+    /// The node's tick in millisecond `at_ms`: what a stamp is made of.
+    #[must_use]
+    pub fn tick_at(&self, at_ms: u64) -> u32 {
+        #[expect(clippy::cast_possible_truncation, reason = "the tick wraps")]
+        let tick = at_ms.wrapping_sub(self.power_up_ms) as u32;
+        tick
+    }
+
+    /// Plays a scenario from the next millisecond on, or after those before it. Says in which millisecond it begins.
+    pub fn play(&mut self, scenario: &Scenario) -> u64 {
+        self.player.play(self.now_ms, scenario)
+    }
+
+    pub(crate) fn stream(&mut self, items: &[Item]) -> Option<u64> {
+        self.player.stream(self.now_ms, items)
+    }
+
+    pub(crate) fn waiting_steps(&self) -> usize {
+        self.player.waiting()
+    }
+
+    pub(crate) fn player_mut(&mut self) -> &mut Player {
+        &mut self.player
+    }
+
+    /// Whether no contact is going to move.
+    #[must_use]
+    pub fn is_idle(&self) -> bool {
+        self.player.is_idle()
+    }
+
+    /// What has moved since this was last asked.
+    pub fn take_played(&mut self) -> Vec<Played> {
+        std::mem::take(&mut self.played)
+    }
+
+    /// When the next contact moves, as far as scenarios are laid out.
+    #[must_use]
+    pub fn next_move_ms(&self) -> Option<u64> {
+        self.player.next_due_ms()
+    }
+
+    /// Lets every millisecond up to and including `ms` pass. The past is left alone.
+    pub fn advance_to(&mut self, ms: u64) {
+        while self.now_ms < ms {
+            self.pass_ms();
+            self.node.poll(self.tick_at(self.now_ms));
+            self.pump();
+        }
+    }
+
+    /// The same, much faster where nothing happens. For a node whose Genius port is not served meanwhile.
+    ///
+    /// A node whose inputs stay as they are, whose line is silent and which has nothing to say has nothing to do
+    /// either: it has no other reason to act. The samples that are passed over are such as the node itself takes
+    /// to have been the same when it missed them.
+    pub fn leap_to(&mut self, ms: u64) {
+        while self.now_ms < ms {
+            let next_move_ms = self.player.next_due_ms().unwrap_or(u64::MAX);
+            let still_until_ms = ms.min(next_move_ms.saturating_sub(1));
+            if self.is_at_rest() && still_until_ms > self.now_ms {
+                self.pass_over(still_until_ms);
+            } else {
+                self.advance_to(self.now_ms + 1);
+            }
+        }
+    }
+
+    /// Lets time pass while the node's main loop is held up, and only its interrupts run: changes queue up. It
+    /// runs again in the last of these milliseconds.
+    pub fn hold_up_to(&mut self, ms: u64) {
+        while self.now_ms < ms {
+            self.pass_ms();
+        }
+        self.node.poll(self.tick_at(self.now_ms));
+        self.pump();
+    }
+
+    /// Makes the node as old as if it had been on for that much longer, with nothing happening: its tick goes on,
+    /// around its 32 bits if need be, and so does its clock.
+    pub fn grow_older(&mut self, by_ms: u64) {
+        let mut left_ms = by_ms;
+        while left_ms > 0 {
+            let leap_ms = left_ms.min(LONGEST_LEAP_MS);
+            left_ms -= leap_ms;
+            self.leapt_ms += leap_ms - 1;
+            self.power_up_ms = self.power_up_ms.wrapping_sub(leap_ms);
+            self.sample_and_poll();
+        }
+    }
+
+    fn pass_ms(&mut self) {
+        self.now_ms += 1;
+        let tick = self.tick_at(self.now_ms);
+        if let Some(moved) = self.player.due(self.now_ms) {
+            self.played.push(moved.played(tick, tick));
+            self.moved_ms = self.now_ms;
+        }
+        self.capture.sample(tick, self.player.state());
+    }
+
+    /// Whether nothing is on its way through debounce or onto the line.
+    #[must_use]
+    pub fn is_at_rest(&self) -> bool {
+        // Held back twice at most: until a change is accepted, and until no earlier one can come.
+        let longest_ms = u64::from(self.options.debounce.longest_ms());
+        let settled = self.now_ms - self.moved_ms >= 2 * longest_ms;
+        settled && self.on_the_line.is_none()
+    }
+
+    fn pass_over(&mut self, until_ms: u64) {
+        let until_ms = until_ms.min(self.now_ms + LONGEST_LEAP_MS);
+        self.leapt_ms += until_ms - self.now_ms - 1;
+        self.now_ms = until_ms;
+        self.sample_and_poll();
+    }
+
+    fn sample_and_poll(&mut self) {
+        let tick = self.tick_at(self.now_ms);
+        self.capture.sample(tick, self.player.state());
+        self.node.poll(tick);
+    }
+
+    /// Lets a Genius port of the node work in the present millisecond: once in each that passes.
+    pub fn serve<W: SharedRam>(&mut self, port: &mut GeniusPort<W>) {
+        port.poll(&mut self.node);
+        self.pump();
+    }
+
+    /// The GENI board has pulled its interrupt line in millisecond `at_ms`. To be said before time
+    /// passes on.
+    pub fn interrupt<W: SharedRam>(&mut self, port: &mut GeniusPort<W>, at_ms: u64) {
+        let tick = self.tick_at(at_ms);
+        port.interrupt(&mut self.node, tick);
+    }
+
+    /// Bytes arrive on the node's line in the present millisecond.
+    pub fn receive(&mut self, bytes: &[u8]) {
+        let tick = self.tick_at(self.now_ms);
+        for &byte in bytes {
+            self.node.serial_receive(byte, tick);
+            self.pump();
+        }
+    }
+
+    /// The node's UART meets a byte that it cannot read.
+    pub fn line_error(&mut self) {
+        self.node.serial_line_errors(1);
+    }
+
+    /// Bytes that the node has sent and nobody has taken.
+    #[must_use]
+    pub fn output(&mut self) -> &[u8] {
+        self.output.make_contiguous()
+    }
+
+    /// The first `count` bytes of [`output`](Self::output) have been taken.
+    pub fn taken(&mut self, count: usize) {
+        self.output.drain(..count.min(self.output.len()));
+        self.pump();
+    }
+
+    /// Takes everything that the node has to say in the present millisecond.
+    pub fn take_output(&mut self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        self.pump();
+        while !self.output.is_empty() {
+            bytes.extend(self.output.drain(..));
+            self.pump();
+        }
+        bytes
+    }
+
+    /// The rate at which the node's line runs.
+    #[must_use]
+    pub fn baud(&self) -> Baud {
+        self.baud
+    }
+
+    /// What the node dropped, refused or lost since power-up. Milliseconds that were passed over are not missed.
+    #[must_use]
+    pub fn diagnostics(&self) -> Diagnostics {
+        let seen = self.node.diagnostics();
+        // The node's own count stops at its largest value, after 49 days that were passed over; then it says nothing.
+        let leapt_ms = u32::try_from(self.leapt_ms).unwrap_or(u32::MAX);
+        Diagnostics { samples_missed: seen.samples_missed.saturating_sub(leapt_ms), ..seen }
+    }
+
+    /// The log as it is now: the total since the last erase, modulo 65536, and its entries from the oldest to the
+    /// newest. Nothing goes over the line for it.
+    #[must_use]
+    pub fn log(&self) -> (u16, Vec<Entry>) {
+        const COUNT: u8 = 10;
+        let mut entries: Vec<Entry> = Vec::new();
+        for start in (1..=MAX_SIZE).step_by(COUNT.into()) {
+            entries.extend(self.node.read(start, COUNT).entries);
+        }
+        let head = self.node.read(1, 0);
+        // In a ring that has wrapped, the oldest entry is in the slot that comes next.
+        let oldest = usize::from(head.next_slot).min(entries.len());
+        entries.rotate_left(oldest);
+        (head.total, entries)
+    }
+
+    /// Whether another command finds room to wait for its turn.
+    #[must_use]
+    pub fn has_room(&self) -> bool {
+        self.node.serial_has_room()
+    }
+
+    /// Moves bytes from the node onto the line, and changes the rate when the line is empty.
+    fn pump(&mut self) {
+        loop {
+            if self.output.is_empty()
+                && self.on_the_line.is_none()
+                && let Some(baud) = self.node.baud_change()
+            {
+                self.node.baud_changed(baud);
+                self.baud = baud;
+            }
+            if self.output.len() >= OUTPUT_LIMIT {
+                return;
+            }
+            match self.options.line_rate {
+                LineRate::Unlimited => match self.node.serial_transmit() {
+                    Some(byte) => self.output.push_back(byte),
+                    None => return,
+                },
+                LineRate::Real => {
+                    if !self.pump_at_real_rate() {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Ends the byte on the line and begins the next. False when there is nothing to do in this millisecond.
+    fn pump_at_real_rate(&mut self) -> bool {
+        let now_ns = self.now_ms * NANOSECONDS_PER_MS;
+        let start_ns = match self.on_the_line {
+            Some((_, end_ns)) if end_ns > now_ns => return false,
+            Some((byte, end_ns)) => {
+                self.output.push_back(byte);
+                end_ns
+            }
+            None => now_ns,
+        };
+        let byte_ns = BYTE_AT_1_BAUD_NS / u64::from(self.baud.bits_per_second());
+        self.on_the_line = self.node.serial_transmit().map(|byte| (byte, start_ns + byte_ns));
+        self.on_the_line.is_some()
+    }
+}
