@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 
 use common::bench::{Bench, text};
 use common::{Running, ser_cli, wait_until};
-use ser_tests::recorder::{Kind, PATIENCE, image};
-use ser_tests::with_both_kinds;
+use ser_sim::testing::{Kind, PATIENCE, image};
+use ser_sim::with_both_kinds;
 
 with_both_kinds! {
     contacts_are_recorded_and_read_back_in_every_format,

@@ -11,7 +11,7 @@ use std::process::{Command, Output, Stdio};
 use std::sync::mpsc::Receiver;
 
 use common::{Running, ser_cli, wait_until};
-use ser_tests::recorder::{PATIENCE, image};
+use ser_sim::testing::{PATIENCE, image};
 use tempfile::TempDir;
 
 /// For recorders that are there, on such a machine. A board may also stand still for so long.

@@ -16,7 +16,7 @@ use ser_proto::{
     Configuration, Decoded, Entry, FrameDecoder, FrameEncoder, Inputs, MAX_BODY_LEN, Model, ReadReply, Reply,
     TimeStamp,
 };
-use ser_tests::recorder::Kind;
+use ser_sim::testing::Kind;
 
 /// Six columns and a note.
 fn columns(row: &str) -> Vec<&str> {

@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use ser_proto::{Baud, MAX_SIZE, Model};
-use ser_tests::download::Download;
+use ser_trial::download::Download;
 
 fn main() {
     println!("Reading a full log of {MAX_SIZE} entries over RS-232, in virtual time.\n");

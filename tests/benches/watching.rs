@@ -2,7 +2,7 @@
 //!
 //! In virtual time: the numbers are the same on every computer.
 
-use ser_tests::watching::{Load, Way, line_carries};
+use ser_trial::watching::{Load, Way, line_carries};
 
 const SECONDS: u32 = 60;
 

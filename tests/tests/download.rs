@@ -2,7 +2,7 @@
 
 use ser_client::LogPosition;
 use ser_proto::{Baud, Model};
-use ser_tests::download::Download;
+use ser_trial::download::Download;
 
 fn reads_at_line_rate(model: Model) {
     for baud in Baud::ALL {

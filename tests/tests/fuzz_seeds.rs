@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use ser_tests::fuzzing::{TARGETS, seeds};
+use ser_trial::fuzzing::{TARGETS, seeds};
 
 /// Makes a test of each target.
 macro_rules! targets {

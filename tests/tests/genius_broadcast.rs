@@ -3,7 +3,7 @@
 use geni_board::CommandError;
 use geni_board::Destination::Broadcast;
 use ser_proto::{Code, Command, Model, Reply, TimeStamp};
-use ser_tests::genius_world::World;
+use ser_trial::genius_world::World;
 
 const NOON: TimeStamp =
     TimeStamp { year: 26, month: 11, day: 22, hour: 12, minute: 0, second: 0, millisecond: 0 };

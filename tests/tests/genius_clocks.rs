@@ -8,7 +8,7 @@ use ser_proto::{
 };
 use ser_sim::genius::SplitMix64;
 use ser_sim::{Scenario, Step};
-use ser_tests::genius_world::{HOST, Recorder, World};
+use ser_trial::genius_world::{HOST, Recorder, World};
 
 /// Recorders look at their boards in the same moment here; those of real ones can lie up to 1 ms
 /// apart.

@@ -8,7 +8,7 @@ use ser_proto::{
     AutoReport, Baud, Code, Command, Configure, Entry, Inputs, LastBroadcast, Mode, Model, Reply, TimeStamp,
 };
 use ser_sim::genius::{Board, BoardOptions, BoardWindow};
-use ser_tests::genius_world::{HOST, World};
+use ser_trial::genius_world::{HOST, World};
 
 const UNIT: u8 = 5;
 

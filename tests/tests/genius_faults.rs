@@ -4,7 +4,7 @@ use geni_board::Destination::Device;
 use geni_board::SharedRam;
 use ser_proto::{AutoReport, Command, Configure, Inputs, Model, Reply};
 use ser_sim::genius::{DeviceFault, Fault};
-use ser_tests::genius_world::{HOST, World};
+use ser_trial::genius_world::{HOST, World};
 
 const UNIT: u8 = 5;
 

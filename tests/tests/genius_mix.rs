@@ -7,7 +7,7 @@ use ser_proto::{
 };
 use ser_sim::genius::Noise;
 use ser_sim::{Scenario, Step};
-use ser_tests::genius_world::{HOST, World};
+use ser_trial::genius_world::{HOST, World};
 
 const UNIT: u8 = 5;
 const SIZE: u16 = 512;

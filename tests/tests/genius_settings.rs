@@ -5,7 +5,7 @@ use geni_board::{Completion, Data, Destination, Priority, Transmission};
 use ser_node::Debounce;
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{Command, Model, TimeStamp};
-use ser_tests::genius_world::World;
+use ser_trial::genius_world::World;
 
 const UNIT: u8 = 5;
 

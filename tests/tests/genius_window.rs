@@ -9,8 +9,9 @@ use ser_proto::{
     AutoReport, Code, Command, Configuration, Entry, Inputs, Model, ReadReply, Reply, TimeStamp,
 };
 use ser_sim::genius::Noise;
-use ser_tests::recorder::{Kind, NODE, PATIENCE, PATIENT, Recorder, assert_entries_are, listen, stamp_ms};
-use ser_tests::with_both_kinds;
+use ser_sim::testing::{Kind, PATIENCE};
+use ser_sim::with_both_kinds;
+use ser_trial::recorder::{NODE, PATIENT, Recorder, assert_entries_are, listen, stamp_ms};
 
 with_both_kinds! {
     every_command_is_answered,

@@ -2,13 +2,13 @@
 //! bus and reporting all the time. In virtual time: the same in every run and on every machine.
 #![cfg(target_os = "linux")]
 
+use image_bench::bench::{Bench, Parts, Setup};
+use image_bench::genius::{Genius, HOST};
+use image_bench::program::Program;
 use ser_proto::{
     AutoReport, Command, Configure, Decoded, Entry, FrameDecoder, Inputs, MAX_BODY_LEN, Reply, TimeStamp,
 };
-use ser_tests::recorder::image;
-use ser_tests::timing::bench::{Bench, Parts, Setup};
-use ser_tests::timing::genius::{Genius, HOST};
-use ser_tests::timing::program::Program;
+use ser_sim::testing::image;
 
 /// Where the emulator's plugin is: set by `cargo xtask test`, which builds it.
 const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";

@@ -11,8 +11,9 @@ use std::time::{Duration, Instant};
 
 use ser_client::{Delivery, Unit};
 use ser_proto::{AutoReport, Baud, Configuration, Entry, Inputs, Model, TimeStamp};
+use ser_sim::testing::{Kind, PATIENCE};
 use ser_sim::{ForcedFault, ResetCause};
-use ser_tests::recorder::{Kind, NODE, PATIENCE, PATIENT, Recorder, assert_entries_are, stamp_ms};
+use ser_trial::recorder::{NODE, PATIENT, Recorder, assert_entries_are, stamp_ms};
 
 const TEN_O_CLOCK: TimeStamp =
     TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 0 };

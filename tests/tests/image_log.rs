@@ -4,7 +4,7 @@
 mod image_records;
 
 use ser_client::{Endpoint, open};
-use ser_tests::recorder::Recorder;
+use ser_trial::recorder::Recorder;
 
 #[test]
 #[ignore = "needs the emulator and the image: cargo xtask test"]

@@ -6,7 +6,8 @@ use std::thread;
 use ser_client::{Cursor, Delivery, Endpoint, Unit, open};
 use ser_proto::{AutoReport, Configuration, Entry, Model, TimeStamp};
 use ser_sim::Played;
-use ser_tests::recorder::{Kind, NODE, PATIENCE, PATIENT, Recorder};
+use ser_sim::testing::{Kind, PATIENCE};
+use ser_trial::recorder::{NODE, PATIENT, Recorder};
 
 /// As the image's memory map has it.
 const STACK_LEN: u32 = 8 * 1024;

@@ -2,18 +2,18 @@
 //! xtask timing` prints all the numbers.
 #![cfg(target_os = "linux")]
 
-use ser_board::budget::CAPTURE_INSTRUCTIONS;
-use ser_proto::Model;
-use ser_sim::{EmulatorOptions, INSTRUCTIONS_PER_MS, Lockstep, LockstepOptions};
-use ser_tests::recorder::image;
-use ser_tests::timing::bench::{Carried, Parts, RATE};
-use ser_tests::timing::costs::{
+use image_bench::bench::{Carried, Parts, RATE};
+use image_bench::costs::{
     self, Change, Commands, Cost, LONGEST_DEBOUNCE_MS, SHORTEST_DEBOUNCE_MS, Way, runs_of,
 };
-use ser_tests::timing::lateness::{Lateness, expiry};
-use ser_tests::timing::load::Load;
-use ser_tests::timing::program::{Handler, Kind, Program};
-use ser_tests::timing::tally::Tally;
+use image_bench::lateness::{Lateness, expiry};
+use image_bench::load::Load;
+use image_bench::program::{Handler, Kind, Program};
+use image_bench::tally::Tally;
+use ser_board::budget::CAPTURE_INSTRUCTIONS;
+use ser_proto::Model;
+use ser_sim::testing::image;
+use ser_sim::{EmulatorOptions, INSTRUCTIONS_PER_MS, Lockstep, LockstepOptions};
 
 /// Where the emulator's plugin is: set by `cargo xtask test`, which builds it.
 const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";

@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use ser_client::{Delivery, Endpoint, Lost, Unit, Unsolicited, open};
 use ser_proto::{AutoReport, Baud, Configuration, Entry, Inputs, Model, ReadReply, TimeStamp};
-use ser_tests::recorder::{Kind, PATIENCE, Recorder, assert_entries_are, listen, stamp_ms};
-use ser_tests::with_both_kinds;
+use ser_sim::testing::{Kind, PATIENCE};
+use ser_sim::with_both_kinds;
+use ser_trial::recorder::{Recorder, assert_entries_are, listen, stamp_ms};
 
 with_both_kinds! {
     set_clock_start_and_read,

@@ -2,8 +2,8 @@
 //!
 //! `cargo xtask simulate` goes on for as long as one likes.
 
-use ser_tests::simulation::account::Tally;
-use ser_tests::simulation::{Options, Report, run, run_flat_out};
+use ser_trial::simulation::account::Tally;
+use ser_trial::simulation::{Options, Report, run, run_flat_out};
 
 const HOUR_MS: u64 = 3_600_000;
 const MINUTE_MS: u64 = 60_000;

@@ -2,7 +2,7 @@
 //! most of what it carries is delivered. Every event is delivered once and in order, or counted as lost: the run itself
 //! sees to that.
 
-use ser_tests::watching::{Load, Watched, Way, line_carries};
+use ser_trial::watching::{Load, Watched, Way, line_carries};
 
 const SECONDS: u32 = 60;
 

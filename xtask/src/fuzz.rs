@@ -138,7 +138,7 @@ fn plant_seeds(target: &str) -> Result<()> {
 /// The program that knows the targets without a fuzzer.
 fn helper(verb: &str, target: &str) -> Command {
     let mut cargo = steps::cargo();
-    cargo.args(["run", "--quiet", "-p", "ser-tests", "--example", "fuzzing", "--", verb, target]);
+    cargo.args(["run", "--quiet", "-p", "ser-trial", "--example", "fuzzing", "--", verb, target]);
     cargo
 }
 
@@ -173,7 +173,7 @@ fn describe(target: &str, found: &[PathBuf]) -> String {
         let file = file.strip_prefix(places::root()).unwrap_or(file).display();
         text += &format!(
             "  {file}\n    \
-             to repeat it:    cargo run -p ser-tests --example fuzzing -- replay {target} {file}\n    \
+             to repeat it:    cargo run -p ser-trial --example fuzzing -- replay {target} {file}\n    \
              to shorten it:   cargo +{TOOLCHAIN} fuzz tmin --fuzz-dir tests/fuzz --sanitizer none {target} {file}\n"
         );
     }

@@ -16,6 +16,6 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let mut simulate = steps::cargo();
-    simulate.args(["run", "--release", "--quiet", "-p", "ser-tests", "--bin", "simulate", "--"]);
+    simulate.args(["run", "--release", "--quiet", "-p", "ser-trial", "--bin", "simulate", "--"]);
     steps::become_program(simulate.args(&arguments.options))
 }

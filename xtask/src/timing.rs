@@ -48,7 +48,7 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
         "--release",
         "--quiet",
         "-p",
-        "ser-tests",
+        "image-bench",
         "--bin",
         "timing",
         "--",

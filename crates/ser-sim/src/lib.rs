@@ -40,6 +40,8 @@ mod service;
 mod sim_node;
 mod simulator;
 mod tcp;
+#[cfg(feature = "testing")]
+pub mod testing;
 mod wire;
 
 pub use contacts::Contacts;

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
-use ser_tests::recorder::{Kind, image};
+use ser_sim::testing::{Kind, image};
 use tempfile::TempDir;
 
 use super::{Running, ser_cli, wait_until};

@@ -10,7 +10,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ser_tests::recorder::PATIENCE;
+use ser_sim::testing::PATIENCE;
 
 /// The program as it was built, without the user's settings.
 pub(crate) fn ser_cli() -> Command {

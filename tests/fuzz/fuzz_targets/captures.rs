@@ -1,4 +1,4 @@
-//! See `ser_tests::fuzzing::captures`.
+//! See `ser_trial::fuzzing::captures`.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_tests::fuzzing::captures(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_trial::fuzzing::captures(data));

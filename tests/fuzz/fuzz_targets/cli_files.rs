@@ -1,4 +1,4 @@
-//! See `ser_tests::fuzzing::cli_files`.
+//! See `ser_trial::fuzzing::cli_files`.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_tests::fuzzing::cli_files(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_trial::fuzzing::cli_files(data));

@@ -1,4 +1,4 @@
-//! See `ser_tests::fuzzing::client`.
+//! See `ser_trial::fuzzing::client`.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_tests::fuzzing::client(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_trial::fuzzing::client(data));

@@ -1,4 +1,4 @@
-//! See `ser_tests::fuzzing::comm_req`.
+//! See `ser_trial::fuzzing::comm_req`.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_tests::fuzzing::comm_req(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_trial::fuzzing::comm_req(data));

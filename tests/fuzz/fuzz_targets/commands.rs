@@ -1,4 +1,4 @@
-//! See `ser_tests::fuzzing::commands`.
+//! See `ser_trial::fuzzing::commands`.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_tests::fuzzing::commands(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_trial::fuzzing::commands(data));

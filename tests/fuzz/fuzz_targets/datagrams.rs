@@ -1,4 +1,4 @@
-//! See `ser_tests::fuzzing::datagrams`.
+//! See `ser_trial::fuzzing::datagrams`.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_tests::fuzzing::datagrams(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_trial::fuzzing::datagrams(data));

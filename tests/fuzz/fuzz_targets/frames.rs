@@ -1,4 +1,4 @@
-//! See `ser_tests::fuzzing::frames`.
+//! See `ser_trial::fuzzing::frames`.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_tests::fuzzing::frames(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_trial::fuzzing::frames(data));

@@ -1,4 +1,4 @@
-//! See `ser_tests::fuzzing::geni_driver`.
+//! See `ser_trial::fuzzing::geni_driver`.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_tests::fuzzing::geni_driver(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_trial::fuzzing::geni_driver(data));

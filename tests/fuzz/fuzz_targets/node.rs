@@ -1,4 +1,4 @@
-//! See `ser_tests::fuzzing::node`.
+//! See `ser_trial::fuzzing::node`.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_tests::fuzzing::node(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_trial::fuzzing::node(data));

@@ -1,4 +1,4 @@
-//! See `ser_tests::fuzzing::replies`.
+//! See `ser_trial::fuzzing::replies`.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_tests::fuzzing::replies(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ser_trial::fuzzing::replies(data));

@@ -14,7 +14,7 @@ use geni_board::SharedRam;
 use ser_client::{Clock, GeniHost, GeniWindow, OpenError, Options, Unit};
 use ser_proto::Model;
 use ser_sim::genius::{Noise, RAM_LEN};
-use ser_tests::genius_world::{Recorder, World};
+use ser_trial::genius_world::{Recorder, World};
 use tempfile::TempDir;
 
 /// Everybody is on the bus long before that.

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use defmt_decoder::{DecodeError, Table};
-use ser_tests::recorder::{PATIENCE, image};
+use ser_sim::testing::{PATIENCE, image};
 
 /// Waits until the log holds all of the expected records, among others.
 ///

@@ -8,11 +8,11 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use ser_console::Harmless;
-use ser_tests::fuzzing::{TARGETS, Target, seeds};
+use ser_trial::fuzzing::{TARGETS, Target, seeds};
 
 const USAGE: &str = "\
-usage: cargo run -p ser-tests --example fuzzing -- plant TARGET FOLDER
-       cargo run -p ser-tests --example fuzzing -- replay TARGET FILE…
+usage: cargo run -p ser-trial --example fuzzing -- plant TARGET FOLDER
+       cargo run -p ser-trial --example fuzzing -- replay TARGET FILE…
 A file whose name ends with .hex is hex text.";
 
 fn main() -> ExitCode {

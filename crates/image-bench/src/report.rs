@@ -11,7 +11,7 @@ use super::lateness::Lateness;
 use super::load::{Account, Load};
 use super::program::{Handler, Program};
 use super::tally::Masked;
-use crate::digits::grouped;
+use ser_trial::digits::grouped;
 
 /// Instructions of the main loop that the rings in front of it cover: a pass must not take longer.
 pub const PASS_BUDGET: u64 = MAIN_LOOP_STALL_MS as u64 * INSTRUCTIONS_PER_MS;
@@ -336,9 +336,9 @@ impl Report {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulation::account::Tally as Told;
-    use crate::simulation::conversation::Talk;
-    use crate::timing::bench::Carried;
+    use crate::bench::Carried;
+    use ser_trial::simulation::account::Tally as Told;
+    use ser_trial::simulation::conversation::Talk;
 
     fn report() -> Report {
         let told = Told { delivered: 900, overwritten: 100, ..Told::default() };

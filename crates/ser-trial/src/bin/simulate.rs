@@ -1,11 +1,11 @@
-//! Whole-system simulation in virtual time: see `ser_tests::simulation`.
+//! Whole-system simulation in virtual time: see `ser_trial::simulation`.
 
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::Parser;
-use ser_tests::simulation::{self, Options, Paces};
+use ser_trial::simulation::{self, Options, Paces};
 
 const EXAMPLES: &str = "\
 Examples:

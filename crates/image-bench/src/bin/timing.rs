@@ -1,4 +1,4 @@
-//! Timing of the ARM image in the emulator, for `cargo xtask timing`: see `ser_tests::timing`.
+//! Timing of the ARM image in the emulator, for `cargo xtask timing`: see `image_bench`.
 
 use std::process::ExitCode;
 
@@ -26,8 +26,8 @@ mod measured {
     use std::time::Instant;
 
     use clap::Parser;
-    use ser_tests::timing::bench::Parts;
-    use ser_tests::timing::report::Report;
+    use image_bench::bench::Parts;
+    use image_bench::report::Report;
 
     /// What `cargo xtask timing` runs when it has understood its options and built image and plugin.
     #[derive(Debug, Parser)]

@@ -1,6 +1,6 @@
 //! A recorder under test, native or as the ARM image, behind a pseudo-terminal.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -8,72 +8,18 @@ use chrono::NaiveDateTime;
 use ser_client::{Endpoint, GeniHost, Options, Unit, Unsolicited, open};
 use ser_proto::{Entry, Model};
 use ser_sim::genius::Noise;
+use ser_sim::testing::{Kind, PATIENCE, image};
 use ser_sim::{
     Backend, EmulatedBoard, EmulatorOptions, GeniusOptions, Notice, Played, Port, Scenario, SimOptions,
     Simulator, Step,
 };
 use tempfile::TempDir;
 
-/// How long anything may take: these tests run on machines that stall for seconds.
-pub const PATIENCE: Duration = Duration::from_secs(120);
-
-/// Where the ARM image is: set by `cargo xtask test`, which builds it.
-pub const IMAGE_VARIABLE: &str = "SER_IMAGE_MPS2_AN385";
-
-/// The ARM image.
-///
-/// # Panics
-/// When nobody says where it is.
-#[must_use]
-pub fn image() -> PathBuf {
-    std::env::var_os(IMAGE_VARIABLE)
-        .unwrap_or_else(|| panic!("{IMAGE_VARIABLE} is not set: run `cargo xtask test`"))
-        .into()
-}
-
 /// The recorder's number, where it is on a bus.
 pub const NODE: u8 = 5;
 
 /// For a client on a machine that stalls.
 pub const PATIENT: Options = Options { timeout: Duration::from_secs(20), retries: 5 };
-
-/// What plays the node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// The recorder in this process.
-    Native,
-    /// The ARM image in the emulator.
-    Emulated,
-}
-
-impl Kind {
-    fn backend(self) -> Backend {
-        match self {
-            Kind::Native => Backend::default(),
-            Kind::Emulated => Backend::Emulator(EmulatorOptions::new(image())),
-        }
-    }
-}
-
-/// Makes two tests of each function that takes a [`Kind`]: `native::…` and, for `cargo xtask test`, `emulated::…`.
-#[macro_export]
-macro_rules! with_both_kinds {
-    ($($test:ident),* $(,)?) => {
-        mod native {
-            $(#[test]
-            fn $test() {
-                super::$test($crate::recorder::Kind::Native);
-            })*
-        }
-        mod emulated {
-            $(#[test]
-            #[ignore = "needs the emulator and the image: cargo xtask test"]
-            fn $test() {
-                super::$test($crate::recorder::Kind::Emulated);
-            })*
-        }
-    };
-}
 
 /// A recorder that is switched on.
 pub struct Recorder {

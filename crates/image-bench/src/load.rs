@@ -15,9 +15,9 @@ use super::costs::beginnings;
 use super::genius::{Genius, HOST};
 use super::lateness::{Lateness, expiry};
 use super::program::Program;
-use crate::simulation::account::Tally as Told;
-use crate::simulation::conversation::{Conversation, Order, Outgoing, Talk};
-use crate::simulation::ledger::Ledger;
+use ser_trial::simulation::account::Tally as Told;
+use ser_trial::simulation::conversation::{Conversation, Order, Outgoing, Talk};
+use ser_trial::simulation::ledger::Ledger;
 
 /// 2000-01-01 00:00, what a clock that has never been set shows at tick 0.
 const NEVER_SET_MS: i64 = 946_684_800_000;

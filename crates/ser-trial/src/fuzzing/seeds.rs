@@ -18,7 +18,7 @@ pub struct Seed {
 /// The folder that has a folder of seeds for each target.
 #[must_use]
 pub fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fuzz/seeds")
 }
 
 /// The seeds of a target, by name.
