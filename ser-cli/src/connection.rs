@@ -1,5 +1,7 @@
 //! From `--port` to a unit that can be talked to, and from the client's errors to what the user is told.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use ser_client::{
@@ -9,6 +11,7 @@ use ser_proto::{Baud, Configuration};
 
 use crate::cli::ConnectionArgs;
 use crate::error::{Failure, Result, advise, inform, warn};
+use crate::interrupt::Caught;
 use crate::unit_name::UnitName;
 
 /// What the user calls the unit.
@@ -34,8 +37,13 @@ pub(crate) fn unit_name(connection: &ConnectionArgs) -> Result<UnitName> {
 /// Opens the line to the unit. Nothing is sent yet.
 pub(crate) fn open(connection: &ConnectionArgs) -> Result<Unit> {
     let endpoint = endpoint(connection)?;
-    let mut unit = Unit::open(&endpoint, baud(connection).bits_per_second(), options(connection))
-        .map_err(|error| open_failure(&error))?;
+    let (baud_rate, options) = (baud(connection).bits_per_second(), options(connection));
+    let mut unit = match endpoint {
+        Endpoint::Geni { .. } => {
+            unless_interrupted(|stop| Unit::open_unless(&endpoint, baud_rate, options, stop))?
+        }
+        _ => Unit::open(&endpoint, baud_rate, options).map_err(|error| open_failure(&error))?,
+    };
     // A terminal server does not tell how fast its port is; who uses it may.
     if let (false, Some(baud)) = (endpoint.has_baud(), connection.baud) {
         unit.set_line_rate(LineRate::BitsPerSecond(baud.bits_per_second()));
@@ -64,7 +72,22 @@ pub(crate) fn open_bus(connection: &ConnectionArgs) -> Result<ser_client::GeniHo
             .hint("name the window of this host's GENI board, as in --port geni:/dev/shm/host")
             .hint("no board at hand? ser-cli sim --genius /dev/shm/host --node 5"));
     };
-    ser_client::GeniHost::open(window, options(connection).timeout).map_err(|error| open_failure(&error))
+    let patience = options(connection).timeout;
+    unless_interrupted(|stop| ser_client::GeniHost::open_unless(window, patience, stop))
+}
+
+/// Opens the window to a bus. An interrupt has to wait until what was written there is put back, as the window may
+/// turn out to be none.
+fn unless_interrupted<T>(
+    open: impl FnOnce(&Arc<AtomicBool>) -> std::result::Result<T, OpenError>,
+) -> Result<T> {
+    let caught = Caught::for_now()?;
+    let opened = open(caught.flag()).map_err(|error| open_failure(&error))?;
+    // At the last moment, when opening looked no more.
+    if caught.flag().load(Ordering::Relaxed) {
+        return Err(Failure::from(GeniusError::Interrupted));
+    }
+    Ok(opened)
 }
 
 fn no_port() -> Failure {

@@ -1,20 +1,55 @@
 //! Ctrl-C, and a polite kill, as something to ask for in a loop.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::error::{EXIT_FAILURE, Failure, Result, advise};
 
 /// What to tell when the program ends before it has tidied up.
 static LEFT_BEHIND: Mutex<Option<&str>> = Mutex::new(None);
 
+/// Set by an interrupt, once anybody wants to know of them.
+static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+
+/// How many look at the flag. An interrupt that nobody looks for ends the program.
+static LOOKING: AtomicUsize = AtomicUsize::new(0);
+
 /// From now on an interrupt sets the flag instead of ending the program. The flag is looked at between two questions
 /// to the unit; whoever does not want to wait for that presses Ctrl-C once more, which ends the program at once.
 pub(crate) fn catch() -> Result<Arc<AtomicBool>> {
-    let flag = Arc::new(AtomicBool::new(false));
+    let flag = flag()?;
+    LOOKING.fetch_add(1, Ordering::Relaxed);
+    Ok(flag)
+}
+
+/// Looks at the flag as long as this is there.
+pub(crate) struct Caught(Arc<AtomicBool>);
+
+impl Caught {
+    /// The same as [`catch`] for something that has to be put back.
+    pub(crate) fn for_now() -> Result<Caught> {
+        catch().map(Caught)
+    }
+
+    pub(crate) fn flag(&self) -> &Arc<AtomicBool> {
+        &self.0
+    }
+}
+
+impl Drop for Caught {
+    fn drop(&mut self) {
+        LOOKING.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+fn flag() -> Result<Arc<AtomicBool>> {
+    if let Some(flag) = INTERRUPTED.get() {
+        return Ok(Arc::clone(flag));
+    }
+    let flag = Arc::clone(INTERRUPTED.get_or_init(Arc::default));
     let set = Arc::clone(&flag);
     let caught = move || {
-        if set.swap(true, Ordering::Relaxed) {
+        if set.swap(true, Ordering::Relaxed) || LOOKING.load(Ordering::Relaxed) == 0 {
             if let Some(hint) = *LEFT_BEHIND.lock().unwrap_or_else(PoisonError::into_inner) {
                 advise(hint);
             }

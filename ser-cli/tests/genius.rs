@@ -409,6 +409,30 @@ fn a_window_may_be_mapped_into_memory() {
 }
 
 #[test]
+fn ctrl_c_ends_the_wait_for_a_board_and_puts_back_what_was_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let photo = folder.path().join("photo");
+    let mut bytes = vec![0xA5; 0x4000];
+    // As if a board had said that it is well.
+    bytes[0x0893] = 1;
+    for command in ["status", "erase --yes", "watch", "genius devices", "genius globals --follow"] {
+        fs::write(&photo, &bytes).expect("written");
+        let node = if command.starts_with("genius") { "" } else { "?node=5" };
+        let port = format!("geni:{}{node}", photo.display());
+        let mut waiting = ser_cli();
+        waiting.env("SER_PORT", port).env("SER_STATE_DIR", folder.path().join("state"));
+        waiting.args(["--timeout", PATIENT_TIMEOUT]).args(command.split_whitespace());
+        let mut waiting = Running::start(waiting.stderr(Stdio::piped()));
+        let told = waiting.told();
+        wait_until("it waits for the board", || fs::read(&photo).expect("a file")[0x0893] == 0);
+        assert_eq!(waiting.interrupt(), Some(1), "{command}");
+        let told: Vec<_> = told.iter().collect();
+        assert!(told.iter().any(|line| line.contains("interrupted")), "{told:?}");
+        assert!(fs::read(&photo).expect("a file") == bytes, "{command}");
+    }
+}
+
+#[test]
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn the_image_is_spoken_to_over_the_bus() {
     let image = image();

@@ -1,6 +1,7 @@
 //! A unit behind a line: blocking calls, one per thing that a recorder can do.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use ser_proto::{
@@ -77,12 +78,24 @@ impl Unit {
     /// # Errors
     /// See [`OpenError`].
     pub fn open(endpoint: &Endpoint, baud: u32, options: Options) -> Result<Unit, OpenError> {
+        Unit::open_unless(endpoint, baud, options, &Arc::default())
+    }
+
+    /// The same until `stop` is set, where a board on a bus has to be waited for.
+    ///
+    /// # Errors
+    /// See [`OpenError`].
+    #[cfg_attr(not(unix), expect(unused_variables, reason = "there are no windows to boards"))]
+    pub fn open_unless(
+        endpoint: &Endpoint,
+        baud: u32,
+        options: Options,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Unit, OpenError> {
         match endpoint {
             #[cfg(unix)]
             Endpoint::Geni { window, node: Some(node) } => {
-                let host = crate::GeniHost::open(window.clone(), options.timeout)?;
-                let path = &window.file;
-                host.find(*node).map_err(|error| OpenError::Genius { path: path.clone(), error })?;
+                let host = crate::GeniHost::open_with_node(window.clone(), options.timeout, stop, *node)?;
                 Ok(host.unit(*node, options))
             }
             line => Ok(Unit::new(open(line, baud)?, options)),

@@ -17,12 +17,9 @@
 //! samples them, and a move that it was caught in was none.
 
 use std::collections::VecDeque;
-use std::ffi::OsString;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::fd::{AsFd, BorrowedFd};
-use std::os::unix::ffi::{OsStrExt, OsStringExt};
-use std::os::unix::fs::FileTypeExt;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command as Process, Stdio};
@@ -35,6 +32,7 @@ use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use ser_proto::{Baud, Command, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Model, Reply};
 use tempfile::TempDir;
 
+use crate::emulator_files::EmulatorFiles;
 use crate::error::SimError;
 use crate::external_bus::ExternalBus;
 use crate::machine::Machine;
@@ -65,7 +63,7 @@ const PATIENCE_PLAYING: Duration = Duration::from_micros(100);
 /// A board in QEMU.
 pub(crate) struct Emulator {
     program: PathBuf,
-    arguments: Vec<OsString>,
+    files: EmulatorFiles,
     bus: Arc<ExternalBus>,
     /// The battery-backed clock's count.
     clock: Pace,
@@ -120,17 +118,16 @@ impl Drop for Qemu {
 }
 
 impl Emulator {
-    /// A board without power. It has a GENI if it is to be on a Genius bus.
+    /// A board without power. It has a GENI if it is to be on a Genius bus. Where its log is a pipe
+    /// that nobody reads, this waits, unless told to stop.
     pub(crate) fn new(
         options: &EmulatorOptions,
         model: Model,
         debounce_ms: u8,
         geni: bool,
+        stop: &AtomicBool,
     ) -> Result<Emulator, SimError> {
-        // QEMU's own words for a missing image are less clear.
-        File::open(&options.image)
-            .map_err(SimError::io(format!("open the image {}", options.image.display())))?;
-        make_log(options)?;
+        let files = EmulatorFiles::open(options, stop)?;
         let directory = TempDir::with_prefix("ser-sim-")
             .map_err(SimError::io("make a temporary directory for the emulator"))?;
         let memory = options.memory.clone().unwrap_or_else(|| directory.path().join("memory"));
@@ -141,7 +138,7 @@ impl Emulator {
         bus.set_inputs(0);
         Ok(Emulator {
             program: options.program.clone().unwrap_or_else(|| PROGRAM.into()),
-            arguments: arguments(options, &memory),
+            files,
             boots: bus.boots(),
             bus: Arc::new(bus),
             clock: Pace::from(Instant::now(), time_of_day_ms()),
@@ -241,9 +238,11 @@ impl Emulator {
         let doing = || format!("start {}", self.program.display());
         let printed = File::create(self.printed_path()).map_err(SimError::io("make a temporary file"))?;
         let mut process = Process::new(&self.program);
-        process.args(&self.arguments);
+        let handed_over = self.files.hand_over(&self.bus).map_err(SimError::io(doing()))?;
+        process.args(&handed_over.arguments);
         process.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(printed);
         let mut qemu = spawn(&mut process, &self.program)?;
+        drop(handed_over);
         let (input, output) = (qemu.0.stdin.take(), qemu.0.stdout.take());
         let (Some(input), Some(output)) = (input, output) else {
             return Err(SimError::io(doing())(io::Error::other("no pipes")));
@@ -482,56 +481,6 @@ pub(crate) fn spawn(process: &mut Process, program: &Path) -> Result<Qemu, SimEr
     }
 }
 
-/// What the board is made of, for the emulator.
-pub(crate) fn arguments(options: &EmulatorOptions, memory: &Path) -> Vec<OsString> {
-    let mut backend = OsString::from(format!(
-        "memory-backend-file,id=ext,size={},share=on,mem-path=",
-        crate::external_bus::MEMORY_LEN
-    ));
-    backend.push(doubled_commas(memory));
-    let mut log = OsString::from("null,id=log");
-    if let Some(path) = &options.log {
-        // Behind what it has logged already: the board may have been off in between.
-        log = OsString::from("file,id=log,append=on,path=");
-        log.push(doubled_commas(path));
-    }
-    let mut arguments: Vec<OsString> = [
-        "-M",
-        "mps2-an385,memory-backend=ext",
-        "-display",
-        "none",
-        "-monitor",
-        "none",
-        "-chardev",
-        "stdio,id=rs232,signal=off",
-        "-serial",
-        "chardev:rs232",
-        "-serial",
-        "chardev:log",
-        "-chardev",
-    ]
-    .map(OsString::from)
-    .to_vec();
-    arguments.extend([log, "-object".into(), backend, "-kernel".into(), options.image.clone().into()]);
-    arguments
-}
-
-/// Makes the file for the log. A pipe or a terminal may be there already: writing to one destroys
-/// nothing.
-pub(crate) fn make_log(options: &EmulatorOptions) -> Result<(), SimError> {
-    let Some(path) = &options.log else { return Ok(()) };
-    let made = match fs::metadata(path) {
-        Ok(found) if found.file_type().is_fifo() || found.file_type().is_char_device() => return Ok(()),
-        Ok(_) => return Err(SimError::LogTaken(path.to_owned())),
-        Err(_) => File::options().write(true).create_new(true).open(path),
-    };
-    made.map(drop).map_err(|error| match error.kind() {
-        // A link that leads nowhere.
-        ErrorKind::AlreadyExists => SimError::LogTaken(path.to_owned()),
-        _ => SimError::io(format!("make the log {}", path.display()))(error),
-    })
-}
-
 /// What the emulator has printed, or its beginning.
 pub(crate) fn read_printed(path: &Path) -> String {
     let mut printed = Vec::new();
@@ -544,14 +493,6 @@ pub(crate) fn read_printed(path: &Path) -> String {
 fn time_of_day_ms() -> u64 {
     let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since_1970.as_millis()).unwrap_or_default()
-}
-
-/// A comma ends an option of QEMU unless it is doubled.
-pub(crate) fn doubled_commas(path: &Path) -> OsString {
-    let bytes = path.as_os_str().as_bytes();
-    OsString::from_vec(
-        bytes.iter().flat_map(|&byte| [byte].repeat(if byte == b',' { 2 } else { 1 })).collect(),
-    )
 }
 
 pub(crate) fn never_wait(descriptor: impl AsFd) -> io::Result<()> {
@@ -594,34 +535,6 @@ mod tests {
     }
 
     #[test]
-    fn commas_in_paths_do_not_end_qemus_options() {
-        assert_eq!(doubled_commas(Path::new("/a,b/c")), "/a,,b/c");
-    }
-
-    #[test]
-    fn a_log_takes_the_place_of_nothing() {
-        let folder = tempfile::tempdir().unwrap();
-        let (log, link) = (folder.path().join("log"), folder.path().join("link"));
-        std::os::unix::fs::symlink(&log, &link).unwrap();
-        let make_log = |path: &Path| {
-            make_log(&EmulatorOptions { log: Some(path.to_owned()), ..EmulatorOptions::new("image") })
-        };
-        assert!(matches!(make_log(&link), Err(SimError::LogTaken(_))));
-        assert!(!log.exists());
-        make_log(&log).unwrap();
-        for text in ["", "a report"] {
-            fs::write(&log, text).unwrap();
-            for path in [&log, &link, &folder.path().to_owned()] {
-                assert!(matches!(make_log(path), Err(SimError::LogTaken(_))), "{}", path.display());
-            }
-            assert_eq!(fs::read_to_string(&log).unwrap(), text);
-        }
-        make_log(Path::new("/dev/null")).unwrap();
-        let nowhere = make_log(Path::new("/nonexistent/log")).unwrap_err().to_string();
-        assert!(nowhere.starts_with("cannot make the log /nonexistent/log"), "{nowhere}");
-    }
-
-    #[test]
     fn of_what_the_emulator_prints_without_end_the_beginning_is_shown() {
         let file = tempfile::NamedTempFile::new().unwrap();
         file.as_file().set_len(1 << 40).unwrap();
@@ -633,7 +546,7 @@ mod tests {
         let image = tempfile::NamedTempFile::new().unwrap();
         let mut options = EmulatorOptions::new(image.path());
         options.program = Some("/nonexistent/qemu-system-arm".into());
-        let mut emulator = Emulator::new(&options, Model::Ser160, 0, false).unwrap();
+        let mut emulator = Emulator::new(&options, Model::Ser160, 0, false, &AtomicBool::new(false)).unwrap();
         let error = emulator.power_up(&AtomicBool::new(false)).unwrap_err().to_string();
         assert!(error.contains("not installed") && error.contains("package qemu-system-arm"), "{error}");
     }
@@ -644,7 +557,7 @@ mod tests {
         let mut options = EmulatorOptions::new(image.path());
         // The shell knows no option -M.
         options.program = Some("/bin/sh".into());
-        let mut emulator = Emulator::new(&options, Model::Ser160, 0, false).unwrap();
+        let mut emulator = Emulator::new(&options, Model::Ser160, 0, false, &AtomicBool::new(false)).unwrap();
         let error = emulator.power_up(&AtomicBool::new(false)).unwrap_err().to_string();
         assert!(error.contains("exit status: 2") && error.contains("-M"), "{error}");
     }

@@ -5,14 +5,15 @@
 //! writes to the file would show up on the board as well, but the kernel copies a few bytes one by one, and an input
 //! latch caught between two of its bytes would be a contact change that never was.
 
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind};
-use std::os::unix::fs::FileExt;
+use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::Path;
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 use geni_board::RAM_LEN;
 use memmap2::MmapRaw;
+use rustix::fs::OFlags;
 use ser_board::last_words::MAX_TEXT_LEN;
 use ser_proto::Model;
 
@@ -62,19 +63,28 @@ const MADE_BY_US: [u32; 2] = [u32::from_le_bytes(*b"SER "), u32::from_le_bytes(*
 /// Opens a memory that was made before; nothing where the file is something else.
 fn open_memory(path: &Path) -> io::Result<Option<File>> {
     // Before it is opened: a pipe would wait for its other end.
-    let found = fs::symlink_metadata(path)?;
-    if !found.is_file() || found.len() != MEMORY_LEN {
+    if !is_memory(&fs::symlink_metadata(path)?) {
         return Ok(None);
     }
-    let file = File::options().read(true).write(true).open(path)?;
+    // By now it may be something else.
+    let flags = OFlags::NOFOLLOW | OFlags::NONBLOCK;
+    let file = File::options().read(true).write(true).custom_flags(flags.bits().cast_signed()).open(path)?;
+    if !is_memory(&file.metadata()?) {
+        return Ok(None);
+    }
     let mut mark = [0; 8];
     file.read_exact_at(&mut mark, MARK as u64)?;
     Ok((mark == *MADE_BY_US.map(u32::to_le_bytes).as_flattened()).then_some(file))
 }
 
+fn is_memory(found: &Metadata) -> bool {
+    found.is_file() && found.len() == MEMORY_LEN
+}
+
 /// The mapped memory.
 pub(crate) struct ExternalBus {
     memory: MmapRaw,
+    file: File,
     /// When the clock's count was written last, and the longest time between two such moments; 0 for never.
     clock_written_ms: AtomicU64,
     clock_gap_ms: AtomicU64,
@@ -86,9 +96,10 @@ impl ExternalBus {
     /// # Errors
     /// `AlreadyExists` where something else is, which is left as it is.
     pub(crate) fn open(path: &Path) -> io::Result<ExternalBus> {
-        let bus = |file: &File| {
+        let bus = |file: File| {
             Ok(ExternalBus {
-                memory: MmapRaw::map_raw(file)?,
+                memory: MmapRaw::map_raw(&file)?,
+                file,
                 clock_written_ms: AtomicU64::new(0),
                 clock_gap_ms: AtomicU64::new(0),
             })
@@ -96,16 +107,21 @@ impl ExternalBus {
         match File::options().read(true).write(true).create_new(true).open(path) {
             Ok(file) => {
                 file.set_len(MEMORY_LEN)?;
-                let bus = bus(&file)?;
+                let bus = bus(file)?;
                 (0..).step_by(4).zip(MADE_BY_US).for_each(|(at, word)| bus.write(MARK + at, word));
                 Ok(bus)
             }
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
                 let file = open_memory(path)?.ok_or(ErrorKind::AlreadyExists)?;
-                bus(&file)
+                bus(file)
             }
             Err(error) => Err(error),
         }
+    }
+
+    /// The file, for the other side to map it, too.
+    pub(crate) fn file(&self) -> &File {
+        &self.file
     }
 
     pub(crate) fn set_straps(&self, model: Model, debounce_ms: u8) {

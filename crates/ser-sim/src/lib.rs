@@ -17,6 +17,8 @@ mod contacts;
 mod emulated_board;
 #[cfg(unix)]
 mod emulator;
+#[cfg(unix)]
+mod emulator_files;
 mod error;
 #[cfg(unix)]
 mod external_bus;

@@ -25,9 +25,11 @@ mod tracer;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, Write};
+use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::os::unix::net::UnixListener;
 use std::path::{Path, PathBuf};
 use std::process::{ChildStdin, Command as Process, Stdio};
+use std::sync::atomic::AtomicBool;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -35,9 +37,8 @@ use ser_proto::Model;
 use tempfile::TempDir;
 
 use crate::emulated_board::ForcedFault;
-use crate::emulator::{
-    PROGRAM, Qemu, arguments, doubled_commas, is_temporary, make_log, read_printed, spawn,
-};
+use crate::emulator::{PROGRAM, Qemu, is_temporary, read_printed, spawn};
+use crate::emulator_files::EmulatorFiles;
 use crate::error::SimError;
 use crate::external_bus::ExternalBus;
 use crate::genius::Board;
@@ -96,7 +97,7 @@ impl Lockstep {
     /// # Errors
     /// When the emulator or the plugin cannot be started.
     pub fn start(options: &LockstepOptions) -> Result<Lockstep, SimError> {
-        make_log(&options.emulator)?;
+        let files = EmulatorFiles::open(&options.emulator, &AtomicBool::new(false))?;
         let directory = TempDir::with_prefix("ser-sim-")
             .map_err(SimError::io("make a temporary directory for the emulator"))?;
         let memory = directory.path().join("memory");
@@ -114,12 +115,13 @@ impl Lockstep {
         let printed =
             File::create(directory.path().join(PRINTED)).map_err(SimError::io("make a temporary file"))?;
         let mut process = Process::new(&program);
-        process.args(arguments(&options.emulator, &memory)).args(extra(options, &plugin_at, &probe_at));
+        let handed_over = files.hand_over(&bus).map_err(SimError::io("start the emulator"))?;
+        process.args(&handed_over.arguments).args(extra(options, &plugin_at, &probe_at));
         let (output, qemus) = LineOut::new().map_err(SimError::io("make a pipe for the emulator"))?;
         process.stdin(Stdio::piped()).stdout(qemus).stderr(printed);
         let mut qemu = spawn(&mut process, &program)?;
-        // It has our copy of its end of the pipe.
-        drop(process);
+        // They have our copies of its files, and of its end of the pipe.
+        drop((handed_over, process));
         let input = qemu.0.stdin.take().ok_or(SimError::Ended)?;
         let mut accept = |listener| accept(listener, &mut qemu, directory.path());
         let (tracer, probe) = (Tracer::new(accept(&plugin)?), Probe::new(accept(&probe)?));
@@ -284,6 +286,14 @@ fn extra(options: &LockstepOptions, plugin_at: &Path, probe_at: &Path) -> Vec<Os
     ]
 }
 
+/// A comma ends an option of QEMU unless it is doubled.
+fn doubled_commas(path: &Path) -> OsString {
+    let bytes = path.as_os_str().as_bytes();
+    OsString::from_vec(
+        bytes.iter().flat_map(|&byte| [byte].repeat(if byte == b',' { 2 } else { 1 })).collect(),
+    )
+}
+
 /// Waits for the emulator to call.
 fn accept(
     listener: &UnixListener,
@@ -327,6 +337,11 @@ fn explain(error: io::Error, qemu: &mut Qemu, directory: &Path) -> SimError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn commas_in_paths_do_not_end_qemus_options() {
+        assert_eq!(doubled_commas(Path::new("/a,b/c")), "/a,,b/c");
+    }
 
     #[test]
     fn an_emulator_that_knows_no_such_options_says_so() {

@@ -8,7 +8,7 @@
 //! root could open the terminal again. The link is then moved to a fresh pseudo-terminal.
 
 use std::ffi::OsStr;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
 use std::mem;
 use std::os::fd::{AsFd, BorrowedFd};
@@ -44,6 +44,11 @@ pub(crate) struct PtyLine {
     host_present: bool,
     host_changed: bool,
     freed: Instant,
+    /// Whether the link is gone because it could not be noted as ours.
+    lost: bool,
+    /// Whether the link could not be moved when that was last tried.
+    failing: bool,
+    notices: Vec<String>,
 }
 
 /// What the link is in.
@@ -138,11 +143,14 @@ impl PtyLine {
             host_present: false,
             host_changed: false,
             freed: Instant::now(),
+            lost: false,
+            failing: false,
+            notices: Vec::new(),
         })
     }
 
     /// Nobody has the terminal open: makes it ready for the next host.
-    fn free(&mut self) -> io::Result<()> {
+    fn free(&mut self) {
         self.host_present = false;
         self.freed = Instant::now();
         match self.pair.open_slave() {
@@ -153,16 +161,42 @@ impl PtyLine {
             }
             // Taken and nobody there to have it: see the notes above.
             Err(Errno::BUSY) if !self.pair.has_host() => {
-                self.pair = Pair::new()?;
-                // Somebody may have put something else there meanwhile.
-                if self.published && self.place.holds_ours()? {
-                    replace_link(&self.pair.slave, &self.link)?;
-                    self.place.remember()?;
-                }
+                let moved = self.move_to_fresh_terminal();
+                self.tell(moved);
             }
             Err(_) => {}
         }
+    }
+
+    /// Where that fails, and where somebody has put something else in the place of the link, all
+    /// stays as it is until the next time.
+    fn move_to_fresh_terminal(&mut self) -> io::Result<()> {
+        if self.published && !self.lost && !self.place.holds_ours()? {
+            return Ok(());
+        }
+        let pair = Pair::new()?;
+        if self.published {
+            if self.lost {
+                symlink(&pair.slave, &self.link)?;
+            } else {
+                replace_link(&pair.slave, &self.link)?;
+            }
+            self.lost = true;
+            self.place.remember()?;
+            self.lost = false;
+        }
+        self.pair = pair;
         Ok(())
+    }
+
+    /// Tells the user once that hosts cannot come, until they can.
+    fn tell(&mut self, moved: io::Result<()>) {
+        let failed = moved.err();
+        if let (Some(error), false) = (&failed, self.failing) {
+            let link = self.link.display();
+            self.notices.push(format!("{link} cannot lead to a fresh terminal, tried again: {error}"));
+        }
+        self.failing = failed.is_some();
     }
 }
 
@@ -178,8 +212,8 @@ impl Line for PtyLine {
                 Ok(0)
             }
             // Linux reports a slave that nobody has open as EIO, others as the end of the file.
-            Ok(0) => self.no_host(),
-            Err(error) if error.raw_os_error() == Some(Errno::IO.raw_os_error()) => self.no_host(),
+            Ok(0) => Ok(self.no_host()),
+            Err(error) if error.raw_os_error() == Some(Errno::IO.raw_os_error()) => Ok(self.no_host()),
             Err(error) => Err(error),
         }
     }
@@ -222,6 +256,10 @@ impl Line for PtyLine {
         self.link.display().to_string()
     }
 
+    fn take_notices(&mut self) -> Vec<String> {
+        mem::take(&mut self.notices)
+    }
+
     fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
         // Without a host the master reports that over and over and would keep us from waiting at all.
         if self.host_present { vec![self.pair.master.as_fd()] } else { Vec::new() }
@@ -236,11 +274,11 @@ impl PtyLine {
         }
     }
 
-    fn no_host(&mut self) -> io::Result<usize> {
+    fn no_host(&mut self) -> usize {
         if self.host_present || self.freed.elapsed() > FREE_EVERY {
-            self.free()?;
+            self.free();
         }
-        Ok(0)
+        0
     }
 }
 
@@ -256,11 +294,77 @@ fn claim(link: &Path) -> Result<Claim, SimError> {
     }
 }
 
-/// Puts a link to `target` in the place of the one that is there, with no moment without any.
+/// Puts a link to `target` in the place of the one that is there, with no moment without any. Until
+/// then it has a name that nobody can foresee, so nobody can be in its way.
 fn replace_link(target: &Path, link: &Path) -> io::Result<()> {
-    let mut fresh = link.as_os_str().to_owned();
-    fresh.push(format!(".{}", std::process::id()));
-    let fresh = PathBuf::from(fresh);
-    symlink(target, &fresh)?;
-    fs::rename(&fresh, link).inspect_err(|_| drop(fs::remove_file(&fresh)))
+    let folder = link.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let fresh = tempfile::Builder::new().prefix(".ser-sim-").make_in(folder, |path| symlink(target, path))?;
+    Ok(fresh.into_temp_path().persist(link)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_link_moves_to_a_fresh_terminal_whatever_stands_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("ser");
+        let theirs = folder.path().join(format!("ser.{}", std::process::id()));
+        fs::write(&theirs, "theirs").unwrap();
+        let mut line = PtyLine::open(Some(&link)).unwrap();
+        line.publish().unwrap();
+        for _ in 0..3 {
+            let before = fs::read_link(&link).unwrap();
+            line.move_to_fresh_terminal().unwrap();
+            let now = fs::read_link(&link).unwrap();
+            assert!(now != before && now == line.pair.slave);
+        }
+        assert_eq!(fs::read_to_string(&theirs).unwrap(), "theirs");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "nothing is left behind");
+        drop(line);
+        assert!(fs::symlink_metadata(&link).is_err(), "still known as ours");
+    }
+
+    #[test]
+    fn a_link_that_is_away_for_a_while_moves_when_it_is_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let (link, away) = (folder.path().join("ser"), folder.path().join("away"));
+        let mut line = PtyLine::open(Some(&link)).unwrap();
+        line.publish().unwrap();
+        let before = fs::read_link(&link).unwrap();
+        fs::rename(&link, &away).unwrap();
+        fs::write(&link, "theirs").unwrap();
+        line.move_to_fresh_terminal().unwrap();
+        assert_eq!((fs::read_to_string(&link).unwrap(), &line.pair.slave), ("theirs".to_owned(), &before));
+        fs::remove_file(&link).unwrap();
+        line.move_to_fresh_terminal().unwrap();
+        assert!(fs::symlink_metadata(&link).is_err(), "what the user has taken away stays away");
+        fs::rename(&away, &link).unwrap();
+        line.move_to_fresh_terminal().unwrap();
+        assert_ne!(fs::read_link(&link).unwrap(), before);
+    }
+
+    #[test]
+    fn a_link_that_could_not_be_noted_is_made_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("ser");
+        let mut line = PtyLine::open(Some(&link)).unwrap();
+        line.publish().unwrap();
+        // As it is when the record could not be written.
+        fs::remove_file(&link).unwrap();
+        line.lost = true;
+        fs::write(&link, "theirs").unwrap();
+        for _ in 0..2 {
+            let failed = line.move_to_fresh_terminal();
+            assert!(failed.is_err());
+            line.tell(failed);
+        }
+        assert_eq!(line.take_notices().len(), 1, "told once");
+        fs::remove_file(&link).unwrap();
+        line.move_to_fresh_terminal().unwrap();
+        assert_eq!(fs::read_link(&link).unwrap(), line.pair.slave);
+    }
 }

@@ -400,7 +400,7 @@ fn run_on_bus(
             None
         }
         Backend::Emulator(image) => {
-            Some(crate::emulator::Emulator::new(&image, start.model, debounce_ms, true)?)
+            Some(crate::emulator::Emulator::new(&image, start.model, debounce_ms, true, &shared.stop)?)
         }
     };
     start.board = image.as_ref().map(|image| EmulatedBoard::new(image.external_bus()));
@@ -457,7 +457,8 @@ fn run_emulator(
     mut start: Start,
 ) -> Result<(), SimError> {
     let shared = Arc::clone(&service.shared);
-    let mut emulator = crate::emulator::Emulator::new(options, start.model, debounce_ms, false)?;
+    let mut emulator =
+        crate::emulator::Emulator::new(options, start.model, debounce_ms, false, &shared.stop)?;
     start.board = Some(EmulatedBoard::new(emulator.external_bus()));
     emulator.power_up(&shared.stop)?;
     start.go(service, &mut emulator)?;

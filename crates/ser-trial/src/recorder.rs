@@ -71,6 +71,19 @@ impl Recorder {
         Recorder::start_image(EmulatorOptions { log: Some(log.to_owned()), ..EmulatorOptions::new(image()) })
     }
 
+    /// Switches on the ARM image with a memory and a log in files.
+    ///
+    /// # Panics
+    /// When it does not answer, or the image is not there.
+    #[must_use]
+    pub fn start_keeping(memory: &Path, log: &Path) -> Recorder {
+        Recorder::start_image(EmulatorOptions {
+            memory: Some(memory.to_owned()),
+            log: Some(log.to_owned()),
+            ..EmulatorOptions::new(image())
+        })
+    }
+
     /// Switches on the ARM image with a memory that may have been in use before.
     ///
     /// # Panics

@@ -4,7 +4,7 @@
 use std::fs::{File, OpenOptions};
 use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -179,6 +179,16 @@ impl Desk {
         patience: Duration,
     ) -> Result<GeniHost, OpenError> {
         GeniHost::open_in(Arc::clone(&self.clock) as Arc<dyn Clock>, window, patience)
+    }
+
+    /// The same for somebody who may have had enough.
+    pub(crate) fn open_unless(
+        &self,
+        window: GeniWindow,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<GeniHost, OpenError> {
+        let clock = Arc::clone(&self.clock) as Arc<dyn Clock>;
+        GeniHost::open_in_unless(clock, window, Duration::from_secs(1), stop)
     }
 
     pub(crate) fn host(&self) -> GeniHost {

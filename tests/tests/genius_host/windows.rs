@@ -3,6 +3,8 @@
 use std::fs::{self, File};
 use std::os::fd::AsRawFd;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::thread;
 
 use ser_client::{Delivery, GeniWindow, GeniusError, OpenError};
@@ -62,6 +64,45 @@ fn a_window_without_a_board_behind_it_is_silent() {
     }
     // One that was named by mistake is what it was.
     assert!(fs::read(&photo).expect("read").iter().all(|&byte| byte == 0xA5));
+}
+
+/// A file of somebody's that looks like the window of a board that has stopped.
+fn like_a_window(path: &Path, offset: usize) -> Vec<u8> {
+    let mut bytes = vec![0xA5; offset + RAM_LEN + 7];
+    bytes[offset + 0x0893] = 1;
+    fs::write(path, &bytes).expect("written");
+    bytes
+}
+
+#[test]
+fn a_place_in_a_file_that_was_named_by_mistake_is_what_it_was() {
+    let desk = Desk::new(&ONE);
+    let path = desk.path("photo");
+    for offset in [0, 0x1234] {
+        let bytes = like_a_window(&path, offset);
+        let window = GeniWindow { offset: Some(offset as u64), ..window(&path) };
+        match desk.open(window).err() {
+            Some(OpenError::Genius { error: GeniusError::BoardSilent, .. }) => {}
+            other => panic!("{other:?}"),
+        }
+        assert!(fs::read(&path).expect("read") == bytes, "{offset}");
+    }
+}
+
+#[test]
+fn opening_ends_when_it_is_told_to() {
+    let desk = Desk::new(&ONE);
+    let path = desk.path("photo");
+    let bytes = like_a_window(&path, 0);
+    let window = GeniWindow { offset: Some(0), ..window(&path) };
+    let began_ms = desk.now_ms();
+    let stop = Arc::new(AtomicBool::new(true));
+    match desk.open_unless(window, &stop).err() {
+        Some(OpenError::Genius { error: GeniusError::Interrupted, .. }) => {}
+        other => panic!("{other:?}"),
+    }
+    assert!(desk.now_ms() - began_ms <= 10, "at once");
+    assert!(fs::read(&path).expect("read") == bytes);
 }
 
 #[test]

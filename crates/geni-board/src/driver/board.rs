@@ -26,8 +26,8 @@ pub(super) enum Phase {
     Released,
     /// Self-test: first no access at all, then the OK flag is waited for.
     SelfTest { since_ms: u32 },
-    /// A board that should be running: its OK flag has been cleared and should come back.
-    Attaching { since_ms: u32 },
+    /// A board that should be running: once its OK flag has been cleared, it should come back.
+    Attaching { since_ms: u32, cleared: bool },
     /// The OK flag is there. `window_since_ms` says since when, where the board is not on the bus yet.
     Configuring { window_since_ms: Option<u32>, futile: u8 },
     /// The board stays off the bus for a while. When it is `silent`, its tables need no lock.
@@ -52,13 +52,13 @@ impl<R: SharedRam> Driver<R> {
         match self.phase {
             Phase::Begin => {
                 let phase = self.first_phase(now_ms);
-                self.go(phase)
+                self.go(now_ms, phase)
             }
             Phase::Reset { since_ms, hold_ms } if elapsed_ms(now_ms, since_ms) < hold_ms => Ok(None),
-            Phase::Reset { .. } => self.go(Phase::Released),
-            Phase::Released => self.go(Phase::SelfTest { since_ms: now_ms }),
+            Phase::Reset { .. } => self.go(now_ms, Phase::Released),
+            Phase::Released => self.go(now_ms, Phase::SelfTest { since_ms: now_ms }),
             Phase::SelfTest { since_ms } => self.await_self_test(now_ms, since_ms),
-            Phase::Attaching { since_ms } => self.await_heartbeat(now_ms, since_ms),
+            Phase::Attaching { since_ms, cleared } => self.await_heartbeat(now_ms, since_ms, cleared),
             Phase::Configuring { window_since_ms, futile } => {
                 self.watch_heart(now_ms, timing::OFF_BUS_MS)?;
                 self.look(now_ms);
@@ -78,25 +78,24 @@ impl<R: SharedRam> Driver<R> {
             Phase::Failed { since_ms, pause_ms } if elapsed_ms(now_ms, since_ms) < pause_ms => Ok(None),
             Phase::Failed { .. } => {
                 let phase = self.phase_after_failure(now_ms);
-                self.go(phase)
+                self.go(now_ms, phase)
             }
         }
     }
 
-    fn go(&mut self, phase: Phase) -> Result<Option<Event>, Failure> {
-        if let Phase::Attaching { .. } = phase {
-            // The flag may be a relic.
-            self.ram.write(map::STATUS_OK, 0);
-        }
+    fn go(&mut self, now_ms: u32, phase: Phase) -> Result<Option<Event>, Failure> {
         self.phase = phase;
-        Ok(None)
+        match phase {
+            Phase::Attaching { since_ms, cleared } => self.await_heartbeat(now_ms, since_ms, cleared),
+            _ => Ok(None),
+        }
     }
 
     fn first_phase(&self, now_ms: u32) -> Phase {
         match self.options.start {
             Start::Reset { hold_ms } if self.options.reset_line => Phase::Reset { since_ms: now_ms, hold_ms },
             Start::Reset { .. } | Start::Released => Phase::SelfTest { since_ms: now_ms },
-            Start::Running => Phase::Attaching { since_ms: now_ms },
+            Start::Running => Phase::Attaching { since_ms: now_ms, cleared: false },
         }
     }
 
@@ -105,15 +104,28 @@ impl<R: SharedRam> Driver<R> {
             count(&mut self.counters.resets);
             Phase::Reset { since_ms: now_ms, hold_ms: timing::RESET_MS }
         } else {
-            Phase::Attaching { since_ms: now_ms }
+            Phase::Attaching { since_ms: now_ms, cleared: false }
         }
     }
 
-    fn await_heartbeat(&mut self, now_ms: u32, since_ms: u32) -> Result<Option<Event>, Failure> {
-        if self.ram.read(map::STATUS_OK) == 1 {
-            self.enter_configuring(now_ms, None);
-        } else if elapsed_ms(now_ms, since_ms) >= self.options.heartbeat_timeout_ms {
-            return Err(Failure::NoHeartbeat);
+    fn await_heartbeat(
+        &mut self,
+        now_ms: u32,
+        since_ms: u32,
+        cleared: bool,
+    ) -> Result<Option<Event>, Failure> {
+        match self.ram.read(map::STATUS_OK) {
+            1 if cleared => self.enter_configuring(now_ms, None),
+            // The flag may be a relic.
+            0 | 1 if !cleared => {
+                self.ram.write(map::STATUS_OK, 0);
+                self.phase = Phase::Attaching { since_ms, cleared: true };
+            }
+            // With any other value this is a board in its self-test, or none, and not ours to write to.
+            _ if elapsed_ms(now_ms, since_ms) >= self.options.heartbeat_timeout_ms => {
+                return Err(Failure::NoHeartbeat);
+            }
+            _ => {}
         }
         Ok(None)
     }

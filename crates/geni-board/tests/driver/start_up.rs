@@ -4,7 +4,7 @@ use geni_board::{
     BusRate, Configuration, ConfigurationOutcome, DipSwitches, Event, Failure, Identity, Options, Start,
 };
 
-use crate::board::Board;
+use crate::board::{Board, OK};
 use crate::world::{World, configuration};
 
 fn is_ready(event: &Event) -> bool {
@@ -95,6 +95,40 @@ fn a_flag_left_behind_by_a_dead_board_is_not_believed() {
     let (failed_ms, events) = world.until(10_000, is_failed);
     assert_eq!(events, [Event::Failed(Failure::NoHeartbeat)]);
     assert!((1_000..1_100).contains(&failed_ms), "noticed after {failed_ms} ms");
+}
+
+/// What a window holds that is none, or a board in its self-test.
+fn silent_with(flag: u8) -> World {
+    let options =
+        Options { start: Start::Running, reset_line: false, ..Options::new(Configuration::DEFAULT) };
+    let mut board = Board::running(0);
+    board.misbehaviour.hangs = true;
+    board.ram[OK] = flag;
+    World::new(board, options)
+}
+
+#[test]
+fn nothing_is_written_to_what_cannot_be_a_running_board() {
+    for flag in [0x02, 0x20, 0x55, 0xFF] {
+        let mut world = silent_with(flag);
+        let (failed_ms, events) = world.until(10_000, is_failed);
+        assert_eq!(events, [Event::Failed(Failure::NoHeartbeat)]);
+        assert!((1_000..1_100).contains(&failed_ms), "noticed after {failed_ms} ms");
+        // And not later either, when it is tried again.
+        world.run(10_000);
+        assert_eq!(world.board().written, [], "{flag:02X}");
+    }
+}
+
+#[test]
+fn a_board_in_its_self_test_is_waited_for() {
+    let mut world = silent_with(0x55);
+    world.run(500);
+    assert_eq!(world.board().written, []);
+    world.board().ram[OK] = 1;
+    world.board().misbehaviour.hangs = false;
+    let (_, events) = world.until(10_000, is_ready);
+    assert_eq!(events[0], Event::Configured(ConfigurationOutcome::Unchanged));
 }
 
 #[test]

@@ -37,6 +37,8 @@ pub enum GeniusError {
     },
     /// The window can no longer be read or written.
     Window(io::ErrorKind),
+    /// Whoever opened the window has had enough of waiting for the board.
+    Interrupted,
 }
 
 impl GeniusError {
@@ -51,7 +53,10 @@ impl GeniusError {
             | GeniusError::BoardBusy
             | GeniusError::Undelivered(_)
             | GeniusError::BroadcastFailed(_) => true,
-            GeniusError::OwnNumber { .. } | GeniusError::OddReply { .. } | GeniusError::Window(_) => false,
+            GeniusError::OwnNumber { .. }
+            | GeniusError::OddReply { .. }
+            | GeniusError::Window(_)
+            | GeniusError::Interrupted => false,
         }
     }
 
@@ -79,6 +84,7 @@ impl GeniusError {
             }
             GeniusError::OddReply { .. } => "does this kind of device know the question?",
             GeniusError::Window(_) => "is the file still there, and as long as it was?",
+            GeniusError::Interrupted => "nothing has been asked of a unit; give the board some seconds",
         }
     }
 }
@@ -96,6 +102,7 @@ impl fmt::Display for GeniusError {
             GeniusError::BroadcastFailed(error) => write!(f, "the broadcast did not get out: {error}"),
             GeniusError::OddReply { node } => write!(f, "the reply of device {node} makes no sense"),
             GeniusError::Window(kind) => write!(f, "the window of the GENI board cannot be used: {kind}"),
+            GeniusError::Interrupted => f.write_str("interrupted while the GENI board was waited for"),
         }
     }
 }

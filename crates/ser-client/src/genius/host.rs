@@ -1,6 +1,7 @@
 //! The host's side of a GENI board: who is on the bus, what they say, and what is said to them.
 
 use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -74,6 +75,18 @@ impl GeniHost {
         GeniHost::open_in(Arc::new(RealTime::new()), window, patience)
     }
 
+    /// The same until `stop` is set, if that comes first.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open), and [`GeniusError::Interrupted`].
+    pub fn open_unless(
+        window: impl Into<GeniWindow>,
+        patience: Duration,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<GeniHost, OpenError> {
+        GeniHost::open_in_unless(Arc::new(RealTime::new()), window, patience, stop)
+    }
+
     /// The same for a host in whose time board and bus live.
     ///
     /// # Errors
@@ -83,10 +96,46 @@ impl GeniHost {
         window: impl Into<GeniWindow>,
         patience: Duration,
     ) -> Result<GeniHost, OpenError> {
-        let place = window.into();
+        GeniHost::open_in_unless(clock, window, patience, &Arc::default())
+    }
+
+    /// The same for a host in whose time board and bus live.
+    ///
+    /// # Errors
+    /// As [`open_unless`](Self::open_unless).
+    pub fn open_in_unless(
+        clock: Arc<dyn Clock>,
+        window: impl Into<GeniWindow>,
+        patience: Duration,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<GeniHost, OpenError> {
+        GeniHost::open_and(clock, window.into(), patience, stop, |_| Ok(()))
+    }
+
+    /// The same, with something more to wait for.
+    pub(crate) fn open_with_node(
+        window: GeniWindow,
+        patience: Duration,
+        stop: &Arc<AtomicBool>,
+        node: u8,
+    ) -> Result<GeniHost, OpenError> {
+        let find = |host: &mut Host| host.find(node).map(drop);
+        GeniHost::open_and(Arc::new(RealTime::new()), window, patience, stop, find)
+    }
+
+    fn open_and(
+        clock: Arc<dyn Clock>,
+        place: GeniWindow,
+        patience: Duration,
+        stop: &Arc<AtomicBool>,
+        then: impl FnOnce(&mut Host) -> Result<(), GeniusError>,
+    ) -> Result<GeniHost, OpenError> {
         let patience = patience.max(HEARTBEAT_PATIENCE);
         let mut host = Host::new(Window::open(&place)?, Arc::clone(&clock), patience);
-        host.begin().map_err(|error| OpenError::Genius { path: place.file, error })?;
+        host.stop = Some(Arc::clone(stop));
+        let begun = host.begin().and_then(|()| then(&mut host));
+        begun.map_err(|error| OpenError::Genius { path: place.file, error })?;
+        host.stop = None;
         Ok(GeniHost { shared: Arc::new(Mutex::new(host)), clock })
     }
 
@@ -252,6 +301,8 @@ pub(super) struct Host {
     driver: Driver<Window>,
     clock: Arc<dyn Clock>,
     patience: Duration,
+    /// Set when nobody wants to wait any longer; looked at while the window is opened.
+    stop: Option<Arc<AtomicBool>>,
     identity: Option<Identity>,
     failure: Option<Failure>,
     pub(super) inboxes: Inboxes,
@@ -288,6 +339,7 @@ impl Host {
             devices_changed: clock.now(),
             clock,
             patience,
+            stop: None,
             identity: None,
             failure: None,
             inboxes: Inboxes::default(),
@@ -430,6 +482,9 @@ impl Host {
             }
             if self.clock.now() >= until {
                 return Ok(false);
+            }
+            if self.stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+                return Err(GeniusError::Interrupted);
             }
             self.clock.wait(PACE);
         }

@@ -8,11 +8,11 @@ mod inboxes;
 #[cfg(unix)]
 mod link;
 #[cfg(unix)]
+mod put_back;
+#[cfg(unix)]
 mod recognition;
 #[cfg(unix)]
 mod window;
-#[cfg(unix)]
-mod window_file;
 
 pub use error::GeniusError;
 pub use geni_board::{BlockKind, Device as DeviceRecord, Status as BoardStatus};

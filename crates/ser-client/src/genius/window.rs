@@ -2,18 +2,21 @@
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind};
-use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::os::unix::fs::{FileExt, FileTypeExt, OpenOptionsExt};
 
-use geni_board::{MappedRam, RAM_LEN, SharedRam};
+use geni_board::{FileRam, MappedRam, RAM_LEN, SharedRam};
 use rustix::fs::OFlags;
 
-use super::window_file::WindowFile;
+use super::put_back::PutBack;
 use crate::{GeniWindow, OpenError};
 
+/// The window, until a board answers there with what to put back.
+pub(super) type Window = PutBack<AnyRam>;
+
 /// Shared RAM, however it is reached.
-pub(super) enum Window {
+pub(super) enum AnyRam {
     /// A program on the other side, through a file. Should the file get shorter, that is an error and nothing worse.
-    File(WindowFile),
+    File(FileRam),
     /// A board.
     Memory(MappedRam),
 }
@@ -28,8 +31,7 @@ impl Window {
             _ => OpenError::Other { name: path(), error },
         };
         // Before anything is opened: there are devices that take notice of that.
-        let metadata = fs::metadata(&place.file).map_err(other)?;
-        let kind = metadata.file_type();
+        let kind = fs::metadata(&place.file).map_err(other)?.file_type();
         let mut options = OpenOptions::new();
         options.read(true).write(true);
         if kind.is_char_device() {
@@ -39,67 +41,75 @@ impl Window {
             return Err(OpenError::NotAWindow { path: path() });
         }
         let file = options.open(&place.file).map_err(other)?;
+        // By now it may be something else.
+        if file.metadata().map_err(other)?.file_type() != kind {
+            return Err(OpenError::NotAWindow { path: path() });
+        }
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(OpenError::WindowInUse { path: path() }),
             Err(TryLockError::Error(error)) => return Err(other(error)),
         }
-        if kind.is_file() { Window::of_file(file, place) } else { Window::of_memory(&file, place) }
-    }
-
-    /// A file that has another size may be anything, and must not be written to unless the user says where.
-    fn of_file(file: File, place: &GeniWindow) -> Result<Window, OpenError> {
-        let other = |error| OpenError::Other { name: place.file.clone(), error };
-        let len = file.metadata().map_err(other)?.len();
-        match place.offset {
-            None if len == RAM_LEN as u64 => WindowFile::new(file).map(Window::File).map_err(other),
-            Some(offset) if offset.checked_add(RAM_LEN as u64).is_some_and(|end| end <= len) => {
-                Window::of_memory(&file, place)
-            }
-            _ => Err(OpenError::WindowSize { path: place.file.clone(), len }),
-        }
-    }
-
-    fn of_memory(file: &File, place: &GeniWindow) -> Result<Window, OpenError> {
-        let ram = MappedRam::new(file, place.offset.unwrap_or(0));
-        ram.map(Window::Memory).map_err(|error| OpenError::NoMemory { path: place.file.clone(), error })
+        let ram = if kind.is_file() { of_file(file, place) } else { of_memory(&file, place) };
+        ram.map(PutBack::new)
     }
 
     /// The last error since this was asked.
     pub(super) fn take_error(&self) -> Option<ErrorKind> {
-        match self {
-            Window::File(ram) => ram.take_error(),
-            Window::Memory(_) => None,
+        match self.ram() {
+            AnyRam::File(ram) => ram.take_error(),
+            AnyRam::Memory(_) => None,
         }
     }
 }
 
-impl SharedRam for Window {
+/// A file that has another size may be anything, and must not be written to unless the user says where.
+fn of_file(file: File, place: &GeniWindow) -> Result<AnyRam, OpenError> {
+    let other = |error| OpenError::Other { name: place.file.clone(), error };
+    let len = file.metadata().map_err(other)?.len();
+    let offset = match place.offset {
+        None if len == RAM_LEN as u64 => 0,
+        Some(offset) if offset.checked_add(RAM_LEN as u64).is_some_and(|end| end <= len) => offset,
+        _ => return Err(OpenError::WindowSize { path: place.file.clone(), len }),
+    };
+    // Some systems show the memory of a board as a file that can be mapped and not read.
+    if file.read_exact_at(&mut [0], offset).is_err() {
+        return of_memory(&file, place);
+    }
+    FileRam::new(file, offset).map(AnyRam::File).map_err(other)
+}
+
+fn of_memory(file: &File, place: &GeniWindow) -> Result<AnyRam, OpenError> {
+    let ram = MappedRam::new(file, place.offset.unwrap_or(0));
+    ram.map(AnyRam::Memory).map_err(|error| OpenError::NoMemory { path: place.file.clone(), error })
+}
+
+impl SharedRam for AnyRam {
     fn read(&self, offset: u16) -> u8 {
         match self {
-            Window::File(ram) => ram.read(offset),
-            Window::Memory(ram) => ram.read(offset),
+            AnyRam::File(ram) => ram.read(offset),
+            AnyRam::Memory(ram) => ram.read(offset),
         }
     }
 
     fn write(&mut self, offset: u16, byte: u8) {
         match self {
-            Window::File(ram) => ram.write(offset, byte),
-            Window::Memory(ram) => ram.write(offset, byte),
+            AnyRam::File(ram) => ram.write(offset, byte),
+            AnyRam::Memory(ram) => ram.write(offset, byte),
         }
     }
 
     fn read_bytes(&self, offset: u16, bytes: &mut [u8]) {
         match self {
-            Window::File(ram) => ram.read_bytes(offset, bytes),
-            Window::Memory(ram) => ram.read_bytes(offset, bytes),
+            AnyRam::File(ram) => ram.read_bytes(offset, bytes),
+            AnyRam::Memory(ram) => ram.read_bytes(offset, bytes),
         }
     }
 
     fn write_bytes(&mut self, offset: u16, bytes: &[u8]) {
         match self {
-            Window::File(ram) => ram.write_bytes(offset, bytes),
-            Window::Memory(ram) => ram.write_bytes(offset, bytes),
+            AnyRam::File(ram) => ram.write_bytes(offset, bytes),
+            AnyRam::Memory(ram) => ram.write_bytes(offset, bytes),
         }
     }
 }

@@ -1,15 +1,13 @@
-//! A file as a window. It has the right size, and may be anything all the same until a board
-//! answers in it: a file of somebody's that was named by mistake gets back what was written to it.
+//! A window that may be none. A file, or a place in it, that was named by mistake may be anything: until a board
+//! answers there, it gets back what was written to it.
 
 use std::cell::RefCell;
-use std::fs::File;
-use std::io::{self, ErrorKind};
 
-use geni_board::{FileRam, SharedRam};
+use geni_board::SharedRam;
 
-/// Shared RAM in a file, with what to put back.
-pub(super) struct WindowFile {
-    ram: FileRam,
+/// Shared RAM, with what to put back.
+pub(super) struct PutBack<R: SharedRam> {
+    ram: R,
     /// Nothing once a board has shown itself: then the window is one.
     written: RefCell<Option<Vec<Written>>>,
 }
@@ -21,18 +19,14 @@ struct Written {
     byte: u8,
 }
 
-impl WindowFile {
-    /// A file that is a window and nothing else.
-    ///
-    /// # Errors
-    /// As for [`FileRam::new`].
-    pub(super) fn new(file: File) -> io::Result<WindowFile> {
-        Ok(WindowFile { ram: FileRam::new(file, 0)?, written: RefCell::new(Some(Vec::new())) })
+impl<R: SharedRam> PutBack<R> {
+    pub(super) const fn new(ram: R) -> PutBack<R> {
+        PutBack { ram, written: RefCell::new(Some(Vec::new())) }
     }
 
-    /// The last error since this was asked.
-    pub(super) fn take_error(&self) -> Option<ErrorKind> {
-        self.ram.take_error()
+    /// The window itself.
+    pub(super) const fn ram(&self) -> &R {
+        &self.ram
     }
 
     /// Looks whether somebody else has changed what we have written: that is a board.
@@ -48,7 +42,7 @@ impl WindowFile {
     }
 }
 
-impl SharedRam for WindowFile {
+impl<R: SharedRam> SharedRam for PutBack<R> {
     fn read(&self, offset: u16) -> u8 {
         let byte = self.ram.read(offset);
         self.look(offset, &[byte]);
@@ -79,7 +73,7 @@ impl SharedRam for WindowFile {
     }
 }
 
-impl Drop for WindowFile {
+impl<R: SharedRam> Drop for PutBack<R> {
     fn drop(&mut self) {
         for Written { offset, before, byte } in self.written.take().into_iter().flatten() {
             if self.ram.read(offset) == byte {
@@ -91,19 +85,19 @@ impl Drop for WindowFile {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
+    use std::fs::{self, File};
     use std::os::unix::fs::FileExt;
 
-    use geni_board::RAM_LEN;
+    use geni_board::{FileRam, RAM_LEN};
 
     use super::*;
 
     /// A file that is no window, and one that is opened as if it were.
-    fn mistaken() -> (tempfile::NamedTempFile, WindowFile) {
+    fn mistaken() -> (tempfile::NamedTempFile, PutBack<FileRam>) {
         let file = tempfile::NamedTempFile::new().unwrap();
         fs::write(file.path(), [0xA5; RAM_LEN]).unwrap();
         let window = File::options().read(true).write(true).open(file.path()).unwrap();
-        (file, WindowFile::new(window).unwrap())
+        (file, PutBack::new(FileRam::new(window, 0).unwrap()))
     }
 
     #[test]

@@ -1,0 +1,234 @@
+//! What the emulator reads and writes besides its standard streams, and how it gets it.
+//!
+//! # Design
+//! A name that is looked up twice may lead to two things: whoever may write to the folder can put a link there in
+//! between. So we open, look at what we have got, and the emulator inherits that; of names it gets only the image's,
+//! which it reads, and those of sockets in a folder of our own.
+
+use std::ffi::OsString;
+use std::fs::{self, File, Metadata};
+use std::io::{self, ErrorKind};
+use std::os::fd::{AsFd, AsRawFd, OwnedFd};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+use rustix::termios::isatty;
+
+use crate::error::SimError;
+use crate::external_bus::{ExternalBus, MEMORY_LEN};
+use crate::simulator::EmulatorOptions;
+
+/// How often it is looked whether somebody reads the pipe that the log goes to.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// The folder of a process's own descriptors.
+const DESCRIPTORS: &str = if cfg!(target_os = "linux") { "/proc/self/fd" } else { "/dev/fd" };
+
+/// Files for the emulator, as often as it is started.
+pub(crate) struct EmulatorFiles {
+    image: PathBuf,
+    log: Option<File>,
+}
+
+impl EmulatorFiles {
+    /// Makes the log. Where that is a pipe, waits until somebody reads it, or until told to stop.
+    pub(crate) fn open(options: &EmulatorOptions, stop: &AtomicBool) -> Result<EmulatorFiles, SimError> {
+        check_image(&options.image)?;
+        let log = options.log.as_deref().map(|path| open_log(path, stop)).transpose()?;
+        Ok(EmulatorFiles { image: options.image.clone(), log })
+    }
+
+    /// Copies for an emulator that is about to be started; it must not be started later than this goes.
+    pub(crate) fn hand_over(&self, bus: &ExternalBus) -> io::Result<HandedOver> {
+        let memory = inherited(bus.file())?;
+        let log = self.log.as_ref().map(inherited).transpose()?;
+        let arguments = arguments(&self.image, &memory, log.as_ref());
+        Ok(HandedOver { arguments, _memory: memory, _log: log })
+    }
+}
+
+/// Descriptors that every process inherits which is started meanwhile.
+pub(crate) struct HandedOver {
+    /// What the board is made of, for the emulator.
+    pub(crate) arguments: Vec<OsString>,
+    _memory: OwnedFd,
+    _log: Option<OwnedFd>,
+}
+
+fn inherited(file: impl AsFd) -> io::Result<OwnedFd> {
+    // Without the flag that closes it.
+    Ok(rustix::io::dup(file)?)
+}
+
+fn arguments(image: &Path, memory: &OwnedFd, log: Option<&OwnedFd>) -> Vec<OsString> {
+    let memory = format!(
+        "memory-backend-file,id=ext,size={MEMORY_LEN},share=on,mem-path={DESCRIPTORS}/{}",
+        memory.as_raw_fd()
+    );
+    let mut arguments: Vec<OsString> = [
+        "-M",
+        "mps2-an385,memory-backend=ext",
+        "-display",
+        "none",
+        "-monitor",
+        "none",
+        "-chardev",
+        "stdio,id=rs232,signal=off",
+        "-serial",
+        "chardev:rs232",
+        "-serial",
+        "chardev:log",
+        "-object",
+        &memory,
+        "-chardev",
+    ]
+    .map(OsString::from)
+    .to_vec();
+    match log {
+        None => arguments.push("null,id=log".into()),
+        Some(log) => {
+            // Behind what it has logged already: the board may have been off in between.
+            arguments.push("file,id=log,append=on,path=/dev/fdset/1".into());
+            arguments.extend(["-add-fd".into(), format!("fd={},set=1", log.as_raw_fd()).into()]);
+        }
+    }
+    arguments.extend(["-kernel".into(), image.into()]);
+    arguments
+}
+
+/// Looks at the image: the emulator's own words for one that is missing are less clear.
+fn check_image(path: &Path) -> Result<(), SimError> {
+    // A pipe would wait for its other end.
+    let file = File::options().read(true).custom_flags(OFlags::NONBLOCK.bits().cast_signed()).open(path);
+    let found = file.and_then(|file| file.metadata());
+    let checked = found.and_then(|found| {
+        let no_file = || io::Error::new(ErrorKind::InvalidInput, "it is not a regular file");
+        found.is_file().then_some(()).ok_or_else(no_file)
+    });
+    checked.map_err(SimError::io(format!("open the image {}", path.display())))
+}
+
+/// Makes the file for the log. A pipe, a terminal or the null device may be there already: writing
+/// to one destroys nothing.
+fn open_log(path: &Path, stop: &AtomicBool) -> Result<File, SimError> {
+    let failed = |error| SimError::io(format!("make the log {}", path.display()))(error);
+    let taken = || SimError::LogTaken(path.to_owned());
+    match File::options().append(true).create_new(true).open(path) {
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+        made => return made.map_err(failed),
+    }
+    // Before it is opened: there are devices that take notice of that. A link may lead nowhere.
+    let kind = fs::metadata(path).map_err(|_| taken())?.file_type();
+    if !kind.is_fifo() && !kind.is_char_device() {
+        return Err(taken());
+    }
+    let file = loop {
+        match open_device(path) {
+            // A pipe that nobody reads yet.
+            Err(rustix::io::Errno::NXIO) if kind.is_fifo() => {}
+            opened => break opened.map_err(|errno| failed(errno.into()))?,
+        }
+        if stop.load(Ordering::Relaxed) {
+            return Err(SimError::Ended);
+        }
+        thread::sleep(LOOK_EVERY);
+    };
+    // By now it may be something else.
+    let found = file.metadata().map_err(failed)?;
+    if !found.file_type().is_fifo() && !isatty(&file) && !is_null(&found) {
+        return Err(taken());
+    }
+    let flags = fcntl_getfl(&file).map_err(|errno| failed(errno.into()))?;
+    fcntl_setfl(&file, flags - OFlags::NONBLOCK).map_err(|errno| failed(errno.into()))?;
+    Ok(file)
+}
+
+/// Opens what is there to write to it, without waiting for anybody.
+fn open_device(path: &Path) -> rustix::io::Result<File> {
+    let flags = OFlags::WRONLY | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
+    rustix::fs::open(path, flags, rustix::fs::Mode::empty()).map(File::from)
+}
+
+fn is_null(found: &Metadata) -> bool {
+    let null = fs::metadata("/dev/null");
+    null.is_ok_and(|null| found.file_type().is_char_device() && found.rdev() == null.rdev())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::symlink;
+
+    use super::*;
+
+    fn open_log(path: &Path) -> Result<File, SimError> {
+        super::open_log(path, &AtomicBool::new(false))
+    }
+
+    #[test]
+    fn a_log_takes_the_place_of_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let (log, link) = (folder.path().join("log"), folder.path().join("link"));
+        symlink(&log, &link).unwrap();
+        assert!(matches!(open_log(&link), Err(SimError::LogTaken(_))));
+        assert!(!log.exists());
+        open_log(&log).unwrap();
+        for text in ["", "a report"] {
+            fs::write(&log, text).unwrap();
+            for path in [&log, &link, &folder.path().to_owned()] {
+                assert!(matches!(open_log(path), Err(SimError::LogTaken(_))), "{}", path.display());
+            }
+            assert_eq!(fs::read_to_string(&log).unwrap(), text);
+        }
+        open_log(Path::new("/dev/null")).unwrap();
+        let nowhere = open_log(Path::new("/nonexistent/log")).unwrap_err().to_string();
+        assert!(nowhere.starts_with("cannot make the log /nonexistent/log"), "{nowhere}");
+    }
+
+    #[test]
+    fn a_device_that_may_keep_what_it_is_given_is_no_log() {
+        assert!(matches!(open_log(Path::new("/dev/zero")), Err(SimError::LogTaken(_))));
+    }
+
+    #[test]
+    fn a_pipe_that_nobody_reads_is_waited_for_until_told_to_stop() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RWXU).unwrap();
+        let stopped = super::open_log(&pipe, &AtomicBool::new(true));
+        assert!(matches!(stopped, Err(SimError::Ended)));
+        let reader = rustix::fs::open(&pipe, OFlags::RDONLY | OFlags::NONBLOCK, rustix::fs::Mode::empty());
+        let log = super::open_log(&pipe, &AtomicBool::new(true)).unwrap();
+        assert!(!fcntl_getfl(&log).unwrap().contains(OFlags::NONBLOCK));
+        drop(reader);
+    }
+
+    #[test]
+    fn the_emulator_gets_no_name_of_what_it_writes() {
+        let folder = tempfile::tempdir().unwrap();
+        let [image, log, memory] = ["image", "log", "memory"].map(|name| folder.path().join(name));
+        fs::write(&image, "").unwrap();
+        let options = EmulatorOptions { log: Some(log), ..EmulatorOptions::new(&image) };
+        let files = EmulatorFiles::open(&options, &AtomicBool::new(false)).unwrap();
+        let handed_over = files.hand_over(&ExternalBus::open(&memory).unwrap()).unwrap();
+        let ours = folder.path().to_str().unwrap();
+        let named: Vec<_> =
+            handed_over.arguments.iter().filter(|text| text.to_str().unwrap().contains(ours)).collect();
+        assert_eq!(named, [image.as_os_str()]);
+    }
+
+    #[test]
+    fn an_image_is_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RWXU).unwrap();
+        for path in [&pipe, folder.path()] {
+            let refused = check_image(path).unwrap_err().to_string();
+            assert!(refused.ends_with("it is not a regular file"), "{refused}");
+        }
+        assert!(check_image(Path::new("/nonexistent/image")).is_err());
+    }
+}
