@@ -8,7 +8,8 @@
 //! | [`budget`]         | ring lengths and interrupt priorities, each with its derivation                        |
 //! | [`ring`]           | a ring between an interrupt and the main loop that has no panicking path               |
 //! | [`serial_line`]    | the rings of the RS-232 line, and when the line is quiet enough for another rate       |
-//! | [`main_loop`]      | one pass of the main loop between the line and the node                                |
+//! | [`main_loop`]      | one pass of the main loop between the ports and the node                               |
+//! | [`genius`]         | the Genius port, with the lines of its GENI board                                      |
 //! | [`inputs`]         | the word of inputs: ports, wiring, and samples that could not be taken                 |
 //! | [`serialiser`]     | inputs behind industrial digital-input serialisers on SPI                              |
 //! | [`flash_log`]      | the configuration in flash memory                                                      |
@@ -32,6 +33,7 @@ pub mod clock_chip;
 pub mod counter;
 pub mod fault;
 pub mod flash_log;
+pub mod genius;
 pub mod health;
 pub mod inputs;
 pub mod last_words;

@@ -1,11 +1,14 @@
-//! One pass of the main loop between the RS-232 line and the node, the same on every board.
+//! One pass of the main loop between the ports and the node, the same on every board.
 //!
-//! The board's part is a [`Line`]: its UART with the rings in front of it. A pass never waits and does no more than
-//! the rings hold, so a line that takes and gives bytes as fast as they come cannot keep the main loop.
+//! The board's part is a [`Line`]: its UART with the rings in front of it; and, where there is one, the
+//! [`GeniBoard`]. A pass never waits and does no more than the rings hold, so a line that takes and gives bytes as
+//! fast as they come cannot keep the main loop.
 
+use geni::SharedRam;
 use ser_node::{Node, Rtc, Storage};
 use ser_proto::Baud;
 
+use crate::genius::{GeniBoard, Genius};
 use crate::serial_line::Received;
 
 /// A board's RS-232 line as the main loop sees it.
@@ -13,8 +16,9 @@ pub trait Line {
     /// The most bytes taken, and the most given, in one pass: the longer ring's length.
     const MAX_BYTES: usize;
 
-    /// The next byte that has arrived.
-    fn receive(&mut self) -> Option<Received>;
+    /// The next byte, if it arrived no later than at this tick: see
+    /// [`take_until`](crate::serial_line::take_until).
+    fn receive(&mut self, now_ms: u32) -> Option<Received>;
 
     /// How many bytes were lost or misread since this was asked last.
     fn errors(&mut self) -> u32;
@@ -34,24 +38,38 @@ pub trait Line {
 }
 
 /// Hands over what has arrived, records what has changed, and takes what is to be sent. Gives the tick of the pass.
-pub fn pass<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L) -> u32 {
-    // Read first: see `Node::poll`.
+///
+/// The order is what makes stamps right: first the tick is read, then the pulses of the GENI board's interrupt line
+/// are taken, and then bytes that arrived no later than that tick. Interrupts come at any point. But a pulse that was
+/// not taken came after the tick was read, and is no older than any byte that is dealt with, nor than any change that
+/// is recorded.
+pub fn pass<S: Storage, R: Rtc, L: Line, W: SharedRam, B: GeniBoard>(
+    node: &mut Node<'_, S, R>,
+    line: &mut L,
+    mut genius: Option<&mut Genius<W, B>>,
+) -> u32 {
     let now_ms = node.tick_ms();
-    take_in(node, line);
+    if let Some(genius) = &mut genius {
+        genius.take_pulses(node);
+    }
+    take_in(node, line, now_ms);
     node.poll(now_ms);
     change_baud(node, line, now_ms);
     hand_out(node, line);
+    if let Some(genius) = genius {
+        genius.serve(node);
+    }
     now_ms
 }
 
-fn take_in<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L) {
+fn take_in<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L, now_ms: u32) {
     node.serial_line_errors(line.errors());
     for _ in 0..L::MAX_BYTES {
-        // Commands that find no room in the node wait in the ring.
+        // Commands that find no room in the node wait in the ring, and so do bytes that came after the tick was read.
         if !node.serial_has_room() {
             break;
         }
-        let Some(received) = line.receive() else { break };
+        let Some(received) = line.receive(now_ms) else { break };
         node.serial_receive(received.byte, received.tick_ms);
     }
 }

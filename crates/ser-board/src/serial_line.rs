@@ -25,6 +25,14 @@ pub struct Received {
     pub tick_ms: u32,
 }
 
+/// Takes the oldest byte out of the ring, if it arrived no later than at tick `now_ms`. One that has arrived since
+/// that tick was read waits for the next look.
+pub fn take_until<const N: usize>(ring: &mut Reader<'_, Received, N>, now_ms: u32) -> Option<Received> {
+    let has_come = |received: &Received| now_ms.wrapping_sub(received.tick_ms) <= u32::MAX / 2;
+    ring.peek().filter(has_come)?;
+    ring.pop()
+}
+
 /// One received byte in a ring.
 pub struct ReceivedCell {
     tick_ms: AtomicU32,
@@ -225,6 +233,18 @@ mod tests {
         }
         assert_eq!(std::iter::from_fn(|| ends.received.pop()).collect::<Vec<_>>(), bytes);
         assert_eq!(ends.errors.take(), 0);
+    }
+
+    #[test]
+    fn a_byte_that_came_after_the_tick_was_read_waits() {
+        let mut rings = SerialRings::<4, 4>::new();
+        let mut ends = rings.split();
+        for tick_ms in [u32::MAX, 0, 1] {
+            ends.receiver.push(byte(b'x', tick_ms));
+        }
+        let mut take = |now_ms| take_until(&mut ends.received, now_ms).map(|received| received.tick_ms);
+        assert_eq!([take(u32::MAX - 1), take(u32::MAX), take(u32::MAX)], [None, Some(u32::MAX), None]);
+        assert_eq!([take(7), take(7), take(7)], [Some(0), Some(1), None]);
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! A board's main loop with a UART that is a pair of queues: rings, line and node together.
 
+use geni::SharedRam;
 use ser_board::budget;
+use ser_board::genius::{GeniBoard, Genius};
 use ser_board::main_loop::{self, Line};
 use ser_board::ring::{Reader, Writer};
-use ser_board::serial_line::{LineErrors, Quiet, Received, Receiver, SerialEnds, SerialRings};
+use ser_board::serial_line::{self, LineErrors, Quiet, Received, Receiver, SerialEnds, SerialRings};
 use ser_node::{
     Capture, CaptureChannel, CopyNumber, Debounce, Event, NoRtc, Node, NodeParts, RECORD_LEN, Storage,
 };
@@ -29,6 +31,31 @@ impl Storage for NoStorage {
     }
 }
 
+/// A GENI board that is not fitted.
+enum NoBoard {}
+
+const NO_GENIUS: Option<&mut Genius<NoBoard, NoBoard>> = None;
+
+impl SharedRam for NoBoard {
+    fn read(&self, _: u16) -> u8 {
+        match *self {}
+    }
+
+    fn write(&mut self, _: u16, _: u8) {
+        match *self {}
+    }
+}
+
+impl GeniBoard for NoBoard {
+    fn next_pulse(&mut self) -> Option<u32> {
+        match *self {}
+    }
+
+    fn drive_reset(&mut self, _: bool) {
+        match *self {}
+    }
+}
+
 /// The main loop's end of a UART.
 struct Uart<'a> {
     received: Reader<'a, Received, RECEIVE>,
@@ -43,8 +70,8 @@ struct Uart<'a> {
 impl Line for Uart<'_> {
     const MAX_BYTES: usize = RECEIVE;
 
-    fn receive(&mut self) -> Option<Received> {
-        self.received.pop()
+    fn receive(&mut self, now_ms: u32) -> Option<Received> {
+        serial_line::take_until(&mut self.received, now_ms)
     }
 
     fn errors(&mut self) -> u32 {
@@ -125,7 +152,7 @@ impl Board<'_> {
     fn pass_ms(&mut self, ms: u32) {
         for _ in 0..ms {
             self.stall_ms(0);
-            assert_eq!(main_loop::pass(&mut self.node, &mut self.uart), self.tick_ms);
+            assert_eq!(main_loop::pass(&mut self.node, &mut self.uart, NO_GENIUS), self.tick_ms);
         }
     }
 

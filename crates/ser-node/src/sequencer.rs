@@ -34,12 +34,25 @@ pub struct Change {
     pub state: u32,
 }
 
+/// Inputs that changed in one millisecond.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Place {
+    changed: u32,
+    /// Inputs that capture had to drop: they are in effect from here on, and in no change.
+    dropped: u32,
+}
+
+impl Place {
+    const EMPTY: Place = Place { changed: 0, dropped: 0 };
+}
+
 /// Changes on their way from capture to log.
 pub(crate) struct Sequencer {
     debounce: Debounce,
     hold_ms: u64,
     /// Changes by the low bits of the tick at which they began.
-    waiting: [u32; WINDOW],
+    waiting: [Place; WINDOW],
+    /// Places that are not empty.
     waiting_count: usize,
     /// Changes after this tick wait.
     hold_after_ms: Option<u64>,
@@ -57,7 +70,7 @@ impl Sequencer {
         Sequencer {
             debounce,
             hold_ms: debounce.longest_ms().into(),
-            waiting: [0; WINDOW],
+            waiting: [Place::EMPTY; WINDOW],
             waiting_count: 0,
             hold_after_ms: None,
             front_ms: 0,
@@ -86,15 +99,22 @@ impl Sequencer {
     /// Takes a change that was accepted at `tick_ms`; every earlier one must have been taken out with
     /// [`next`](Self::next).
     pub(crate) fn push(&mut self, tick_ms: u64, changed: u32, state: u32) {
-        // Changes that capture had to drop are in no sample, but the states show them: they are in effect.
+        // Changes that capture had to drop are in no sample, but the states show them.
         let dropped = state ^ changed ^ self.accepted;
-        self.state ^= dropped;
         self.accepted = state;
-        for number in Inputs(changed).numbers() {
+        self.put(tick_ms, changed, |place, bit| place.changed |= bit);
+        // They were accepted before this sample, and began no later than a change of this sample
+        // would have: what waits from before that time does not know of them.
+        self.put(tick_ms, dropped, |place, bit| place.dropped |= bit);
+    }
+
+    /// Puts inputs that were accepted at `tick_ms` to the millisecond in which they changed.
+    fn put(&mut self, tick_ms: u64, inputs: u32, put: impl Fn(&mut Place, u32)) {
+        for number in Inputs(inputs).numbers() {
             let began_ms = tick_ms.saturating_sub(self.debounce.time_ms(number).into());
-            if let Some(waiting) = self.waiting.get_mut(slot(began_ms)) {
-                self.waiting_count += usize::from(*waiting == 0);
-                *waiting |= 1 << (number - 1);
+            if let Some(place) = self.waiting.get_mut(slot(began_ms)) {
+                self.waiting_count += usize::from(*place == Place::EMPTY);
+                put(place, 1 << (number - 1));
             }
         }
     }
@@ -109,9 +129,11 @@ impl Sequencer {
         while self.waiting_count > 0 && self.front_ms < end_ms {
             let tick_ms = self.front_ms;
             self.front_ms += 1;
-            let changed = core::mem::take(self.waiting.get_mut(slot(tick_ms))?);
+            let place = self.waiting.get_mut(slot(tick_ms))?;
+            let Place { changed, dropped } = core::mem::replace(place, Place::EMPTY);
+            self.waiting_count -= usize::from(changed | dropped != 0);
+            self.state ^= dropped;
             if changed != 0 {
-                self.waiting_count -= 1;
                 self.handed_on_ms = tick_ms;
                 self.state ^= changed;
                 return Some(Change { tick_ms, changed, state: self.state });
@@ -265,5 +287,43 @@ mod tests {
         assert_eq!(sequencer.next(11), Some(Change { tick_ms: 10, changed: 0b0001, state: 0b0101 }));
         sequencer.push(12, 0b0100, 0b0001);
         assert_eq!(sequencer.next(13), Some(Change { tick_ms: 12, changed: 0b0100, state: 0b0001 }));
+    }
+
+    #[test]
+    fn changes_that_wait_do_not_show_what_was_dropped_after_them() {
+        let change = |tick_ms, changed, state| Some(Change { tick_ms, changed, state });
+        let mut sequencer = Sequencer::new(Debounce::OFF);
+        sequencer.baseline(0);
+        sequencer.hold_after(Some(8));
+        sequencer.push(9, 0b0001, 0b0001);
+        sequencer.push(10, 0b0010, 0b0011);
+        // Input 3 came on in between, and went with the sample that found no room.
+        sequencer.push(20, 0b0001, 0b0110);
+        assert_eq!(sequencer.next(21), None);
+        sequencer.hold_after(None);
+        assert_eq!(sequencer.next(21), change(9, 0b0001, 0b0001));
+        assert_eq!(sequencer.next(21), change(10, 0b0010, 0b0011));
+        assert_eq!(sequencer.next(21), change(20, 0b0001, 0b0110));
+        assert_eq!(sequencer.next(21), None);
+    }
+
+    #[test]
+    fn what_was_dropped_with_debounce_is_in_effect_when_it_can_have_begun_at_the_latest() {
+        let change = |tick_ms, changed, state| Some(Change { tick_ms, changed, state });
+        let mut sequencer = Sequencer::new(Debounce::OFF.with(2, 10).with(3, 5));
+        sequencer.baseline(0);
+        sequencer.push(100, 0b0010, 0b0010);
+        sequencer.push(101, 0b0001, 0b0011);
+        // Input 3 is on, and nobody has seen when: before 105.
+        sequencer.push(110, 0b0011, 0b0100);
+        let seen: Vec<_> = std::iter::from_fn(|| sequencer.next(121)).map(Some).collect();
+        let expected = [
+            change(90, 0b0010, 0b0010),
+            change(100, 0b0010, 0b0000),
+            change(101, 0b0001, 0b0001),
+            change(110, 0b0001, 0b0100),
+        ];
+        assert_eq!(seen, expected);
+        assert_eq!(sequencer.waiting_count, 0);
     }
 }

@@ -51,7 +51,8 @@
 
 use core::ptr::{self, NonNull};
 
-use geni_board::WindowRam;
+use geni::WindowRam;
+use ser_board::genius;
 use ser_board::last_words::{Boot, MAX_TEXT_LEN, Text};
 use ser_node::Debounce;
 use ser_proto::Model;
@@ -139,6 +140,9 @@ pub(crate) fn debounce() -> Debounce {
     Debounce::uniform(time_ms)
 }
 
+/// The port of the node with its board.
+pub(crate) type Genius = genius::Genius<WindowRam, GeniBoard>;
+
 /// A GENI board that is fitted: its shared RAM and its reset line.
 pub(crate) struct GeniBoard {
     reset_held: bool,
@@ -160,9 +164,15 @@ impl GeniBoard {
         let board = GeniBoard { reset_held: GENI_RESET.read() & 1 != 0 };
         Some((board, window))
     }
+}
 
-    /// Drives the reset line.
-    pub(crate) fn drive_reset(&mut self, held: bool) {
+impl genius::GeniBoard for GeniBoard {
+    /// The bus is shared memory: it has no line.
+    fn next_pulse(&mut self) -> Option<u32> {
+        None
+    }
+
+    fn drive_reset(&mut self, held: bool) {
         if held != self.reset_held {
             self.reset_held = held;
             // Bit 0 is the line; adding one to a line that is held carries into the count.

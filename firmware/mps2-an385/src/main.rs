@@ -15,7 +15,6 @@ mod device;
 mod external_bus;
 mod fault;
 mod forced;
-mod genius;
 mod inputs;
 mod lamps;
 mod log;
@@ -38,11 +37,10 @@ mod app {
     use ser_board::report::{self, Report};
     use ser_cortex_m::protection::{self, Region};
     use ser_cortex_m::stack;
-    use ser_node::{Capture, CaptureChannel, Event, Liveness, Node, NodeParts, VERSION};
+    use ser_node::{Capture, CaptureChannel, Event, GeniusOptions, Liveness, Node, NodeParts, VERSION};
 
     use crate::configuration::{self, BenchFlash, Configuration};
-    use crate::external_bus;
-    use crate::genius::Genius;
+    use crate::external_bus::{self, GeniBoard, Genius};
     use crate::inputs::{self, InputLatch};
     use crate::lamps::Lamps;
     use crate::rtc::{self, BenchClock};
@@ -124,8 +122,8 @@ mod app {
         });
         let (serial, receive, transmit) = uart::start(rings, node.baud());
         // SAFETY: as above.
-        let genius = unsafe { external_bus::GeniBoard::find() };
-        let genius = genius.map(|(board, window)| Genius::new(board, window, model));
+        let genius = unsafe { GeniBoard::find() };
+        let genius = genius.map(|(board, window)| Genius::new(board, window, GeniusOptions::new(model)));
         let sampler = Sampler::new(InputLatch, inputs::wiring(model), &inputs::HEALTH);
         let watchdog = Watchdog::start();
         let timer = Timer::start();
@@ -183,10 +181,7 @@ mod app {
         let mut liveness = Liveness::new();
         let mut report = Report::new(node.tick_ms(), &HEALTH);
         loop {
-            let now_ms = main_loop::pass(node, serial);
-            if let Some(genius) = genius {
-                genius.poll(node);
-            }
+            let now_ms = main_loop::pass(node, serial, genius.as_mut());
             lamps.show(now_ms, &condition(node, serial, genius.as_ref(), *was_fault));
             if liveness.pass(now_ms) {
                 watchdog.feed(now_ms);

@@ -19,7 +19,7 @@ use cortex_m::peripheral::NVIC;
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
 use ser_board::main_loop::Line;
 use ser_board::ring::{Reader, Writer};
-use ser_board::serial_line::{LineErrors, Quiet, Received, Receiver, SerialEnds, SerialRings};
+use ser_board::serial_line::{self, LineErrors, Quiet, Received, Receiver, SerialEnds, SerialRings};
 use ser_proto::Baud;
 
 use crate::device::{self, Interrupt, base};
@@ -139,8 +139,8 @@ impl SerialLine {
 impl Line for SerialLine {
     const MAX_BYTES: usize = RECEIVE_RING_LEN;
 
-    fn receive(&mut self) -> Option<Received> {
-        let received = self.received.pop();
+    fn receive(&mut self, now_ms: u32) -> Option<Received> {
+        let received = serial_line::take_until(&mut self.received, now_ms);
         if received.is_some() {
             self.bytes = self.bytes.wrapping_add(1);
         } else if !NVIC::is_enabled(Interrupt::UART0_RX) {

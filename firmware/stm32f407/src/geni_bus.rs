@@ -64,6 +64,7 @@ use core::ptr::{self, NonNull};
 
 use geni_board::WindowRam;
 use ser_board::budget::PULSE_RING_LEN;
+use ser_board::genius;
 use ser_node::ring::{Reader, Ring, Writer};
 use stm32f4::stm32f407::{EXTI, FSMC, GPIOG, RCC, SYSCFG};
 
@@ -172,6 +173,9 @@ impl InterruptLine {
     }
 }
 
+/// The port of the node with its board.
+pub(crate) type Genius = genius::Genius<WindowRam, GeniBoard>;
+
 /// A GENI board that is fitted: its reset and interrupt lines.
 pub(crate) struct GeniBoard {
     port: GPIOG,
@@ -218,17 +222,17 @@ impl GeniBoard {
         let port = unsafe { GPIOG::steal() };
         Some((GeniBoard { port, pulses }, window))
     }
+}
 
-    /// Drives the reset line.
-    pub(crate) fn drive_reset(&mut self, held: bool) {
+impl genius::GeniBoard for GeniBoard {
+    fn next_pulse(&mut self) -> Option<u32> {
+        self.pulses.pop()
+    }
+
+    fn drive_reset(&mut self, held: bool) {
         let set = 1 << pins::GENI_RESET;
         let bits = if held { set << 16 } else { set };
         // SAFETY: the register takes any value; the bit is that of the line.
         self.port.bsrr().write(|w| unsafe { w.bits(bits) });
-    }
-
-    /// The tick of the oldest pulse of the interrupt line that has not been asked for.
-    pub(crate) fn next_pulse(&mut self) -> Option<u32> {
-        self.pulses.pop()
     }
 }

@@ -21,7 +21,6 @@ mod clocks;
 mod fault;
 mod flash;
 mod geni_bus;
-mod genius;
 mod inputs;
 mod lamps;
 mod log;
@@ -47,12 +46,11 @@ mod app {
     use ser_board::main_loop;
     use ser_board::report::{self, Report};
     use ser_cortex_m::{last_words, stack};
-    use ser_node::{Capture, CaptureChannel, Event, Liveness, Node, NodeParts, VERSION};
+    use ser_node::{Capture, CaptureChannel, Event, GeniusOptions, Liveness, Node, NodeParts, VERSION};
 
     use crate::clocks::{self, Source};
     use crate::flash::{self, Configuration, ConfigurationFlash};
-    use crate::geni_bus::{GeniBoard, InterruptLine, Pulses};
-    use crate::genius::Genius;
+    use crate::geni_bus::{GeniBoard, Genius, InterruptLine, Pulses};
     use crate::inputs::{self, InputPins};
     use crate::lamps::Lamps;
     use crate::rtc::{self, ChipClock};
@@ -155,7 +153,7 @@ mod app {
         } else {
             None
         };
-        let genius = genius.map(|(board, window)| Genius::new(board, window, model));
+        let genius = genius.map(|(board, window)| Genius::new(board, window, GeniusOptions::new(model)));
         let contacts = InputPins { low: ports.b, middle: ports.c, high: ports.g };
         let sampler = Sampler::new(contacts, inputs::wiring(model), &INPUT_HEALTH);
         let timer = Timer::start(&device.RCC, device.TIM2, device.TIM3);
@@ -207,7 +205,7 @@ mod app {
 
     /// A datagram has arrived at the GENI board. Wakes the main loop.
     #[task(binds = EXTI9_5, priority = 1, local = [geni_line])]
-    fn geni(cx: geni_board::Context) {
+    fn geni(cx: geni::Context) {
         cx.local.geni_line.on_interrupt(timer::tick_ms());
     }
 
@@ -217,13 +215,7 @@ mod app {
         let mut liveness = Liveness::new();
         let mut report = Report::new(node.tick_ms(), &HEALTH);
         loop {
-            if let Some(genius) = genius {
-                genius.take_pulses(node);
-            }
-            let now_ms = main_loop::pass(node, serial);
-            if let Some(genius) = genius {
-                genius.poll(node);
-            }
+            let now_ms = main_loop::pass(node, serial, genius.as_mut());
             lamps.show(now_ms, &condition(node, serial, genius.as_ref(), start));
             if liveness.pass(now_ms) {
                 watchdog.feed();

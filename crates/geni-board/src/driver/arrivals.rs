@@ -1,21 +1,24 @@
-//! When datagrams arrived, which is often long before they can be read: the command block has one
-//! command at a time, and a datagram that is being sent waits for its place in the scan.
+//! When datagrams arrived.
 //!
-//! What a host can see of an arrival is the Receive-Queue flag, and the pulse of the interrupt
-//! line. A *notice* is the tick at which one of them was seen. The board's queue hands datagrams
-//! out in the order in which they came, so the oldest notice belongs to the next datagram. Where
-//! the two do not match:
+//! That is often long before they can be read: the command block carries out one command at a time,
+//! and a datagram that is being sent waits for its place in the scan.
 //!
-//! - **Two datagrams, one flag**: both came between two looks. The one that finds no notice left
-//!   has that of the one before it. When notices of later datagrams are there by then, it takes the
-//!   first of those, and the last of them finds none left. With the interrupt line each datagram
-//!   has a pulse of its own.
-//! - **A flag, and the datagram is gone**: once the board says that its queue is empty, all notices
-//!   that were there when it was asked are void.
-//! - **A datagram, and nobody saw a flag**: it came before the board was looked at, or its flag was
-//!   lost. Nobody knows when it arrived, and it is handed out without a time, unless a later
-//!   datagram's notice waits: it takes that.
-//! - **The board has failed**: its queue goes with it, and so do the notices.
+//! A host sees two signs of an arrival: the Receive-Queue flag, and the pulse of the interrupt line.
+//! A *notice* is the tick of such a sign. The board hands datagrams out in the order in which they
+//! came, so the oldest notice belongs to the datagram that is read next. There are four cases in
+//! which the two do not match:
+//!
+//! - **Two datagrams, one flag.** Both came between two looks, so there is one notice less than there
+//!   are datagrams. A datagram that finds no notice gets the notice of the one before it. The one
+//!   that finds none need not be the second of the two: where notices of later datagrams are there
+//!   by then, each datagram takes the next one's, and the last of them finds none. With the interrupt
+//!   line each datagram has a pulse of its own, and this does not happen.
+//! - **A flag, and no datagram.** The board has dropped it. A board that says that its queue is empty
+//!   voids all notices that were there when it was asked.
+//! - **A datagram, and no flag.** It came before the board was looked at, or its flag was lost.
+//!   Nobody knows when it arrived, and it is handed out without a time. If a later datagram's notice
+//!   waits, it takes that one instead.
+//! - **The board has failed.** Its queue is gone, and so are the notices.
 
 use heapless::Deque;
 
@@ -33,12 +36,12 @@ pub(super) struct Arrivals {
     before_read: usize,
     /// Pulses of the interrupt line since the board was last looked at.
     pulses: Deque<u32, MAX_NOTICES>,
-    /// The flag was seen at this tick before its pulse was handed in.
+    /// The flag was seen at this tick, and its pulse has not been handed in.
     awaits_pulse: Option<u32>,
     /// The flag was last seen set at this tick.
     seen_ms: Option<u32>,
-    /// When the datagram arrived that was read last, for as long as there may be others that came
-    /// with it.
+    /// When the datagram arrived that was read last. It is kept for as long as there may be others
+    /// that came with it.
     latest: Option<u32>,
 }
 
@@ -56,8 +59,12 @@ impl Arrivals {
 
     /// The line was pulsed at this tick, for a datagram and nothing else.
     pub(super) fn pulsed(&mut self, tick_ms: u32) {
-        // A flag that was seen a moment before its pulse has its notice already.
-        if self.awaits_pulse.take().is_some_and(|seen_ms| elapsed_ms(tick_ms, seen_ms) <= 1) {
+        // A flag that was seen a moment before its pulse was handed in has its notice already. The
+        // pulse knows the tick better.
+        if let Some(seen_ms) = self.awaits_pulse.take()
+            && elapsed_ms(tick_ms, seen_ms) <= 1
+        {
+            self.notices.back_mut().into_iter().for_each(|notice| *notice = tick_ms);
             return;
         }
         // The board takes no more datagrams than these between two looks.
@@ -68,8 +75,9 @@ impl Arrivals {
     pub(super) fn looked(&mut self, is_set: bool, now_ms: u32) {
         if !is_set {
             while let Some(tick_ms) = self.pulses.pop_front() {
-                // It fell between the pulses that had been handed in and the look that cleared its
-                // flag. Any other pulse without a flag says nothing, such as the one after a reset.
+                // The pulse came after the others were handed in, and right before the look that
+                // cleared its flag. Any other pulse without a flag means no datagram: there is one
+                // after a reset, for instance.
                 if self.seen_ms.is_some_and(|seen_ms| elapsed_ms(tick_ms, seen_ms) <= 1) {
                     self.notice(tick_ms);
                 }
@@ -99,8 +107,8 @@ impl Arrivals {
         self.before_read = self.notices.len();
     }
 
-    /// It has brought a datagram. Gives when that arrived, if anybody knows. The flag must have
-    /// been looked at since: it may have come while the command was carried out.
+    /// It has brought a datagram. Gives when that arrived, if anybody knows. The datagram may have
+    /// come while the command was carried out, so the flag must have been looked at since.
     pub(super) fn read(&mut self) -> Option<u32> {
         self.latest = self.notices.pop_front().or(self.latest);
         self.latest
@@ -115,7 +123,7 @@ impl Arrivals {
         self.latest = None;
     }
 
-    /// When the oldest datagram arrived that is known to wait.
+    /// When the oldest of the datagrams arrived that are known to wait.
     pub(super) fn oldest(&self) -> Option<u32> {
         self.notices.front().or(self.pulses.front()).copied()
     }
@@ -150,10 +158,10 @@ mod tests {
     }
 
     #[test]
-    fn two_datagrams_with_one_flag_have_its_tick_both() {
+    fn two_datagrams_that_share_a_flag_both_have_its_tick() {
         let mut arrivals = seen([10]);
         assert_eq!(read_all(&mut arrivals, 2), [Some(10), Some(10)]);
-        // The board says that there is no more; what is read then came unseen.
+        // The board says that there is no more. What is read after that was not seen to come.
         arrivals.read_started();
         arrivals.found_empty();
         assert_eq!(read_all(&mut arrivals, 1), [None]);
@@ -163,7 +171,7 @@ mod tests {
     fn a_flag_whose_datagram_is_gone_is_not_taken_for_the_next_one() {
         let mut arrivals = seen([10]);
         arrivals.read_started();
-        // Meanwhile another one arrives, and the answer to the reading is of before.
+        // Another one arrives meanwhile. The board answered before that.
         arrivals.looked(true, 20);
         arrivals.found_empty();
         assert_eq!(read_all(&mut arrivals, 1), [Some(20)]);
@@ -205,6 +213,28 @@ mod tests {
     }
 
     #[test]
+    fn a_flag_that_is_seen_before_its_pulse_is_handed_in_gets_the_tick_of_the_pulse() {
+        // The pulse comes between the handing in and the reading of the tick, or right after that.
+        for (seen_ms, pulsed_ms) in [(101, 100), (100, 101), (100, 100), (0, u32::MAX), (u32::MAX, 0)] {
+            let mut arrivals = seen([seen_ms]);
+            arrivals.pulsed(pulsed_ms);
+            assert_eq!(arrivals.oldest(), Some(pulsed_ms));
+            arrivals.looked(false, seen_ms.wrapping_add(2));
+            assert_eq!(read_all(&mut arrivals, 2), [Some(pulsed_ms), Some(pulsed_ms)]);
+        }
+    }
+
+    #[test]
+    fn a_pulse_whose_datagram_has_been_read_changes_no_other_ones_notice() {
+        let mut arrivals = seen([100]);
+        assert_eq!(read_all(&mut arrivals, 1), [Some(100)]);
+        arrivals.pulsed(101);
+        assert_eq!(arrivals.oldest(), None);
+        arrivals.looked(true, 200);
+        assert_eq!(read_all(&mut arrivals, 1), [Some(200)]);
+    }
+
+    #[test]
     fn a_pulse_whose_flag_went_with_that_of_an_earlier_one_has_its_own_tick() {
         let mut arrivals = Arrivals::new();
         // The first is handed in; the second falls right before the look that clears their flag.
@@ -223,12 +253,5 @@ mod tests {
         assert_eq!(arrivals.oldest(), None);
         arrivals.looked(true, 90);
         assert_eq!(read_all(&mut arrivals, 1), [Some(90)]);
-    }
-
-    #[test]
-    fn ticks_may_wrap() {
-        let mut arrivals = seen([u32::MAX]);
-        arrivals.pulsed(0);
-        assert_eq!(read_all(&mut arrivals, 2), [Some(u32::MAX), Some(u32::MAX)]);
     }
 }

@@ -114,6 +114,16 @@ enum Due {
     },
 }
 
+/// What is known of one millisecond and not recorded yet.
+#[derive(Clone, Copy, Debug, Default)]
+struct Waiting {
+    /// Inputs that changed in it.
+    changed: u32,
+    /// Inputs that had changed before it beyond the capture queue: its sample is the first to show
+    /// them.
+    dropped: u32,
+}
+
 /// The books of one recorder, from power-up to power-up.
 #[derive(Clone, Debug)]
 pub struct Ledger {
@@ -122,7 +132,7 @@ pub struct Ledger {
     debounce: DebounceModel,
     /// Accepted changes that an earlier one may still come before, or a datagram that has not been
     /// read.
-    waiting: BTreeMap<u64, u32>,
+    waiting: BTreeMap<u64, Waiting>,
     /// When the oldest datagram arrived that the recorder has not taken from its board.
     wait_after_ms: Option<u64>,
     /// Inputs that have changed beyond the capture queue since the latest change that was accepted.
@@ -219,7 +229,7 @@ impl Ledger {
 
     /// Edges that are not decided upon.
     fn undecided(&self) -> u64 {
-        let waiting: u64 = self.waiting.values().map(|changed| u64::from(changed.count_ones())).sum();
+        let waiting: u64 = self.waiting.values().map(|waiting| u64::from(waiting.changed.count_ones())).sum();
         waiting + self.debounce.unsettled()
     }
 
@@ -276,21 +286,20 @@ impl Ledger {
             if at_ms + self.hold_ms > now_ms || waits && at_ms + HELD_BACK_MS > now_ms {
                 return;
             }
-            let (at_ms, changed) = first.remove_entry();
-            self.record(at_ms, changed);
+            let (at_ms, waiting) = first.remove_entry();
+            self.state ^= waiting.dropped;
+            self.unrecorded ^= waiting.dropped;
+            self.record(at_ms, waiting.changed);
         }
     }
 
     fn take_accepted(&mut self, accepted: &mut Vec<Accepted>) {
-        if let Some(&(_, at_ms)) = accepted.first().filter(|_| self.dropped != 0) {
-            // Its sample shows them.
-            self.record_until(at_ms.saturating_sub(1));
-            let dropped = std::mem::take(&mut self.dropped);
-            self.state ^= dropped;
-            self.unrecorded ^= dropped;
+        if let Some((_, at_ms)) = accepted.first() {
+            // What waits from before does not know of them.
+            self.waiting.entry(*at_ms).or_default().dropped ^= std::mem::take(&mut self.dropped);
         }
         for (bit, at_ms) in accepted.drain(..) {
-            *self.waiting.entry(at_ms).or_default() |= 1 << bit;
+            self.waiting.entry(at_ms).or_default().changed |= 1 << bit;
         }
     }
 

@@ -128,3 +128,24 @@ fn an_answer_that_waited_in_its_queue_does_not_undo_a_resize_over_the_other_port
     ledger.replied(Port::Line, &configuration(3)).expect("a reply");
     assert_eq!(ledger.smallest_size(), 3);
 }
+
+#[test]
+fn events_that_wait_do_not_show_what_was_dropped_after_them() {
+    let mut ledger = Ledger::new(Model::Ser160.mask());
+    ledger.power_up(0, 0, MAX_SIZE, Debounce::OFF);
+    // A datagram of millisecond 1 is read late, and the main loop is away meanwhile.
+    ledger.wait_after(Some(1));
+    let queue_ms = QUEUE_LEN as u64;
+    let moves = (2..2 + queue_ms).map(|at_ms| (at_ms, 1)).chain([(2 + queue_ms, 4)]);
+    ledger.contacts_moved_unseen(moves);
+    let shown_ms = 10 + queue_ms;
+    ledger.contacts_moved(shown_ms, 1);
+    ledger.wait_after(None);
+    ledger.settle(shown_ms);
+    assert_eq!(ledger.len(), QUEUE_LEN + 1);
+    for (event, count) in ledger.events.iter().zip(1..) {
+        let is_last = event.at_ms == shown_ms;
+        let dropped = if is_last { 4 } else { 0 };
+        assert_eq!((event.state, event.unrecorded), (count % 2 | dropped, dropped), "{event:?}");
+    }
+}

@@ -1,0 +1,56 @@
+//! The node's Genius port in the main loop, over the GENI board that a recorder's board is wired to.
+
+use geni::SharedRam;
+use ser_node::{GeniusDiagnostics, GeniusOptions, GeniusPort, Node, Rtc, Storage};
+
+use crate::budget::PULSE_RING_LEN;
+
+/// The lines of a GENI board as the main loop sees them.
+pub trait GeniBoard {
+    /// The tick of the oldest pulse of the interrupt line that was not asked for yet. A board that
+    /// does not connect the line never has one.
+    fn next_pulse(&mut self) -> Option<u32>;
+
+    /// Drives the reset line.
+    fn drive_reset(&mut self, held: bool);
+}
+
+/// The port with its board.
+pub struct Genius<W, B> {
+    port: GeniusPort<W>,
+    board: B,
+}
+
+impl<W: SharedRam, B: GeniBoard> Genius<W, B> {
+    /// A port for the board whose shared RAM is behind `window`.
+    pub fn new(board: B, window: W, options: GeniusOptions) -> Genius<W, B> {
+        Genius { port: GeniusPort::new(window, options), board }
+    }
+
+    /// Hands the pulses of the interrupt line in. The node records what came after them later.
+    pub(crate) fn take_pulses<S: Storage, R: Rtc>(&mut self, node: &mut Node<'_, S, R>) {
+        // No more than there is room for: a line that chatters must not keep the main loop.
+        for _ in 0..PULSE_RING_LEN {
+            let Some(tick_ms) = self.board.next_pulse() else { break };
+            self.port.interrupt(node, tick_ms);
+        }
+    }
+
+    /// Does what is due, when the node has been polled.
+    pub(crate) fn serve<S: Storage, R: Rtc>(&mut self, node: &mut Node<'_, S, R>) {
+        // The pass may have taken long. A flag that is seen now has had its pulse.
+        self.take_pulses(node);
+        self.port.poll(node);
+        self.board.drive_reset(self.port.reset_held());
+    }
+
+    /// Whether the board is started and configured.
+    pub fn is_ready(&self) -> bool {
+        self.port.is_ready()
+    }
+
+    /// What was ignored, lost or repeated so far.
+    pub fn diagnostics(&self) -> GeniusDiagnostics {
+        self.port.diagnostics()
+    }
+}
