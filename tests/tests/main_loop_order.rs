@@ -6,7 +6,9 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-use geni::{Completion, Configuration, Data, Destination, Driver, Options, Priority, Start, Transmission};
+use geni_board::{
+    Completion, Configuration, Data, Destination, Driver, Options, Priority, Start, Transmission,
+};
 use ser_board::genius::{GeniBoard, Genius};
 use ser_board::main_loop::{self, Line};
 use ser_board::serial_line::Received;

@@ -1,6 +1,6 @@
 //! The node's Genius port in the main loop, over the GENI board that a recorder's board is wired to.
 
-use geni::SharedRam;
+use geni_board::SharedRam;
 use ser_node::{GeniusDiagnostics, GeniusOptions, GeniusPort, Node, Rtc, Storage};
 
 use crate::budget::PULSE_RING_LEN;

@@ -4,7 +4,7 @@
 //! [`GeniBoard`]. A pass never waits and does no more than the rings hold, so a line that takes and gives bytes as
 //! fast as they come cannot keep the main loop.
 
-use geni::SharedRam;
+use geni_board::SharedRam;
 use ser_node::{Node, Rtc, Storage};
 use ser_proto::Baud;
 

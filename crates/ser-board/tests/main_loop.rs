@@ -1,6 +1,6 @@
 //! A board's main loop with a UART that is a pair of queues: rings, line and node together.
 
-use geni::SharedRam;
+use geni_board::SharedRam;
 use ser_board::budget;
 use ser_board::genius::{GeniBoard, Genius};
 use ser_board::main_loop::{self, Line};

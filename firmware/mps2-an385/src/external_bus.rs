@@ -51,7 +51,7 @@
 
 use core::ptr::{self, NonNull};
 
-use geni::WindowRam;
+use geni_board::WindowRam;
 use ser_board::genius;
 use ser_board::last_words::{Boot, MAX_TEXT_LEN, Text};
 use ser_node::Debounce;
