@@ -1,9 +1,15 @@
 //! Ctrl-C, and a polite kill, as something to ask for in a loop.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::thread;
+use std::time::Duration;
 
 use crate::error::{EXIT_FAILURE, Failure, Result, advise};
+
+/// How soon an interrupt is noticed.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// What to tell when the program ends before it has tidied up.
 static LEFT_BEHIND: Mutex<Option<&str>> = Mutex::new(None);
@@ -60,6 +66,23 @@ fn flag() -> Result<Arc<AtomicBool>> {
         Failure::new(format!("cannot catch Ctrl-C: {error}")).hint("report this as a bug")
     })?;
     Ok(flag)
+}
+
+/// Does what may have to wait for others without end, as opening a pipe does, until there is an interrupt.
+pub(crate) fn unless_interrupted<T: Send + 'static>(
+    stop: &AtomicBool,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T> {
+    let (sender, done) = channel();
+    // It cannot be cut short. Nobody waits for it, and it ends with the program.
+    thread::spawn(move || sender.send(work()));
+    loop {
+        match done.recv_timeout(LOOK_EVERY) {
+            Ok(done) => return Ok(done),
+            Err(RecvTimeoutError::Timeout) if !stop.load(Ordering::Relaxed) => {}
+            Err(_) => return Err(Failure::Interrupted),
+        }
+    }
 }
 
 /// Sets what is told if a second interrupt comes: what there is to put back by hand.
