@@ -23,9 +23,9 @@ static LOOKING: AtomicUsize = AtomicUsize::new(0);
 /// From now on an interrupt sets the flag instead of ending the program. The flag is looked at between two questions
 /// to the unit; whoever does not want to wait for that presses Ctrl-C once more, which ends the program at once.
 pub(crate) fn catch() -> Result<Arc<AtomicBool>> {
-    let flag = flag()?;
-    LOOKING.fetch_add(1, Ordering::Relaxed);
-    Ok(flag)
+    // Before the first interrupt can come.
+    LOOKING.fetch_add(1, Ordering::SeqCst);
+    flag()
 }
 
 /// Looks at the flag as long as this is there.
@@ -40,11 +40,18 @@ impl Caught {
     pub(crate) fn flag(&self) -> &Arc<AtomicBool> {
         &self.0
     }
+
+    /// Looks for the last time. An interrupt that comes later ends the program, unless somebody else looks for it.
+    pub(crate) fn ends_interrupted(self) -> bool {
+        let flag = Arc::clone(&self.0);
+        drop(self);
+        flag.load(Ordering::SeqCst)
+    }
 }
 
 impl Drop for Caught {
     fn drop(&mut self) {
-        LOOKING.fetch_sub(1, Ordering::Relaxed);
+        LOOKING.fetch_sub(1, Ordering::SeqCst);
     }
 }
 
@@ -55,7 +62,7 @@ fn flag() -> Result<Arc<AtomicBool>> {
     let flag = Arc::clone(INTERRUPTED.get_or_init(Arc::default));
     let set = Arc::clone(&flag);
     let caught = move || {
-        if set.swap(true, Ordering::Relaxed) || LOOKING.load(Ordering::Relaxed) == 0 {
+        if set.swap(true, Ordering::SeqCst) || LOOKING.load(Ordering::SeqCst) == 0 {
             if let Some(hint) = *LEFT_BEHIND.lock().unwrap_or_else(PoisonError::into_inner) {
                 advise(hint);
             }
