@@ -1,7 +1,7 @@
 //! From `--port` to a unit that can be talked to, and from the client's errors to what the user is told.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use ser_client::{
@@ -83,11 +83,8 @@ fn unless_interrupted<T>(
 ) -> Result<T> {
     let caught = Caught::for_now()?;
     let opened = open(caught.flag()).map_err(|error| open_failure(&error))?;
-    // At the last moment, when opening looked no more.
-    if caught.flag().load(Ordering::Relaxed) {
-        return Err(Failure::from(GeniusError::Interrupted));
-    }
-    Ok(opened)
+    // It may have come at the last moment, when opening looked no more.
+    if caught.ends_interrupted() { Err(GeniusError::Interrupted.into()) } else { Ok(opened) }
 }
 
 fn no_port() -> Failure {

@@ -1,9 +1,15 @@
 //! Ctrl-C, and a polite kill, as something to ask for in a loop.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::thread;
+use std::time::Duration;
 
 use crate::error::{EXIT_FAILURE, Failure, Result, advise};
+
+/// How soon an interrupt is noticed.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// What to tell when the program ends before it has tidied up.
 static LEFT_BEHIND: Mutex<Option<&str>> = Mutex::new(None);
@@ -17,9 +23,9 @@ static LOOKING: AtomicUsize = AtomicUsize::new(0);
 /// From now on an interrupt sets the flag instead of ending the program. The flag is looked at between two questions
 /// to the unit; whoever does not want to wait for that presses Ctrl-C once more, which ends the program at once.
 pub(crate) fn catch() -> Result<Arc<AtomicBool>> {
-    let flag = flag()?;
-    LOOKING.fetch_add(1, Ordering::Relaxed);
-    Ok(flag)
+    // Before the first interrupt can come.
+    LOOKING.fetch_add(1, Ordering::SeqCst);
+    flag()
 }
 
 /// Looks at the flag as long as this is there.
@@ -34,11 +40,18 @@ impl Caught {
     pub(crate) fn flag(&self) -> &Arc<AtomicBool> {
         &self.0
     }
+
+    /// Looks for the last time. An interrupt that comes later ends the program, unless somebody else looks for it.
+    pub(crate) fn ends_interrupted(self) -> bool {
+        let flag = Arc::clone(&self.0);
+        drop(self);
+        flag.load(Ordering::SeqCst)
+    }
 }
 
 impl Drop for Caught {
     fn drop(&mut self) {
-        LOOKING.fetch_sub(1, Ordering::Relaxed);
+        LOOKING.fetch_sub(1, Ordering::SeqCst);
     }
 }
 
@@ -49,7 +62,7 @@ fn flag() -> Result<Arc<AtomicBool>> {
     let flag = Arc::clone(INTERRUPTED.get_or_init(Arc::default));
     let set = Arc::clone(&flag);
     let caught = move || {
-        if set.swap(true, Ordering::Relaxed) || LOOKING.load(Ordering::Relaxed) == 0 {
+        if set.swap(true, Ordering::SeqCst) || LOOKING.load(Ordering::SeqCst) == 0 {
             if let Some(hint) = *LEFT_BEHIND.lock().unwrap_or_else(PoisonError::into_inner) {
                 advise(hint);
             }
@@ -60,6 +73,23 @@ fn flag() -> Result<Arc<AtomicBool>> {
         Failure::new(format!("cannot catch Ctrl-C: {error}")).hint("report this as a bug")
     })?;
     Ok(flag)
+}
+
+/// Does what may have to wait for others without end, as opening a pipe does, until there is an interrupt.
+pub(crate) fn unless_interrupted<T: Send + 'static>(
+    stop: &AtomicBool,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T> {
+    let (sender, done) = channel();
+    // It cannot be cut short. Nobody waits for it, and it ends with the program.
+    thread::spawn(move || sender.send(work()));
+    loop {
+        match done.recv_timeout(LOOK_EVERY) {
+            Ok(done) => return Ok(done),
+            Err(RecvTimeoutError::Timeout) if !stop.load(Ordering::Relaxed) => {}
+            Err(_) => return Err(Failure::Interrupted),
+        }
+    }
 }
 
 /// Sets what is told if a second interrupt comes: what there is to put back by hand.

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What makes room for itself, follows links, replaces or removes; what panics on a closed pipe.
-const CALLS: [&str; 13] = [
+/// What makes room for itself, writes, follows links, replaces or removes; what panics on a closed pipe.
+const CALLS: [&str; 26] = [
     "File::create(",
     "File::create_buffered(",
     "fs::write(",
@@ -15,9 +15,23 @@ const CALLS: [&str; 13] = [
     "fs::rename(",
     "fs::hard_link(",
     "truncate(true)",
+    ".write(true)",
+    "append(true)",
+    "OFlags::WRONLY",
+    "OFlags::RDWR",
     "set_len(",
+    "ftruncate(",
+    "set_permissions(",
     "remove_file(",
     "remove_dir_all(",
+    "unlinkat(",
+    "symlink(",
+    "renameat(",
+    "remove_dir(",
+    "map_raw(",
+    "map_mut(",
+    // The other program opens what it is told by name.
+    "Process::new(",
     ".persist(",
     // And what ends with it: `eprintln!`.
     "println!(",
@@ -25,7 +39,14 @@ const CALLS: [&str; 13] = [
 ];
 
 /// File, call, how often, and why that is right.
-const JUDGED: [(&str, &str, usize, &str); 12] = [
+const JUDGED: [(&str, &str, usize, &str); 28] = [
+    (
+        "crates/geni-board/src/mapped_ram.rs",
+        "map_raw(",
+        1,
+        "what the caller has opened; the client puts back what it writes there before a board answers",
+    ),
+    ("ser-cli/src/closed_stdout.rs", "OFlags::RDWR", 1, "compared, and nothing is opened with it"),
     (
         "ser-cli/src/output/rows.rs",
         "set_len(",
@@ -33,7 +54,20 @@ const JUDGED: [(&str, &str, usize, &str); 12] = [
         "what was just written to standard output, if nobody has written after it",
     ),
     ("ser-cli/src/state.rs", ".persist(", 1, "over a state file, which it was read as just before"),
+    ("ser-cli/src/state.rs", ".write(true)", 1, "the lock, which is never written to; no link is followed"),
     ("ser-cli/src/state.rs", "remove_file(", 1, "a state file, which it was read as just before"),
+    (
+        "crates/ser-client/src/genius/window.rs",
+        ".write(true)",
+        1,
+        "what the user names as a window; before a board answers, what is written is put back",
+    ),
+    (
+        "crates/ser-sim/src/claim.rs",
+        "OFlags::RDWR",
+        1,
+        "the claim's record, in a directory as below; no link",
+    ),
     (
         "crates/ser-sim/src/claim.rs",
         "remove_file(",
@@ -46,18 +80,69 @@ const JUDGED: [(&str, &str, usize, &str); 12] = [
         1,
         "the claim's record, in a directory that nobody else can write to",
     ),
+    (
+        "crates/ser-sim/src/claim.rs",
+        "unlinkat(",
+        1,
+        "the claim's record, by its open directory, while it is locked",
+    ),
     ("crates/ser-sim/src/emulator.rs", "File::create(", 1, "in a temporary directory of its own"),
+    (
+        "crates/ser-sim/src/emulator.rs",
+        "Process::new(",
+        1,
+        "what QEMU writes it inherits open; see emulator_files.rs",
+    ),
+    (
+        "crates/ser-sim/src/emulator_files.rs",
+        "OFlags::WRONLY",
+        1,
+        "looked at after opening: a pipe, a terminal or the null device",
+    ),
+    (
+        "crates/ser-sim/src/emulator_files.rs",
+        "append(true)",
+        1,
+        "makes the file, and fails where anything is",
+    ),
+    (
+        "crates/ser-sim/src/external_bus.rs",
+        ".write(true)",
+        2,
+        "makes the file, or opens one with our mark and no link, looked at after opening",
+    ),
+    ("crates/ser-sim/src/external_bus.rs", "map_raw(", 1, "one of these two"),
     ("crates/ser-sim/src/external_bus.rs", "set_len(", 1, "a file that was just made, and by nobody else"),
+    (
+        "crates/ser-sim/src/genius_bench/host_window.rs",
+        ".write(true)",
+        1,
+        "makes the file, and fails where anything is",
+    ),
     ("crates/ser-sim/src/lockstep.rs", "File::create(", 1, "in a temporary directory of its own"),
-    ("crates/ser-sim/src/pty.rs", "fs::rename(", 1, "over a link that the claim's record says is ours"),
-    ("crates/ser-sim/src/pty.rs", "remove_file(", 1, "a link that was just made"),
+    (
+        "crates/ser-sim/src/lockstep.rs",
+        "Process::new(",
+        1,
+        "as in emulator.rs; sockets are in a temporary directory, and the plugin is read",
+    ),
+    ("crates/ser-sim/src/pty.rs", ".persist(", 1, "over a link that the claim's record says is ours"),
+    ("crates/ser-sim/src/pty.rs", "OFlags::RDWR", 1, "a pseudo-terminal that was just made, by its own name"),
+    ("crates/ser-sim/src/pty.rs", "symlink(", 3, "makes a link, and fails where anything is"),
     (
         "crates/ser-qemu-plugin/src/lib.rs",
         "println!(",
         1,
         "in QEMU, whose standard error is a file of the bench",
     ),
+    (
+        "crates/ser-trial/examples/fuzzing.rs",
+        ".write(true)",
+        1,
+        "makes the file, and fails where anything is",
+    ),
     ("xtask/src/setup/apt.rs", "File::create(", 1, "in the build folder"),
+    ("xtask/src/setup/apt.rs", "append(true)", 1, "the file that was just made in the build folder"),
 ];
 
 fn root() -> PathBuf {
@@ -77,13 +162,29 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
+/// Where the tests at the end of a source begin. A module of tests that is in another file ends
+/// nothing.
+fn end_of_code(source: &str) -> usize {
+    let is_body = |at: usize| {
+        let mut lines = source[at..].lines().skip(1);
+        lines.next().is_some_and(|line| line.starts_with("mod ") && line.ends_with('{'))
+    };
+    let marks = source.match_indices("\n#[cfg(").map(|(at, _)| at + 1);
+    let is_of_tests = |at: usize| {
+        let mark = source[at..].lines().next().unwrap_or_default();
+        mark == "#[cfg(test)]" || mark.starts_with("#[cfg(all(test")
+    };
+    marks.into_iter().find(|&at| is_of_tests(at) && is_body(at)).unwrap_or(source.len())
+}
+
 /// How often each call stands in a source, comments and its tests at the end apart.
 fn calls(source: &str) -> BTreeMap<&'static str, usize> {
-    let end =
-        source.find("#[cfg(test)]\nmod ").or_else(|| source.find("#[cfg(all(test")).unwrap_or(source.len());
-    let lines = source[..end].lines().filter(|line| !line.trim_start().starts_with("//"));
+    let code = &source[..end_of_code(source)];
+    let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
     let code: String = lines.flat_map(|line| [line, "\n"]).collect();
-    let counts = CALLS.map(|call| (call, code.matches(call).count()));
+    // `is_symlink` only looks.
+    let is_call = |&(at, _): &(usize, &str)| !code[..at].ends_with('_');
+    let counts = CALLS.map(|call| (call, code.match_indices(call).filter(is_call).count()));
     counts.into_iter().filter(|(_, count)| *count > 0).collect()
 }
 
@@ -114,7 +215,16 @@ fn every_call_that_could_touch_a_file_of_others_has_been_judged() {
 
 #[test]
 fn calls_in_comments_and_tests_are_none() {
-    let source =
-        "fs::write(a);\n  // fs::copy(a)\nfs::write(b);\n#[cfg(test)]\nmod tests {\nfs::rename(a)\n}";
+    let source = "fs::write(a);\n  // fs::copy(a)\nfs::write(b);\na.is_symlink()\n\
+                  #[cfg(test)]\nmod tests {\nfs::rename(a)\n}";
     assert_eq!(calls(source), BTreeMap::from([("fs::write(", 2)]));
+}
+
+#[test]
+fn a_module_of_tests_in_another_file_ends_nothing() {
+    let source = "#[cfg(test)]\nmod mutants;\nfs::write(a);\n\n#[cfg(test)]\nmod tests {\nfs::write(a)\n}";
+    for mark in ["#[cfg(test)]", "#[cfg(all(test, unix))]"] {
+        let source = source.replace("#[cfg(test)]", mark);
+        assert_eq!(calls(&source), BTreeMap::from([("fs::write(", 1)]), "{mark}");
+    }
 }

@@ -23,13 +23,10 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use crc::{CRC_64_XZ, Crc};
-use rustix::fs::{AtFlags, CWD, Mode, OFlags, mkdirat, openat, unlinkat};
-use rustix::process::geteuid;
+use rustix::fs::{AtFlags, Mode, OFlags, openat, unlinkat};
 
-use crate::error::SimError;
-
-/// Where the user's directory for records may be, in order of preference.
-const PLACES: [&str; 2] = ["/var/tmp", "/tmp"];
+use crate::error::{NoRecords, SimError};
+use crate::record_folder;
 
 /// How often a record may go between its opening and its locking: each time a simulator ends at
 /// that moment.
@@ -53,7 +50,8 @@ impl Claim {
     pub(crate) fn on(name: &Path, in_use: fn(PathBuf) -> SimError) -> Result<Claim, SimError> {
         let file_name = record_name(name).map_err(SimError::io(format!("make {}", name.display())))?;
         let doing = || format!("note that {} is in use", name.display());
-        let folder = open_folder().map_err(SimError::io(doing()))?;
+        let folder = record_folder::open()
+            .map_err(|tried| SimError::NoRecords(NoRecords { name: name.to_owned(), tried }))?;
         // Programs that tidy up leave a locked folder alone; without the lock it works all the
         // same.
         let _ = folder.try_lock_shared();
@@ -164,35 +162,6 @@ fn record_name(name: &Path) -> io::Result<String> {
     Ok(format!("{hash:016x}"))
 }
 
-/// The user's directory for records; made where there is none.
-fn open_folder() -> io::Result<File> {
-    let name = format!("ser-sim-{}", geteuid().as_raw());
-    let mut failure = io::Error::from(ErrorKind::NotFound);
-    for place in PLACES {
-        match open_own_folder(&Path::new(place).join(&name)) {
-            Ok(folder) => return Ok(folder),
-            Err(error) => failure = error,
-        }
-    }
-    Err(failure)
-}
-
-/// Opens a directory that nobody but us can look into or change.
-fn open_own_folder(path: &Path) -> io::Result<File> {
-    match mkdirat(CWD, path, Mode::RWXU) {
-        Ok(()) | Err(rustix::io::Errno::EXIST) => {}
-        Err(error) => return Err(error.into()),
-    }
-    let flags = OFlags::RDONLY | OFlags::DIRECTORY | OFlags::NOFOLLOW | OFlags::CLOEXEC;
-    let folder = File::from(openat(CWD, path, flags, Mode::empty())?);
-    let found = folder.metadata()?;
-    if found.uid() != geteuid().as_raw() || found.mode() & 0o077 != 0 {
-        let whose = format!("{} is not a directory of this user alone", path.display());
-        return Err(io::Error::new(ErrorKind::PermissionDenied, whose));
-    }
-    Ok(folder)
-}
-
 /// Makes or opens the record and locks it; nothing when another simulator has it.
 fn lock_record(folder: &File, name: &str) -> io::Result<Option<File>> {
     let flags = OFlags::RDWR | OFlags::CREATE | OFlags::NOFOLLOW | OFlags::CLOEXEC;
@@ -218,7 +187,7 @@ fn lock_record(folder: &File, name: &str) -> io::Result<Option<File>> {
 
 #[cfg(test)]
 mod tests {
-    use std::os::unix::fs::{PermissionsExt, symlink};
+    use std::os::unix::fs::symlink;
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::thread;
 
@@ -256,23 +225,6 @@ mod tests {
         for name in ["/", "..", "/tmp/..", ""] {
             assert!(matches!(Claim::on(Path::new(name), SimError::LinkInUse), Err(SimError::Io { .. })));
         }
-    }
-
-    #[test]
-    fn a_folder_that_others_could_have_prepared_is_not_used() {
-        let place = tempfile::tempdir().unwrap();
-        let folder = place.path().join("ser-sim");
-        open_own_folder(&folder).unwrap();
-        open_own_folder(&folder).unwrap();
-        let link = place.path().join("link");
-        symlink(&folder, &link).unwrap();
-        assert!(open_own_folder(&link).is_err());
-        fs::set_permissions(&folder, fs::Permissions::from_mode(0o777)).unwrap();
-        let refused = open_own_folder(&folder).unwrap_err().to_string();
-        assert!(refused.ends_with("is not a directory of this user alone"), "{refused}");
-        let file = place.path().join("file");
-        fs::write(&file, "").unwrap();
-        assert!(open_own_folder(&file).is_err());
     }
 
     #[test]

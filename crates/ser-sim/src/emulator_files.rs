@@ -9,7 +9,7 @@ use std::ffi::OsString;
 use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind};
 use std::os::fd::{AsFd, AsRawFd, OwnedFd};
-use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -37,7 +37,7 @@ pub(crate) struct EmulatorFiles {
 impl EmulatorFiles {
     /// Makes the log. Where that is a pipe, waits until somebody reads it, or until told to stop.
     pub(crate) fn open(options: &EmulatorOptions, stop: &AtomicBool) -> Result<EmulatorFiles, SimError> {
-        check_image(&options.image)?;
+        options.check_image()?;
         let log = options.log.as_deref().map(|path| open_log(path, stop)).transpose()?;
         Ok(EmulatorFiles { image: options.image.clone(), log })
     }
@@ -98,18 +98,6 @@ fn arguments(image: &Path, memory: &OwnedFd, log: Option<&OwnedFd>) -> Vec<OsStr
     }
     arguments.extend(["-kernel".into(), image.into()]);
     arguments
-}
-
-/// Looks at the image: the emulator's own words for one that is missing are less clear.
-fn check_image(path: &Path) -> Result<(), SimError> {
-    // A pipe would wait for its other end.
-    let file = File::options().read(true).custom_flags(OFlags::NONBLOCK.bits().cast_signed()).open(path);
-    let found = file.and_then(|file| file.metadata());
-    let checked = found.and_then(|found| {
-        let no_file = || io::Error::new(ErrorKind::InvalidInput, "it is not a regular file");
-        found.is_file().then_some(()).ok_or_else(no_file)
-    });
-    checked.map_err(SimError::io(format!("open the image {}", path.display())))
 }
 
 /// Makes the file for the log. A pipe, a terminal or the null device may be there already: writing
@@ -226,9 +214,9 @@ mod tests {
         let pipe = folder.path().join("pipe");
         rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RWXU).unwrap();
         for path in [&pipe, folder.path()] {
-            let refused = check_image(path).unwrap_err().to_string();
+            let refused = EmulatorOptions::new(path).check_image().unwrap_err().to_string();
             assert!(refused.ends_with("it is not a regular file"), "{refused}");
         }
-        assert!(check_image(Path::new("/nonexistent/image")).is_err());
+        assert!(EmulatorOptions::new("/nonexistent/image").check_image().is_err());
     }
 }

@@ -28,6 +28,8 @@ pub enum SimError {
     WindowTaken(PathBuf),
     /// Another simulator has the GENI window.
     WindowInUse(PathBuf),
+    /// There is no place to note that a link or a window is in use.
+    NoRecords(NoRecords),
     /// There is something already under the name of the log.
     LogTaken(PathBuf),
     /// The emulator is not installed.
@@ -57,6 +59,60 @@ pub enum SimError {
     StillPlaying,
 }
 
+/// The user's directory for notes of who has which link or window can be had nowhere.
+#[derive(Debug)]
+pub struct NoRecords {
+    /// The link or window.
+    pub name: PathBuf,
+    /// The directories that were tried, in order of preference.
+    pub tried: Vec<(PathBuf, FolderFault)>,
+}
+
+/// Why a directory cannot be used for notes that nobody else may change.
+#[derive(Debug)]
+pub enum FolderFault {
+    /// It belongs to another user.
+    NotYours,
+    /// Others can look into it or change it.
+    OpenToOthers,
+    /// Something else is there: a file, or a link.
+    NoFolder,
+    /// It cannot be made or opened.
+    Other(io::Error),
+}
+
+impl NoRecords {
+    /// What a person can do about it, a line each. None where only the reasons tell.
+    pub fn hints(&self) -> impl Iterator<Item = String> {
+        self.tried.iter().filter_map(|(path, fault)| {
+            let path = path.display();
+            match fault {
+                FolderFault::NotYours => Some(format!("remove {path}, which is not yours")),
+                FolderFault::NoFolder => Some(format!("remove {path}, which is no folder")),
+                FolderFault::OpenToOthers => Some(format!("keep others out: chmod 700 {path}")),
+                FolderFault::Other(_) => None,
+            }
+        })
+    }
+}
+
+impl fmt::Display for NoRecords {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "cannot note that {} is in use", self.name.display())?;
+        for (index, (path, fault)) in self.tried.iter().enumerate() {
+            let between = if index == 0 { ": " } else { "; " };
+            write!(f, "{between}{} ", path.display())?;
+            match fault {
+                FolderFault::NotYours => f.write_str("belongs to another user")?,
+                FolderFault::OpenToOthers => f.write_str("is open to others")?,
+                FolderFault::NoFolder => f.write_str("is no folder")?,
+                FolderFault::Other(error) => write!(f, "cannot be used: {error}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
 impl SimError {
     pub(crate) fn io(doing: impl Into<String>) -> impl FnOnce(io::Error) -> SimError {
         let doing = doing.into();
@@ -72,6 +128,7 @@ impl fmt::Display for SimError {
             SimError::NoSuchHost(address) => {
                 write!(f, "cannot listen on {address}: no host of this name is known")
             }
+            SimError::NoRecords(no_records) => no_records.fmt(f),
             SimError::LinkInUse(path) | SimError::WindowInUse(path) => {
                 write!(f, "another simulator has {}", path.display())
             }

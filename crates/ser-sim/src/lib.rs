@@ -36,6 +36,8 @@ mod pace;
 mod player;
 #[cfg(unix)]
 mod pty;
+#[cfg(unix)]
+mod record_folder;
 mod scenario;
 mod scenario_lines;
 mod service;
@@ -49,7 +51,7 @@ mod wire;
 pub use contacts::Contacts;
 #[cfg(unix)]
 pub use emulated_board::{EmulatedBoard, ForcedFault};
-pub use error::SimError;
+pub use error::{FolderFault, NoRecords, SimError};
 pub use genius_options::{GeniusOptions, MAX_NODES};
 pub use line::Port;
 #[cfg(target_os = "linux")]

@@ -1,7 +1,11 @@
 //! A simulated node that keeps pace with real time and answers on a serial line.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{self, ErrorKind};
+#[cfg(unix)]
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -121,6 +125,26 @@ impl EmulatorOptions {
     pub fn new(image: impl Into<PathBuf>) -> EmulatorOptions {
         EmulatorOptions { image: image.into(), memory: None, log: None, program: None }
     }
+
+    /// Looks whether the image is a file that can be read: the emulator's own words for one that is not are less
+    /// clear.
+    ///
+    /// # Errors
+    /// When it is none.
+    pub fn check_image(&self) -> Result<(), SimError> {
+        let opened = open_regular(&self.image).map(drop);
+        opened.map_err(SimError::io(format!("open the image {}", self.image.display())))
+    }
+}
+
+/// Opens a file to read it, and nothing that would have to be waited for, as a pipe.
+fn open_regular(path: &Path) -> io::Result<File> {
+    let mut options = File::options();
+    #[cfg(unix)]
+    options.custom_flags(rustix::fs::OFlags::NONBLOCK.bits().cast_signed());
+    let file = options.read(true).open(path)?;
+    let no_file = || io::Error::new(ErrorKind::InvalidInput, "it is not a regular file");
+    if file.metadata()?.is_file() { Ok(file) } else { Err(no_file()) }
 }
 
 /// A node that runs, until this is dropped.

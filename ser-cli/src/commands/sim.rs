@@ -2,10 +2,9 @@
 
 mod bus;
 
-use std::fs::File;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use clap::ValueEnum;
@@ -131,14 +130,14 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<()> {
     let stop = interrupt::catch()?;
     let mut announced = Ok(());
-    ser_sim::run(options(args)?, &stop, |ports| {
+    ser_sim::run(options(args, &stop)?, &stop, |ports| {
         announced = announce(ports);
         stop.fetch_or(announced.is_err(), Ordering::Relaxed);
     })?;
     announced
 }
 
-fn options(args: &Args) -> Result<SimOptions> {
+fn options(args: &Args, stop: &AtomicBool) -> Result<SimOptions> {
     let model = args.model.into();
     let port = match &args.tcp {
         Some(address) => Port::Tcp { address: address.clone(), gives_way_after: args.tcp_idle.0 },
@@ -146,11 +145,7 @@ fn options(args: &Args) -> Result<SimOptions> {
         None => Port::Pty { link: args.pty.clone() },
     };
     let genius = args.genius.as_deref().map(|window| genius(args, window, model)).transpose()?;
-    let contacts = match (&args.contacts, &genius) {
-        (Some(path), Some(genius)) => contacts_failure(Contacts::from_path_on_bus(path, &genius.nodes))?,
-        (Some(path), None) => contacts_failure(Contacts::from_path(path, model))?,
-        (None, _) => Contacts::None,
-    };
+    let contacts = contacts(args, genius.as_ref(), stop)?;
     let rate = if args.paced { LineRate::Real } else { LineRate::Unlimited };
     Ok(SimOptions {
         contacts,
@@ -167,12 +162,24 @@ pub(crate) fn backend(image: Option<&Path>, log: Option<PathBuf>, line_rate: Lin
     let Some(image) = image else {
         return Ok(Backend::Native { line_rate, non_volatile: NonVolatile::new() });
     };
-    File::open(image).map_err(|error| {
-        Failure::new(format!("cannot open the image {}: {error}", image.display()))
+    let options = EmulatorOptions { log, ..EmulatorOptions::new(image) };
+    options.check_image().map_err(|error| {
+        Failure::new(error)
             .hint("cargo xtask firmware builds the images and says where they are")
             .hint("or leave --image out: the built-in node needs none")
     })?;
-    Ok(Backend::Emulator(EmulatorOptions { log, ..EmulatorOptions::new(image) }))
+    Ok(Backend::Emulator(options))
+}
+
+/// Reads the contacts. That waits for whoever writes them, where they come from a pipe.
+fn contacts(args: &Args, genius: Option<&GeniusOptions>, stop: &AtomicBool) -> Result<Contacts> {
+    let Some(path) = args.contacts.clone() else { return Ok(Contacts::None) };
+    let (model, nodes) = (args.model.into(), genius.map(|genius| genius.nodes.clone()));
+    let contacts = interrupt::unless_interrupted(stop, move || match nodes {
+        Some(nodes) => Contacts::from_path_on_bus(&path, &nodes),
+        None => Contacts::from_path(&path, model),
+    })?;
+    contacts_failure(contacts)
 }
 
 fn genius(args: &Args, window: &Path, model: Model) -> Result<GeniusOptions> {
@@ -249,7 +256,11 @@ fn announce(ports: &str) -> Result<()> {
 /// What went wrong in the simulator, with advice.
 impl From<SimError> for Failure {
     fn from(error: SimError) -> Failure {
-        Failure::new(&error).hint(match error {
+        let failure = match &error {
+            SimError::NoRecords(no_records) => no_records.hints().fold(Failure::new(&error), Failure::hint),
+            _ => Failure::new(&error),
+        };
+        failure.hint(match error {
             SimError::Scenario(_) => "see ser-cli sim --help for the format, and correct this line",
             SimError::NoSuchHost(_) => "check the spelling, or give an IP address",
             SimError::LinkTaken(_) | SimError::LinkInUse(_) => {
@@ -274,6 +285,7 @@ impl From<SimError> for Failure {
                 }
                 _ => "check names, rights, and that no other simulator runs there",
             },
+            SimError::NoRecords(_) => "one of these folders is needed, but not for --tcp without --genius",
             SimError::Ended | SimError::StillPlaying => "try again; if it persists, report it as a bug",
         })
     }

@@ -1,0 +1,71 @@
+//! A pipe may stand wherever a file may, and nobody has to write to it or read it: the first Ctrl-C ends the wait.
+#![cfg(target_os = "linux")]
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use common::{Running, ser_cli, wait_until};
+
+/// The number of Ctrl-C, as a bit in the masks of the system.
+const INTERRUPT: u64 = 1 << 1;
+
+fn pipe(folder: &Path) -> PathBuf {
+    let path = folder.join("pipe");
+    assert!(Command::new("mkfifo").arg(&path).status().expect("mkfifo runs").success());
+    path
+}
+
+/// Whether a program catches Ctrl-C by now: before that it ends it in any case.
+fn catches_interrupts(program: &Running) -> bool {
+    let status = fs::read_to_string(format!("/proc/{}/status", program.0.id())).expect("a process");
+    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).expect("a mask");
+    u64::from_str_radix(caught.trim(), 16).expect("a mask") & INTERRUPT != 0
+}
+
+#[test]
+fn the_first_ctrl_c_ends_the_wait_for_the_other_end_of_a_pipe() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = pipe(folder.path()).display().to_string();
+    fs::write(folder.path().join("image"), "").expect("written");
+    for arguments in ["--contacts PIPE", "--genius host --node 5 --contacts PIPE", "--image image --log PIPE"]
+    {
+        let mut waiting = ser_cli();
+        waiting.arg("sim").args(arguments.replace("PIPE", &pipe).split_whitespace());
+        waiting.current_dir(folder.path()).stdout(Stdio::null()).stderr(Stdio::null());
+        let mut waiting = Running::start(&mut waiting);
+        wait_until("it catches Ctrl-C", || catches_interrupts(&waiting));
+        assert_eq!(waiting.interrupt(), Some(0), "{arguments}");
+    }
+}
+
+#[test]
+fn contacts_may_come_through_a_pipe_with_a_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = pipe(folder.path());
+    let mut sim = ser_cli();
+    sim.args(["sim", "--contacts"]).arg(&pipe).stdout(Stdio::piped()).stderr(Stdio::null());
+    let mut sim = Running::start(&mut sim);
+    let lines = sim.lines();
+    fs::write(&pipe, "ms,input,state\n0,3,1\n").expect("the simulator reads");
+    let port = lines.recv_timeout(ser_sim::testing::PATIENCE).expect("the simulator answers");
+    wait_until("the contact has moved", || {
+        let read = ser_cli().args(["-p", &port, "read", "--all", "--format", "csv"]).output();
+        String::from_utf8_lossy(&read.expect("ser-cli runs").stdout).lines().count() == 2
+    });
+    assert_eq!(sim.interrupt(), Some(0));
+}
+
+#[test]
+fn a_pipe_is_no_image() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = pipe(folder.path());
+    for command in ["sim", "demo"] {
+        let output = ser_cli().args([command, "--image"]).arg(&pipe).output().expect("ser-cli runs");
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{told}");
+        assert!(told.contains("it is not a regular file") && told.contains("hint: "), "{told}");
+    }
+}
