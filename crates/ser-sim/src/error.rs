@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 use std::{fmt, io};
 
-use crate::scenario::ScenarioError;
+use crate::contacts::scenario_error::ScenarioError;
 
 /// Why a simulator did not start, or ended.
 #[derive(Debug)]

@@ -9,19 +9,10 @@
 //! - [`Lockstep`] is the ARM image in virtual time, held still whenever the world moves: for what has to be exact.
 //! - [`genius`] is the other way to a node: a GENI board, the Genius bus it sits on, and other devices there.
 
-mod breaker_trip;
 #[cfg(unix)]
 mod claim;
 mod contacts;
-#[cfg(unix)]
-mod emulated_board;
-#[cfg(unix)]
-mod emulator;
-#[cfg(unix)]
-mod emulator_files;
 mod error;
-#[cfg(unix)]
-mod external_bus;
 pub mod genius;
 #[cfg(unix)]
 mod genius_bench;
@@ -30,38 +21,31 @@ mod line;
 #[cfg(target_os = "linux")]
 mod lockstep;
 mod machine;
-mod native;
-mod non_volatile;
-mod pace;
-mod player;
+mod options;
 #[cfg(unix)]
-mod pty;
-#[cfg(unix)]
-mod record_folder;
-mod scenario;
-mod scenario_lines;
+mod qemu;
 mod service;
-mod sim_node;
 mod simulator;
-mod tcp;
 #[cfg(feature = "testing")]
 pub mod testing;
-mod wire;
 
-pub use contacts::Contacts;
-#[cfg(unix)]
-pub use emulated_board::{EmulatedBoard, ForcedFault};
-pub use error::{FolderFault, NoRecords, SimError};
+pub use contacts::player::{Played, STREAM_LEAD_MS};
+pub use contacts::scenario::Scenario;
+pub use contacts::scenario_error::{MAX_STEPS, ScenarioError, ScenarioFault};
+pub use contacts::source::Contacts;
+pub use contacts::step::Step;
+pub use error::SimError;
 pub use genius_options::{GeniusOptions, MAX_NODES};
-pub use line::Port;
+pub use line::port::Port;
 #[cfg(target_os = "linux")]
 pub use lockstep::{INSTRUCTIONS_PER_MS, Lockstep, LockstepOptions};
-pub use non_volatile::{MemoryStorage, NonVolatile, SimRtc};
-pub use player::{Played, STREAM_LEAD_MS};
-pub use scenario::{MAX_STEPS, Scenario, ScenarioError, ScenarioFault, Step};
+pub use machine::non_volatile::{MemoryStorage, NonVolatile, SimRtc};
+pub use machine::sim_node::{LineRate, PoweredOff, Ram, SimNode, SimNodeOptions};
+pub use options::{Backend, EmulatorOptions, Notice, SimOptions};
+#[cfg(unix)]
+pub use qemu::emulated_board::{EmulatedBoard, ForcedFault};
 #[cfg(unix)]
 pub use ser_board::last_words::ResetCause;
 #[cfg(unix)]
 pub use ser_board::leds::Lamps;
-pub use sim_node::{LineRate, PoweredOff, Ram, SimNode, SimNodeOptions};
-pub use simulator::{Backend, EmulatorOptions, Notice, SimOptions, Simulator, run};
+pub use simulator::{Simulator, run};

@@ -36,13 +36,13 @@ use std::time::{Duration, Instant};
 use ser_proto::Model;
 use tempfile::TempDir;
 
-use crate::emulated_board::ForcedFault;
-use crate::emulator::{PROGRAM, Qemu, is_temporary, read_printed, spawn};
-use crate::emulator_files::EmulatorFiles;
 use crate::error::SimError;
-use crate::external_bus::ExternalBus;
 use crate::genius::Board;
-use crate::simulator::EmulatorOptions;
+use crate::options::EmulatorOptions;
+use crate::qemu::emulated_board::ForcedFault;
+use crate::qemu::emulator::{PROGRAM, Qemu, is_temporary, read_printed, spawn};
+use crate::qemu::emulator_files::EmulatorFiles;
+use crate::qemu::external_bus::ExternalBus;
 
 use line_out::LineOut;
 use probe::Probe;

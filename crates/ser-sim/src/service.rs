@@ -6,14 +6,14 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::contacts::Arrived;
+use crate::contacts::player::Played;
+use crate::contacts::scenario::Scenario;
+use crate::contacts::source::Arrived;
 use crate::error::SimError;
+use crate::line::wire::Wire;
 use crate::line::{Line, garble, rates_agree};
 use crate::machine::Machine;
-use crate::player::Played;
-use crate::scenario::Scenario;
-use crate::simulator::Notice;
-use crate::wire::Wire;
+use crate::options::Notice;
 
 /// Contacts of the emulated board move when this computer has time; less than this is not worth a word.
 const NOTICEABLE_MS: u64 = 3;
@@ -251,9 +251,9 @@ mod tests {
     use ser_proto::{AutoReport, Baud, Command, Configure, FrameEncoder, Model};
 
     use super::*;
-    use crate::native::Native;
-    use crate::pace::Pace;
-    use crate::sim_node::{Ram, SimNode, SimNodeOptions};
+    use crate::machine::native::Native;
+    use crate::machine::pace::Pace;
+    use crate::machine::sim_node::{Ram, SimNode, SimNodeOptions};
 
     /// A line whose host is the test.
     #[derive(Default)]

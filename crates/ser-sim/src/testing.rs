@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::simulator::{Backend, EmulatorOptions};
+use crate::options::{Backend, EmulatorOptions};
 
 /// How long anything may take: tests run on machines that stall for seconds.
 pub const PATIENCE: Duration = Duration::from_secs(120);

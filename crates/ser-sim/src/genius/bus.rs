@@ -5,15 +5,12 @@ use std::collections::BTreeMap;
 use std::marker::PhantomData;
 
 use super::device::{Device, Message};
+use super::device_id::DeviceId;
 use super::faults::{Accidents, Fault, Noise};
 use super::scan_time::{BusRate, MIN_SCAN_NS};
 
 /// Device numbers are 0 to 31.
 pub const ADDRESSES: u8 = 32;
-
-/// A device on a bus, by the order in which they were connected.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct DeviceId(usize);
 
 /// A device on a bus whose type is known.
 pub struct Handle<T> {

@@ -1,6 +1,6 @@
 //! What goes wrong, at random or when told: always the same way for the same seed.
 
-use super::bus::DeviceId;
+use super::device_id::DeviceId;
 use super::split_mix::SplitMix64;
 
 /// How often messages suffer, in millionths.

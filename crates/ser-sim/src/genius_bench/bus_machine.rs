@@ -9,14 +9,14 @@ use ser_proto::{Baud, Command, FrameEncoder, TimeStamp};
 
 use super::host_window::HostWindow;
 use super::recorder::{Recorder, as_seen_from_afar};
+use crate::contacts::player::{Played, STREAM_LEAD_MS};
+use crate::contacts::scenario::Scenario;
+use crate::contacts::scenario_lines::Item;
 use crate::error::SimError;
 use crate::genius::{Board, Bus, Handle};
 use crate::machine::Machine;
-use crate::pace::Pace;
-use crate::player::{Played, STREAM_LEAD_MS};
-use crate::scenario::Scenario;
-use crate::scenario_lines::Item;
-use crate::sim_node::SimNode;
+use crate::machine::pace::Pace;
+use crate::machine::sim_node::SimNode;
 
 /// How soon the host's board sees what the host has written.
 const PATIENCE: Duration = Duration::from_millis(1);

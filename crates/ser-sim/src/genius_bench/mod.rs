@@ -7,13 +7,13 @@ mod shared_board;
 
 use ser_node::{GeniusOptions as PortOptions, GeniusPort};
 
-use crate::emulator::Emulator;
 use crate::error::SimError;
 use crate::genius::{Board, BoardOptions, Bus, Handle};
 use crate::genius_options::GeniusOptions;
-use crate::non_volatile::NonVolatile;
-use crate::pace::Pace;
-use crate::sim_node::{PoweredOff, Ram, SimNodeOptions};
+use crate::machine::non_volatile::NonVolatile;
+use crate::machine::pace::Pace;
+use crate::machine::sim_node::{PoweredOff, Ram, SimNodeOptions};
+use crate::qemu::emulator::Emulator;
 
 use bus_machine::BusMachine;
 use host_window::HostWindow;

@@ -8,15 +8,15 @@ use std::sync::Arc;
 use ser_node::GeniusPort;
 
 use super::shared_board::{BoardRam, SharedBoard};
-use crate::emulator::Emulator;
+use crate::contacts::player::Player;
 use crate::error::SimError;
-use crate::external_bus::ExternalBus;
 use crate::genius::{Violation, ViolationKind};
 use crate::machine::Machine;
-use crate::native::Native;
-use crate::pace::Pace;
-use crate::player::Player;
-use crate::sim_node::{PoweredOff, SimNode};
+use crate::machine::native::Native;
+use crate::machine::pace::Pace;
+use crate::machine::sim_node::{PoweredOff, SimNode};
+use crate::qemu::emulator::Emulator;
+use crate::qemu::external_bus::ExternalBus;
 
 /// A recorder under power, and its board.
 pub(super) struct Recorder<'a> {

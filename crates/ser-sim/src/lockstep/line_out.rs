@@ -10,7 +10,7 @@ use std::os::fd::OwnedFd;
 
 use rustix::pipe::{PipeFlags, fcntl_setpipe_size, pipe_with};
 
-use crate::emulator::is_temporary;
+use crate::qemu::emulator::is_temporary;
 
 /// The bench's end.
 pub(super) struct LineOut {

@@ -2,9 +2,9 @@
 
 use super::Board;
 use super::interrupts::Condition;
-use super::live::Reason;
+use super::presence::Power;
+use super::reason::Reason;
 use super::request_queue::is_memory_access;
-use super::start_up::Power;
 use crate::genius::datagram::{BROADCAST, Datagram, Priority, subfunction};
 use crate::genius::device::{Device, Message};
 use crate::genius::faults::DeviceFault;

@@ -6,7 +6,7 @@
 
 use super::Board;
 use super::interrupts::Condition;
-use super::live::Reason;
+use super::reason::Reason;
 use crate::genius::datagram::{BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, Priority};
 use crate::genius::device::Message;
 use crate::genius::map;

@@ -2,7 +2,7 @@
 
 use super::Board;
 use super::commands::CommandState;
-use super::start_up::Power;
+use super::presence::Power;
 use super::violations::{Violation, ViolationKind};
 use crate::genius::map::{self, RAM_LEN};
 

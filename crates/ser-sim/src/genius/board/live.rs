@@ -4,10 +4,11 @@ use super::commands::CommandState;
 use super::io_tables::IoCopies;
 use super::lockout::Lockout;
 use super::log_in::LogIns;
+use super::presence::Presence;
+use super::reason::Reason;
 use super::receive_queue::ReceiveQueue;
 use super::request_queue::RequestQueue;
 use super::setup::Setup;
-use super::start_up::Presence;
 use super::status::BusErrors;
 use crate::genius::outbox::Outbox;
 
@@ -52,19 +53,4 @@ impl Live {
             outbox: Outbox::default(),
         }
     }
-}
-
-/// Why the board sends a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Reason {
-    /// The command in the command block.
-    Command,
-    /// A command whose end the host does not want to hear of.
-    UnreportedCommand,
-    /// A Read ID to a device that is not logged in.
-    LogIn { address: u8 },
-    /// A device's outputs were enabled.
-    Assign { address: u8 },
-    /// An answer.
-    Reply,
 }

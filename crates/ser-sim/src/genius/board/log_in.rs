@@ -2,7 +2,7 @@
 
 use super::Board;
 use super::interrupts::Condition;
-use super::live::Reason;
+use super::reason::Reason;
 use crate::genius::datagram::{Datagram, Priority, subfunction};
 use crate::genius::device::Message;
 use crate::genius::identity::{BlockKind, Identity};

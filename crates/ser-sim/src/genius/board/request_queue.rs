@@ -6,7 +6,7 @@
 
 use super::Board;
 use super::interrupts::Condition;
-use super::live::Reason;
+use super::reason::Reason;
 use super::violations::ViolationKind;
 use crate::genius::datagram::{Datagram, Priority, subfunction};
 use crate::genius::device::Message;

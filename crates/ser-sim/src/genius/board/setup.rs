@@ -2,7 +2,7 @@
 
 use super::Board;
 use super::commands::{COMPLETE, PROCESS_ERROR, SYNTAX_ERROR};
-use super::start_up::{OFF_BUS_US, Presence};
+use super::presence::{OFF_BUS_US, Presence};
 use crate::genius::map;
 use crate::genius::scan_time::BusRate;
 

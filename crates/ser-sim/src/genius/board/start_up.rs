@@ -2,7 +2,9 @@
 
 use super::Board;
 use super::interrupts::Condition;
-use super::live::{Live, Reason};
+use super::live::Live;
+use super::presence::{OFF_BUS_US, Power, Presence, Stage};
+use super::reason::Reason;
 use super::violations::ViolationKind;
 use crate::genius::map;
 use crate::genius::outbox::Outbox;
@@ -15,45 +17,11 @@ const FALSE_INTERRUPT_US: u64 = 250;
 const SECOND_PATTERN_US: u64 = 850_000;
 /// From here on the host may access the RAM.
 const HOST_MAY_ACCESS_US: u64 = 1_700_000;
-/// Between the OK flag and the bus, and after a change of the configuration.
-pub(super) const OFF_BUS_US: u64 = 1_500_000;
 /// A number that was heard this recently on the bus is in use: longer than the longest scan.
 const NUMBER_IN_USE_US: u64 = 1_200_000;
 /// Without a turn for so long, again longer than a scan, the board cannot get at the bus.
 const TURN_MISSED_US: u64 = 1_000_000;
 pub(super) const HEARTBEAT_US: u64 = 200_000;
-
-/// What the processors do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Power {
-    InReset,
-    SelfTest { released_us: u64, stage: Stage },
-    Running,
-    Stopped,
-}
-
-/// How far the start-up is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stage {
-    Released,
-    Interrupted,
-    SecondPattern,
-    RamReady,
-}
-
-/// Whether a running board takes turns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Presence {
-    /// Not before then.
-    Off {
-        until_us: u64,
-    },
-    /// Another device has its number.
-    Conflict {
-        heard_us: u64,
-    },
-    On,
-}
 
 /// A lamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::Board;
 use super::interrupts::Condition;
-use super::start_up::Power;
+use super::presence::Power;
 use crate::genius::map;
 
 /// This many errors ...

@@ -11,10 +11,10 @@ use geni_board::SharedRam;
 use ser_node::{Capture, CaptureChannel, Debounce, Diagnostics, Event, GeniusPort, Node, NodeParts};
 use ser_proto::{Baud, Entry, MAX_SIZE, Model};
 
-use crate::non_volatile::{MemoryStorage, NonVolatile, SimRtc};
-use crate::player::{Played, Player};
-use crate::scenario::Scenario;
-use crate::scenario_lines::Item;
+use crate::contacts::player::{Played, Player};
+use crate::contacts::scenario::Scenario;
+use crate::contacts::scenario_lines::Item;
+use crate::machine::non_volatile::{MemoryStorage, NonVolatile, SimRtc};
 
 /// Bytes that may wait for the other end of the line before the node is asked for no more.
 const OUTPUT_LIMIT: usize = 4096;

@@ -6,13 +6,13 @@ use std::time::Duration;
 
 use ser_proto::Baud;
 
+use crate::contacts::player::Played;
+use crate::contacts::scenario::Scenario;
+use crate::contacts::scenario_lines::Item;
 use crate::error::SimError;
 use crate::machine::Machine;
-use crate::pace::Pace;
-use crate::player::Played;
-use crate::scenario::Scenario;
-use crate::scenario_lines::Item;
-use crate::sim_node::SimNode;
+use crate::machine::pace::Pace;
+use crate::machine::sim_node::SimNode;
 
 /// How soon a node that is left alone notices that time has passed. Stamps do not depend on it, only how soon an
 /// event is reported.

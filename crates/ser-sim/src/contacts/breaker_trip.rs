@@ -1,6 +1,7 @@
 //! A breaker trip as a recorder in a small substation sees it.
 
-use crate::scenario::{Scenario, Step};
+use crate::contacts::scenario::Scenario;
+use crate::contacts::step::Step;
 
 /// What the inputs stand for.
 const NAMES: [(u8, &str); 32] = [

@@ -4,8 +4,9 @@ use std::collections::VecDeque;
 
 use ser_proto::Inputs;
 
-use crate::scenario::{Scenario, Step};
-use crate::scenario_lines::Item;
+use crate::contacts::scenario::Scenario;
+use crate::contacts::scenario_lines::Item;
+use crate::contacts::step::Step;
 
 /// How long a stream's scenario waits for its further lines when they did not come together with the first.
 ///

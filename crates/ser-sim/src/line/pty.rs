@@ -25,9 +25,9 @@ use rustix::termios::{OptionalActions, QueueSelector, Termios};
 use rustix::{fs as rfs, termios};
 use tempfile::TempDir;
 
+use super::Line;
 use crate::claim::{Claim, Holder};
 use crate::error::SimError;
-use crate::line::Line;
 
 /// The rate of a port that nobody has set: what a factory-fresh node uses.
 const INITIAL_BITS_PER_SECOND: u32 = 9600;

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use ser_board::last_words::ResetCause;
 use ser_board::leds::Lamps;
 
-use crate::external_bus::ExternalBus;
+use crate::qemu::external_bus::ExternalBus;
 
 /// How often the board is looked at by whoever waits for it.
 const LOOK_EVERY: Duration = Duration::from_millis(2);

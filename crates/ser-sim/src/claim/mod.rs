@@ -15,6 +15,8 @@
 //! itself that decides, which fails where something is, and neither replaces what the other has
 //! made.
 
+mod record_folder;
+
 use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, ErrorKind};
 use std::os::unix::ffi::OsStrExt;
@@ -26,7 +28,6 @@ use crc::{CRC_64_XZ, Crc};
 use rustix::fs::{AtFlags, Mode, OFlags, openat, unlinkat};
 
 use crate::error::{NoRecords, SimError};
-use crate::record_folder;
 
 /// How often a record may go between its opening and its locking: each time a simulator ends at
 /// that moment.

@@ -8,7 +8,8 @@ use std::mem;
 
 use ser_proto::Model;
 
-use crate::scenario::{ScenarioError, ScenarioFault, Step};
+use crate::contacts::scenario_error::{ScenarioError, ScenarioFault};
+use crate::contacts::step::Step;
 
 /// No step comes near this; a longer line is some other file.
 const MAX_LINE_LEN: usize = 1024;
@@ -225,7 +226,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::scenario::Scenario;
+    use crate::contacts::scenario::Scenario;
 
     fn step(at_ms: u64, input: u8, on: bool) -> Step {
         Step { at_ms, input, on }

@@ -1,15 +1,20 @@
 //! What stands at the node's end of the line: the node in virtual time, or the emulated board.
 
+pub(crate) mod native;
+pub(crate) mod non_volatile;
+pub(crate) mod pace;
+pub(crate) mod sim_node;
+
 #[cfg(unix)]
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use ser_proto::Baud;
 
+use crate::contacts::player::Played;
+use crate::contacts::scenario::Scenario;
+use crate::contacts::scenario_lines::Item;
 use crate::error::SimError;
-use crate::player::Played;
-use crate::scenario::Scenario;
-use crate::scenario_lines::Item;
 
 /// A node that is to be served. Nothing here waits.
 pub(crate) trait Machine {

@@ -19,8 +19,8 @@ use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::termios::isatty;
 
 use crate::error::SimError;
-use crate::external_bus::{ExternalBus, MEMORY_LEN};
-use crate::simulator::EmulatorOptions;
+use crate::options::EmulatorOptions;
+use crate::qemu::external_bus::{ExternalBus, MEMORY_LEN};
 
 /// How often it is looked whether somebody reads the pipe that the log goes to.
 const LOOK_EVERY: Duration = Duration::from_millis(20);

@@ -32,15 +32,15 @@ use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use ser_proto::{Baud, Command, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Model, Reply};
 use tempfile::TempDir;
 
-use crate::emulator_files::EmulatorFiles;
+use crate::contacts::player::{Move, Played, Player};
+use crate::contacts::scenario::Scenario;
+use crate::contacts::scenario_lines::Item;
 use crate::error::SimError;
-use crate::external_bus::ExternalBus;
 use crate::machine::Machine;
-use crate::pace::Pace;
-use crate::player::{Move, Played, Player};
-use crate::scenario::Scenario;
-use crate::scenario_lines::Item;
-use crate::simulator::EmulatorOptions;
+use crate::machine::pace::Pace;
+use crate::options::EmulatorOptions;
+use crate::qemu::emulator_files::EmulatorFiles;
+use crate::qemu::external_bus::ExternalBus;
 
 pub(crate) const PROGRAM: &str = "qemu-system-arm";
 

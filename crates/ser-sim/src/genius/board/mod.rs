@@ -12,7 +12,9 @@ mod live;
 mod lockout;
 mod log_in;
 mod options;
+mod presence;
 mod ram;
+mod reason;
 mod receive_queue;
 mod request_queue;
 mod setup;
@@ -27,8 +29,8 @@ pub use violations::{Violation, ViolationKind};
 
 use self::interrupts::InterruptPin;
 use self::live::Live;
+use self::presence::Power;
 use self::ram::Ram;
-use self::start_up::Power;
 use self::violations::Violations;
 use super::map::RAM_LEN;
 

@@ -1,47 +1,21 @@
 //! The far end of the node's serial line, where a host plugs in.
 
+mod open;
+pub(crate) mod port;
+#[cfg(unix)]
+mod pty;
+mod tcp;
+pub(crate) mod wire;
+
 use std::io;
 #[cfg(unix)]
 use std::os::fd::BorrowedFd;
-use std::path::PathBuf;
-use std::time::Duration;
 
 use ser_proto::Baud;
 
 use crate::error::SimError;
 
-/// Where a host reaches the simulated node: it has one RS-232 port, hence one of these.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Port {
-    /// A pseudo-terminal, which hosts open as they would a serial port.
-    Pty {
-        /// The symbolic link under which it is found; `None` makes one in a temporary directory.
-        link: Option<PathBuf>,
-    },
-    /// None: hosts reach it in another way.
-    Unconnected,
-    /// A TCP port for one client at a time.
-    Tcp {
-        /// Address to listen on, as in `127.0.0.1:4000`; port 0 takes a free one. Whoever reaches
-        /// it may do everything.
-        address: String,
-        /// A client that has sent nothing for so long gives way when another one comes; `None` is
-        /// never.
-        gives_way_after: Option<Duration>,
-    },
-}
-
-impl Port {
-    /// How long a TCP client may be silent by default: `ser-cli watch` says something every ten
-    /// seconds.
-    pub const GIVES_WAY_AFTER: Duration = Duration::from_secs(600);
-
-    /// A TCP port with what is usual.
-    #[must_use]
-    pub fn tcp(address: impl Into<String>) -> Port {
-        Port::Tcp { address: address.into(), gives_way_after: Some(Port::GIVES_WAY_AFTER) }
-    }
-}
+pub(crate) use open::open;
 
 /// A medium that carries the bytes of a line. Nothing here waits.
 pub(crate) trait Line: Send {
@@ -71,54 +45,6 @@ pub(crate) trait Line: Send {
     /// Descriptors that become readable when [`read`](Self::read) has something to do; the one of a host comes first.
     #[cfg(unix)]
     fn descriptors(&self) -> Vec<BorrowedFd<'_>>;
-}
-
-/// Makes the line of `port`, not yet known to anybody.
-pub(crate) fn open(port: &Port) -> Result<Box<dyn Line>, SimError> {
-    match port {
-        #[cfg(unix)]
-        Port::Pty { link } => Ok(Box::new(crate::pty::PtyLine::open(link.as_deref())?)),
-        #[cfg(not(unix))]
-        Port::Pty { .. } => Err(SimError::Unsupported("a pseudo-terminal")),
-        Port::Unconnected => Ok(Box::new(NoLine)),
-        Port::Tcp { address, gives_way_after } => {
-            Ok(Box::new(crate::tcp::TcpLine::listen(address, *gives_way_after)?))
-        }
-    }
-}
-
-/// A connector without a cable.
-struct NoLine;
-
-impl Line for NoLine {
-    fn read(&mut self, _buffer: &mut [u8]) -> io::Result<usize> {
-        Ok(0)
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        Ok(bytes.len())
-    }
-
-    fn host_bits_per_second(&self) -> Option<u32> {
-        None
-    }
-
-    fn take_host_change(&mut self) -> bool {
-        false
-    }
-
-    fn publish(&mut self) -> Result<(), SimError> {
-        Ok(())
-    }
-
-    fn name(&self) -> String {
-        String::new()
-    }
-
-    #[cfg(unix)]
-    fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
-        Vec::new()
-    }
 }
 
 /// Whether a host set to `host` bit/s can understand a node at `node`.

@@ -9,9 +9,10 @@ use std::thread;
 
 use ser_proto::Model;
 
+use crate::contacts::scenario::Scenario;
+use crate::contacts::scenario_error::{ScenarioError, ScenarioFault};
+use crate::contacts::scenario_lines::{Item, ScenarioLines, Scenarios};
 use crate::error::SimError;
-use crate::scenario::{Scenario, ScenarioError, ScenarioFault};
-use crate::scenario_lines::{Item, ScenarioLines, Scenarios};
 
 /// What moves the contacts of a simulated node from its start on.
 #[derive(Default)]

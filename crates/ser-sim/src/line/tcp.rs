@@ -17,8 +17,8 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, T
 use std::os::fd::{AsFd, BorrowedFd};
 use std::time::{Duration, Instant};
 
+use super::Line;
 use crate::error::SimError;
-use crate::line::Line;
 
 /// How long a client that has said its last word may wait for answers.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);

@@ -1,0 +1,36 @@
+//! Whether a board runs, and whether it takes turns on the bus.
+
+/// Between the OK flag and the bus, and after a change of the configuration.
+pub(super) const OFF_BUS_US: u64 = 1_500_000;
+
+/// What the processors do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Power {
+    InReset,
+    SelfTest { released_us: u64, stage: Stage },
+    Running,
+    Stopped,
+}
+
+/// How far the start-up is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stage {
+    Released,
+    Interrupted,
+    SecondPattern,
+    RamReady,
+}
+
+/// Whether a running board takes turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Presence {
+    /// Not before then.
+    Off {
+        until_us: u64,
+    },
+    /// Another device has its number.
+    Conflict {
+        heard_us: u64,
+    },
+    On,
+}
