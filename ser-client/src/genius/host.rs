@@ -15,8 +15,8 @@ use ser_proto::genius::{
 };
 
 use super::GeniusError;
+use super::answers::Answers;
 use super::inboxes::Inboxes;
-use super::recognition::Answers;
 use super::window::Window;
 use crate::{Clock, RealTime};
 use crate::{GeniWindow, OpenError, Unit};
