@@ -32,8 +32,9 @@ const PERIOD_MS: u64 = 5;
 /// Moves at all recorders in the same sample; its stamps are compared.
 const COMMON: u8 = 2;
 
-/// In each round every recorder sends so many reports at least, one in some 30 ms.
-const REPORTS_PER_ROUND: u32 = 5;
+/// Each recorder sends a report in some 60 ms. So many at least come while a broadcast is carried
+/// out.
+const REPORTS_PER_ROUND: u32 = 2;
 
 struct Plant<'p> {
     bench: Bench<'p>,
