@@ -163,7 +163,7 @@ fn one_broadcast_sets_the_image_and_two_recorders_that_report_all_the_time() {
         let before = plant.reports();
         plant.genius().broadcast(&Command::SetClock(time)).unwrap();
         plant.run(CARRIED_OUT_MS, true);
-        // Otherwise nobody was busy, and the round shows nothing.
+        // All of them were busy in this round.
         let reports: Vec<u32> =
             plant.reports().iter().zip(&before).map(|(after, before)| after - before).collect();
         assert!(reports.iter().all(|&count| count >= REPORTS_PER_ROUND), "round {round}: {reports:?}");

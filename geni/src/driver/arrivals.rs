@@ -125,7 +125,7 @@ impl Arrivals {
         self.latest = None;
     }
 
-    /// When the oldest of the datagrams arrived that are known to wait.
+    /// When the oldest datagram that is known to wait arrived.
     pub(super) fn oldest(&self) -> Option<u32> {
         self.notices.front().or(self.pulses.front()).copied()
     }
