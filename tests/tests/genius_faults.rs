@@ -2,9 +2,9 @@
 
 use geni_board::Destination::Device;
 use geni_board::SharedRam;
-use ser_proto::{AutoReport, Command, Configure, Inputs, Model, Reply};
+use ser_proto::{Command, Inputs, Model, Reply};
 use ser_sim::genius::{DeviceFault, Fault};
-use ser_trial::genius_world::{HOST, World};
+use ser_trial::genius_world::World;
 
 const UNIT: u8 = 5;
 
@@ -78,22 +78,10 @@ fn a_board_that_restarts_in_the_middle_of_a_command_is_configured_anew() {
     }
 }
 
-/// The unit sends its events to the host as they happen.
-fn report_to_host(world: &mut World) {
-    let configure = Configure {
-        size: None,
-        baud: None,
-        auto_report: AutoReport::Genius,
-        report_address: HOST,
-        auto_print: false,
-    };
-    world.ask(UNIT, &Command::Configure(configure));
-}
-
 #[test]
 fn a_board_that_answers_late_or_has_no_memory_is_waited_for() {
     let mut world = started();
-    report_to_host(&mut world);
+    world.report_to_host();
     inject(&mut world, DeviceFault::AnswerLate { by_us: 30_000 });
     inject(&mut world, DeviceFault::OutOfMemory { datagrams: 5 });
     let events = live_on(&mut world, 3_000);
@@ -111,7 +99,7 @@ fn a_board_that_answers_late_or_has_no_memory_is_waited_for() {
 #[test]
 fn reports_outlive_a_board() {
     let mut world = started();
-    report_to_host(&mut world);
+    world.report_to_host();
     inject(&mut world, DeviceFault::Hang);
     let events = live_on(&mut world, RECOVERY_MS);
     world.run(1_000);

@@ -82,6 +82,7 @@ impl Plant {
             let already =
                 set.iter().filter(|set| matches!(set.command, Command::SetClock(time) if time.hour == 1));
             if already.count() == index {
+                // Without an interrupt line it counts from the next look, which is in every millisecond.
                 set.push(Set { at_ms: arrived_us.div_ceil(1000), command: sent[index] });
             }
         }

@@ -10,11 +10,12 @@ use geni_board::{
 use ser_node::{GeniusOptions, GeniusPort};
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{Command, FrameEncoder, Model};
-use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusRate, Handle};
+use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusRate, Handle, Read, tick_ms};
 use ser_sim::{Lockstep, Ram, Scenario, SimNode, SimNodeOptions, Step};
 
-/// Device numbers.
-pub const HOST: u8 = 31;
+use ser_trial::genius_world::HOST;
+
+/// Device number of the image.
 const RECORDER: u8 = 5;
 
 /// Reset line at power-up, as short as the board allows.
@@ -136,6 +137,20 @@ impl Genius {
             data: Data::from_slice(&command.to_body()).unwrap_or_default(),
         };
         self.host.transmit(transmission).map_err(|error| format!("the host's board refuses: {error:?}"))
+    }
+
+    /// When each recorder's board received the datagram that it handed over last: the tick of that
+    /// moment, the image's first.
+    ///
+    /// # Panics
+    /// When there was none since its reset.
+    #[must_use]
+    pub fn read_arrived_ms(&mut self) -> Vec<u64> {
+        let image = self.bus.borrow().get(self.recorder).latest_read();
+        let others = self.others.iter_mut().map(|other| other.port.window().look(Board::latest_read));
+        let others = others.collect::<Vec<_>>();
+        let arrived_ms = |read: Option<Read>| tick_ms(read.expect("a datagram").arrived_us);
+        [image].into_iter().chain(others).map(arrived_ms).collect()
     }
 
     /// Takes the bodies of what the recorder has said.

@@ -7,29 +7,21 @@ use std::time::Duration;
 use ser_board::budget::MAX_BITS_PER_SECOND;
 use ser_client::LineRate;
 use ser_node::Debounce;
-use ser_proto::{AutoReport, Command, Configure, MAX_SIZE, Model, Reply};
+use ser_proto::{Command, MAX_SIZE, Model, Reply};
 use ser_sim::INSTRUCTIONS_PER_MS;
 
 use super::bench::{Bench, Carried, Parts, Setup};
 use super::costs::beginnings;
-use super::genius::{Genius, HOST};
+use super::genius::Genius;
 use super::lateness::{Lateness, expiry};
 use super::program::Program;
+use ser_trial::genius_world::REPORT;
 use ser_trial::simulation::account::Tally as Told;
 use ser_trial::simulation::conversation::{Conversation, Order, Outgoing, Talk};
 use ser_trial::simulation::ledger::Ledger;
 
 /// 2000-01-01 00:00, what a clock that has never been set shows at tick 0.
 const NEVER_SET_MS: i64 = 946_684_800_000;
-
-/// The recorder sends every event to the host on the bus, besides.
-const REPORT: Configure = Configure {
-    size: None,
-    baud: None,
-    auto_report: AutoReport::Genius,
-    report_address: HOST,
-    auto_print: false,
-};
 
 /// Bytes that are never missing on the line: more than it takes in a millisecond.
 const LINE_AHEAD: usize = 4;
@@ -108,6 +100,7 @@ impl<'p> Load<'p> {
         let mut ledger = Ledger::new(Model::Ser320.mask());
         ledger.power_up(0, NEVER_SET_MS, MAX_SIZE, Debounce::OFF);
         let mut line = Conversation::new("RS-232", LineRate::BitsPerSecond(MAX_BITS_PER_SECOND));
+        // The recorder reports every event to the host on the bus, besides.
         line.begin(Order::Ask(Command::Configure(REPORT)), bench.now_ms());
         Ok(Load {
             bench,

@@ -71,13 +71,13 @@ pub const RECEIVE_PRIORITY: u8 = 2;
 /// Priority of the transmit interrupt: being late makes a pause on the line and nothing else.
 pub const TRANSMIT_PRIORITY: u8 = 1;
 
-/// Priority of the GENI board's interrupt line: its edge is latched, and all that it does is to
-/// take the tick at which a datagram arrived. The interrupts above it take some 10 µs of the
-/// millisecond.
+/// Priority of the GENI board's interrupt line. The line's edge is latched, so the interrupt may
+/// wait, and all that it takes is the tick at which a datagram arrived. The interrupts above it need
+/// some 10 µs of a millisecond.
 pub const EXTERNAL_BUS_PRIORITY: u8 = 1;
 
-/// Pulses of the GENI board's interrupt line that may wait for the main loop. Each is a datagram,
-/// of which the board holds 15; one more may be on its way out.
+/// Pulses of the GENI board's interrupt line that may wait for the main loop. Each means a datagram.
+/// The board holds 15 of them, and one more may be on its way out.
 pub const PULSE_RING_LEN: usize = ring_len(16);
 
 /// Bytes of the log that may wait for a debug probe: all that a start has to say, some 40 records of 25 bytes at

@@ -1,9 +1,9 @@
 //! A value, and what it was a short while ago.
 //!
-//! Changes are recorded up to [`HELD_BACK_MS`](crate::HELD_BACK_MS) after they happened, and what
-//! was in force when they happened decides about them. A history therefore has a place for every
-//! millisecond of that span. However many settings come over both ports, and in whatever order they
-//! are read, none is forgotten that still decides about a change.
+//! Changes are recorded up to [`HELD_BACK_MS`](crate::HELD_BACK_MS) after they happened. What was in
+//! force when they happened decides about them. A history therefore has a place for every
+//! millisecond of that span. Settings may come over both ports, in any number, and may be read in any
+//! order: none that still decides about a change is forgotten.
 
 use crate::sequencer::{WINDOW, slot};
 
@@ -21,7 +21,7 @@ pub(crate) struct History<T> {
     before: (u64, T),
     /// The latest setting of all. Its millisecond is the latest that has a place.
     latest: (u64, T),
-    /// What was set last in each millisecond; where nothing was, the bit below is clear.
+    /// What was set last in each millisecond. The bits below tell where something was.
     values: [T; SPAN],
     is_set: [u32; SPAN / BITS],
 }
@@ -35,8 +35,8 @@ impl<T: Copy> History<T> {
     /// Sets the value in millisecond `tick_ms`. The sample of that millisecond has been taken already.
     pub(crate) fn set(&mut self, tick_ms: u64, value: T) {
         if tick_ms + SPAN as u64 <= self.latest.0 {
-            // All changes of that time have been recorded. It may still be the latest before the
-            // others.
+            // All changes of that time have been recorded. The setting may still be the latest one
+            // before those that have a place.
             if tick_ms >= self.before.0 {
                 self.before = (tick_ms, value);
             }

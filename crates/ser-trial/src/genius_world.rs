@@ -11,12 +11,23 @@ use geni_board::{
 };
 use ser_node::{Debounce, GeniusOptions, GeniusPort};
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
-use ser_proto::{Command, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Model, Reply};
+use ser_proto::{
+    AutoReport, Command, Configure, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Model, Reply,
+};
 use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusRate, Handle, Noise, ViolationKind};
 use ser_sim::{NonVolatile, Ram, Scenario, SimNode, SimNodeOptions, SimRtc, Step};
 
 /// Device number of the host.
 pub const HOST: u8 = 31;
+
+/// A recorder sends every event to the host, as it happens.
+pub const REPORT: Configure = Configure {
+    size: None,
+    baud: None,
+    auto_report: AutoReport::Genius,
+    report_address: HOST,
+    auto_print: false,
+};
 
 /// Reset line at power-up, as short as the boards allow.
 const RESET: Start = Start::Reset { hold_ms: 20 };
@@ -45,6 +56,15 @@ pub struct Recorder {
 }
 
 impl Recorder {
+    /// When the board received the datagram that it handed over last, in microseconds.
+    ///
+    /// # Panics
+    /// When there was none since its reset.
+    #[must_use]
+    pub fn read_arrived_us(&mut self) -> u64 {
+        self.port.window().look(Board::latest_read).expect("a datagram").arrived_us
+    }
+
     /// Opens or closes contacts in the next millisecond.
     pub fn contact(&mut self, input: u8, on: bool) {
         self.node.play(&Scenario::from_steps([Step { at_ms: 0, input, on }]));
@@ -184,6 +204,13 @@ impl World {
         world.run(SETTLING_MS);
         world.host.inbox.clear();
         world
+    }
+
+    /// All recorders [report](REPORT) from now on.
+    pub fn report_to_host(&mut self) {
+        for recorder in &mut self.recorders {
+            recorder.serial_ask(&Command::Configure(REPORT));
+        }
     }
 
     /// Lets a millisecond pass.

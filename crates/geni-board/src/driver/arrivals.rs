@@ -73,6 +73,8 @@ impl Arrivals {
 
     /// The Receive-Queue flag was looked at, and cleared if it was set.
     pub(super) fn looked(&mut self, is_set: bool, now_ms: u32) {
+        // A pulse that has not been handed in by now does not belong to that flag any more.
+        self.awaits_pulse = self.awaits_pulse.filter(|&seen_ms| elapsed_ms(now_ms, seen_ms) <= 1);
         if !is_set {
             while let Some(tick_ms) = self.pulses.pop_front() {
                 // The pulse came after the others were handed in, and right before the look that
@@ -123,7 +125,7 @@ impl Arrivals {
         self.latest = None;
     }
 
-    /// When the oldest of the datagrams arrived that are known to wait.
+    /// When the oldest datagram that is known to wait arrived.
     pub(super) fn oldest(&self) -> Option<u32> {
         self.notices.front().or(self.pulses.front()).copied()
     }

@@ -64,12 +64,13 @@ enum Task {
 ///
 /// # When a datagram arrived
 ///
-/// The board's flags are looked at in every poll, whatever command is in progress, and a datagram
-/// is handed out with the tick at which its flag was seen
-/// ([`Received::arrived_ms`](crate::Received::arrived_ms)): later than the flag by no more than
-/// lies between two polls. A host that has to know it to the millisecond although its main loop may
-/// be away connects the interrupt line and lets nothing but [`Interrupts::RECEIVE_QUEUE`] pull it:
-/// then it is the tick of the pulse.
+/// Every poll looks at the board's flags, whatever command is in progress. A datagram is handed out
+/// with the tick at which its flag was seen: [`Received::arrived_ms`](crate::Received::arrived_ms).
+/// That is later than the flag by no more than the time between two polls.
+///
+/// Some hosts have to know the tick to the millisecond although their main loop may be away. They
+/// connect the interrupt line and let nothing but [`Interrupts::RECEIVE_QUEUE`] pull it. A datagram
+/// then has the tick of its pulse.
 ///
 /// # What happens when
 ///
@@ -168,9 +169,9 @@ impl<R: SharedRam> Driver<R> {
         }
     }
 
-    /// The interrupt line was pulsed at `tick_ms`, by the count of [`poll`](Driver::poll): flags
-    /// are looked at in its next call. Where only [`Interrupts::RECEIVE_QUEUE`] pulls the line, a
-    /// datagram arrived at that tick. Pulses are handed in in their order.
+    /// The interrupt line was pulsed at `tick_ms`, by the count of [`poll`](Driver::poll). The next
+    /// poll looks at the flags. Where only [`Interrupts::RECEIVE_QUEUE`] pulls the line, a datagram
+    /// arrived at that tick. Pulses have to be handed in in the order in which they came.
     pub fn interrupt(&mut self, tick_ms: u32) {
         self.interrupted = true;
         if self.options.interrupts == Interrupts::RECEIVE_QUEUE {
@@ -178,7 +179,7 @@ impl<R: SharedRam> Driver<R> {
         }
     }
 
-    /// When the oldest datagram arrived that waits to be read, as far as that is known.
+    /// When the oldest datagram that waits to be read arrived, as far as that is known.
     pub fn oldest_arrival_ms(&self) -> Option<u32> {
         if self.is_ready() { self.arrivals.oldest() } else { None }
     }
@@ -452,8 +453,8 @@ impl<R: SharedRam> Driver<R> {
     fn report(&mut self, done: Done, now_ms: u32) -> Option<Event> {
         match done {
             Done::Read(received) => {
-                // The flag of a datagram that came in the meantime was set before the command was
-                // finished.
+                // The datagram may have come after the latest look. Its flag is set by now, since the
+                // command has finished.
                 self.look(now_ms);
                 let arrived_ms = self.arrivals.read();
                 let received = Received { arrived_ms, ..received? };

@@ -16,8 +16,8 @@ use ser_proto::genius::{
 };
 
 use super::GeniusError;
+use super::answers::Answers;
 use super::inboxes::Inboxes;
-use super::recognition::Answers;
 use super::window::Window;
 use crate::{Clock, RealTime};
 use crate::{GeniWindow, OpenError, Unit};
@@ -28,8 +28,8 @@ pub(super) const PACE: Duration = Duration::from_millis(1);
 /// What happens in one look is dealt with, up to so many events; more wait for the next.
 const EVENTS_PER_LOOK: usize = 16;
 
-/// About so long takes a set-clock datagram itself, with what the host's board needs to take it
-/// over. The recorder's board raises its flag at once. Measured with the models of both.
+/// A set-clock datagram takes about so long: the host's board takes it over and sends it. The
+/// recorder's board raises its flag as soon as it is there. Measured with the models of both.
 const HANDOVER: Duration = Duration::from_millis(2);
 
 /// A board has its heartbeat five times a second. One that runs in the time of a busy computer gets longer.
@@ -205,8 +205,8 @@ impl GeniHost {
         self.lock().read_forces(node, table)
     }
 
-    /// How long it takes until a short datagram that is sent now arrives, on the average: the next turn is half a scan
-    /// away. On a busy bus it takes longer, as all devices together send one datagram per scan.
+    /// How long a short datagram that is sent now takes to arrive, on the average. The host's next turn is half a scan
+    /// away. A busy bus takes longer, as all devices together send one datagram per scan.
     #[must_use]
     pub fn delay(&self) -> Duration {
         PACE + self.scan_time().unwrap_or_default() / 2 + HANDOVER

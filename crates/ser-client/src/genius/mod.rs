@@ -1,5 +1,6 @@
 //! A host on a Genius bus, through the window that it shares with its GENI board.
 
+mod answers;
 mod error;
 #[cfg(unix)]
 mod host;

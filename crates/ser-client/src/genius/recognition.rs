@@ -6,19 +6,17 @@
 //! original units answer, too, and which changes nothing). What came out is remembered until the
 //! device logs in anew.
 
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 use geni_board::{BlockKind, Destination};
+use ser_proto::Command;
 use ser_proto::genius::GlobalData;
-use ser_proto::{Command, Reply};
 
 use super::GeniusError;
 use super::host::{BusDevice, GeniHost, Host, PACE, ser_message};
-use super::inboxes::Inboxes;
 use crate::Options;
 
-/// The question that only recorders answer.
+/// The question that only recorders answer. [`Answers`](super::answers::Answers) knows the answer.
 const QUESTION: Command = Command::LastBroadcast;
 
 /// How recorders are told from other devices with as many inputs.
@@ -52,36 +50,6 @@ impl BusDevice {
     }
 }
 
-/// What devices have answered, each since it logged in.
-#[derive(Debug, Default)]
-pub(super) struct Answers {
-    /// By device number; `false` for one that was asked and said nothing.
-    is_recorder: BTreeMap<u8, bool>,
-}
-
-impl Answers {
-    /// A device has logged in or out: it may be another one.
-    pub(super) fn forget(&mut self, node: u8) {
-        self.is_recorder.remove(&node);
-    }
-
-    pub(super) fn forget_all(&mut self) {
-        self.is_recorder.clear();
-    }
-
-    /// Takes the answer of a device out of its box, if it is there.
-    fn collect(&mut self, node: u8, inboxes: &mut Inboxes) {
-        let answers = |body: &[u8]| matches!(Reply::parse(body), Ok(Reply::LastBroadcast(_)));
-        if inboxes.take_if(node, answers).is_some() {
-            self.is_recorder.insert(node, true);
-        }
-    }
-
-    fn knows(&self, node: u8) -> bool {
-        self.is_recorder.contains_key(&node)
-    }
-}
-
 impl GeniHost {
     /// The recorders that are logged in. While devices come and go this waits as
     /// [`devices`](Self::devices) does; asking takes as long as the options say where somebody does
@@ -104,7 +72,7 @@ impl GeniHost {
             let is_recorder = match how {
                 Recognition::ModelNumber(model) if device.device.model == model => true,
                 Recognition::ModelNumber(_) => continue,
-                Recognition::Asking(_) => host.answers.is_recorder.get(&device.number) == Some(&true),
+                Recognition::Asking(_) => host.answers.is_recorder(device.number),
             };
             if is_recorder {
                 found.recorders.push((device.number, inputs));
@@ -139,7 +107,7 @@ impl GeniHost {
         // Who has not even heard the question is asked again the next time.
         let mut host = self.lock();
         for node in unknown.into_iter().filter(|node| !unheard.contains(node)) {
-            host.answers.is_recorder.insert(node, false);
+            host.answers.was_silent(node);
         }
         Ok(any)
     }

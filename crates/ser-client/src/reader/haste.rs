@@ -4,13 +4,21 @@ use ser_proto::MAX_ENTRIES;
 
 use crate::Delivery;
 
-use super::{Asked, Batch, Footing, HASTE, Head, LogReader, Pending, Purpose, ReadRequest};
+use super::{Asked, Batch, Footing, Growth, HASTE, Head, LogReader, Pending, Purpose, ReadRequest};
 
 impl LogReader {
     /// Whether events come faster than they can be read with a look at the anchor now and then. Whatever the ring holds
     /// is taken then, and a look whether it still has its size proves it.
     pub(super) fn is_in_haste(&self) -> bool {
         self.margin > 0 && self.pace >= MAX_ENTRIES as u64
+    }
+
+    /// In haste nobody looks for the anchor. What was read ahead of it is held until the ring has shown its size.
+    pub(super) fn stop_looking_for_anchor(&mut self) {
+        let is_anchored = matches!(self.footing, Footing::Anchored(_));
+        if is_anchored && self.is_in_haste() && self.growth != Growth::Asking {
+            self.footing = if self.ahead.is_empty() { Footing::Firm } else { Footing::Held };
+        }
     }
 
     /// Keeps all entries of a reply that are new, whichever events have come to these slots by now.
@@ -45,9 +53,6 @@ impl LogReader {
     pub(super) fn plan_in_haste(&mut self, head: Head) -> Option<Asked> {
         let probe = Asked { request: self.probe(), purpose: Purpose::Probe };
         let all = self.asked.len();
-        if let Footing::Anchored(_) = self.footing {
-            self.footing = if self.ahead.is_empty() { Footing::Firm } else { Footing::Held };
-        }
         let is_probing = self.asked.iter().any(|asked| asked.purpose == Purpose::Probe);
         let is_reading = self.asked.iter().any(|asked| asked.purpose != Purpose::Probe);
         if !is_probing && (is_reading || self.footing == Footing::Held) {

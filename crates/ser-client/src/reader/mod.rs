@@ -369,6 +369,7 @@ impl LogReader {
             Purpose::Haste => self.take_in_haste(request, batch),
             Purpose::Events(first) => self.take_events(first, request, batch, on)?,
         }
+        self.stop_looking_for_anchor();
         self.fruitless = if self.delivered == delivered_before { self.fruitless + 1 } else { 0 };
         if self.fruitless > MAX_FRUITLESS { Err(Disturbed::NoProgress) } else { Ok(()) }
     }

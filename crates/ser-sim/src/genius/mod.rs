@@ -49,4 +49,4 @@ pub use identity::{BlockKind, Identity};
 pub use map::RAM_LEN;
 pub use scan_time::{BusRate, MIN_SCAN_NS};
 pub use split_mix::SplitMix64;
-pub use window::BoardWindow;
+pub use window::{BoardWindow, tick_ms};

@@ -10,7 +10,7 @@ use ser_node::GeniusPort;
 use super::shared_board::{BoardRam, SharedBoard};
 use crate::contacts::player::Player;
 use crate::error::SimError;
-use crate::genius::{Violation, ViolationKind};
+use crate::genius::{Violation, ViolationKind, tick_ms};
 use crate::machine::Machine;
 use crate::machine::native::Native;
 use crate::machine::pace::Pace;
@@ -174,7 +174,7 @@ impl BuiltIn<'_> {
     fn advance_to(&mut self, ms: u64, board: &SharedBoard) {
         // Before the node records what came after them.
         for at_us in board.lock().take_interrupts() {
-            self.native.node.interrupt(&mut self.port, at_us.div_ceil(1000));
+            self.native.node.interrupt(&mut self.port, tick_ms(at_us));
         }
         self.native.node.advance_to(ms);
         self.native.node.serve(&mut self.port);

@@ -16,7 +16,7 @@ use ser_proto::{Command, Model, Reply};
 use ser_sim::SimNode;
 use ser_sim::genius::{
     BlockKind, Board, BoardOptions, BoardWindow, Bus, BusRate, Circuits, DeviceFault, DeviceId,
-    DiscreteBlock, Fault, Handle, Noise, Traffic, ViolationKind,
+    DiscreteBlock, Fault, Handle, Noise, Traffic, ViolationKind, tick_ms,
 };
 
 use super::chance::Chance;
@@ -24,7 +24,7 @@ use super::conversation::{Conversation, Order};
 use super::ledger::{Ledger, Port};
 use super::line_host::Errand;
 use super::orders::{self, Way};
-use super::taps::{BusTap, Expected, TappedWindow, answered_as};
+use super::taps::{BusTap, Expected, Taken, TappedWindow, answered_as};
 use super::trail::Trail;
 
 /// Device numbers.
@@ -44,6 +44,11 @@ struct UnitPort {
     port: GeniusPort<TappedWindow>,
     board: Handle<Board>,
     tap: BusTap,
+    /// Whether its board's interrupt line is connected. Without it the recorder goes by its looks
+    /// at the board.
+    has_line: bool,
+    /// How often the recorder had given its board up when it was served last.
+    failures: u32,
     /// Whether its board has started anew without the recorder's doing, so that it was looked at too early.
     restarted: bool,
     /// Since when datagrams had waited that a board which started anew took with it: the recorder
@@ -160,9 +165,11 @@ impl BusLife {
             let tap = BusTap::default();
             let options = GeniusOptions { start: RESET, ..GeniusOptions::new(model) };
             let port = GeniusPort::new(TappedWindow::new(window, Rc::clone(&tap)), options);
-            UnitPort { number, port, board, tap, restarted: false, gone_since_ms: None }
+            let has_line = chance.one_in(2);
+            let (restarted, gone_since_ms) = (false, None);
+            UnitPort { number, port, board, tap, has_line, failures: 0, restarted, gone_since_ms }
         });
-        let units = units.collect();
+        let units: Vec<UnitPort> = units.collect();
         let (host, window) = connect(HOST);
         let driver = Driver::new(window, Options { start: RESET, ..Options::new(Configuration::DEFAULT) });
         let deaf = bus.borrow_mut().connect(Board::powered(BoardOptions::at(DEAF))).id();
@@ -193,30 +200,33 @@ impl BusLife {
         self.bus.borrow_mut().advance_to((now_ms - self.begin_ms) * 1000);
     }
 
-    /// Millisecond in which a recorder's main loop can first see what happened in this microsecond
-    /// of the bus.
+    /// Tick that a recorder's interrupt has in this microsecond of the bus.
     fn ms(&self, bus_us: u64) -> u64 {
-        self.begin_ms + bus_us.div_ceil(1000)
+        self.begin_ms + tick_ms(bus_us)
     }
 
     /// Hands a recorder the pulses of its board's interrupt line, before it records what came after
     /// them.
     pub fn hand_in_pulses(&mut self, index: usize, node: &mut SimNode<'_>, ledger: &mut Ledger) {
         let pulses = self.units[index].port.window().inner().take_interrupts();
-        for at_us in pulses {
+        let has_line = self.units[index].has_line;
+        for at_us in pulses.into_iter().filter(|_| has_line) {
             let at_ms = self.ms(at_us);
             node.interrupt(&mut self.units[index].port, at_ms);
         }
         ledger.wait_after(self.untaken_since_ms(index));
     }
 
-    /// Since when the oldest datagram waits that a recorder still has to take from its board. From
-    /// a board that has failed nothing will be taken.
+    /// Since when the oldest datagram waits that a recorder still has to take from its board, by its
+    /// interrupt line or by its looks. From a board that has failed nothing will be taken.
     fn untaken_since_ms(&mut self, index: usize) -> Option<u64> {
-        let UnitPort { port, board, tap, gone_since_ms, .. } = &mut self.units[index];
+        let UnitPort { port, board, tap, has_line, gone_since_ms, .. } = &mut self.units[index];
         if !port.is_ready() {
             *gone_since_ms = None;
             return None;
+        }
+        if !*has_line {
+            return tap.borrow().untaken_since_look_ms();
         }
         let gone_since_ms = *gone_since_ms;
         let bus = self.bus.borrow();
@@ -224,7 +234,28 @@ impl BusLife {
         gone_since_ms.or(untaken_us.map(|us| self.ms(us)))
     }
 
+    /// When a message counts as arrived: in the millisecond of its pulse, or of the look that saw its
+    /// flag; `None` if there was no such look.
+    ///
+    /// # Errors
+    /// When a look lies outside of what it may be.
+    fn arrived_ms(&self, index: usize, taken: &Taken, now_ms: u64) -> Result<Option<u64>, String> {
+        let came_ms = self.ms(taken.arrived_us);
+        if self.units[index].has_line {
+            return Ok(Some(came_ms));
+        }
+        match taken.seen_ms {
+            Some(seen_ms) if !(came_ms..=now_ms).contains(&seen_ms) => Err(format!(
+                "a datagram of {came_ms} ms counts as arrived at {seen_ms} ms, and is read at {now_ms} ms"
+            )),
+            seen_ms => Ok(seen_ms),
+        }
+    }
+
     /// Lets the port of a recorder live, whose node has come to the present.
+    ///
+    /// # Errors
+    /// When a datagram counts as arrived at a time at which it cannot have been seen.
     pub fn serve(
         &mut self,
         index: usize,
@@ -232,14 +263,19 @@ impl BusLife {
         node: &mut SimNode<'_>,
         ledger: &mut Ledger,
         expected: &mut Expected,
-    ) {
-        let UnitPort { port, tap, .. } = &mut self.units[index];
+    ) -> Result<(), String> {
+        let UnitPort { port, tap, failures, .. } = &mut self.units[index];
+        tap.borrow_mut().begin(now_ms);
         node.serve(port);
         let held = port.reset_held();
         port.window().inner().drive_reset(held);
-        let messages = std::mem::take(&mut tap.borrow_mut().messages);
+        let messages = tap.borrow_mut().end();
+        let failed = port.diagnostics().board.failures;
+        if std::mem::replace(failures, failed) != failed {
+            tap.borrow_mut().board_failed();
+        }
         for taken in messages {
-            let arrived_ms = self.ms(taken.arrived_us);
+            let arrived_ms = self.arrived_ms(index, &taken, now_ms)?;
             match taken.received {
                 Err(error) => {
                     expected.parse_error(error);
@@ -247,13 +283,19 @@ impl BusLife {
                         ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS);
                     }
                 }
-                Ok(Command::SetClock(time)) => ledger.set_clock(arrived_ms, time),
-                Ok(Command::SetMode { recording }) => ledger.set_recording(arrived_ms, recording),
+                // A time is worth nothing if nobody knows when it came.
+                Ok(Command::SetClock(time)) => {
+                    arrived_ms.into_iter().for_each(|at_ms| ledger.set_clock(at_ms, time));
+                }
+                Ok(Command::SetMode { recording }) => {
+                    ledger.set_recording(arrived_ms.unwrap_or(now_ms), recording);
+                }
                 Ok(command) if taken.broadcast => ledger.command_done(&command),
                 Ok(command) => ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS),
             }
         }
         ledger.wait_after(self.untaken_since_ms(index));
+        Ok(())
     }
 
     /// Lets the host look at its board and do what it wants to do now.

@@ -51,6 +51,14 @@ struct OnTheWay {
     baud: Baud,
 }
 
+impl OnTheWay {
+    /// The tick that the recorder's interrupt reads when the byte is there: that of the latest
+    /// sample, as with the pulses of a GENI board.
+    fn tick_ms(&self) -> u64 {
+        self.at_ns / NS_PER_MS
+    }
+}
+
 /// The host and its line.
 pub struct LineHost {
     /// Its conversation.
@@ -191,7 +199,7 @@ impl LineHost {
     /// When something happens here next, if the recorder says nothing.
     #[must_use]
     pub fn next_ms(&self, now_ms: u64, errand: Errand) -> u64 {
-        let byte_ms = self.on_the_way.front().map_or(NEVER, |first| first.at_ns.div_ceil(NS_PER_MS));
+        let byte_ms = self.on_the_way.front().map_or(NEVER, OnTheWay::tick_ms);
         if now_ms < self.stuck_until_ms {
             return byte_ms.min(self.stuck_until_ms);
         }
@@ -221,7 +229,7 @@ impl LineHost {
         ledger: &mut Ledger,
         expected: &mut Expected,
     ) {
-        while self.on_the_way.front().is_some_and(|first| first.at_ns <= now_ms * NS_PER_MS) {
+        while self.on_the_way.front().is_some_and(|first| first.tick_ms() <= now_ms) {
             let Some(OnTheWay { byte, baud, .. }) = self.on_the_way.pop_front() else { break };
             let one_in = self.one_in.filter(|_| now_ms < self.bad_until_ms);
             let mut heard = std::mem::take(&mut self.heard);

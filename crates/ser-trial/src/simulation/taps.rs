@@ -3,6 +3,7 @@
 //! The ledger lives on this. Each side is decoded here once more, next to the recorder and not by it.
 
 use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::rc::Rc;
 
 use geni_board::{SharedRam, map};
@@ -16,6 +17,9 @@ use super::printout::Printout;
 
 /// What a body says.
 pub type Received = Result<Command, ParseError>;
+
+/// The flag of a datagram in the receive queue.
+const RECEIVE_QUEUE_FLAG: u16 = map::INTERRUPT_STATUS.at(map::INTERRUPT_FIRST + 5);
 
 /// Bytes of the longest command that a recorder has room for.
 const MAX_COMMAND_LEN: usize = 16;
@@ -167,6 +171,8 @@ pub struct Taken {
     pub broadcast: bool,
     /// When the board received it, in microseconds of the bus.
     pub arrived_us: u64,
+    /// The look to which a recorder without the interrupt line puts it; `None` if it saw no flag.
+    pub seen_ms: Option<u64>,
 }
 
 /// What is taken through a window.
@@ -176,9 +182,58 @@ pub struct Taking {
     pub messages: Vec<Taken>,
     /// How many datagrams the board had handed over when one was taken last.
     handed_over: u64,
+    looks: Looks,
+    /// The datagram that was taken last still has to be put to a look; whether it is among the
+    /// messages.
+    unseen: Option<bool>,
+}
+
+/// Looks that found the flag set, as a recorder without the interrupt line counts arrivals.
+///
+/// Each stands for one datagram, in their order. Datagrams that share a flag leave later ones too
+/// few: the last has the look of the one before. See `docs/genius.md`.
+#[derive(Debug, Default)]
+struct Looks {
+    /// The present, by the simulation's time.
+    now_ms: u64,
+    /// Those that no datagram has been put to.
+    seen_ms: VecDeque<u64>,
+    latest_ms: Option<u64>,
 }
 
 impl Taking {
+    /// A recorder is about to look at its board, for the first time in this millisecond.
+    pub fn begin(&mut self, now_ms: u64) {
+        self.looks.now_ms = now_ms;
+    }
+
+    /// It has looked. Gives the messages that it has taken.
+    pub fn end(&mut self) -> Vec<Taken> {
+        self.put_to_a_look();
+        std::mem::take(&mut self.messages)
+    }
+
+    /// The recorder has given its board up, and has forgotten what it saw there.
+    pub fn board_failed(&mut self) {
+        self.looks.seen_ms.clear();
+        self.looks.latest_ms = None;
+    }
+
+    /// When the oldest datagram was seen to arrive that has not been taken.
+    #[must_use]
+    pub fn untaken_since_look_ms(&self) -> Option<u64> {
+        self.looks.seen_ms.front().copied()
+    }
+
+    /// The flag of a datagram that came while another one was read is seen before that is passed on.
+    fn put_to_a_look(&mut self) {
+        let Some(is_message) = self.unseen.take() else { return };
+        self.looks.latest_ms = self.looks.seen_ms.pop_front().or(self.looks.latest_ms);
+        if let Some(message) = self.messages.last_mut().filter(|_| is_message) {
+            message.seen_ms = self.looks.latest_ms;
+        }
+    }
+
     /// When the oldest datagram arrived that has not been taken from this board, in microseconds of
     /// the bus.
     #[must_use]
@@ -217,6 +272,10 @@ impl SharedRam for TappedWindow {
     }
 
     fn write(&mut self, offset: u16, byte: u8) {
+        if offset == RECEIVE_QUEUE_FLAG && self.inner.read(offset) & 1 != 0 && byte == 0 {
+            let looks = &mut self.tap.borrow_mut().looks;
+            looks.seen_ms.push_back(looks.now_ms);
+        }
         self.inner.write(offset, byte);
     }
 
@@ -227,12 +286,15 @@ impl SharedRam for TappedWindow {
         }
         let Some(Read { number, arrived_us }) = self.inner.look(Board::latest_read) else { return };
         let mut taking = self.tap.borrow_mut();
+        taking.put_to_a_look();
         taking.handed_over = number;
-        if self.inner.read(map::READ_FUNCTION) == FUNCTION_HORNER
-            && self.inner.read(map::READ_SUBFUNCTION) == SUBFUNCTION_SER
-        {
+        let is_message = self.inner.read(map::READ_FUNCTION) == FUNCTION_HORNER
+            && self.inner.read(map::READ_SUBFUNCTION) == SUBFUNCTION_SER;
+        taking.unseen = Some(is_message);
+        if is_message {
             let broadcast = self.inner.read(map::READ_DIRECTED) != 1;
-            taking.messages.push(Taken { received: Command::parse(bytes), broadcast, arrived_us });
+            let received = Command::parse(bytes);
+            taking.messages.push(Taken { received, broadcast, arrived_us, seen_ms: None });
         }
     }
 }

@@ -284,8 +284,8 @@ impl World {
         let [node, other] = &mut life.nodes[..] else { return Err("two nodes".to_owned()) };
         line.deliver(*now_ms, node, &mut first.ledger, &mut first.expected);
         if let Some(bus) = &mut life.bus {
-            bus.serve(0, *now_ms, node, &mut first.ledger, &mut first.expected);
-            bus.serve(1, *now_ms, other, &mut second.ledger, &mut second.expected);
+            bus.serve(0, *now_ms, node, &mut first.ledger, &mut first.expected)?;
+            bus.serve(1, *now_ms, other, &mut second.ledger, &mut second.expected)?;
         }
         line.listen(*now_ms, node, &mut first.ledger, trail)?;
         line.act(*now_ms, errand, &first.ledger, trail)?;

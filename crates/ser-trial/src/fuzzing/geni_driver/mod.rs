@@ -5,7 +5,7 @@ mod ram;
 mod recovery;
 
 use geni_board::{
-    AnswerError, Completion, Configuration, Data, Destination, Options, Priority, RequestAnswer,
+    AnswerError, Completion, Configuration, Data, Destination, Interrupts, Options, Priority, RequestAnswer,
     RequestStatus, Requests, Start, Transmission,
 };
 
@@ -23,9 +23,11 @@ const MAX_POLLS: u32 = 4_000;
 /// - Nothing is written but what belongs to the host, and nothing read from the reserved area. Lockout is asked for and
 ///   given back when it may be, by what the driver has seen.
 /// - A board without a heartbeat is not trusted any longer than agreed.
+/// - A datagram is handed out with a tick at which its flag was seen or, where the interrupt line is for datagrams only,
+///   at which that was pulsed, or with none.
 /// - Counters never go back; each datagram that was accepted ends once, in the way that was asked for.
 /// - When a board that works takes over, the driver is ready within a bounded time, sends, keeps the board's global
-///   data up to date and breaks no rule of the board.
+///   data up to date, knows when datagrams arrive and breaks no rule of the board.
 ///
 /// # Panics
 /// When one of these does not hold.
@@ -55,7 +57,13 @@ fn options(bits: u8, script: &mut Script<'_>) -> Options {
     };
     let requests = if bits & 0x10 == 0 { Requests::Refuse } else { Requests::Ask };
     let reset_line = bits & 0x20 == 0;
-    Options { start, requests, reset_line, ..Options::new(configuration(script)) }
+    // Whether the interrupt line, if there is one, is for datagrams only.
+    let interrupts = if bits & 0x80 == 0 {
+        Interrupts::ALL.without(Interrupts::OUTPUTS_SENT)
+    } else {
+        Interrupts::RECEIVE_QUEUE
+    };
+    Options { start, requests, reset_line, interrupts, ..Options::new(configuration(script)) }
 }
 
 fn configuration(script: &mut Script<'_>) -> Configuration {
@@ -66,7 +74,8 @@ fn configuration(script: &mut Script<'_>) -> Configuration {
 
 /// Something happens between two polls.
 fn act(bench: &mut Bench, script: &mut Script<'_>) {
-    match script.byte() % 16 {
+    let what = script.byte();
+    match what % 16 {
         0 => bench.ram().set(script.word(), script.byte()),
         1 => bench.ram().set(0x0880 + u16::from(script.byte() % 0x52), script.byte()),
         2 => bench.ram().set_lockout(script.byte()),
@@ -84,7 +93,7 @@ fn act(bench: &mut Bench, script: &mut Script<'_>) {
         }
         11 => bench.configure(configuration(script)),
         12 => answer(bench, script),
-        13 => bench.driver.interrupt(bench.now_ms),
+        13 => bench.pulse(u32::from(what / 16)),
         14 => bench.pass(u32::from(script.word() % 4096)),
         _ => {
             for _ in 0..script.byte() {

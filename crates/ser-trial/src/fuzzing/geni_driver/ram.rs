@@ -6,6 +6,9 @@ use std::rc::Rc;
 use geni_board::{RAM_LEN, SharedRam, map};
 use ser_sim::genius::BoardWindow;
 
+/// The flag of a datagram in the receive queue.
+const RECEIVE_QUEUE_FLAG: u16 = map::INTERRUPT_STATUS.at(map::INTERRUPT_FIRST + 5);
+
 /// The driver's end.
 #[derive(Clone, Debug)]
 pub(super) struct Window(pub(super) Rc<RefCell<Ram>>);
@@ -66,6 +69,8 @@ pub(super) struct Ram {
     lockout_seen: [u8; 2],
     /// Whether the driver has seen a heartbeat since this was last asked.
     pub(super) beat_seen: bool,
+    /// Whether the driver has seen the flag of a datagram since this was last asked.
+    pub(super) flag_seen: bool,
     pub(super) written: Vec<(u16, u8)>,
 }
 
@@ -91,6 +96,7 @@ impl Ram {
             accesses: 0,
             lockout_seen: [0; 2],
             beat_seen: false,
+            flag_seen: false,
             written: Vec::new(),
         }
     }
@@ -104,6 +110,7 @@ impl Ram {
             map::LOCKOUT_REQUEST => self.lockout_seen[0] = byte & 1,
             map::LOCKOUT_STATE => self.lockout_seen[1] = byte & 1,
             map::STATUS_OK => self.beat_seen |= byte == 1,
+            RECEIVE_QUEUE_FLAG => self.flag_seen |= byte & 1 != 0,
             _ => {}
         }
         byte

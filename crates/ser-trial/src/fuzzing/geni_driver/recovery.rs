@@ -3,11 +3,16 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use geni_board::{Completion, Configuration, Data, Destination, Event, Priority, Transmission};
-use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusRate, Handle, Violation, ViolationKind};
+use geni_board::{Completion, Configuration, Data, Destination, Event, Priority, Transmission, map};
+use ser_sim::genius::{
+    Board, BoardOptions, BoardWindow, Bus, BusRate, Handle, Violation, ViolationKind, tick_ms,
+};
 
 use super::bench::Bench;
 use super::ram::BoardHolder;
+
+/// The driver's board.
+const DRIVER: u8 = 5;
 
 /// A main loop that is in no hurry.
 const PACE_MS: u32 = 10;
@@ -19,15 +24,25 @@ const LIMIT_MS: u32 = 150_000;
 /// Whatever the driver still waits for from before the change is given up in this time.
 const SETTLED_MS: u32 = 5_500;
 
-/// Where the setup table and this host's global data are.
+/// A device that sends datagrams without a driver.
+const SENDER: u8 = 9;
+
+/// A datagram has been sent and read by then.
+const DATAGRAM_MS: u32 = 5_000;
+
+/// Where the setup table, the interrupts that are not wanted, and this host's global data are.
 const SETUP_TABLE: usize = 0x0882;
+const INTERRUPT_DISABLE: usize = 0x08B2;
 const BROADCAST_OUTPUT: usize = 0x1F80;
 
 struct Recovery {
     bench: Bench,
     bus: Rc<RefCell<Bus>>,
     board: Handle<Board>,
+    sender: Handle<Board>,
     window: BoardWindow,
+    /// The driver's millisecond in which the bus began.
+    began_ms: u32,
 }
 
 /// Checks that the driver brings a board onto the bus that takes the place of the hostile RAM now: one that has just
@@ -39,6 +54,7 @@ pub(super) fn assert_recovers(bench: Bench, warm: bool) {
     recovery.assert_configured();
     recovery.assert_sends();
     recovery.assert_global_data();
+    recovery.assert_knows_arrivals();
     recovery.assert_lawful(violations);
 }
 
@@ -47,14 +63,19 @@ impl Recovery {
         // The slowest bus has the fewest scans to go through.
         let rate = BusRate::K38;
         let bus = Rc::new(RefCell::new(Bus::new(rate)));
-        let board = bus.borrow_mut().connect(Board::new(BoardOptions::at(5).rate(rate)));
+        let board = bus.borrow_mut().connect(Board::new(BoardOptions::at(DRIVER).rate(rate)));
+        let sender = bus.borrow_mut().connect(Board::powered(BoardOptions::at(SENDER).rate(rate)));
         let window = BoardWindow::new(Rc::clone(&bus), board);
         window.drive_reset(bench.driver.reset_held());
         if warm {
             bus.borrow_mut().advance_by(5_000_000);
         }
         bench.ram().board = Some(BoardHolder(window.clone()));
-        Recovery { bench, bus, board, window }
+        let lived_ms = if warm { 5_000 } else { 0 };
+        let began_ms = bench.now_ms.wrapping_sub(lived_ms);
+        // What it did before the driver was there.
+        let _ = window.take_interrupts();
+        Recovery { bench, bus, board, sender, window, began_ms }
     }
 
     fn step(&mut self) -> Option<Event> {
@@ -64,9 +85,19 @@ impl Recovery {
             self.bench.configure(self.bench.wanted);
         }
         self.bus.borrow_mut().advance_by(u64::from(PACE_MS) * 1000);
+        for at_us in self.window.take_interrupts() {
+            let tick_ms = self.tick_ms(at_us);
+            self.bench.pulse_at(tick_ms);
+        }
         let event = self.bench.poll_now();
         self.window.drive_reset(self.bench.driver.reset_held());
         event
+    }
+
+    /// The driver's tick in this microsecond of the bus.
+    #[expect(clippy::cast_possible_truncation, reason = "the tick wraps")]
+    fn tick_ms(&self, bus_us: u64) -> u32 {
+        self.began_ms.wrapping_add(tick_ms(bus_us) as u32)
     }
 
     /// Until the driver has been on the bus for a while, and what it still had to send is dealt with.
@@ -123,6 +154,54 @@ impl Recovery {
         assert!(self.bench.is_sending());
         let sent = (0..1_000).find_map(|_| self.step().filter(|event| matches!(event, Event::Sent(_))));
         assert_eq!(sent, Some(Event::Sent(Ok(()))));
+    }
+
+    /// Whether the board pulls its line for datagrams and nothing else. One that has taken the place
+    /// of another unseen was not told to, and its pulses may mean anything.
+    fn pulls_for_datagrams(&self) -> bool {
+        self.ram(INTERRUPT_DISABLE, 8) == [0, 1, 1, 1, 1, 1, 0, 1]
+    }
+
+    /// With the interrupt line a datagram arrived in the millisecond of its pulse, by the board's own
+    /// word; without it, when its flag was looked for next.
+    fn assert_knows_arrivals(&mut self) {
+        if self.bench.has_line && !self.pulls_for_datagrams() {
+            return;
+        }
+        for number in 1..=3 {
+            self.send_from_elsewhere(number);
+            let arrived_ms = (0..DATAGRAM_MS / PACE_MS)
+                .find_map(|_| match self.step() {
+                    Some(Event::Received(received)) if received.source == SENDER => {
+                        assert_eq!(*received.data, [number]);
+                        Some(received.arrived_ms)
+                    }
+                    _ => None,
+                })
+                .expect("the datagram is handed out");
+            let read = self.bus.borrow().get(self.board).latest_read().expect("it has been read");
+            let pulsed_ms = self.tick_ms(read.arrived_us);
+            let expected_ms = if self.bench.has_line {
+                pulsed_ms
+            } else {
+                // Looks are at whole paces, and later than the arrival.
+                let paced_ms = self.bench.now_ms.wrapping_sub(pulsed_ms) % PACE_MS;
+                let at_once = paced_ms == 0 && read.arrived_us.is_multiple_of(1000);
+                pulsed_ms.wrapping_add(if paced_ms == 0 && !at_once { PACE_MS } else { paced_ms })
+            };
+            assert_eq!(arrived_ms, Some(expected_ms));
+        }
+    }
+
+    /// Another device sends a datagram of one byte.
+    fn send_from_elsewhere(&mut self, number: u8) {
+        let mut bus = self.bus.borrow_mut();
+        let sender = bus.get_mut(self.sender);
+        sender.host_write_from(map::TRANSMIT_BUFFER.start, &[number]);
+        let header = [DRIVER, 0x40, 0x50, 0, 1];
+        sender.host_write_from(map::TRANSMIT_DESTINATION, &header);
+        sender.host_write(map::COMMAND_CODE, 2);
+        sender.host_write(map::COMMAND_STATUS, 1);
     }
 
     fn assert_global_data(&mut self) {

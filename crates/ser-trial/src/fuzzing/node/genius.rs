@@ -14,6 +14,8 @@ use super::prompt_board::{Incoming, Outgoing, PromptBoard};
 pub(super) struct Genius {
     port: GeniusPort<PromptBoard>,
     board: PromptBoard,
+    /// Whether the board's interrupt line is connected.
+    pub(super) has_line: bool,
     /// The reply that is waited for.
     pub(super) reply: Option<Outgoing>,
     /// Events that auto report owes.
@@ -23,11 +25,11 @@ pub(super) struct Genius {
 }
 
 impl Genius {
-    pub(super) fn new(model: Model) -> Genius {
+    pub(super) fn new(model: Model, has_line: bool) -> Genius {
         let board = PromptBoard::new();
         let options = GeniusOptions { start: Start::Running, ..GeniusOptions::new(model) };
         let port = GeniusPort::new(board.clone(), options);
-        Genius { port, board, reply: None, owed: VecDeque::new(), ignored: 0 }
+        Genius { port, board, has_line, reply: None, owed: VecDeque::new(), ignored: 0 }
     }
 
     /// The port works in the present millisecond. Reports are compared with the events that are owed to
@@ -71,6 +73,13 @@ impl Genius {
     pub(super) fn bring_command(&mut self, source: u8, is_broadcast: bool, body: &[u8]) {
         let (function, subfunction) = (FUNCTION_HORNER, SUBFUNCTION_SER);
         self.board.bring(Incoming { source, is_broadcast, function, subfunction, data: body.to_vec() });
+    }
+
+    /// The board pulls its interrupt line for what it has been brought.
+    pub(super) fn pulse(&mut self, node: &mut SimNode<'_>) {
+        if self.has_line {
+            node.interrupt(&mut self.port, node.now_ms());
+        }
     }
 
     /// Asks for a force table; there are four.

@@ -19,14 +19,15 @@ use model::Recorder;
 /// How often the power goes at most.
 const MAX_POWER_CYCLES: u32 = 8;
 
-/// `data` says which model it is, what debounce times it has, whether it is on a bus and what its clock shows, and then
-/// what happens: contacts move, bytes, commands and datagrams arrive, the UART misreads a byte, time passes, the power
-/// goes.
+/// `data` says which model it is, what debounce times it has, whether it is on a bus, with or without the interrupt
+/// line, and what its clock shows, and then what happens: contacts move, bytes, commands and datagrams arrive, the UART
+/// misreads a byte, time passes, with or without the main loop, the power goes.
 ///
 /// - What the node says is, to the byte and in its millisecond, what the model says: every reply, report and line.
 /// - The log is that of the model, with stamps by the clock of the model.
 /// - What was refused is counted.
-/// - Commands in datagrams are answered in the same way; auto reports bring every event once; global data are the
+/// - Commands in datagrams are answered in the same way, and count from the millisecond of their pulse, or of the look
+///   that sees their flag; auto reports bring every event once; global data are the
 ///   inputs.
 /// - The same log comes out when the host is slow and the line has its real rate; what is said is always a whole
 ///   message.
@@ -45,7 +46,7 @@ pub fn node(data: &[u8]) {
         let node = off.power_up(&mut ram);
         let mut bench = Bench::new(node, &mut model, setup.host, inputs, setup.bytes_per_ms());
         if setup.is_on_bus {
-            bench = bench.on_bus();
+            bench = bench.on_bus(setup.has_line);
         }
         while !script.is_over() && !bench.is_over() {
             if act(&mut bench, &mut script, setup.host) == Power::Goes {
@@ -66,6 +67,7 @@ struct Setup {
     model: Model,
     host: Host,
     is_on_bus: bool,
+    has_line: bool,
     debounce_ms: [u8; 32],
     rtc: NaiveDateTime,
 }
@@ -96,6 +98,7 @@ impl Setup {
             model: if bits & 1 == 0 { Model::Ser160 } else { Model::Ser320 },
             host,
             is_on_bus,
+            has_line: bits & 0x40 != 0,
             debounce_ms,
             rtc: DateTime::from_timestamp_millis(time_ms).expect("within the century").naive_utc(),
         }
@@ -155,6 +158,10 @@ fn act(bench: &mut Bench<'_, '_>, script: &mut Script<'_>, host: Host) -> Power 
         10 => bench.ask_over_bus(script.byte() % 32, body(script)),
         _ => match script.byte() {
             table @ 0..=7 => bench.ask_forces(script.byte() % 32, table),
+            8..=15 => {
+                let (for_ms, contacts) = (script.byte(), script.byte());
+                bench.broadcast_while_away(script.byte() % 32, body(script), for_ms, contacts);
+            }
             _ => bench.broadcast(script.byte() % 32, body(script)),
         },
     }

@@ -1,7 +1,8 @@
 //! What a host on the Genius bus does to the recorder, and what must come of it.
 
 use ser_proto::genius::{FUNCTION_GENIUS, FUNCTION_HORNER, SUBFUNCTION_SER, Subfunction, max_entries};
-use ser_proto::{Command, Decoded, FrameDecoder, LastBroadcast, MAX_BODY_LEN, Reply};
+use ser_proto::{AutoReport, Command, Decoded, FrameDecoder, LastBroadcast, MAX_BODY_LEN, Reply};
+use ser_sim::{Scenario, Step};
 
 use super::bench::Bench;
 use super::genius::Genius;
@@ -12,17 +13,21 @@ use crate::fuzzing::framing::frame_of;
 /// Everything that was brought over the bus is dealt with in this time.
 const BUS_MS: u32 = 20;
 
-/// A prompt board that is not busy hands a datagram over in the pass of the main loop after the one
-/// that saw its flag.
-const READ_AFTER_MS: u64 = 1;
+/// The main loop sees the flag of a datagram in the next millisecond, and a prompt board that is not
+/// busy hands it over in the one after that.
+const SEEN_AFTER_MS: u64 = 1;
+const READ_AFTER_MS: u64 = 2;
+
+/// The main loop is away for less than changes wait for a datagram.
+const MAX_AWAY_MS: u8 = 200;
 
 /// The longest backlog of reports has gone in this time.
 const MAX_REPORTING_MS: u32 = 4_000;
 
 impl Bench<'_, '_> {
     /// The same with a Genius port that is ready.
-    pub(super) fn on_bus(mut self) -> Self {
-        self.genius = Some(Genius::new(self.model.model));
+    pub(super) fn on_bus(mut self, has_line: bool) -> Self {
+        self.genius = Some(Genius::new(self.model.model, has_line));
         self.pass(BUS_MS);
         assert!(self.genius.as_ref().is_some_and(Genius::is_ready));
         self
@@ -40,17 +45,31 @@ impl Bench<'_, '_> {
         panic!("events were not reported");
     }
 
-    /// A command arrives in a datagram. The board raises its flag in the next millisecond.
+    /// When a datagram counts as arrived that the board receives now: in the millisecond of its
+    /// pulse, or in that of the look that sees its flag.
+    fn arrives_ms(&self) -> u64 {
+        let has_line = self.genius.as_ref().is_some_and(|genius| genius.has_line);
+        self.tick_ms + if has_line { 0 } else { SEEN_AFTER_MS }
+    }
+
+    /// The board receives something.
+    fn bring(&mut self, bring: impl FnOnce(&mut Genius)) {
+        let Some(genius) = &mut self.genius else { return };
+        bring(genius);
+        genius.pulse(&mut self.node);
+    }
+
+    /// A command arrives in a datagram.
     pub(super) fn ask_over_bus(&mut self, source: u8, body: &[u8]) {
         if self.genius.is_none() {
             return;
         }
         self.await_reports();
-        let arrives_ms = self.tick_ms + 1;
+        let arrives_ms = self.arrives_ms();
         let most = u8::try_from(max_entries(self.model.model)).expect("at most ten");
         let mut said = self.model.body(body, arrives_ms, most).into_iter();
         if let Ok(Command::SetClock(_)) = Command::parse(body) {
-            self.model.set_battery_clock(arrives_ms + READ_AFTER_MS);
+            self.model.set_battery_clock(self.tick_ms + READ_AFTER_MS);
         }
         let expected = said.next().map(|said| match said {
             Said::Reply(reply) => {
@@ -60,7 +79,7 @@ impl Bench<'_, '_> {
         });
         // Printouts go to the serial line.
         self.expected.extend(said);
-        self.genius.iter_mut().for_each(|genius| genius.bring_command(source, false, body));
+        self.bring(|genius| genius.bring_command(source, false, body));
         self.await_reply(expected.as_ref());
     }
 
@@ -73,8 +92,10 @@ impl Bench<'_, '_> {
             2 => state,
             _ => Vec::new(),
         };
-        let Some(genius) = &mut self.genius else { return };
-        genius.bring_read_io_forces(source, table);
+        if self.genius.is_none() {
+            return;
+        }
+        self.bring(|genius| genius.bring_read_io_forces(source, table));
         let code = Subfunction::ReadIoForcesReply.code();
         let reply = reply_to(source, FUNCTION_GENIUS, code, [vec![table], contents].concat());
         self.await_reply(Some(&reply).filter(|_| table <= 3));
@@ -96,16 +117,59 @@ impl Bench<'_, '_> {
             return;
         }
         self.await_reports();
-        let arrives_ms = self.tick_ms + 1;
-        // A board receives its own broadcasts, and the driver drops them.
-        let command = if source == NUMBER { None } else { self.model.broadcast(body, arrives_ms) };
-        if let Some(Command::SetClock(_)) = command {
-            self.model.set_battery_clock(arrives_ms + READ_AFTER_MS);
-        }
-        let arrived_ms = self.model.now_ms(arrives_ms);
-        self.genius.iter_mut().for_each(|genius| genius.bring_command(source, true, body));
+        let expected = self.expect_broadcast(source, body, READ_AFTER_MS);
+        self.bring(|genius| genius.bring_command(source, true, body));
         self.await_reply(None);
-        let Some(command) = command else { return };
+        self.check_last_broadcast(expected);
+    }
+
+    /// The same with the interrupt line while the main loop is away: it comes back after so long,
+    /// and finds contacts that have moved again and again since then. A recorder that says
+    /// something about each change would say it later than the model, so it must not.
+    pub(super) fn broadcast_while_away(&mut self, source: u8, body: &[u8], for_ms: u8, contacts: u8) {
+        let is_quiet =
+            self.model.configuration.auto_report == AutoReport::Off && !self.model.configuration.auto_print;
+        let decides = matches!(Command::parse(body), Ok(Command::SetClock(_) | Command::SetMode { .. }));
+        if !self.genius.as_ref().is_some_and(|genius| genius.has_line) || !is_quiet || !decides {
+            return;
+        }
+        self.await_reports();
+        let away_ms = for_ms % MAX_AWAY_MS;
+        let expected = self.expect_broadcast(source, body, u64::from(away_ms) + READ_AFTER_MS);
+        self.bring(|genius| genius.bring_command(source, true, body));
+        self.stay_away(away_ms, contacts.into());
+        self.await_reply(None);
+        self.check_last_broadcast(expected);
+    }
+
+    /// Contacts move in every millisecond, and the main loop comes back in the last of them.
+    fn stay_away(&mut self, for_ms: u8, contacts: u32) {
+        let mut steps = Vec::new();
+        for at_ms in 0..u64::from(for_ms) {
+            self.inputs ^= contacts.rotate_left(u32::from(for_ms));
+            self.tick_ms += 1;
+            let inputs = self.inputs;
+            steps.extend((0..32).map(|index| Step { at_ms, input: index + 1, on: inputs >> index & 1 != 0 }));
+            assert_eq!(self.model.sample(self.tick_ms, self.inputs), []);
+        }
+        self.node.play(&Scenario::from_steps(steps));
+        self.node.hold_up_to(self.node.now_ms() + u64::from(for_ms));
+    }
+
+    /// What the recorder will have to say about a broadcast that it reads so long from now, if it
+    /// heeds it.
+    fn expect_broadcast(&mut self, source: u8, body: &[u8], read_after_ms: u64) -> Option<(Command, i64)> {
+        let arrives_ms = self.arrives_ms();
+        // A board receives its own broadcasts, and the driver drops them.
+        let command = if source == NUMBER { None } else { self.model.broadcast(body, arrives_ms) }?;
+        if let Command::SetClock(_) = command {
+            self.model.set_battery_clock(self.tick_ms + read_after_ms);
+        }
+        Some((command, self.model.now_ms(arrives_ms)))
+    }
+
+    fn check_last_broadcast(&mut self, expected: Option<(Command, i64)>) {
+        let Some((command, arrived_ms)) = expected else { return };
         let told = self.last_broadcast();
         assert_eq!(told.code, command.code().byte());
         let told_ms = i64::from(told.hour) * 3_600_000

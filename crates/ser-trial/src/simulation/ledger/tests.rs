@@ -146,6 +146,6 @@ fn events_that_wait_do_not_show_what_was_dropped_after_them() {
     for (event, count) in ledger.events.iter().zip(1..) {
         let is_last = event.at_ms == shown_ms;
         let dropped = if is_last { 4 } else { 0 };
-        assert_eq!((event.state, event.unrecorded), (count % 2 | dropped, dropped), "{event:?}");
+        assert_eq!((event.state, event.unrecorded), ((count % 2) | dropped, dropped), "{event:?}");
     }
 }

@@ -1,0 +1,48 @@
+//! What devices on a bus have answered to the question that only recorders answer.
+
+use std::collections::BTreeMap;
+
+use ser_proto::Reply;
+
+use super::inboxes::Inboxes;
+
+/// What devices have answered, each since it logged in.
+#[derive(Debug, Default)]
+pub(super) struct Answers {
+    /// By device number; `false` for one that was asked and said nothing.
+    is_recorder: BTreeMap<u8, bool>,
+}
+
+impl Answers {
+    /// A device has logged in or out: it may be another one.
+    pub(super) fn forget(&mut self, node: u8) {
+        self.is_recorder.remove(&node);
+    }
+
+    pub(super) fn forget_all(&mut self) {
+        self.is_recorder.clear();
+    }
+
+    /// Takes the answer of a device out of its box, if it is there.
+    pub(super) fn collect(&mut self, node: u8, inboxes: &mut Inboxes) {
+        let answers = |body: &[u8]| matches!(Reply::parse(body), Ok(Reply::LastBroadcast(_)));
+        if inboxes.take_if(node, answers).is_some() {
+            self.is_recorder.insert(node, true);
+        }
+    }
+
+    /// It was asked and said nothing.
+    pub(super) fn was_silent(&mut self, node: u8) {
+        self.is_recorder.insert(node, false);
+    }
+
+    /// Whether it was asked, and answered or had its time to.
+    pub(super) fn knows(&self, node: u8) -> bool {
+        self.is_recorder.contains_key(&node)
+    }
+
+    /// Whether it has answered as recorders do.
+    pub(super) fn is_recorder(&self, node: u8) -> bool {
+        self.is_recorder.get(&node) == Some(&true)
+    }
+}
