@@ -207,7 +207,7 @@ mod app {
 
     /// A datagram has arrived at the GENI board. Wakes the main loop.
     #[task(binds = EXTI9_5, priority = 1, local = [geni_line])]
-    fn geni(cx: geni_board::Context) {
+    fn geni(cx: geni::Context) {
         cx.local.geni_line.on_interrupt(timer::tick_ms());
     }
 
