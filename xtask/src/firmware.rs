@@ -1,16 +1,15 @@
 //! `firmware`: builds the images and checks whether they may be flashed.
 
+use std::fmt::Display;
 use std::path::PathBuf;
 
+use image_check::{Checked, check, table, verdict};
+
 use crate::boards::{BOARDS, Board, MPS2_AN385};
-use crate::checks::{self, Outcome};
-use crate::image::Image;
-use crate::image::calls::Calls;
 use crate::setup::cross::{self, CrossToolchain};
 use crate::setup::demand::Installing;
 use crate::setup::emulator;
 use crate::steps::{self, Failure, Result, heading, note};
-use crate::{stack_paths, table};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -37,7 +36,7 @@ pub(crate) struct Arguments {
 
 /// A board by its name.
 pub(crate) fn board(name: &str) -> std::result::Result<&'static Board, String> {
-    let names: Vec<_> = BOARDS.iter().map(|board| board.name).collect();
+    let names: Vec<_> = BOARDS.iter().map(|board| board.name()).collect();
     Board::named(name).ok_or_else(|| format!("the boards are {}", names.join(", ")))
 }
 
@@ -66,7 +65,7 @@ pub(crate) fn toolchains<'a>(boards: &[&'a Board], installing: Installing) -> To
         match toolchain {
             Ok(toolchain) => found.push((board, toolchain)),
             Err(failure) => {
-                note(&format!("left out: {}.{failure}", board.name));
+                note(&format!("left out: {}.{failure}", board.name()));
                 missing.push(failure);
             }
         }
@@ -88,52 +87,23 @@ fn build(toolchain: &CrossToolchain, board: &Board) -> Result<PathBuf> {
     Ok(board.image())
 }
 
-/// An image that may be flashed.
-#[derive(Debug)]
-pub(crate) struct Checked {
-    /// The board's name.
-    pub(crate) board: &'static str,
-    /// How deep its stack can get at most, in bytes.
-    pub(crate) stack_bytes: u32,
-}
-
 /// Builds images and checks them. One that may not be flashed is a failure.
 pub(crate) fn build_and_check(boards: &[(&Board, CrossToolchain)], stack: bool) -> Result<Vec<Checked>> {
     if boards.is_empty() {
         return Ok(Vec::new());
     }
     heading("Firmware");
-    let (mut columns, mut checked) = (Vec::new(), Vec::new());
-    let mut paths = String::new();
+    let mut images = Vec::new();
     for (board, toolchain) in boards {
-        let image = Image::read(&build(toolchain, board)?)?;
-        let calls = Calls::of(&image, &checks::forced(board, &image));
-        columns.push((*board, checks::all(board, &image, &calls)));
-        // Where there is no bound, one of the checks has failed.
-        let stack_bytes = checks::bound(&image, &calls).unwrap_or(0);
-        checked.push(Checked { board: board.name, stack_bytes });
-        if stack {
-            paths += &stack_paths::shown(board, &image, &calls);
-        }
+        let image = build(toolchain, board)?;
+        images.push(check(board.limits, &image).map_err(told)?);
     }
-    steps::print(table::lines(&columns).join("\n") + "\n" + &paths)?;
-    verdict(&columns)?;
-    Ok(checked)
+    let paths = images.iter().filter(|_| stack).map(|image| &*image.stack_paths);
+    steps::print(table(&images) + &paths.collect::<String>())?;
+    verdict(&images).map_err(told)?;
+    Ok(images)
 }
 
-fn verdict(columns: &[(&Board, Vec<Outcome>)]) -> Result<()> {
-    let broken = |(board, outcomes): &(&Board, Vec<Outcome>)| {
-        let broken: Vec<_> = outcomes.iter().filter(|outcome| !outcome.wrong.is_empty()).collect();
-        let names: Vec<_> = broken.iter().map(|outcome| outcome.what).collect();
-        (!names.is_empty()).then(|| format!("{} ({})", board.name, names.join(", ")))
-    };
-    let broken: Vec<_> = columns.iter().filter_map(broken).collect();
-    if broken.is_empty() {
-        return Ok(());
-    }
-    Err(Failure::new(format!(
-        "not to be flashed: {}\n  \
-         The lines above say why; llvm-addr2line -ife IMAGE ADDRESS shows the source of an address.",
-        broken.join("; ")
-    )))
+fn told(why: impl Display) -> Failure {
+    Failure::new(why.to_string())
 }

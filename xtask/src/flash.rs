@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
         return Err(missing());
     }
     build_and_check(&[(board, cross::find_one(board.target, installing)?)], false)?;
-    heading(&format!("Flashing {}", board.name));
+    heading(&format!("Flashing {}", board.name()));
     let mut flash = unrelated(PROBE_RS);
     flash.args(["download", "--chip", chip, "--verify"]);
     if let Some(probe) = &arguments.probe {
@@ -59,11 +59,11 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
 
 fn emulated(board: &Board) -> Failure {
     let flashed: Vec<_> =
-        BOARDS.iter().filter(|board| board.chip.is_some()).map(|board| board.name).collect();
+        BOARDS.iter().filter(|board| board.chip.is_some()).map(|board| board.name()).collect();
     Failure::new(format!(
         "{} is emulated and has nothing to flash; run its image with\n  cargo xtask qemu --pty /tmp/ser\n\
          Boards to flash: {}",
-        board.name,
+        board.name(),
         flashed.join(", ")
     ))
 }

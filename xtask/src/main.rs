@@ -1,25 +1,20 @@
 //! Everything about the project that is one command: `cargo xtask --help`.
 //!
 //! A verb is a file. What verbs share: [`setup`] finds or installs tools, [`steps`] runs them and says how to repeat
-//! what failed. [`boards`] says what there is to build, [`image`] reads what was built, [`checks`] says whether it
-//! may be flashed.
+//! what failed. [`boards`] says what there is to build, `image-check` whether what was built may be flashed.
 
 mod boards;
-mod checks;
 mod demo;
 mod firmware;
 mod flash;
 mod fuzz;
-mod image;
 mod lint;
 mod log;
 mod places;
 mod qemu;
 mod setup;
 mod simulate;
-mod stack_paths;
 mod steps;
-mod table;
 mod test;
 mod timing;
 

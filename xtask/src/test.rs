@@ -2,8 +2,9 @@
 
 use std::process::Command;
 
+use image_check::Checked;
+
 use crate::boards::{BOARDS, MPS2_AN385};
-use crate::firmware::Checked;
 use crate::setup::demand::{self, Demand, Installing, Kind};
 use crate::setup::{self, emulator, programs};
 use crate::steps::{self, Failure, Result, heading, note};
@@ -54,7 +55,7 @@ fn everything(demand: Demand) -> Result<()> {
     if let Some(missing) = missing.into_iter().next().filter(|_| demand.is_strict()) {
         return Err(missing);
     }
-    tests(demand, checked.iter().find(|image| image.board == MPS2_AN385.name))
+    tests(demand, checked.iter().find(|image| image.board == MPS2_AN385.name()))
 }
 
 /// Builds and runs the tests; those in the emulator where it is there and its image was built
@@ -82,7 +83,9 @@ fn tests(demand: Demand, image: Option<&Checked>) -> Result<()> {
     heading("Tests, with those in the emulator");
     let mut tests = all_tests();
     tests.env(IMAGE_VARIABLE, MPS2_AN385.image());
-    tests.env(STACK_VARIABLE, image.stack_bytes.to_string());
+    if let Some(bytes) = image.stack_bytes {
+        tests.env(STACK_VARIABLE, bytes.to_string());
+    }
     if let Some(plugin) = plugin {
         tests.env(PLUGIN_VARIABLE, plugin);
     }

@@ -8,11 +8,11 @@
 //! Priorities are not asked: handlers of the same one cannot interrupt each other, and their sum is then too much. With one
 //! handler to a priority, it is exact.
 
-use crate::boards::Board;
-use crate::checks::Outcome;
+use crate::calls::{Calls, Deepest};
 use crate::checks::memory::against;
+use crate::checks::outcome::Outcome;
 use crate::image::Image;
-use crate::image::calls::{Calls, Deepest};
+use crate::limits::Limits;
 
 /// Registers that the processor saves when it takes an exception (DDI 0403E, B1.5.6): r0–r3, r12, lr, pc, xPSR, …
 const SAVED_BYTES: u32 = 8 * 4;
@@ -106,10 +106,10 @@ pub(super) fn fault_handler(image: &Image, calls: &Calls<'_>) -> Outcome {
 }
 
 /// A stack that gets too deep has to run into a fault and not into variables.
-pub(super) fn overflow(board: &Board, image: &Image) -> Outcome {
+pub(super) fn overflow(limits: &Limits, image: &Image) -> Outcome {
     let mut wrong = Vec::new();
     let (start, end) = (image.symbol("_stack_start"), image.symbol("_stack_end"));
-    if end != Some(board.stack_floor) {
+    if end != Some(limits.stack_floor) {
         wrong.push(format!("the stack ends at {}, and there is memory below", shown(end)));
     }
     if image.vectors().map(|(stack, _)| stack) != start {
@@ -134,7 +134,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::boards::STM32F407 as BOARD;
+    use crate::limits::STM32F407 as BOARD;
 
     const PUSH: u16 = 0xB510; // {r4, lr}
     const POP: u16 = 0xBD10; // {r4, pc}

@@ -10,8 +10,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::image::walk::{Call, Callee, Walk, walk};
 use crate::image::{Image, VECTOR_TABLE};
+use crate::walk::{Call, Callee, Walk, walk};
 
 /// Functions that call each other.
 pub(crate) struct Calls<'a> {

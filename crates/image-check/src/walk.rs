@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use crate::image::Image;
-use crate::image::thumb::{Constant, Flow, Instruction, Stack, decode, is_wide};
+use crate::thumb::{Constant, Flow, Instruction, Stack, decode, is_wide};
 
 /// Who is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
