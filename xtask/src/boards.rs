@@ -48,6 +48,16 @@ impl Board {
         places::firmware_target().join(self.target).join("release").join(self.package)
     }
 
+    /// Where tests look for the image.
+    pub(crate) fn image_variable(&self) -> String {
+        format!("SER_IMAGE_{}", self.as_identifier().to_uppercase())
+    }
+
+    /// What the name of a test over its image ends with.
+    pub(crate) fn as_identifier(&self) -> String {
+        self.name().replace('-', "_")
+    }
+
     /// The board of this name.
     pub(crate) fn named(name: &str) -> Option<&'static Board> {
         const { &BOARDS }.iter().find(|board| board.name() == name)

@@ -19,6 +19,8 @@ mod calls;
 mod check;
 mod checks;
 mod image;
+#[cfg(test)]
+mod independent;
 mod limits;
 mod names;
 mod sizes;
