@@ -1,7 +1,7 @@
 //! `lint`: format, clippy and documentation.
 
 use crate::boards::{BOARDS, Board};
-use crate::firmware::toolchains;
+use crate::images::toolchains;
 use crate::places;
 use crate::setup;
 use crate::setup::components::{self, Component};

@@ -8,7 +8,7 @@ use crate::boards::{BOARDS, MPS2_AN385};
 use crate::setup::demand::{self, Demand, Installing, Kind};
 use crate::setup::{self, emulator, programs};
 use crate::steps::{self, Failure, Result, heading, note};
-use crate::{firmware, lint, timing};
+use crate::{images, lint, plugin};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -49,9 +49,9 @@ fn everything(demand: Demand) -> Result<()> {
     let targets = BOARDS.each_ref().map(|board| board.target);
     setup::make_ready(demand, &targets, &Kind::ALL)?;
     lint::host(demand.is_strict())?;
-    let (found, missing) = firmware::toolchains(&BOARDS.each_ref(), Installing::Forbidden);
+    let (found, missing) = images::toolchains(&BOARDS.each_ref(), Installing::Forbidden);
     lint::firmware(&found, demand.is_strict())?;
-    let checked = firmware::build_and_check(&found, false)?;
+    let checked = images::build_and_check(&found, false)?;
     if let Some(missing) = missing.into_iter().next().filter(|_| demand.is_strict()) {
         return Err(missing);
     }
@@ -72,7 +72,7 @@ fn tests(demand: Demand, images: &[Checked]) -> Result<()> {
         steps::run(steps::cargo().args(["test", "--workspace"]))?;
         return ignored_tests(images);
     };
-    let plugin = match timing::build_plugin() {
+    let plugin = match plugin::build() {
         Ok(plugin) => Some(plugin),
         // Those that need it are built for Linux only.
         Err(failure) if cfg!(not(target_os = "linux")) && !demand.is_strict() => {
