@@ -1,6 +1,6 @@
 //! What `yaxpeax-arm` says of an instruction, in the terms of our own decoder.
 //!
-//! That decoder knows the ARMv7 of application processors, of which ARMv7-M is a part. Where it
+//! That decoder knows the `ARMv7` of application processors, of which ARMv7-M is a part. Where it
 //! says the same in other words, it is put into ours here:
 //!
 //! * It counts the distance of 16-bit conditional branches from the next instruction and all
@@ -101,18 +101,33 @@ fn words(list: u16) -> u16 {
 }
 
 /// How many of the first operands are written.
+#[expect(clippy::match_same_arms, reason = "an arm for each kind")]
 fn destinations(opcode: Opcode) -> usize {
     match opcode {
-        Opcode::STR | Opcode::STRH | Opcode::STRB | Opcode::STRD => 0,
-        Opcode::STRT | Opcode::STRHT | Opcode::STRBT => 0,
+        Opcode::STR
+        | Opcode::STRH
+        | Opcode::STRB
+        | Opcode::STRD
+        | Opcode::STRT
+        | Opcode::STRHT
+        | Opcode::STRBT
+        | Opcode::MCR(..)
+        | Opcode::MCRR(..) => 0,
         Opcode::CMP | Opcode::CMN | Opcode::TST | Opcode::TEQ => 0,
         Opcode::BX | Opcode::BXJ | Opcode::BLX | Opcode::CBZ | Opcode::CBNZ => 0,
         // What would be loaded into the program counter is a hint to the memory.
         Opcode::NOP | Opcode::PLD | Opcode::PLI => 0,
-        Opcode::MCR(..) | Opcode::MCRR(..) => 0,
-        Opcode::LDRD | Opcode::LDREXD | Opcode::MRRC(..) => 2,
-        Opcode::UMULL | Opcode::SMULL | Opcode::UMLAL | Opcode::SMLAL | Opcode::UMAAL => 2,
-        Opcode::SMLAL_halfword(..) | Opcode::SMLALD(_) | Opcode::SMLSLD(_) => 2,
+        Opcode::LDRD
+        | Opcode::LDREXD
+        | Opcode::MRRC(..)
+        | Opcode::UMULL
+        | Opcode::SMULL
+        | Opcode::UMLAL
+        | Opcode::SMLAL
+        | Opcode::UMAAL
+        | Opcode::SMLAL_halfword(..)
+        | Opcode::SMLALD(_)
+        | Opcode::SMLSLD(_) => 2,
         _ => 1,
     }
 }
