@@ -15,7 +15,7 @@ use crate::limits::Limits;
 
 pub use outcome::Outcome;
 pub(crate) use panics::forced;
-pub(crate) use stack::{Share, bound, shares};
+pub(crate) use stack::{bound, shares, together};
 
 /// All checks of an image; the same number, in the same order, for each board.
 pub(crate) fn all(limits: &Limits, image: &Image, calls: &Calls<'_>) -> Vec<Outcome> {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs;
-use std::io;
+use std::io::{self, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -13,6 +13,15 @@ use object::{
 };
 
 use crate::names;
+
+/// A file with what a debugger wants to know, in bytes.
+const MAX_FILE_LEN: u64 = 64 << 20;
+
+/// What it lays into memory: as much as the largest controllers of this family have.
+const MAX_LOADED_LEN: u64 = 4 << 20;
+
+/// Places of the memory that it lays something into.
+const MAX_PIECES: usize = 256;
 
 /// Why a file cannot be read as an image.
 #[derive(Debug)]
@@ -27,6 +36,8 @@ enum Why {
     Unread(io::Error),
     /// It is no ELF file, or a damaged one.
     NoElf(object::Error),
+    /// No board could hold it.
+    TooLarge,
 }
 
 impl fmt::Display for ReadError {
@@ -35,6 +46,7 @@ impl fmt::Display for ReadError {
         match &self.why {
             Why::Unread(error) => write!(f, "{file}: {error}"),
             Why::NoElf(error) => write!(f, "{file}: {error}"),
+            Why::TooLarge => write!(f, "{file}: no board could hold that"),
         }
     }
 }
@@ -107,12 +119,21 @@ impl Image {
     }
 
     fn read_elf(file: &Path) -> Result<Image, Why> {
-        let bytes = fs::read(file)?;
+        let mut bytes = Vec::new();
+        fs::File::open(file)?.take(MAX_FILE_LEN + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > MAX_FILE_LEN {
+            return Err(Why::TooLarge);
+        }
         let file = File::parse(bytes.as_slice())?;
         let mut image = Image::default();
+        let mut loaded: u64 = 0;
         for section in file.sections().filter(|section| is_loaded(section) && section.size() > 0) {
             let reserved = section.kind() == SectionKind::UninitializedData;
             let bytes = if reserved { &[] } else { section.data()? };
+            loaded += bytes.len() as u64;
+            if loaded > MAX_LOADED_LEN || image.pieces.len() >= MAX_PIECES {
+                return Err(Why::TooLarge);
+            }
             image.pieces.push(Piece {
                 name: section.name()?.to_owned(),
                 address: narrow(section.address()),
@@ -149,7 +170,7 @@ impl Image {
     fn add_function(&mut self, name: &str, address: u32, size: u32) {
         let function = self.functions.entry(address).or_default();
         function.names.push(names::as_in_source(name));
-        function.end = function.end.max(address + size);
+        function.end = function.end.max(address.saturating_add(size));
     }
 
     /// A variable without a size may stand where another one begins.

@@ -15,10 +15,10 @@ impl Sizes {
         let mut sizes = Sizes::default();
         for piece in &image.pieces {
             if piece.writable {
-                sizes.variables += piece.size;
+                sizes.variables = sizes.variables.saturating_add(piece.size);
             }
             if !piece.bytes.is_empty() {
-                sizes.flash += piece.size;
+                sizes.flash = sizes.flash.saturating_add(piece.size);
             }
         }
         sizes

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use ser_console::Harmless;
 
 use crate::calls::Calls;
-use crate::checks::{Share, shares};
+use crate::checks::{shares, together};
 use crate::image::Image;
 use crate::limits::Limits;
 use crate::walk::Callee;
@@ -22,8 +22,12 @@ pub(crate) fn shown(limits: &Limits, image: &Image, calls: &Calls<'_>) -> String
         _ = writeln!(text, "{:7}  {}{own}", share.deepest.bytes, names.join(" → "));
         saved += share.saved;
     }
-    _ = writeln!(text, "{saved:7}  registers that the processor saves for {} handlers", shares.len() - 1);
-    _ = writeln!(text, "{:7}  together", shares.iter().map(Share::bytes).sum::<u32>());
+    _ = writeln!(
+        text,
+        "{saved:7}  registers that the processor saves for {} handlers",
+        shares.len().saturating_sub(1)
+    );
+    _ = writeln!(text, "{:7}  together", together(&shares));
     text + &computed(image, calls)
 }
 

@@ -39,7 +39,8 @@ pub(crate) struct Share {
 impl Share {
     /// Bytes of the stack that it finds.
     pub(crate) fn bytes(&self) -> u32 {
-        self.saved + if self.deepest.other_stack.is_none() { self.deepest.bytes } else { 0 }
+        let own = if self.deepest.other_stack.is_none() { self.deepest.bytes } else { 0 };
+        self.saved.saturating_add(own)
     }
 }
 
@@ -77,7 +78,12 @@ pub(crate) fn shares(image: &Image, calls: &Calls<'_>) -> Result<Vec<Share>, Vec
 /// # Errors
 /// What cannot be bounded, in words.
 pub(crate) fn bound(image: &Image, calls: &Calls<'_>) -> Result<u32, Vec<String>> {
-    Ok(shares(image, calls)?.iter().map(Share::bytes).sum())
+    Ok(together(&shares(image, calls)?))
+}
+
+/// What all have of the stack.
+pub(crate) fn together(shares: &[Share]) -> u32 {
+    shares.iter().map(Share::bytes).fold(0, u32::saturating_add)
 }
 
 /// The worst case against what the memory map sets aside.
@@ -100,7 +106,7 @@ pub(super) fn fault_handler(image: &Image, calls: &Calls<'_>) -> Outcome {
     let Some((bytes, top)) = own else { return Outcome::new(WHAT, "", vec![]) };
     let interrupted = shares.iter().find(|share| share.vector == NON_MASKABLE).map_or(0, Share::bytes);
     match image.size_of_object_before(top) {
-        Some(size) => against(WHAT, bytes + interrupted, size),
+        Some(size) => against(WHAT, bytes.saturating_add(interrupted), size),
         None => Outcome::new(WHAT, "?", vec![format!("it begins at {top:#010x}, where no variable ends")]),
     }
 }
