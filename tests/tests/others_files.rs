@@ -51,7 +51,12 @@ const JUDGED: [(&str, &str, usize, &str); 12] = [
     ("crates/ser-sim/src/lockstep.rs", "File::create(", 1, "in a temporary directory of its own"),
     ("crates/ser-sim/src/pty.rs", "fs::rename(", 1, "over a link that the claim's record says is ours"),
     ("crates/ser-sim/src/pty.rs", "remove_file(", 1, "a link that was just made"),
-    ("crates/ser-qemu-plugin/src/lib.rs", "println!(", 1, "in QEMU, whose standard error is a file of the bench"),
+    (
+        "crates/ser-qemu-plugin/src/lib.rs",
+        "println!(",
+        1,
+        "in QEMU, whose standard error is a file of the bench",
+    ),
     ("xtask/src/setup/apt.rs", "File::create(", 1, "in the build folder"),
 ];
 
