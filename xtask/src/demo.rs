@@ -4,7 +4,7 @@ use std::ffi::OsString;
 
 use crate::setup::demand::Installing;
 use crate::steps::{self, Result};
-use crate::{firmware, qemu};
+use crate::{images, ser_cli};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -25,10 +25,10 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
-    let mut demo = qemu::ser_cli("demo");
+    let mut demo = ser_cli::command("demo");
     if arguments.qemu {
-        demo.arg("--image").arg(firmware::build_emulated(installing)?);
+        demo.arg("--image").arg(images::build_emulated(installing)?);
     }
-    qemu::build_ser_cli()?;
+    ser_cli::build()?;
     steps::become_program(demo.args(&arguments.options))
 }

@@ -1,16 +1,9 @@
 //! `firmware`: builds the images and checks whether they may be flashed.
 
-use std::path::PathBuf;
-
-use crate::boards::{BOARDS, Board, MPS2_AN385};
-use crate::checks::{self, Outcome};
-use crate::image::Image;
-use crate::image::calls::Calls;
-use crate::setup::cross::{self, CrossToolchain};
+use crate::boards::{BOARDS, Board};
+use crate::images::{self, build_and_check, toolchains};
 use crate::setup::demand::Installing;
-use crate::setup::emulator;
-use crate::steps::{self, Failure, Result, heading, note};
-use crate::{stack_paths, table};
+use crate::steps::Result;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -27,18 +20,12 @@ nothing in flash that is wanted while the flash is being erased.";
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
     /// Only for this board; by default for all.
-    #[arg(long, value_parser = board)]
+    #[arg(long, value_parser = images::board)]
     board: Option<&'static Board>,
 
     /// Show the deepest paths through the program.
     #[arg(long)]
     stack: bool,
-}
-
-/// A board by its name.
-pub(crate) fn board(name: &str) -> std::result::Result<&'static Board, String> {
-    let names: Vec<_> = BOARDS.iter().map(|board| board.name).collect();
-    Board::named(name).ok_or_else(|| format!("the boards are {}", names.join(", ")))
 }
 
 pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
@@ -53,87 +40,4 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
         (Ok(_), Some(missing)) => Err(missing),
         (checked, _) => checked.map(drop),
     }
-}
-
-/// Boards that can be built for, each with its toolchain; and why the others cannot, which has been said by then.
-pub(crate) type Toolchains<'a> = (Vec<(&'a Board, CrossToolchain)>, Vec<Failure>);
-
-/// Finds a toolchain for each board.
-pub(crate) fn toolchains<'a>(boards: &[&'a Board], installing: Installing) -> Toolchains<'a> {
-    let (mut found, mut missing) = (Vec::new(), Vec::new());
-    let targets: Vec<_> = boards.iter().map(|board| board.target).collect();
-    for (&board, toolchain) in boards.iter().zip(cross::find(&targets, installing)) {
-        match toolchain {
-            Ok(toolchain) => found.push((board, toolchain)),
-            Err(failure) => {
-                note(&format!("left out: {}.{failure}", board.name));
-                missing.push(failure);
-            }
-        }
-    }
-    (found, missing)
-}
-
-/// Builds the image for the emulator, which has to be there; gives its file.
-pub(crate) fn build_emulated(installing: Installing) -> Result<PathBuf> {
-    emulator::find(installing)?;
-    let toolchain = cross::find_one(MPS2_AN385.target, installing)?;
-    heading("Firmware");
-    build(&toolchain, &MPS2_AN385)
-}
-
-/// Builds one image; gives its file.
-fn build(toolchain: &CrossToolchain, board: &Board) -> Result<PathBuf> {
-    steps::run(toolchain.cargo("build").args(["--release", "--package", board.package]))?;
-    Ok(board.image())
-}
-
-/// An image that may be flashed.
-#[derive(Debug)]
-pub(crate) struct Checked {
-    /// The board's name.
-    pub(crate) board: &'static str,
-    /// How deep its stack can get at most, in bytes.
-    pub(crate) stack_bytes: u32,
-}
-
-/// Builds images and checks them. One that may not be flashed is a failure.
-pub(crate) fn build_and_check(boards: &[(&Board, CrossToolchain)], stack: bool) -> Result<Vec<Checked>> {
-    if boards.is_empty() {
-        return Ok(Vec::new());
-    }
-    heading("Firmware");
-    let (mut columns, mut checked) = (Vec::new(), Vec::new());
-    let mut paths = String::new();
-    for (board, toolchain) in boards {
-        let image = Image::read(&build(toolchain, board)?)?;
-        let calls = Calls::of(&image, &checks::forced(board, &image));
-        columns.push((*board, checks::all(board, &image, &calls)));
-        // Where there is no bound, one of the checks has failed.
-        let stack_bytes = checks::bound(&image, &calls).unwrap_or(0);
-        checked.push(Checked { board: board.name, stack_bytes });
-        if stack {
-            paths += &stack_paths::shown(board, &image, &calls);
-        }
-    }
-    steps::print(table::lines(&columns).join("\n") + "\n" + &paths)?;
-    verdict(&columns)?;
-    Ok(checked)
-}
-
-fn verdict(columns: &[(&Board, Vec<Outcome>)]) -> Result<()> {
-    let broken = |(board, outcomes): &(&Board, Vec<Outcome>)| {
-        let broken: Vec<_> = outcomes.iter().filter(|outcome| !outcome.wrong.is_empty()).collect();
-        let names: Vec<_> = broken.iter().map(|outcome| outcome.what).collect();
-        (!names.is_empty()).then(|| format!("{} ({})", board.name, names.join(", ")))
-    };
-    let broken: Vec<_> = columns.iter().filter_map(broken).collect();
-    if broken.is_empty() {
-        return Ok(());
-    }
-    Err(Failure::new(format!(
-        "not to be flashed: {}\n  \
-         The lines above say why; llvm-addr2line -ife IMAGE ADDRESS shows the source of an address.",
-        broken.join("; ")
-    )))
 }

@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 
 use crate::boards::{BOARDS, Board};
-use crate::firmware::{self, build_and_check};
+use crate::images::{self, build_and_check};
 use crate::setup::cross;
 use crate::setup::demand::Installing;
 use crate::steps::{self, Failure, Result, heading, unrelated, works};
@@ -23,7 +23,7 @@ const PROBE_RS: &str = "probe-rs";
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
     /// Which board it is.
-    #[arg(long, value_parser = firmware::board)]
+    #[arg(long, value_parser = images::board)]
     board: &'static Board,
 
     /// Which probe, as `probe-rs list` shows it; there is no need to say it where only one is connected.
@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
         return Err(missing());
     }
     build_and_check(&[(board, cross::find_one(board.target, installing)?)], false)?;
-    heading(&format!("Flashing {}", board.name));
+    heading(&format!("Flashing {}", board.name()));
     let mut flash = unrelated(PROBE_RS);
     flash.args(["download", "--chip", chip, "--verify"]);
     if let Some(probe) = &arguments.probe {
@@ -58,12 +58,11 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
 }
 
 fn emulated(board: &Board) -> Failure {
-    let flashed: Vec<_> =
-        BOARDS.iter().filter(|board| board.chip.is_some()).map(|board| board.name).collect();
+    let flashed: Vec<_> = BOARDS.iter().filter(|board| board.chip.is_some()).map(Board::name).collect();
     Failure::new(format!(
         "{} is emulated and has nothing to flash; run its image with\n  cargo xtask qemu --pty /tmp/ser\n\
          Boards to flash: {}",
-        board.name,
+        board.name(),
         flashed.join(", ")
     ))
 }

@@ -185,8 +185,13 @@ mod tests {
     use clap::Parser;
     use clap::error::ErrorKind;
 
-    use super::chosen;
-    use crate::Arguments;
+    use super::{Arguments, chosen};
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        _fuzz: Arguments,
+    }
 
     #[test]
     fn a_target_that_there_is_not_is_refused_and_the_others_are_named() {
@@ -200,7 +205,7 @@ mod tests {
     #[test]
     fn a_time_that_is_none_is_refused_as_a_number() {
         for wrong in ["0", "-5", "2147483648", "soon"] {
-            let error = Arguments::try_parse_from(["xtask", "fuzz", "--seconds", wrong]).unwrap_err();
+            let error = Line::try_parse_from(["fuzz", "--seconds", wrong]).unwrap_err();
             assert_eq!(error.kind(), ErrorKind::ValueValidation, "{error}");
         }
     }

@@ -1,7 +1,7 @@
 //! `lint`: format, clippy and documentation.
 
 use crate::boards::{BOARDS, Board};
-use crate::firmware::toolchains;
+use crate::images::toolchains;
 use crate::places;
 use crate::setup;
 use crate::setup::components::{self, Component};
@@ -56,7 +56,7 @@ pub(crate) fn host(strict: bool) -> Result<()> {
 /// What is flashed. A toolchain without clippy is a failure where nothing may be left out.
 pub(crate) fn firmware(boards: &[(&Board, CrossToolchain)], strict: bool) -> Result<()> {
     for (board, toolchain) in boards {
-        heading(&format!("Clippy on the firmware for {}", board.name));
+        heading(&format!("Clippy on the firmware for {}", board.name()));
         match toolchain.clippy() {
             Some(mut clippy) => {
                 let package = ["--release", "--package", board.package];

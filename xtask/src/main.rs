@@ -1,25 +1,25 @@
 //! Everything about the project that is one command: `cargo xtask --help`.
 //!
-//! A verb is a file. What verbs share: [`setup`] finds or installs tools, [`steps`] runs them and says how to repeat
-//! what failed. [`boards`] says what there is to build, [`image`] reads what was built, [`checks`] says whether it
-//! may be flashed.
+//! A verb is a file. What verbs share: [`setup`] finds or installs tools, [`steps`] runs them and
+//! says how to repeat what failed. [`boards`] says what there is to build, [`images`] builds it and
+//! has `image-check` say whether it may be flashed; [`plugin`] and [`ser_cli`] are built for several
+//! verbs.
 
 mod boards;
-mod checks;
 mod demo;
 mod firmware;
 mod flash;
 mod fuzz;
-mod image;
+mod images;
 mod lint;
 mod log;
 mod places;
+mod plugin;
 mod qemu;
+mod ser_cli;
 mod setup;
 mod simulate;
-mod stack_paths;
 mod steps;
-mod table;
 mod test;
 mod timing;
 

@@ -1,11 +1,10 @@
 //! `qemu`: the ARM image in the emulator, on a pseudo-terminal, a TCP port or a Genius bus.
 
 use std::ffi::OsString;
-use std::process::Command;
 
-use crate::firmware;
 use crate::setup::demand::Installing;
-use crate::steps::{self, Result, heading};
+use crate::steps::{self, Result};
+use crate::{images, ser_cli};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -26,27 +25,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
-    let image = firmware::build_emulated(installing)?;
-    build_ser_cli()?;
-    steps::become_program(ser_cli("sim").arg("--image").arg(image).args(&arguments.options))
-}
-
-/// Builds `ser-cli`, showing the progress; the first time takes a while.
-pub(crate) fn build_ser_cli() -> Result<()> {
-    heading("ser-cli");
-    steps::run(steps::cargo().args(["build", "--package", "ser-cli"]))?;
-    steps::say(&"");
-    Ok(())
-}
-
-/// `ser-cli` with this subcommand. File names among the options are meant from where the user is.
-pub(crate) fn ser_cli(subcommand: &str) -> Command {
-    let mut command = steps::cargo();
-    if let Ok(here) = std::env::current_dir() {
-        command.current_dir(here);
-    }
-    command.args(["run", "--quiet", "--package", "ser-cli", "--manifest-path"]);
-    command.arg(crate::places::root().join("Cargo.toml"));
-    command.args(["--", subcommand]);
-    command
+    let image = images::build_emulated(installing)?;
+    ser_cli::build()?;
+    steps::become_program(ser_cli::command("sim").arg("--image").arg(image).args(&arguments.options))
 }

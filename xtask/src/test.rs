@@ -2,12 +2,13 @@
 
 use std::process::Command;
 
+use image_check::Checked;
+
 use crate::boards::{BOARDS, MPS2_AN385};
-use crate::firmware::Checked;
 use crate::setup::demand::{self, Demand, Installing, Kind};
 use crate::setup::{self, emulator, programs};
 use crate::steps::{self, Failure, Result, heading, note};
-use crate::{firmware, lint, timing};
+use crate::{images, lint, plugin};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -20,11 +21,11 @@ Examples:
 What is missing, and will be installed, is said first. What cannot be built or run here is left out, and \
 that is said, too; with --strict, and where CI is \"true\", it is a failure.";
 
-/// Where the tests in the emulator look for the image.
-const IMAGE_VARIABLE: &str = "SER_IMAGE_MPS2_AN385";
-
-/// Where they look for the bound of its stack, in bytes.
+/// Where the tests in the emulator look for the bound of its image's stack, in bytes.
 const STACK_VARIABLE: &str = "SER_STACK_BOUND_MPS2_AN385";
+
+/// What the names of tests over the image of a board begin with.
+const IMAGE_TEST: &str = "image_of_";
 
 /// Where those that count instructions look for the emulator's plugin.
 const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";
@@ -48,29 +49,30 @@ fn everything(demand: Demand) -> Result<()> {
     let targets = BOARDS.each_ref().map(|board| board.target);
     setup::make_ready(demand, &targets, &Kind::ALL)?;
     lint::host(demand.is_strict())?;
-    let (found, missing) = firmware::toolchains(&BOARDS.each_ref(), Installing::Forbidden);
+    let (found, missing) = images::toolchains(&BOARDS.each_ref(), Installing::Forbidden);
     lint::firmware(&found, demand.is_strict())?;
-    let checked = firmware::build_and_check(&found, false)?;
+    let checked = images::build_and_check(&found, false)?;
     if let Some(missing) = missing.into_iter().next().filter(|_| demand.is_strict()) {
         return Err(missing);
     }
-    tests(demand, checked.iter().find(|image| image.board == MPS2_AN385.name))
+    tests(demand, &checked)
 }
 
 /// Builds and runs the tests; those in the emulator where it is there and its image was built
 /// above.
-fn tests(demand: Demand, image: Option<&Checked>) -> Result<()> {
+fn tests(demand: Demand, images: &[Checked]) -> Result<()> {
     heading("Building the tests");
     steps::run(steps::cargo().args(["test", "--workspace", "--no-run"]))?;
-    let Some(image) = image.filter(|_| emulator::there()) else {
+    let emulated = images.iter().find(|image| image.board == MPS2_AN385.name());
+    let Some(emulated) = emulated.filter(|_| emulator::there()) else {
         if demand.is_strict() {
             return Err(Failure::new("the tests in the emulator cannot be run here"));
         }
         heading("Tests, without those in the emulator");
         steps::run(steps::cargo().args(["test", "--workspace"]))?;
-        return ignored_tests();
+        return ignored_tests(images);
     };
-    let plugin = match timing::build_plugin() {
+    let plugin = match plugin::build() {
         Ok(plugin) => Some(plugin),
         // Those that need it are built for Linux only.
         Err(failure) if cfg!(not(target_os = "linux")) && !demand.is_strict() => {
@@ -81,8 +83,10 @@ fn tests(demand: Demand, image: Option<&Checked>) -> Result<()> {
     };
     heading("Tests, with those in the emulator");
     let mut tests = all_tests();
-    tests.env(IMAGE_VARIABLE, MPS2_AN385.image());
-    tests.env(STACK_VARIABLE, image.stack_bytes.to_string());
+    on_images(&mut tests, images);
+    if let Some(bytes) = emulated.stack_bytes {
+        tests.env(STACK_VARIABLE, bytes.to_string());
+    }
     if let Some(plugin) = plugin {
         tests.env(PLUGIN_VARIABLE, plugin);
     }
@@ -96,13 +100,71 @@ fn all_tests() -> Command {
     tests
 }
 
+/// Says to tests where the images are, and leaves out those over an image that was not built.
+fn on_images(tests: &mut Command, images: &[Checked]) {
+    for board in &BOARDS {
+        match images.iter().find(|image| image.board == board.name()) {
+            Some(image) => _ = tests.env(board.image_variable(), &image.file),
+            None => _ = tests.args(["--skip", &format!("{IMAGE_TEST}{}", board.as_identifier())]),
+        }
+    }
+}
+
 /// The ignored tests that need no emulator.
-fn ignored_tests() -> Result<()> {
+fn ignored_tests(images: &[Checked]) -> Result<()> {
     heading("Tests with programs of others");
     let mut others = steps::cargo();
     others.args(["test", "--workspace", "--", "--ignored", programs::MODULE]).args(programs::skipped());
     steps::run(&mut others)?;
+    heading("Tests over the instructions of the images");
+    let mut over_images = steps::cargo();
+    over_images.args(["test", "--package", "image-check", "--lib", "--", "--ignored"]);
+    on_images(&mut over_images, images);
+    steps::run(&mut over_images)?;
     heading("Tests that take minutes");
     let long = ["test", "--package", "ser-tests", "--test", "simulation", "--", "--ignored"];
     steps::run(steps::cargo().args(long))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ffi::OsStr;
+    use std::fs;
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::places;
+
+    fn built(board: &'static str) -> Checked {
+        let (outcomes, stack_paths) = (Vec::new(), String::new());
+        Checked { board, file: PathBuf::from("elf"), outcomes, stack_bytes: None, stack_paths }
+    }
+
+    /// The variables and the arguments of a run with these images.
+    fn told(images: &[Checked]) -> (Vec<String>, Vec<String>) {
+        let mut command = Command::new("cargo");
+        on_images(&mut command, images);
+        let text = |text: &OsStr| text.to_string_lossy().into_owned();
+        let variables = command.get_envs().map(|(name, _)| text(name)).collect();
+        (variables, command.get_args().map(text).collect())
+    }
+
+    #[test]
+    fn tests_are_told_where_each_image_is_and_those_without_are_left_out() {
+        let both = BOARDS.each_ref().map(|board| built(board.name()));
+        let variables = ["SER_IMAGE_MPS2_AN385", "SER_IMAGE_STM32F407"].map(str::to_owned);
+        assert_eq!(told(&both), (variables.to_vec(), vec![]));
+        let skipped = ["--skip", "image_of_stm32f407"].map(str::to_owned);
+        assert_eq!(told(&both[..1]), (variables[..1].to_vec(), skipped.to_vec()));
+    }
+
+    #[test]
+    fn there_is_a_test_over_the_image_of_each_board() {
+        let source = places::root().join("crates/image-check/src/independent/images.rs");
+        let source = fs::read_to_string(source).expect("the tests");
+        for board in &BOARDS {
+            assert!(source.contains(&format!("fn {IMAGE_TEST}{}()", board.as_identifier())));
+            assert!(source.contains(&format!("\"{}\"", board.image_variable())));
+        }
+    }
 }

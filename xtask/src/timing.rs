@@ -1,11 +1,8 @@
 //! `timing`: the instructions of the ARM image, counted in the emulator.
 
-use std::path::PathBuf;
-
 use crate::setup::demand::Installing;
-use crate::setup::emulator;
-use crate::steps::{self, Failure, Result, heading};
-use crate::{firmware, places};
+use crate::steps::{self, Result, heading};
+use crate::{images, plugin};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -15,12 +12,6 @@ Examples:
 Seconds are of virtual time, which counts instructions: the numbers are the same in every run \
 and on every machine. Exit code 1 when something is over budget, the capture interrupt late, \
 or an event unaccounted for.";
-
-/// What QEMU loads to tell of instructions.
-const PLUGIN: &str = "ser-qemu-plugin";
-
-/// From this version on QEMU has plugins name the second version of its interface.
-const SECOND_INTERFACE: u32 = 9;
 
 /// Count the instructions of the ARM image in the emulator, hold them against the budgets, and account for every
 /// event of a load.
@@ -39,8 +30,8 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
-    let image = firmware::build_emulated(installing)?;
-    let plugin = build_plugin()?;
+    let image = images::build_emulated(installing)?;
+    let plugin = plugin::build()?;
     heading("Timing");
     let mut timing = steps::cargo();
     timing.args([
@@ -58,33 +49,22 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
     steps::become_program(&mut timing)
 }
 
-/// Builds the emulator's plugin for the emulator that there is; gives its file.
-pub(crate) fn build_plugin() -> Result<PathBuf> {
-    if cfg!(not(target_os = "linux")) {
-        return Err(Failure::new(
-            "instructions are counted by a plugin of the emulator, which is built for Linux only",
-        ));
-    }
-    heading("Plugin for the emulator");
-    let interface = if emulator::major_version() < Some(SECOND_INTERFACE) { "1" } else { "2" };
-    let mut build = steps::cargo();
-    build.env("SER_QEMU_PLUGIN_API", interface).args(["build", "--release", "--package", PLUGIN]);
-    steps::run(&mut build)?;
-    Ok(places::host_target().join("release/libser_qemu_plugin.so"))
-}
-
 #[cfg(test)]
 mod tests {
     use clap::Parser;
     use clap::error::ErrorKind;
 
-    use crate::{Arguments, Verb};
+    use super::Arguments;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        timing: Arguments,
+    }
 
     fn understood(line: &[&str]) -> Result<u32, clap::Error> {
-        match Arguments::try_parse_from([&["xtask", "timing"], line].concat())?.verb {
-            Verb::Timing(arguments) => Ok(arguments.load_seconds),
-            other => panic!("{other:?}"),
-        }
+        let line = Line::try_parse_from([&["timing"], line].concat())?;
+        Ok(line.timing.load_seconds)
     }
 
     #[test]

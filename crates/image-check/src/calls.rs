@@ -10,8 +10,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::image::walk::{Call, Callee, Walk, walk};
 use crate::image::{Image, VECTOR_TABLE};
+use crate::walk::{Call, Callee, Walk, walk};
+
+/// So many calls below each other are followed: ten times as many as a program for a board has. What
+/// is deeper is refused, before it needs more stack here than there is.
+const DEEPEST: usize = 200;
 
 /// Functions that call each other.
 pub(crate) struct Calls<'a> {
@@ -39,6 +43,8 @@ pub(crate) enum Unbounded {
     Recursion(Vec<u32>),
     /// An instruction that could not be followed; what it does is in the walk of its function.
     NotFollowed(u32),
+    /// A function below more calls than are followed.
+    TooDeep(u32),
 }
 
 impl<'a> Calls<'a> {
@@ -47,7 +53,7 @@ impl<'a> Calls<'a> {
         let mut calls = Calls { image, walks: BTreeMap::new(), pointed_to: BTreeSet::new() };
         let mut begun = BTreeSet::new();
         for &function in image.functions.keys() {
-            calls.returns(function, &mut begun);
+            calls.returns(function, &mut begun, 0);
         }
         calls.pointed_to = pointers(image, &calls.walks);
         let left_out =
@@ -56,10 +62,11 @@ impl<'a> Calls<'a> {
         calls
     }
 
-    /// Walks a function, unless that has been done; says whether it comes back.
-    fn returns(&mut self, function: u32, begun: &mut BTreeSet<u32>) -> bool {
-        if begun.insert(function) {
-            let walk = walk(self.image, function, &mut |callee| self.returns(callee, begun));
+    /// Walks a function, unless that has been done; says whether it comes back. One that is too deep
+    /// has its turn later, and is taken to come back.
+    fn returns(&mut self, function: u32, begun: &mut BTreeSet<u32>, depth: usize) -> bool {
+        if depth < DEEPEST && begun.insert(function) {
+            let walk = walk(self.image, function, &mut |callee| self.returns(callee, begun, depth + 1));
             self.walks.insert(function, walk);
         }
         // One whose walk is not over yet takes part in a recursion, which fails anyway.
@@ -124,6 +131,9 @@ impl<'a> Calls<'a> {
         if let Some(begin) = on_the_way.iter().position(|&caller| caller == function) {
             return Err(Unbounded::Recursion(on_the_way.split_off(begin)));
         }
+        if on_the_way.len() >= DEEPEST {
+            return Err(Unbounded::TooDeep(function));
+        }
         let walk = self.walks.get(&function).ok_or(Unbounded::NotFollowed(function))?;
         if let Some(&(at, _)) = walk.troubles.first() {
             return Err(Unbounded::NotFollowed(at));
@@ -136,8 +146,9 @@ impl<'a> Calls<'a> {
         for call in &walk.calls {
             for target in self.targets(call) {
                 let below = self.deepest_from(target, known, on_the_way)?;
-                if call.depth + below.bytes > deepest.bytes {
-                    deepest.bytes = call.depth + below.bytes;
+                let bytes = call.depth.saturating_add(below.bytes);
+                if bytes > deepest.bytes {
+                    deepest.bytes = bytes;
                     deepest.path.truncate(1);
                     deepest.path.extend(below.path);
                 }
@@ -156,6 +167,9 @@ impl<'a> Calls<'a> {
                     ring.iter().chain(ring.first()).map(|&at| self.image.name_of(at)).collect();
                 format!("recursion: {}", names.join(" → "))
             }
+            Unbounded::TooDeep(at) => {
+                format!("{} is more calls deep than any program", self.image.name_of(*at))
+            }
             Unbounded::NotFollowed(at) => {
                 let troubles = self.walks.values().flat_map(|walk| &walk.troubles);
                 let what = troubles.into_iter().find(|(place, _)| place == at);
@@ -172,7 +186,7 @@ impl<'a> Calls<'a> {
 /// Functions whose address stands in data or is put into a register. What the vector table holds is for the processor.
 fn pointers(image: &Image, walks: &BTreeMap<u32, Walk>) -> BTreeSet<u32> {
     let mut values: BTreeSet<u32> = walks.values().flat_map(|walk| walk.constants.iter().copied()).collect();
-    for piece in image.pieces.iter().filter(|piece| piece.name != VECTOR_TABLE) {
+    for piece in image.pieces.iter().filter(|piece| piece.name != VECTOR_TABLE && !piece.bytes.is_empty()) {
         let places = piece.addresses().filter(|address| address % 4 == 0 && !image.is_code(*address));
         values.extend(places.filter_map(|address| image.word(address)));
     }

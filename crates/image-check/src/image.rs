@@ -1,25 +1,69 @@
 //! An image as the linker has left it: its bytes, its functions, and what in it is code.
-//!
-//! [`sizes`] weighs it, [`names`] knows the names of panics, [`walk`] follows one function with the help of [`thumb`],
-//! [`calls`] puts the functions together.
-
-pub(crate) mod calls;
-pub(crate) mod names;
-pub(crate) mod sizes;
-pub(crate) mod thumb;
-pub(crate) mod walk;
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::fs;
+use std::io::{self, Read};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use object::elf::{SHF_ALLOC, SHF_WRITE};
 use object::{
     File, Object, ObjectSection, ObjectSymbol, Section, SectionFlags, SectionKind, Symbol, SymbolKind,
 };
 
-use crate::steps::{Failure, Result};
+use crate::names;
+
+/// A file with what a debugger wants to know, in bytes.
+const MAX_FILE_LEN: u64 = 64 << 20;
+
+/// What it lays into memory: as much as the largest controllers of this family have.
+const MAX_LOADED_LEN: u64 = 4 << 20;
+
+/// Places of the memory that it lays something into.
+const MAX_PIECES: usize = 256;
+
+/// Why a file cannot be read as an image.
+#[derive(Debug)]
+pub struct ReadError {
+    file: PathBuf,
+    why: Why,
+}
+
+#[derive(Debug)]
+enum Why {
+    /// The file cannot be read.
+    Unread(io::Error),
+    /// It is no ELF file, or a damaged one.
+    NoElf(object::Error),
+    /// No board could hold it.
+    TooLarge,
+}
+
+impl fmt::Display for ReadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let file = self.file.display();
+        match &self.why {
+            Why::Unread(error) => write!(f, "{file}: {error}"),
+            Why::NoElf(error) => write!(f, "{file}: {error}"),
+            Why::TooLarge => write!(f, "{file}: no board could hold that"),
+        }
+    }
+}
+
+impl std::error::Error for ReadError {}
+
+impl From<io::Error> for Why {
+    fn from(error: io::Error) -> Why {
+        Why::Unread(error)
+    }
+}
+
+impl From<object::Error> for Why {
+    fn from(error: object::Error) -> Why {
+        Why::NoElf(error)
+    }
+}
 
 /// What an image lays into one place of the memory.
 #[derive(Debug)]
@@ -70,16 +114,28 @@ pub(crate) struct Image {
 
 impl Image {
     /// Reads an ELF file.
-    pub(crate) fn read(path: &Path) -> Result<Image> {
-        let fails = |error: &dyn std::fmt::Display| Failure::new(format!("{}: {error}", path.display()));
-        let bytes = fs::read(path).map_err(|error| fails(&error))?;
-        let file = File::parse(bytes.as_slice()).map_err(|error| fails(&error))?;
+    pub(crate) fn read(file: &Path) -> Result<Image, ReadError> {
+        Image::read_elf(file).map_err(|why| ReadError { file: file.to_owned(), why })
+    }
+
+    fn read_elf(file: &Path) -> Result<Image, Why> {
+        let mut bytes = Vec::new();
+        fs::File::open(file)?.take(MAX_FILE_LEN + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > MAX_FILE_LEN {
+            return Err(Why::TooLarge);
+        }
+        let file = File::parse(bytes.as_slice())?;
         let mut image = Image::default();
+        let mut loaded: u64 = 0;
         for section in file.sections().filter(|section| is_loaded(section) && section.size() > 0) {
             let reserved = section.kind() == SectionKind::UninitializedData;
-            let bytes = if reserved { &[] } else { section.data().map_err(|error| fails(&error))? };
+            let bytes = if reserved { &[] } else { section.data()? };
+            loaded += bytes.len() as u64;
+            if loaded > MAX_LOADED_LEN || image.pieces.len() >= MAX_PIECES {
+                return Err(Why::TooLarge);
+            }
             image.pieces.push(Piece {
-                name: section.name().map_err(|error| fails(&error))?.to_owned(),
+                name: section.name()?.to_owned(),
                 address: narrow(section.address()),
                 size: narrow(section.size()),
                 bytes: bytes.to_vec(),
@@ -114,7 +170,7 @@ impl Image {
     fn add_function(&mut self, name: &str, address: u32, size: u32) {
         let function = self.functions.entry(address).or_default();
         function.names.push(names::as_in_source(name));
-        function.end = function.end.max(address + size);
+        function.end = function.end.max(address.saturating_add(size));
     }
 
     /// A variable without a size may stand where another one begins.
@@ -233,6 +289,11 @@ impl Image {
         let size = narrow(bytes.len() as u64);
         image.pieces.push(Piece { name: ".text".to_owned(), address, size, bytes, writable: false });
         image
+    }
+
+    /// Nothing but these pieces.
+    pub(crate) fn of_pieces(pieces: Vec<Piece>) -> Image {
+        Image { pieces, ..Image::default() }
     }
 
     /// Adds a vector table.

@@ -1,15 +1,22 @@
 //! No way to a panic.
 
-use crate::boards::Board;
-use crate::checks::{Outcome, forced};
+use std::collections::BTreeSet;
+
+use crate::calls::Calls;
+use crate::checks::outcome::Outcome;
 use crate::image::Image;
-use crate::image::calls::Calls;
-use crate::image::names::is_panic;
+use crate::limits::Limits;
+use crate::names::is_panic;
+
+/// The functions that end the program on purpose. Calls of theirs count for nothing.
+pub(crate) fn forced(limits: &Limits, image: &Image) -> BTreeSet<u32> {
+    limits.forced.iter().filter_map(|(name, _)| image.function(name)).collect()
+}
 
 /// The linker drops what nobody refers to: a function of the panic machinery that is still there can be reached.
-pub(super) fn none(board: &Board, image: &Image, calls: &Calls<'_>) -> Outcome {
-    let forced = forced(board, image);
-    let missing = board.forced.iter().filter(|(name, _)| image.function(name).is_none());
+pub(super) fn none(limits: &Limits, image: &Image, calls: &Calls<'_>) -> Outcome {
+    let forced = forced(limits, image);
+    let missing = limits.forced.iter().filter(|(name, _)| image.function(name).is_none());
     let mut wrong: Vec<_> = missing.map(|(name, _)| format!("{name} is to panic and is not there")).collect();
     // What matters is who brings a panic in; among themselves, panics call each other.
     let is_harmless = |at| {
@@ -40,16 +47,16 @@ pub(super) fn none(board: &Board, image: &Image, calls: &Calls<'_>) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::boards::STM32F407 as BOARD;
+    use crate::limits::STM32F407 as BOARD;
 
     const FMT: &str = "_ZN4core9panicking9panic_fmt17h0123456789abcdefE";
     const BOUNDS: &str = "_ZN4core9panicking18panic_bounds_check17h0123456789abcdefE";
     const CALL_NEXT: [u16; 3] = [0xB510, 0xF000, 0xF800]; // push {r4, lr}; bl
     const CALL_AFTER_NEXT: [u16; 3] = [0xB510, 0xF000, 0xF803];
 
-    fn outcome(board: &Board, functions: &[(&str, &[u16])]) -> Outcome {
+    fn outcome(limits: &Limits, functions: &[(&str, &[u16])]) -> Outcome {
         let image = Image::of_functions(0x100, functions);
-        none(board, &image, &Calls::of(&image, &forced(board, &image)))
+        none(limits, &image, &Calls::of(&image, &forced(limits, &image)))
     }
 
     #[test]
@@ -72,7 +79,7 @@ mod tests {
 
     #[test]
     fn a_function_may_panic_on_purpose_and_no_other_one() {
-        let board = Board { forced: &[("force", "a test")], ..BOARD };
+        let board = Limits { forced: &[("force", "a test")], ..BOARD };
         let forced = outcome(&board, &[("force", &CALL_NEXT), (FMT, &[0xDE00])]);
         assert_eq!((&*forced.result, forced.wrong), ("none but on purpose", vec![]));
         let both = [("main", &CALL_AFTER_NEXT[..]), ("force", &CALL_NEXT), (FMT, &[0xDE00])];

@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use crate::image::Image;
-use crate::image::thumb::{Constant, Flow, Instruction, Stack, decode, is_wide};
+use crate::thumb::{Constant, Flow, Instruction, Stack, decode, is_wide};
 
 /// Who is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -107,8 +107,9 @@ impl State {
 /// Follows the function at `entry`. `returns` says of another function whether it comes back.
 pub(crate) fn walk(image: &Image, entry: u32, returns: &mut dyn FnMut(u32) -> bool) -> Walk {
     let end = image.functions.get(&entry).map_or(entry, |function| function.end);
-    let (seen, used_at, walk) = (BTreeMap::new(), None, Walk::default());
-    let mut walker = Walker { image, entry, end, returns, seen, used_at, walk };
+    let (seen, due) = (BTreeMap::new(), BTreeSet::new());
+    let (used_at, walk) = (None, Walk::default());
+    let mut walker = Walker { image, entry, end, returns, seen, due, used_at, walk };
     walker.reach(entry, State::default());
     while let Some((address, state)) = walker.next() {
         walker.step(address, &state);
@@ -125,8 +126,10 @@ struct Walker<'a> {
     entry: u32,
     end: u32,
     returns: &'a mut dyn FnMut(u32) -> bool,
-    /// State before each instruction that was reached, and whether it has to be looked at (again).
-    seen: BTreeMap<u32, (State, bool)>,
+    /// State before each instruction that was reached.
+    seen: BTreeMap<u32, State>,
+    /// Those that have to be looked at, for the first time or again.
+    due: BTreeSet<u32>,
     /// Where the stack that it was called with is in use.
     used_at: Option<u32>,
     walk: Walk,
@@ -141,15 +144,16 @@ impl Walker<'_> {
 
     /// There is a path to an instruction.
     fn reach(&mut self, address: u32, state: State) {
-        let Some((known, due)) = self.seen.get_mut(&address) else {
-            self.seen.insert(address, (state, true));
+        let Some(known) = self.seen.get_mut(&address) else {
+            self.seen.insert(address, state);
+            self.due.insert(address);
             return;
         };
         let uneven = known.depth != state.depth || known.other_stack != state.other_stack;
         for (known, new) in known.registers.iter_mut().zip(state.registers) {
             if known.is_some() && *known != new {
                 *known = None;
-                *due = true;
+                self.due.insert(address);
             }
         }
         if uneven {
@@ -158,9 +162,8 @@ impl Walker<'_> {
     }
 
     fn next(&mut self) -> Option<(u32, State)> {
-        let (&address, (state, due)) = self.seen.iter_mut().find(|(_, (_, due))| *due)?;
-        *due = false;
-        Some((address, state.clone()))
+        let address = self.due.pop_first()?;
+        Some((address, self.seen.get(&address)?.clone()))
     }
 
     /// One instruction.
@@ -174,7 +177,7 @@ impl Walker<'_> {
         if after.depth > 0 && after.other_stack.is_none() {
             self.used_at.get_or_insert(address);
         }
-        let next = address + instruction.length;
+        let next = address.saturating_add(instruction.length);
         // A conditional instruction may also not be carried out.
         let mut goes_on = before.conditional > 0;
         match instruction.flow {
@@ -213,7 +216,7 @@ impl Walker<'_> {
         }
         let halfword = |address| self.image.bytes(address).map(u16::from_le_bytes);
         let first = halfword(address)?;
-        let second = if is_wide(first) { halfword(address + 2)? } else { 0 };
+        let second = if is_wide(first) { halfword(address.saturating_add(2))? } else { 0 };
         Some(decode(address, first, second))
     }
 
@@ -248,7 +251,7 @@ impl Walker<'_> {
             Stack::Deeper(_) if conditional && instruction.flow != Flow::Return => {
                 self.trouble(address, Trouble::UnevenStack);
             }
-            Stack::Deeper(bytes) => state.depth += bytes,
+            Stack::Deeper(bytes) => state.depth = state.depth.saturating_add(bytes),
             Stack::Change(register) => match state.register(register).filter(|_| !conditional) {
                 Some(top) => {
                     (state.depth, state.other_stack) = (0, Some(top));
@@ -328,13 +331,14 @@ impl Walker<'_> {
             return self.trouble(address, Trouble::Table);
         };
         for at in (table..end).step_by(entry_len as usize) {
-            let entry = match entry_len {
+            let entry: Option<u32> = match entry_len {
                 1 => self.image.bytes(at).map(|[byte]| u32::from(byte)),
                 _ => self.image.bytes(at).map(|bytes| u16::from_le_bytes(bytes).into()),
             };
-            let target = table + entry.unwrap_or(0) * 2;
+            let Some(entry) = entry else { return self.trouble(address, Trouble::Table) };
+            let target = table.saturating_add(entry * 2);
             // A last byte may be there only to make the table's length even.
-            let filler = entry_len == 1 && at + 1 == end && !(end..self.end).contains(&target);
+            let filler = entry_len == 1 && end - at == 1 && !(end..self.end).contains(&target);
             if !filler {
                 self.jump(address, target, state);
             }

@@ -8,11 +8,11 @@
 //! Priorities are not asked: handlers of the same one cannot interrupt each other, and their sum is then too much. With one
 //! handler to a priority, it is exact.
 
-use crate::boards::Board;
-use crate::checks::Outcome;
+use crate::calls::{Calls, Deepest};
 use crate::checks::memory::against;
+use crate::checks::outcome::Outcome;
 use crate::image::Image;
-use crate::image::calls::{Calls, Deepest};
+use crate::limits::Limits;
 
 /// Registers that the processor saves when it takes an exception (DDI 0403E, B1.5.6): r0–r3, r12, lr, pc, xPSR, …
 const SAVED_BYTES: u32 = 8 * 4;
@@ -39,7 +39,8 @@ pub(crate) struct Share {
 impl Share {
     /// Bytes of the stack that it finds.
     pub(crate) fn bytes(&self) -> u32 {
-        self.saved + if self.deepest.other_stack.is_none() { self.deepest.bytes } else { 0 }
+        let own = if self.deepest.other_stack.is_none() { self.deepest.bytes } else { 0 };
+        self.saved.saturating_add(own)
     }
 }
 
@@ -77,7 +78,12 @@ pub(crate) fn shares(image: &Image, calls: &Calls<'_>) -> Result<Vec<Share>, Vec
 /// # Errors
 /// What cannot be bounded, in words.
 pub(crate) fn bound(image: &Image, calls: &Calls<'_>) -> Result<u32, Vec<String>> {
-    Ok(shares(image, calls)?.iter().map(Share::bytes).sum())
+    Ok(together(&shares(image, calls)?))
+}
+
+/// What all have of the stack.
+pub(crate) fn together(shares: &[Share]) -> u32 {
+    shares.iter().map(Share::bytes).fold(0, u32::saturating_add)
 }
 
 /// The worst case against what the memory map sets aside.
@@ -100,16 +106,16 @@ pub(super) fn fault_handler(image: &Image, calls: &Calls<'_>) -> Outcome {
     let Some((bytes, top)) = own else { return Outcome::new(WHAT, "", vec![]) };
     let interrupted = shares.iter().find(|share| share.vector == NON_MASKABLE).map_or(0, Share::bytes);
     match image.size_of_object_before(top) {
-        Some(size) => against(WHAT, bytes + interrupted, size),
+        Some(size) => against(WHAT, bytes.saturating_add(interrupted), size),
         None => Outcome::new(WHAT, "?", vec![format!("it begins at {top:#010x}, where no variable ends")]),
     }
 }
 
 /// A stack that gets too deep has to run into a fault and not into variables.
-pub(super) fn overflow(board: &Board, image: &Image) -> Outcome {
+pub(super) fn overflow(limits: &Limits, image: &Image) -> Outcome {
     let mut wrong = Vec::new();
     let (start, end) = (image.symbol("_stack_start"), image.symbol("_stack_end"));
-    if end != Some(board.stack_floor) {
+    if end != Some(limits.stack_floor) {
         wrong.push(format!("the stack ends at {}, and there is memory below", shown(end)));
     }
     if image.vectors().map(|(stack, _)| stack) != start {
@@ -134,7 +140,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::boards::STM32F407 as BOARD;
+    use crate::limits::STM32F407 as BOARD;
 
     const PUSH: u16 = 0xB510; // {r4, lr}
     const POP: u16 = 0xBD10; // {r4, pc}

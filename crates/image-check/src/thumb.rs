@@ -240,6 +240,7 @@ fn load_store_single(address: u32, first: u16, second: u16) -> Instruction {
         let word = at.wrapping_add_signed(if first & 1 << 7 == 0 { -distance } else { distance });
         return match register {
             PC => plain.going(Flow::JumpWord(word)),
+            SP => plain.holding(SP, Constant::WordAt(word)).stack(Stack::Unknown),
             _ => plain.holding(register, Constant::WordAt(word)),
         };
     }
@@ -286,7 +287,8 @@ fn immediate(first: u16, second: u16) -> Instruction {
     match (first & 0xFBF0, register) {
         (_, SP) if operand == SP => plain.stack(bytes().map_or(Stack::Unknown, Stack::Deeper)),
         (_, SP) => plain.stack(Stack::Unknown),
-        (0xF040, _) if operand == PC => plain.holding(register, Constant::Whole(expanded(twelve))),
+        // With flags or without.
+        (0xF040 | 0xF050, _) if operand == PC => plain.holding(register, Constant::Whole(expanded(twelve))),
         (0xF240, _) => plain.holding(register, Constant::Whole((operand << 12 | twelve).into())),
         (0xF2C0, _) => plain.holding(register, Constant::Upper(operand << 12 | twelve)),
         _ => plain,
@@ -508,6 +510,8 @@ mod tests {
             (0x44A5, 0),      // add sp, r4
             (0xEBAD, 0x0D04), // sub.w sp, sp, r4
             (0xF380, 0x8814), // msr control, r0
+            (0xF8DF, 0xD008), // ldr.w sp, [pc, #8]
+            (0xF8D0, 0xD008), // ldr.w sp, [r0, #8]
         ];
         for (first, second) in moves {
             assert_eq!(stack(first, second), Stack::Unknown, "{first:04x}");
@@ -520,6 +524,7 @@ mod tests {
         assert_eq!(constant(0, 0xF241, 0x2C35), Some((12, Constant::Whole(0x1235)))); // movw r12, #0x1235
         assert_eq!(constant(0, 0xF6C0, 0x0C00), Some((12, Constant::Upper(0x0800)))); // movt r12, #0x800
         assert_eq!(constant(0, 0xF04F, 0x6300), Some((3, Constant::Whole(0x0800_0000)))); // mov.w r3, #…
+        assert_eq!(constant(0, 0xF05F, 0x6300), Some((3, Constant::Whole(0x0800_0000)))); // movs.w r3, #…
         assert_eq!(constant(0, 0xF04F, 0x11FF), Some((1, Constant::Whole(0x00FF_00FF))));
         assert_eq!(constant(0, 0xF04F, 0x21FF), Some((1, Constant::Whole(0xFF00_FF00))));
         assert_eq!(constant(0, 0xF04F, 0x3101), Some((1, Constant::Whole(0x0101_0101))));

@@ -2,26 +2,26 @@
 
 use std::collections::BTreeSet;
 
-use crate::boards::Board;
-use crate::checks::Outcome;
-use crate::image::calls::Calls;
+use crate::calls::Calls;
+use crate::checks::outcome::Outcome;
 use crate::image::{Image, Piece};
+use crate::limits::Limits;
 
 /// Below, processors of this family have their flash, and other memory that holds no code; RAM begins here.
 const RAM_BEGINS: u32 = 0x2000_0000;
 
 /// Whatever the handlers, and the functions that the board names, can reach has to be in RAM: what they call, and the
 /// constants that they read.
-pub(super) fn while_erasing(board: &Board, image: &Image, calls: &Calls<'_>) -> Outcome {
+pub(super) fn while_erasing(limits: &Limits, image: &Image, calls: &Calls<'_>) -> Outcome {
     const WHAT: &str = "while flash is erased";
-    if board.while_erasing.is_empty() {
+    if limits.while_erasing.is_empty() {
         return Outcome::new(WHAT, "", vec![]);
     }
     let mut wrong = Vec::new();
     // The first vector is that of reset, which begins in flash.
     let mut roots: BTreeSet<u32> =
         image.vectors().into_iter().flat_map(|(_, vectors)| vectors.into_iter().skip(1)).collect();
-    for name in board.while_erasing {
+    for name in limits.while_erasing {
         match image.function(name) {
             Some(function) => _ = roots.insert(function),
             None => wrong.push(format!("there is no function {name}")),
@@ -59,7 +59,7 @@ fn in_flash(image: &Image, address: u32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::boards::{MPS2_AN385, STM32F407};
+    use crate::limits::{MPS2_AN385, STM32F407};
 
     const BX_LR: u16 = 0x4770;
     const PUSH: u16 = 0xB510; // {r4, lr}

@@ -1,20 +1,20 @@
 //! Flash and variables against their budgets.
 
-use crate::boards::Board;
-use crate::checks::Outcome;
+use crate::checks::outcome::Outcome;
 use crate::image::Image;
-use crate::image::sizes::Sizes;
+use crate::limits::Limits;
+use crate::sizes::Sizes;
 
 const KIB: u32 = 1024;
 
 /// Code, constants and first values.
-pub(super) fn flash(board: &Board, image: &Image) -> Outcome {
-    against("flash", Sizes::of(image).flash, board.flash_budget)
+pub(super) fn flash(limits: &Limits, image: &Image) -> Outcome {
+    against("flash", Sizes::of(image).flash, limits.flash_budget)
 }
 
 /// All that can be written, but for the stack.
-pub(super) fn variables(board: &Board, image: &Image) -> Outcome {
-    against("variables", Sizes::of(image).variables, board.variables_budget)
+pub(super) fn variables(limits: &Limits, image: &Image) -> Outcome {
+    against("variables", Sizes::of(image).variables, limits.variables_budget)
 }
 
 /// A use against a limit.

@@ -1,0 +1,31 @@
+//! What an image has to keep to before it is flashed.
+//!
+//! Everything here is read off the image: nothing has to run, and nothing is taken on trust. What each board is held to
+//! stands in [`Limits`].
+
+mod memory;
+mod outcome;
+mod panics;
+mod ram;
+mod stack;
+
+use crate::calls::Calls;
+use crate::image::Image;
+use crate::limits::Limits;
+
+pub use outcome::Outcome;
+pub(crate) use panics::forced;
+pub(crate) use stack::{bound, shares, together};
+
+/// All checks of an image; the same number, in the same order, for each board.
+pub(crate) fn all(limits: &Limits, image: &Image, calls: &Calls<'_>) -> Vec<Outcome> {
+    vec![
+        memory::flash(limits, image),
+        memory::variables(limits, image),
+        stack::depth(image, calls),
+        stack::fault_handler(image, calls),
+        stack::overflow(limits, image),
+        panics::none(limits, image, calls),
+        ram::while_erasing(limits, image, calls),
+    ]
+}

@@ -1,0 +1,57 @@
+//! What the image of each board has to keep to.
+
+const KIB: u32 = 1024;
+
+/// What the image of a board has to keep to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// The board's name.
+    pub board: &'static str,
+    /// Bytes. Goals, below what the memory map has: an affordable controller with room for more.
+    pub flash_budget: u32,
+    /// Bytes of variables, with an event log of full size.
+    pub variables_budget: u32,
+    /// Where the memory with the stack begins. Below, the protection unit allows nothing: a stack
+    /// that gets there ends in a fault.
+    pub stack_floor: u32,
+    /// Functions that go on while the flash is being erased, besides all interrupt handlers: they
+    /// and all that they call have to be in RAM. None where nothing is erased.
+    pub while_erasing: &'static [&'static str],
+    /// Functions that end the program on purpose, each with the reason: they may panic, and have no
+    /// bound for the stack.
+    pub forced: &'static [(&'static str, &'static str)],
+}
+
+/// The emulated board.
+pub const MPS2_AN385: Limits = Limits {
+    board: "mps2-an385",
+    flash_budget: 48 * KIB,
+    variables_budget: 48 * KIB,
+    stack_floor: 0x2000_0000,
+    while_erasing: &[],
+    forced: &[(
+        "ser_mps2_an385::forced::force",
+        "the bench sees how this very image ends when something goes wrong",
+    )],
+};
+
+/// The board to flash.
+pub const STM32F407: Limits = Limits {
+    board: "stm32f407",
+    flash_budget: 48 * KIB,
+    variables_budget: 48 * KIB,
+    stack_floor: 0x1000_0000,
+    while_erasing: &["main"],
+    forced: &[],
+};
+
+/// Those of all boards.
+pub const ALL: [Limits; 2] = [MPS2_AN385, STM32F407];
+
+impl Limits {
+    /// The limits of the board with this name.
+    #[must_use]
+    pub fn of(board: &str) -> Option<&'static Limits> {
+        const { &ALL }.iter().find(|limits| limits.board == board)
+    }
+}

@@ -1,0 +1,26 @@
+//! `ser-cli`, which several verbs run.
+
+use std::process::Command;
+
+use crate::places;
+use crate::steps::{self, Result, heading};
+
+/// Builds `ser-cli`, showing the progress; the first time takes a while.
+pub(crate) fn build() -> Result<()> {
+    heading("ser-cli");
+    steps::run(steps::cargo().args(["build", "--package", "ser-cli"]))?;
+    steps::say(&"");
+    Ok(())
+}
+
+/// `ser-cli` with this subcommand. File names among the options are meant from where the user is.
+pub(crate) fn command(subcommand: &str) -> Command {
+    let mut command = steps::cargo();
+    if let Ok(here) = std::env::current_dir() {
+        command.current_dir(here);
+    }
+    command.args(["run", "--quiet", "--package", "ser-cli", "--manifest-path"]);
+    command.arg(places::root().join("Cargo.toml"));
+    command.args(["--", subcommand]);
+    command
+}
