@@ -8,12 +8,13 @@ use image_bench::costs::{
 };
 use image_bench::lateness::{Lateness, expiry};
 use image_bench::load::Load;
+use image_bench::lockstep::{INSTRUCTIONS_PER_MS, Lockstep, LockstepOptions};
 use image_bench::program::{Handler, Kind, Program};
 use image_bench::tally::Tally;
 use ser_board::budget::CAPTURE_INSTRUCTIONS;
 use ser_proto::Model;
+use ser_sim::EmulatorOptions;
 use ser_sim::testing::image;
-use ser_sim::{EmulatorOptions, INSTRUCTIONS_PER_MS, Lockstep, LockstepOptions};
 
 /// Where the emulator's plugin is: set by `cargo xtask test`, which builds it.
 const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";

@@ -39,7 +39,7 @@ const CALLS: [&str; 26] = [
 ];
 
 /// File, call, how often, and why that is right.
-const JUDGED: [(&str, &str, usize, &str); 28] = [
+const JUDGED: [(&str, &str, usize, &str); 29] = [
     (
         "crates/geni-board/src/mapped_ram.rs",
         "map_raw(",
@@ -125,9 +125,9 @@ const JUDGED: [(&str, &str, usize, &str); 28] = [
         1,
         "makes the file, and fails where anything is",
     ),
-    ("crates/ser-sim/src/lockstep.rs", "File::create(", 1, "in a temporary directory of its own"),
+    ("crates/image-bench/src/lockstep.rs", "File::create(", 1, "in a temporary directory of its own"),
     (
-        "crates/ser-sim/src/lockstep.rs",
+        "crates/image-bench/src/lockstep.rs",
         "Process::new(",
         1,
         "as in emulator.rs; sockets are in a temporary directory, and the plugin is read",
@@ -141,7 +141,7 @@ const JUDGED: [(&str, &str, usize, &str); 28] = [
     ),
     ("crates/ser-sim/src/line/pty.rs", "symlink(", 3, "makes a link, and fails where anything is"),
     (
-        "crates/ser-qemu-plugin/src/lib.rs",
+        "crates/image-bench/plugin/src/lib.rs",
         "println!(",
         1,
         "in QEMU, whose standard error is a file of the bench",
@@ -202,12 +202,14 @@ fn calls(source: &str) -> BTreeMap<&'static str, usize> {
 #[test]
 fn every_call_that_could_touch_a_file_of_others_has_been_judged() {
     let mut files = Vec::new();
-    let entries = |folder: PathBuf| {
-        fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path())
-    };
-    for package in entries(root()).chain(entries(root().join("crates"))) {
+    let mut packages = Vec::new();
+    for folder in [root(), root().join("crates"), root().join("crates/image-bench")] {
+        let entries = fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+        packages.extend(entries.filter(|entry| entry.join("Cargo.toml").exists()));
+    }
+    for package in packages {
         for folder in ["src", "examples"].map(|folder| package.join(folder)) {
-            if package.join("Cargo.toml").exists() && folder.is_dir() {
+            if folder.is_dir() {
                 sources(&folder, &mut files);
             }
         }

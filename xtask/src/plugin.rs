@@ -7,7 +7,7 @@ use crate::setup::emulator;
 use crate::steps::{self, Failure, Result, heading};
 
 /// What QEMU loads to tell of instructions.
-const PLUGIN: &str = "ser-qemu-plugin";
+const PLUGIN: &str = "image-bench-plugin";
 
 /// From this version on QEMU has plugins name the second version of its interface.
 const SECOND_INTERFACE: u32 = 9;
@@ -24,5 +24,5 @@ pub(crate) fn build() -> Result<PathBuf> {
     let mut build = steps::cargo();
     build.env("SER_QEMU_PLUGIN_API", interface).args(["build", "--release", "--package", PLUGIN]);
     steps::run(&mut build)?;
-    Ok(places::host_target().join("release/libser_qemu_plugin.so"))
+    Ok(places::host_target().join("release/libimage_bench_plugin.so"))
 }

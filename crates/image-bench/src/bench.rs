@@ -6,9 +6,10 @@
 use std::collections::VecDeque;
 use std::path::PathBuf;
 
+use crate::lockstep::{Lockstep, LockstepOptions};
 use ser_board::serial_line::CHARACTER_BITS;
 use ser_proto::{Baud, Command, FrameEncoder, Model};
-use ser_sim::{EmulatorOptions, ForcedFault, Lockstep, LockstepOptions, SimError};
+use ser_sim::{EmulatorOptions, ForcedFault, SimError};
 
 use super::genius::Genius;
 use super::program::{Handler, Kind, Program};

@@ -4,6 +4,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use crate::lockstep::Lockstep;
 use geni_board::{
     Completion, Configuration, Data, Destination, Driver, Event, Options, Priority, Start, Transmission,
 };
@@ -11,7 +12,7 @@ use ser_node::{GeniusOptions, GeniusPort};
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{Command, FrameEncoder, Model};
 use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusRate, Handle, Read, tick_ms};
-use ser_sim::{Lockstep, Ram, Scenario, SimNode, SimNodeOptions, Step};
+use ser_sim::{Ram, Scenario, SimNode, SimNodeOptions, Step};
 
 use ser_trial::genius_world::HOST;
 

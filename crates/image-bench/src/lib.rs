@@ -12,6 +12,8 @@ pub mod lateness;
 #[cfg(target_os = "linux")]
 pub mod load;
 #[cfg(target_os = "linux")]
+pub mod lockstep;
+#[cfg(target_os = "linux")]
 mod masking;
 #[cfg(target_os = "linux")]
 pub mod program;

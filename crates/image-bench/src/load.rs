@@ -4,11 +4,11 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use crate::lockstep::INSTRUCTIONS_PER_MS;
 use ser_board::budget::MAX_BITS_PER_SECOND;
 use ser_client::LineRate;
 use ser_node::Debounce;
 use ser_proto::{Command, MAX_SIZE, Model, Reply};
-use ser_sim::INSTRUCTIONS_PER_MS;
 
 use super::bench::{Bench, Carried, Parts, Setup};
 use super::costs::beginnings;

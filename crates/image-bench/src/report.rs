@@ -2,8 +2,8 @@
 
 use std::fmt;
 
+use crate::lockstep::INSTRUCTIONS_PER_MS;
 use ser_board::budget::{CAPTURE_INSTRUCTIONS, MAIN_LOOP_STALL_MS};
-use ser_sim::INSTRUCTIONS_PER_MS;
 
 use super::bench::{Parts, RATE};
 use super::costs::{self, Change, Commands, Cost, LONGEST_DEBOUNCE_MS, SHORTEST_DEBOUNCE_MS, Way, runs_of};

@@ -114,7 +114,8 @@ impl fmt::Display for NoRecords {
 }
 
 impl SimError {
-    pub(crate) fn io(doing: impl Into<String>) -> impl FnOnce(io::Error) -> SimError {
+    /// Says what was being tried, as in `listen on 127.0.0.1:4000`.
+    pub fn io(doing: impl Into<String>) -> impl FnOnce(io::Error) -> SimError {
         let doing = doing.into();
         |source| SimError::Io { doing, source }
     }

@@ -6,7 +6,7 @@
 //!   result on every machine.
 //! - [`Simulator`] is a node that keeps pace with real time and answers on a pseudo-terminal or a TCP port:
 //!   what a host program can be tried against.
-//! - [`Lockstep`] is the ARM image in virtual time, held still whenever the world moves: for what has to be exact.
+//! - [`qemu`] is the ARM image in an emulator: what a bench needs that drives it by itself.
 //! - [`genius`] is the other way to a node: a GENI board, the Genius bus it sits on, and other devices there.
 
 #[cfg(unix)]
@@ -18,12 +18,10 @@ pub mod genius;
 mod genius_bench;
 mod genius_options;
 mod line;
-#[cfg(target_os = "linux")]
-mod lockstep;
 mod machine;
 mod options;
 #[cfg(unix)]
-mod qemu;
+pub mod qemu;
 mod service;
 mod simulator;
 #[cfg(feature = "testing")]
@@ -37,8 +35,6 @@ pub use contacts::step::Step;
 pub use error::SimError;
 pub use genius_options::{GeniusOptions, MAX_NODES};
 pub use line::port::Port;
-#[cfg(target_os = "linux")]
-pub use lockstep::{INSTRUCTIONS_PER_MS, Lockstep, LockstepOptions};
 pub use machine::non_volatile::{MemoryStorage, NonVolatile, SimRtc};
 pub use machine::sim_node::{LineRate, PoweredOff, Ram, SimNode, SimNodeOptions};
 pub use options::{Backend, EmulatorOptions, Notice, SimOptions};

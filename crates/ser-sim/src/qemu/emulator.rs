@@ -20,15 +20,13 @@ use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::fd::{AsFd, BorrowedFd};
-use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command as Process, Stdio};
+use std::path::PathBuf;
+use std::process::{ChildStdin, ChildStdout, Command as Process, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use ser_proto::{Baud, Command, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Model, Reply};
 use tempfile::TempDir;
 
@@ -41,8 +39,7 @@ use crate::machine::pace::Pace;
 use crate::options::EmulatorOptions;
 use crate::qemu::emulator_files::EmulatorFiles;
 use crate::qemu::external_bus::ExternalBus;
-
-pub(crate) const PROGRAM: &str = "qemu-system-arm";
+use crate::qemu::process::{PROGRAM, Qemu, is_temporary, never_wait, read_printed, spawn};
 
 /// How long the image may take to answer: QEMU starts slowly on a busy machine.
 const ANSWER_WITHIN: Duration = Duration::from_secs(60);
@@ -52,9 +49,6 @@ const ASK_EVERY: Duration = Duration::from_millis(250);
 
 /// Bytes that may wait for the board, and for the host.
 const WAITING_LIMIT: usize = 4096;
-
-/// So much of what QEMU prints is shown: more than it has to say about itself.
-const MAX_PRINTED_LEN: u64 = 16_384;
 
 /// How soon the board is looked after when nothing is going on, and when contacts move.
 const PATIENCE: Duration = Duration::from_millis(2);
@@ -104,17 +98,6 @@ struct Running {
     output: ChildStdout,
     to_board: VecDeque<u8>,
     from_board: FromBoard,
-}
-
-/// The process; goes with us.
-pub(crate) struct Qemu(pub(crate) Child);
-
-impl Drop for Qemu {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 impl Emulator {
@@ -469,39 +452,10 @@ impl Machine for Emulator {
     }
 }
 
-/// Starts the emulator.
-pub(crate) fn spawn(process: &mut Process, program: &Path) -> Result<Qemu, SimError> {
-    // Ctrl-C at the terminal is for us; we end it when we end.
-    process.process_group(0);
-    match process.spawn() {
-        Err(error) if error.kind() == ErrorKind::NotFound => {
-            Err(SimError::EmulatorMissing { program: program.to_owned() })
-        }
-        spawned => spawned.map(Qemu).map_err(SimError::io(format!("start {}", program.display()))),
-    }
-}
-
-/// What the emulator has printed, or its beginning.
-pub(crate) fn read_printed(path: &Path) -> String {
-    let mut printed = Vec::new();
-    // It is an addition to a failure that is told in any case.
-    let _ = File::open(path).and_then(|file| file.take(MAX_PRINTED_LEN).read_to_end(&mut printed));
-    String::from_utf8_lossy(&printed).trim().to_owned()
-}
-
 /// Milliseconds since 1970, as this computer has it.
 fn time_of_day_ms() -> u64 {
     let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since_1970.as_millis()).unwrap_or_default()
-}
-
-pub(crate) fn never_wait(descriptor: impl AsFd) -> io::Result<()> {
-    let flags = fcntl_getfl(&descriptor)?;
-    Ok(fcntl_setfl(&descriptor, flags | OFlags::NONBLOCK)?)
-}
-
-pub(crate) fn is_temporary(error: &io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }
 
 #[cfg(test)]
@@ -532,13 +486,6 @@ mod tests {
         from_board.taken(rest);
         assert_eq!(from_board.rate, Some(Baud::B19200));
         assert_eq!(from_board.output(), after);
-    }
-
-    #[test]
-    fn of_what_the_emulator_prints_without_end_the_beginning_is_shown() {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        file.as_file().set_len(1 << 40).unwrap();
-        assert_eq!(read_printed(file.path()).len() as u64, MAX_PRINTED_LEN);
     }
 
     #[test]

@@ -29,21 +29,27 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 const DESCRIPTORS: &str = if cfg!(target_os = "linux") { "/proc/self/fd" } else { "/dev/fd" };
 
 /// Files for the emulator, as often as it is started.
-pub(crate) struct EmulatorFiles {
+pub struct EmulatorFiles {
     image: PathBuf,
     log: Option<File>,
 }
 
 impl EmulatorFiles {
     /// Makes the log. Where that is a pipe, waits until somebody reads it, or until told to stop.
-    pub(crate) fn open(options: &EmulatorOptions, stop: &AtomicBool) -> Result<EmulatorFiles, SimError> {
+    ///
+    /// # Errors
+    /// When the image is no file, or the log cannot be made or is something that is not ours.
+    pub fn open(options: &EmulatorOptions, stop: &AtomicBool) -> Result<EmulatorFiles, SimError> {
         options.check_image()?;
         let log = options.log.as_deref().map(|path| open_log(path, stop)).transpose()?;
         Ok(EmulatorFiles { image: options.image.clone(), log })
     }
 
     /// Copies for an emulator that is about to be started; it must not be started later than this goes.
-    pub(crate) fn hand_over(&self, bus: &ExternalBus) -> io::Result<HandedOver> {
+    ///
+    /// # Errors
+    /// When this process can open no more files.
+    pub fn hand_over(&self, bus: &ExternalBus) -> io::Result<HandedOver> {
         let memory = inherited(bus.file())?;
         let log = self.log.as_ref().map(inherited).transpose()?;
         let arguments = arguments(&self.image, &memory, log.as_ref());
@@ -52,9 +58,9 @@ impl EmulatorFiles {
 }
 
 /// Descriptors that every process inherits which is started meanwhile.
-pub(crate) struct HandedOver {
+pub struct HandedOver {
     /// What the board is made of, for the emulator.
-    pub(crate) arguments: Vec<OsString>,
+    pub arguments: Vec<OsString>,
     _memory: OwnedFd,
     _log: Option<OwnedFd>,
 }

@@ -82,7 +82,7 @@ fn is_memory(found: &Metadata) -> bool {
 }
 
 /// The mapped memory.
-pub(crate) struct ExternalBus {
+pub struct ExternalBus {
     memory: MmapRaw,
     file: File,
     /// When the clock's count was written last, and the longest time between two such moments; 0 for never.
@@ -95,7 +95,7 @@ impl ExternalBus {
     ///
     /// # Errors
     /// `AlreadyExists` where something else is, which is left as it is.
-    pub(crate) fn open(path: &Path) -> io::Result<ExternalBus> {
+    pub fn open(path: &Path) -> io::Result<ExternalBus> {
         let bus = |file: File| {
             Ok(ExternalBus {
                 memory: MmapRaw::map_raw(&file)?,
@@ -124,7 +124,8 @@ impl ExternalBus {
         &self.file
     }
 
-    pub(crate) fn set_straps(&self, model: Model, debounce_ms: u8) {
+    /// Says which model the board is, and the debounce time of its inputs.
+    pub fn set_straps(&self, model: Model, debounce_ms: u8) {
         let model = match model {
             Model::Ser160 => 160,
             Model::Ser320 => 320,
@@ -134,28 +135,28 @@ impl ExternalBus {
     }
 
     /// Fits a GENI board, whose shared RAM is all zeros, or takes it out.
-    pub(crate) fn fit_geni(&self, fitted: bool) {
+    pub fn fit_geni(&self, fitted: bool) {
         (0..RAM_LEN).for_each(|offset| self.window_byte(offset).store(0, Ordering::SeqCst));
         self.write(GENI_STRAP, fitted.into());
     }
 
     /// A byte of the GENI board's shared RAM.
-    pub(crate) fn read_geni(&self, offset: u16) -> u8 {
+    pub fn read_geni(&self, offset: u16) -> u8 {
         self.window_byte(offset.into()).load(Ordering::SeqCst)
     }
 
     /// Writes one.
-    pub(crate) fn write_geni(&self, offset: u16, byte: u8) {
+    pub fn write_geni(&self, offset: u16, byte: u8) {
         self.window_byte(offset.into()).store(byte, Ordering::SeqCst);
     }
 
     /// The GENI board's reset line: bit 0 is set as long as it is held, and the rest changes with every pulse.
-    pub(crate) fn geni_reset(&self) -> u32 {
+    pub fn geni_reset(&self) -> u32 {
         self.read(GENI_RESET)
     }
 
     /// Moves all contacts at once.
-    pub(crate) fn set_inputs(&self, inputs: u32) {
+    pub fn set_inputs(&self, inputs: u32) {
         self.write(INPUT_LATCH, inputs);
     }
 
@@ -165,7 +166,7 @@ impl ExternalBus {
     }
 
     /// The tick of the board's latest sample.
-    pub(crate) fn sample_counter(&self) -> u32 {
+    pub fn sample_counter(&self) -> u32 {
         self.read(SAMPLE_COUNTER)
     }
 
@@ -182,7 +183,7 @@ impl ExternalBus {
     }
 
     /// How often the board has started.
-    pub(crate) fn boots(&self) -> u32 {
+    pub fn boots(&self) -> u32 {
         self.read(BOOT_COUNT)
     }
 
@@ -219,12 +220,12 @@ impl ExternalBus {
     }
 
     /// Has it bring a fault upon itself.
-    pub(crate) fn force(&self, fault: u32) {
+    pub fn force(&self, fault: u32) {
         self.write(FORCED_FAULT, fault);
     }
 
     /// Turns its battery-backed clock on to `count_ms`. Only one thread may.
-    pub(crate) fn set_clock(&self, count_ms: u64) {
+    pub fn set_clock(&self, count_ms: u64) {
         let before_ms = self.clock_written_ms.swap(count_ms, Ordering::Relaxed);
         if before_ms == count_ms {
             return;

@@ -3,5 +3,6 @@
 
 pub(crate) mod emulated_board;
 pub(crate) mod emulator;
-pub(crate) mod emulator_files;
-pub(crate) mod external_bus;
+pub mod emulator_files;
+pub mod external_bus;
+pub mod process;

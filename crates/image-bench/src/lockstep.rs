@@ -1,7 +1,7 @@
 //! The ARM image in QEMU in virtual time: it runs from stop to stop, and the world moves while it is held.
 //!
 //! # Design
-//! QEMU counts instructions for time (`-icount`), and a plugin of it (`ser-qemu-plugin`) holds the processor before
+//! QEMU counts instructions for time (`-icount`), and a plugin of it (`image-bench-plugin`) holds the processor before
 //! chosen instructions. Between two stops nothing reaches the board from outside. What happens is then the same in
 //! every run and on every machine, and every instruction can be looked at.
 //!
@@ -36,13 +36,13 @@ use std::time::{Duration, Instant};
 use ser_proto::Model;
 use tempfile::TempDir;
 
-use crate::error::SimError;
-use crate::genius::Board;
-use crate::options::EmulatorOptions;
-use crate::qemu::emulated_board::ForcedFault;
-use crate::qemu::emulator::{PROGRAM, Qemu, is_temporary, read_printed, spawn};
-use crate::qemu::emulator_files::EmulatorFiles;
-use crate::qemu::external_bus::ExternalBus;
+use ser_sim::EmulatorOptions;
+use ser_sim::ForcedFault;
+use ser_sim::SimError;
+use ser_sim::genius::Board;
+use ser_sim::qemu::emulator_files::EmulatorFiles;
+use ser_sim::qemu::external_bus::ExternalBus;
+use ser_sim::qemu::process::{PROGRAM, Qemu, is_temporary, read_printed, spawn};
 
 use line_out::LineOut;
 use probe::Probe;
@@ -65,7 +65,7 @@ pub const INSTRUCTIONS_PER_MS: u64 = 1_000_000 >> INSTRUCTION_SHIFT;
 pub struct LockstepOptions {
     /// The image and the emulator.
     pub emulator: EmulatorOptions,
-    /// The plugin for QEMU, built from `ser-qemu-plugin`.
+    /// The plugin for QEMU, built from `image-bench-plugin`.
     pub plugin: PathBuf,
     /// Which recorder the board is strapped to be.
     pub model: Model,

@@ -10,7 +10,7 @@ use std::os::fd::OwnedFd;
 
 use rustix::pipe::{PipeFlags, fcntl_setpipe_size, pipe_with};
 
-use crate::qemu::emulator::is_temporary;
+use ser_sim::qemu::process::is_temporary;
 
 /// The bench's end.
 pub(super) struct LineOut {
