@@ -9,10 +9,35 @@ use ser_client::{
 };
 use ser_proto::{Baud, Configuration};
 
-use crate::cli::ConnectionArgs;
 use crate::error::{Failure, Result, advise, inform, warn};
 use crate::interrupt::Caught;
 use crate::unit_name::UnitName;
+use crate::values;
+
+/// How to reach the unit. Accepted before and after the subcommand.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Connection")]
+pub(crate) struct ConnectionArgs {
+    /// Serial port of the unit (/dev/ttyUSB0, COM3), tcp://HOST:PORT, or geni:FILE?node=N on a Genius bus.
+    ///
+    /// FILE is the window that this computer shares with its GENI board, N the unit's number on the bus. For a board in
+    /// this computer FILE is a device for memory; &offset=0x… says where in it the window begins.
+    #[arg(short, long, global = true, env = "SER_PORT", hide_env_values = true, value_name = "PORT")]
+    pub(crate) port: Option<String>,
+
+    /// Rate of the serial port, 9600 if not given. Over TCP: of the terminal server's port, for `clock set` to reckon
+    /// with.
+    #[arg(long, global = true, value_name = "RATE", value_parser = values::baud)]
+    pub(crate) baud: Option<Baud>,
+
+    /// How long the unit may take to answer, on top of the time on the line: 500ms, 2s.
+    #[arg(long, global = true, value_name = "TIME", value_parser = values::duration)]
+    pub(crate) timeout: Option<Duration>,
+
+    /// How often a question is asked again when no good answer comes.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100))]
+    pub(crate) retries: Option<u32>,
+}
 
 /// What the user calls the unit.
 pub(crate) fn port_text(connection: &ConnectionArgs) -> Result<&str> {

@@ -5,8 +5,7 @@ use std::time::{Duration, Instant};
 
 use ser_client::Cursor;
 
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::error::Result;
 use crate::output::{self, Before, Life};
 use crate::state::{Delivered, StateFile, StateLock};

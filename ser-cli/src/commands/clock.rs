@@ -5,8 +5,7 @@ use std::time::Instant;
 
 use ser_proto::TimeStamp;
 
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result};
 use crate::time::{local_time_in, parse_time, time_after};
 

@@ -4,7 +4,6 @@ use std::io::{self, Write};
 
 use clap_complete::Shell;
 
-use crate::cli::Cli;
 use crate::error::Result;
 
 const EXAMPLES: &str = "\
@@ -21,9 +20,9 @@ pub(crate) struct Args {
     shell: Shell,
 }
 
-pub(crate) fn run(args: &Args) -> Result<()> {
+pub(crate) fn run(args: &Args, definition: &mut clap::Command) -> Result<()> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::definition(), "ser-cli", &mut script);
+    clap_complete::generate(args.shell, definition, "ser-cli", &mut script);
     let mut out = io::stdout().lock();
     out.write_all(&script)?;
     out.flush()?;

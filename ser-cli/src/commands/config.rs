@@ -5,8 +5,7 @@ use std::io::{self, Write};
 use ser_client::{RequestError, Unit};
 use ser_proto::{AutoReport, Baud, Configuration, Configure, MAX_REPORT_ADDRESS};
 
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result};
 use crate::output::field;
 use crate::values::{self, ReportVia, Switch, on_off};

@@ -1,7 +1,6 @@
 //! `erase`: away with the events.
 
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
 use crate::keeper::{Keeper, StateArgs};
 

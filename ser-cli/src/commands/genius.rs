@@ -9,8 +9,7 @@ use clap::ValueEnum;
 use ser_client::Recognition;
 use ser_proto::genius::{Device, ForceTable};
 
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result};
 
 const EXAMPLES: &str = "\

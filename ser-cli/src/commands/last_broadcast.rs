@@ -2,8 +2,7 @@
 
 use std::io::{self, Write};
 
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::error::Result;
 
 const EXAMPLES: &str = "\

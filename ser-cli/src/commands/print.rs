@@ -6,8 +6,7 @@ use std::time::{Duration, Instant};
 
 use ser_client::{LineRate, TextLine, Unsolicited};
 
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
 use crate::values;
 

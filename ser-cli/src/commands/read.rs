@@ -6,8 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use ser_client::{Cursor, Delivery, LogFollower, RangeReader, RequestError, Unit};
 use ser_proto::{Code, Command, MAX_SIZE, Reply};
 
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::delivery::Outlet;
 use crate::error::{Failure, Result, advise, inform, warn};
 use crate::interrupt;

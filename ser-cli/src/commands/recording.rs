@@ -1,7 +1,6 @@
 //! `start` and `stop`: whether the unit records.
 
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::error::{Result, inform};
 
 const START_EXAMPLES: &str = "\

@@ -5,8 +5,7 @@ use std::io::{self, Write};
 use ser_client::{Delivery, LogPosition, Unit};
 use ser_proto::{Configuration, Entry, Mode, Model};
 
-use crate::cli::ConnectionArgs;
-use crate::connection::{self, unless_unanswered};
+use crate::connection::{self, ConnectionArgs, unless_unanswered};
 use crate::error::{Result, advise};
 use crate::output::field;
 

@@ -8,8 +8,7 @@ use std::time::{Duration, Instant};
 use ser_client::{LogFollower, LogWatcher, ReportSwitch, Unit};
 use ser_proto::{AutoReport, Configuration, Configure};
 
-use crate::cli::ConnectionArgs;
-use crate::connection::{self, HEARTBEAT};
+use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::delivery::Outlet;
 use crate::error::{Failure, Result, inform};
 use crate::interrupt;

@@ -71,7 +71,7 @@ pub unsafe extern "C" fn qemu_plugin_install(
             0
         }
         Err(what) => {
-            eprintln!("ser-qemu-plugin: {what}");
+            eprintln!("image-bench-plugin: {what}");
             1
         }
     }

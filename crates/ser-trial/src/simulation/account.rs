@@ -10,7 +10,8 @@ use std::ops::Range;
 use ser_client::{Delivery, Lost};
 use ser_proto::Entry;
 
-use super::ledger::{Erase, Ledger, Recorded};
+use super::ledger::Ledger;
+use super::recorded::{Erase, Recorded};
 use super::wrong::{Told, Wrong, erases};
 use silence::Silence;
 pub use silence::{Known, Unreported};

@@ -9,12 +9,12 @@ mod tests;
 
 use std::collections::{BTreeMap, VecDeque};
 
-use chrono::NaiveDateTime;
 use ser_node::capture::QUEUE_LEN;
 use ser_node::{Debounce, HELD_BACK_MS};
 use ser_proto::{Command, Configuration, Entry, MAX_SIZE, Reply, TimeStamp};
 
 use super::debounce_model::{Accepted, DebounceModel};
+use super::recorded::{Erase, Recorded, stamp_ms};
 use super::wrong::{Numbered, Told, Wrong, erases};
 
 /// A hundred years, 1970–2069: what two-digit years can tell apart.
@@ -26,35 +26,6 @@ const KEPT: usize = 1 << 17;
 
 /// For so long a reply may be on its way that tells older settings.
 const SETTINGS_SETTLE_MS: u64 = 120_000;
-
-/// An event that must be recorded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Recorded {
-    /// Its stamp, in milliseconds since 1970.
-    pub stamp_ms: i64,
-    /// The inputs that changed.
-    pub changed: u32,
-    /// The inputs that are on.
-    pub state: u32,
-    /// When it happened.
-    pub at_ms: u64,
-    /// Inputs that changed since the event before, and of which no event tells; those that changed back are not in it.
-    pub unrecorded: u32,
-}
-
-impl Recorded {
-    /// Whether this is what an entry says.
-    #[must_use]
-    pub fn is(&self, entry: &Entry) -> bool {
-        (self.changed, self.state) == (entry.changed.0, entry.state.0)
-            && stamp_ms(entry.time) == Some(self.stamp_ms)
-    }
-}
-
-/// Milliseconds since 1970; nothing if there is no such time.
-pub(super) fn stamp_ms(time: TimeStamp) -> Option<i64> {
-    NaiveDateTime::try_from(time).ok().map(|time| time.and_utc().timestamp_millis())
-}
 
 /// What became of edges; each is in one of these.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -73,22 +44,6 @@ pub struct Edges {
     pub cut_off: u64,
     /// Not dealt with yet.
     pub undecided: u64,
-}
-
-/// An erase, between two events: `from` is the index of the first event that may be after it, `to` of the last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Erase {
-    /// The earliest it can have been.
-    pub from: usize,
-    /// The latest it can have been; grows until its reply has been seen.
-    pub to: usize,
-    /// Whether it has been, and not only may have been.
-    pub certain: bool,
-}
-
-impl Erase {
-    /// Power-up is as good as an erase.
-    pub const POWER_UP: Erase = Erase { from: 0, to: 0, certain: true };
 }
 
 /// The port that a command came by.

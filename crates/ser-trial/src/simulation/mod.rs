@@ -25,6 +25,7 @@ pub mod noise;
 pub mod orders;
 pub mod pace;
 pub mod printout;
+pub mod recorded;
 pub mod report;
 pub mod taps;
 pub mod trail;

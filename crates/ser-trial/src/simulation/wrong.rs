@@ -5,7 +5,7 @@ use std::fmt::{self, Display};
 use chrono::DateTime;
 use ser_proto::Entry;
 
-use super::ledger::{Erase, Recorded, stamp_ms};
+use super::recorded::{Erase, Recorded, stamp_ms};
 
 /// Erases that are shown; a life can have thousands.
 const SHOWN: usize = 8;

@@ -7,8 +7,7 @@ use ser_client::{GeniHost, Recognition};
 use ser_proto::{Command, LastBroadcast, TimeStamp};
 
 use super::{no_recorder, silent_candidates};
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
 use crate::time::{local_time_in, parse_time};
 

@@ -7,8 +7,7 @@ use std::io::{self, Write};
 use ser_client::{BlockKind, BusDevice, GeniHost, Recognition};
 use ser_proto::genius::GlobalData;
 
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::error::{Result, advise, inform, warn};
 
 pub(super) fn run(connection: &ConnectionArgs, how: Recognition) -> Result<()> {

@@ -4,8 +4,7 @@ use std::io::{self, Write};
 
 use ser_proto::genius::ForceTable;
 
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::decoding::hex_text;
 use crate::error::Result;
 

@@ -11,8 +11,7 @@ use ser_client::{BusRecorders, GeniHost, Recognition};
 use ser_proto::genius::GlobalData;
 
 use super::{no_recorder, silent_candidates};
-use crate::cli::ConnectionArgs;
-use crate::connection;
+use crate::connection::{self, ConnectionArgs};
 use crate::error::{Result, advise, inform};
 use crate::interrupt;
 use crate::outage::Outage;
