@@ -1,13 +1,15 @@
 //! `genius`: the bus as a whole.
 
 mod broadcast;
+mod decode;
 mod devices;
+mod dip;
 mod forces;
 mod globals;
 
 use clap::ValueEnum;
 use ser_client::Recognition;
-use ser_proto::genius::{Device, ForceTable};
+use ser_proto::genius::{Device, DipSwitches, ForceTable};
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result};
@@ -21,6 +23,8 @@ Examples:
   ser-cli genius forces --node 5 --table input-values
   ser-cli genius broadcast clock
   ser-cli genius broadcast erase --yes
+  ser-cli genius decode 20 1E 04 00 01 00
+  ser-cli genius dip 10100111
 
 The port is the window of this host's GENI board, without a node.";
 
@@ -42,6 +46,17 @@ Examples:
   ser-cli genius broadcast clock
   ser-cli genius broadcast clock --at 2026-11-22T10:00:00.250
   ser-cli genius broadcast erase --yes";
+
+const DECODE_EXAMPLES: &str = "\
+Examples:
+  ser-cli genius decode 20 00                   the bus's own: Read ID
+  ser-cli genius decode 20 1E 04 00 01 00       Read Device
+  ser-cli genius decode 40 50 45                the recorder's: erase";
+
+const DIP_EXAMPLES: &str = "\
+Examples:
+  ser-cli genius dip 10100111                   what do these switches say?
+  ser-cli genius dip --address 5 --rate 38.4K   how are they to be set?";
 
 /// Look at a Genius bus as a whole, and speak to all its recorders at once.
 #[derive(Debug, clap::Args)]
@@ -87,6 +102,26 @@ enum What {
         what: broadcast::What,
         #[command(flatten)]
         who: Who,
+    },
+    /// Say in words what a datagram means. No bus is needed.
+    #[command(after_help = DECODE_EXAMPLES)]
+    Decode {
+        /// Function code, subfunction code and data, in hexadecimal.
+        #[arg(required = true, value_name = "HEX")]
+        bytes: Vec<String>,
+    },
+    /// Say what a recorder's DIP switches mean, or how to set them. No bus is needed.
+    #[command(after_help = DIP_EXAMPLES)]
+    Dip {
+        /// Switches 1 to 8 as eight digits: 1 is open, 0 is closed.
+        #[arg(value_name = "SWITCHES", value_parser = dip::switches, conflicts_with_all = ["address", "rate"])]
+        switches: Option<DipSwitches>,
+        /// The bus address that the recorder is to have, 0-31.
+        #[arg(long, value_name = "N", value_parser = device)]
+        address: Option<Device>,
+        /// The rate of the bus.
+        #[arg(long, value_name = "RATE", default_value = "153.6K")]
+        rate: dip::Rate,
     },
 }
 
@@ -139,6 +174,8 @@ fn device(text: &str) -> std::result::Result<Device, String> {
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     match args.what {
+        What::Decode { ref bytes } => decode::run(bytes),
+        What::Dip { switches, address, rate } => dip::run(switches, address, rate),
         What::Devices { who } => devices::run(connection, who.recognition(connection)),
         What::Globals { follow, who } => globals::run(connection, follow, who.recognition(connection)),
         What::Forces { node, table } => forces::run(connection, node.number(), table.into()),

@@ -46,8 +46,16 @@ impl Message {
         if datagram.function != FUNCTION_GENIUS {
             return Err(MessageError::WrongFunction { function: datagram.function });
         }
-        let data = &datagram.data[..];
-        match Subfunction::from_code(datagram.subfunction) {
+        Message::from_data(datagram.subfunction, &datagram.data)
+    }
+
+    /// Understands what a datagram of function code 20h carries.
+    ///
+    /// # Errors
+    /// See [`MessageError`]. A subfunction that we do not know is not an error.
+    pub fn from_data(subfunction: u8, carried: &Data) -> Result<Message, MessageError> {
+        let data = &carried[..];
+        match Subfunction::from_code(subfunction) {
             Subfunction::ReadId if data.is_empty() => Ok(Message::ReadId),
             subfunction @ Subfunction::ReadId => {
                 Err(MessageError::WrongLength { subfunction, length: data.len() })
@@ -63,7 +71,7 @@ impl Message {
                 MemoryContents::parse(subfunction, data).map(Message::WriteDevice)
             }
             Subfunction::WritePoint => WritePoint::parse(data).map(Message::WritePoint),
-            subfunction => Ok(Message::Unknown { subfunction, data: datagram.data.clone() }),
+            subfunction => Ok(Message::Unknown { subfunction, data: carried.clone() }),
         }
     }
 

@@ -1,0 +1,147 @@
+//! `genius decode`: a datagram's codes and data in words.
+
+use std::io::{self, Write};
+
+use ser_proto::genius::{
+    Data, FUNCTION_GENIUS, FUNCTION_HORNER, MAX_DATA, Message, PointMask, SUBFUNCTION_SER, WritePoint,
+};
+
+use crate::decoding::{explain, hex_text};
+use crate::error::{Failure, Result};
+
+pub(super) fn run(words: &[String]) -> Result<()> {
+    let lines = lines_of(&bytes_of(words)?)?;
+    let mut out = io::stdout().lock();
+    writeln!(out, "{}", lines.join("\n"))?;
+    out.flush()?;
+    Ok(())
+}
+
+/// The bytes of words such as `20`, `0x20` or `201E0001`.
+fn bytes_of(words: &[String]) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    for word in words {
+        let digits = word.strip_prefix("0x").unwrap_or(word);
+        let pairs = digits.as_bytes().chunks(2);
+        let of_pair = |pair: &[u8]| match pair {
+            [high, low] => Some(hex_digit(*high)? << 4 | hex_digit(*low)?),
+            _ => None,
+        };
+        let of_word: Option<Vec<u8>> = pairs.map(of_pair).collect();
+        bytes.extend(of_word.ok_or_else(|| {
+            Failure::usage(format!("{word:?} is no hexadecimal byte"))
+                .hint("every byte has two digits: ser-cli genius decode 20 00")
+        })?);
+    }
+    Ok(bytes)
+}
+
+fn hex_digit(digit: u8) -> Option<u8> {
+    char::from(digit).to_digit(16).and_then(|digit| u8::try_from(digit).ok())
+}
+
+/// What a datagram says, and what it carries.
+fn lines_of(bytes: &[u8]) -> Result<Vec<String>> {
+    let &[function, subfunction, ref data @ ..] = bytes else {
+        return Err(Failure::usage("a datagram begins with its function and its subfunction code")
+            .hint("a Read ID: ser-cli genius decode 20 00"));
+    };
+    let Ok(carried) = Data::from_slice(data) else {
+        return Err(Failure::usage(format!(
+            "{} bytes of data are too many: a datagram carries up to {MAX_DATA}",
+            data.len()
+        )));
+    };
+    match (function, subfunction) {
+        (FUNCTION_GENIUS, _) => of_the_bus(subfunction, &carried),
+        (FUNCTION_HORNER, SUBFUNCTION_SER) => {
+            let message = explain(data, None);
+            match message.is_damage() {
+                true => Err(Failure::new(message.text)),
+                false => Ok(std::iter::once(message.text).chain(message.details).collect()),
+            }
+        }
+        _ => Ok(vec![format!("function {function:02X}h, subfunction {subfunction:02X}h: {}", shown(data))]),
+    }
+}
+
+fn of_the_bus(subfunction: u8, data: &Data) -> Result<Vec<String>> {
+    let message = Message::from_data(subfunction, data).map_err(|error| {
+        Failure::new(error).hint("the first byte is the function code, the second the subfunction code")
+    })?;
+    let details = match &message {
+        Message::ReadIoForcesReply(forces) => vec![shown(&forces.contents)],
+        Message::ReadDeviceReply(piece) | Message::WriteDevice(piece) => vec![shown(&piece.contents)],
+        Message::WritePoint(write) => changes(write),
+        Message::Unknown { data, .. } if !data.is_empty() => vec![shown(data)],
+        _ => Vec::new(),
+    };
+    let details = details.iter().map(|detail| format!("  {detail}"));
+    Ok(std::iter::once(message.to_string()).chain(details).collect())
+}
+
+/// The bits that a Write Point changes, a byte a line.
+fn changes(write: &WritePoint) -> Vec<String> {
+    let bits = |mask: u8| {
+        let bits: Vec<_> = (0..8).filter(|bit| mask >> bit & 1 != 0).map(|bit: u8| bit.to_string()).collect();
+        if bits.is_empty() { "none".to_owned() } else { bits.join(" ") }
+    };
+    let line = |(offset, mask): (usize, &PointMask)| {
+        format!("byte {offset}: sets bits {}, clears bits {}", bits(mask.or), bits(!mask.and & !mask.or))
+    };
+    write.masks.iter().enumerate().map(line).collect()
+}
+
+fn shown(data: &[u8]) -> String {
+    if data.is_empty() { "no data".to_owned() } else { hex_text(data) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decoded(words: &str) -> String {
+        let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
+        match bytes_of(&words).and_then(|bytes| lines_of(&bytes)) {
+            Ok(lines) => lines.join("\n"),
+            Err(failure) => failure.text(),
+        }
+    }
+
+    #[test]
+    fn every_kind_of_datagram_is_told_in_words() {
+        for (words, text) in [
+            ("20 00", "Read ID"),
+            ("20 40 02", "Read I/O Forces: input values"),
+            ("20 1E 04 00 01 00", "Read Device 4 bytes at 000100h"),
+            ("20 20 02 00 01 00 AB CD", "Write Device 2 bytes at 000100h\n  AB CD"),
+            (
+                "200B 04 000100 FE 01 FF 00",
+                "Write Point at 000100h\n  byte 0: sets bits 0, clears bits none\n  \
+                 byte 1: sets bits none, clears bits none",
+            ),
+            ("20 0F 01 02", "Report Fault, 2 bytes\n  01 02"),
+            ("20 33", "datagram 33h, no data"),
+            ("40 50 45", "host: erase the event buffer | unit: event buffer erased"),
+            ("0x33 0x01 0xFF", "function 33h, subfunction 01h: FF"),
+        ] {
+            assert_eq!(decoded(words), text, "{words}");
+        }
+        assert!(decoded("20 01 05").contains("Read ID reply"), "{}", decoded("20 01 05"));
+    }
+
+    #[test]
+    fn what_is_no_datagram_is_refused_with_what_to_do() {
+        for (words, what) in [
+            ("20", "begins with its function"),
+            ("2", "no hexadecimal byte"),
+            ("20 0g", "no hexadecimal byte"),
+            ("20 1E 04", "1"),
+            ("40 50 FF", "no message"),
+        ] {
+            assert!(decoded(words).contains(what), "{words}: {}", decoded(words));
+        }
+        let long = format!("20 0F {}", "00".repeat(MAX_DATA + 1));
+        assert!(decoded(&long).contains("too many"), "{}", decoded(&long));
+    }
+}

@@ -1,0 +1,95 @@
+//! `genius dip`: the DIP switches of a recorder, both ways.
+
+use std::io::{self, Write};
+
+use clap::ValueEnum;
+use ser_proto::genius::{BusRate, BusSettings, Device, DipSwitches};
+
+use crate::error::{Failure, Result, warn};
+
+/// The rate of a bus as the switches have it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Rate {
+    /// 153.6 kbit/s standard.
+    #[value(name = "153.6K")]
+    Standard,
+    /// 153.6 kbit/s extended, for long cables.
+    #[value(name = "153.6K-extended")]
+    Extended,
+    /// 76.8 kbit/s.
+    #[value(name = "76.8K")]
+    Half,
+    /// 38.4 kbit/s.
+    #[value(name = "38.4K")]
+    Quarter,
+}
+
+impl From<Rate> for BusRate {
+    fn from(rate: Rate) -> BusRate {
+        match rate {
+            Rate::Standard => BusRate::K153_6Standard,
+            Rate::Extended => BusRate::K153_6Extended,
+            Rate::Half => BusRate::K76_8,
+            Rate::Quarter => BusRate::K38_4,
+        }
+    }
+}
+
+/// Shows what the switches say, or how to set them.
+pub(super) fn run(switches: Option<DipSwitches>, address: Option<Device>, rate: Rate) -> Result<()> {
+    let switches = match (switches, address) {
+        (Some(switches), _) => switches,
+        (None, Some(address)) => BusSettings { address, rate: rate.into() }.switches(),
+        (None, None) => {
+            return Err(Failure::usage("neither switches nor an address are given")
+                .hint("what do they say? ser-cli genius dip 10100111")
+                .hint("how to set them? ser-cli genius dip --address 5"));
+        }
+    };
+    let mut out = io::stdout().lock();
+    writeln!(out, "{}", text(switches))?;
+    out.flush()?;
+    if let Err(closed) = switches.settings() {
+        warn(closed);
+    }
+    Ok(())
+}
+
+/// Eight digits, switch 1 first, 1 for an open switch.
+pub(super) fn switches(text: &str) -> std::result::Result<DipSwitches, String> {
+    let digits: Vec<char> = text.chars().collect();
+    if digits.len() != 8 || digits.iter().any(|digit| !matches!(digit, '0' | '1')) {
+        return Err("eight digits are needed, switch 1 first: 1 is open, 0 is closed".to_owned());
+    }
+    let bits = digits.iter().rev().fold(0, |bits, digit| bits << 1 | u8::from(*digit == '1'));
+    Ok(DipSwitches(bits))
+}
+
+fn text(switches: DipSwitches) -> String {
+    let digits: Vec<&str> = (1..=8).map(|number| if switches.is_open(number) { "1" } else { "0" }).collect();
+    format!(
+        "switch  1 2 3 4 5 6 7 8\n        {}   (1 is open)\naddress {}, {}",
+        digits.join(" "),
+        switches.address(),
+        switches.rate()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn switches_are_read_and_set_alike() {
+        let read = switches("10100111").expect("switches");
+        assert_eq!(
+            text(read),
+            "switch  1 2 3 4 5 6 7 8\n        1 0 1 0 0 1 1 1   (1 is open)\naddress 5, 153.6K standard"
+        );
+        let address = Device::new(5).expect("an address");
+        assert_eq!(BusSettings { address, rate: Rate::Standard.into() }.switches(), read);
+        for wrong in ["", "1010011", "101001110", "10100112", "0xA7"] {
+            assert!(switches(wrong).is_err(), "{wrong}");
+        }
+    }
+}
