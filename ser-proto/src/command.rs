@@ -3,7 +3,8 @@
 use nom::Parser;
 use nom::number::complete::{be_u8, be_u16};
 
-use crate::params::{byte, flag, parse_params};
+use crate::fields::{byte, flag};
+use crate::params::parse_params;
 use crate::read_reply::parse_request;
 use crate::{Body, Code, Configure, ParseError, TimeStamp};
 

@@ -8,7 +8,8 @@
 
 use nom::Parser;
 
-use crate::params::{Bytes, below, byte, flag, parse_params, word};
+use crate::fields::{Bytes, below, byte, flag, word};
+use crate::params::parse_params;
 use crate::{Body, Code, ParseError};
 
 /// The largest event buffer, in entries.

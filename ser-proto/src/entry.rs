@@ -11,7 +11,7 @@ use nom::Parser;
 use nom::combinator::map;
 use nom::number::complete::{be_u16, be_u32};
 
-use crate::params::{Bytes, Fault};
+use crate::fields::{Bytes, Fault};
 use crate::{Body, Model, TimeStamp};
 
 /// A set of inputs: input 1 is bit 0, input 32 is bit 31.

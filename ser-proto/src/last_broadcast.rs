@@ -9,7 +9,8 @@ use core::fmt;
 use nom::Parser;
 use nom::number::complete::be_u8;
 
-use crate::params::{Bytes, below, byte, parse_params, word};
+use crate::fields::{Bytes, below, byte, word};
+use crate::params::parse_params;
 use crate::{Body, Code, ParseError};
 
 /// The command that was last received as a broadcast, and when.

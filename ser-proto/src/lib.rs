@@ -20,6 +20,7 @@ mod command;
 mod configuration;
 mod entry;
 mod error;
+mod fields;
 mod frame_decoder;
 mod frame_encoder;
 pub mod genius;

@@ -9,7 +9,8 @@ use core::fmt;
 use nom::Parser;
 use nom::number::complete::be_u8;
 
-use crate::params::{Bytes, byte, flag, parse_params};
+use crate::fields::{Bytes, byte, flag};
+use crate::params::parse_params;
 use crate::{Body, Code, ParseError};
 
 /// The reply to `M`: whether the unit records, and its firmware version.

@@ -7,7 +7,8 @@
 use heapless::Vec;
 use nom::number::complete::{be_u8, be_u16};
 
-use crate::params::{Bytes, below, byte, parse_params, word};
+use crate::fields::{Bytes, below, byte, word};
+use crate::params::parse_params;
 use crate::{Body, Code, Entry, MAX_SIZE, Model, ParseError};
 
 /// The most entries that one reply carries.

@@ -13,7 +13,7 @@ use nom::Parser;
 use nom::number::complete::{be_u8, be_u16};
 
 use crate::Body;
-use crate::params::{Bytes, Fault};
+use crate::fields::{Bytes, Fault};
 
 /// A date and time of day with a resolution of one millisecond, in whatever time zone the unit was set to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -10,8 +10,11 @@
 use core::fmt;
 
 use heapless::Vec;
+use nom::Parser;
+use nom::number::complete::{le_u16, le_u32};
 
 use super::packing::gather;
+use crate::fields::parse_exactly;
 use crate::{Inputs, Model};
 
 /// The global data of a recorder.
@@ -39,15 +42,11 @@ impl GlobalData {
     /// # Errors
     /// [`GlobalDataLength`] when there are neither 2 nor 4 bytes.
     pub fn parse(bytes: &[u8]) -> Result<GlobalData, GlobalDataLength> {
-        match *bytes {
-            [a, b] => {
-                Ok(GlobalData { model: Model::Ser160, state: Inputs(u16::from_le_bytes([a, b]).into()) })
-            }
-            [a, b, c, d] => {
-                Ok(GlobalData { model: Model::Ser320, state: Inputs(u32::from_le_bytes([a, b, c, d])) })
-            }
-            _ => Err(GlobalDataLength { length: bytes.len() }),
-        }
+        let (ser160, ser320) = (le_u16.map(u32::from), le_u32);
+        let state = |model, state| GlobalData { model, state: Inputs(state) };
+        parse_exactly(bytes, 2, ser160.map(|bits| state(Model::Ser160, bits)))
+            .or_else(|_| parse_exactly(bytes, 4, ser320.map(|bits| state(Model::Ser320, bits))))
+            .map_err(|_| GlobalDataLength { length: bytes.len() })
     }
 
     /// The bytes on the bus. Inputs that the model does not have are left out.

@@ -10,10 +10,13 @@
 use core::fmt;
 
 use heapless::Vec;
+use nom::combinator::rest;
 
+use super::message_error::parse_data;
 use super::packing::gather;
 use super::{Data, GlobalData, MessageError, Subfunction};
 use crate::Model;
+use crate::fields::byte;
 
 /// The most bytes of a force table that one reply carries, after the byte that names the table.
 pub const MAX_FORCE_TABLE: usize = 128;
@@ -55,20 +58,11 @@ impl ForceTable {
     }
 
     pub(super) fn parse(data: &[u8]) -> Result<ForceTable, MessageError> {
-        match *data {
-            [code] => ForceTable::parse_code(Subfunction::ReadIoForces, code),
-            _ => {
-                Err(MessageError::WrongLength { subfunction: Subfunction::ReadIoForces, length: data.len() })
-            }
-        }
+        parse_data(Subfunction::ReadIoForces, data, 1, byte(ForceTable::from_code))
     }
 
     pub(super) fn to_data(self) -> Data {
         Data::from_array([self.code()])
-    }
-
-    fn parse_code(subfunction: Subfunction, code: u8) -> Result<ForceTable, MessageError> {
-        ForceTable::from_code(code).ok_or(MessageError::BadValue { subfunction, offset: 0, value: code })
     }
 }
 
@@ -107,10 +101,11 @@ impl IoForces {
 
     pub(super) fn parse(data: &[u8]) -> Result<IoForces, MessageError> {
         let subfunction = Subfunction::ReadIoForcesReply;
-        let wrong_length = MessageError::WrongLength { subfunction, length: data.len() };
-        let (&code, contents) = data.split_first().ok_or(wrong_length)?;
-        let table = ForceTable::parse_code(subfunction, code)?;
-        Ok(IoForces { table, contents: Vec::from_slice(contents).map_err(|_| wrong_length)? })
+        let (table, contents) =
+            parse_data(subfunction, data, data.len(), (byte(ForceTable::from_code), rest))?;
+        let contents = Vec::from_slice(contents)
+            .map_err(|_| MessageError::WrongLength { subfunction, length: data.len() })?;
+        Ok(IoForces { table, contents })
     }
 
     pub(super) fn to_data(&self) -> Data {

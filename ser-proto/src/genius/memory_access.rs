@@ -11,9 +11,14 @@
 use core::fmt;
 
 use heapless::Vec;
+use nom::combinator::rest;
+use nom::number::complete::le_u24;
+use nom::{IResult, Parser};
 
+use super::message_error::parse_data;
 use super::packing::gather;
 use super::{Data, MAX_DATA, MessageError, Subfunction};
+use crate::fields::{Bytes, Fault, byte};
 
 /// Bytes before the contents.
 const HEADER_LEN: usize = 4;
@@ -41,8 +46,9 @@ impl MemoryAddress {
         self.0
     }
 
-    pub(super) const fn from_le_bytes([low, middle, high]: [u8; 3]) -> MemoryAddress {
-        MemoryAddress(u32::from_le_bytes([low, middle, high, 0]))
+    /// The field of a message, low byte first.
+    pub(super) fn field(bytes: Bytes<'_>) -> IResult<Bytes<'_>, MemoryAddress, Fault> {
+        le_u24.map(MemoryAddress).parse(bytes)
     }
 
     pub(super) const fn to_le_bytes(self) -> [u8; 3] {
@@ -70,14 +76,9 @@ pub struct MemoryRange {
 
 impl MemoryRange {
     pub(super) fn parse(data: &[u8]) -> Result<MemoryRange, MessageError> {
-        let subfunction = Subfunction::ReadDevice;
-        match *data {
-            [length, a, b, c] if usize::from(length) <= MAX_MEMORY_DATA => {
-                Ok(MemoryRange { address: MemoryAddress::from_le_bytes([a, b, c]), length })
-            }
-            [value, _, _, _] => Err(MessageError::BadValue { subfunction, offset: 0, value }),
-            _ => Err(MessageError::WrongLength { subfunction, length: data.len() }),
-        }
+        let length = byte(|length| (usize::from(length) <= MAX_MEMORY_DATA).then_some(length));
+        let range = (length, MemoryAddress::field).map(|(length, address)| MemoryRange { address, length });
+        parse_data(Subfunction::ReadDevice, data, HEADER_LEN, range)
     }
 
     pub(super) fn to_data(self) -> Data {
@@ -99,14 +100,12 @@ pub struct MemoryContents {
 impl MemoryContents {
     pub(super) fn parse(subfunction: Subfunction, data: &[u8]) -> Result<MemoryContents, MessageError> {
         let wrong_length = MessageError::WrongLength { subfunction, length: data.len() };
-        let Some((&[length, a, b, c], contents)) = data.split_first_chunk() else {
-            return Err(wrong_length);
-        };
+        let contents = data.get(HEADER_LEN..).ok_or(wrong_length)?;
         let contents = Vec::from_slice(contents).map_err(|_| wrong_length)?;
-        if usize::from(length) != contents.len() {
-            return Err(MessageError::BadValue { subfunction, offset: 0, value: length });
-        }
-        Ok(MemoryContents { address: MemoryAddress::from_le_bytes([a, b, c]), contents })
+        let length = byte(|length| (usize::from(length) == contents.len()).then_some(length));
+        let (_, address, _) =
+            parse_data(subfunction, data, data.len(), (length, MemoryAddress::field, rest))?;
+        Ok(MemoryContents { address, contents })
     }
 
     pub(super) fn to_data(&self) -> Data {

@@ -2,7 +2,10 @@
 
 use core::fmt;
 
+use nom::Parser;
+
 use super::{FUNCTION_GENIUS, Subfunction};
+use crate::fields::{Bytes, Fault, Refusal, parse_exactly};
 
 /// Why a datagram could not be understood. Offsets count from the first data byte, which is offset 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +32,23 @@ pub enum MessageError {
         /// What it holds.
         value: u8,
     },
+}
+
+/// Parses the data of a datagram, of which there must be `expected_len` bytes.
+pub(super) fn parse_data<'a, T>(
+    subfunction: Subfunction,
+    data: Bytes<'a>,
+    expected_len: usize,
+    parser: impl Parser<Bytes<'a>, Output = T, Error = Fault>,
+) -> Result<T, MessageError> {
+    parse_exactly(data, expected_len, parser).map_err(|refusal| match refusal {
+        Refusal::Length => MessageError::WrongLength { subfunction, length: data.len() },
+        // Fields that are checked have one byte here.
+        Refusal::Value { offset, value } => {
+            let [_, value] = value.to_be_bytes();
+            MessageError::BadValue { subfunction, offset, value }
+        }
+    })
 }
 
 impl fmt::Display for MessageError {

@@ -7,7 +7,12 @@
 
 use core::fmt;
 
+use nom::Parser;
+use nom::number::complete::{be_u8, le_u16};
+
+use super::message_error::parse_data;
 use super::{BusRate, Data, MessageError, Subfunction};
+use crate::fields::byte;
 
 /// Data bytes of the reply.
 const LEN: usize = 12;
@@ -42,44 +47,38 @@ pub struct ReadIdReply {
 
 impl ReadIdReply {
     pub(super) fn parse(data: &[u8]) -> Result<ReadIdReply, MessageError> {
-        let subfunction = Subfunction::ReadIdReply;
-        let Ok(
-            [
-                input_len,
-                output_len,
-                configuration_len,
-                diagnostic_len,
+        // The lower half of the byte means nothing.
+        let rate = byte(|rate| BusRate::from_code(rate >> 4));
+        let lengths = (be_u8, be_u8, be_u8, be_u8);
+        let fields = (lengths, be_u8.map(DeviceStatus), le_u16, be_u8, be_u8, be_u8, be_u8, rate);
+        let reply = fields.map(
+            |(
+                lengths,
                 status,
-                reference_low,
-                reference_high,
+                reference_address,
                 application,
                 software_revision,
                 controller,
                 model,
                 rate,
-            ],
-        ) = <[u8; LEN]>::try_from(data)
-        else {
-            return Err(MessageError::WrongLength { subfunction, length: data.len() });
-        };
-        Ok(ReadIdReply {
-            input_len,
-            output_len,
-            configuration_len,
-            diagnostic_len,
-            status: DeviceStatus(status),
-            reference_address: u16::from_le_bytes([reference_low, reference_high]),
-            application,
-            software_revision,
-            controller,
-            model,
-            // The lower half of the byte means nothing.
-            rate: BusRate::from_code(rate >> 4).ok_or(MessageError::BadValue {
-                subfunction,
-                offset: LEN - 1,
-                value: rate,
-            })?,
-        })
+            )| {
+                let (input_len, output_len, configuration_len, diagnostic_len) = lengths;
+                ReadIdReply {
+                    input_len,
+                    output_len,
+                    configuration_len,
+                    diagnostic_len,
+                    status,
+                    reference_address,
+                    application,
+                    software_revision,
+                    controller,
+                    model,
+                    rate,
+                }
+            },
+        );
+        parse_data(Subfunction::ReadIdReply, data, LEN, reply)
     }
 
     pub(super) fn to_data(self) -> Data {

@@ -7,10 +7,18 @@
 //! The head is that of the other memory accesses; the order of the masks is that of the PLC command that makes
 //! such datagrams. See `docs/genius.md` for how sure this is.
 
+use nom::Parser;
+use nom::number::complete::be_u8;
+
+use super::message_error::parse_data;
 use super::{Data, MemoryAddress, MessageError, Subfunction};
+use crate::fields::byte;
 
 /// Bytes after the address.
 const MASKS_LEN: u8 = 4;
+
+/// Length, address and masks.
+const LEN: usize = 8;
 
 /// Which bits of a byte change: a bit outside `and` is cleared, a bit in `or` is set, the others stay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -45,18 +53,11 @@ pub struct WritePoint {
 
 impl WritePoint {
     pub(super) fn parse(data: &[u8]) -> Result<WritePoint, MessageError> {
-        let subfunction = Subfunction::WritePoint;
-        match *data {
-            [MASKS_LEN, a, b, c, first_and, first_or, second_and, second_or] => Ok(WritePoint {
-                address: MemoryAddress::from_le_bytes([a, b, c]),
-                masks: [
-                    PointMask { and: first_and, or: first_or },
-                    PointMask { and: second_and, or: second_or },
-                ],
-            }),
-            [value, _, _, _, _, _, _, _] => Err(MessageError::BadValue { subfunction, offset: 0, value }),
-            _ => Err(MessageError::WrongLength { subfunction, length: data.len() }),
-        }
+        let mask = || (be_u8, be_u8).map(|(and, or)| PointMask { and, or });
+        let length = byte(|length| (length == MASKS_LEN).then_some(length));
+        let fields = (length, MemoryAddress::field, mask(), mask());
+        let write = fields.map(|(_, address, first, second)| WritePoint { address, masks: [first, second] });
+        parse_data(Subfunction::WritePoint, data, LEN, write)
     }
 
     pub(super) fn to_data(self) -> Data {

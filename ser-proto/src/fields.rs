@@ -1,0 +1,92 @@
+//! Fields of a message, parsed with nom behind our own errors.
+//!
+//! The length is checked before any field, so a message of a wrong length is never mistaken for one with a bad value.
+
+use nom::Parser;
+use nom::error::{ErrorKind, FromExternalError, ParseError as NomParseError};
+
+pub(crate) type Bytes<'a> = &'a [u8];
+
+/// What nom hands up: how many bytes were left where parsing stopped, and the value that was refused there.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    remaining: usize,
+    value: Option<u16>,
+}
+
+impl NomParseError<Bytes<'_>> for Fault {
+    fn from_error_kind(input: Bytes<'_>, _: ErrorKind) -> Fault {
+        Fault { remaining: input.len(), value: None }
+    }
+
+    fn append(_: Bytes<'_>, _: ErrorKind, other: Fault) -> Fault {
+        other
+    }
+}
+
+impl FromExternalError<Bytes<'_>, u16> for Fault {
+    fn from_external_error(input: Bytes<'_>, _: ErrorKind, value: u16) -> Fault {
+        Fault { remaining: input.len(), value: Some(value) }
+    }
+}
+
+/// Why bytes are not what their layout asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Refusal {
+    /// There are never so many.
+    Length,
+    /// A field holds a value that it cannot have.
+    Value {
+        /// Where the field starts.
+        offset: usize,
+        /// What it holds.
+        value: u16,
+    },
+}
+
+/// Parses `bytes`, of which there must be `expected_len`.
+pub(crate) fn parse_exactly<'a, T>(
+    bytes: Bytes<'a>,
+    expected_len: usize,
+    parser: impl Parser<Bytes<'a>, Output = T, Error = Fault>,
+) -> Result<T, Refusal> {
+    if bytes.len() != expected_len {
+        return Err(Refusal::Length);
+    }
+    // `finish()` would do, but it panics on `Incomplete`, which these parsers never return.
+    match nom::combinator::all_consuming(parser).parse(bytes) {
+        Ok((_, fields)) => Ok(fields),
+        Err(nom::Err::Error(Fault { remaining, value: Some(value) })) => {
+            Err(Refusal::Value { offset: bytes.len() - remaining, value })
+        }
+        Err(_) => Err(Refusal::Length),
+    }
+}
+
+/// A one-byte field that `accept` turns into its meaning, or refuses.
+pub(crate) fn byte<'a, T>(
+    accept: impl Fn(u8) -> Option<T>,
+) -> impl Parser<Bytes<'a>, Output = T, Error = Fault> {
+    nom::combinator::map_res(nom::number::complete::be_u8, move |value| accept(value).ok_or(u16::from(value)))
+}
+
+/// A two-byte field, high byte first, that `accept` turns into its meaning, or refuses.
+pub(crate) fn word<'a, T>(
+    accept: impl Fn(u16) -> Option<T>,
+) -> impl Parser<Bytes<'a>, Output = T, Error = Fault> {
+    nom::combinator::map_res(nom::number::complete::be_u16, move |value| accept(value).ok_or(value))
+}
+
+/// A flag byte: 0 or 1.
+pub(crate) fn flag(value: u8) -> Option<bool> {
+    match value {
+        0 => Some(false),
+        1 => Some(true),
+        _ => None,
+    }
+}
+
+/// Accepts `value` when it is below `limit`.
+pub(crate) fn below<T: PartialOrd>(limit: T) -> impl Fn(T) -> Option<T> {
+    move |value| (value < limit).then_some(value)
+}
