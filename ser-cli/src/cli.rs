@@ -9,14 +9,14 @@ use crate::error;
 
 const EXAMPLES: &str = "\
 Examples:
-  ser-cli demo                          see it work, no unit needed
+  ser-cli demo                          see it work, no recorder needed
   ser-cli ports                         which serial ports there are
-  ser-cli -p /dev/ttyUSB0 status        is the unit there? how is it?
+  ser-cli -p /dev/ttyUSB0 status        is the recorder there? how is it?
   ser-cli -p /dev/ttyUSB0 read          all events as a table
   ser-cli -p tcp://10.0.0.7:4000 watch  events as they happen
   export SER_PORT=/dev/ttyUSB0          say the port once
 
-Exit codes: 0 done, 1 the unit did not answer or something else failed, 2 the command line makes no sense. \
+Exit codes: 0 done, 1 the recorder did not answer or something else failed, 2 the command line makes no sense. \
 Only data goes to standard output; everything else goes to standard error.";
 
 /// Subcommands that talk to no unit: how to reach one is accepted there, and not mentioned.

@@ -1,4 +1,4 @@
-//! From `--port` to a unit that can be talked to, and from the client's errors to what the user is told.
+//! From `--port` to a recorder that can be talked to, and from the client's errors to what the user is told.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -14,13 +14,13 @@ use crate::interrupt::Caught;
 use crate::unit_name::UnitName;
 use crate::values;
 
-/// How to reach the unit. Accepted before and after the subcommand.
+/// How to reach the recorder. Accepted before and after the subcommand.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Connection")]
 pub(crate) struct ConnectionArgs {
-    /// Serial port of the unit (/dev/ttyUSB0, COM3), tcp://HOST:PORT, or geni:FILE?node=N on a Genius bus.
+    /// Serial port of the recorder (/dev/ttyUSB0, COM3), tcp://HOST:PORT, or geni:FILE?node=N on a Genius bus.
     ///
-    /// FILE is the window that this computer shares with its GENI board, N the unit's number on the bus. For a board in
+    /// FILE is the window that this computer shares with its GENI board, N the recorder's number on the bus. For a board in
     /// this computer FILE is a device for memory; &offset=0x… says where in it the window begins.
     #[arg(short, long, global = true, env = "SER_PORT", hide_env_values = true, value_name = "PORT")]
     pub(crate) port: Option<String>,
@@ -30,7 +30,7 @@ pub(crate) struct ConnectionArgs {
     #[arg(long, global = true, value_name = "RATE", value_parser = values::baud)]
     pub(crate) baud: Option<Baud>,
 
-    /// How long the unit may take to answer, on top of the time on the line: 500ms, 2s.
+    /// How long the recorder may take to answer, on top of the time on the line: 500ms, 2s.
     #[arg(long, global = true, value_name = "TIME", value_parser = values::duration)]
     pub(crate) timeout: Option<Duration>,
 
@@ -39,7 +39,7 @@ pub(crate) struct ConnectionArgs {
     pub(crate) retries: Option<u32>,
 }
 
-/// What the user calls the unit.
+/// What the user calls the recorder.
 pub(crate) fn port_text(connection: &ConnectionArgs) -> Result<&str> {
     connection.port.as_deref().map(str::trim).filter(|port| !port.is_empty()).ok_or_else(no_port)
 }
@@ -54,12 +54,12 @@ fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint> {
     })
 }
 
-/// What the unit is called wherever this program is started, and however the user spells it.
+/// What the recorder is called wherever this program is started, and however the user spells it.
 pub(crate) fn unit_name(connection: &ConnectionArgs) -> Result<UnitName> {
     Ok(UnitName::of(port_text(connection)?, &endpoint(connection)?))
 }
 
-/// Opens the line to the unit. Nothing is sent yet.
+/// Opens the line to the recorder. Nothing is sent yet.
 pub(crate) fn open(connection: &ConnectionArgs) -> Result<Unit> {
     let endpoint = endpoint(connection)?;
     let (baud_rate, options) = (baud(connection).bits_per_second(), options(connection));
@@ -76,7 +76,7 @@ pub(crate) fn open(connection: &ConnectionArgs) -> Result<Unit> {
     Ok(unit)
 }
 
-/// The rate of the line: the one that units are delivered with, if no other is given.
+/// The rate of the line: the one that recorders are delivered with, if no other is given.
 fn baud(connection: &ConnectionArgs) -> Baud {
     connection.baud.unwrap_or_default()
 }
@@ -89,7 +89,7 @@ pub(crate) fn options(connection: &ConnectionArgs) -> Options {
     options
 }
 
-/// Joins the Genius bus, whichever unit on it is named.
+/// Joins the Genius bus, whichever recorder on it is named.
 #[cfg(unix)]
 pub(crate) fn open_bus(connection: &ConnectionArgs) -> Result<ser_client::GeniHost> {
     let Endpoint::Geni { window, .. } = endpoint(connection)? else {
@@ -113,14 +113,14 @@ fn unless_interrupted<T>(
 }
 
 fn no_port() -> Failure {
-    let failure = Failure::usage("which unit? No --port is given and SER_PORT is not set");
+    let failure = Failure::usage("which recorder? No --port is given and SER_PORT is not set");
     let failure = match &ser_client::ports()[..] {
         [only] => failure.hint(format!("this computer has one serial port: try --port {}", only.path)),
         _ => failure.hint("name a serial port, as in --port /dev/ttyUSB0; ser-cli ports lists them"),
     };
     failure
         .hint("name a terminal server, as in --port tcp://10.0.0.7:4000")
-        .hint("no unit at hand? ser-cli demo")
+        .hint("no recorder at hand? ser-cli demo")
 }
 
 fn open_failure(error: &OpenError) -> Failure {
@@ -145,10 +145,10 @@ fn open_failure(error: &OpenError) -> Failure {
 
 impl From<RequestError> for Failure {
     fn from(error: RequestError) -> Failure {
-        let hint = error.hint().unwrap_or("try again; ser-cli status tells whether the unit is well");
+        let hint = error.hint().unwrap_or("try again; ser-cli status tells whether the recorder is well");
         let failure = Failure::new(&error).hint(hint);
         match error {
-            // A unit that is asked at another rate sees no question, and says nothing.
+            // A recorder that is asked at another rate sees no question, and says nothing.
             RequestError::NoReply {
                 diagnosis: Diagnosis::Silent | Diagnosis::Garbage { .. } | Diagnosis::Damaged { .. },
                 ..
@@ -163,25 +163,25 @@ impl From<RequestError> for Failure {
     }
 }
 
-/// When nothing was understood at the rate of the port, looks whether the unit is there at another one.
+/// When nothing was understood at the rate of the port, looks whether the recorder is there at another one.
 pub(crate) fn explain_silence(failure: Failure, connection: &ConnectionArgs) -> Failure {
     if !failure.is_unanswered() {
         return failure;
     }
     if !endpoint(connection).is_ok_and(|endpoint| endpoint.has_baud()) {
         return failure.hint(
-            "a unit stays silent also when a terminal server talks to it at another rate than its own",
+            "a recorder stays silent also when a terminal server talks to it at another rate than its own",
         );
     }
-    inform("no answer: looking for the unit at other rates …");
+    inform("no answer: looking for the recorder at other rates …");
     // Whatever hinders the search, the failure that led to it is the one to tell.
     match open(connection).ok().and_then(|mut unit| unit.find_baud().ok()) {
         Some(Some(found)) => {
             let (asked, found) = (baud(connection).bits_per_second(), found.bits_per_second());
-            Failure::new(format!("no answer at {asked} baud; the unit answers at {found}"))
+            Failure::new(format!("no answer at {asked} baud; the recorder answers at {found}"))
                 .hint(format!("add --baud {found}"))
         }
-        Some(None) => failure.hint("the unit does not answer at any other rate either"),
+        Some(None) => failure.hint("the recorder does not answer at any other rate either"),
         None => failure,
     }
 }
@@ -199,16 +199,16 @@ impl From<GeniusError> for Failure {
     }
 }
 
-/// Asks for the settings; `None` from an original unit, which does not know the question and stays silent.
+/// Asks for the settings; `None` from an original recorder, which does not know the question and stays silent.
 ///
-/// A read, which every unit answers, goes first: so a unit that is not there at all is told apart, and waited for
+/// A read, which every recorder answers, goes first: so a recorder that is not there at all is told apart, and waited for
 /// only once.
 pub(crate) fn settings(unit: &mut Unit) -> Result<Option<Configuration>> {
     unit.log_position()?;
     unless_unanswered(unit.configuration())
 }
 
-/// `None` where a unit that is there does not answer.
+/// `None` where a recorder that is there does not answer.
 pub(crate) fn unless_unanswered<T>(answer: std::result::Result<T, RequestError>) -> Result<Option<T>> {
     use Diagnosis::{Ignored, Silent, SilentOnBus};
     match answer {
@@ -223,11 +223,11 @@ pub(crate) fn unless_unanswered<T>(answer: std::result::Result<T, RequestError>)
 /// The failure to do without the settings.
 pub(crate) fn settings_unknown() -> Failure {
     Failure::new(
-        "the unit does not tell its settings: original units (HE660SER160, HE660SER320) never answer this query",
+        "the recorder does not tell its settings: original recorders (HE660SER160, HE660SER320) never answer this query",
     )
 }
 
-/// How many entries the unit's log holds: as the user says, or as the unit says, or as it was the last time.
+/// How many entries the recorder's log holds: as the user says, or as the recorder says, or as it was the last time.
 pub(crate) fn log_size(unit: &mut Unit, given: Option<u16>, remembered: Option<u16>) -> Result<u16> {
     match given {
         Some(size) => Ok(size),
@@ -240,11 +240,11 @@ pub(crate) fn log_size_unknown() -> Failure {
     settings_unknown().hint("say with --log-size N how many entries its log has (2048 as delivered)")
 }
 
-/// Tells that the unit talks at another rate from now on, where the rate is ours to follow.
+/// Tells that the recorder talks at another rate from now on, where the rate is ours to follow.
 pub(crate) fn tell_new_baud(connection: &ConnectionArgs, now: &Configuration) -> Result<()> {
     if baud(connection) != now.baud && endpoint(connection)?.has_baud() {
         let rate = now.baud.bits_per_second();
-        warn(format_args!("the unit's RS-232 port runs at {rate} baud from now on"));
+        warn(format_args!("the recorder's RS-232 port runs at {rate} baud from now on"));
         advise(format_args!("add --baud {rate} from now on"));
     }
     Ok(())

@@ -10,7 +10,7 @@ use ser_console::Harmless;
 /// The result of everything that a command does.
 pub(crate) type Result<T> = std::result::Result<T, Failure>;
 
-/// The unit did not answer or refused, or something else went wrong while running.
+/// The recorder did not answer or refused, or something else went wrong while running.
 pub(crate) const EXIT_FAILURE: u8 = 1;
 
 /// The command line asks for something that cannot be; clap uses the same code.
@@ -36,7 +36,7 @@ pub(crate) struct Report {
     message: String,
     hints: Vec<String>,
     exit: u8,
-    /// Nothing that the unit said was understood, if it said anything.
+    /// Nothing that the recorder said was understood, if it said anything.
     unanswered: bool,
     /// It may work again without anybody doing anything here.
     may_pass: bool,
@@ -85,7 +85,7 @@ impl Failure {
         self
     }
 
-    /// Whether nothing was understood of the unit.
+    /// Whether nothing was understood of the recorder.
     pub(crate) fn is_unanswered(&self) -> bool {
         matches!(self, Failure::Told(report) if report.unanswered)
     }

@@ -21,7 +21,7 @@ static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 static LOOKING: AtomicUsize = AtomicUsize::new(0);
 
 /// From now on an interrupt sets the flag instead of ending the program. The flag is looked at between two questions
-/// to the unit; whoever does not want to wait for that presses Ctrl-C once more, which ends the program at once.
+/// to the recorder; whoever does not want to wait for that presses Ctrl-C once more, which ends the program at once.
 pub(crate) fn catch() -> Result<Arc<AtomicBool>> {
     // Before the first interrupt can come.
     LOOKING.fetch_add(1, Ordering::SeqCst);

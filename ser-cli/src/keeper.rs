@@ -18,15 +18,15 @@ const SAVE_EVERY: Duration = Duration::from_secs(1);
 pub(crate) struct StateArgs {
     /// Where to remember what was delivered; without it, the user's state directory (~/.local/state/ser-cli).
     ///
-    /// A unit is the same however its port is spelled: by a relative path, by a link, by the device
+    /// A recorder is the same however its port is spelled: by a relative path, by a link, by the device
     /// behind it, or, on this computer, by localhost, 127.0.0.1 or `::1`. A USB adapter that has a
     /// serial number is known by that (/dev/serial/by-id), not by the number that it gets when it
-    /// is plugged in. Numbers in /dev/pts are given anew: name a simulated unit by its link.
+    /// is plugged in. Numbers in /dev/pts are given anew: name a simulated recorder by its link.
     #[arg(long, env = "SER_STATE_DIR", hide_env_values = true, value_name = "DIR")]
     state_dir: Option<PathBuf>,
 }
 
-/// The state file of a unit, and what is to be written to it.
+/// The state file of a recorder, and what is to be written to it.
 pub(crate) struct Keeper {
     file: StateFile,
     saved: Option<Delivered>,
@@ -37,7 +37,7 @@ pub(crate) struct Keeper {
 }
 
 impl Keeper {
-    /// Loads what has been delivered from this unit.
+    /// Loads what has been delivered from this recorder.
     pub(crate) fn load(args: &StateArgs, connection: &ConnectionArgs) -> Result<Keeper> {
         let mut file = StateFile::of_unit(&connection::unit_name(connection)?, args.state_dir.as_deref())?;
         let lock = file.lock()?;

@@ -68,7 +68,7 @@ fn bar() -> ProgressBar {
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} events, {eta} left") {
         bar.set_style(style);
     }
-    // The bar goes on breathing when the unit hesitates.
+    // The bar goes on breathing when the recorder hesitates.
     bar.enable_steady_tick(Duration::from_millis(500));
     bar
 }

@@ -1,6 +1,6 @@
-//! What has been delivered already, kept in the user's state directory between two runs: one file per unit.
+//! What has been delivered already, kept in the user's state directory between two runs: one file per recorder.
 //!
-//! A unit that was called otherwise before has its file under that name; it moves when it is
+//! A recorder that was called otherwise before has its file under that name; it moves when it is
 //! written. Files are replaced as a whole, and only files of ours are: no link is followed, and
 //! nothing else is read to its end.
 
@@ -34,7 +34,7 @@ const MAX_NAME_LEN: usize = 255;
 /// So much of a name that is too long is kept for people.
 const TELLING_LEN: usize = 100;
 
-/// Where a unit's log had been read to.
+/// Where a recorder's log had been read to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Delivered {
     /// Behind the last event that was delivered; `None` while there is nothing but a name.
@@ -84,7 +84,7 @@ impl Delivered {
         Ok(Delivered { cursor, size: content.size, life, next_life, erased: content.erased.map(Entry::from) })
     }
 
-    /// The content of the state file of this unit.
+    /// The content of the state file of this recorder.
     ///
     /// # Errors
     /// None that is known: there is nothing here that JSON does not have.
@@ -111,7 +111,7 @@ impl Delivered {
 pub(crate) struct StateFile {
     path: PathBuf,
     unit: String,
-    /// Where the file may be from when the unit was called otherwise.
+    /// Where the file may be from when the recorder was called otherwise.
     others: Vec<PathBuf>,
     /// Of these, the one that was loaded.
     moves_from: Option<PathBuf>,
@@ -127,7 +127,7 @@ pub(crate) struct StateLock {
 #[derive(Serialize, Deserialize)]
 struct Content {
     version: u32,
-    /// The unit's name, for whoever looks into the file.
+    /// The recorder's name, for whoever looks into the file.
     unit: String,
     /// The recorder's total after the last event, in version 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -164,7 +164,7 @@ struct LastEntry {
 }
 
 impl StateFile {
-    /// The file for this unit, in `directory` or where the system wants state to be.
+    /// The file for this recorder, in `directory` or where the system wants state to be.
     pub(crate) fn of_unit(unit: &UnitName, directory: Option<&Path>) -> Result<StateFile> {
         let directory = match directory {
             Some(directory) => directory.to_path_buf(),
@@ -247,7 +247,7 @@ impl StateFile {
         temporary.as_file().sync_all()?;
         temporary.persist(&self.path)?;
         if let Some(other) = self.moves_from.take().filter(|other| matches!(load_from(other), Ok(Some(_)))) {
-            // Found again, it would be taken for what another unit has delivered.
+            // Found again, it would be taken for what another recorder has delivered.
             let _ = fs::remove_file(other);
         }
         Ok(())
@@ -257,7 +257,7 @@ impl StateFile {
 fn load_from(path: &Path) -> Result<Option<Delivered>> {
     let damaged = |why: &dyn fmt::Display| {
         Failure::new(format!("{} does not say what was delivered: {why}", path.display()))
-            .hint("read --all delivers everything the unit has and needs no state")
+            .hint("read --all delivers everything the recorder has and needs no state")
             .hint("move the file away to begin anew: the next --new then delivers everything")
     };
     let text = match read_ours(path) {
@@ -326,7 +326,7 @@ fn default_directory() -> Result<PathBuf> {
     Ok(base.join("ser-cli"))
 }
 
-/// A name that any file system takes, that people can read, and that no other unit's name gives.
+/// A name that any file system takes, that people can read, and that no other recorder's name gives.
 fn file_name(unit: &str) -> String {
     const SUFFIX: &str = ".json";
     // Windows takes COM3.json for the port itself.

@@ -11,19 +11,21 @@ const FORMATS: [&str; 4] =
 /// Understands `2026-11-22T10:00:00.250`, also with a blank for the `T`, without fraction or without seconds.
 pub(crate) fn parse_time(text: &str) -> Result<TimeStamp, String> {
     if text.ends_with(['Z', 'z']) || text.get(19..).is_some_and(|tail| tail.contains(['+', '-'])) {
-        return Err("a unit's clock has no time zone: give the local time without Z or offset".to_string());
+        return Err(
+            "a recorder's clock has no time zone: give the local time without Z or offset".to_string()
+        );
     }
     let time = FORMATS
         .iter()
         .find_map(|format| NaiveDateTime::parse_from_str(text, format).ok())
         .ok_or("not a date and time like 2026-11-22T10:00:00.250")?;
     if time.nanosecond() >= 1_000_000_000 {
-        return Err("a unit's clock has no second 60".to_string());
+        return Err("a recorder's clock has no second 60".to_string());
     }
     if time.nanosecond() % 1_000_000 != 0 {
-        return Err("a unit's clock has milliseconds, not finer: give up to three decimals".to_string());
+        return Err("a recorder's clock has milliseconds, not finer: give up to three decimals".to_string());
     }
-    stamp(time).map_err(|year| format!("a unit's clock runs from 1970 to 2069, not in {year}"))
+    stamp(time).map_err(|year| format!("a recorder's clock runs from 1970 to 2069, not in {year}"))
 }
 
 /// The stamp of a calendar time; its year when the two digits of a stamp cannot say it.
@@ -31,7 +33,7 @@ pub(crate) fn stamp(time: NaiveDateTime) -> Result<TimeStamp, i32> {
     TimeStamp::try_from(time).map_err(|_| chrono::Datelike::year(&time))
 }
 
-/// The local time `ahead` from now, as a unit's clock would show it.
+/// The local time `ahead` from now, as a recorder's clock would show it.
 pub(crate) fn local_time_in(ahead: std::time::Duration) -> Result<TimeStamp, i32> {
     let ahead = TimeDelta::from_std(ahead).unwrap_or_default();
     stamp((Local::now() + ahead).naive_local())

@@ -1,8 +1,8 @@
-//! What a unit is called: one name however the way to it is spelled, and the names that it may have
+//! What a recorder is called: one name however the way to it is spelled, and the names that it may have
 //! had.
 //!
 //! # Design
-//! Under its name is kept what was delivered from a unit, so the name has to be the same from one
+//! Under its name is kept what was delivered from a recorder, so the name has to be the same from one
 //! run to the next.
 //!
 //! - A link is a name that somebody has chosen because it lasts (`/dev/serial/by-id/…`,
@@ -12,9 +12,9 @@
 //!   without one would take turns at the same name.
 //! - The computer itself is `localhost`, also as `127.0.0.1` and `[::1]`.
 //!
-//! All other names of the unit are looked under when there is nothing under this one. Other
+//! All other names of the recorder are looked under when there is nothing under this one. Other
 //! spellings of the same name, and names of versions before this one, give way to it. A name in its
-//! own right, such as that of the device that a link leads to, keeps what is under it: the unit may be
+//! own right, such as that of the device that a link leads to, keeps what is under it: the recorder may be
 //! called by it again. The number of a pseudo-terminal is
 //! none of them, for the next program that wants one gets it.
 
@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 
 use ser_client::{Endpoint, GeniWindow};
 
-/// A unit's name, and others that it may have been called by.
+/// A recorder's name, and others that it may have been called by.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct UnitName {
     /// The name.
@@ -36,7 +36,7 @@ pub(crate) struct UnitName {
 }
 
 impl UnitName {
-    /// Of the unit behind `text`, which has been understood as `endpoint`.
+    /// Of the recorder behind `text`, which has been understood as `endpoint`.
     pub(crate) fn of(text: &str, endpoint: &Endpoint) -> UnitName {
         let (name, others) = names(text, endpoint);
         let mut unit = UnitName { name, others: Vec::new(), aliases: Vec::new() };
@@ -53,7 +53,7 @@ impl UnitName {
     }
 }
 
-/// The name of a unit, and all others.
+/// The name of a recorder, and all others.
 fn names(text: &str, endpoint: &Endpoint) -> (String, Vec<String>) {
     match endpoint {
         Endpoint::Tcp { address } => tcp_names(address),

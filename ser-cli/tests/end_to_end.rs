@@ -1,4 +1,4 @@
-//! The command line as a user types it, against simulated units: the native one and the ARM image.
+//! The command line as a user types it, against simulated recorders: the native one and the ARM image.
 #![cfg(unix)]
 
 mod common;
@@ -165,7 +165,7 @@ fn what_a_killed_simulator_has_left_behind_is_taken_over() {
         let mut sim = Running::start(command);
         assert_eq!(
             sim.told().recv_timeout(PATIENCE).ok().as_deref(),
-            Some("the simulated unit answers; Ctrl-C switches it off")
+            Some("the simulated recorder answers; Ctrl-C switches it off")
         );
         sim
     };
@@ -318,11 +318,12 @@ fn impatient(port: &str, rate: &str) -> (Ended, String) {
 fn wrong_rate(port: &str) -> Ended {
     let mut ended = (None, None);
     // The search is short, and the simulator may have to wait for its turn longer than that.
-    wait_until("the unit is found at its own rate", || {
+    wait_until("the recorder is found at its own rate", || {
         let (end, error) = impatient(port, "19200");
         assert!(error.contains("hint: "), "{error}");
         ended = end;
-        error.contains("no answer at 19200 baud; the unit answers at 9600") && error.contains("--baud 9600")
+        error.contains("no answer at 19200 baud; the recorder answers at 9600")
+            && error.contains("--baud 9600")
     });
     ended
 }
@@ -462,11 +463,11 @@ fn the_second_interrupt_ends_a_command_that_waits_for_a_silent_unit() {
         watch.0.try_wait().expect("a child").is_some()
     });
     assert_eq!(watch.wait(), Some(1));
-    // Three attempts of 20 s are what the unit would have had.
+    // Three attempts of 20 s are what the recorder would have had.
     assert!(began.elapsed() < Duration::from_secs(55), "it has waited for the unit");
     let mut error = String::new();
     watch.0.stderr.take().expect("piped").read_to_string(&mut error).expect("text");
-    assert!(error.contains("hint: the unit may still report by itself"), "{error}");
+    assert!(error.contains("hint: the recorder may still report by itself"), "{error}");
 }
 
 #[test]

@@ -35,7 +35,7 @@ fn overrun() -> Bench {
     bench
 }
 
-/// A unit whose inputs can be seen, recorded or not: it is on a Genius bus, too.
+/// A recorder whose inputs can be seen, recorded or not: it is on a Genius bus, too.
 struct Seen {
     bench: Bench,
     window: tempfile::TempDir,
@@ -182,7 +182,7 @@ fn a_file_that_ends_in_a_row_gets_a_line_end_first() {
     assert!(rows[2].starts_with("1,") && rows[2].ends_with(",5,1,1,0,"), "{csv}");
 }
 
-/// A unit whose log holds these entries, on TCP; gives its port.
+/// A recorder whose log holds these entries, on TCP; gives its port.
 fn unit_with(entries: Vec<Entry>) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = format!("tcp://{}", listener.local_addr().expect("an address"));

@@ -17,7 +17,7 @@ use tempfile::TempDir;
 /// What a terminal obeys: it clears the screen, sets its title, turns text around.
 const HOSTILE: &str = "\u{1B}[2J\u{1B}]0;x\u{7}\r\u{9B}1m\u{202E}";
 
-/// A simulated unit with three events, on a pseudo-terminal and on a Genius bus.
+/// A simulated recorder with three events, on a pseudo-terminal and on a Genius bus.
 struct Unit {
     folder: TempDir,
     _sim: Running,

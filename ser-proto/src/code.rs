@@ -5,7 +5,7 @@
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Code {
-    /// `C`: configure the unit.
+    /// `C`: configure the recorder.
     Configure = 0x43,
     /// `E`: erase the event buffer.
     Erase = 0x45,

@@ -12,7 +12,7 @@ use crate::{Body, Code, Configure, ParseError, TimeStamp};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
-    /// `C` alone: what configuration is in force? An extension of this project; original units stay silent.
+    /// `C` alone: what configuration is in force? An extension of this project; original recorders stay silent.
     QueryConfiguration,
     /// `C`: change the configuration.
     Configure(Configure),
@@ -20,7 +20,7 @@ pub enum Command {
     Erase,
     /// `L`: which broadcast came last?
     LastBroadcast,
-    /// `M` alone: is the unit recording? An extension of this project; original units stay silent.
+    /// `M` alone: is the recorder recording? An extension of this project; original recorders stay silent.
     QueryMode,
     /// `M`: start or stop recording.
     SetMode {

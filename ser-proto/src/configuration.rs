@@ -114,7 +114,7 @@ impl AutoReport {
     }
 }
 
-/// The settings in force: the body of a `C` reply, and what a unit keeps over a power cycle.
+/// The settings in force: the body of a `C` reply, and what a recorder keeps over a power cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Configuration {

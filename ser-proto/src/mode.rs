@@ -13,7 +13,7 @@ use crate::fields::{Bytes, byte, flag};
 use crate::params::parse_params;
 use crate::{Body, Code, ParseError};
 
-/// The reply to `M`: whether the unit records, and its firmware version.
+/// The reply to `M`: whether the recorder records, and its firmware version.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mode {

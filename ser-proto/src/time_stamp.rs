@@ -4,7 +4,7 @@
 //! | year | month | day | hour | minute | second | millisecond (2) |
 //! ```
 //!
-//! A stamp from the wire may hold an impossible date (a unit whose clock was never set): it is kept as it is,
+//! A stamp from the wire may hold an impossible date (a recorder whose clock was never set): it is kept as it is,
 //! so that an entry is never lost over it, and [`TimeStamp::check`] tells.
 
 use core::fmt;
@@ -15,7 +15,7 @@ use nom::number::complete::{be_u8, be_u16};
 use crate::Body;
 use crate::fields::{Bytes, Fault};
 
-/// A date and time of day with a resolution of one millisecond, in whatever time zone the unit was set to.
+/// A date and time of day with a resolution of one millisecond, in whatever time zone the recorder was set to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TimeStamp {

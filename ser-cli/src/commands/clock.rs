@@ -1,4 +1,4 @@
-//! `clock`: the unit's clock.
+//! `clock`: the recorder's clock.
 
 use std::io::{self, Write};
 use std::time::Instant;
@@ -14,7 +14,7 @@ Examples:
   ser-cli clock set                               to the time of this computer
   ser-cli clock set --at 2026-11-22T10:00:00.250  to any other";
 
-/// Set the unit's clock.
+/// Set the recorder's clock.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -26,7 +26,7 @@ pub(crate) struct Args {
 enum What {
     /// Set the clock; events that are recorded already keep their times.
     ///
-    /// The time sent is the one at which the last byte arrives, so that the line adds no delay. The unit knows no
+    /// The time sent is the one at which the last byte arrives, so that the line adds no delay. The recorder knows no
     /// time zone and no daylight saving time. Shown is the time that was sent.
     #[command(after_help = EXAMPLES)]
     Set {
@@ -41,7 +41,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     // Checked before anything is sent; no download takes us from one century into the next.
     if at.is_none() {
         local_time_in(std::time::Duration::ZERO).map_err(|year| {
-            Failure::new(format!("a unit's clock runs from 1970 to 2069; this computer's says {year}"))
+            Failure::new(format!("a recorder's clock runs from 1970 to 2069; this computer's says {year}"))
                 .hint("set this computer's clock, or give the time with --at")
         })?;
     }
@@ -61,6 +61,6 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     Ok(())
 }
 
-/// No unit and no client takes this for a date.
+/// No recorder and no client takes this for a date.
 const NO_TIME: TimeStamp =
     TimeStamp { year: 0, month: 0, day: 0, hour: 0, minute: 0, second: 0, millisecond: 0 };

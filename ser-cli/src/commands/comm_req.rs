@@ -38,7 +38,7 @@ Examples:
   ser-cli comm-req parse 7 0 8 99 0 0 13 70 8 199 0040h 0050h 5
   ser-cli comm-req parse --data 014Dh 007Dh --bytes 3";
 
-/// Show the `COMM_REQ` blocks of a PLC that send a message to a unit or fetch its answer; nothing is sent.
+/// Show the `COMM_REQ` blocks of a PLC that send a message to a recorder or fetch its answer; nothing is sent.
 ///
 /// Words are shown in decimal and hex, ready to be typed into a PLC. The other way round, words become a message.
 #[derive(Debug, clap::Args)]
@@ -50,10 +50,10 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum What {
-    /// The block that sends a message to a unit (`COMM_REQ` 14).
+    /// The block that sends a message to a recorder (`COMM_REQ` 14).
     #[command(after_help = SEND_EXAMPLES)]
     Send(SendArgs),
-    /// The block that fetches what a unit has sent (`COMM_REQ` 13).
+    /// The block that fetches what a recorder has sent (`COMM_REQ` 13).
     #[command(after_help = DEQUEUE_EXAMPLES)]
     Dequeue(DequeueArgs),
     /// What the words of a block, or of fetched data, say.
@@ -63,7 +63,7 @@ enum What {
 
 #[derive(Debug, clap::Args)]
 struct SendArgs {
-    /// Bus address of the unit, 0-31, or `all` for a broadcast, which is carried out and not answered.
+    /// Bus address of the recorder, 0-31, or `all` for a broadcast, which is carried out and not answered.
     #[arg(long, value_name = "N", value_parser = values::address)]
     to: Address,
 
@@ -85,7 +85,7 @@ struct SendArgs {
 
 #[derive(Debug, clap::Args)]
 struct DequeueArgs {
-    /// Bus address of the unit, 0-31.
+    /// Bus address of the recorder, 0-31.
     #[arg(long, value_name = "N", value_parser = values::device)]
     from: Device,
 

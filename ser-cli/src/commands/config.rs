@@ -1,4 +1,4 @@
-//! `config`: the unit's settings.
+//! `config`: the recorder's settings.
 
 use std::io::{self, Write};
 
@@ -16,9 +16,9 @@ Examples:
   ser-cli config --size 1024 --auto-print off  change two of them
   ser-cli config --line-baud 19200             from then on: --baud 19200";
 
-/// Show or change the unit's settings. What is not given stays as it is; the unit keeps them without power.
+/// Show or change the recorder's settings. What is not given stays as it is; the recorder keeps them without power.
 ///
-/// To keep what is not given, the unit is asked first. An original unit does not answer that: give it at least
+/// To keep what is not given, the recorder is asked first. An original recorder does not answer that: give it at least
 /// --auto-report, --report-to and --auto-print, which its protocol cannot leave out.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -34,11 +34,11 @@ pub(crate) struct Settings {
     #[arg(long, value_name = "N", value_parser = values::entries())]
     size: Option<u16>,
 
-    /// Rate of the unit's RS-232 port, used after its reply.
+    /// Rate of the recorder's RS-232 port, used after its reply.
     #[arg(long, value_name = "RATE", value_parser = values::baud)]
     line_baud: Option<Baud>,
 
-    /// Where the unit reports events by itself.
+    /// Where the recorder reports events by itself.
     #[arg(long, value_name = "WHERE")]
     auto_report: Option<ReportVia>,
 
@@ -46,7 +46,7 @@ pub(crate) struct Settings {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_REPORT_ADDRESS)))]
     report_to: Option<u8>,
 
-    /// Whether the unit prints every event as a line of text on RS-232.
+    /// Whether the recorder prints every event as a line of text on RS-232.
     #[arg(long, value_name = "SWITCH")]
     auto_print: Option<Switch>,
 }
@@ -113,7 +113,7 @@ fn change(unit: &mut Unit, settings: &Settings) -> Result<Configuration> {
     };
     unit.configure(settings.on_top_of(base)).map_err(|error| match error {
         RequestError::Refused { in_force } => Failure::new(format!(
-            "the unit did not take the settings; in force are: size {}, {} baud, auto report {}, report to {}, auto print {}",
+            "the recorder did not take the settings; in force are: size {}, {} baud, auto report {}, report to {}, auto print {}",
             in_force.size,
             in_force.baud.bits_per_second(),
             auto_report_name(in_force.auto_report),

@@ -11,7 +11,7 @@ use crate::output::Palette;
 const EXAMPLES: &str = "\
 Examples:
   ser-cli decode capture.bin                    a capture of the line
-  ser-cli decode --from unit capture.bin        only the unit was listened to
+  ser-cli decode --from recorder capture.bin    only it was listened to
   echo '1B 30 31 34 35 34 35' | ser-cli decode  hex text
   echo 52 01 F4 05 | ser-cli decode --body      bodies, one a line";
 

@@ -34,10 +34,10 @@ pub(crate) struct Args {
     raw: bool,
 }
 
-/// A command to a unit, as the words of a command line.
+/// A command to a recorder, as the words of a command line.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Message {
-    /// `C` alone: ask for the configuration (original units stay silent).
+    /// `C` alone: ask for the configuration (original recorders stay silent).
     QueryConfig,
     /// `C`: change the configuration; size and rate that are not given are kept, the rest becomes 0 or off.
     Config(Settings),
@@ -45,7 +45,7 @@ pub(crate) enum Message {
     Erase,
     /// `L`: ask for the last broadcast.
     LastBroadcast,
-    /// `M` alone: ask for mode and version (original units stay silent).
+    /// `M` alone: ask for mode and version (original recorders stay silent).
     QueryMode,
     /// `M`: start recording.
     Start,
@@ -90,7 +90,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 }
 
 impl Message {
-    /// The command as the unit gets it.
+    /// The command as the recorder gets it.
     pub(crate) fn command(&self) -> Command {
         match *self {
             Message::QueryConfig => Command::QueryConfiguration,

@@ -13,7 +13,7 @@ next read --new goes on with the new log and tells of no loss. What is recorded 
 too, and then told as a loss. In the moment of the erase itself, a change that is undone before the next event leaves \
 no trace.";
 
-/// Erase all events in the unit. There is no way back.
+/// Erase all events in the recorder. There is no way back.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -28,7 +28,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let port = connection::port_text(connection)?;
     if !args.yes {
-        return Err(Failure::usage(format!("this erases all events in the unit at {port} for good"))
+        return Err(Failure::usage(format!("this erases all events in the recorder at {port} for good"))
             .hint("keep them first: ser-cli read --all --format csv > events.csv")
             .hint("then add --yes"));
     }
@@ -49,6 +49,6 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
 fn erased(total: u16) -> String {
     let events = if total == 1 { "1 event".to_owned() } else { format!("{total} events") };
     format!(
-        "event buffer erased; {events} had been recorded since the erase before (the unit counts modulo 65536)"
+        "event buffer erased; {events} had been recorded since the erase before (the recorder counts modulo 65536)"
     )
 }

@@ -9,7 +9,7 @@ const EXAMPLES: &str = "\
 Examples:
   ser-cli last-broadcast --port /dev/ttyUSB0";
 
-/// Show which command the unit last received as a Genius broadcast, and when.
+/// Show which command the recorder last received as a Genius broadcast, and when.
 ///
 /// Broadcasts get no reply on the bus; this is how to check that one was received.
 #[derive(Debug, clap::Args)]

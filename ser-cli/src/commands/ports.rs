@@ -10,7 +10,7 @@ use crate::error::{Result, advise, inform};
 const EXAMPLES: &str = "\
 Examples:
   ser-cli ports
-  ser-cli status -p /dev/ttyUSB0  ask the unit on one of them how it is";
+  ser-cli status -p /dev/ttyUSB0  ask the recorder on one of them how it is";
 
 /// List the serial ports of this computer.
 ///

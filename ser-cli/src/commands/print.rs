@@ -1,4 +1,4 @@
-//! `print`: the unit prints entries on its RS-232 port, which is the line we are on.
+//! `print`: the recorder prints entries on its RS-232 port, which is the line we are on.
 
 use std::io::{self, Write};
 use std::ops::Range;
@@ -17,9 +17,9 @@ Examples:
 /// A line with 32 changes and a good deal more.
 const LONGEST_LINE: usize = 300;
 
-/// Let the unit print entries as lines of text, and show them.
+/// Let the recorder print entries as lines of text, and show them.
 ///
-/// The unit prints on its RS-232 port whatever the command came by. Through a terminal server or a printer sharer the
+/// The recorder prints on its RS-232 port whatever the command came by. Through a terminal server or a printer sharer the
 /// lines arrive here only if they are passed on. Waiting ends when all lines are there, or none comes any more.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -37,7 +37,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let mut unit = connection::open(connection)?;
     unit.print(args.from, args.count)?;
     if unit.bus_address().is_some() {
-        inform("the unit prints on its RS-232 port: no line comes over the Genius bus");
+        inform("the recorder prints on its RS-232 port: no line comes over the Genius bus");
         return Ok(());
     }
     let patience = connection.timeout.unwrap_or(Duration::from_secs(1))
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     Ok(())
 }
 
-/// Damage, or lines that the unit prints by itself (auto print).
+/// Damage, or lines that the recorder prints by itself (auto print).
 fn tell_left_out(line: &TextLine) {
     match is_damaged(line) {
         true => warn(format_args!("a line arrived damaged and is left out: {}", line.text)),
@@ -83,7 +83,7 @@ fn is_damaged(line: &TextLine) -> bool {
     line.noise > 0 || line.cut
 }
 
-/// The lines that are to come. A unit with auto print on sends others in between.
+/// The lines that are to come. A recorder with auto print on sends others in between.
 struct Wanted {
     /// Entry numbers that have not come yet.
     entries: Range<u32>,

@@ -1,4 +1,4 @@
-//! `read`: events from the unit's log.
+//! `read`: events from the recorder's log.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,7 +20,7 @@ Examples:
   ser-cli read --format csv > events.csv    for a spreadsheet
   ser-cli read --new --format jsonl >> log  what has not been delivered yet
   ser-cli read --from 2040 --count 9        entries by their numbers
-  ser-cli read --log-size 2048              an original unit
+  ser-cli read --log-size 2048              an original recorder
 
 Formats:
   table   entry, time, time since previous and first event, changes
@@ -39,7 +39,7 @@ with --fail-on-loss it is 3, also for a ring that had gone round before it was f
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// Everything the unit has, oldest first; this is what happens if nothing else is asked for.
+    /// Everything the recorder has, oldest first; this is what happens if nothing else is asked for.
     #[arg(long, conflicts_with_all = ["new", "from", "count"])]
     all: bool,
 
@@ -47,7 +47,7 @@ pub(crate) struct Args {
     #[arg(long, conflicts_with_all = ["from", "count"])]
     new: bool,
 
-    /// Number of the first entry, as the unit numbers them: place in memory, not age.
+    /// Number of the first entry, as the recorder numbers them: place in memory, not age.
     #[arg(long, value_name = "N", requires = "count", value_parser = values::entries())]
     from: Option<u16>,
 
@@ -63,7 +63,7 @@ pub(crate) struct Args {
     #[arg(long)]
     fail_on_loss: bool,
 
-    /// How many entries the unit's log holds; then the unit is not asked (original units do not answer).
+    /// How many entries the recorder's log holds; then the recorder is not asked (original recorders do not answer).
     #[arg(long, value_name = "N", value_parser = values::entries())]
     log_size: Option<u16>,
 
@@ -92,7 +92,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let remembered = keeper.as_ref().and_then(Keeper::size);
     let size = connection::log_size(&mut unit, args.log_size, remembered)?;
     let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), size, &stop);
-    // What did reach standard output is remembered also when the unit fell silent in the middle, or after Ctrl-C.
+    // What did reach standard output is remembered also when the recorder fell silent in the middle, or after Ctrl-C.
     let saved = keeper.as_mut().map_or(Ok(()), Keeper::save);
     let delivered = outlet.finish().and(result)?;
     saved?;
@@ -122,7 +122,7 @@ fn read_by_cursor(
     Ok(summary.delivered)
 }
 
-/// Reads entries by number. Neither cursor nor size come into it: the unit answers with what exists.
+/// Reads entries by number. Neither cursor nor size come into it: the recorder answers with what exists.
 fn read_range(
     unit: &mut Unit,
     outlet: &mut Outlet,

@@ -1,4 +1,4 @@
-//! `sim`: a simulated unit.
+//! `sim`: a simulated recorder.
 
 mod bus;
 
@@ -40,7 +40,7 @@ On standard input (--contacts -) times count from the arrival of the first
 line; an empty line ends a scenario, and more may follow. Lines that come one by
 one are given 100 ms, so that the first of them are not late.
 
-When the unit answers, what to give to --port is written to standard output,
+When the recorder answers, what to give to --port is written to standard output,
 one line for each way to reach one.";
 
 /// Which recorder.
@@ -61,14 +61,14 @@ impl From<ModelName> for Model {
     }
 }
 
-/// A unit on the bus.
+/// A recorder on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct BusNode {
     number: u8,
     model: Option<ModelName>,
 }
 
-/// Simulate a unit on a pseudo-terminal or a TCP port, or units on a Genius bus, until interrupted.
+/// Simulate a recorder on a pseudo-terminal or a TCP port, or recorders on a Genius bus, until interrupted.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -76,17 +76,17 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value = "ser320")]
     model: ModelName,
 
-    /// Make this symbolic link to the unit's pseudo-terminal; it appears when the unit answers and goes with it.
+    /// Make this symbolic link to the recorder's pseudo-terminal; it appears when the recorder answers and goes with it.
     #[arg(long, value_name = "LINK", conflicts_with = "tcp")]
     pty: Option<PathBuf>,
 
-    /// Put units on a Genius bus; this file becomes the window of the host's GENI board, and goes with the simulator.
+    /// Put recorders on a Genius bus; this file becomes the window of the host's GENI board, and goes with the simulator.
     ///
-    /// The first unit also has its RS-232 port, where --pty or --tcp say.
+    /// The first recorder also has its RS-232 port, where --pty or --tcp say.
     #[arg(long, value_name = "FILE", requires = "node", help_heading = bus::HEADING)]
     genius: Option<PathBuf>,
 
-    /// Number of a unit on the Genius bus, 0-31, and which recorder it is if not --model; may be repeated.
+    /// Number of a recorder on the Genius bus, 0-31, and which recorder it is if not --model; may be repeated.
     #[arg(long, value_name = "N[:MODEL]", requires = "genius", value_parser = bus_node, help_heading = bus::HEADING)]
     node: Vec<BusNode>,
 
@@ -104,7 +104,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "TIME", default_value = "600s", value_parser = patience)]
     tcp_idle: Patience,
 
-    /// Move the unit's contacts as this CSV file says; `-` is standard input.
+    /// Move the recorder's contacts as this CSV file says; `-` is standard input.
     #[arg(long, value_name = "FILE")]
     contacts: Option<PathBuf>,
 
@@ -112,7 +112,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "MS", default_value_t = 0)]
     debounce: u8,
 
-    /// Send as slowly as the line's rate, as a real unit does; without it, answers come at once.
+    /// Send as slowly as the line's rate, as a real recorder does; without it, answers come at once.
     #[arg(long, conflicts_with = "image")]
     paced: bool,
 
@@ -237,7 +237,7 @@ fn tcp_address(text: &str) -> std::result::Result<String, String> {
     }
 }
 
-/// Tells all the ways to reach the units, one a line.
+/// Tells all the ways to reach the recorders, one a line.
 fn announce(ports: &str) -> Result<()> {
     let mut out = io::stdout().lock();
     // A script gets them letter by letter; a terminal would obey some.
@@ -245,11 +245,11 @@ fn announce(ports: &str) -> Result<()> {
     let shown = |port: &str| if is_terminal { Harmless(port).line() } else { port.to_owned() };
     let written = ports.lines().try_for_each(|port| writeln!(out, "{}", shown(port)));
     match written.and_then(|()| out.flush()) {
-        // A script that has read the port may close our output; the unit goes on.
+        // A script that has read the port may close our output; the recorder goes on.
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {}
         written => written?,
     }
-    inform("the simulated unit answers; Ctrl-C switches it off");
+    inform("the simulated recorder answers; Ctrl-C switches it off");
     Ok(())
 }
 

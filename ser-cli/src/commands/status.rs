@@ -1,4 +1,4 @@
-//! `status`: what the unit is doing.
+//! `status`: what the recorder is doing.
 
 use std::io::{self, Write};
 
@@ -14,16 +14,16 @@ Examples:
   ser-cli status --port /dev/ttyUSB0
   ser-cli status --port tcp://10.0.0.7:4000 --timeout 5s";
 
-/// Ask the unit what it is doing: recording or not, log, settings, latest event.
+/// Ask the recorder what it is doing: recording or not, log, settings, latest event.
 ///
-/// Original units answer only a part of this; the rest is shown as not known.
+/// Original recorders answer only a part of this; the rest is shown as not known.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {}
 
 pub(crate) fn run(_args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let mut unit = connection::open(connection)?;
-    // Every unit answers a read: one that does not is not there, and need not be waited for again.
+    // Every recorder answers a read: one that does not is not there, and need not be waited for again.
     let position = unit.log_position()?;
     let mode = unless_unanswered(unit.mode())?;
     let configuration = match mode {
@@ -34,7 +34,7 @@ pub(crate) fn run(_args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let latest = latest_event(&mut unit, position, size)?;
     write(&mut io::stdout().lock(), mode, position, configuration, latest)?;
     if mode.is_none() {
-        advise("mode and settings are not known: an original unit does not answer the queries for them");
+        advise("mode and settings are not known: an original recorder does not answer the queries for them");
     }
     Ok(())
 }

@@ -21,21 +21,21 @@ const EXAMPLES: &str = "\
 Examples:
   ser-cli watch                        until Ctrl-C
   ser-cli watch --format jsonl >> log  run after run, no event twice
-  ser-cli watch --poll --interval 5s   leaves the unit's settings alone
-  ser-cli watch --log-size 2048        an original unit
+  ser-cli watch --poll --interval 5s   leaves the recorder's settings alone
+  ser-cli watch --log-size 2048        an original recorder
 
-First comes what has not been delivered yet (as read --new), then every event as it happens. The unit is told to \
+First comes what has not been delivered yet (as read --new), then every event as it happens. The recorder is told to \
 report by itself (auto report on RS-232); on the way out, also after Ctrl-C or an error, it gets back the setting \
-it had. Units that report to the Genius bus keep doing so and are asked every second instead, and so are original \
-units. Every now and then the log itself is looked at, so that a report lost on the line is an event late, not lost.
-While events come so fast that reports and readings are more than the line carries, the unit is told not to report \
+it had. Recorders that report to the Genius bus keep doing so and are asked every second instead, and so are original \
+recorders. Every now and then the log itself is looked at, so that a report lost on the line is an event late, not lost.
+While events come so fast that reports and readings are more than the line carries, the recorder is told not to report \
 and is read without a pause. What is overwritten all the same is counted, where it belongs.
-On a Genius bus a board or a unit that fails is waited for, a minute or as long as --timeout says.";
+On a Genius bus a board or a recorder that fails is waited for, a minute or as long as --timeout says.";
 
-/// How often the unit is asked when it does not report by itself.
+/// How often the recorder is asked when it does not report by itself.
 const POLL_EVERY: Duration = Duration::from_secs(1);
 
-/// How often the log is looked at when the unit does report.
+/// How often the log is looked at when the recorder does report.
 const CHECK_EVERY: Duration = Duration::from_secs(10);
 
 /// Show events as they happen.
@@ -50,7 +50,7 @@ pub(crate) struct Args {
     #[arg(long)]
     fail_on_loss: bool,
 
-    /// Ask the unit again and again instead of letting it report.
+    /// Ask the recorder again and again instead of letting it report.
     #[arg(long)]
     poll: bool,
 
@@ -58,7 +58,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     interval: Option<Duration>,
 
-    /// How many entries the unit's log holds; needed for original units, which do not tell.
+    /// How many entries the recorder's log holds; needed for original recorders, which do not tell.
     #[arg(long, value_name = "N", value_parser = values::entries())]
     log_size: Option<u16>,
 
@@ -75,9 +75,9 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let watcher = match plan.reports {
         Some(Reports { switch, found }) => {
             if !switch.is_on {
-                inform("the unit reports by itself until Ctrl-C");
+                inform("the recorder reports by itself until Ctrl-C");
             }
-            // From the first try on: the unit may have carried out what it did not answer.
+            // From the first try on: the recorder may have carried out what it did not answer.
             interrupt::leaves_behind(Some(not_put_back(&found)));
             LogWatcher::reporting(follower, plan.interval, switch)
         }
@@ -106,18 +106,18 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
 const fn not_put_back(found: &Configuration) -> &'static str {
     match found.auto_report {
         AutoReport::Off => {
-            "the unit may still report by itself; ser-cli config --auto-report off puts that back"
+            "the recorder may still report by itself; ser-cli config --auto-report off puts that back"
         }
         AutoReport::Rs232 => {
-            "the unit may have stopped reporting; ser-cli config --auto-report rs232 puts that back"
+            "the recorder may have stopped reporting; ser-cli config --auto-report rs232 puts that back"
         }
         AutoReport::Genius => {
-            "the unit may have stopped reporting; ser-cli config --auto-report genius puts that back"
+            "the recorder may have stopped reporting; ser-cli config --auto-report genius puts that back"
         }
     }
 }
 
-/// How the unit is going to be watched.
+/// How the recorder is going to be watched.
 struct Plan {
     size: u16,
     /// Auto reports, if they come to this computer or may be made to.
@@ -140,7 +140,9 @@ fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
     }
     let Some(found) = connection::settings(unit)? else {
         let size = args.log_size.or(remembered).ok_or_else(connection::log_size_unknown)?;
-        inform("the unit does not tell its settings, as original units do not: it is asked for events");
+        inform(
+            "the recorder does not tell its settings, as original recorders do not: it is asked for events",
+        );
         return Ok(polling(size));
     };
     let size = args.log_size.unwrap_or(found.size);
@@ -159,14 +161,14 @@ fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
             AutoReport::Genius if unit.bus_address() == Some(found.report_address) => Ok(reporting(true)),
             AutoReport::Off => Ok(reporting(false)),
             AutoReport::Genius | AutoReport::Rs232 => {
-                inform("the unit reports elsewhere and goes on doing so: it is asked for events");
+                inform("the recorder reports elsewhere and goes on doing so: it is asked for events");
                 Ok(polling(size))
             }
         },
         AutoReport::Rs232 => Ok(reporting(true)),
         AutoReport::Off => Ok(reporting(false)),
         AutoReport::Genius => {
-            inform("the unit reports to the Genius bus and goes on doing so: it is asked for events");
+            inform("the recorder reports to the Genius bus and goes on doing so: it is asked for events");
             Ok(polling(size))
         }
     }

@@ -101,10 +101,10 @@ mod tests {
         assert_eq!(
             decoded(ANY, b"ready\r\n\x1B0452000105580A\x1B014545"),
             [
-                "0  text    ready",
-                "7  host    read 5 entries from entry 1",
-                "20  text    0A",
-                "22  either  host: erase the event buffer | unit: event buffer erased",
+                "0  text      ready",
+                "7  host      read 5 entries from entry 1",
+                "20  text      0A",
+                "22  either    host: erase the event buffer | recorder: event buffer erased",
                 "2 messages, 2 lines of text, nothing damaged"
             ]
         );
@@ -115,8 +115,8 @@ mod tests {
         assert_eq!(
             decoded(ANY, b"\r\n0001 2026-11-22 10:00:00.250  3 ON\r\n0002 ACE\r\n"),
             [
-                "2  text    0001 2026-11-22 10:00:00.250  3 ON",
-                "38  text    0002 ACE",
+                "2  text      0001 2026-11-22 10:00:00.250  3 ON",
+                "38  text      0002 ACE",
                 "0 messages, 2 lines of text, nothing damaged"
             ]
         );
@@ -133,8 +133,8 @@ mod tests {
         assert_eq!(
             decoded(ANY, b"# erase\n1B 30 31 34 35 34 35\n1B303134433443\n"),
             [
-                "2:1  either  host: erase the event buffer | unit: event buffer erased",
-                "3:1  host    query the last broadcast",
+                "2:1  either    host: erase the event buffer | recorder: event buffer erased",
+                "3:1  host      query the last broadcast",
                 "2 messages, nothing damaged"
             ]
         );
@@ -148,11 +148,11 @@ mod tests {
                 b"\x1B014546\x1B0145\x1B01G\x1B014C4C\x1B01"
             ),
             [
-                "0  damage  frame given up at byte 6: checksum is 46h, the bytes add up to 45h",
-                "7  damage  frame given up at byte 12: a new frame began before it was complete",
-                "12  damage  frame given up at byte 15: byte 47h is no hexadecimal digit",
-                "16  host    query the last broadcast",
-                "23  damage  the data ends inside the frame",
+                "0  damage    frame given up at byte 6: checksum is 46h, the bytes add up to 45h",
+                "7  damage    frame given up at byte 12: a new frame began before it was complete",
+                "12  damage    frame given up at byte 15: byte 47h is no hexadecimal digit",
+                "16  host      query the last broadcast",
+                "23  damage    the data ends inside the frame",
                 "1 message, 4 damaged places"
             ]
         );
@@ -166,10 +166,10 @@ mod tests {
                 b"1B 30 31 34 35 34 3\n1B 30 31 34 ?35 34 35"
             ),
             [
-                "1:19  damage  odd number of digits: a single 3, skipped",
-                "1:1  damage  frame given up at line 2, column 1: a new frame began before it was complete",
-                "2:13  damage  '?' is no hexadecimal digit, skipped",
-                "2:1  host    erase the event buffer",
+                "1:19  damage    odd number of digits: a single 3, skipped",
+                "1:1  damage    frame given up at line 2, column 1: a new frame began before it was complete",
+                "2:13  damage    '?' is no hexadecimal digit, skipped",
+                "2:1  host      erase the event buffer",
                 "1 message, 3 damaged places"
             ]
         );
@@ -180,15 +180,15 @@ mod tests {
         assert_eq!(
             decoded(CaptureOptions { bodies: true, ..ANY }, b"52 01 F4 05\n\n1B\n53"),
             [
-                "1:1  host    read 5 entries from entry 500",
-                "3:1  damage  no message: unknown command byte 1Bh (1B)",
-                "4:1  unit    clock set",
+                "1:1  host      read 5 entries from entry 500",
+                "3:1  damage    no message: unknown command byte 1Bh (1B)",
+                "4:1  recorder  clock set",
                 "2 messages, 1 damaged place"
             ]
         );
         let raw = CaptureOptions { bodies: true, format: Some(CaptureFormat::Raw), ..ANY };
-        assert_eq!(decoded(raw, b"\x52\x01\xF4\x05")[0], "0  host    read 5 entries from entry 500");
-        assert_eq!(decoded(raw, &[0x52; 300])[0], "0  damage  a body of more than 255 bytes");
+        assert_eq!(decoded(raw, b"\x52\x01\xF4\x05")[0], "0  host      read 5 entries from entry 500");
+        assert_eq!(decoded(raw, &[0x52; 300])[0], "0  damage    a body of more than 255 bytes");
     }
 
     #[test]
@@ -196,10 +196,10 @@ mod tests {
         let hex = CaptureOptions { format: Some(CaptureFormat::Hex), ..ANY };
         assert_eq!(
             decoded(hex, b"\x1B")[0],
-            "1:1  damage  an ESC byte in hex text (--format raw?) is no hexadecimal digit, skipped"
+            "1:1  damage    an ESC byte in hex text (--format raw?) is no hexadecimal digit, skipped"
         );
         let raw = CaptureOptions { format: Some(CaptureFormat::Raw), ..ANY };
-        assert_eq!(decoded(raw, b"1B 30")[0], "0  text    1B 30");
+        assert_eq!(decoded(raw, b"1B 30")[0], "0  text      1B 30");
     }
 
     #[test]

@@ -15,7 +15,8 @@ pub enum Side {
     /// Commands.
     Host,
     /// Replies and auto reports.
-    Unit,
+    #[value(alias = "unit")]
+    Recorder,
 }
 
 /// What a body says.
@@ -36,16 +37,17 @@ impl Explanation {
 
 /// Puts a body into words; when `from` is not known and both sides could have sent it, both readings.
 pub(crate) fn explain(body: &[u8], from: Option<Side>) -> Explanation {
-    let command = (from != Some(Side::Unit)).then(|| Command::parse(body));
+    let command = (from != Some(Side::Recorder)).then(|| Command::parse(body));
     let reply = (from != Some(Side::Host)).then(|| Reply::parse(body));
     let plain = |kind, text| Explanation { kind, text, details: Vec::new() };
     match (command, reply) {
-        (Some(Ok(command)), Some(Ok(reply))) => {
-            plain(Kind::Either, format!("host: {} | unit: {}", command_text(&command), reply_text(&reply)))
-        }
+        (Some(Ok(command)), Some(Ok(reply))) => plain(
+            Kind::Either,
+            format!("host: {} | recorder: {}", command_text(&command), reply_text(&reply)),
+        ),
         (Some(Ok(command)), _) => plain(Kind::Host, command_text(&command)),
         (_, Some(Ok(reply))) => {
-            Explanation { kind: Kind::Unit, text: reply_text(&reply), details: entry_lines(&reply) }
+            Explanation { kind: Kind::Recorder, text: reply_text(&reply), details: entry_lines(&reply) }
         }
         (command, reply) => {
             plain(Kind::Damage, no_message(body, command.and_then(Result::err), reply.and_then(Result::err)))
@@ -195,22 +197,25 @@ mod tests {
         for (body, meaning) in [
             (
                 &[0x43, 4, 0, 6, 3, 1, 1][..],
-                "Unit: configuration: size 1024, 9600 baud, auto report on RS-232 (address 1), auto print on",
+                "Recorder: configuration: size 1024, 9600 baud, auto report on RS-232 (address 1), auto print on",
             ),
-            (&[0x45], "Unit: event buffer erased"),
-            (&[0x4C, 0x45, 14, 30, 50, 0, 250], "Unit: last broadcast: erase at 14:30:50.250"),
-            (&[0x4D, 1, 0x7D], "Unit: recording, version 1.25"),
-            (&[0x50], "Unit: print accepted"),
-            (&[0x53], "Unit: clock set"),
+            (&[0x45], "Recorder: event buffer erased"),
+            (&[0x4C, 0x45, 14, 30, 50, 0, 250], "Recorder: last broadcast: erase at 14:30:50.250"),
+            (&[0x4D, 1, 0x7D], "Recorder: recording, version 1.25"),
+            (&[0x50], "Recorder: print accepted"),
+            (&[0x53], "Recorder: clock set"),
         ] {
-            assert_eq!(text(body, Some(Side::Unit)), meaning);
+            assert_eq!(text(body, Some(Side::Recorder)), meaning);
         }
     }
 
     #[test]
     fn what_both_could_have_sent_gets_both_readings() {
-        assert_eq!(text(&[0x45], None), "Either: host: erase the event buffer | unit: event buffer erased");
-        assert_eq!(text(&[0x53], None), "Unit: clock set");
+        assert_eq!(
+            text(&[0x45], None),
+            "Either: host: erase the event buffer | recorder: event buffer erased"
+        );
+        assert_eq!(text(&[0x53], None), "Recorder: clock set");
     }
 
     #[test]

@@ -43,8 +43,8 @@ impl Place {
 pub(crate) enum Kind {
     /// A message from the host.
     Host,
-    /// A message from the unit.
-    Unit,
+    /// A message from the recorder.
+    Recorder,
     /// A message that either could have sent.
     Either,
     /// A line of text.
@@ -90,7 +90,7 @@ impl<W: Write> Listing<W> {
         let Palette { faint, alarm, .. } = self.palette;
         let (name, style) = match kind {
             Kind::Host => ("host", anstyle::Style::new()),
-            Kind::Unit => ("unit", anstyle::Style::new()),
+            Kind::Recorder => ("recorder", anstyle::Style::new()),
             Kind::Either => ("either", anstyle::Style::new()),
             Kind::Text => ("text", faint),
             Kind::Noise => ("noise", alarm),
@@ -99,11 +99,11 @@ impl<W: Write> Listing<W> {
         match kind {
             Kind::Text => self.tally.lines += 1,
             Kind::Noise | Kind::Damage => self.tally.damages += 1,
-            Kind::Host | Kind::Unit | Kind::Either => self.tally.messages += 1,
+            Kind::Host | Kind::Recorder | Kind::Either => self.tally.messages += 1,
         }
-        writeln!(self.out, "{:>8}  {style}{name:<6}  {text}{style:#}", place.short())?;
+        writeln!(self.out, "{:>8}  {style}{name:<8}  {text}{style:#}", place.short())?;
         for detail in details {
-            writeln!(self.out, "{:>18}{detail}", "")?;
+            writeln!(self.out, "{:>20}{detail}", "")?;
         }
         Ok(())
     }

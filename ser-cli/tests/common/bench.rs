@@ -1,4 +1,4 @@
-//! A simulated unit on a pseudo-terminal, for the tests that use it as a user does.
+//! A simulated recorder on a pseudo-terminal, for the tests that use it as a user does.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use super::{Running, ser_cli, wait_until};
 
-/// A unit made with `ser-cli sim`, whose contacts are moved through its standard input.
+/// A recorder made with `ser-cli sim`, whose contacts are moved through its standard input.
 pub(crate) struct Bench {
     pub(crate) folder: TempDir,
     pub(crate) sim: Running,

@@ -8,7 +8,7 @@ use ser_proto::{Command, FrameEncoder};
 use super::dribble::Dribble;
 
 const FORMATS: [Option<CaptureFormat>; 3] = [None, Some(CaptureFormat::Raw), Some(CaptureFormat::Hex)];
-const SIDES: [Option<Side>; 3] = [None, Some(Side::Host), Some(Side::Unit)];
+const SIDES: [Option<Side>; 3] = [None, Some(Side::Host), Some(Side::Recorder)];
 
 /// The capture is `data`, in each format, from each side, with frames and without:
 ///

@@ -14,7 +14,7 @@ pub(super) struct Args {
     #[arg(required = true, value_name = "WORD", value_parser = values::word, allow_negative_numbers = true)]
     words: Vec<u16>,
 
-    /// The words are data that a PLC has fetched from a unit, and no block.
+    /// The words are data that a PLC has fetched from a recorder, and no block.
     #[arg(long)]
     data: bool,
 
@@ -57,7 +57,7 @@ fn is_for_a_recorder(function: u8, subfunction: u8) -> bool {
 
 /// Where nobody says how many bytes there are, the high half of the last word may be none.
 fn fetched(words: &[u16], bytes: Option<usize>) -> Explanation {
-    let explained = |count| explain(&bytes_of_words(words, count).collect::<Vec<_>>(), Some(Side::Unit));
+    let explained = |count| explain(&bytes_of_words(words, count).collect::<Vec<_>>(), Some(Side::Recorder));
     match bytes {
         Some(bytes) => explained(bytes),
         None => {

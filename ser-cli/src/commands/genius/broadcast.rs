@@ -69,7 +69,7 @@ fn send(what: What, host: &GeniHost) -> Result<Command> {
     let command = match what {
         What::Clock { at: Some(time) } => Command::SetClock(time),
         What::Clock { at: None } => Command::SetClock(local_time_in(host.delay()).map_err(|year| {
-            Failure::new(format!("a unit's clock runs from 1970 to 2069; this computer's says {year}"))
+            Failure::new(format!("a recorder's clock runs from 1970 to 2069; this computer's says {year}"))
                 .hint("set this computer's clock, or give the time with --at")
         })?),
         What::Start => Command::SetMode { recording: true },

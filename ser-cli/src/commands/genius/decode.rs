@@ -122,7 +122,7 @@ mod tests {
             ),
             ("20 0F 01 02", "Report Fault, 2 bytes\n  01 02"),
             ("20 33", "datagram 33h, no data"),
-            ("40 50 45", "host: erase the event buffer | unit: event buffer erased"),
+            ("40 50 45", "host: erase the event buffer | recorder: event buffer erased"),
             ("0x33 0x01 0xFF", "function 33h, subfunction 01h: FF"),
         ] {
             assert_eq!(decoded(words), text, "{words}");
