@@ -34,7 +34,7 @@ pub struct SimOptions {
     pub genius: Option<GeniusOptions>,
     /// Called with a sentence for the user when something is not as it should be but goes on.
     pub notice: Option<Notice>,
-    /// Whether [`Simulator::played`] is wanted. It takes memory with every move, as long as the
+    /// Whether [`Simulator::played`](crate::Simulator::played) is wanted. It takes memory with every move, as long as the
     /// simulator runs.
     pub keep_played: bool,
 }
