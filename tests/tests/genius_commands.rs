@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use geni_board::Destination::{Broadcast, Device};
-use geni_board::{Configuration, Driver, Event, Options, Received, Start};
+use geni_board::{Configuration, Driver, Event, Options, ReceivedDatagram, Start};
 use ser_proto::{
     AutoReport, Baud, Code, Command, Configure, Entry, Inputs, LastBroadcast, Mode, Model, Reply, TimeStamp,
 };
@@ -308,7 +308,7 @@ fn second_host(world: &mut World, number: u8) -> Driver<BoardWindow> {
 }
 
 /// What a host has received, if something has happened.
-fn look(host: &mut Driver<BoardWindow>, world: &World) -> Option<Received> {
+fn look(host: &mut Driver<BoardWindow>, world: &World) -> Option<ReceivedDatagram> {
     let event = host.poll(u32::try_from(world.now_ms).expect("less than 49 days"));
     let held = host.reset_held();
     host.ram_mut().drive_reset(held);
@@ -328,7 +328,7 @@ fn of_two_hosts_that_ask_each_gets_the_answer_to_its_own_question() {
             destination: Device(UNIT),
             function: 0x40,
             subfunction: 0x50,
-            priority: geni_board::Priority::Normal,
+            priority: geni_board::TransmitPriority::Normal,
             completion: geni_board::Completion::Acknowledged,
             data: geni_board::Data::from_slice(b"M").expect("a byte"),
         };

@@ -1,7 +1,7 @@
 //! A bus and a line together set a recorder's clock and mode as fast as they can, while debounce
 //! holds changes back: what was in force when a contact moved decides about the change.
 
-use geni_board::{Completion, Data, Destination, Priority, Transmission};
+use geni_board::{Completion, Data, Destination, Transmission, TransmitPriority};
 use ser_node::Debounce;
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{Command, Model, TimeStamp};
@@ -66,7 +66,7 @@ impl Plant {
                 destination: Destination::Broadcast,
                 function: FUNCTION_HORNER,
                 subfunction: SUBFUNCTION_SER,
-                priority: Priority::High,
+                priority: TransmitPriority::High,
                 completion: Completion::Taken,
                 data,
             };

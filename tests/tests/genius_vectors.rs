@@ -1,10 +1,10 @@
 //! The examples of `vectors/genius.txt`: what they mean, and that we produce them.
 
 use ser_proto::genius::{
-    CommReq, Datagram, Device, DipSwitches, GlobalData, Message, PlcReference, Priority, SendDatagram,
+    BusAddress, CommReq, Datagram, DipSwitches, GlobalData, Message, PlcReference, Priority, SendDatagram,
 };
 
-const PLC: Device = Device::new(31).unwrap();
+const PLC: BusAddress = BusAddress::new(31).unwrap();
 
 /// The examples of one kind, each with the line it is on and its other fields.
 fn examples(kind: &str) -> Vec<(usize, Vec<&'static str>)> {

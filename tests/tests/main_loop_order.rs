@@ -7,18 +7,18 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 
 use geni_board::{
-    Completion, Configuration, Data, Destination, Driver, Options, Priority, Start, Transmission,
+    Completion, Configuration, Data, Destination, Driver, Options, Start, Transmission, TransmitPriority,
 };
 use ser_board::genius::{GeniBoard, Genius};
 use ser_board::main_loop::{self, Line};
-use ser_board::serial_line::Received;
+use ser_board::serial_line::ReceivedByte;
 use ser_node::{
     Capture, CaptureChannel, CopyNumber, Debounce, Event as Change, GeniusOptions, NoRtc, Node, NodeParts,
     RECORD_LEN, Storage,
 };
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{AutoReport, Baud, Command, Configure, Entry, FrameEncoder, Model, TimeStamp};
-use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusRate, Handle};
+use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusTiming, Handle};
 
 const UNIT: u8 = 5;
 const HOST: u8 = 31;
@@ -64,7 +64,7 @@ struct Surroundings {
     board: Handle<Board>,
     host: Driver<BoardWindow>,
     pulses: VecDeque<u32>,
-    bytes: VecDeque<Received>,
+    bytes: VecDeque<ReceivedByte>,
     acts: Vec<(u32, Act)>,
     /// When the contact moved.
     moved_ms: Option<u32>,
@@ -88,7 +88,7 @@ impl Surroundings {
                 Act::Broadcast(command) => transmit(&mut self.host, Destination::Broadcast, &command),
                 Act::Say(command) => {
                     let bytes = FrameEncoder::new(command.to_body());
-                    self.bytes.extend(bytes.map(|byte| Received { byte, tick_ms: now_ms }));
+                    self.bytes.extend(bytes.map(|byte| ReceivedByte { byte, tick_ms: now_ms }));
                 }
             }
         }
@@ -119,7 +119,7 @@ fn transmit(host: &mut Driver<BoardWindow>, destination: Destination, command: &
         destination,
         function: FUNCTION_HORNER,
         subfunction: SUBFUNCTION_SER,
-        priority: Priority::Normal,
+        priority: TransmitPriority::Normal,
         completion: Completion::Acknowledged,
         data: Data::from_slice(&command.to_body()).expect("short"),
     };
@@ -166,7 +166,7 @@ struct Lines {
 impl Line for Lines {
     const MAX_BYTES: usize = 256;
 
-    fn receive(&mut self, now_ms: u32) -> Option<Received> {
+    fn receive(&mut self, now_ms: u32) -> Option<ReceivedByte> {
         let bytes = &mut self.around.borrow_mut().bytes;
         if bytes.front()?.tick_ms <= now_ms { bytes.pop_front() } else { None }
     }
@@ -216,7 +216,7 @@ struct Bench {
 impl Bench {
     /// Everybody is on the bus.
     fn start() -> Bench {
-        let bus = Rc::new(RefCell::new(Bus::new(BusRate::default())));
+        let bus = Rc::new(RefCell::new(Bus::new(BusTiming::default())));
         let connect = |number| bus.borrow_mut().connect(Board::new(BoardOptions::at(number)));
         let (board, host) = (connect(UNIT), connect(HOST));
         let window = |board| BoardWindow::new(Rc::clone(&bus), board);

@@ -1,6 +1,8 @@
 //! The command block (chapter 10): four commands, one at a time.
 
-use crate::datagram::{Completion, Data, MAX_DEVICE_NUMBER, Priority, Received, Transmission};
+use crate::datagram::{
+    Completion, Data, MAX_DEVICE_NUMBER, ReceivedDatagram, Transmission, TransmitPriority,
+};
 use crate::map;
 use crate::ram::SharedRam;
 
@@ -103,8 +105,8 @@ pub(crate) fn start_transmission<R: SharedRam>(ram: &mut R, transmission: &Trans
     // The capacity of the data is 134.
     let len = u8::try_from(transmission.data.len()).unwrap_or(0);
     let priority = match transmission.priority {
-        Priority::Normal => 0,
-        Priority::High => 1,
+        TransmitPriority::Normal => 0,
+        TransmitPriority::High => 1,
     };
     ram.write_bytes(map::TRANSMIT_BUFFER.start, &transmission.data);
     ram.write(map::TRANSMIT_DESTINATION, transmission.destination.to_byte());
@@ -129,12 +131,12 @@ pub(crate) fn start_transmission<R: SharedRam>(ram: &mut R, transmission: &Trans
 }
 
 /// What a finished Read Datagram command has brought. `None` when it makes no sense.
-pub(crate) fn read_datagram<R: SharedRam>(ram: &R) -> Option<Received> {
+pub(crate) fn read_datagram<R: SharedRam>(ram: &R) -> Option<ReceivedDatagram> {
     let source = ram.read(map::READ_SOURCE);
     if source > MAX_DEVICE_NUMBER {
         return None;
     }
-    Some(Received {
+    Some(ReceivedDatagram {
         source,
         function: ram.read(map::READ_FUNCTION),
         subfunction: ram.read(map::READ_SUBFUNCTION),
@@ -152,9 +154,9 @@ pub(crate) fn read_reply<R: SharedRam>(
     source: u8,
     function: u8,
     subfunction: u8,
-) -> Option<Received> {
+) -> Option<ReceivedDatagram> {
     let data = read_data(ram, ram.read(map::REPLY_LEN))?;
-    Some(Received { source, function, subfunction, broadcast: false, arrived_ms: None, data })
+    Some(ReceivedDatagram { source, function, subfunction, broadcast: false, arrived_ms: None, data })
 }
 
 fn read_data<R: SharedRam>(ram: &R, len: u8) -> Option<Data> {
@@ -180,7 +182,7 @@ mod tests {
             destination: Destination::Device(30),
             function: 0x40,
             subfunction: 0x50,
-            priority: Priority::High,
+            priority: TransmitPriority::High,
             completion,
             data: Data::from_slice(&[7, 8, 9]).expect("short"),
         }

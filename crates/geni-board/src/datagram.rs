@@ -43,7 +43,7 @@ impl Destination {
 /// Which datagrams go first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Priority {
+pub enum TransmitPriority {
     /// In a bus scan in which nobody else has sent one.
     #[default]
     Normal,
@@ -77,7 +77,7 @@ pub struct Transmission {
     /// Subfunction code.
     pub subfunction: u8,
     /// How urgent it is.
-    pub priority: Priority,
+    pub priority: TransmitPriority,
     /// What is to be known.
     pub completion: Completion,
     /// The data.
@@ -140,7 +140,7 @@ impl core::error::Error for TransmitError {}
 /// A datagram that has arrived.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Received {
+pub struct ReceivedDatagram {
     /// Device number of the sender, 0–31.
     pub source: u8,
     /// Function code.

@@ -2,10 +2,10 @@
 
 use core::fmt;
 
-use crate::datagram::Received;
+use crate::datagram::ReceivedDatagram;
 use crate::device_table::Device;
 use crate::request_queue::{MemoryRequest, RequestHeader};
-use crate::setup_table::{Configuration, DipSwitches};
+use crate::setup_table::{BoardSwitches, Configuration};
 use crate::status_table::Status;
 
 /// Something that happened between two calls of [`Driver::poll`](crate::Driver::poll).
@@ -31,11 +31,11 @@ pub enum Event {
         change: DeviceChange,
     },
     /// A datagram has arrived.
-    Received(Received),
+    Received(ReceivedDatagram),
     /// The datagram that was to be sent has been, or not.
     Sent(Result<(), CommandError>),
     /// The reply to the datagram that was sent, or the lack of it.
-    Replied(Result<Received, CommandError>),
+    Replied(Result<ReceivedDatagram, CommandError>),
     /// Another device asks for this host's memory: see
     /// [`Driver::answer_request`](crate::Driver::answer_request).
     Request(MemoryRequest),
@@ -67,7 +67,7 @@ pub struct Identity {
     /// Software revision.
     pub revision: u8,
     /// Its switches.
-    pub switches: DipSwitches,
+    pub switches: BoardSwitches,
     /// Its configuration.
     pub configuration: Configuration,
 }

@@ -66,8 +66,8 @@ mod window_ram;
 pub use command_block::{CommandCode, CommandStatus};
 pub use counters::Counters;
 pub use datagram::{
-    Completion, Data, Destination, MAX_DATA_LEN, MAX_DEVICE_NUMBER, MAX_FUNCTION_CODE, Priority, Received,
-    Transmission, TransmitError,
+    Completion, Data, Destination, MAX_DATA_LEN, MAX_DEVICE_NUMBER, MAX_FUNCTION_CODE, ReceivedDatagram,
+    Transmission, TransmitError, TransmitPriority,
 };
 pub use device_table::{BlockKind, Device};
 pub use driver::Driver;
@@ -84,6 +84,6 @@ pub use request_queue::{
     AnswerError, MAX_REQUEST_DATA_LEN, MemoryRequest, READ_DEVICE, RequestAnswer, RequestHeader,
     RequestStatus, WRITE_DEVICE, WRITE_POINT,
 };
-pub use setup_table::{BusRate, Configuration, DipSwitches, InvalidConfiguration};
+pub use setup_table::{BoardSwitches, Configuration, InvalidConfiguration, RateSetting};
 pub use status_table::Status;
 pub use window_ram::WindowRam;

@@ -8,7 +8,7 @@ use crate::ram::SharedRam;
 /// Bit rate of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum BusRate {
+pub enum RateSetting {
     /// 153.6 kbit/s, extended.
     K153_6Extended,
     /// 153.6 kbit/s, standard.
@@ -22,31 +22,31 @@ pub enum BusRate {
 /// The DIP switches, as the board read them at power-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct DipSwitches {
+pub struct BoardSwitches {
     /// Address of the board on the bus, 0–31.
     pub device_number: u8,
     /// Bit rate of the bus.
-    pub rate: BusRate,
+    pub rate: RateSetting,
     /// Whether devices are sent outputs as soon as they log in.
     pub outputs_enabled: bool,
 }
 
-impl DipSwitches {
+impl BoardSwitches {
     /// From the byte in the setup table; an open switch is 1.
     #[must_use]
-    pub const fn from_byte(byte: u8) -> DipSwitches {
+    pub const fn from_byte(byte: u8) -> BoardSwitches {
         // Bit 5 is switch 6 and bit 6 is switch 7.
         let rate = match byte >> 5 & 0b11 {
-            0b00 => BusRate::K153_6Extended,
-            0b01 => BusRate::K38_4,
-            0b10 => BusRate::K76_8,
-            _ => BusRate::K153_6Standard,
+            0b00 => RateSetting::K153_6Extended,
+            0b01 => RateSetting::K38_4,
+            0b10 => RateSetting::K76_8,
+            _ => RateSetting::K153_6Standard,
         };
-        DipSwitches { device_number: byte & 0x1F, rate, outputs_enabled: byte & 0x80 != 0 }
+        BoardSwitches { device_number: byte & 0x1F, rate, outputs_enabled: byte & 0x80 != 0 }
     }
 
-    pub(crate) fn read<R: SharedRam>(ram: &R) -> DipSwitches {
-        DipSwitches::from_byte(ram.read(map::SETUP_DIP_SWITCHES))
+    pub(crate) fn read<R: SharedRam>(ram: &R) -> BoardSwitches {
+        BoardSwitches::from_byte(ram.read(map::SETUP_DIP_SWITCHES))
     }
 }
 
@@ -177,14 +177,14 @@ mod tests {
 
     #[test]
     fn switches_6_and_7_choose_the_bus_rate() {
-        let rate = |byte| DipSwitches::from_byte(byte).rate;
-        assert_eq!(rate(0x00), BusRate::K153_6Extended);
-        assert_eq!(rate(0x20), BusRate::K38_4);
-        assert_eq!(rate(0x40), BusRate::K76_8);
-        assert_eq!(rate(0x60), BusRate::K153_6Standard);
-        let as_delivered = DipSwitches::from_byte(0xFF);
+        let rate = |byte| BoardSwitches::from_byte(byte).rate;
+        assert_eq!(rate(0x00), RateSetting::K153_6Extended);
+        assert_eq!(rate(0x20), RateSetting::K38_4);
+        assert_eq!(rate(0x40), RateSetting::K76_8);
+        assert_eq!(rate(0x60), RateSetting::K153_6Standard);
+        let as_delivered = BoardSwitches::from_byte(0xFF);
         assert_eq!((as_delivered.device_number, as_delivered.outputs_enabled), (31, true));
-        assert!(!DipSwitches::from_byte(0x7F).outputs_enabled);
+        assert!(!BoardSwitches::from_byte(0x7F).outputs_enabled);
     }
 
     #[test]

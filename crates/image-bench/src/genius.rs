@@ -6,12 +6,13 @@ use std::rc::Rc;
 
 use crate::lockstep::Lockstep;
 use geni_board::{
-    Completion, Configuration, Data, Destination, Driver, Event, Options, Priority, Start, Transmission,
+    Completion, Configuration, Data, Destination, Driver, Event, Options, Start, Transmission,
+    TransmitPriority,
 };
 use ser_node::{GeniusOptions, GeniusPort};
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{Command, FrameEncoder, Model};
-use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusRate, Handle, Read, tick_ms};
+use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusTiming, Handle, Read, tick_ms};
 use ser_sim::{Ram, Scenario, SimNode, SimNodeOptions, Step};
 
 use ser_trial::genius_world::HOST;
@@ -58,7 +59,7 @@ impl Genius {
     /// Both boards have power, and nobody has looked at them.
     #[must_use]
     pub fn new() -> Genius {
-        let bus = Rc::new(RefCell::new(Bus::new(BusRate::default())));
+        let bus = Rc::new(RefCell::new(Bus::new(BusTiming::default())));
         let connect = |number| bus.borrow_mut().connect(Board::powered(BoardOptions::at(number)));
         let (recorder, host) = (connect(RECORDER), connect(HOST));
         let window = BoardWindow::new(Rc::clone(&bus), host);
@@ -132,7 +133,7 @@ impl Genius {
             destination,
             function: FUNCTION_HORNER,
             subfunction: SUBFUNCTION_SER,
-            priority: Priority::Normal,
+            priority: TransmitPriority::Normal,
             completion: Completion::Acknowledged,
             // No command is longer than a datagram.
             data: Data::from_slice(&command.to_body()).unwrap_or_default(),

@@ -9,7 +9,7 @@ use ser_node::{Node, Rtc, Storage};
 use ser_proto::Baud;
 
 use crate::genius::{GeniBoard, Genius};
-use crate::serial_line::Received;
+use crate::serial_line::ReceivedByte;
 
 /// A board's RS-232 line as the main loop sees it.
 pub trait Line {
@@ -18,7 +18,7 @@ pub trait Line {
 
     /// The next byte, if it arrived no later than at this tick: see
     /// [`take_until`](crate::serial_line::take_until).
-    fn receive(&mut self, now_ms: u32) -> Option<Received>;
+    fn receive(&mut self, now_ms: u32) -> Option<ReceivedByte>;
 
     /// How many bytes were lost or misread since this was asked last.
     fn errors(&mut self) -> u32;

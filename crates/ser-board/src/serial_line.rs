@@ -18,7 +18,7 @@ pub const CHARACTER_BITS: u32 = 10;
 /// A byte that has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Received {
+pub struct ReceivedByte {
     /// The byte.
     pub byte: u8,
     /// When, in milliseconds since power-up, wrapping.
@@ -27,8 +27,11 @@ pub struct Received {
 
 /// Takes the oldest byte out of the ring, if it arrived no later than at tick `now_ms`. One that has arrived since
 /// that tick was read waits for the next look.
-pub fn take_until<const N: usize>(ring: &mut Reader<'_, Received, N>, now_ms: u32) -> Option<Received> {
-    let has_come = |received: &Received| now_ms.wrapping_sub(received.tick_ms) <= u32::MAX / 2;
+pub fn take_until<const N: usize>(
+    ring: &mut Reader<'_, ReceivedByte, N>,
+    now_ms: u32,
+) -> Option<ReceivedByte> {
+    let has_come = |received: &ReceivedByte| now_ms.wrapping_sub(received.tick_ms) <= u32::MAX / 2;
     ring.peek().filter(has_come)?;
     ring.pop()
 }
@@ -39,7 +42,7 @@ pub struct ReceivedCell {
     byte: AtomicU8,
 }
 
-impl Slot for Received {
+impl Slot for ReceivedByte {
     type Cell = ReceivedCell;
     const EMPTY: ReceivedCell = ReceivedCell { tick_ms: AtomicU32::new(0), byte: AtomicU8::new(0) };
 
@@ -50,14 +53,17 @@ impl Slot for Received {
     }
 
     #[inline]
-    fn load(cell: &ReceivedCell) -> Received {
-        Received { byte: cell.byte.load(Ordering::Relaxed), tick_ms: cell.tick_ms.load(Ordering::Relaxed) }
+    fn load(cell: &ReceivedCell) -> ReceivedByte {
+        ReceivedByte {
+            byte: cell.byte.load(Ordering::Relaxed),
+            tick_ms: cell.tick_ms.load(Ordering::Relaxed),
+        }
     }
 }
 
 /// Memory of the rings of both directions; belongs into a static. See [`budget`](crate::budget) for the lengths.
 pub struct SerialRings<const RECEIVE: usize, const TRANSMIT: usize> {
-    receive: Ring<Received, RECEIVE>,
+    receive: Ring<ReceivedByte, RECEIVE>,
     transmit: Ring<u8, TRANSMIT>,
     errors: Counter,
 }
@@ -67,7 +73,7 @@ pub struct SerialEnds<'a, const RECEIVE: usize, const TRANSMIT: usize> {
     /// The receive interrupt's.
     pub receiver: Receiver<'a, RECEIVE>,
     /// The main loop's end of what was received.
-    pub received: Reader<'a, Received, RECEIVE>,
+    pub received: Reader<'a, ReceivedByte, RECEIVE>,
     /// The main loop's end of what was not received as it was sent.
     pub errors: LineErrors<'a>,
     /// The main loop's end of what is to be sent.
@@ -112,7 +118,7 @@ pub struct ReceiveStatus {
 
 /// The receive interrupt's end.
 pub struct Receiver<'a, const N: usize> {
-    ring: Writer<'a, Received, N>,
+    ring: Writer<'a, ReceivedByte, N>,
     errors: &'a Counter,
 }
 
@@ -127,7 +133,7 @@ impl<const N: usize> Receiver<'_, N> {
 
     /// Takes a byte that the UART has. Without room it is lost.
     #[inline]
-    pub fn push(&mut self, received: Received) {
+    pub fn push(&mut self, received: ReceivedByte) {
         if !self.ring.push(received) {
             self.count_error();
         }
@@ -151,7 +157,7 @@ impl<const N: usize> Receiver<'_, N> {
         }
         let byte = read();
         if has_byte {
-            self.push(Received { byte, tick_ms });
+            self.push(ReceivedByte { byte, tick_ms });
         }
         for _ in 0..u32::from(has_byte && misread) + u32::from(overrun) {
             self.count_error();
@@ -219,8 +225,8 @@ pub const fn character_ms(baud: Baud, characters: u32) -> u32 {
 mod tests {
     use super::*;
 
-    fn byte(byte: u8, tick_ms: u32) -> Received {
-        Received { byte, tick_ms }
+    fn byte(byte: u8, tick_ms: u32) -> ReceivedByte {
+        ReceivedByte { byte, tick_ms }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use ser_board::budget;
 use ser_board::genius::{GeniBoard, Genius};
 use ser_board::main_loop::{self, Line};
 use ser_board::ring::{Reader, Writer};
-use ser_board::serial_line::{self, LineErrors, Quiet, Received, Receiver, SerialEnds, SerialRings};
+use ser_board::serial_line::{self, LineErrors, Quiet, ReceivedByte, Receiver, SerialEnds, SerialRings};
 use ser_node::{
     Capture, CaptureChannel, CopyNumber, Debounce, Event, NoRtc, Node, NodeParts, RECORD_LEN, Storage,
 };
@@ -58,7 +58,7 @@ impl GeniBoard for NoBoard {
 
 /// The main loop's end of a UART.
 struct Uart<'a> {
-    received: Reader<'a, Received, RECEIVE>,
+    received: Reader<'a, ReceivedByte, RECEIVE>,
     errors: LineErrors<'a>,
     to_send: Writer<'a, u8, TRANSMIT>,
     quiet: Quiet,
@@ -70,7 +70,7 @@ struct Uart<'a> {
 impl Line for Uart<'_> {
     const MAX_BYTES: usize = RECEIVE;
 
-    fn receive(&mut self, now_ms: u32) -> Option<Received> {
+    fn receive(&mut self, now_ms: u32) -> Option<ReceivedByte> {
         serial_line::take_until(&mut self.received, now_ms)
     }
 
@@ -158,7 +158,7 @@ impl Board<'_> {
 
     fn arrive(&mut self, command: &Command) {
         for byte in FrameEncoder::new(command.to_body()) {
-            self.receiver.push(Received { byte, tick_ms: self.tick_ms });
+            self.receiver.push(ReceivedByte { byte, tick_ms: self.tick_ms });
         }
     }
 
@@ -216,7 +216,7 @@ fn what_arrives_during_the_longest_stall_is_not_lost() {
         board.stall_ms(if ms.is_multiple_of(2) { 0 } else { u32::MAX });
         while arrived < budget::bytes_in(ms) {
             let byte = line.next().unwrap();
-            board.receiver.push(Received { byte, tick_ms: board.tick_ms });
+            board.receiver.push(ReceivedByte { byte, tick_ms: board.tick_ms });
             arrived += 1;
         }
     }
@@ -232,7 +232,7 @@ fn bytes_beyond_the_ring_are_counted_as_line_errors() {
     let mut memory = Memory::new();
     let mut board = memory.power_up();
     for _ in 0..RECEIVE + 10 {
-        board.receiver.push(Received { byte: b'.', tick_ms: 0 });
+        board.receiver.push(ReceivedByte { byte: b'.', tick_ms: 0 });
     }
     board.receiver.count_error();
     // At once: no byte may ever follow.

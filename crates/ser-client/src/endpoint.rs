@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
-use ser_proto::genius::Device;
+use ser_proto::genius::BusAddress;
 
 const TCP_PREFIX: &str = "tcp://";
 const GENI_PREFIX: &str = "geni:";
@@ -149,7 +149,7 @@ fn exists(file: &str) -> bool {
 }
 
 fn node_number(text: &str) -> Option<u8> {
-    text.parse().ok().and_then(Device::new).map(Device::number)
+    text.parse().ok().and_then(BusAddress::new).map(BusAddress::number)
 }
 
 /// In decimal, or in hex after `0x`.

@@ -23,7 +23,8 @@ mod reporter;
 
 use geni_board::{
     Completion, Configuration, Counters, Data, Destination, DeviceChange, Driver, Event, Failure, Interrupts,
-    MAX_DATA_LEN, Options, Priority, Received, SharedRam, Start, Status, Transmission, timing,
+    MAX_DATA_LEN, Options, ReceivedDatagram, SharedRam, Start, Status, Transmission, TransmitPriority,
+    timing,
 };
 use heapless::{Deque, Vec};
 use ser_proto::genius::{
@@ -261,7 +262,12 @@ impl<W: SharedRam> GeniusPort<W> {
         }
     }
 
-    fn receive<S: Storage, R: Rtc>(&mut self, datagram: &Received, node: &mut Node<'_, S, R>, now_ms: u32) {
+    fn receive<S: Storage, R: Rtc>(
+        &mut self,
+        datagram: &ReceivedDatagram,
+        node: &mut Node<'_, S, R>,
+        now_ms: u32,
+    ) {
         const READ_IO_FORCES: u8 = Subfunction::ReadIoForces.code();
         match (datagram.function, datagram.subfunction) {
             (FUNCTION_HORNER, SUBFUNCTION_SER) => self.receive_message(datagram, node, now_ms),
@@ -281,7 +287,7 @@ impl<W: SharedRam> GeniusPort<W> {
 
     fn receive_message<S: Storage, R: Rtc>(
         &mut self,
-        datagram: &Received,
+        datagram: &ReceivedDatagram,
         node: &mut Node<'_, S, R>,
         now_ms: u32,
     ) {
@@ -375,7 +381,7 @@ impl<W: SharedRam> GeniusPort<W> {
             destination: Destination::Device(to),
             function,
             subfunction,
-            priority: Priority::Normal,
+            priority: TransmitPriority::Normal,
             completion: Completion::Acknowledged,
             data,
         };

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use ser_proto::Model;
 
-use crate::genius::{BusRate, Noise};
+use crate::genius::{BusTiming, Noise};
 
 /// Device numbers are 0 to 31, and one of them is the host's.
 pub const MAX_NODES: usize = 31;
@@ -19,7 +19,7 @@ pub struct GeniusOptions {
     /// The host's number.
     pub host_number: u8,
     /// How fast the bus is.
-    pub rate: BusRate,
+    pub rate: BusTiming,
     /// What goes wrong on the bus.
     pub noise: Noise,
 }
@@ -30,7 +30,7 @@ impl GeniusOptions {
     pub fn new(window: impl Into<PathBuf>, nodes: Vec<(u8, Model)>) -> GeniusOptions {
         let taken = |number| nodes.iter().any(|&(node, _)| node == number);
         let host_number = (0..=31).rev().find(|&number| !taken(number)).unwrap_or(31);
-        let (rate, noise) = (BusRate::default(), Noise::default());
+        let (rate, noise) = (BusTiming::default(), Noise::default());
         GeniusOptions { window: window.into(), nodes, host_number, rate, noise }
     }
 }

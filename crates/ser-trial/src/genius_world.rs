@@ -7,14 +7,15 @@ use std::rc::Rc;
 
 use chrono::NaiveDateTime;
 use geni_board::{
-    CommandError, Completion, Configuration, Data, Destination, Driver, Event, Options, Received, Start,
+    CommandError, Completion, Configuration, Data, Destination, Driver, Event, Options, ReceivedDatagram,
+    Start,
 };
 use ser_node::{Debounce, GeniusOptions, GeniusPort};
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{
     AutoReport, Command, Configure, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Model, Reply,
 };
-use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusRate, Handle, Noise, ViolationKind};
+use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusTiming, Handle, Noise, ViolationKind};
 use ser_sim::{NonVolatile, Ram, Scenario, SimNode, SimNodeOptions, SimRtc, Step};
 
 /// Device number of the host.
@@ -108,7 +109,7 @@ pub struct Host {
     /// The board.
     pub board: Handle<Board>,
     /// Datagrams that have arrived, and when.
-    pub inbox: VecDeque<(u64, Received)>,
+    pub inbox: VecDeque<(u64, ReceivedDatagram)>,
     /// How the datagrams ended that were to be sent.
     pub sent: VecDeque<Result<(), CommandError>>,
 }
@@ -145,7 +146,7 @@ impl World {
     }
 
     fn of(recorders: &[(u8, Model)], noise: Noise, debounce: Debounce, board_model: u8) -> World {
-        let bus = Rc::new(RefCell::new(Bus::with_noise(BusRate::default(), noise)));
+        let bus = Rc::new(RefCell::new(Bus::with_noise(BusTiming::default(), noise)));
         let connect = |number| {
             let options = BoardOptions { model: board_model, ..BoardOptions::at(number) };
             let board = bus.borrow_mut().connect(Board::new(options));
@@ -266,7 +267,7 @@ impl World {
             destination,
             function,
             subfunction,
-            priority: geni_board::Priority::Normal,
+            priority: geni_board::TransmitPriority::Normal,
             completion: Completion::Acknowledged,
             data,
         };
@@ -280,7 +281,7 @@ impl World {
 
     /// The oldest message of a recorder that has arrived at the host.
     pub fn take_message(&mut self, from: u8) -> Option<(u64, Data)> {
-        let fits = |received: &Received| {
+        let fits = |received: &ReceivedDatagram| {
             (received.source, received.function, received.subfunction)
                 == (from, FUNCTION_HORNER, SUBFUNCTION_SER)
         };

@@ -19,7 +19,7 @@ use cortex_m::peripheral::NVIC;
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
 use ser_board::main_loop::Line;
 use ser_board::ring::{Reader, Writer};
-use ser_board::serial_line::{self, LineErrors, Quiet, Received, Receiver, SerialEnds, SerialRings};
+use ser_board::serial_line::{self, LineErrors, Quiet, ReceivedByte, Receiver, SerialEnds, SerialRings};
 use ser_proto::Baud;
 
 use crate::device::{self, Interrupt, base};
@@ -93,7 +93,7 @@ impl ReceiveInterrupt {
                 STATE.write(RECEIVE_OVERRUN);
                 self.receiver.count_error();
             }
-            self.receiver.push(Received { byte, tick_ms });
+            self.receiver.push(ReceivedByte { byte, tick_ms });
         }
     }
 }
@@ -116,7 +116,7 @@ impl TransmitInterrupt {
 
 /// The main loop's end.
 pub(crate) struct SerialLine {
-    received: Reader<'static, Received, RECEIVE_RING_LEN>,
+    received: Reader<'static, ReceivedByte, RECEIVE_RING_LEN>,
     errors: LineErrors<'static>,
     to_send: Writer<'static, u8, TRANSMIT_RING_LEN>,
     baud: Baud,
@@ -139,7 +139,7 @@ impl SerialLine {
 impl Line for SerialLine {
     const MAX_BYTES: usize = RECEIVE_RING_LEN;
 
-    fn receive(&mut self, now_ms: u32) -> Option<Received> {
+    fn receive(&mut self, now_ms: u32) -> Option<ReceivedByte> {
         let received = serial_line::take_until(&mut self.received, now_ms);
         if received.is_some() {
             self.bytes = self.bytes.wrapping_add(1);

@@ -11,7 +11,7 @@
 
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
 use ser_board::main_loop::Line;
-use ser_board::serial_line::{self, LineErrors, ReceiveStatus, Received, Receiver, SerialEnds, SerialRings};
+use ser_board::serial_line::{self, LineErrors, ReceiveStatus, ReceivedByte, Receiver, SerialEnds, SerialRings};
 use ser_node::ring::{Reader, Writer};
 use ser_proto::Baud;
 use stm32f4::stm32f407::{RCC, USART2};
@@ -88,7 +88,7 @@ impl SerialInterrupt {
 /// The main loop's end.
 pub(crate) struct SerialLine {
     uart: USART2,
-    received: Reader<'static, Received, RECEIVE_RING_LEN>,
+    received: Reader<'static, ReceivedByte, RECEIVE_RING_LEN>,
     errors: LineErrors<'static>,
     to_send: Writer<'static, u8, TRANSMIT_RING_LEN>,
     bytes: u32,
@@ -109,7 +109,7 @@ impl SerialLine {
 impl Line for SerialLine {
     const MAX_BYTES: usize = RECEIVE_RING_LEN;
 
-    fn receive(&mut self, now_ms: u32) -> Option<Received> {
+    fn receive(&mut self, now_ms: u32) -> Option<ReceivedByte> {
         let received = serial_line::take_until(&mut self.received, now_ms);
         self.bytes = self.bytes.wrapping_add(u32::from(received.is_some()));
         received

@@ -7,7 +7,9 @@ mod values;
 use std::io::{self, Write};
 use std::num::NonZeroU16;
 
-use ser_proto::genius::{Address, CommReq, Datagram, DequeueDatagram, Device, PlcReference, SendDatagram};
+use ser_proto::genius::{
+    Address, BusAddress, CommReq, Datagram, DequeueDatagram, PlcReference, SendDatagram,
+};
 
 use super::encode::Message;
 use crate::error::Result;
@@ -87,7 +89,7 @@ struct SendArgs {
 struct DequeueArgs {
     /// Bus address of the recorder, 0-31.
     #[arg(long, value_name = "N", value_parser = values::device)]
-    from: Device,
+    from: BusAddress,
 
     /// Where the PLC shall put the first word.
     #[arg(long, value_name = "PLACE", default_value = "%R200", value_parser = values::reference)]
@@ -139,7 +141,7 @@ impl DequeueArgs {
     }
 }
 
-const SOMEBODY: Device = match Device::new(0) {
+const SOMEBODY: BusAddress = match BusAddress::new(0) {
     Some(device) => device,
     None => unreachable!(),
 };

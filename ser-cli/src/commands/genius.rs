@@ -9,7 +9,7 @@ mod globals;
 
 use clap::ValueEnum;
 use ser_client::Recognition;
-use ser_proto::genius::{Device, DipSwitches, ForceTable};
+use ser_proto::genius::{BusAddress, DipSwitches, ForceTable};
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result};
@@ -87,7 +87,7 @@ enum What {
     Forces {
         /// The device's number, 0-31.
         #[arg(long, value_name = "N", value_parser = device)]
-        node: Device,
+        node: BusAddress,
         /// Which table.
         #[arg(long)]
         table: TableName,
@@ -118,7 +118,7 @@ enum What {
         switches: Option<DipSwitches>,
         /// The bus address that the recorder is to have, 0-31.
         #[arg(long, value_name = "N", value_parser = device)]
-        address: Option<Device>,
+        address: Option<BusAddress>,
         /// The rate of the bus.
         #[arg(long, value_name = "RATE", default_value = "153.6K")]
         rate: dip::Rate,
@@ -167,8 +167,8 @@ impl From<TableName> for ForceTable {
     }
 }
 
-fn device(text: &str) -> std::result::Result<Device, String> {
-    let number = text.parse().ok().and_then(Device::new);
+fn device(text: &str) -> std::result::Result<BusAddress, String> {
+    let number = text.parse().ok().and_then(BusAddress::new);
     number.ok_or_else(|| "not a bus address: 0 to 31".to_string())
 }
 

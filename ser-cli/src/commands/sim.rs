@@ -10,7 +10,7 @@ use std::time::Duration;
 use clap::ValueEnum;
 use ser_console::Harmless;
 use ser_proto::Model;
-use ser_proto::genius::Device;
+use ser_proto::genius::BusAddress;
 use ser_sim::{
     Backend, Contacts, EmulatorOptions, GeniusOptions, LineRate, MAX_NODES, NonVolatile, Notice, Port,
     SimError, SimOptions,
@@ -208,7 +208,7 @@ fn bus_node(text: &str) -> std::result::Result<BusNode, String> {
 }
 
 fn device(text: &str) -> Option<u8> {
-    text.parse().ok().and_then(Device::new).map(Device::number)
+    text.parse().ok().and_then(BusAddress::new).map(BusAddress::number)
 }
 
 fn contacts_failure(contacts: std::result::Result<Contacts, SimError>) -> Result<Contacts> {

@@ -7,16 +7,16 @@ use crate::MAX_REPORT_ADDRESS;
 /// A device on the bus: its number is its address, 0–31.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Device(u8);
+pub struct BusAddress(u8);
 
-impl Device {
+impl BusAddress {
     /// Number 0, by custom a hand-held monitor.
-    pub(super) const FIRST: Device = Device(0);
+    pub(super) const FIRST: BusAddress = BusAddress(0);
 
     /// The device with that number, 0–31.
     #[must_use]
-    pub const fn new(number: u8) -> Option<Device> {
-        if number <= MAX_REPORT_ADDRESS { Some(Device(number)) } else { None }
+    pub const fn new(number: u8) -> Option<BusAddress> {
+        if number <= MAX_REPORT_ADDRESS { Some(BusAddress(number)) } else { None }
     }
 
     /// Its number, 0–31.
@@ -26,13 +26,13 @@ impl Device {
     }
 
     /// Every device that a bus can have, in the order in which they take turns.
-    pub fn all() -> impl Iterator<Item = Device> {
-        (0..=MAX_REPORT_ADDRESS).map(Device)
+    pub fn all() -> impl Iterator<Item = BusAddress> {
+        (0..=MAX_REPORT_ADDRESS).map(BusAddress)
     }
 }
 
 /// As `5`.
-impl fmt::Display for Device {
+impl fmt::Display for BusAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(&self.0, f)
     }
@@ -43,7 +43,7 @@ impl fmt::Display for Device {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Address {
     /// To one device.
-    Device(Device),
+    Device(BusAddress),
     /// To every device on the bus, number 255.
     Broadcast,
 }
@@ -52,7 +52,7 @@ impl Address {
     /// The address with that number: 0–31 or 255.
     #[must_use]
     pub const fn from_number(number: u8) -> Option<Address> {
-        match (number, Device::new(number)) {
+        match (number, BusAddress::new(number)) {
             (u8::MAX, _) => Some(Address::Broadcast),
             (_, Some(device)) => Some(Address::Device(device)),
             (_, None) => None,
@@ -69,8 +69,8 @@ impl Address {
     }
 }
 
-impl From<Device> for Address {
-    fn from(device: Device) -> Address {
+impl From<BusAddress> for Address {
+    fn from(device: BusAddress) -> Address {
         Address::Device(device)
     }
 }
@@ -95,9 +95,9 @@ mod tests {
             let address = Address::from_number(number);
             assert_eq!(address.is_some(), number <= 31 || number == 255, "{number}");
             assert!(address.is_none_or(|address| address.number() == number));
-            assert_eq!(Device::new(number).map(Device::number), (number <= 31).then_some(number));
+            assert_eq!(BusAddress::new(number).map(BusAddress::number), (number <= 31).then_some(number));
         }
-        assert_eq!(Device::all().count(), 32);
+        assert_eq!(BusAddress::all().count(), 32);
         assert_eq!(Address::Broadcast.to_string(), "all");
         assert_eq!(Address::from_number(7).unwrap().to_string(), "7");
     }

@@ -4,7 +4,7 @@ use core::fmt;
 
 use heapless::Vec;
 
-use super::{Address, Device, FUNCTION_GENIUS, FUNCTION_HORNER, Priority, SUBFUNCTION_SER, Subfunction};
+use super::{Address, BusAddress, FUNCTION_GENIUS, FUNCTION_HORNER, Priority, SUBFUNCTION_SER, Subfunction};
 
 /// The most data bytes of a datagram: what the buffers of a GENI board hold (GENI manual, chapter
 /// 10, tables of the Transmit Datagram commands). Messages of the recorder have at most
@@ -19,7 +19,7 @@ pub type Data = Vec<u8, MAX_DATA>;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Datagram {
     /// Who sent it.
-    pub source: Device,
+    pub source: BusAddress,
     /// To whom.
     pub destination: Address,
     /// Which family of datagrams, e.g. [`FUNCTION_GENIUS`].
@@ -38,7 +38,7 @@ impl Datagram {
     /// # Errors
     /// [`TooMuchData`] above [`MAX_DATA`] bytes.
     pub fn new(
-        source: Device,
+        source: BusAddress,
         destination: Address,
         function: u8,
         subfunction: u8,
@@ -122,7 +122,7 @@ impl core::error::Error for TooMuchData {}
 mod tests {
     use super::*;
 
-    const UNIT: Device = Device::new(5).unwrap();
+    const UNIT: BusAddress = BusAddress::new(5).unwrap();
 
     #[test]
     fn data_of_134_bytes_fit_and_135_do_not() {

@@ -103,10 +103,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::genius::{Device, MemoryType};
+    use crate::genius::{BusAddress, MemoryType};
 
     const BLOCK: DequeueDatagram = DequeueDatagram::from_recorder(
-        Address::Device(Device::new(5).unwrap()),
+        Address::Device(BusAddress::new(5).unwrap()),
         70,
         PlcReference::register(200).unwrap(),
         PlcReference::register(100).unwrap(),

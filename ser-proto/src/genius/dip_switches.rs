@@ -12,7 +12,7 @@
 
 use core::fmt;
 
-use super::{BusRate, Device};
+use super::{BusAddress, BusRate};
 
 /// Where the switches stand: switch 1 is bit 0, a 1 is open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -28,9 +28,9 @@ impl DipSwitches {
 
     /// The address that switches 1–5 give.
     #[must_use]
-    pub fn address(self) -> Device {
+    pub fn address(self) -> BusAddress {
         // Five bits are always an address.
-        Device::new(self.0 & 0x1F).unwrap_or(Device::FIRST)
+        BusAddress::new(self.0 & 0x1F).unwrap_or(BusAddress::FIRST)
     }
 
     /// The rate that switches 6 and 7 give.
@@ -71,7 +71,7 @@ impl fmt::Display for DipSwitches {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BusSettings {
     /// Its address.
-    pub address: Device,
+    pub address: BusAddress,
     /// The rate of the bus.
     pub rate: BusRate,
 }
@@ -139,7 +139,7 @@ mod tests {
         for (number, row) in (0..).zip(ADDRESSES) {
             for (rate_row, rate) in RATES {
                 let open = switches(&format!("{row}{rate_row}1"));
-                let settings = BusSettings { address: Device::new(number).unwrap(), rate };
+                let settings = BusSettings { address: BusAddress::new(number).unwrap(), rate };
                 assert_eq!(open.settings(), Ok(settings));
                 assert_eq!(settings.switches(), open);
                 let closed = switches(&format!("{row}{rate_row}0"));

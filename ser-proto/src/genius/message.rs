@@ -4,7 +4,7 @@ use core::fmt;
 
 use super::datagram::ByteCount;
 use super::{
-    Address, Data, Datagram, Device, FUNCTION_GENIUS, ForceTable, IoForces, MemoryContents, MemoryRange,
+    Address, BusAddress, Data, Datagram, FUNCTION_GENIUS, ForceTable, IoForces, MemoryContents, MemoryRange,
     MessageError, Priority, ReadIdReply, Subfunction, WritePoint,
 };
 
@@ -77,7 +77,7 @@ impl Message {
 
     /// The message on its way.
     #[must_use]
-    pub fn to_datagram(&self, source: Device, destination: Address, priority: Priority) -> Datagram {
+    pub fn to_datagram(&self, source: BusAddress, destination: Address, priority: Priority) -> Datagram {
         Datagram {
             source,
             destination,
@@ -151,8 +151,8 @@ mod tests {
     use crate::Model;
     use crate::genius::{MAX_DATA, MemoryAddress};
 
-    const HOST: Device = Device::new(31).unwrap();
-    const UNIT: Device = Device::new(5).unwrap();
+    const HOST: BusAddress = BusAddress::new(31).unwrap();
+    const UNIT: BusAddress = BusAddress::new(5).unwrap();
 
     fn datagram(subfunction: u8, data: &[u8]) -> Datagram {
         Datagram {

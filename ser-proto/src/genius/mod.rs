@@ -27,7 +27,7 @@ mod ser_datagram;
 mod subfunction;
 mod write_point;
 
-pub use address::{Address, Device};
+pub use address::{Address, BusAddress};
 pub use bus_rate::BusRate;
 pub use comm_req::{CommReq, MAX_WORDS, Words};
 pub use comm_req_block::CommReqError;

@@ -12,8 +12,8 @@ use super::comm_req_block::{Block, HEADER_LEN, address, byte, exactly, start};
 use super::datagram::{ByteCount, Subject};
 use super::packing::gather;
 use super::{
-    Address, CommReqError, Data, Datagram, Device, MAX_DATA, PlcReference, Priority, Words, bytes_of_words,
-    words_of_bytes,
+    Address, BusAddress, CommReqError, Data, Datagram, MAX_DATA, PlcReference, Priority, Words,
+    bytes_of_words, words_of_bytes,
 };
 
 /// The command number.
@@ -56,7 +56,7 @@ impl SendDatagram {
 
     /// The datagram as a bus controller with that address sends it.
     #[must_use]
-    pub fn to_datagram(&self, source: Device) -> Datagram {
+    pub fn to_datagram(&self, source: BusAddress) -> Datagram {
         Datagram {
             source,
             destination: self.target,
@@ -142,8 +142,8 @@ mod tests {
     use crate::genius::MemoryType;
     use crate::{Command, TimeStamp};
 
-    const PLC: Device = Device::new(31).unwrap();
-    const UNIT: Device = Device::new(5).unwrap();
+    const PLC: BusAddress = BusAddress::new(31).unwrap();
+    const UNIT: BusAddress = BusAddress::new(5).unwrap();
     const STATUS: PlcReference = PlcReference::register(100).unwrap();
 
     fn send(command: &Command) -> SendDatagram {

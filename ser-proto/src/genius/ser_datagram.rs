@@ -6,7 +6,7 @@
 
 use core::fmt;
 
-use super::{Address, Data, Datagram, Device, Priority};
+use super::{Address, BusAddress, Data, Datagram, Priority};
 use crate::{Command, MAX_ENTRIES, Model, ParseError, READ_REPLY_HEADER_LEN, Reply};
 
 /// Function code of the recorder's maker.
@@ -29,7 +29,7 @@ pub const fn max_entries(model: Model) -> usize {
 impl Datagram {
     /// A command on its way to a recorder, or to all of them: a broadcast is carried out and not answered.
     #[must_use]
-    pub fn from_command(source: Device, destination: Address, command: &Command) -> Datagram {
+    pub fn from_command(source: BusAddress, destination: Address, command: &Command) -> Datagram {
         // No command is longer than nine bytes, so nothing is ever cut off here.
         let data = Data::from_slice(&command.to_body()).unwrap_or_default();
         ser_datagram(source, destination, data)
@@ -40,8 +40,8 @@ impl Datagram {
     /// # Errors
     /// [`SerDatagramError::TooLong`] for a read reply with more than [`max_entries`].
     pub fn from_reply(
-        source: Device,
-        destination: Device,
+        source: BusAddress,
+        destination: BusAddress,
         reply: &Reply,
     ) -> Result<Datagram, SerDatagramError> {
         let body = reply.to_body();
@@ -76,7 +76,7 @@ impl Datagram {
     }
 }
 
-fn ser_datagram(source: Device, destination: Address, data: Data) -> Datagram {
+fn ser_datagram(source: BusAddress, destination: Address, data: Data) -> Datagram {
     Datagram {
         source,
         destination,
@@ -138,8 +138,8 @@ mod tests {
     use super::*;
     use crate::{Entry, Inputs, ReadReply, TimeStamp};
 
-    const HOST: Device = Device::new(31).unwrap();
-    const UNIT: Device = Device::new(5).unwrap();
+    const HOST: BusAddress = BusAddress::new(31).unwrap();
+    const UNIT: BusAddress = BusAddress::new(5).unwrap();
 
     fn read_reply(model: Model, count: usize) -> Reply {
         let time =

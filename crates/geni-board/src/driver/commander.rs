@@ -4,7 +4,7 @@ use crate::command_block::{
     CommandStatus, read_datagram, read_reply, start_configure, start_read, start_transmission,
 };
 use crate::counters::{Counters, count};
-use crate::datagram::{Completion, Received, Transmission, TransmitError};
+use crate::datagram::{Completion, ReceivedDatagram, Transmission, TransmitError};
 use crate::elapsed::elapsed_ms;
 use crate::event::{CommandError, Failure};
 use crate::ram::SharedRam;
@@ -15,13 +15,13 @@ use crate::timing;
 #[derive(Debug)]
 pub(super) enum Done {
     /// A datagram came out of the receive queue; `None` when it is nothing to pass on.
-    Read(Option<Received>),
+    Read(Option<ReceivedDatagram>),
     /// The receive queue was empty when the board looked.
     QueueEmpty,
     /// Nothing is known about the receive queue.
     NothingRead,
     Sent(Result<(), CommandError>),
-    Replied(Result<Received, CommandError>),
+    Replied(Result<ReceivedDatagram, CommandError>),
     Configured(CommandStatus),
 }
 

@@ -5,7 +5,7 @@ use crate::device_table::{Device, Record, read_record};
 use crate::event::{DeviceChange, Event};
 use crate::map;
 use crate::ram::SharedRam;
-use crate::setup_table::DipSwitches;
+use crate::setup_table::BoardSwitches;
 
 /// Records in one poll.
 const RECORDS_PER_POLL: usize = 4;
@@ -39,7 +39,7 @@ impl DeviceWatch {
             let number = self.next;
             self.next = (number + 1) % map::DEVICE_COUNT;
             // The board does not use its own record.
-            if number == DipSwitches::read(ram).device_number {
+            if number == BoardSwitches::read(ram).device_number {
                 continue;
             }
             let seen = match read_record(ram, number, buffer_len) {

@@ -13,7 +13,7 @@ mod request_server;
 mod status_watch;
 
 use crate::counters::{Counters, count};
-use crate::datagram::{Completion, Received, Transmission, TransmitError};
+use crate::datagram::{Completion, ReceivedDatagram, Transmission, TransmitError};
 use crate::device_table::{Device, write_outputs_disabled};
 use crate::elapsed::elapsed_ms;
 use crate::event::{CommandError, ConfigurationOutcome, Event, Failure, Identity};
@@ -23,7 +23,7 @@ use crate::map;
 use crate::options::{Options, Start};
 use crate::ram::SharedRam;
 use crate::request_queue::{AnswerError, RequestAnswer};
-use crate::setup_table::{Configuration, DipSwitches};
+use crate::setup_table::{BoardSwitches, Configuration};
 use crate::status_table::Status;
 use crate::timing;
 
@@ -65,7 +65,7 @@ enum Task {
 /// # When a datagram arrived
 ///
 /// Every poll looks at the board's flags, whatever command is in progress. A datagram is handed out
-/// with the tick at which its flag was seen: [`Received::arrived_ms`](crate::Received::arrived_ms).
+/// with the tick at which its flag was seen: [`ReceivedDatagram::arrived_ms`](crate::ReceivedDatagram::arrived_ms).
 /// That is later than the flag by no more than the time between two polls.
 ///
 /// Some hosts have to know the tick to the millisecond although their main loop may be away. They
@@ -457,8 +457,8 @@ impl<R: SharedRam> Driver<R> {
                 // command has finished.
                 self.look(now_ms);
                 let arrived_ms = self.arrivals.read();
-                let received = Received { arrived_ms, ..received? };
-                let own_number = DipSwitches::read(&self.ram).device_number;
+                let received = ReceivedDatagram { arrived_ms, ..received? };
+                let own_number = BoardSwitches::read(&self.ram).device_number;
                 if received.broadcast && received.source == own_number {
                     count(&mut self.counters.own_broadcasts);
                     return None;
@@ -504,7 +504,7 @@ impl<R: SharedRam> Driver<R> {
         self.global.due();
         Event::Ready(Identity {
             revision: Status::read(&self.ram).revision,
-            switches: DipSwitches::read(&self.ram),
+            switches: BoardSwitches::read(&self.ram),
             configuration: self.in_force,
         })
     }

@@ -2,8 +2,8 @@
 //! block is busy.
 
 use geni_board::{
-    Completion, Configuration, Data, Destination, Event, Interrupts, Options, Priority, Received, Start,
-    Transmission,
+    Completion, Configuration, Data, Destination, Event, Interrupts, Options, ReceivedDatagram, Start,
+    Transmission, TransmitPriority,
 };
 
 use crate::world::World;
@@ -15,7 +15,7 @@ fn busy(world: &mut World, for_ms: u32) {
         destination: Destination::Device(30),
         function: 0x40,
         subfunction: 0x50,
-        priority: Priority::Normal,
+        priority: TransmitPriority::Normal,
         completion: Completion::Acknowledged,
         data: Data::from_slice(&[0x45]).expect("short"),
     };
@@ -26,7 +26,7 @@ fn busy(world: &mut World, for_ms: u32) {
 /// Datagrams by their first byte, with their arrivals.
 fn arrivals(events: &[Event]) -> Vec<(u8, Option<u32>)> {
     let received = |event: &Event| match event {
-        Event::Received(Received { data, arrived_ms, .. }) => Some((data[0], *arrived_ms)),
+        Event::Received(ReceivedDatagram { data, arrived_ms, .. }) => Some((data[0], *arrived_ms)),
         _ => None,
     };
     events.iter().filter_map(received).collect()

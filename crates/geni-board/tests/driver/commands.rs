@@ -1,8 +1,8 @@
 //! Chapter 10: Read Datagram, Transmit Datagram, Transmit Datagram with Reply.
 
 use geni_board::{
-    CommandError, Completion, Configuration, Data, Destination, Event, Failure, Options, Priority, Received,
-    Start, Transmission, TransmitError,
+    CommandError, Completion, Configuration, Data, Destination, Event, Failure, Options, ReceivedDatagram,
+    Start, Transmission, TransmitError, TransmitPriority,
 };
 
 use crate::board::Board;
@@ -13,7 +13,7 @@ fn transmission(completion: Completion) -> Transmission {
         destination: Destination::Device(30),
         function: 0x40,
         subfunction: 0x50,
-        priority: Priority::Normal,
+        priority: TransmitPriority::Normal,
         completion,
         data: Data::from_slice(&[0x45]).expect("short"),
     }
@@ -72,7 +72,7 @@ fn a_reply_comes_from_whom_it_was_asked() {
     world.board().reply = Some(vec![9, 8, 7]);
     world.driver.transmit(transmission(Completion::Reply { subfunction: 0x51 })).expect("accepted");
     let (_, events) = world.until(100, is_end_of_transmission);
-    let reply = Received {
+    let reply = ReceivedDatagram {
         source: 30,
         function: 0x40,
         subfunction: 0x51,

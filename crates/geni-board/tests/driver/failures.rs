@@ -1,8 +1,8 @@
 //! Heartbeat, faults and what becomes of work in progress.
 
 use geni_board::{
-    CommandError, Completion, Configuration, Data, Destination, Event, Failure, Options, Priority, Start,
-    Transmission, TransmitError,
+    CommandError, Completion, Configuration, Data, Destination, Event, Failure, Options, Start, Transmission,
+    TransmitError, TransmitPriority,
 };
 
 use crate::world::{World, configuration};
@@ -20,7 +20,7 @@ fn transmission(completion: Completion) -> Transmission {
         destination: Destination::Device(30),
         function: 0x40,
         subfunction: 0x50,
-        priority: Priority::Normal,
+        priority: TransmitPriority::Normal,
         completion,
         data: Data::from_slice(&[1, 2]).expect("short"),
     }

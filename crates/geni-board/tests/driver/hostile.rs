@@ -1,8 +1,8 @@
 //! A RAM full of noise: no panic, no endless poll, nothing written where the host has no business.
 
 use geni_board::{
-    Completion, Configuration, Data, Destination, Event, Options, Priority, RequestAnswer, Requests, Start,
-    Transmission,
+    Completion, Configuration, Data, Destination, Event, Options, RequestAnswer, Requests, Start,
+    Transmission, TransmitPriority,
 };
 use proptest::prelude::*;
 
@@ -90,7 +90,7 @@ fn transmission(completion: u8) -> Transmission {
         destination: Destination::Device(1),
         function: 0x40,
         subfunction: 0x50,
-        priority: Priority::High,
+        priority: TransmitPriority::High,
         completion: match completion {
             0 => Completion::Taken,
             1 => Completion::Acknowledged,

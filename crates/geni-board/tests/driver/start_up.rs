@@ -1,7 +1,7 @@
 //! Chapter 3, Startup; chapter 4; chapter 10, Configuration Change.
 
 use geni_board::{
-    BusRate, Configuration, ConfigurationOutcome, DipSwitches, Event, Failure, Identity, Options, Start,
+    BoardSwitches, Configuration, ConfigurationOutcome, Event, Failure, Identity, Options, RateSetting, Start,
 };
 
 use crate::board::{Board, OK};
@@ -36,7 +36,8 @@ fn reset_self_test_configuration_and_bus_follow_each_other() {
     assert!(!world.driver.is_ready());
     let (off_bus_ms, events) = world.until(2_000, is_ready);
     assert!((1_495..1_510).contains(&off_bus_ms), "ready after {off_bus_ms} ms");
-    let switches = DipSwitches { device_number: 7, rate: BusRate::K153_6Standard, outputs_enabled: true };
+    let switches =
+        BoardSwitches { device_number: 7, rate: RateSetting::K153_6Standard, outputs_enabled: true };
     assert_eq!(events, [Event::Ready(Identity { revision: 0x21, switches, configuration: wanted })]);
     assert_eq!(world.driver.configuration(), wanted);
     assert_eq!(world.board().resets, 0, "one reset only, the first");

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use geni_board::{
     Completion, Configuration, Data, Destination, Device, DeviceChange, Driver, Event, Failure, Identity,
-    MAX_DEVICE_NUMBER, Options, Priority, Received, SharedRam, Start, Status, TableError, Transmission,
-    TransmitError, map,
+    MAX_DEVICE_NUMBER, Options, ReceivedDatagram, SharedRam, Start, Status, TableError, Transmission,
+    TransmitError, TransmitPriority, map,
 };
 use ser_proto::Command;
 use ser_proto::genius::{
@@ -232,14 +232,14 @@ impl GeniHost {
     }
 
     /// What a recorder has sent before now. The board holds some of it back until it is asked, so a look will not do.
-    pub(crate) fn take_waiting(&self, node: u8) -> Result<Vec<Received>, GeniusError> {
+    pub(crate) fn take_waiting(&self, node: u8) -> Result<Vec<ReceivedDatagram>, GeniusError> {
         let mut host = self.lock();
         host.empty_receive_queue()?;
         Ok(std::iter::from_fn(|| host.inboxes.take(node)).collect())
     }
 
     /// Waits for messages of a recorder.
-    pub(crate) fn receive(&self, node: u8, timeout: Duration) -> Result<Vec<Received>, GeniusError> {
+    pub(crate) fn receive(&self, node: u8, timeout: Duration) -> Result<Vec<ReceivedDatagram>, GeniusError> {
         let until = self.clock.now() + timeout;
         loop {
             let mut host = self.lock();
@@ -278,7 +278,7 @@ pub(super) fn ser_message(destination: Destination, command: &Command) -> Result
         destination,
         function: FUNCTION_HORNER,
         subfunction: SUBFUNCTION_SER,
-        priority: Priority::Normal,
+        priority: TransmitPriority::Normal,
         completion: Completion::Acknowledged,
         // No command is as long as that.
         data: data.map_err(|_| GeniusError::BoardBusy)?,
@@ -286,9 +286,9 @@ pub(super) fn ser_message(destination: Destination, command: &Command) -> Result
 }
 
 /// A datagram that has arrived, as the protocol knows it.
-fn bus_datagram(received: &Received, own_number: u8) -> Option<Datagram> {
-    let source = ser_proto::genius::Device::new(received.source)?;
-    let own_number = ser_proto::genius::Device::new(own_number)?;
+fn bus_datagram(received: &ReceivedDatagram, own_number: u8) -> Option<Datagram> {
+    let source = ser_proto::genius::BusAddress::new(received.source)?;
+    let own_number = ser_proto::genius::BusAddress::new(own_number)?;
     Datagram::new(source, own_number.into(), received.function, received.subfunction, &received.data).ok()
 }
 
@@ -308,7 +308,7 @@ pub(super) struct Host {
     pub(super) inboxes: Inboxes,
     pub(super) answers: Answers,
     sent: Option<Result<(), geni_board::CommandError>>,
-    replied: Option<Result<Received, geni_board::CommandError>>,
+    replied: Option<Result<ReceivedDatagram, geni_board::CommandError>>,
     tables: Option<Vec<BusDevice>>,
     /// Who is logged in by the driver's word, a bit for each.
     known: u32,
@@ -436,7 +436,7 @@ impl Host {
             destination: Destination::Device(node),
             function: FUNCTION_GENIUS,
             subfunction: Subfunction::ReadIoForces.code(),
-            priority: Priority::Normal,
+            priority: TransmitPriority::Normal,
             completion: Completion::Reply { subfunction: reply.code() },
             data: Data::from_slice(&[table.code()]).unwrap_or_default(),
         };

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use geni_board::Received;
+use geni_board::ReceivedDatagram;
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 
 /// Messages that wait in one box; the oldest go when there are more.
@@ -11,7 +11,7 @@ const CAPACITY: usize = 1024;
 /// A box for every sender.
 #[derive(Debug, Default)]
 pub(super) struct Inboxes {
-    boxes: BTreeMap<u8, VecDeque<Received>>,
+    boxes: BTreeMap<u8, VecDeque<ReceivedDatagram>>,
     dropped: u64,
     ignored: u64,
 }
@@ -19,7 +19,7 @@ pub(super) struct Inboxes {
 impl Inboxes {
     /// Keeps a message that a recorder has sent to this host. What is said to all, or is no message of a recorder,
     /// answers nobody here.
-    pub(super) fn put(&mut self, received: Received) {
+    pub(super) fn put(&mut self, received: ReceivedDatagram) {
         let of_recorder = (received.function, received.subfunction) == (FUNCTION_HORNER, SUBFUNCTION_SER);
         if received.broadcast || !of_recorder {
             self.ignored += 1;
@@ -34,12 +34,12 @@ impl Inboxes {
     }
 
     /// The oldest message of a device.
-    pub(super) fn take(&mut self, node: u8) -> Option<Received> {
+    pub(super) fn take(&mut self, node: u8) -> Option<ReceivedDatagram> {
         self.boxes.get_mut(&node)?.pop_front()
     }
 
     /// The oldest message of a device whose data are of some kind; the others stay.
-    pub(super) fn take_if(&mut self, node: u8, fits: impl Fn(&[u8]) -> bool) -> Option<Received> {
+    pub(super) fn take_if(&mut self, node: u8, fits: impl Fn(&[u8]) -> bool) -> Option<ReceivedDatagram> {
         let inbox = self.boxes.get_mut(&node)?;
         let place = inbox.iter().position(|received| fits(&received.data))?;
         inbox.remove(place)
@@ -62,9 +62,9 @@ impl Inboxes {
 mod tests {
     use super::*;
 
-    fn received(source: u8, broadcast: bool, subfunction: u8, data: u8) -> Received {
+    fn received(source: u8, broadcast: bool, subfunction: u8, data: u8) -> ReceivedDatagram {
         let data = geni_board::Data::from_slice(&[data]).unwrap();
-        Received { source, function: FUNCTION_HORNER, subfunction, broadcast, arrived_ms: None, data }
+        ReceivedDatagram { source, function: FUNCTION_HORNER, subfunction, broadcast, arrived_ms: None, data }
     }
 
     #[test]
@@ -75,7 +75,7 @@ mod tests {
         inboxes.put(received(5, true, SUBFUNCTION_SER, 3));
         inboxes.put(received(5, false, 0x51, 4));
         inboxes.put(received(5, false, SUBFUNCTION_SER, 5));
-        let data = |received: Option<Received>| received.map(|received| received.data[0]);
+        let data = |received: Option<ReceivedDatagram>| received.map(|received| received.data[0]);
         let taken = [5, 5, 5, 6, 7].map(|node| data(inboxes.take(node)));
         assert_eq!(taken, [Some(1), Some(5), None, Some(2), None]);
         assert_eq!(inboxes.lost(), (2, 0));

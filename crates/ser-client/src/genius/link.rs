@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use geni_board::Received;
+use geni_board::ReceivedDatagram;
 
 use super::GeniHost;
 use crate::link::Link;
@@ -16,7 +16,7 @@ pub(crate) struct GeniusLink {
 
 impl GeniusLink {
     /// Gives the session its messages, which are so many bytes.
-    fn hand_over(&self, received: &[Received], session: &mut Session) -> usize {
+    fn hand_over(&self, received: &[ReceivedDatagram], session: &mut Session) -> usize {
         for datagram in received {
             session.process_body(self.now(), &datagram.data);
         }

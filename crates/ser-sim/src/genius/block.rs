@@ -3,7 +3,7 @@
 use super::device::{Device, Message};
 use super::faults::DeviceFault;
 use super::identity::BlockKind;
-use super::scan_time::BusRate;
+use super::scan_time::BusTiming;
 use super::station::Station;
 
 /// How many circuits a block has.
@@ -45,7 +45,7 @@ pub struct DiscreteBlock {
 impl DiscreteBlock {
     /// A block whose circuits work as `kind` says.
     #[must_use]
-    pub fn new(number: u8, rate: BusRate, circuits: Circuits, kind: BlockKind) -> DiscreteBlock {
+    pub fn new(number: u8, rate: BusTiming, circuits: Circuits, kind: BlockKind) -> DiscreteBlock {
         let mut station = Station::new(number, rate, circuits.model(), kind);
         station.max_datagram_len = 16;
         let mut block = DiscreteBlock { station, circuits };
@@ -93,7 +93,7 @@ impl Device for DiscreteBlock {
         Some(self.station.number)
     }
 
-    fn rate(&self) -> BusRate {
+    fn rate(&self) -> BusTiming {
         self.station.rate
     }
 

@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 use super::device::{Device, Message};
 use super::device_id::DeviceId;
 use super::faults::{Accidents, Fault, Noise};
-use super::scan_time::{BusRate, MIN_SCAN_NS};
+use super::scan_time::{BusTiming, MIN_SCAN_NS};
 
 /// Device numbers are 0 to 31.
 pub const ADDRESSES: u8 = 32;
@@ -56,7 +56,7 @@ pub struct Traffic {
 /// A *bus scan* here is the token's way from the lowest device number round to the lowest again; in it there
 /// is room for one datagram of normal priority. Devices with low numbers thus have the first chance.
 pub struct Bus {
-    rate: BusRate,
+    rate: BusTiming,
     now_us: u64,
     connected: Vec<Connected>,
     token: Token,
@@ -86,13 +86,13 @@ enum Token {
 impl Bus {
     /// A bus without devices, at time zero, on which nothing goes wrong by itself.
     #[must_use]
-    pub fn new(rate: BusRate) -> Bus {
+    pub fn new(rate: BusTiming) -> Bus {
         Bus::with_noise(rate, Noise::default())
     }
 
     /// A bus on which messages suffer.
     #[must_use]
-    pub fn with_noise(rate: BusRate, noise: Noise) -> Bus {
+    pub fn with_noise(rate: BusTiming, noise: Noise) -> Bus {
         Bus {
             rate,
             now_us: 0,

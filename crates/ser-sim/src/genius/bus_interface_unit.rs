@@ -5,7 +5,7 @@ use super::datagram::{Datagram, subfunction};
 use super::device::{Device, Message};
 use super::faults::DeviceFault;
 use super::identity::BlockKind;
-use super::scan_time::BusRate;
+use super::scan_time::BusTiming;
 use super::station::Station;
 
 const MODEL: u8 = 160;
@@ -75,7 +75,7 @@ impl BusInterfaceUnit {
     /// # Panics
     /// When there is more data than that.
     #[must_use]
-    pub fn new(number: u8, rate: BusRate, inputs: StationData, outputs: StationData) -> BusInterfaceUnit {
+    pub fn new(number: u8, rate: BusTiming, inputs: StationData, outputs: StationData) -> BusInterfaceUnit {
         assert!(inputs.len() <= 128 && outputs.len() <= 128, "a device has at most 128 bytes each way");
         let kind = match (inputs.is_empty(), outputs.is_empty()) {
             (true, true) => BlockKind::Neither,
@@ -168,7 +168,7 @@ impl Device for BusInterfaceUnit {
         Some(self.station.number)
     }
 
-    fn rate(&self) -> BusRate {
+    fn rate(&self) -> BusTiming {
         self.station.rate
     }
 

@@ -62,7 +62,7 @@ impl Datagram {
 
 /// Whether a datagram waits until the scan's turn for one is free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Priority {
+pub enum MessagePriority {
     /// One in each scan, from all devices together.
     Normal,
     /// On the sender's own turn, whatever else was sent in the scan.

@@ -4,7 +4,7 @@ use std::any::Any;
 
 use super::datagram::{BROADCAST, Datagram};
 use super::faults::DeviceFault;
-use super::scan_time::BusRate;
+use super::scan_time::BusTiming;
 
 /// Something a device says on its turn.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -53,7 +53,7 @@ impl Message {
 
     /// How long it takes, apart from the fixed part of a turn.
     #[must_use]
-    pub fn duration_ns(&self, rate: BusRate) -> u64 {
+    pub fn duration_ns(&self, rate: BusTiming) -> u64 {
         match self {
             Message::Control(data) | Message::Directed { data, .. } => rate.byte_ns() * data.len() as u64,
             Message::AssignController { .. } => rate.datagram_ns(0),
@@ -68,7 +68,7 @@ pub trait Device: Any + Send {
     fn address(&self) -> Option<u8>;
 
     /// The speed it is set to.
-    fn rate(&self) -> BusRate;
+    fn rate(&self) -> BusTiming;
 
     /// It was connected to the bus.
     fn connect(&mut self, now_us: u64) {

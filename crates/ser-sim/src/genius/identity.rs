@@ -1,6 +1,6 @@
 //! What a device says about itself in a Read ID reply.
 
-use super::scan_time::BusRate;
+use super::scan_time::BusTiming;
 
 /// Which way a device's control data goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +50,7 @@ pub struct Identity {
     /// Its model number.
     pub model: u8,
     /// Its speed.
-    pub rate: BusRate,
+    pub rate: BusTiming,
 }
 
 /// Length of a Read ID reply.
@@ -88,7 +88,7 @@ impl Identity {
             0b10 => BlockKind::Outputs,
             _ => BlockKind::Combination,
         };
-        let rate = BusRate::ALL.into_iter().find(|rate| rate.code() == data[11] >> 4)?;
+        let rate = BusTiming::ALL.into_iter().find(|rate| rate.code() == data[11] >> 4)?;
         Some(Identity {
             input_len: data[0],
             output_len: data[1],
@@ -120,7 +120,7 @@ mod tests {
             revision: 0x21,
             controller: 31,
             model: 160,
-            rate: BusRate::K76,
+            rate: BusTiming::K76,
         };
         let bytes = identity.to_bytes();
         assert_eq!(bytes, [2, 4, 0, 0, 0b0111, 0x34, 0x12, 160, 0x21, 31, 160, 0x20]);

@@ -6,9 +6,9 @@
 //! [`BusInterfaceUnit`]s. A host works with its board through the shared RAM alone:
 //!
 //! ```
-//! use ser_sim::genius::{Board, BoardOptions, Bus, BusRate};
+//! use ser_sim::genius::{Board, BoardOptions, Bus, BusTiming};
 //!
-//! let mut bus = Bus::new(BusRate::default());
+//! let mut bus = Bus::new(BusTiming::default());
 //! let board = bus.connect(Board::powered(BoardOptions::at(31)));
 //! // The manual: no access for 1.7 seconds, then wait for the OK flag.
 //! bus.advance_to(2_000_000);
@@ -41,12 +41,14 @@ pub use block::{Circuits, DiscreteBlock};
 pub use board::{Board, BoardOptions, Led, Leds, Read, Timing, Violation, ViolationKind};
 pub use bus::{ADDRESSES, Bus, Handle, Traffic};
 pub use bus_interface_unit::{BusInterfaceUnit, Side, StationData};
-pub use datagram::{BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, Priority, STANDARD, subfunction};
+pub use datagram::{
+    BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, MessagePriority, STANDARD, subfunction,
+};
 pub use device::{Device, Message};
 pub use device_id::DeviceId;
 pub use faults::{DeviceFault, Fault, Noise};
 pub use identity::{BlockKind, Identity};
 pub use map::RAM_LEN;
-pub use scan_time::{BusRate, MIN_SCAN_NS};
+pub use scan_time::{BusTiming, MIN_SCAN_NS};
 pub use split_mix::SplitMix64;
 pub use window::{BoardWindow, tick_ms};

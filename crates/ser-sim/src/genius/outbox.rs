@@ -2,13 +2,13 @@
 
 use std::collections::VecDeque;
 
-use super::datagram::Priority;
+use super::datagram::MessagePriority;
 use super::device::Message;
 
 /// What a device has to say besides its control data. `T` tells the owner why it said it.
 #[derive(Clone, Debug)]
 pub(super) struct Outbox<T> {
-    waiting: VecDeque<(Priority, Message, T)>,
+    waiting: VecDeque<(MessagePriority, Message, T)>,
     /// The one that is being sent in the present turn.
     sending: Option<T>,
 }
@@ -20,7 +20,7 @@ impl<T> Default for Outbox<T> {
 }
 
 impl<T> Outbox<T> {
-    pub(super) fn push(&mut self, priority: Priority, message: Message, reason: T) {
+    pub(super) fn push(&mut self, priority: MessagePriority, message: Message, reason: T) {
         self.waiting.push_back((priority, message, reason));
     }
 
@@ -30,7 +30,7 @@ impl<T> Outbox<T> {
 
     /// The message for this turn: at most one, and one of normal priority only when the scan has had none.
     pub(super) fn take(&mut self, background_free: bool) -> Option<Message> {
-        let high = self.waiting.iter().position(|(priority, ..)| *priority == Priority::High);
+        let high = self.waiting.iter().position(|(priority, ..)| *priority == MessagePriority::High);
         let index = high.or((background_free && !self.waiting.is_empty()).then_some(0))?;
         let (_, message, reason) = self.waiting.remove(index)?;
         self.sending = Some(reason);
@@ -58,7 +58,9 @@ mod tests {
     #[test]
     fn high_priority_goes_first_and_normal_priority_waits_for_its_place() {
         let mut outbox = Outbox::default();
-        for (to, priority) in [(1, Priority::Normal), (2, Priority::High), (3, Priority::Normal)] {
+        for (to, priority) in
+            [(1, MessagePriority::Normal), (2, MessagePriority::High), (3, MessagePriority::Normal)]
+        {
             outbox.push(priority, Message::AssignController { to }, to);
         }
         let mut turn = |background_free| {

@@ -5,7 +5,7 @@
 
 /// The four speeds of a bus. All devices on it must be set to the same one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum BusRate {
+pub enum BusTiming {
     /// 153.6 kbaud with time for long cables between turns.
     K153Extended,
     /// 153.6 kbaud, the default.
@@ -24,18 +24,19 @@ pub const MIN_SCAN_NS: u64 = 3_000_000;
 /// matters for how long a scan with a datagram takes.
 const DATAGRAM_CHARACTERS: u64 = 9;
 
-impl BusRate {
+impl BusTiming {
     /// All of them.
-    pub const ALL: [BusRate; 4] = [BusRate::K153Extended, BusRate::K153Standard, BusRate::K76, BusRate::K38];
+    pub const ALL: [BusTiming; 4] =
+        [BusTiming::K153Extended, BusTiming::K153Standard, BusTiming::K76, BusTiming::K38];
 
     /// The rate that bits 5 and 6 of a GENI's DIP switches select.
     #[must_use]
-    pub fn from_dip_switches(switches: u8) -> BusRate {
+    pub fn from_dip_switches(switches: u8) -> BusTiming {
         match switches >> 5 & 0b11 {
-            0b00 => BusRate::K153Extended,
-            0b01 => BusRate::K38,
-            0b10 => BusRate::K76,
-            _ => BusRate::K153Standard,
+            0b00 => BusTiming::K153Extended,
+            0b01 => BusTiming::K38,
+            0b10 => BusTiming::K76,
+            _ => BusTiming::K153Standard,
         }
     }
 
@@ -43,10 +44,10 @@ impl BusRate {
     #[must_use]
     pub fn dip_switches(self) -> u8 {
         match self {
-            BusRate::K153Extended => 0b00 << 5,
-            BusRate::K38 => 0b01 << 5,
-            BusRate::K76 => 0b10 << 5,
-            BusRate::K153Standard => 0b11 << 5,
+            BusTiming::K153Extended => 0b00 << 5,
+            BusTiming::K38 => 0b01 << 5,
+            BusTiming::K76 => 0b10 << 5,
+            BusTiming::K153Standard => 0b11 << 5,
         }
     }
 
@@ -54,10 +55,10 @@ impl BusRate {
     #[must_use]
     pub fn code(self) -> u8 {
         match self {
-            BusRate::K153Extended => 0,
-            BusRate::K153Standard => 1,
-            BusRate::K76 => 2,
-            BusRate::K38 => 3,
+            BusTiming::K153Extended => 0,
+            BusTiming::K153Standard => 1,
+            BusTiming::K76 => 2,
+            BusTiming::K38 => 3,
         }
     }
 
@@ -65,10 +66,10 @@ impl BusRate {
     #[must_use]
     pub fn fixed_ns(self) -> u64 {
         match self {
-            BusRate::K153Extended => 1_015_000,
-            BusRate::K153Standard => 943_000,
-            BusRate::K76 => 1_538_000,
-            BusRate::K38 => 2_583_000,
+            BusTiming::K153Extended => 1_015_000,
+            BusTiming::K153Standard => 943_000,
+            BusTiming::K76 => 1_538_000,
+            BusTiming::K38 => 2_583_000,
         }
     }
 
@@ -76,9 +77,9 @@ impl BusRate {
     #[must_use]
     pub fn byte_ns(self) -> u64 {
         match self {
-            BusRate::K153Extended | BusRate::K153Standard => 71_500,
-            BusRate::K76 => 143_000,
-            BusRate::K38 => 286_000,
+            BusTiming::K153Extended | BusTiming::K153Standard => 71_500,
+            BusTiming::K76 => 143_000,
+            BusTiming::K38 => 286_000,
         }
     }
 
@@ -86,11 +87,11 @@ impl BusRate {
     #[must_use]
     pub fn skip_ns(self) -> u64 {
         match self {
-            BusRate::K153Standard => 6_510,
+            BusTiming::K153Standard => 6_510,
             // Two bit times, for long cables.
-            BusRate::K153Extended => 2 * 6_510,
-            BusRate::K76 => 13_021,
-            BusRate::K38 => 26_042,
+            BusTiming::K153Extended => 2 * 6_510,
+            BusTiming::K76 => 13_021,
+            BusTiming::K38 => 26_042,
         }
     }
 
@@ -113,9 +114,9 @@ mod tests {
 
     #[test]
     fn the_switches_give_the_rate_and_back() {
-        for rate in BusRate::ALL {
-            assert_eq!(BusRate::from_dip_switches(rate.dip_switches() | 0x9F), rate);
+        for rate in BusTiming::ALL {
+            assert_eq!(BusTiming::from_dip_switches(rate.dip_switches() | 0x9F), rate);
         }
-        assert_eq!(BusRate::from_dip_switches(0xFF), BusRate::default());
+        assert_eq!(BusTiming::from_dip_switches(0xFF), BusTiming::default());
     }
 }

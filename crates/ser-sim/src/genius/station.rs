@@ -3,18 +3,18 @@
 
 use std::collections::BTreeSet;
 
-use super::datagram::{BROADCAST, Datagram, Priority, subfunction};
+use super::datagram::{BROADCAST, Datagram, MessagePriority, subfunction};
 use super::device::Message;
 use super::identity::{BlockKind, Identity};
 use super::outbox::Outbox;
-use super::scan_time::BusRate;
+use super::scan_time::BusTiming;
 
 /// Without outputs for so many scans a device falls back to its default outputs.
 const SILENT_SCANS: u8 = 3;
 
 pub(super) struct Station {
     pub(super) number: u8,
-    pub(super) rate: BusRate,
+    pub(super) rate: BusTiming,
     pub(super) model: u8,
     pub(super) reference: u16,
     pub(super) kind: BlockKind,
@@ -28,7 +28,7 @@ pub(super) struct Station {
 }
 
 impl Station {
-    pub(super) fn new(number: u8, rate: BusRate, model: u8, kind: BlockKind) -> Station {
+    pub(super) fn new(number: u8, rate: BusTiming, model: u8, kind: BlockKind) -> Station {
         Station {
             number,
             rate,
@@ -131,6 +131,6 @@ impl Station {
     }
 
     fn say(&mut self, to: u8, datagram: Datagram) {
-        self.outbox.push(Priority::Normal, Message::Datagram { to, datagram }, ());
+        self.outbox.push(MessagePriority::Normal, Message::Datagram { to, datagram }, ());
     }
 }

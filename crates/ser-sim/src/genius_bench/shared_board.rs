@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use geni_board::SharedRam;
 
-use crate::genius::{Board, BusRate, Device, DeviceFault, Message};
+use crate::genius::{Board, BusTiming, Device, DeviceFault, Message};
 
 /// A handle of a board; clones are the same board.
 #[derive(Clone)]
@@ -25,7 +25,7 @@ impl Device for SharedBoard {
         self.lock().address()
     }
 
-    fn rate(&self) -> BusRate {
+    fn rate(&self) -> BusTiming {
         self.lock().rate()
     }
 

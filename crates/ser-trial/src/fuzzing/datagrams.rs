@@ -1,8 +1,8 @@
 //! Datagrams of the Genius bus, global data and DIP switches.
 
 use ser_proto::genius::{
-    Address, Datagram, Device, DipSwitches, FUNCTION_GENIUS, FUNCTION_HORNER, GlobalData, MAX_DATA, Message,
-    MessageError, Priority, SUBFUNCTION_SER, SerDatagramError, Subfunction,
+    Address, BusAddress, Datagram, DipSwitches, FUNCTION_GENIUS, FUNCTION_HORNER, GlobalData, MAX_DATA,
+    Message, MessageError, Priority, SUBFUNCTION_SER, SerDatagramError, Subfunction,
 };
 use ser_proto::{Command, Reply};
 
@@ -20,7 +20,7 @@ use super::script::Script;
 pub fn datagrams(data: &[u8]) {
     let mut script = Script::new(data);
     dip_switches(script.clone().byte());
-    let source = Device::new(script.byte() % 32).expect("32 devices");
+    let source = BusAddress::new(script.byte() % 32).expect("32 devices");
     let destination = Address::from_number(script.byte()).unwrap_or(Address::Broadcast);
     let (function, subfunction) = (script.byte(), script.byte());
     let priority = Priority::from_code(script.byte() % 2).expect("two priorities");

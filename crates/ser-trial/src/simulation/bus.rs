@@ -8,14 +8,15 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use geni_board::{
-    Completion, Configuration, Data, Destination, Driver, Event, Options, Priority, Start, Transmission,
+    Completion, Configuration, Data, Destination, Driver, Event, Options, Start, Transmission,
+    TransmitPriority,
 };
 use ser_node::{GeniusOptions, GeniusPort};
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{Command, Model, Reply};
 use ser_sim::SimNode;
 use ser_sim::genius::{
-    BlockKind, Board, BoardOptions, BoardWindow, Bus, BusRate, Circuits, DeviceFault, DeviceId,
+    BlockKind, Board, BoardOptions, BoardWindow, Bus, BusTiming, Circuits, DeviceFault, DeviceId,
     DiscreteBlock, Fault, Handle, Noise, Traffic, ViolationKind, tick_ms,
 };
 
@@ -119,7 +120,7 @@ fn message(destination: Destination, command: &Command) -> Transmission {
         destination,
         function: FUNCTION_HORNER,
         subfunction: SUBFUNCTION_SER,
-        priority: Priority::Normal,
+        priority: TransmitPriority::Normal,
         completion: Completion::Acknowledged,
         // No command is longer than a datagram.
         data: Data::from_slice(&command.to_body()).unwrap_or_default(),
@@ -155,7 +156,7 @@ impl BusLife {
     /// Switches everything on.
     #[must_use]
     pub fn new(mut chance: Chance, models: &[Model], begin_ms: u64, noise: Noise) -> BusLife {
-        let bus = Rc::new(RefCell::new(Bus::with_noise(BusRate::default(), noise)));
+        let bus = Rc::new(RefCell::new(Bus::with_noise(BusTiming::default(), noise)));
         let connect = |number| {
             let board = bus.borrow_mut().connect(Board::new(BoardOptions::at(number)));
             (board, BoardWindow::new(Rc::clone(&bus), board))
@@ -173,7 +174,7 @@ impl BusLife {
         let (host, window) = connect(HOST);
         let driver = Driver::new(window, Options { start: RESET, ..Options::new(Configuration::DEFAULT) });
         let deaf = bus.borrow_mut().connect(Board::powered(BoardOptions::at(DEAF))).id();
-        let block = DiscreteBlock::new(2, BusRate::default(), Circuits::Sixteen, BlockKind::Inputs);
+        let block = DiscreteBlock::new(2, BusTiming::default(), Circuits::Sixteen, BlockKind::Inputs);
         let block = bus.borrow_mut().connect(block).id();
         let next_fault_ms = begin_ms + chance.within(5_000..=60_000);
         BusLife {

@@ -1,7 +1,7 @@
 //! Places in a PLC, bus addresses and words, as people write them.
 
 use clap::ValueEnum;
-use ser_proto::genius::{Address, Device, MemoryType, PlcReference, Priority};
+use ser_proto::genius::{Address, BusAddress, MemoryType, PlcReference, Priority};
 
 /// How urgent a datagram is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -22,8 +22,8 @@ impl From<PriorityName> for Priority {
 }
 
 /// A bus address, 0-31.
-pub(super) fn device(text: &str) -> Result<Device, String> {
-    let number = text.parse().ok().and_then(Device::new);
+pub(super) fn device(text: &str) -> Result<BusAddress, String> {
+    let number = text.parse().ok().and_then(BusAddress::new);
     number.ok_or_else(|| "not a bus address: 0 to 31".to_string())
 }
 

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use clap::ValueEnum;
-use ser_proto::genius::{BusRate, BusSettings, Device, DipSwitches};
+use ser_proto::genius::{BusAddress, BusRate, BusSettings, DipSwitches};
 
 use crate::error::{Failure, Result, warn};
 
@@ -36,7 +36,7 @@ impl From<Rate> for BusRate {
 }
 
 /// Shows what the switches say, or how to set them.
-pub(super) fn run(switches: Option<DipSwitches>, address: Option<Device>, rate: Rate) -> Result<()> {
+pub(super) fn run(switches: Option<DipSwitches>, address: Option<BusAddress>, rate: Rate) -> Result<()> {
     let switches = match (switches, address) {
         (Some(switches), _) => switches,
         (None, Some(address)) => BusSettings { address, rate: rate.into() }.switches(),
@@ -86,7 +86,7 @@ mod tests {
             text(read),
             "switch  1 2 3 4 5 6 7 8\n        1 0 1 0 0 1 1 1   (1 is open)\naddress 5, 153.6K standard"
         );
-        let address = Device::new(5).expect("an address");
+        let address = BusAddress::new(5).expect("an address");
         assert_eq!(BusSettings { address, rate: Rate::Standard.into() }.switches(), read);
         for wrong in ["", "1010011", "101001110", "10100112", "0xA7"] {
             assert!(switches(wrong).is_err(), "{wrong}");

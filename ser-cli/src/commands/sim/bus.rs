@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 use ser_sim::GeniusOptions;
-use ser_sim::genius::{BusRate, Noise};
+use ser_sim::genius::{BusTiming, Noise};
 
 use super::device;
 use crate::error::{Failure, Result};
@@ -25,13 +25,13 @@ enum RateName {
     Quarter,
 }
 
-impl From<RateName> for BusRate {
-    fn from(name: RateName) -> BusRate {
+impl From<RateName> for BusTiming {
+    fn from(name: RateName) -> BusTiming {
         match name {
-            RateName::Standard => BusRate::K153Standard,
-            RateName::Extended => BusRate::K153Extended,
-            RateName::Half => BusRate::K76,
-            RateName::Quarter => BusRate::K38,
+            RateName::Standard => BusTiming::K153Standard,
+            RateName::Extended => BusTiming::K153Extended,
+            RateName::Half => BusTiming::K76,
+            RateName::Quarter => BusTiming::K38,
         }
     }
 }

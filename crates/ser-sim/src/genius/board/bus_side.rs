@@ -5,18 +5,18 @@ use super::interrupts::Condition;
 use super::presence::Power;
 use super::reason::Reason;
 use super::request_queue::is_memory_access;
-use crate::genius::datagram::{BROADCAST, Datagram, Priority, subfunction};
+use crate::genius::datagram::{BROADCAST, Datagram, MessagePriority, subfunction};
 use crate::genius::device::{Device, Message};
 use crate::genius::faults::DeviceFault;
 use crate::genius::identity::Identity;
-use crate::genius::scan_time::BusRate;
+use crate::genius::scan_time::BusTiming;
 
 impl Device for Board {
     fn address(&self) -> Option<u8> {
         self.is_on_bus().then(|| self.number())
     }
 
-    fn rate(&self) -> BusRate {
+    fn rate(&self) -> BusTiming {
         self.live.setup.rate()
     }
 
@@ -172,7 +172,7 @@ impl Board {
         if datagram.is(subfunction::READ_ID) {
             let reply = Datagram::standard(subfunction::READ_ID_REPLY, self.identity().to_bytes());
             let message = Message::Datagram { to: from, datagram: reply };
-            return self.live.outbox.push(Priority::High, message, Reason::Reply);
+            return self.live.outbox.push(MessagePriority::High, message, Reason::Reply);
         }
         if is_memory_access(datagram) {
             return self.queue_request(from, datagram);

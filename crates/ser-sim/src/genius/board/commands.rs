@@ -7,7 +7,7 @@
 use super::Board;
 use super::interrupts::Condition;
 use super::reason::Reason;
-use crate::genius::datagram::{BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, Priority};
+use crate::genius::datagram::{BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, MessagePriority};
 use crate::genius::device::Message;
 use crate::genius::map;
 
@@ -203,7 +203,7 @@ impl Board {
         true
     }
 
-    fn message_to_transmit(&self) -> Option<(Priority, Message)> {
+    fn message_to_transmit(&self) -> Option<(MessagePriority, Message)> {
         let options = self.ram.read(map::COMMAND_OPTIONS, 5);
         self.message(options[0], options[1], options[2], options[3], options[4])
     }
@@ -216,12 +216,12 @@ impl Board {
         subfunction: u8,
         priority: u8,
         len: u8,
-    ) -> Option<(Priority, Message)> {
+    ) -> Option<(MessagePriority, Message)> {
         let number_exists = to < 32 || to == BROADCAST;
         if !number_exists || function > MAX_FUNCTION || usize::from(len) > MAX_DATAGRAM_LEN {
             return None;
         }
-        let priority = if priority == 0 { Priority::Normal } else { Priority::High };
+        let priority = if priority == 0 { MessagePriority::Normal } else { MessagePriority::High };
         let data = self.ram.read(map::TRANSMIT_BUFFER, len.into()).to_vec();
         Some((priority, Message::Datagram { to, datagram: Datagram { function, subfunction, data } }))
     }

@@ -3,7 +3,7 @@
 use super::Board;
 use super::interrupts::Condition;
 use super::reason::Reason;
-use crate::genius::datagram::{Datagram, Priority, subfunction};
+use crate::genius::datagram::{Datagram, MessagePriority, subfunction};
 use crate::genius::device::Message;
 use crate::genius::identity::{BlockKind, Identity};
 use crate::genius::map;
@@ -97,7 +97,7 @@ impl Board {
             State::Absent if !asking && !refuse && device.asked_scans == 0 => {
                 let datagram = Datagram::standard(subfunction::READ_ID, []);
                 let message = Message::Datagram { to: from, datagram };
-                self.live.outbox.push(Priority::Normal, message, Reason::LogIn { address: from });
+                self.live.outbox.push(MessagePriority::Normal, message, Reason::LogIn { address: from });
             }
             State::Absent | State::Refused => {}
         }
@@ -218,7 +218,7 @@ impl Board {
                 device.assigned = false;
             } else if !device.assigned && !telling && matches!(device.state, State::Present { .. }) {
                 let message = Message::AssignController { to: address };
-                self.live.outbox.push(Priority::Normal, message, Reason::Assign { address });
+                self.live.outbox.push(MessagePriority::Normal, message, Reason::Assign { address });
             }
         }
     }

@@ -1,6 +1,6 @@
 //! What differs between boards.
 
-use crate::genius::scan_time::BusRate;
+use crate::genius::scan_time::BusTiming;
 
 /// A board's switches and constants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +24,7 @@ impl BoardOptions {
 
     /// The same board at another rate.
     #[must_use]
-    pub fn rate(self, rate: BusRate) -> BoardOptions {
+    pub fn rate(self, rate: BusTiming) -> BoardOptions {
         BoardOptions { switches: self.switches & !0x60 | rate.dip_switches(), ..self }
     }
 

@@ -10,7 +10,7 @@ use crate::genius::datagram::Datagram;
 const LEN: usize = 15;
 
 #[derive(Clone, Debug)]
-pub(super) struct Received {
+pub(super) struct QueuedDatagram {
     at_us: u64,
     pub(super) from: u8,
     pub(super) broadcast: bool,
@@ -28,7 +28,7 @@ pub struct Read {
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReceiveQueue {
-    waiting: VecDeque<Received>,
+    waiting: VecDeque<QueuedDatagram>,
     read: Option<Read>,
 }
 
@@ -37,13 +37,13 @@ impl Board {
     pub(super) fn queue_received(&mut self, from: u8, broadcast: bool, datagram: Datagram) {
         if self.live.received.waiting.len() < LEN {
             let at_us = self.now_us;
-            self.live.received.waiting.push_back(Received { at_us, from, broadcast, datagram });
+            self.live.received.waiting.push_back(QueuedDatagram { at_us, from, broadcast, datagram });
             self.raise(Condition::ReceiveQueue);
         }
     }
 
     /// The oldest datagram goes into the read buffer.
-    pub(super) fn take_received(&mut self) -> Option<Received> {
+    pub(super) fn take_received(&mut self) -> Option<QueuedDatagram> {
         let received = self.live.received.waiting.pop_front()?;
         self.reads += 1;
         self.live.received.read = Some(Read { number: self.reads, arrived_us: received.at_us });

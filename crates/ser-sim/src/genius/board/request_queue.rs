@@ -8,7 +8,7 @@ use super::Board;
 use super::interrupts::Condition;
 use super::reason::Reason;
 use super::violations::ViolationKind;
-use crate::genius::datagram::{Datagram, Priority, subfunction};
+use crate::genius::datagram::{Datagram, MessagePriority, subfunction};
 use crate::genius::device::Message;
 use crate::genius::map::{REQUEST_HEAD, REQUEST_LEN, REQUEST_QUEUE, REQUEST_TAIL, REQUESTS};
 
@@ -118,6 +118,6 @@ impl Board {
         let data = [&buffer[LENGTH..SOURCE], &buffer[DATA..DATA + data_len]].concat();
         let datagram = Datagram::standard(subfunction::READ_DEVICE_REPLY, data);
         let message = Message::Datagram { to: buffer[SOURCE], datagram };
-        self.live.outbox.push(Priority::Normal, message, Reason::Reply);
+        self.live.outbox.push(MessagePriority::Normal, message, Reason::Reply);
     }
 }

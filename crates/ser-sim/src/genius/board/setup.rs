@@ -4,7 +4,7 @@ use super::Board;
 use super::commands::{COMPLETE, PROCESS_ERROR, SYNTAX_ERROR};
 use super::presence::{OFF_BUS_US, Presence};
 use crate::genius::map;
-use crate::genius::scan_time::BusRate;
+use crate::genius::scan_time::BusTiming;
 
 /// The configuration in force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,8 +33,8 @@ impl Setup {
         self.switches = self.switches & !0x1F | switches & 0x1F;
     }
 
-    pub(super) fn rate(self) -> BusRate {
-        BusRate::from_dip_switches(self.switches)
+    pub(super) fn rate(self) -> BusTiming {
+        BusTiming::from_dip_switches(self.switches)
     }
 
     pub(super) fn outputs_enabled(self) -> bool {

@@ -4,31 +4,31 @@ use std::thread;
 
 use super::rig::{Rig, SECOND_US};
 use crate::genius::{
-    Board, BoardOptions, Bus, BusInterfaceUnit, BusRate, Device, MIN_SCAN_NS, Message, StationData,
+    Board, BoardOptions, Bus, BusInterfaceUnit, BusTiming, Device, MIN_SCAN_NS, Message, StationData,
 };
 
 /// Published contributions in hundredths of a millisecond: rate, bytes, time.
-const PUBLISHED: [(BusRate, usize, u64); 20] = [
-    (BusRate::K153Standard, 16, 209),
-    (BusRate::K153Standard, 32, 324),
-    (BusRate::K153Standard, 64, 552),
-    (BusRate::K153Standard, 128, 1010),
-    (BusRate::K153Standard, 256, 1925),
-    (BusRate::K153Extended, 16, 216),
-    (BusRate::K153Extended, 32, 331),
-    (BusRate::K153Extended, 64, 560),
-    (BusRate::K153Extended, 128, 1017),
-    (BusRate::K153Extended, 256, 1932),
-    (BusRate::K76, 16, 383),
-    (BusRate::K76, 32, 612),
-    (BusRate::K76, 64, 1069),
-    (BusRate::K76, 128, 1985),
-    (BusRate::K76, 256, 3815),
-    (BusRate::K38, 16, 716),
-    (BusRate::K38, 32, 1174),
-    (BusRate::K38, 64, 2089),
-    (BusRate::K38, 128, 3920),
-    (BusRate::K38, 256, 7580),
+const PUBLISHED: [(BusTiming, usize, u64); 20] = [
+    (BusTiming::K153Standard, 16, 209),
+    (BusTiming::K153Standard, 32, 324),
+    (BusTiming::K153Standard, 64, 552),
+    (BusTiming::K153Standard, 128, 1010),
+    (BusTiming::K153Standard, 256, 1925),
+    (BusTiming::K153Extended, 16, 216),
+    (BusTiming::K153Extended, 32, 331),
+    (BusTiming::K153Extended, 64, 560),
+    (BusTiming::K153Extended, 128, 1017),
+    (BusTiming::K153Extended, 256, 1932),
+    (BusTiming::K76, 16, 383),
+    (BusTiming::K76, 32, 612),
+    (BusTiming::K76, 64, 1069),
+    (BusTiming::K76, 128, 1985),
+    (BusTiming::K76, 256, 3815),
+    (BusTiming::K38, 16, 716),
+    (BusTiming::K38, 32, 1174),
+    (BusTiming::K38, 64, 2089),
+    (BusTiming::K38, 128, 3920),
+    (BusTiming::K38, 256, 7580),
 ];
 
 #[test]
@@ -66,8 +66,8 @@ impl Device for Listener {
     fn address(&self) -> Option<u8> {
         Some(0)
     }
-    fn rate(&self) -> BusRate {
-        BusRate::default()
+    fn rate(&self) -> BusTiming {
+        BusTiming::default()
     }
     fn next_due_us(&self) -> Option<u64> {
         None
@@ -89,10 +89,10 @@ impl Device for Listener {
 
 #[test]
 fn turns_go_in_the_order_of_device_numbers_whatever_the_order_of_connection() {
-    let mut bus = Bus::new(BusRate::default());
+    let mut bus = Bus::new(BusTiming::default());
     let data = StationData { discrete_bytes: 1, channels: 0 };
     for number in [17, 3, 31, 8] {
-        bus.connect(BusInterfaceUnit::new(number, BusRate::default(), data, data));
+        bus.connect(BusInterfaceUnit::new(number, BusTiming::default(), data, data));
     }
     let listener = bus.connect(Listener { turns: Vec::new() });
     bus.advance_to(100_000);
@@ -125,7 +125,7 @@ fn the_model_says_when_something_happens_next_and_time_can_be_cut_anywhere() {
 
 #[test]
 fn an_empty_bus_has_nothing_to_do() {
-    let mut bus = Bus::new(BusRate::default());
+    let mut bus = Bus::new(BusTiming::default());
     assert_eq!(bus.next_due_us(), None);
     bus.advance_to(SECOND_US);
     assert_eq!((bus.now_us(), bus.scan_time_ns()), (SECOND_US, None));
@@ -136,7 +136,7 @@ fn an_empty_bus_has_nothing_to_do() {
 #[test]
 fn a_bus_goes_on_in_another_thread_as_it_does_in_this_one() {
     let started = || {
-        let mut bus = Bus::new(BusRate::default());
+        let mut bus = Bus::new(BusTiming::default());
         for number in [30, 31] {
             bus.connect(Board::powered(BoardOptions::at(number)));
         }
@@ -156,10 +156,10 @@ fn a_bus_goes_on_in_another_thread_as_it_does_in_this_one() {
 #[test]
 fn a_scan_is_the_sum_of_turns_and_of_a_bit_time_for_every_number_that_is_not_in_use() {
     for (rate, bit_ns) in [
-        (BusRate::K153Standard, 6_510),
-        (BusRate::K153Extended, 2 * 6_510),
-        (BusRate::K76, 13_021),
-        (BusRate::K38, 26_042),
+        (BusTiming::K153Standard, 6_510),
+        (BusTiming::K153Extended, 2 * 6_510),
+        (BusTiming::K76, 13_021),
+        (BusTiming::K38, 26_042),
     ] {
         let mut bus = Bus::new(rate);
         bus.connect(Board::powered(BoardOptions::at(31).rate(rate)));

@@ -2,12 +2,12 @@
 
 use super::rig::{PROCESS_ERROR, Rig, SECOND_US, lengths};
 use crate::genius::{
-    BlockKind, Board, BoardOptions, BusInterfaceUnit, BusRate, Circuits, DiscreteBlock, Fault, StationData,
+    BlockKind, Board, BoardOptions, BusInterfaceUnit, BusTiming, Circuits, DiscreteBlock, Fault, StationData,
     ViolationKind,
 };
 
 fn block(number: u8, circuits: Circuits) -> DiscreteBlock {
-    DiscreteBlock::new(number, BusRate::default(), circuits, BlockKind::Combination)
+    DiscreteBlock::new(number, BusTiming::default(), circuits, BlockKind::Combination)
 }
 
 #[test]
@@ -26,7 +26,7 @@ fn a_device_that_sends_inputs_is_asked_who_it_is_and_entered_in_the_table() {
 #[test]
 fn block_kinds_are_told_apart() {
     let (mut rig, [host]) = Rig::started([31]);
-    let rate = BusRate::default();
+    let rate = BusTiming::default();
     rig.bus.connect(DiscreteBlock::new(1, rate, Circuits::Eight, BlockKind::Inputs));
     rig.bus.connect(DiscreteBlock::new(2, rate, Circuits::ThirtyTwo, BlockKind::Outputs));
     let data = StationData { discrete_bytes: 6, channels: 6 };
@@ -72,7 +72,7 @@ fn a_device_with_more_data_than_a_buffer_holds_is_not_logged_in() {
     rig.advance_ms(1_600);
     rig.bus.connect(block(6, Circuits::Sixteen));
     rig.bus.connect(block(7, Circuits::ThirtyTwo));
-    let rate = BusRate::default();
+    let rate = BusTiming::default();
     rig.bus.connect(DiscreteBlock::new(8, rate, Circuits::ThirtyTwo, BlockKind::Inputs));
     rig.bus.connect(DiscreteBlock::new(9, rate, Circuits::ThirtyTwo, BlockKind::Outputs));
     rig.advance_ms(500);
@@ -180,7 +180,7 @@ fn a_device_that_outgrows_its_buffer_is_logged_out() {
 
 fn growing_unit() -> BusInterfaceUnit {
     let data = StationData { discrete_bytes: 1, channels: 0 };
-    BusInterfaceUnit::new(9, BusRate::default(), data, StationData::default())
+    BusInterfaceUnit::new(9, BusTiming::default(), data, StationData::default())
 }
 
 #[test]
@@ -254,12 +254,12 @@ fn outputs_go_to_devices_that_are_logged_in_and_to_nobody_else() {
     let (mut rig, [host]) = Rig::started([31]);
     let filler = StationData { discrete_bytes: 100, channels: 0 };
     // Enough traffic that the shortest scan does not hide anything.
-    rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), filler, filler));
+    rig.bus.connect(BusInterfaceUnit::new(3, BusTiming::default(), filler, filler));
     rig.write_all(host, 0x3000 + 128 * 9, &[0xFF; 64]);
     rig.advance_ms(500);
     let absent_ns = rig.bus.scan_time_ns();
     let outputs = StationData { discrete_bytes: 64, channels: 0 };
-    let device = rig.bus.connect(BusInterfaceUnit::new(9, BusRate::default(), outputs, outputs));
+    let device = rig.bus.connect(BusInterfaceUnit::new(9, BusTiming::default(), outputs, outputs));
     rig.wait_for(host, 0x1E02 + 8 * 9, 1);
     rig.advance_ms(200);
     assert_eq!(rig.bus.get(device).outputs(), [0xFF; 64]);

@@ -2,7 +2,7 @@
 
 use super::rig::{Rig, SECOND_US};
 use crate::genius::{
-    BlockKind, Board, BoardOptions, BusRate, Circuits, DeviceFault, DiscreteBlock, Fault, Led, Leds,
+    BlockKind, Board, BoardOptions, BusTiming, Circuits, DeviceFault, DiscreteBlock, Fault, Led, Leds,
     ViolationKind,
 };
 
@@ -134,7 +134,7 @@ fn the_lamps_follow_board_and_bus() {
 fn nothing_is_taken_from_the_bus_before_the_board_is_on_it() {
     let mut rig = Rig::new();
     let [host] = rig.connect([31]);
-    let block = DiscreteBlock::new(4, BusRate::default(), Circuits::Eight, BlockKind::Combination);
+    let block = DiscreteBlock::new(4, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
     let block = rig.bus.connect(block);
     rig.bus.get_mut(block).set_inputs(0xA5);
     rig.bus.advance_to(2 * SECOND_US);

@@ -1,7 +1,7 @@
 //! Chapter 4: the setup table and Read ID requests to the board.
 
 use super::rig::{COMPLETE, Rig, SECOND_US, lengths};
-use crate::genius::{Board, BoardOptions, BusRate};
+use crate::genius::{Board, BoardOptions, BusTiming};
 
 #[test]
 fn the_host_configures_in_the_window_before_the_bus_and_loses_no_time() {
@@ -61,7 +61,7 @@ fn the_host_cannot_change_the_switches() {
 #[test]
 fn a_board_at_another_rate_than_the_bus_does_not_get_on_it() {
     let mut rig = Rig::new();
-    let wrong = rig.bus.connect(Board::powered(BoardOptions::at(30).rate(BusRate::K38)));
+    let wrong = rig.bus.connect(Board::powered(BoardOptions::at(30).rate(BusTiming::K38)));
     let [right] = rig.connect([31]);
     rig.bus.advance_to(6 * SECOND_US);
     assert_eq!(rig.read_word(wrong, 0x0898), 0xFFFF);

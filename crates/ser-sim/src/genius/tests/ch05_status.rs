@@ -2,7 +2,7 @@
 
 use super::rig::{Rig, SECOND_US};
 use crate::genius::{
-    BlockKind, BusInterfaceUnit, BusRate, Circuits, DeviceFault, DiscreteBlock, Fault, StationData,
+    BlockKind, BusInterfaceUnit, BusTiming, Circuits, DeviceFault, DiscreteBlock, Fault, StationData,
     ViolationKind,
 };
 
@@ -108,7 +108,7 @@ fn the_scan_time_is_the_time_between_the_boards_two_previous_turns() {
     let (mut rig, [host]) = Rig::started([31]);
     assert_eq!(rig.read_word(host, 0x0898), 3, "the shortest scan");
     let data = StationData { discrete_bytes: 128, channels: 0 };
-    rig.bus.connect(BusInterfaceUnit::new(1, BusRate::default(), data, data));
+    rig.bus.connect(BusInterfaceUnit::new(1, BusTiming::default(), data, data));
     rig.advance_ms(500);
     let scan_ns = rig.bus.scan_time_ns().unwrap();
     assert_eq!(u64::from(rig.read_word(host, 0x0898)), (scan_ns + 500_000) / 1_000_000);
@@ -139,7 +139,7 @@ fn the_revision_can_be_read() {
 #[test]
 fn a_board_that_fails_sends_no_more_outputs() {
     let (mut rig, [host]) = Rig::started([31]);
-    let block = DiscreteBlock::new(4, BusRate::default(), Circuits::Eight, BlockKind::Combination);
+    let block = DiscreteBlock::new(4, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
     let block = rig.bus.connect(block);
     rig.write(host, 0x3000 + 128 * 4, 0x3C);
     assert!(rig.bus.advance_until(SECOND_US, |bus| bus.get(block).outputs() == 0x3C));

@@ -1,7 +1,7 @@
 //! Chapter 6: interrupt status and disable tables.
 
 use super::rig::{COMPLETE, Host, Rig};
-use crate::genius::{BlockKind, BusRate, Circuits, DiscreteBlock};
+use crate::genius::{BlockKind, BusTiming, Circuits, DiscreteBlock};
 
 const REQUEST_QUEUE: u16 = 1;
 const DEVICE_STATUS: u16 = 3;
@@ -26,7 +26,7 @@ fn provoke(rig: &mut Rig, host: Host, other: Host, index: u16) {
             assert_eq!(rig.transmit(other, 30, [0x20, 0x20], 0, &[1, 0, 0, 0, 5]), COMPLETE);
         }
         DEVICE_STATUS => {
-            let rate = BusRate::default();
+            let rate = BusTiming::default();
             rig.bus.connect(DiscreteBlock::new(4, rate, Circuits::Eight, BlockKind::Inputs));
         }
         OUTPUTS_SENT => {}

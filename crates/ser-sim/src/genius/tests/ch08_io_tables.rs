@@ -1,12 +1,12 @@
 //! Chapter 8: input and output tables.
 
 use super::rig::{COMPLETE, Rig, lengths};
-use crate::genius::{BlockKind, BusInterfaceUnit, BusRate, Circuits, DiscreteBlock, StationData};
+use crate::genius::{BlockKind, BusInterfaceUnit, BusTiming, Circuits, DiscreteBlock, StationData};
 
 #[test]
 fn inputs_and_outputs_are_in_the_buffers_of_their_devices() {
     let (mut rig, [host]) = Rig::started([31]);
-    let rate = BusRate::default();
+    let rate = BusTiming::default();
     let block = rig.bus.connect(DiscreteBlock::new(12, rate, Circuits::Eight, BlockKind::Combination));
     let unit = rig.bus.connect(BusInterfaceUnit::new(
         3,
@@ -32,7 +32,7 @@ fn shorter_buffers_shorten_the_whole_table() {
     let blocks: Vec<_> = (0..31)
         .map(|number| {
             let block =
-                DiscreteBlock::new(number, BusRate::default(), Circuits::Eight, BlockKind::Combination);
+                DiscreteBlock::new(number, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
             rig.bus.connect(block)
         })
         .collect();
@@ -50,7 +50,7 @@ fn shorter_buffers_shorten_the_whole_table() {
 #[test]
 fn inputs_are_new_in_every_scan() {
     let (mut rig, [host]) = Rig::started([31]);
-    let block = DiscreteBlock::new(2, BusRate::default(), Circuits::Eight, BlockKind::Inputs);
+    let block = DiscreteBlock::new(2, BusTiming::default(), Circuits::Eight, BlockKind::Inputs);
     let block = rig.bus.connect(block);
     rig.advance_ms(100);
     for inputs in 0..50 {
@@ -65,7 +65,7 @@ fn forced_points_are_what_the_controller_sees_and_the_field_gets() {
     let (mut rig, [host]) = Rig::started([31]);
     use crate::genius::Side;
     let data = StationData { discrete_bytes: 1, channels: 1 };
-    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, data));
+    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusTiming::default(), data, data));
     rig.bus.get_mut(unit).set_inputs(&[0b0101, 0x11, 0x22]);
     rig.bus.get_mut(unit).force_point(Side::Inputs, 0, Some(false));
     rig.bus.get_mut(unit).force_point(Side::Inputs, 3, Some(true));
@@ -100,7 +100,7 @@ fn every_type_of_device_has_its_shortest_buffer() {
             let (mut rig, [host]) = Rig::started([31]);
             assert_eq!(rig.configure(host, lengths(0, 0, buffer)), COMPLETE);
             let data = |discrete_bytes| StationData { discrete_bytes, channels: 0 };
-            rig.bus.connect(BusInterfaceUnit::new(5, BusRate::default(), data(inputs), data(outputs)));
+            rig.bus.connect(BusInterfaceUnit::new(5, BusTiming::default(), data(inputs), data(outputs)));
             rig.advance_ms(2_000);
             assert_eq!(rig.device(host, 5)[2], u8::from(buffer == shortest), "{name}, {buffer}");
         }

@@ -2,7 +2,7 @@
 
 use super::rig::{COMPLETE, Host, Rig, SECOND_US, lengths};
 use crate::genius::{
-    BlockKind, BusInterfaceUnit, BusRate, Circuits, DiscreteBlock, StationData, ViolationKind,
+    BlockKind, BusInterfaceUnit, BusTiming, Circuits, DiscreteBlock, StationData, ViolationKind,
 };
 
 /// The manual's example algorithm for a request.
@@ -49,7 +49,7 @@ fn it_is_not_granted_in_the_same_moment() {
 #[test]
 fn during_a_lockout_inputs_wait_and_outputs_repeat() {
     let (mut rig, [host]) = Rig::started([31]);
-    let block = DiscreteBlock::new(2, BusRate::default(), Circuits::Eight, BlockKind::Combination);
+    let block = DiscreteBlock::new(2, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
     let block = rig.bus.connect(block);
     rig.bus.get_mut(block).set_inputs(1);
     rig.write(host, 0x3100, 11);
@@ -73,13 +73,13 @@ fn a_device_that_logs_in_during_a_lockout_gets_no_outputs_that_nobody_wrote() {
     let (mut rig, [host]) = Rig::started([31]);
     let data = StationData { discrete_bytes: 100, channels: 0 };
     assert!(request(&mut rig, host));
-    rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, data));
+    rig.bus.connect(BusInterfaceUnit::new(3, BusTiming::default(), data, data));
     rig.wait_for(host, 0x1E02 + 8 * 3, 1);
     rig.advance_ms(200);
     let locked_ns = rig.bus.scan_time_ns().unwrap();
     assert!(release(&mut rig, host));
     rig.advance_ms(200);
-    assert_eq!(rig.bus.scan_time_ns().unwrap() - locked_ns, 100 * BusRate::default().byte_ns());
+    assert_eq!(rig.bus.scan_time_ns().unwrap() - locked_ns, 100 * BusTiming::default().byte_ns());
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Chapter 10: the Configuration Change command.
 
 use super::rig::{COMPLETE, PROCESS_ERROR, Rig, SECOND_US, SYNTAX_ERROR, lengths};
-use crate::genius::{BlockKind, BusRate, Circuits, DiscreteBlock};
+use crate::genius::{BlockKind, BusTiming, Circuits, DiscreteBlock};
 
 #[test]
 fn the_board_leaves_the_bus_for_1_5_seconds_and_logs_everyone_out() {
@@ -24,7 +24,7 @@ fn the_board_leaves_the_bus_for_1_5_seconds_and_logs_everyone_out() {
 #[test]
 fn with_a_new_buffer_length_alone_the_board_goes_on_transmitting() {
     let (mut rig, [host, other]) = Rig::started([30, 31]);
-    let block = DiscreteBlock::new(2, BusRate::default(), Circuits::Eight, BlockKind::Combination);
+    let block = DiscreteBlock::new(2, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
     let block = rig.bus.connect(block);
     rig.write(host, 0x3100, 5);
     assert!(rig.bus.advance_until(SECOND_US, |bus| bus.get(block).outputs() == 5));

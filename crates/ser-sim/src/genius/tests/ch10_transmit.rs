@@ -2,7 +2,7 @@
 
 use super::rig::{COMPLETE, PROCESS_ERROR, Rig, SYNTAX_ERROR};
 use crate::genius::{
-    BlockKind, BusInterfaceUnit, BusRate, Circuits, DeviceFault, DiscreteBlock, Fault, StationData,
+    BlockKind, BusInterfaceUnit, BusTiming, Circuits, DeviceFault, DiscreteBlock, Fault, StationData,
 };
 
 #[test]
@@ -112,7 +112,7 @@ fn normal_priority_waits_for_a_scan_without_a_datagram_and_high_priority_does_no
 #[test]
 fn a_block_takes_no_more_than_16_bytes() {
     let (mut rig, [host]) = Rig::started([31]);
-    rig.bus.connect(DiscreteBlock::new(2, BusRate::default(), Circuits::Eight, BlockKind::Inputs));
+    rig.bus.connect(DiscreteBlock::new(2, BusTiming::default(), Circuits::Eight, BlockKind::Inputs));
     rig.advance_ms(100);
     assert_eq!(rig.transmit(host, 2, [0x20, 0x04], 0, &[0; 16]), COMPLETE);
     assert_eq!(rig.transmit(host, 2, [0x20, 0x04], 0, &[0; 17]), PROCESS_ERROR);
@@ -138,7 +138,7 @@ fn a_board_that_loses_the_bus_ends_the_command_with_a_process_error() {
 fn a_reply_to_a_datagram_without_reply_waits_in_the_receive_queue() {
     let (mut rig, [host]) = Rig::started([31]);
     let data = StationData { discrete_bytes: 2, channels: 0 };
-    rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, data));
+    rig.bus.connect(BusInterfaceUnit::new(3, BusTiming::default(), data, data));
     rig.wait_for(host, 0x1E02 + 8 * 3, 1);
     assert_eq!(rig.transmit(host, 3, [0x20, 0x40], 0, &[1]), COMPLETE);
     rig.advance_ms(100);
@@ -149,7 +149,7 @@ fn a_reply_to_a_datagram_without_reply_waits_in_the_receive_queue() {
 fn a_datagram_lengthens_the_scan_in_which_it_is_sent() {
     let (mut rig, [host, other]) = Rig::started([30, 31]);
     let data = StationData { discrete_bytes: 64, channels: 0 };
-    rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, data));
+    rig.bus.connect(BusInterfaceUnit::new(3, BusTiming::default(), data, data));
     rig.advance_ms(500);
     for (priority, len) in [(0, 10), (1, 10), (0, 128), (1, 128)] {
         let quiet_ns = rig.bus.scan_time_ns().unwrap();
@@ -162,7 +162,7 @@ fn a_datagram_lengthens_the_scan_in_which_it_is_sent() {
         let end = rig.bus.traffic().scans + 1;
         assert!(rig.bus.advance_until(1_000_000, |bus| bus.traffic().scans == end));
         longest_ns = longest_ns.max(rig.bus.scan_time_ns().unwrap());
-        assert_eq!(longest_ns - quiet_ns, BusRate::default().datagram_ns(len), "{priority} {len}");
+        assert_eq!(longest_ns - quiet_ns, BusTiming::default().datagram_ns(len), "{priority} {len}");
         rig.advance_ms(100);
         assert!(rig.read_datagram(other).is_some());
     }

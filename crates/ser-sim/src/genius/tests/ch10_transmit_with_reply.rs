@@ -1,13 +1,13 @@
 //! Chapter 10: the Transmit Datagram with Reply command.
 
 use super::rig::{COMPLETE, PROCESS_ERROR, Rig, SECOND_US, SYNTAX_ERROR};
-use crate::genius::{BusInterfaceUnit, BusRate, DeviceFault, Fault, Side, StationData};
+use crate::genius::{BusInterfaceUnit, BusTiming, DeviceFault, Fault, Side, StationData};
 
 #[test]
 fn the_reply_comes_into_the_read_buffer_and_not_into_the_queue() {
     let (mut rig, [host]) = Rig::started([31]);
     let data = StationData { discrete_bytes: 6, channels: 6 };
-    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, StationData::default()));
+    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusTiming::default(), data, StationData::default()));
     rig.bus.get_mut(unit).force_point(Side::Inputs, 9, Some(true));
     rig.bus.get_mut(unit).force_channel(Side::Inputs, 5, Some(0x0102));
     rig.advance_ms(200);
@@ -31,7 +31,7 @@ fn the_reply_comes_into_the_read_buffer_and_not_into_the_queue() {
 fn each_of_the_four_force_tables_is_another_one() {
     let (mut rig, [host]) = Rig::started([31]);
     let data = StationData { discrete_bytes: 1, channels: 1 };
-    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, data));
+    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusTiming::default(), data, data));
     rig.bus.get_mut(unit).force_point(Side::Inputs, 0, Some(true));
     rig.bus.get_mut(unit).force_channel(Side::Outputs, 0, Some(0x1234));
     rig.bus.get_mut(unit).force_point(Side::Outputs, 7, Some(false));
@@ -48,7 +48,7 @@ fn each_of_the_four_force_tables_is_another_one() {
 fn a_table_of_128_bytes_comes_whole() {
     let (mut rig, [host]) = Rig::started([31]);
     let data = StationData { discrete_bytes: 128, channels: 0 };
-    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, StationData::default()));
+    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusTiming::default(), data, StationData::default()));
     rig.bus.get_mut(unit).force_point(Side::Inputs, 8 * 128 - 1, Some(true));
     rig.advance_ms(200);
     rig.write(host, 0x08D2, 0);
@@ -105,7 +105,7 @@ fn a_reply_that_comes_too_late_goes_into_the_queue() {
 fn a_lost_reply_is_the_same_as_none() {
     let (mut rig, [host]) = Rig::started([31]);
     let data = StationData { discrete_bytes: 1, channels: 0 };
-    rig.bus.connect(BusInterfaceUnit::new(3, BusRate::default(), data, data));
+    rig.bus.connect(BusInterfaceUnit::new(3, BusTiming::default(), data, data));
     rig.advance_ms(200);
     rig.start_command(host, 3, &[3, 0x20, 0x40, 0x41, 1, 1, 0]);
     let question = rig.bus.traffic().background + 1;

@@ -1,6 +1,6 @@
 //! A bus with hosts on it that follow the manual's example algorithms.
 
-use crate::genius::{Board, BoardOptions, Bus, BusRate, Handle, Noise};
+use crate::genius::{Board, BoardOptions, Bus, BusTiming, Handle, Noise};
 
 pub(super) type Host = Handle<Board>;
 
@@ -17,11 +17,11 @@ pub(super) struct Rig {
 
 impl Rig {
     pub(super) fn new() -> Rig {
-        Rig { bus: Bus::new(BusRate::default()) }
+        Rig { bus: Bus::new(BusTiming::default()) }
     }
 
     pub(super) fn with_noise(noise: Noise) -> Rig {
-        Rig { bus: Bus::with_noise(BusRate::default(), noise) }
+        Rig { bus: Bus::with_noise(BusTiming::default(), noise) }
     }
 
     /// Hosts with these device numbers, their boards just out of reset.

@@ -5,8 +5,8 @@ mod ram;
 mod recovery;
 
 use geni_board::{
-    AnswerError, Completion, Configuration, Data, Destination, Interrupts, Options, Priority, RequestAnswer,
-    RequestStatus, Requests, Start, Transmission,
+    AnswerError, Completion, Configuration, Data, Destination, Interrupts, Options, RequestAnswer,
+    RequestStatus, Requests, Start, Transmission, TransmitPriority,
 };
 
 use super::script::Script;
@@ -112,7 +112,7 @@ fn transmission(script: &mut Script<'_>) -> Transmission {
         },
         function: script.byte() % 128,
         subfunction: script.byte(),
-        priority: if bits & 0x20 == 0 { Priority::Normal } else { Priority::High },
+        priority: if bits & 0x20 == 0 { TransmitPriority::Normal } else { TransmitPriority::High },
         completion: match bits >> 6 {
             0 => Completion::Taken,
             1 => Completion::Acknowledged,

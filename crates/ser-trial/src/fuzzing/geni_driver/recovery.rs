@@ -3,9 +3,9 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use geni_board::{Completion, Configuration, Data, Destination, Event, Priority, Transmission, map};
+use geni_board::{Completion, Configuration, Data, Destination, Event, Transmission, TransmitPriority, map};
 use ser_sim::genius::{
-    Board, BoardOptions, BoardWindow, Bus, BusRate, Handle, Violation, ViolationKind, tick_ms,
+    Board, BoardOptions, BoardWindow, Bus, BusTiming, Handle, Violation, ViolationKind, tick_ms,
 };
 
 use super::bench::Bench;
@@ -61,7 +61,7 @@ pub(super) fn assert_recovers(bench: Bench, warm: bool) {
 impl Recovery {
     fn begin(bench: Bench, warm: bool) -> Recovery {
         // The slowest bus has the fewest scans to go through.
-        let rate = BusRate::K38;
+        let rate = BusTiming::K38;
         let bus = Rc::new(RefCell::new(Bus::new(rate)));
         let board = bus.borrow_mut().connect(Board::new(BoardOptions::at(DRIVER).rate(rate)));
         let sender = bus.borrow_mut().connect(Board::powered(BoardOptions::at(SENDER).rate(rate)));
@@ -145,7 +145,7 @@ impl Recovery {
             destination: Destination::Device(9),
             function: 0x40,
             subfunction: 0x50,
-            priority: Priority::Normal,
+            priority: TransmitPriority::Normal,
             completion: Completion::Taken,
             data: Data::from_slice(b"L").expect("one byte fits"),
         };
