@@ -15,12 +15,13 @@ use ser_proto::genius::{
     Datagram, FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, IoForces, Message, SUBFUNCTION_SER, Subfunction,
 };
 
-use super::GeniusError;
 use super::answers::Answers;
 use super::inboxes::Inboxes;
 use super::window::Window;
-use crate::{Clock, RealTime};
-use crate::{GeniWindow, OpenError, Unit};
+use crate::transport::clock::{Clock, RealTime};
+use crate::transport::endpoint::GeniWindow;
+use crate::transport::genius_error::GeniusError;
+use crate::transport::open_error::OpenError;
 
 /// Nothing tells when a file has changed, so it is looked at this often.
 pub(super) const PACE: Duration = Duration::from_millis(1);
@@ -58,7 +59,7 @@ pub struct BusDevice {
     pub inputs: Vec<u8>,
 }
 
-/// A host on a Genius bus. Clones are the same host; each can be in another [`Unit`].
+/// A host on a Genius bus. Clones are the same host; each can be in another [`Unit`](crate::Unit).
 #[derive(Clone)]
 pub struct GeniHost {
     shared: Arc<Mutex<Host>>,
@@ -137,12 +138,6 @@ impl GeniHost {
         begun.map_err(|error| OpenError::Genius { path: place.file, error })?;
         host.stop = None;
         Ok(GeniHost { shared: Arc::new(Mutex::new(host)), clock })
-    }
-
-    /// A recorder on the bus.
-    #[must_use]
-    pub fn unit(&self, node: u8, options: crate::Options) -> Unit {
-        Unit::on_genius(self.clone(), node, options)
     }
 
     /// The host's own number.

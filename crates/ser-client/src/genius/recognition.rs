@@ -12,9 +12,9 @@ use geni_board::{BlockKind, Destination};
 use ser_proto::Command;
 use ser_proto::genius::GlobalData;
 
-use super::GeniusError;
 use super::host::{BusDevice, GeniHost, Host, PACE, ser_message};
-use crate::Options;
+use crate::session::options::Options;
+use crate::transport::genius_error::GeniusError;
 
 /// The question that only recorders answer. [`Answers`](super::answers::Answers) knows the answer.
 const QUESTION: Command = Command::LastBroadcast;

@@ -8,7 +8,8 @@ use geni_board::{FileRam, MappedRam, RAM_LEN, SharedRam};
 use rustix::fs::OFlags;
 
 use super::put_back::PutBack;
-use crate::{GeniWindow, OpenError};
+use crate::transport::endpoint::GeniWindow;
+use crate::transport::open_error::OpenError;
 
 /// The window, until a board answers there with what to put back.
 pub(super) type Window = PutBack<AnyRam>;

@@ -44,9 +44,15 @@
 //! - *Configure* with a baud rate: the unit may have changed the rate already, so the repeat would be garbage;
 //! - *Set clock*, unless each attempt gets a time of its own: see [`Session::request_set_clock`].
 
+pub(crate) mod counters;
+pub(crate) mod diagnosis;
+pub(crate) mod link;
+pub(crate) mod options;
 mod owed;
 mod pace;
 mod request;
+pub(crate) mod text_line;
+pub(crate) mod unsolicited;
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -55,13 +61,15 @@ use ser_proto::{
     Code, Command, Decoded, FrameDecoder, MAX_BODY_LEN, ParseError, Reply, TimeStamp, encoded_len,
 };
 
-use crate::text_line::LineAssembler;
-use crate::unsolicited::UnsolicitedQueue;
-use crate::{Counters, Diagnosis, LineRate, Unsolicited};
+use crate::transport::line_rate::LineRate;
+use counters::Counters;
+use diagnosis::Diagnosis;
 use owed::Owed;
 use pace::Pace;
 pub use request::Attempt;
 use request::{Request, changes_something, encode, longest_reply, may_be_repeated};
+use text_line::LineAssembler;
+use unsolicited::{Unsolicited, UnsolicitedQueue};
 
 /// Reads that may be under way at once.
 const MAX_READS: usize = 2;

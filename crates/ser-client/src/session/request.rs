@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use ser_proto::{Command, FrameEncoder, MAX_ENTRIES, Model, ParseError, Reply, TimeStamp};
 
-use crate::{Counters, LineRate};
+use super::counters::Counters;
+use crate::transport::line_rate::LineRate;
 
 /// A request whose answer has not come.
 #[derive(Debug)]

@@ -9,8 +9,9 @@ use std::time::Duration;
 
 use serialport::{DataBits, FlowControl, Parity, SerialPort, StopBits};
 
-use crate::transport::bytes_read;
-use crate::{OpenError, Transport};
+use super::open_error::OpenError;
+use super::ports::ports;
+use super::{Transport, bytes_read};
 
 /// Far longer than the kernel needs to take one frame at 300 baud, so only a stuck port runs into it.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
@@ -60,7 +61,7 @@ fn why_not_opened(path: &str, baud: u32, error: &serialport::Error) -> OpenError
 }
 
 fn exists(path: &str) -> bool {
-    Path::new(path).exists() || crate::ports().iter().any(|port| port.path.eq_ignore_ascii_case(path))
+    Path::new(path).exists() || ports().iter().any(|port| port.path.eq_ignore_ascii_case(path))
 }
 
 #[cfg(unix)]

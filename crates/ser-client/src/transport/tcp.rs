@@ -4,8 +4,8 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-use crate::transport::bytes_read;
-use crate::{OpenError, Transport};
+use super::open_error::OpenError;
+use super::{Transport, bytes_read};
 
 /// For each address of the host.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);

@@ -3,7 +3,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::{Attempt, Clock, Diagnosis, Session, Transport, TransportError};
+use super::diagnosis::Diagnosis;
+use super::{Attempt, Session};
+use crate::transport::Transport;
+use crate::transport::clock::Clock;
+use crate::transport::transport_error::TransportError;
 
 /// How much is taken from a line in one go, at most: a peer that never stops must not keep us from asking.
 const MAX_WAITING_BYTES: usize = 64 * 1024;

@@ -10,7 +10,13 @@ use std::time::Duration;
 
 use ser_proto::Configure;
 
-use crate::{Cursor, LineRate, LogFollower, RequestError, Step, Summary, Unit, Unsolicited};
+use super::follower::{LogFollower, Step};
+use crate::reading::cursor::Cursor;
+use crate::reading::summary::Summary;
+use crate::session::unsolicited::Unsolicited;
+use crate::transport::line_rate::LineRate;
+use crate::unit::Unit;
+use crate::unit::request_error::RequestError;
 
 /// Readings that follow each other without a pause for so long are more than the line carries beside the reports.
 const BUSY_FOR: Duration = Duration::from_secs(3);

@@ -82,12 +82,15 @@ mod course;
 mod haste;
 
 use std::collections::VecDeque;
-use std::error::Error;
-use std::fmt;
 
-use ser_proto::{Command, Entry, MAX_ENTRIES, MAX_SIZE, Model, ReadReply};
+use ser_proto::{Entry, MAX_ENTRIES, MAX_SIZE, Model, ReadReply};
 
-use crate::{Cursor, Delivery, LogPosition, Lost};
+use super::cursor::Cursor;
+use super::delivery::{Delivery, Lost};
+pub use super::disturbed::Disturbed;
+use super::log_position::LogPosition;
+pub use super::read_request::ReadRequest;
+pub use super::summary::Summary;
 use ahead::Ahead;
 
 /// The index that total 0 gets in the arithmetic here, large enough that nothing ever goes below zero.
@@ -109,53 +112,6 @@ const HASTE: u64 = 4;
 
 /// A reading needs a few replies now and then that bring no event; so many in a row mean that something is wrong.
 const MAX_FRUITLESS: u32 = 32;
-
-/// Entries to ask for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ReadRequest {
-    /// Number of the first entry, from 1.
-    pub start: u16,
-    /// How many, 1–10.
-    pub count: u8,
-}
-
-impl ReadRequest {
-    /// Asks where the log stands. One entry comes along, because no manual promises an answer to a count of 0.
-    pub const POSITION: ReadRequest = ReadRequest { start: 1, count: 1 };
-}
-
-impl From<ReadRequest> for Command {
-    fn from(request: ReadRequest) -> Command {
-        Command::Read { start: request.start, count: request.count }
-    }
-}
-
-/// Why a reading cannot go on. The cursor stands behind the last event that was delivered: a new reading from there
-/// sorts most of these out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Disturbed {
-    /// Total and next slot moved in a way that recording does not explain: the log was erased or resized meanwhile.
-    Changed,
-    /// The ring does not have the size that was given.
-    WrongSize,
-    /// The replies bring no events although there must be some.
-    NoProgress,
-}
-
-/// What a reading came to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Summary {
-    /// Events that were delivered.
-    pub delivered: u32,
-    /// Events that are known to be lost.
-    pub lost: u32,
-    /// Places at which inputs had changed and nothing was recorded.
-    pub unrecorded: u32,
-    /// Whether the log began anew, so that an unknown number is lost besides.
-    pub restarted: bool,
-    /// Where the log stood in the latest reply.
-    pub position: LogPosition,
-}
 
 /// The head of the log in the latest reply: index and slot of the next event.
 #[derive(Clone, Copy, Debug)]
@@ -784,27 +740,3 @@ struct Batch<'a> {
 const fn low_16(value: u64) -> u16 {
     value as u16
 }
-
-impl Disturbed {
-    /// What a person can try next.
-    #[must_use]
-    pub const fn hint(&self) -> &'static str {
-        match self {
-            Disturbed::Changed => "read again; does another host erase or resize the log?",
-            Disturbed::WrongSize => "give the size that the unit was configured with",
-            Disturbed::NoProgress => "read again, at a higher baud rate if events come very fast",
-        }
-    }
-}
-
-impl fmt::Display for Disturbed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Disturbed::Changed => "the log was erased or resized while it was being read",
-            Disturbed::WrongSize => "the log does not have the size that was expected",
-            Disturbed::NoProgress => "the log tells of events and does not hand them out",
-        })
-    }
-}
-
-impl Error for Disturbed {}

@@ -5,7 +5,10 @@ use std::fmt;
 
 use ser_proto::{Code, Configuration, InvalidTime};
 
-use crate::{Diagnosis, Disturbed, TransportError};
+use crate::reading::disturbed::Disturbed;
+use crate::session::NoReply;
+use crate::session::diagnosis::Diagnosis;
+use crate::transport::transport_error::TransportError;
 
 /// Why a request did not succeed.
 #[derive(Debug)]
@@ -95,5 +98,12 @@ impl From<TransportError> for RequestError {
 impl From<Disturbed> for RequestError {
     fn from(disturbed: Disturbed) -> RequestError {
         RequestError::Disturbed(disturbed)
+    }
+}
+
+impl From<NoReply> for RequestError {
+    fn from(no_reply: NoReply) -> RequestError {
+        let NoReply { command, attempts, diagnosis, may_have_been_done } = no_reply;
+        RequestError::NoReply { command, attempts, diagnosis, may_have_been_done }
     }
 }

@@ -5,7 +5,14 @@
 //! reports that would have shown it may be lost, or were never sent. A reading begins with the last event that was
 //! delivered, and if no more than nine have happened since, it is one request.
 
-use crate::{Cursor, Delivery, Disturbed, LogPosition, LogReader, RequestError, Summary, Unit};
+use crate::reading::cursor::Cursor;
+use crate::reading::delivery::Delivery;
+use crate::reading::disturbed::Disturbed;
+use crate::reading::log_position::LogPosition;
+use crate::reading::reader::LogReader;
+use crate::reading::summary::Summary;
+use crate::unit::Unit;
+use crate::unit::request_error::RequestError;
 
 /// How often a reading begins anew because the log was changed under it.
 const MAX_RESYNCS: u32 = 4;

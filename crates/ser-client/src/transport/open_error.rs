@@ -1,29 +1,9 @@
-//! Opening the line to a unit, with an error that says what to do about it.
+//! Why a line could not be opened, and what to do about it.
 
 use std::error::Error;
 use std::{fmt, io};
 
-use crate::{Endpoint, GeniusError, SerialTransport, TcpTransport, Transport};
-
-/// Opens the line. `baud` is the rate in bits per second; a line without a rate ignores it.
-///
-/// # Errors
-/// See [`OpenError`].
-pub fn open(endpoint: &Endpoint, baud: u32) -> Result<Box<dyn Transport>, OpenError> {
-    match endpoint {
-        Endpoint::Serial { path } => Ok(Box::new(SerialTransport::open(path, baud)?)),
-        Endpoint::Tcp { address } => Ok(Box::new(TcpTransport::connect(address)?)),
-        Endpoint::Geni { window, node } => Err(no_line(&window.file, *node)),
-    }
-}
-
-/// A window is opened by [`Unit::open`](crate::Unit::open) and [`GeniHost`](crate::GeniHost), where that can be.
-fn no_line(file: &str, node: Option<u8>) -> OpenError {
-    match node {
-        Some(_) => OpenError::NotAWindow { path: file.to_owned() },
-        None => OpenError::NoNode { path: file.to_owned() },
-    }
-}
+use super::genius_error::GeniusError;
 
 fn file_name(path: &str) -> &str {
     path.rsplit('/').next().unwrap_or(path)

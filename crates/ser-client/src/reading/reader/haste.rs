@@ -2,9 +2,9 @@
 
 use ser_proto::MAX_ENTRIES;
 
-use crate::Delivery;
-
-use super::{Asked, Batch, Footing, Growth, HASTE, Head, LogReader, Pending, Purpose, ReadRequest};
+use super::super::delivery::Delivery;
+use super::super::read_request::ReadRequest;
+use super::{Asked, Batch, Footing, Growth, HASTE, Head, LogReader, Pending, Purpose};
 
 impl LogReader {
     /// Whether events come faster than they can be read with a look at the anchor now and then. Whatever the ring holds

@@ -4,7 +4,7 @@ use std::fmt;
 
 use ser_proto::ParseError;
 
-use crate::Counters;
+use super::counters::Counters;
 
 /// Why there was no answer, as far as the bytes that did arrive can tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

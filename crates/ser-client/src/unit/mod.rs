@@ -1,7 +1,9 @@
 //! A unit behind a line: blocking calls, one per thing that a recorder can do.
 
+mod open;
+pub(crate) mod request_error;
+
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use ser_proto::{
@@ -9,12 +11,19 @@ use ser_proto::{
     encoded_len,
 };
 
-use crate::link::{Link, SerialLink};
-use crate::session::NoReply;
-use crate::{
-    Clock, Counters, Cursor, Delivery, Endpoint, LineRate, LogFollower, LogPosition, OpenError, RangeReader,
-    ReadRequest, RealTime, RequestError, Session, Summary, Timing, Transport, Unsolicited, open,
-};
+use crate::reading::delivery::Delivery;
+use crate::reading::log_position::LogPosition;
+use crate::reading::range_reader::RangeReader;
+use crate::reading::read_request::ReadRequest;
+use crate::session::counters::Counters;
+use crate::session::link::{Link, SerialLink};
+use crate::session::options::Options;
+use crate::session::unsolicited::Unsolicited;
+use crate::session::{NoReply, Session, Timing};
+use crate::transport::Transport;
+use crate::transport::clock::{Clock, RealTime};
+use crate::transport::line_rate::LineRate;
+use request_error::RequestError;
 
 /// A unit changes its rate when the reply is out; what arrives in that moment it would not understand.
 const BAUD_SETTLING: Duration = Duration::from_millis(20);
@@ -22,29 +31,12 @@ const BAUD_SETTLING: Duration = Duration::from_millis(20);
 /// How long a unit may take to answer when its rate is looked for, on top of the time that the bytes are on the line.
 const SEARCH_TIMEOUT: Duration = Duration::from_millis(250);
 
-/// How patient to be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Options {
-    /// How long a unit may take to answer, on top of the time that the bytes are on the line. Behind a terminal
-    /// server that time is not known, so a slow line there wants a longer timeout.
-    pub timeout: Duration,
-    /// How often a request is repeated when no answer comes. Requests that must not be carried out twice never are.
-    pub retries: u32,
-}
-
-/// One second, and two repeats.
-impl Default for Options {
-    fn default() -> Self {
-        Options { timeout: Duration::from_secs(1), retries: 2 }
-    }
-}
-
 /// A unit at the other end of a line.
 pub struct Unit {
     link: Box<dyn Link>,
     session: Session,
     /// Where the log stood at the end of the last reading by cursor.
-    last_position: Option<LogPosition>,
+    pub(crate) last_position: Option<LogPosition>,
 }
 
 impl Unit {
@@ -61,45 +53,6 @@ impl Unit {
         let line_rate = LineRate::from(transport.bits_per_second());
         let session = Session::new(Timing { timeout, retries, line_rate });
         Unit { link: Box::new(SerialLink::new(transport, clock)), session, last_position: None }
-    }
-
-    #[cfg(unix)]
-    pub(crate) fn on_genius(host: crate::GeniHost, node: u8, options: Options) -> Unit {
-        let Options { timeout, retries } = options;
-        let timing = Timing { timeout, retries, line_rate: LineRate::Instant };
-        // A bus has many talkers, and no silence that could be filled.
-        let session = Session::new(timing).one_at_a_time();
-        let link = Box::new(crate::genius::GeniusLink { host, node });
-        Unit { link, session, last_position: None }
-    }
-
-    /// Opens the way to a unit. `baud` is the rate of a serial port in bits per second.
-    ///
-    /// # Errors
-    /// See [`OpenError`].
-    pub fn open(endpoint: &Endpoint, baud: u32, options: Options) -> Result<Unit, OpenError> {
-        Unit::open_unless(endpoint, baud, options, &Arc::default())
-    }
-
-    /// The same until `stop` is set, where a board on a bus has to be waited for.
-    ///
-    /// # Errors
-    /// See [`OpenError`].
-    #[cfg_attr(not(unix), expect(unused_variables, reason = "there are no windows to boards"))]
-    pub fn open_unless(
-        endpoint: &Endpoint,
-        baud: u32,
-        options: Options,
-        stop: &Arc<AtomicBool>,
-    ) -> Result<Unit, OpenError> {
-        match endpoint {
-            #[cfg(unix)]
-            Endpoint::Geni { window, node: Some(node) } => {
-                let host = crate::GeniHost::open_with_node(window.clone(), options.timeout, stop, *node)?;
-                Ok(host.unit(*node, options))
-            }
-            line => Ok(Unit::new(open(line, baud)?, options)),
-        }
     }
 
     /// This host's number on the Genius bus, if that is where the unit is: auto reports can be sent there.
@@ -249,30 +202,6 @@ impl Unit {
             reader.take(&self.read(request)?, on);
         }
         Ok(reader.delivered())
-    }
-
-    /// Reads what has happened since `cursor` (everything, if there is none) from a log of `size` entries, each event
-    /// once and in order, and says what was lost; see [`reader`](crate::reader).
-    ///
-    /// `cursor` moves on with every reply, never past what was handed to `on`. After an error the next call goes on
-    /// where this one stopped.
-    ///
-    /// # Errors
-    /// If no reply comes, the line fails, or the log is changed again and again while it is read.
-    pub fn read_new(
-        &mut self,
-        cursor: &mut Option<Cursor>,
-        size: u16,
-        on: &mut dyn FnMut(Delivery),
-    ) -> Result<Summary, RequestError> {
-        let mut follower = LogFollower::new(*cursor, size).starting_near(self.last_position.take());
-        let summary = follower.read_new(self, &mut |step| {
-            step.deliveries.iter().copied().for_each(&mut *on);
-            *cursor = step.cursor;
-            Ok::<(), RequestError>(())
-        })?;
-        self.last_position = follower.position();
-        Ok(summary)
     }
 
     /// Waits for the next message that answers no request: an auto report or a line of text. Those that came during
@@ -478,11 +407,4 @@ impl Unit {
 
 const fn unexpected(command: Code) -> RequestError {
     RequestError::UnexpectedReply { command }
-}
-
-impl From<NoReply> for RequestError {
-    fn from(no_reply: NoReply) -> RequestError {
-        let NoReply { command, attempts, diagnosis, may_have_been_done } = no_reply;
-        RequestError::NoReply { command, attempts, diagnosis, may_have_been_done }
-    }
 }

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use ser_proto::{MAX_ENTRIES, MAX_SIZE};
 
-use crate::LogPosition;
-
-use super::{Asked, Footing, Growth, Head, LogReader, Pending, Purpose, ReadRequest, low_16};
+use super::super::log_position::LogPosition;
+use super::super::read_request::ReadRequest;
+use super::{Asked, Footing, Growth, Head, LogReader, Pending, Purpose, low_16};
 
 /// Replies for one look at the anchor, at most: it costs one entry in so many replies.
 const DEPTH: u64 = 8;

@@ -2,7 +2,9 @@
 
 use ser_proto::{Entry, MAX_ENTRIES, MAX_SIZE, ReadReply};
 
-use crate::{Delivery, LogPosition, Lost, ReadRequest};
+use super::delivery::{Delivery, Lost};
+use super::log_position::LogPosition;
+use super::read_request::ReadRequest;
 
 /// Reads a range of entries. Events that are recorded meanwhile may overwrite entries of the range between two
 /// replies; [`LogReader`](crate::LogReader) follows them, this only tells: [`is_mixed`](Self::is_mixed).

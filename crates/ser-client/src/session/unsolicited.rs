@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use ser_proto::ReadReply;
 
-use crate::TextLine;
+use super::text_line::TextLine;
 
 /// A message that answers no request.
 #[derive(Clone, Debug, PartialEq, Eq)]
