@@ -1,18 +1,18 @@
-//! Entries that were read before their turn.
+//! Entries that were read before their turn, and wait until a reply has proven them.
 
 use std::collections::VecDeque;
 
 use ser_proto::{Entry, Model};
 
-/// What is known of the events from a certain one on. Only so much is read ahead, and so this stays small.
+/// What is known of the events from the next one on. The reach of the requests bounds it.
 #[derive(Debug, Default)]
-pub(super) struct Ahead {
+pub(super) struct ReadAhead {
     /// In the order of the events, with holes; the last one is known.
     entries: VecDeque<Option<(Entry, Model)>>,
 }
 
-impl Ahead {
-    /// Keeps the entry of the event that comes so many after the first.
+impl ReadAhead {
+    /// Keeps the entry of the event that comes `offset` after the first.
     pub(super) fn keep(&mut self, offset: usize, entry: Entry, model: Model) {
         if self.entries.len() <= offset {
             self.entries.resize(offset + 1, None);
@@ -22,13 +22,13 @@ impl Ahead {
         }
     }
 
-    /// Whether the entry of the event that comes so many after the first is known.
+    /// Whether the entry of the event that comes `offset` after the first is known.
     pub(super) fn knows(&self, offset: u64) -> bool {
         let offset = usize::try_from(offset).unwrap_or(usize::MAX);
         matches!(self.entries.get(offset), Some(Some(_)))
     }
 
-    /// The entry of the first event, if it is known: the one after it is the first now.
+    /// Takes out the entry of the first event, if it is known. The next event is the first then.
     pub(super) fn pop(&mut self) -> Option<(Entry, Model)> {
         let known = self.entries.front().copied().flatten()?;
         self.entries.pop_front();
@@ -45,7 +45,7 @@ impl Ahead {
         self.entries.is_empty()
     }
 
-    /// Passes over so many events.
+    /// Passes over `count` events.
     pub(super) fn skip(&mut self, count: u64) {
         let count = usize::try_from(count).unwrap_or(usize::MAX).min(self.entries.len());
         self.entries.drain(..count);
