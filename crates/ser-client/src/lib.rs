@@ -1,12 +1,19 @@
-//! A host's conversation with a sequential event recorder: commands and their answers, told apart from what the
-//! recorder says by itself, and a log that is read by cursor, so that every event arrives once and in order.
+//! A host's conversation with a sequential event recorder: commands and their answers, told apart
+//! from what the recorder says by itself, and a log that is read by cursor, so that every event
+//! arrives once and in order.
 //!
-//! Most programs want [`open`] and [`Unit`]: blocking calls over a serial port or TCP. Underneath, [`Session`]
-//! (requests and their answers) and [`LogReader`] (which entries to read next) know neither clock nor port; they can
-//! be driven by any event loop, and by tests without waiting.
+//! Most programs want [`open`] and [`Unit`]: blocking calls over a serial port or TCP. Underneath,
+//! [`Session`] (requests and their answers) and [`LogReader`] (which entries to read next) know
+//! neither clock nor port. Any event loop can drive them, and tests can without waiting.
 //!
-//! On a Genius bus a unit is reached through the window that a host shares with its GENI board; [`GeniHost`] also knows
-//! who else is on the bus, and speaks to all of them.
+//! On a Genius bus a recorder is reached through the window that a host shares with its GENI board.
+//! [`GeniHost`] also knows who else is on the bus, and speaks to all of them.
+//!
+//! # The folders
+//!
+//! Each needs only those before it: `transport` knows this computer and its ports, `reading` the
+//! log, `session` the conversation, `genius` the bus, `unit` makes blocking calls of them, and
+//! `following` reads again and again.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)

@@ -628,7 +628,8 @@ fn what_is_under_way_is_forgotten_together() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever arrives in whatever pieces, the session stays usable, and cutting does not change the outcome.
+    /// Whatever arrives in whatever pieces, the session stays usable, and cutting does not change
+    /// the outcome.
     #[test]
     fn any_bytes_in_any_pieces(
         noise in prop::collection::vec(prop_oneof![Just(0x1B), b'0'..=b'9', any::<u8>()], 0..300),

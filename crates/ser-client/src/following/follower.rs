@@ -1,9 +1,10 @@
 //! Following a log: reading after reading, each from where the last one ended.
 //!
-//! An auto report is a reason to read, and no more. It says which events it brings by their place and the total, and
-//! both begin anew after an erase: nothing in a report shows whether it goes on with the log that was read last, and
-//! reports that would have shown it may be lost, or were never sent. A reading begins with the last event that was
-//! delivered, and if no more than nine have happened since, it is one request.
+//! An auto report is a reason to read, and no more. It names its events by their place in the ring
+//! and the total, and both begin anew after an erase. So nothing in a report shows whether it goes
+//! on with the log that was read last. Earlier reports might have shown it, but they may be lost, or
+//! were never sent. A reading begins with the last event that was delivered. If no more than nine
+//! have happened since, it is one request.
 
 use crate::reading::cursor::Cursor;
 use crate::reading::delivery::Delivery;
@@ -58,15 +59,16 @@ impl LogFollower {
         self.cursor
     }
 
-    /// The same, when the log was last seen at `position`: if nothing has happened since, the next reading is shorter.
+    /// The same, when the log was last seen at `position`: if nothing has happened since, the next
+    /// reading is shorter.
     #[must_use]
     pub fn starting_near(mut self, position: Option<LogPosition>) -> LogFollower {
         self.position = position;
         self
     }
 
-    /// Whether a reading goes on for as long as there is enough for a full reply, instead of ending when it has come past
-    /// what had happened when it began.
+    /// Whether a reading goes on for as long as there is enough for a full reply, instead of ending
+    /// when it has come past what had happened when it began.
     pub fn set_keeps_up(&mut self, keeps_up: bool) {
         self.keeps_up = keeps_up;
     }
@@ -77,12 +79,14 @@ impl LogFollower {
         self.position
     }
 
-    /// Reads what is new and hands it to `take`, reply by reply; each event comes once and in order, and what was
-    /// lost is told. Auto reports that came before the first reply are forgotten: the reading brings what they have
-    /// to tell. When `take` fails, the reading ends with its error, and the next one begins before what it was given.
+    /// Reads what is new and hands it to `take`, reply by reply; each event comes once and in
+    /// order, and what was lost is told. Auto reports that came before the first reply are
+    /// forgotten: the reading brings what they have to tell. When `take` fails, the reading ends
+    /// with its error, and the next one begins before what it was given.
     ///
     /// # Errors
-    /// Those of `take`; no reply, a line that fails, or a log that is changed again and again while it is read.
+    /// Those of `take`; no reply, a line that fails, or a log that is changed again and again while
+    /// it is read.
     pub fn read_new<E: From<RequestError>>(
         &mut self,
         unit: &mut Unit,
@@ -102,7 +106,8 @@ impl LogFollower {
             }
             match end {
                 Ok(()) => return Ok(Summary { delivered, lost, unrecorded, restarted, ..summary }),
-                // Somebody erased or resized the log: what is still there is sorted out from the cursor.
+                // Somebody erased or resized the log: what is still there is sorted out from the
+                // cursor.
                 Err(Disturbed::Changed | Disturbed::WrongSize) if resyncs < MAX_RESYNCS => {
                     resyncs += 1;
                     self.learn_size(unit)?;

@@ -1,10 +1,11 @@
 //! Following a log without end: when to read it, and whether the recorder is to report by itself.
 //!
-//! A report is the quickest way to hear of an event. But it takes the line: the same entries go over it twice, once in
-//! the report and once in the reading that it causes. While events come so fast that this is more than the line
-//! carries, the recorder is told not to report and is read as fast as it goes; when it has been quiet for a while, it
-//! may report again. Each change is stored in the recorder, so a recorder that is busy again and again is left
-//! unreported for longer each time.
+//! A report is the quickest way to hear of an event. But it takes the line: the same entries go
+//! over it twice, once in the report and once in the reading that it causes. If events come faster
+//! than the line carries them twice, the recorder is told not to report, and is read as fast as it
+//! goes. When it has been quiet for a while, it may report again. Each change of this setting is
+//! stored in the recorder. So a recorder that is busy again and again stays without reports for
+//! longer each time.
 
 use std::time::Duration;
 
@@ -18,7 +19,8 @@ use crate::transport::line_rate::LineRate;
 use crate::unit::Unit;
 use crate::unit::request_error::RequestError;
 
-/// Readings that follow each other without a pause for so long are more than the line carries beside the reports.
+/// Readings that follow each other without a pause for so long are more than the line carries
+/// beside the reports.
 const BUSY_FOR: Duration = Duration::from_secs(3);
 
 /// A pause between two readings that is one.
@@ -45,7 +47,8 @@ const CALM: [Duration; 2] = [Duration::from_secs(30), Duration::from_secs(3600)]
 /// Bytes that an event takes on the line at the least: 12 bytes in hexadecimal digits.
 const EVENT_LEN: usize = 24;
 
-/// The rate of a line that is not known, as behind a terminal server: the highest that recorders have.
+/// The rate of a line that is not known, as behind a terminal server: the highest that recorders
+/// have.
 const HIGHEST_RATE: LineRate = LineRate::BitsPerSecond(19_200);
 
 /// How to make a recorder report to this host, and how to make it stop.
@@ -84,8 +87,8 @@ pub struct LogWatcher {
 }
 
 impl LogWatcher {
-    /// Reads a log every `interval`, from where `follower` stands, or more often where `may_shorten` allows it and the
-    /// ring would overflow in that time.
+    /// Reads a log every `interval`, from where `follower` stands, or more often where
+    /// `may_shorten` allows it and the ring would overflow in that time.
     #[must_use]
     pub fn polling(follower: LogFollower, interval: Duration, may_shorten: bool) -> LogWatcher {
         LogWatcher {
@@ -110,7 +113,8 @@ impl LogWatcher {
         LogWatcher { switch: Some(switch), ..LogWatcher::polling(follower, interval, true) }
     }
 
-    /// Whether the recorder was told to report or not to, so that its setting may have to be put back.
+    /// Whether the recorder was told to report or not to, so that its setting may have to be put
+    /// back.
     #[must_use]
     pub fn has_switched(&self) -> bool {
         self.has_switched
@@ -127,9 +131,10 @@ impl LogWatcher {
         self.due = Duration::ZERO;
     }
 
-    /// Does what is due: reads, or tells the recorder to report or not to; otherwise waits for that, or for a report, for
-    /// `patience` at the longest. What a reading brings goes to `take`, as with [`LogFollower::read_new`]; in a reading
-    /// that events come too fast for that may go on for ever.
+    /// Does what is due: reads, or tells the recorder to report or not to; otherwise waits for
+    /// that, or for a report, for `patience` at the longest. What a reading brings goes to `take`,
+    /// as with [`LogFollower::read_new`]; in a reading that events come too fast for that may go on
+    /// for ever.
     ///
     /// # Errors
     /// As for [`LogFollower::read_new`], and if the recorder refuses the setting.
@@ -147,7 +152,8 @@ impl LogWatcher {
             return self.read(unit, take);
         }
         match unit.wait_event(patience.min(self.due - now))? {
-            // Only a reading shows whether it is still the same log, and one takes the place of all reports.
+            // Only a reading shows whether it is still the same log, and one takes the place of all
+            // reports.
             Some(Unsolicited::Report(_)) => self.due = unit.now(),
             // What the recorder prints says nothing that the log does not.
             Some(Unsolicited::Line(_)) | None => {}

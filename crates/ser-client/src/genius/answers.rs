@@ -1,4 +1,5 @@
-//! What devices on a bus have answered to the question that only recorders answer.
+//! What devices on a bus have answered to the question that only recorders answer. An answer holds
+//! until the device logs in or out.
 
 use std::collections::BTreeMap;
 

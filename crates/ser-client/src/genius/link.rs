@@ -1,4 +1,4 @@
-//! A session's messages in datagrams.
+//! A session's messages in datagrams: the link to one recorder on the bus.
 
 use std::time::Duration;
 

@@ -8,8 +8,8 @@ use ser_proto::Entry;
 
 /// How far a host has read. Keep it, and the next reading starts right after.
 ///
-/// `sequence` alone would do if logs were never erased; the anchor tells a log that went on from one
-/// that began anew.
+/// `sequence` alone would do if logs were never erased; the anchor tells a log that went on from
+/// one that began anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Cursor {
     /// The sequence of the last event that was delivered; 0 if the log was empty.

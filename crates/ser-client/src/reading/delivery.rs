@@ -9,8 +9,8 @@ pub enum Delivery {
     Event {
         /// The physical number of the entry, 1 … size.
         entry_number: u16,
-        /// The sequence of the event in the life of its log, from 1. `None` where entries are read by
-        /// their physical numbers, which do not tell.
+        /// The sequence of the event in the life of its log, from 1. `None` where entries are read
+        /// by their physical numbers, which do not tell.
         sequence: Option<u64>,
         /// What was recorded.
         entry: Entry,
@@ -35,18 +35,19 @@ pub enum Lost {
         /// How many.
         count: u32,
     },
-    /// So many were overwritten before the first reading of this log, or a multiple of 65536 more: the recorder
-    /// counts modulo 65536 and nobody watched.
+    /// So many were overwritten before the first reading of this log, or a multiple of 65536 more:
+    /// the recorder counts modulo 65536 and nobody watched.
     OverwrittenAtLeast {
         /// How many.
         count: u32,
     },
-    /// The log is not the one that was read last: it was erased or lost its contents (power). How many events went
-    /// unread with the old one is not known; what follows is all that the new one holds.
+    /// The log is not the one that was read last: it was erased or lost its contents (power). How
+    /// many events went unread with the old one is not known; what follows is all that the new one
+    /// holds.
     LogRestarted,
     /// These inputs changed between two neighbouring entries, and no entry says when: recording was
-    /// stopped, or the recorder could not take all changes. How many changes there were is not known;
-    /// inputs that changed back meanwhile leave no trace.
+    /// stopped, or the recorder could not take all changes. How many changes there were is not
+    /// known; inputs that changed back meanwhile leave no trace.
     Unrecorded {
         /// The inputs.
         inputs: Inputs,
@@ -54,8 +55,8 @@ pub enum Lost {
 }
 
 impl Lost {
-    /// What is missing between an entry and the one right after it in the same log, if anything: the
-    /// state before, with what changed, has to be the state after.
+    /// What is missing between an entry and the one right after it in the same log, if anything:
+    /// the state before, with what changed, has to be the state after.
     #[must_use]
     pub fn between(entry: &Entry, next: &Entry) -> Option<Lost> {
         let inputs = Inputs(entry.state.0 ^ next.changed.0 ^ next.state.0);

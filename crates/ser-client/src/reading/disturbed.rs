@@ -3,11 +3,12 @@
 use std::error::Error;
 use std::fmt;
 
-/// Why a reading cannot go on. The cursor stands behind the last event that was delivered: a new reading from there
-/// sorts most of these out.
+/// Why a reading cannot go on. The cursor stands behind the last event that was delivered: a new
+/// reading from there sorts most of these out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Disturbed {
-    /// Total and next slot moved in a way that recording does not explain: the log was erased or resized meanwhile.
+    /// Total and next slot moved in a way that recording does not explain: the log was erased or
+    /// resized meanwhile.
     Changed,
     /// The ring does not have the size that was given.
     WrongSize,

@@ -6,8 +6,9 @@ use super::delivery::{Delivery, Lost};
 use super::log_position::LogPosition;
 use super::read_request::ReadRequest;
 
-/// Reads a range of entries. Events that are recorded meanwhile may overwrite entries of the range between two
-/// replies; [`LogReader`](crate::LogReader) follows them, this only tells: [`is_mixed`](Self::is_mixed).
+/// Reads a range of entries. Events that are recorded meanwhile may overwrite entries of the range
+/// between two replies; [`LogReader`](crate::LogReader) follows them, this only tells:
+/// [`is_mixed`](Self::is_mixed).
 #[derive(Debug)]
 pub struct RangeReader {
     start: u16,
@@ -23,8 +24,8 @@ pub struct RangeReader {
 }
 
 impl RangeReader {
-    /// Reads `count` entries from number `start` (from 1) of a ring of `size` entries. What is outside of the ring
-    /// is left out.
+    /// Reads `count` entries from number `start` (from 1) of a ring of `size` entries. What is
+    /// outside of the ring is left out.
     #[must_use]
     pub fn new(start: u16, count: u16, size: u16) -> RangeReader {
         let size = size.clamp(1, MAX_SIZE);
@@ -68,14 +69,15 @@ impl RangeReader {
         }
     }
 
-    /// Whether an entry is the first after the newest: the oldest of a full ring. It has nothing to do with the entry
-    /// that comes before it by number.
+    /// Whether an entry is the first after the newest: the oldest of a full ring. It has nothing to
+    /// do with the entry that comes before it by number.
     #[must_use]
     pub fn is_seam(&self, entry_number: u16) -> bool {
         self.position.is_some_and(|position| entry_number.checked_sub(1) == Some(position.next_slot))
     }
 
-    /// Whether the entry before `next` is still what it was, although the log has moved on between two replies.
+    /// Whether the entry before `next` is still what it was, although the log has moved on between
+    /// two replies.
     fn keeps_before(&self, earlier: LogPosition, now: LogPosition) -> bool {
         let Some(slot) = self.next.checked_sub(2) else { return true };
         earlier == now || went_straight(earlier, now) && !(earlier.next_slot..now.next_slot).contains(&slot)
@@ -87,7 +89,8 @@ impl RangeReader {
         self.position
     }
 
-    /// Whether events that were recorded during the reading may stand in place of entries that were delivered.
+    /// Whether events that were recorded during the reading may stand in place of entries that were
+    /// delivered.
     #[must_use]
     pub fn is_mixed(&self) -> bool {
         let (Some(first), Some(last)) = (self.first, self.position) else { return false };
@@ -139,7 +142,8 @@ mod tests {
     #[test]
     fn a_change_without_an_entry_is_told_between_neighbours_only() {
         let mut reply = reply(11, 4, 215, 13);
-        // Input 2 is on all of a sudden in entry 12, and again in 14, which is the oldest of the ring.
+        // Input 2 is on all of a sudden in entry 12, and again in 14, which is the oldest of the
+        // ring.
         for (entry, state) in reply.entries.iter_mut().zip([0b01, 0b10, 0b11, 0b00]) {
             entry.changed = Inputs(0b01);
             entry.state = Inputs(state);

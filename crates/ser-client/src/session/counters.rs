@@ -1,4 +1,5 @@
-//! What a session has seen on the line.
+//! What a session has seen on the line. [`Diagnosis`](super::diagnosis::Diagnosis) makes a cause of
+//! it when an answer does not come.
 
 use ser_proto::FrameError;
 

@@ -1,4 +1,7 @@
-//! What the line looked like while an answer did not come.
+//! What the line looked like while an answer did not come, and what a person can do about it.
+//!
+//! The difference of two counts tells silence from a wrong rate, from noise, and from a recorder
+//! that talks of something else.
 
 use std::fmt;
 
@@ -9,7 +12,8 @@ use super::counters::Counters;
 /// Why there was no answer, as far as the bytes that did arrive can tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Diagnosis {
-    /// Not one byte arrived. A unit that is asked at the wrong baud rate hears garbage and is silent, too.
+    /// Not one byte arrived. A unit that is asked at the wrong baud rate hears garbage and is
+    /// silent, too.
     Silent,
     /// The unit is on the Genius bus and did not answer.
     SilentOnBus {
@@ -33,8 +37,9 @@ pub enum Diagnosis {
     },
     /// The unit did answer this command, with something that is no such message.
     NotUnderstood(ParseError),
-    /// The unit talks, with frames or lines of text, but does not answer this command. An original unit is silent on
-    /// the queries that this project added to the protocol, and on every command it refuses.
+    /// The unit talks, with frames or lines of text, but does not answer this command. An original
+    /// unit is silent on the queries that this project added to the protocol, and on every command
+    /// it refuses.
     Ignored {
         /// Frames with other contents.
         frames: u64,
@@ -44,8 +49,8 @@ pub enum Diagnosis {
 }
 
 impl Diagnosis {
-    /// Judges what was counted while the answer was awaited; `not_understood` is the last answer to the command that
-    /// made no sense, `unfinished` whether a frame had begun and never ended.
+    /// Judges what was counted while the answer was awaited; `not_understood` is the last answer to
+    /// the command that made no sense, `unfinished` whether a frame had begun and never ended.
     pub(crate) fn of(seen: &Counters, not_understood: Option<ParseError>, unfinished: bool) -> Diagnosis {
         if seen.bytes == 0 {
             return Diagnosis::Silent;
@@ -56,7 +61,8 @@ impl Diagnosis {
         if seen.frames > 0 || seen.lines > 0 {
             return Diagnosis::Ignored { frames: seen.frames, lines: seen.lines };
         }
-        // At a wrong rate an ESC may appear by chance, but hardly ever a length and a body of digits after it.
+        // At a wrong rate an ESC may appear by chance, but hardly ever a length and a body of
+        // digits after it.
         if seen.bad_checksums > 0 || unfinished {
             let frames = seen.bad_checksums + seen.broken_frames + u64::from(unfinished);
             return Diagnosis::Damaged { frames };

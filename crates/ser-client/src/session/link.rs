@@ -1,4 +1,7 @@
-//! What lies between a session and its unit: a line, or a Genius bus.
+//! What lies between a session and its recorder: a line, or a Genius bus.
+//!
+//! A [`Link`] carries the messages of a session and tells it the time. The one for serial ports and
+//! TCP is here; the one for a bus is in `genius`.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -9,7 +12,8 @@ use crate::transport::Transport;
 use crate::transport::clock::Clock;
 use crate::transport::transport_error::TransportError;
 
-/// How much is taken from a line in one go, at most: a peer that never stops must not keep us from asking.
+/// How much is taken from a line in one go, at most: a peer that never stops must not keep us from
+/// asking.
 const MAX_WAITING_BYTES: usize = 64 * 1024;
 
 /// Carries a session's messages.

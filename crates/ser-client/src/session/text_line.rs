@@ -1,4 +1,5 @@
-//! Lines of text between the frames: what a recorder prints.
+//! Lines of text between the frames: what a recorder prints. Lines are bounded, and bytes that have
+//! no place in text are counted and left out.
 
 /// The most characters of a line that are kept.
 pub const MAX_LINE_LEN: usize = 320;
@@ -10,8 +11,8 @@ pub struct TextLine {
     pub text: String,
     /// Whether the line was longer than [`MAX_LINE_LEN`] and the rest is missing.
     pub cut: bool,
-    /// How many bytes of the line have no place in text, among them the remains of broken frames. They are not in
-    /// `text`; a line that has some is damaged.
+    /// How many bytes of the line have no place in text, among them the remains of broken frames.
+    /// They are not in `text`; a line that has some is damaged.
     pub noise: u32,
 }
 

@@ -1,4 +1,7 @@
-//! What a recorder says without being asked.
+//! What a recorder says without being asked, in a queue of bounded length.
+//!
+//! The queue knows which messages came before the last answer: reports among them tell of a log that
+//! has changed since.
 
 use std::collections::VecDeque;
 
@@ -9,8 +12,9 @@ use super::text_line::TextLine;
 /// A message that answers no request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Unsolicited {
-    /// A read reply that nobody asked for: an auto report. In rare cases it is the late answer to a read that was
-    /// given up, so take the place of its entries from their numbers and the header, not from the order of arrival.
+    /// A read reply that nobody asked for: an auto report. In rare cases it is the late answer to a
+    /// read that was given up, so take the place of its entries from their numbers and the header,
+    /// not from the order of arrival.
     Report(ReadReply),
     /// A line of text: auto print, or an answer to a print command.
     Line(TextLine),

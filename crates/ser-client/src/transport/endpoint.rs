@@ -12,7 +12,8 @@ const GENI_PREFIX: &str = "geni:";
 const NODE: &str = "node";
 const OFFSET: &str = "offset";
 
-/// Where a unit is reached: `tcp://HOST:PORT`, `geni:FILE?node=N&offset=X`, or the path or name of a serial port.
+/// Where a unit is reached: `tcp://HOST:PORT`, `geni:FILE?node=N&offset=X`, or the path or name of
+/// a serial port.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Endpoint {
@@ -38,10 +39,11 @@ pub enum Endpoint {
 /// The window that a host shares with its GENI board: 16 KiB, in a file or in memory.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct GeniWindow {
-    /// A file that is the window, a device that gives access to memory, or a file that stands for memory.
+    /// A file that is the window, a device that gives access to memory, or a file that stands for
+    /// memory.
     pub file: String,
-    /// Where in the memory the window begins, in bytes. `None` for a file that is the window and nothing else; for a
-    /// device it is the same as 0.
+    /// Where in the memory the window begins, in bytes. `None` for a file that is the window and
+    /// nothing else; for a device it is the same as 0.
     pub offset: Option<u64>,
 }
 

@@ -28,7 +28,8 @@ pub enum GeniusError {
     BoardBusy,
     /// A datagram to a device did not get through, or was not answered.
     Undelivered(CommandError),
-    /// A broadcast did not get out. Nobody acknowledges one: it is this host's own board that could not send it.
+    /// A broadcast did not get out. Nobody acknowledges one: it is this host's own board that could
+    /// not send it.
     BroadcastFailed(CommandError),
     /// A device answers something that does not belong to the question.
     OddReply {
@@ -42,7 +43,8 @@ pub enum GeniusError {
 }
 
 impl GeniusError {
-    /// Whether this may pass while one waits: the driver starts its board again and again, and devices come back.
+    /// Whether this may pass while one waits: the driver starts its board again and again, and
+    /// devices come back.
     #[must_use]
     pub const fn may_pass(&self) -> bool {
         match self {

@@ -19,7 +19,8 @@ use std::time::Duration;
 
 /// A line to a unit, blocking.
 pub trait Transport: Send {
-    /// Waits up to `timeout` for bytes and takes those that are there. 0 means that none came in time.
+    /// Waits up to `timeout` for bytes and takes those that are there. 0 means that none came in
+    /// time.
     ///
     /// # Errors
     /// A line that has ended is an error, never 0: `NotConnected` for a device that was unplugged,
@@ -43,8 +44,8 @@ pub trait Transport: Send {
     fn bits_per_second(&self) -> Option<u32>;
 }
 
-/// What a blocking read came to: none in time is no error here, and the end of the line, of which `read` makes no
-/// error, is one of kind `ended`.
+/// What a blocking read came to: none in time is no error here, and the end of the line, of which
+/// `read` makes no error, is one of kind `ended`.
 fn bytes_read(read: io::Result<usize>, wanted: usize, ended: ErrorKind) -> io::Result<usize> {
     match read {
         Ok(0) if wanted > 0 => Err(ended.into()),

@@ -139,8 +139,8 @@ impl OpenError {
                 "name a device for memory, and check the offset of the window in it"
             }
             OpenError::WindowDenied { .. } => "ask for the right to read and write it",
-            // A file of this name is how a system shows the memory of a PCI device; others are written to at one's
-            // peril.
+            // A file of this name is how a system shows the memory of a PCI device; others are
+            // written to at one's peril.
             OpenError::WindowSize { path, .. } if file_name(path).starts_with("resource") => {
                 "a GENI window has 16384 bytes: add where in this memory it begins, as in offset=0"
             }

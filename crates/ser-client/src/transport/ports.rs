@@ -17,8 +17,8 @@ pub struct PortInfo {
 
 /// Lists the serial ports, sorted by path.
 ///
-/// On Linux the kernel's list of terminals is read. Not in it are pseudo-terminals (a simulated unit) and links such
-/// as `/dev/serial/by-id/…`; both can be opened by their path all the same.
+/// On Linux the kernel's list of terminals is read. Not in it are pseudo-terminals (a simulated
+/// unit) and links such as `/dev/serial/by-id/…`; both can be opened by their path all the same.
 #[must_use]
 pub fn ports() -> Vec<PortInfo> {
     // serialport panics where the kernel's list is missing, as in some containers.

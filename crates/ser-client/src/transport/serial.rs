@@ -1,7 +1,8 @@
 //! A serial port: RS-232 itself, a USB adapter, or a pseudo-terminal.
 //!
-//! The port is opened for this program alone where the system can do that, with 8 data bits, no parity, one stop bit
-//! and no flow control. What arrived before is left in the buffer: it may be lines that the unit printed.
+//! The port is opened for this program alone where the system can do that, with 8 data bits, no
+//! parity, one stop bit and no flow control. What arrived before is left in the buffer: it may be
+//! lines that the unit printed.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::Path;
@@ -13,7 +14,8 @@ use super::open_error::OpenError;
 use super::ports::ports;
 use super::{Transport, bytes_read};
 
-/// Far longer than the kernel needs to take one frame at 300 baud, so only a stuck port runs into it.
+/// Far longer than the kernel needs to take one frame at 300 baud, so only a stuck port runs into
+/// it.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// An open serial port.

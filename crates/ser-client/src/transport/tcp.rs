@@ -77,7 +77,8 @@ fn why_not_connected(address: &str, error: io::Error) -> OpenError {
 
 impl Transport for TcpTransport {
     fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
-        // A socket takes a timeout of zero for none at all, and may round a small one up to several milliseconds.
+        // A socket takes a timeout of zero for none at all, and may round a small one up to several
+        // milliseconds.
         self.stream.set_nonblocking(timeout.is_zero())?;
         if !timeout.is_zero() {
             self.stream.set_read_timeout(Some(timeout.max(Duration::from_millis(1))))?;

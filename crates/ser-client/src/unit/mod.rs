@@ -1,4 +1,7 @@
-//! A unit behind a line: blocking calls, one per thing that a recorder can do.
+//! A recorder behind a line or on a bus: blocking calls, one per thing that it can do.
+//!
+//! A [`Unit`] drives a session over a link: it sends what is due, waits for what arrives, and makes
+//! an error of an answer that does not come. How it is opened is in `open`.
 
 mod open;
 pub(crate) mod request_error;
@@ -25,10 +28,12 @@ use crate::transport::clock::{Clock, RealTime};
 use crate::transport::line_rate::LineRate;
 use request_error::RequestError;
 
-/// A unit changes its rate when the reply is out; what arrives in that moment it would not understand.
+/// A unit changes its rate when the reply is out; what arrives in that moment it would not
+/// understand.
 const BAUD_SETTLING: Duration = Duration::from_millis(20);
 
-/// How long a unit may take to answer when its rate is looked for, on top of the time that the bytes are on the line.
+/// How long a unit may take to answer when its rate is looked for, on top of the time that the
+/// bytes are on the line.
 const SEARCH_TIMEOUT: Duration = Duration::from_millis(250);
 
 /// A unit at the other end of a line.
@@ -55,14 +60,15 @@ impl Unit {
         Unit { link: Box::new(SerialLink::new(transport, clock)), session, last_position: None }
     }
 
-    /// This host's number on the Genius bus, if that is where the unit is: auto reports can be sent there.
+    /// This host's number on the Genius bus, if that is where the unit is: auto reports can be sent
+    /// there.
     #[must_use]
     pub fn bus_address(&self) -> Option<u8> {
         self.link.bus_address()
     }
 
-    /// Sends a command and waits for the reply. A [`Command::SetClock`] is sent once, with the time that it has:
-    /// [`set_clock`](Self::set_clock) is more exact.
+    /// Sends a command and waits for the reply. A [`Command::SetClock`] is sent once, with the time
+    /// that it has: [`set_clock`](Self::set_clock) is more exact.
     ///
     /// # Errors
     /// If no reply comes or the line fails.
@@ -106,11 +112,12 @@ impl Unit {
         }
     }
 
-    /// Changes the settings and returns those in force. A new baud rate is followed on this side as soon as the
-    /// reply is there; the command is then sent only once.
+    /// Changes the settings and returns those in force. A new baud rate is followed on this side as
+    /// soon as the reply is there; the command is then sent only once.
     ///
     /// # Errors
-    /// If no reply comes, the unit refuses the settings, or the line fails or does not have the new rate.
+    /// If no reply comes, the unit refuses the settings, or the line fails or does not have the new
+    /// rate.
     pub fn configure(&mut self, configure: Configure) -> Result<Configuration, RequestError> {
         let Reply::Configuration(in_force) = self.request(&Command::Configure(configure))? else {
             return Err(unexpected(Code::Configure));
@@ -129,8 +136,9 @@ impl Unit {
         }
     }
 
-    /// Sets the clock. `time_at` is asked for the time that it will be after a delay: the one at which the last byte
-    /// arrives at the unit. It is asked again for each attempt. Returns the time that was set last.
+    /// Sets the clock. `time_at` is asked for the time that it will be after a delay: the one at
+    /// which the last byte arrives at the unit. It is asked again for each attempt. Returns the
+    /// time that was set last.
     ///
     /// # Errors
     /// If there is no such time, no reply comes or the line fails.
@@ -169,8 +177,8 @@ impl Unit {
         }
     }
 
-    /// Has entries printed. The lines come through [`wait_event`](Self::wait_event); those that came before the
-    /// unit's reply are dropped. Sent once.
+    /// Has entries printed. The lines come through [`wait_event`](Self::wait_event); those that
+    /// came before the unit's reply are dropped. Sent once.
     ///
     /// # Errors
     /// If no reply comes or the line fails.
@@ -204,9 +212,9 @@ impl Unit {
         Ok(reader.delivered())
     }
 
-    /// Waits for the next message that answers no request: an auto report or a line of text. Those that came during
-    /// requests come first, except that a reading by cursor takes the place of all reports before it. `None` when
-    /// nothing comes in time.
+    /// Waits for the next message that answers no request: an auto report or a line of text. Those
+    /// that came during requests come first, except that a reading by cursor takes the place of all
+    /// reports before it. `None` when nothing comes in time.
     ///
     /// # Errors
     /// If the line fails.
@@ -233,8 +241,9 @@ impl Unit {
         Ok(())
     }
 
-    /// Looks for a unit that does not answer: asks once at every other rate. `None` if it answers at none of them, or
-    /// the line has no rate. Takes six seconds at most, unless the line is noisy. Afterwards the rate is what it was.
+    /// Looks for a unit that does not answer: asks once at every other rate. `None` if it answers
+    /// at none of them, or the line has no rate. Takes six seconds at most, unless the line is
+    /// noisy. Afterwards the rate is what it was.
     ///
     /// # Errors
     /// If the line fails.
@@ -258,8 +267,8 @@ impl Unit {
                 continue;
             }
             let line_rate = LineRate::BitsPerSecond(baud.bits_per_second());
-            // A session also waits for the longest message that the unit may just be sending; at 300 baud that is too
-            // long for a guess.
+            // A session also waits for the longest message that the unit may just be sending; at
+            // 300 baud that is too long for a guess.
             self.session.set_line_rate(LineRate::Instant);
             self.session.set_patience(SEARCH_TIMEOUT + line_rate.time_for(bytes), 0);
             match self.request(&question) {
@@ -271,7 +280,8 @@ impl Unit {
         Ok(None)
     }
 
-    /// Reckons with a line of this speed behind the transport, as behind a terminal server, which does not tell.
+    /// Reckons with a line of this speed behind the transport, as behind a terminal server, which
+    /// does not tell.
     pub fn set_line_rate(&mut self, line_rate: LineRate) {
         self.session.set_line_rate(line_rate);
     }
@@ -288,7 +298,8 @@ impl Unit {
         self.session.counters()
     }
 
-    /// How many reports and lines were dropped because [`wait_event`](Self::wait_event) did not take them in time.
+    /// How many reports and lines were dropped because [`wait_event`](Self::wait_event) did not
+    /// take them in time.
     #[must_use]
     pub fn unsolicited_dropped(&self) -> u64 {
         self.session.unsolicited_dropped()
@@ -299,14 +310,16 @@ impl Unit {
         self.session.forget_earlier_reports();
     }
 
-    /// Whether reads go one at a time, because the unit does not take a request while it answers another one, or is
-    /// on a Genius bus. Otherwise there are two under way, and the line is never silent.
+    /// Whether reads go one at a time, because the unit does not take a request while it answers
+    /// another one, or is on a Genius bus. Otherwise there are two under way, and the line is never
+    /// silent.
     #[must_use]
     pub fn reads_one_at_a_time(&self) -> bool {
         self.session.is_one_at_a_time()
     }
 
-    /// Asks for what `next` gives, as far as there is room for more reads under way, and does not wait.
+    /// Asks for what `next` gives, as far as there is room for more reads under way, and does not
+    /// wait.
     pub(crate) fn ask(&mut self, next: &mut dyn FnMut() -> Option<ReadRequest>) -> Result<(), RequestError> {
         if !self.session.has_room() {
             return Ok(());
@@ -343,8 +356,8 @@ impl Unit {
         }
     }
 
-    /// Takes what arrived before the request: it answers nothing that is asked from now on. A request that an error
-    /// of the line has cut short is forgotten.
+    /// Takes what arrived before the request: it answers nothing that is asked from now on. A
+    /// request that an error of the line has cut short is forgotten.
     fn prepare(&mut self) -> Result<(), RequestError> {
         self.session.cancel(self.now());
         Ok(self.link.receive_waiting(&mut self.session)?)

@@ -21,7 +21,8 @@ pub enum RequestError {
         attempts: u32,
         /// What the line looked like.
         diagnosis: Diagnosis,
-        /// Whether the command, if it did arrive, has changed something: an erase may or may not have been done.
+        /// Whether the command, if it did arrive, has changed something: an erase may or may not
+        /// have been done.
         may_have_been_done: bool,
     },
     /// The unit did not take the settings; these are in force.

@@ -167,7 +167,8 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    /// Over a line of which the client does not know the rate: what is not answered is given up soon.
+    /// Over a line of which the client does not know the rate: what is not answered is given up
+    /// soon.
     pub(crate) fn new(size: u16) -> Bench {
         Bench::with(size, false)
     }
