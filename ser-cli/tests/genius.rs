@@ -315,7 +315,7 @@ fn each_mistake_has_a_message_of_its_own() {
         (format!("geni:{folder}/silent?node=5"), 1, "the GENI board is silent (no heartbeat)"),
         (format!("geni:{host}?node=7"), 1, "device 7 is not on the bus"),
         (format!("geni:{host}?node=31"), 1, "31 is the number of this host's own board"),
-        (format!("geni:{host}?node=32"), 2, "a recorder's number on the bus is 0 to 31"),
+        (format!("geni:{host}?node=32"), 2, "a recorder's bus address is 0 to 31"),
         (format!("geni:{host}?node=5&offset=1"), 1, "has 16384 bytes and cannot be a GENI window"),
         (format!("geni:{host}?node=5&offset=x"), 2, "an offset is a number of bytes"),
         (format!("geni:{host}?node=5&node=6"), 2, "each once"),

@@ -1,62 +1,62 @@
-//! A host's conversation with a sequential event recorder: commands and their answers, told apart from what the
-//! recorder says by itself, and a log that is read by cursor, so that every event arrives once and in order.
+//! A host's conversation with a sequential event recorder: commands and their answers, told apart
+//! from what the recorder says by itself, and a log that is read by cursor, so that every event
+//! arrives once and in order.
 //!
-//! Most programs want [`open`] and [`Unit`]: blocking calls over a serial port or TCP. Underneath, [`Session`]
-//! (requests and their answers) and [`LogReader`] (which entries to read next) know neither clock nor port; they can
-//! be driven by any event loop, and by tests without waiting.
+//! Most programs want [`open`] and [`Unit`]: blocking calls over a serial port or TCP. Underneath,
+//! [`Session`] (requests and their answers) and [`LogReader`] (which entries to read next) know
+//! neither clock nor port. Any event loop can drive them, and tests can without waiting.
 //!
-//! On a Genius bus a unit is reached through the window that a host shares with its GENI board; [`GeniHost`] also knows
-//! who else is on the bus, and speaks to all of them.
+//! On a Genius bus a recorder is reached through the window that a host shares with its GENI board.
+//! [`GeniHost`] also knows who else is on the bus, and speaks to all of them.
+//!
+//! # The folders
+//!
+//! Each needs only those before it: `transport` knows this computer and its ports, `reading` the
+//! log, `session` the conversation, `genius` the bus, `unit` makes blocking calls of them, and
+//! `following` reads again and again.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
 )]
 
-mod clock;
-mod counters;
-mod cursor;
-mod diagnosis;
-mod endpoint;
-mod follower;
+mod following;
 mod genius;
-mod line_rate;
-mod link;
-mod log_position;
-mod open;
-mod ports;
-mod range_reader;
-pub mod reader;
-mod request_error;
-mod serial;
+mod reading;
 pub mod session;
-mod tcp;
-mod text_line;
 mod transport;
 mod unit;
-mod unsolicited;
-pub mod watcher;
 
-pub use clock::{Clock, RealTime};
-pub use counters::Counters;
-pub use cursor::{Cursor, Delivery, Lost};
-pub use diagnosis::Diagnosis;
-pub use endpoint::{Endpoint, EndpointError, GeniWindow};
-pub use follower::{LogFollower, Step};
-pub use genius::{BlockKind, BoardStatus, DeviceRecord, GeniusError};
+pub use following::follower::{LogFollower, Step};
+pub use following::watcher::{self, LogWatcher, ReportSwitch};
+pub use geni_board::{BlockKind, Device as DeviceRecord, Status as BoardStatus};
 #[cfg(unix)]
-pub use genius::{BusDevice, BusRecorders, GeniHost, Recognition};
-pub use line_rate::LineRate;
-pub use log_position::LogPosition;
-pub use open::{OpenError, open};
-pub use ports::{PortInfo, ports};
-pub use range_reader::RangeReader;
-pub use reader::{Disturbed, LogReader, ReadRequest, Summary};
-pub use request_error::RequestError;
-pub use serial::SerialTransport;
+pub use genius::host::{BusDevice, GeniHost};
+#[cfg(unix)]
+pub use genius::recognition::{BusRecorders, Recognition};
+pub use reading::cursor::Cursor;
+pub use reading::delivery::{Delivery, Lost};
+pub use reading::disturbed::Disturbed;
+pub use reading::log_position::LogPosition;
+pub use reading::range_reader::RangeReader;
+pub use reading::read_request::ReadRequest;
+pub use reading::reader::{self, LogReader};
+pub use reading::summary::Summary;
+pub use session::counters::Counters;
+pub use session::diagnosis::Diagnosis;
+pub use session::options::Options;
+pub use session::text_line::{LineAssembler, MAX_LINE_LEN, TextLine};
+pub use session::unsolicited::Unsolicited;
 pub use session::{Attempt, Busy, NoReply, Session, Timing};
-pub use tcp::TcpTransport;
-pub use text_line::{LineAssembler, MAX_LINE_LEN, TextLine};
-pub use transport::{Transport, TransportError};
-pub use unit::{Options, Unit};
-pub use unsolicited::Unsolicited;
-pub use watcher::{LogWatcher, ReportSwitch};
+pub use transport::Transport;
+pub use transport::clock::{Clock, RealTime};
+pub use transport::endpoint::{Endpoint, EndpointError, GeniWindow};
+pub use transport::genius_error::GeniusError;
+pub use transport::line_rate::LineRate;
+pub use transport::open::open;
+pub use transport::open_error::OpenError;
+pub use transport::ports::{PortInfo, ports};
+pub use transport::serial::SerialTransport;
+pub use transport::tcp::TcpTransport;
+pub use transport::transport_error::TransportError;
+pub use unit::Unit;
+pub use unit::request_error::RequestError;

@@ -9,7 +9,8 @@ use proptest::prelude::*;
 use ser_client::{Cursor, Delivery, Disturbed, LogReader, Lost, Summary};
 use ser_proto::Inputs;
 
-/// A host that keeps its cursor from reading to reading, and a judge that knows what really happened.
+/// A host that keeps its cursor from reading to reading, and a judge that knows what really
+/// happened.
 struct Host {
     cursor: Option<Cursor>,
     /// Serial number of the event that has to come next; not known before the first.
@@ -18,7 +19,8 @@ struct Host {
     rate: u32,
     /// Requests under way, at most.
     window: usize,
-    /// Which replies are lost, the first of them first, over and over; their requests are asked again.
+    /// Which replies are lost, the first of them first, over and over; their requests are asked
+    /// again.
     lost: Vec<bool>,
     /// Whether readings go on until they have caught up.
     keeps_up: bool,
@@ -115,8 +117,8 @@ impl Host {
         }
     }
 
-    /// Checks what was told against what happened. `first_of_life` is the serial of the first event after the latest
-    /// erase.
+    /// Checks what was told against what happened. `first_of_life` is the serial of the first event
+    /// after the latest erase.
     fn judge(&mut self, told: &[Told], first_of_life: u32) {
         for &told in told {
             match told {
@@ -134,8 +136,8 @@ impl Host {
     }
 }
 
-/// Sequences go on from the last one, a loss takes as many as were lost, and they are the recorder's own totals, except
-/// for a multiple of 65536.
+/// Sequences go on from the last one, a loss takes as many as were lost, and they are the
+/// recorder's own totals, except for a multiple of 65536.
 fn check_sequence(delivery: Delivery, last: &mut Option<u64>, recorder: &Recorder) {
     match delivery {
         Delivery::Event { sequence, entry, .. } => {
@@ -347,8 +349,9 @@ fn a_download_takes_few_requests_more_than_there_are_full_replies() {
         let mut requests = 0;
         let mut host = Host { window, ..Host::new() };
         host.read(&mut recorder, |_| requests += 1);
-        // Position, whether the log is full (before the first entries and after them), ten entries at a time, once
-        // around the end of the ring, and every tenth reply or so an entry to look at.
+        // Position, whether the log is full (before the first entries and after them), ten entries
+        // at a time, once around the end of the ring, and every tenth reply or so an entry to look
+        // at.
         assert!((3 + 205 + 1..=3 + 205 + 1 + 3).contains(&requests), "{requests}");
     }
 }
@@ -442,7 +445,8 @@ fn what_was_read_ahead_of_a_log_that_is_gone_is_not_delivered() {
         });
         assert_eq!(taken, Ok(()));
         if reply == 2 {
-            // Full again, with a larger total: it looks as if events had come faster than they can be read.
+            // Full again, with a larger total: it looks as if events had come faster than they can
+            // be read.
             recorder.erase();
             recorder.append_many(400);
         }
@@ -489,7 +493,8 @@ fn a_log_that_was_empty_tells_what_a_resize_that_nobody_told_of_has_thrown_away(
         recorder.append_many(new_events / 2);
         recorder.resize(actual);
         recorder.append_many(new_events.div_ceil(2));
-        // The host goes by the size that it knows, and asks for it when that does not go together with the replies.
+        // The host goes by the size that it knows, and asks for it when that does not go together
+        // with the replies.
         let mut all = Vec::new();
         let mut reader = LogReader::new(host.cursor, 35);
         if host.read_with(&mut reader, &mut recorder, &mut |_| {}, &mut all).is_err() {
@@ -644,8 +649,8 @@ fn any_change() -> impl Strategy<Value = Change> {
     ]
 }
 
-/// Lets something happen that a host is able to notice; see "what cannot be known" in the reader's documentation.
-/// Returns how many events may follow before the next reply.
+/// Lets something happen that a host is able to notice; see "what cannot be known" in the reader's
+/// documentation. Returns how many events may follow before the next reply.
 fn change(recorder: &mut Recorder, change: Change) -> usize {
     match change {
         Change::Erase if recorder.count() < 60_000 => {
@@ -654,7 +659,8 @@ fn change(recorder: &mut Recorder, change: Change) -> usize {
             recorder.erase();
             followers
         }
-        // A total that has wrapped and happens to be what the ring holds looks as if nothing had been thrown away.
+        // A total that has wrapped and happens to be what the ring holds looks as if nothing had
+        // been thrown away.
         Change::Resize(size) if recorder.count() < 65_536 || size <= recorder.size => {
             recorder.resize(size);
             usize::MAX
@@ -666,7 +672,8 @@ fn change(recorder: &mut Recorder, change: Change) -> usize {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Nothing happens during the readings: what is lost is exactly what the recorder does not hold any more.
+    /// Nothing happens during the readings: what is lost is exactly what the recorder does not hold
+    /// any more.
     #[test]
     fn each_event_once_and_every_loss_counted(
         size in any_size(),
@@ -711,7 +718,8 @@ proptest! {
         }
     }
 
-    /// Events happen during the readings, up to so many that the ring turns over: order and count still hold.
+    /// Events happen during the readings, up to so many that the ring turns over: order and count
+    /// still hold.
     #[test]
     fn events_during_the_reading_are_delivered_or_counted(
         size in any_size(),
@@ -786,8 +794,8 @@ proptest! {
         prop_assert_eq!(host.expected, Some(next_serial), "{:?}", told);
     }
 
-    /// The total has wrapped, and after an erase so many events follow at once that neither it nor the next slot
-    /// shows it. The entries do.
+    /// The total has wrapped, and after an erase so many events follow at once that neither it nor
+    /// the next slot shows it. The entries do.
     #[test]
     fn an_erase_that_no_header_shows_is_noticed(
         size in prop_oneof![Just(64_usize), Just(256), Just(2048)],
@@ -823,7 +831,7 @@ proptest! {
         prop_assert_eq!(host.expected, Some(last + 1 + followers), "{:?}", told);
     }
 
-    /// Whatever a broken unit sends, reading neither panics nor goes on for ever.
+    /// Whatever a broken recorder sends, reading neither panics nor goes on for ever.
     #[test]
     fn no_reply_can_break_the_reader(
         size in any::<u16>(),

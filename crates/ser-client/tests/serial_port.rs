@@ -20,7 +20,7 @@ use serialport::{SerialPort, TTYPort};
 /// Far more than anything here takes, on the busiest machine.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// The unit's end of a pseudo-terminal, and the name of the client's end.
+/// The recorder's end of a pseudo-terminal, and the name of the client's end.
 fn pair() -> (TTYPort, String) {
     let (unit, client) = TTYPort::pair().unwrap();
     let path = client.name().unwrap();
@@ -38,7 +38,7 @@ fn read_at_least(transport: &mut dyn Transport, count: usize) -> Vec<u8> {
     all
 }
 
-/// A unit that answers reads, in a thread, until it is dropped.
+/// A recorder that answers reads, in a thread, until it is dropped.
 struct Answering {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,

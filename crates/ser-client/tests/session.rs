@@ -66,7 +66,7 @@ fn a_body_without_a_frame_is_a_message_like_any_other() {
     let mut session = session(0);
     session.request(Command::Read { start: 1, count: 10 }).unwrap();
     assert_eq!(session.dispatch(ms(0)).unwrap().command(), &Command::Read { start: 1, count: 10 });
-    // Over a Genius bus a unit with 32 inputs brings seven entries where ten were asked for.
+    // Over a Genius bus a recorder with 32 inputs brings seven entries where ten were asked for.
     let (report, reply) = (read_reply(5, 2), read_reply(1, 7));
     session.process_body(ms(1), &Reply::Read(report.clone()).to_body());
     session.process_body(ms(1), b"R");
@@ -411,7 +411,7 @@ fn answered(session: &mut Session) -> Option<u16> {
     }
 }
 
-/// A session with a unit that has taken many requests while it answered others.
+/// A session with a recorder that has taken many requests while it answered others.
 fn proven(retries: u32) -> Session {
     let mut session = session(retries);
     session.request(read(20)).unwrap();
@@ -583,7 +583,7 @@ fn one_loss_in_five_is_too_many_for_two_at_once() {
         }
         now += 2000;
     }
-    // It was the line: the unit has shown that it takes two.
+    // It was the line: the recorder has shown that it takes two.
     now += 2000;
     for answers in 1.. {
         session.request(read(1)).unwrap();
@@ -628,7 +628,8 @@ fn what_is_under_way_is_forgotten_together() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever arrives in whatever pieces, the session stays usable, and cutting does not change the outcome.
+    /// Whatever arrives in whatever pieces, the session stays usable, and cutting does not change
+    /// the outcome.
     #[test]
     fn any_bytes_in_any_pieces(
         noise in prop::collection::vec(prop_oneof![Just(0x1B), b'0'..=b'9', any::<u8>()], 0..300),

@@ -55,7 +55,7 @@ fn settings_are_checked_against_what_is_in_force() {
         bench.unit.configure(Configure { size: Some(50), auto_print: true, ..keep_everything() }).unwrap();
     assert_eq!((in_force.size, in_force.auto_print, in_force.baud), (50, true, Baud::B19200));
     assert_eq!(bench.fake().recorder.size, 50);
-    // A unit that finds a field out of range changes nothing and answers with what it has.
+    // A recorder that finds a field out of range changes nothing and answers with what it has.
     let result = bench.unit.configure(Configure { size: Some(2049), ..keep_everything() });
     assert!(matches!(result, Err(RequestError::Refused { in_force: old }) if old == in_force), "{result:?}");
 }

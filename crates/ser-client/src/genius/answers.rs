@@ -1,4 +1,5 @@
-//! What devices on a bus have answered to the question that only recorders answer.
+//! What devices on a bus have answered to the question that only recorders answer. An answer holds
+//! until the device logs in or out.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +10,7 @@ use super::inboxes::Inboxes;
 /// What devices have answered, each since it logged in.
 #[derive(Debug, Default)]
 pub(super) struct Answers {
-    /// By device number; `false` for one that was asked and said nothing.
+    /// By bus address; `false` for one that was asked and said nothing.
     is_recorder: BTreeMap<u8, bool>,
 }
 

@@ -1,4 +1,8 @@
 //! The host's side of a GENI board: who is on the bus, what they say, and what is said to them.
+//!
+//! [`GeniHost`] is a handle that can be cloned. Behind it, `Host` owns the driver of the board. The
+//! driver never waits, so `Host` looks at the board until what it waits for has happened, and sorts
+//! what arrives meanwhile: messages into the inbox of their sender, log-ins into the list of devices.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,12 +19,13 @@ use ser_proto::genius::{
     Datagram, FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, IoForces, Message, SUBFUNCTION_SER, Subfunction,
 };
 
-use super::GeniusError;
 use super::answers::Answers;
 use super::inboxes::Inboxes;
 use super::window::Window;
-use crate::{Clock, RealTime};
-use crate::{GeniWindow, OpenError, Unit};
+use crate::transport::clock::{Clock, RealTime};
+use crate::transport::endpoint::GeniWindow;
+use crate::transport::genius_error::GeniusError;
+use crate::transport::open_error::OpenError;
 
 /// Nothing tells when a file has changed, so it is looked at this often.
 pub(super) const PACE: Duration = Duration::from_millis(1);
@@ -32,7 +37,8 @@ const EVENTS_PER_LOOK: usize = 16;
 /// recorder's board raises its flag as soon as it is there. Measured with the models of both.
 const HANDOVER: Duration = Duration::from_millis(2);
 
-/// A board has its heartbeat five times a second. One that runs in the time of a busy computer gets longer.
+/// A board has its heartbeat five times a second. One that runs in the time of a busy computer gets
+/// longer.
 const HEARTBEAT_PATIENCE: Duration = Duration::from_secs(3);
 
 /// From the heartbeat to the bus, at least: the board starts up, or has just been configured.
@@ -58,7 +64,7 @@ pub struct BusDevice {
     pub inputs: Vec<u8>,
 }
 
-/// A host on a Genius bus. Clones are the same host; each can be in another [`Unit`].
+/// A host on a Genius bus. Clones are the same host; each can be in another [`Unit`](crate::Unit).
 #[derive(Clone)]
 pub struct GeniHost {
     shared: Arc<Mutex<Host>>,
@@ -66,8 +72,9 @@ pub struct GeniHost {
 }
 
 impl GeniHost {
-    /// Opens a window, and waits until the board in it is on the bus. `patience` is how long the board may stand still;
-    /// it gets at least three seconds. What recorders have sent while nobody had the window open is thrown away.
+    /// Opens a window, and waits until the board in it is on the bus. `patience` is how long the
+    /// board may stand still; it gets at least three seconds. What recorders have sent while nobody
+    /// had the window open is thrown away.
     ///
     /// # Errors
     /// When there is no such window, or the board does not come onto the bus.
@@ -139,12 +146,6 @@ impl GeniHost {
         Ok(GeniHost { shared: Arc::new(Mutex::new(host)), clock })
     }
 
-    /// A recorder on the bus.
-    #[must_use]
-    pub fn unit(&self, node: u8, options: crate::Options) -> Unit {
-        Unit::on_genius(self.clone(), node, options)
-    }
-
     /// The host's own number.
     #[must_use]
     pub fn number(&self) -> u8 {
@@ -177,8 +178,9 @@ impl GeniHost {
         self.lock().find(node)
     }
 
-    /// All devices that are logged in, and what their inputs are in one and the same bus scan. While devices come and
-    /// go, as when the bus has just been started, this waits until that is over, two seconds at most.
+    /// All devices that are logged in, and what their inputs are in one and the same bus scan.
+    /// While devices come and go, as when the bus has just been started, this waits until that is
+    /// over, two seconds at most.
     ///
     /// # Errors
     /// When the board fails.
@@ -186,7 +188,8 @@ impl GeniHost {
         self.lock().devices()
     }
 
-    /// Says a command to all recorders. It is carried out and not answered; each of them remembers its last broadcast.
+    /// Says a command to all recorders. It is carried out and not answered; each of them remembers
+    /// its last broadcast.
     ///
     /// # Errors
     /// When it does not get out.
@@ -205,15 +208,16 @@ impl GeniHost {
         self.lock().read_forces(node, table)
     }
 
-    /// How long a short datagram that is sent now takes to arrive, on the average. The host's next turn is half a scan
-    /// away. A busy bus takes longer, as all devices together send one datagram per scan.
+    /// How long a short datagram that is sent now takes to arrive, on the average. The host's next
+    /// turn is half a scan away. A busy bus takes longer, as all devices together send one datagram
+    /// per scan.
     #[must_use]
     pub fn delay(&self) -> Duration {
         PACE + self.scan_time().unwrap_or_default() / 2 + HANDOVER
     }
 
-    /// Datagrams that were no message of a recorder to this host, and messages that nobody took in time. Among the
-    /// latter are those that were there before this host.
+    /// Datagrams that were no message of a recorder to this host, and messages that nobody took in
+    /// time. Among the latter are those that were there before this host.
     #[must_use]
     pub fn lost(&self) -> (u64, u64) {
         self.lock().inboxes.lost()
@@ -231,7 +235,8 @@ impl GeniHost {
         matches!(self.lock().sent, Some(Err(_)))
     }
 
-    /// What a recorder has sent before now. The board holds some of it back until it is asked, so a look will not do.
+    /// What a recorder has sent before now. The board holds some of it back until it is asked, so a
+    /// look will not do.
     pub(crate) fn take_waiting(&self, node: u8) -> Result<Vec<ReceivedDatagram>, GeniusError> {
         let mut host = self.lock();
         host.empty_receive_queue()?;
@@ -270,8 +275,9 @@ impl fmt::Debug for GeniHost {
     }
 }
 
-/// A message in a datagram whose acknowledgement is waited for. The reply comes as a datagram of its own: a board that
-/// is told to wait for it does nothing else meanwhile, and would take an auto report for it.
+/// A message in a datagram whose acknowledgement is waited for. The reply comes as a datagram of
+/// its own: a board that is told to wait for it does nothing else meanwhile, and would take an auto
+/// report for it.
 pub(super) fn ser_message(destination: Destination, command: &Command) -> Result<Transmission, GeniusError> {
     let data = Data::from_slice(&command.to_body());
     Ok(Transmission {
@@ -320,7 +326,8 @@ impl Host {
     fn new(ram: Window, clock: Arc<dyn Clock>, patience: Duration) -> Host {
         // A board that is starting up has anything in its tables; this flag has no such value then.
         let is_set_up = ram.read(map::STATUS_OK) <= 1;
-        // The board serves other programs as well, one after the other: it stays as it is configured.
+        // The board serves other programs as well, one after the other: it stays as it is
+        // configured.
         let configuration = Configuration::new(
             ram.read_word(map::SETUP_REFERENCE),
             ram.read(map::SETUP_BROADCAST_LEN),
@@ -370,8 +377,8 @@ impl Host {
         }
     }
 
-    /// The same for the first time. Auto reports may have come while no program ran, and the recorder's log may have
-    /// become another one since: they are neither news nor answers.
+    /// The same for the first time. Auto reports may have come while no program ran, and the
+    /// recorder's log may have become another one since: they are neither news nor answers.
     fn begin(&mut self) -> Result<(), GeniusError> {
         self.start()?;
         self.empty_receive_queue()?;
@@ -389,7 +396,8 @@ impl Host {
         }
     }
 
-    /// The driver takes the patience once for the datagram before, once for this one, and knows within it.
+    /// The driver takes the patience once for the datagram before, once for this one, and knows
+    /// within it.
     fn datagram_patience(&self) -> Duration {
         DATAGRAM_PATIENCE.max(self.patience.saturating_mul(2))
     }

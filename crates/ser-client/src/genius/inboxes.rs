@@ -17,8 +17,8 @@ pub(super) struct Inboxes {
 }
 
 impl Inboxes {
-    /// Keeps a message that a recorder has sent to this host. What is said to all, or is no message of a recorder,
-    /// answers nobody here.
+    /// Keeps a message that a recorder has sent to this host. What is said to all, or is no message
+    /// of a recorder, answers nobody here.
     pub(super) fn put(&mut self, received: ReceivedDatagram) {
         let of_recorder = (received.function, received.subfunction) == (FUNCTION_HORNER, SUBFUNCTION_SER);
         if received.broadcast || !of_recorder {

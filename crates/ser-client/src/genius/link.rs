@@ -1,12 +1,14 @@
-//! A session's messages in datagrams.
+//! A session's messages in datagrams: the link to one recorder on the bus.
 
 use std::time::Duration;
 
 use geni_board::ReceivedDatagram;
 
-use super::GeniHost;
-use crate::link::Link;
-use crate::{Attempt, Diagnosis, Session, TransportError};
+use super::host::GeniHost;
+use crate::session::diagnosis::Diagnosis;
+use crate::session::link::Link;
+use crate::session::{Attempt, Session};
+use crate::transport::transport_error::TransportError;
 
 /// The way to one recorder on the bus.
 pub(crate) struct GeniusLink {

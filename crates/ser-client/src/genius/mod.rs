@@ -1,25 +1,20 @@
 //! A host on a Genius bus, through the window that it shares with its GENI board.
+//!
+//! `host` owns the driver of the board and knows who is on the bus; `link` carries the messages of
+//! one session in datagrams. A window may be a file that was named by mistake, so `put_back`
+//! restores what was written to it unless a board answers there.
 
-mod answers;
-mod error;
 #[cfg(unix)]
-mod host;
+mod answers;
+#[cfg(unix)]
+pub(crate) mod host;
 #[cfg(unix)]
 mod inboxes;
 #[cfg(unix)]
-mod link;
+pub(crate) mod link;
 #[cfg(unix)]
 mod put_back;
 #[cfg(unix)]
-mod recognition;
+pub(crate) mod recognition;
 #[cfg(unix)]
 mod window;
-
-pub use error::GeniusError;
-pub use geni_board::{BlockKind, Device as DeviceRecord, Status as BoardStatus};
-#[cfg(unix)]
-pub use host::{BusDevice, GeniHost};
-#[cfg(unix)]
-pub(crate) use link::GeniusLink;
-#[cfg(unix)]
-pub use recognition::{BusRecorders, Recognition};

@@ -1,5 +1,5 @@
-//! A window that may be none. A file, or a place in it, that was named by mistake may be anything: until a board
-//! answers there, it gets back what was written to it.
+//! A window that may not be one. A user may name the wrong file, or the wrong place in it. So the
+//! bytes that were there are remembered, and put back unless a board answers.
 
 use std::cell::RefCell;
 

@@ -3,7 +3,7 @@
 //! A recorder is behind a GENI board, and so may other things be; what the bus tells of a device
 //! does not say which. So every device that sends as much as a recorder does, and takes nothing, is
 //! asked a question that only recorders answer: what they heard last by broadcast (`L`, which
-//! original units answer, too, and which changes nothing). What came out is remembered until the
+//! original recorders answer, too, and which changes nothing). What came out is remembered until the
 //! device logs in anew.
 
 use std::time::Duration;
@@ -12,9 +12,9 @@ use geni_board::{BlockKind, Destination};
 use ser_proto::Command;
 use ser_proto::genius::GlobalData;
 
-use super::GeniusError;
 use super::host::{BusDevice, GeniHost, Host, PACE, ser_message};
-use crate::Options;
+use crate::session::options::Options;
+use crate::transport::genius_error::GeniusError;
 
 /// The question that only recorders answer. [`Answers`](super::answers::Answers) knows the answer.
 const QUESTION: Command = Command::LastBroadcast;

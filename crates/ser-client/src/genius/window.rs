@@ -8,21 +8,24 @@ use geni_board::{FileRam, MappedRam, RAM_LEN, SharedRam};
 use rustix::fs::OFlags;
 
 use super::put_back::PutBack;
-use crate::{GeniWindow, OpenError};
+use crate::transport::endpoint::GeniWindow;
+use crate::transport::open_error::OpenError;
 
 /// The window, until a board answers there with what to put back.
 pub(super) type Window = PutBack<AnyRam>;
 
 /// Shared RAM, however it is reached.
 pub(super) enum AnyRam {
-    /// A program on the other side, through a file. Should the file get shorter, that is an error and nothing worse.
+    /// A program on the other side, through a file. Should the file get shorter, that is an error
+    /// and nothing worse.
     File(FileRam),
     /// A board.
     Memory(MappedRam),
 }
 
 impl Window {
-    /// Opens the window and takes it for this program alone: two hosts would overwrite each other's commands.
+    /// Opens the window and takes it for this program alone: two hosts would overwrite each other's
+    /// commands.
     pub(super) fn open(place: &GeniWindow) -> Result<Window, OpenError> {
         let path = || place.file.clone();
         let other = |error: io::Error| match error.kind() {
@@ -63,7 +66,8 @@ impl Window {
     }
 }
 
-/// A file that has another size may be anything, and must not be written to unless the user says where.
+/// A file that has another size may be anything, and must not be written to unless the user says
+/// where.
 fn of_file(file: File, place: &GeniWindow) -> Result<AnyRam, OpenError> {
     let other = |error| OpenError::Other { name: place.file.clone(), error };
     let len = file.metadata().map_err(other)?.len();

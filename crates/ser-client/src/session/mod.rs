@@ -1,52 +1,71 @@
 //! Requests and the answer to each, told apart from what the recorder says by itself.
 //!
-//! A session owns neither port nor clock. Give it a command with [`request`](Session::request); send what
-//! [`dispatch`](Session::dispatch) hands out; give it what arrives with [`process`](Session::process); call
-//! `dispatch` again when [`poll_at`](Session::poll_at) has come; take the result with
-//! [`take_answer`](Session::take_answer). `now` is the time since any fixed moment, and never runs backwards.
+//! A session owns neither port nor clock. Give it a command with [`request`](Session::request);
+//! send what [`dispatch`](Session::dispatch) hands out; give it what arrives with
+//! [`process`](Session::process); call `dispatch` again when [`poll_at`](Session::poll_at) has
+//! come; take the result with [`take_answer`](Session::take_answer). `now` is the time since any
+//! fixed moment, and never runs backwards.
 //!
 //! # Which answer belongs to which request
 //!
-//! The protocol has no transaction numbers. A reply answers the request under way if its command byte is the same;
-//! a read reply must also begin at the entry that was asked for and hold no more entries than that. Every other
-//! read reply is an auto report ([`Unsolicited::Report`]), every other reply is counted and forgotten.
+//! The protocol has no transaction numbers. A reply answers the request under way if its command
+//! byte is the same; a read reply must also begin at the entry that was asked for and hold no more
+//! entries than that. Every other read reply is an auto report ([`Unsolicited::Report`]), every
+//! other reply is counted and forgotten.
 //!
-//! An auto report that is made after the question and begins at the same entry cannot be told from the answer. It need
-//! not be: it says how the log stands now, and whoever reads goes on behind an answer that is short. A report from
-//! before the question would be another matter, so [`Unit`](crate::Unit) takes what has arrived before it asks.
+//! An auto report that is made after the question and begins at the same entry cannot be told from
+//! the answer. It need not be: it says how the log stands now, and whoever reads goes on behind an
+//! answer that is short. A report from before the question would be another matter, so
+//! [`Unit`](crate::Unit) takes what has arrived before it asks.
 //!
-//! A request that was repeated or given up may be answered after all, later. To a repeated read that does no harm:
-//! each reply says where the log stood when it was made. But a *new* request of the same kind could take the old
-//! answer for its own, and the next one the answer after that, and so on. Such a request is therefore held back until
-//! the missing answers have come, or one more timeout has passed.
+//! A request that was repeated or given up may be answered after all, later. To a repeated read
+//! that does no harm: each reply says where the log stood when it was made. But a *new* request of
+//! the same kind could take the old answer for its own, and the next one the answer after that, and
+//! so on. Such a request is therefore held back until the missing answers have come, or one more
+//! timeout has passed.
 //!
 //! # Two reads at once
 //!
-//! Reads may be [requested](Session::has_room) while another one is under way, so that the unit finds the next
-//! request when it is done with an answer, and the line is never silent. Everything else is one at a time.
+//! Reads may be [requested](Session::has_room) while another one is under way, so that the recorder
+//! finds the next request when it is done with an answer, and the line is never silent. Everything
+//! else is one at a time.
 //!
-//! A unit answers in the order in which it was asked, and a line keeps the order. So an answer that comes before that
-//! to an earlier request shows that the earlier request or its answer was lost, and it is sent again at once. Answers
-//! are [handed out](Session::take_answer) in the order in which they come. The time for an answer begins when the one
-//! before it is there. A request that is repeated is alone under way.
+//! A recorder answers in the order in which it was asked, and a line keeps the order. So an answer that
+//! comes before that to an earlier request shows that the earlier request or its answer was lost,
+//! and it is sent again at once. Answers are [handed out](Session::take_answer) in the order in
+//! which they come. The time for an answer begins when the one before it is there. A request that
+//! is repeated is alone under way.
 //!
-//! A unit need not take a request while it answers another one. When one of the first two goes unanswered, it is [one
-//! at a time](Session::is_one_at_a_time) for the rest of the session, and nothing of this counts as an attempt: to
-//! have tried it costs such a unit one timeout at most. A unit that has taken some is forgiven a loss, but not one in
-//! five; one that has taken eight without a loss is tried again after a hundred answers, because then it was the
-//! line.
+//! A recorder need not take a request while it answers another one. When one of the first two goes
+//! unanswered, it is [one at a time](Session::is_one_at_a_time) for the rest of the session, and
+//! nothing of this counts as an attempt: to have tried it costs such a recorder one timeout at most. A
+//! recorder that has taken some is forgiven a loss, but not one in five; one that has taken eight
+//! without a loss is tried again after a hundred answers, because then it was the line.
 //!
 //! # What is repeated
 //!
 //! Queries, reads, start, stop and settings are sent again when no answer comes. Not so:
 //! - *Erase*: a repeated one could erase events that were recorded in between, unread;
 //! - *Print*: everything would be printed twice;
-//! - *Configure* with a baud rate: the unit may have changed the rate already, so the repeat would be garbage;
+//! - *Configure* with a baud rate: the recorder may have changed the rate already, so the repeat would
+//!   be garbage;
 //! - *Set clock*, unless each attempt gets a time of its own: see [`Session::request_set_clock`].
+//!
+//! # The files
+//!
+//! `request` knows what may be done with each command, `owed` the late answers, and `pace` whether
+//! the recorder takes two reads at once. `text_line`, `unsolicited`, `counters` and `diagnosis` hold
+//! what else the line brings. A `link` is what a session needs of a line or a bus.
 
+pub(crate) mod counters;
+pub(crate) mod diagnosis;
+pub(crate) mod link;
+pub(crate) mod options;
 mod owed;
 mod pace;
 mod request;
+pub(crate) mod text_line;
+pub(crate) mod unsolicited;
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -55,29 +74,32 @@ use ser_proto::{
     Code, Command, Decoded, FrameDecoder, MAX_BODY_LEN, ParseError, Reply, TimeStamp, encoded_len,
 };
 
-use crate::text_line::LineAssembler;
-use crate::unsolicited::UnsolicitedQueue;
-use crate::{Counters, Diagnosis, LineRate, Unsolicited};
+use crate::transport::line_rate::LineRate;
+use counters::Counters;
+use diagnosis::Diagnosis;
 use owed::Owed;
 use pace::Pace;
 pub use request::Attempt;
 use request::{Request, changes_something, encode, longest_reply, may_be_repeated};
+use text_line::LineAssembler;
+use unsolicited::{Unsolicited, UnsolicitedQueue};
 
 /// Reads that may be under way at once.
 const MAX_READS: usize = 2;
 
-/// How much longer than its timeout an attempt may last because a frame is just arriving: the longest frame at the
-/// lowest rate. It matters where the rate of the line is not known, as behind a terminal server.
+/// How much longer than its timeout an attempt may last because a frame is just arriving: the
+/// longest frame at the lowest rate. It matters where the rate of the line is not known, as behind
+/// a terminal server.
 const LONGEST_FRAME: Duration = Duration::from_millis(11_400);
 
-/// A time that no unit accepts, until the attempt gets its own.
+/// A time that no recorder accepts, until the attempt gets its own.
 const NO_TIME: TimeStamp =
     TimeStamp { year: 0, month: 0, day: 0, hour: 0, minute: 0, second: 0, millisecond: 0 };
 
 /// How long to wait and how often to try.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
-    /// How long a unit may take to answer, on top of the time that the bytes are on the line.
+    /// How long a recorder may take to answer, on top of the time that the bytes are on the line.
     pub timeout: Duration,
     /// How often a request is repeated, if it may be.
     pub retries: u32,
@@ -86,8 +108,8 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// How long one attempt lasts: the request on the line, a message that the unit was just sending, the longest
-    /// answer, and the time to think.
+    /// How long one attempt lasts: the request on the line, a message that the recorder was just
+    /// sending, the longest answer, and the time to think.
     #[must_use]
     pub fn attempt(&self, command: &Command) -> Duration {
         let bytes = encoded_len(command.to_body().len())
@@ -164,8 +186,8 @@ impl Session {
         Session { pace: Pace::ONE_AT_A_TIME, ..self }
     }
 
-    /// Whether one request at a time is under way, reads or not: because that was wanted, or because the unit does not
-    /// take a request while it answers another one.
+    /// Whether one request at a time is under way, reads or not: because that was wanted, or
+    /// because the recorder does not take a request while it answers another one.
     #[must_use]
     pub const fn is_one_at_a_time(&self) -> bool {
         self.pace.is_one_at_a_time()
@@ -174,13 +196,14 @@ impl Session {
     /// Begins a request. [`dispatch`](Self::dispatch) sends it.
     ///
     /// # Errors
-    /// When another one is under way and this one is no read for which [there is room](Self::has_room), or an answer
-    /// has not been taken.
+    /// When another one is under way and this one is no read for which [there is
+    /// room](Self::has_room), or an answer has not been taken.
     pub fn request(&mut self, command: Command) -> Result<(), Busy> {
         self.begin(command, may_be_repeated(&command), false)
     }
 
-    /// Whether a read may be requested now: nothing else is under way, or only reads, fewer than two.
+    /// Whether a read may be requested now: nothing else is under way, or only reads, fewer than
+    /// two.
     #[must_use]
     pub fn has_room(&self) -> bool {
         // What is asked again is alone under way.
@@ -195,8 +218,8 @@ impl Session {
         self.answers.is_empty() && self.requests.is_empty()
     }
 
-    /// Begins to set the clock. Unlike a [`Command::SetClock`] this is repeated, because each [`Attempt`] wants a
-    /// time of its own.
+    /// Begins to set the clock. Unlike a [`Command::SetClock`] this is repeated, because each
+    /// [`Attempt`] wants a time of its own.
     ///
     /// # Errors
     /// As for [`request`](Self::request).
@@ -214,8 +237,8 @@ impl Session {
         Ok(())
     }
 
-    /// Does what is due: hands out a frame to send, or gives a request up. When it has handed one out, another may be
-    /// due.
+    /// Does what is due: hands out a frame to send, or gives a request up. When it has handed one
+    /// out, another may be due.
     pub fn dispatch(&mut self, now: Duration) -> Option<Attempt<'_>> {
         self.owed.expire(now);
         if self.attempt_ends_at().is_some_and(|end| end <= now) {
@@ -239,8 +262,8 @@ impl Session {
         Some(Attempt { request, frame: &mut self.frame, line_rate: self.timing.line_rate })
     }
 
-    /// When to call [`dispatch`](Self::dispatch) again, if nothing arrives before; a moment in the past means at
-    /// once. `None` while there is no request.
+    /// When to call [`dispatch`](Self::dispatch) again, if nothing arrives before; a moment in the
+    /// past means at once. `None` while there is no request.
     #[must_use]
     pub fn poll_at(&self) -> Option<Duration> {
         let next = self.next_to_send().map(|(_, due)| due);
@@ -354,7 +377,8 @@ impl Session {
         if place == 0 {
             self.pace.kept(request.behind);
         }
-        // Otherwise it is the late answer to an earlier attempt, and says nothing about what was sent since.
+        // Otherwise it is the late answer to an earlier attempt, and says nothing about what was
+        // sent since.
         if request.under_way && place > 0 {
             self.passed_over(now, place);
         }
@@ -363,7 +387,8 @@ impl Session {
         }
     }
 
-    /// The answer to a later request came before those to the first `count`: they are not coming any more.
+    /// The answer to a later request came before those to the first `count`: they are not coming
+    /// any more.
     fn passed_over(&mut self, now: Duration, count: usize) {
         let free = self.pace.lost();
         for _ in 0..count {
@@ -422,8 +447,8 @@ impl Session {
         }
     }
 
-    /// The outcome of a request, once. Of two reads it says itself, by its start, to which it is the answer. When one
-    /// is given up, so is the other.
+    /// The outcome of a request, once. Of two reads it says itself, by its start, to which it is
+    /// the answer. When one is given up, so is the other.
     pub fn take_answer(&mut self) -> Option<Result<Reply, NoReply>> {
         self.answers.pop_front()
     }
@@ -433,8 +458,8 @@ impl Session {
         self.unsolicited.pop()
     }
 
-    /// Forgets the reports that came before the last answer. Messages come in the order in which the unit sent them, so
-    /// these tell of a log that has changed since: the answer knows better.
+    /// Forgets the reports that came before the last answer. Messages come in the order in which
+    /// the recorder sent them, so these tell of a log that has changed since: the answer knows better.
     pub fn forget_earlier_reports(&mut self) {
         self.unsolicited.drop_reports_before_mark();
     }

@@ -1,4 +1,7 @@
 //! Answers that may still come although nobody waits for them any more.
+//!
+//! A new request of the same kind could take such an answer for its own. It is held back until the
+//! answer has come, or its time is over.
 
 use std::time::Duration;
 
@@ -33,7 +36,8 @@ impl Owed {
         self.0.push(Late { code: command.code(), start: read_start(command), replies, until });
     }
 
-    /// Until when the command has to be held back: an answer that may still come would pass for the one to it.
+    /// Until when the command has to be held back: an answer that may still come would pass for the
+    /// one to it.
     pub(super) fn holds_back(&self, command: &Command) -> Option<Duration> {
         let (code, start) = (command.code(), read_start(command));
         self.0.iter().filter(|late| late.code == code && late.start == start).map(|late| late.until).max()

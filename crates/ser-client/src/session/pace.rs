@@ -1,4 +1,7 @@
-//! Whether a unit takes a request while it answers another one.
+//! Whether a recorder takes a request while it answers another one.
+//!
+//! Every request that was taken in this way is a credit, and every one that was lost costs some.
+//! When the credit is used up, requests go one at a time.
 
 /// Requests that were taken in this way, up to which they count.
 const MAX_CREDIT: u8 = 8;
@@ -6,22 +9,23 @@ const MAX_CREDIT: u8 = 8;
 /// As much as one that was lost weighs against those that were taken: one in five is too many.
 const LOSS: u8 = 4;
 
-/// Answers after which a unit that has taken `MAX_CREDIT` requests once, on a line that was bad since, is tried again.
+/// Answers after which a recorder that has taken `MAX_CREDIT` requests once, on a line that was bad
+/// since, is tried again.
 const PROBATION: u8 = 100;
 
-/// What is known about the unit. At first nothing is, and it is tried.
+/// What is known about the recorder. At first nothing is, and it is tried.
 #[derive(Debug, Default)]
 pub(super) struct Pace {
     one_at_a_time: bool,
     credit: u8,
-    /// Whether the unit is known to take requests while it answers.
+    /// Whether the recorder is known to take requests while it answers.
     proven: bool,
     /// Answers since it has been one at a time.
     alone: u8,
 }
 
 impl Pace {
-    /// That of a unit, or a way to it, for which one request at a time is right.
+    /// That of a recorder, or a way to it, for which one request at a time is right.
     pub(super) const ONE_AT_A_TIME: Pace = Pace { one_at_a_time: true, credit: 0, proven: false, alone: 0 };
 
     /// Whether there must be no other request under way.
@@ -29,8 +33,8 @@ impl Pace {
         self.one_at_a_time
     }
 
-    /// A request was answered, and those before it were; `behind` says whether it was sent while another one was
-    /// under way.
+    /// A request was answered, and those before it were; `behind` says whether it was sent while
+    /// another one was under way.
     pub(super) fn kept(&mut self, behind: bool) {
         if behind {
             self.credit = MAX_CREDIT.min(self.credit + 1);
@@ -43,8 +47,8 @@ impl Pace {
         }
     }
 
-    /// One of two requests under way was not answered. Whether that is put down to there having been two: then it is
-    /// one at a time.
+    /// One of two requests under way was not answered. Whether that is put down to there having
+    /// been two: then it is one at a time.
     pub(super) fn lost(&mut self) -> bool {
         match self.credit.checked_sub(LOSS) {
             Some(credit) => self.credit = credit,

@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use ser_proto::{Command, FrameEncoder, MAX_ENTRIES, Model, ParseError, Reply, TimeStamp};
 
-use crate::{Counters, LineRate};
+use super::counters::Counters;
+use crate::transport::line_rate::LineRate;
 
 /// A request whose answer has not come.
 #[derive(Debug)]
@@ -118,7 +119,7 @@ pub(super) fn longest_reply(command: &Command) -> usize {
         Command::Read { count, .. } => Model::Ser320.read_reply_len(usize::from(*count).min(MAX_ENTRIES)),
         Command::QueryConfiguration | Command::Configure(_) | Command::LastBroadcast => 7,
         Command::QueryMode | Command::SetMode { .. } => 3,
-        // Some units echo the parameters of a print command.
+        // Some recorders echo the parameters of a print command.
         Command::Print { .. } => 5,
         Command::Erase | Command::SetClock(_) => 1,
     }

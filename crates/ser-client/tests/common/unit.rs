@@ -19,7 +19,7 @@ type Meanwhile = Box<dyn FnMut(&mut Recorder, &mut Configuration, usize) + Send>
 pub(crate) struct Fake {
     pub(crate) recorder: Recorder,
     pub(crate) configuration: Configuration,
-    /// The rate at which the unit talks; the client's rate has to be the same.
+    /// The rate at which the recorder talks; the client's rate has to be the same.
     pub(crate) unit_rate: u32,
     pub(crate) line_rate: u32,
     /// Whether the client knows that the line has a rate, and waits accordingly.
@@ -27,7 +27,7 @@ pub(crate) struct Fake {
     pub(crate) recording: bool,
     /// How many replies are swallowed from now on.
     pub(crate) swallow: usize,
-    /// Original units do not know the queries.
+    /// Original recorders do not know the queries.
     pub(crate) original: bool,
     /// Whether a command is not heard while an answer is on the line.
     pub(crate) deaf_when_talking: bool,
@@ -167,7 +167,8 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    /// Over a line of which the client does not know the rate: what is not answered is given up soon.
+    /// Over a line of which the client does not know the rate: what is not answered is given up
+    /// soon.
     pub(crate) fn new(size: u16) -> Bench {
         Bench::with(size, false)
     }

@@ -1,0 +1,166 @@
+//! Following a log: reading after reading, each from where the last one ended.
+//!
+//! An auto report is a reason to read, and no more. It names its events by their place in the ring
+//! and the total, and both begin anew after an erase. So nothing in a report shows whether it goes
+//! on with the log that was read last. Earlier reports might have shown it, but they may be lost, or
+//! were never sent. A reading begins with the last event that was delivered. If no more than nine
+//! have happened since, it is one request.
+
+use crate::reading::cursor::Cursor;
+use crate::reading::delivery::Delivery;
+use crate::reading::disturbed::Disturbed;
+use crate::reading::log_position::LogPosition;
+use crate::reading::reader::LogReader;
+use crate::reading::summary::Summary;
+use crate::unit::Unit;
+use crate::unit::request_error::RequestError;
+
+/// How often a reading begins anew because the log was changed under it.
+const MAX_RESYNCS: u32 = 4;
+
+/// What a reply has brought.
+#[derive(Clone, Copy, Debug)]
+pub struct Step<'a> {
+    /// Events and losses, in order.
+    pub deliveries: &'a [Delivery],
+    /// Where the next reading has to begin once these are delivered.
+    pub cursor: Option<Cursor>,
+    /// How many more events the log is known to hold.
+    pub pending: u32,
+    /// How many entries the log holds, as far as is known by now.
+    pub size: u16,
+}
+
+/// A log and how far it has been read.
+#[derive(Clone, Debug)]
+pub struct LogFollower {
+    size: u16,
+    cursor: Option<Cursor>,
+    position: Option<LogPosition>,
+    keeps_up: bool,
+}
+
+impl LogFollower {
+    /// Begins behind `cursor`, or with the oldest event. `size` is how many entries the log holds.
+    #[must_use]
+    pub fn new(cursor: Option<Cursor>, size: u16) -> LogFollower {
+        LogFollower { size, cursor, position: None, keeps_up: false }
+    }
+
+    /// How many entries the log holds, as far as is known.
+    #[must_use]
+    pub fn size(&self) -> u16 {
+        self.size
+    }
+
+    /// Where the next reading begins.
+    #[must_use]
+    pub fn cursor(&self) -> Option<Cursor> {
+        self.cursor
+    }
+
+    /// The same, when the log was last seen at `position`: if nothing has happened since, the next
+    /// reading is shorter.
+    #[must_use]
+    pub fn starting_near(mut self, position: Option<LogPosition>) -> LogFollower {
+        self.position = position;
+        self
+    }
+
+    /// Whether a reading goes on for as long as there is enough for a full reply, instead of ending
+    /// when it has come past what had happened when it began.
+    pub fn set_keeps_up(&mut self, keeps_up: bool) {
+        self.keeps_up = keeps_up;
+    }
+
+    /// Where the log stood at the end of the last reading.
+    #[must_use]
+    pub fn position(&self) -> Option<LogPosition> {
+        self.position
+    }
+
+    /// Reads what is new and hands it to `take`, reply by reply; each event comes once and in
+    /// order, and what was lost is told. Auto reports that came before the first reply are
+    /// forgotten: the reading brings what they have to tell. When `take` fails, the reading ends
+    /// with its error, and the next one begins before what it was given.
+    ///
+    /// # Errors
+    /// Those of `take`; no reply, a line that fails, or a log that is changed again and again while
+    /// it is read.
+    pub fn read_new<E: From<RequestError>>(
+        &mut self,
+        unit: &mut Unit,
+        take: &mut dyn FnMut(&Step<'_>) -> Result<(), E>,
+    ) -> Result<Summary, E> {
+        let (mut delivered, mut lost, mut unrecorded, mut restarted) = (0_u32, 0_u32, 0_u32, false);
+        let mut resyncs = 0;
+        loop {
+            let (summary, end) = self.read_once(unit, take)?;
+            delivered = delivered.saturating_add(summary.delivered);
+            lost = lost.saturating_add(summary.lost);
+            unrecorded = unrecorded.saturating_add(summary.unrecorded);
+            restarted |= summary.restarted;
+            if self.keeps_up && summary.delivered > 0 {
+                // It may last for days.
+                resyncs = 0;
+            }
+            match end {
+                Ok(()) => return Ok(Summary { delivered, lost, unrecorded, restarted, ..summary }),
+                // Somebody erased or resized the log: what is still there is sorted out from the
+                // cursor.
+                Err(Disturbed::Changed | Disturbed::WrongSize) if resyncs < MAX_RESYNCS => {
+                    resyncs += 1;
+                    self.learn_size(unit)?;
+                }
+                Err(disturbed) => return Err(RequestError::Disturbed(disturbed).into()),
+            }
+        }
+    }
+
+    fn read_once<E: From<RequestError>>(
+        &mut self,
+        unit: &mut Unit,
+        take: &mut dyn FnMut(&Step<'_>) -> Result<(), E>,
+    ) -> Result<(Summary, Result<(), Disturbed>), E> {
+        let mut reader = LogReader::new(self.cursor, self.size).keeping_up(self.keeps_up);
+        if let Some(position) = self.position.take() {
+            reader = reader.starting_near(position);
+        }
+        let mut deliveries = Vec::new();
+        let mut first = true;
+        unit.cancel();
+        unit.ask(&mut || reader.request())?;
+        while reader.is_waiting() {
+            let reply = unit.next_reply()?;
+            if first {
+                // What they tell is in the log that is read now, or was erased since.
+                unit.forget_earlier_reports();
+                first = false;
+            }
+            deliveries.clear();
+            let taken = reader.take(&reply, &mut |delivery| deliveries.push(delivery));
+            let (cursor, pending) = (reader.cursor(), reader.pending());
+            // Before anything is done with this: the line shall not have to wait for it.
+            let asked = if taken.is_ok() { unit.ask(&mut || reader.request()) } else { Ok(()) };
+            take(&Step { deliveries: &deliveries, cursor, pending, size: self.size })?;
+            self.cursor = cursor;
+            if taken.is_err() {
+                return Ok((reader.summary(), taken));
+            }
+            asked?;
+        }
+        let summary = reader.summary();
+        self.position = Some(summary.position);
+        Ok((summary, Ok(())))
+    }
+
+    /// Asks for the size again; original recorders do not tell, then it stays what it was said to be.
+    fn learn_size(&mut self, unit: &mut Unit) -> Result<(), RequestError> {
+        match unit.configuration() {
+            Ok(configuration) => self.size = configuration.size,
+            Err(RequestError::NoReply { .. }) => {}
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+}

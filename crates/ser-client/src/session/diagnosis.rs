@@ -1,0 +1,114 @@
+//! What the line looked like while an answer did not come, and what a person can do about it.
+//!
+//! The difference of two counts tells silence from a wrong rate, from noise, and from a recorder
+//! that talks of something else.
+
+use std::fmt;
+
+use ser_proto::ParseError;
+
+use super::counters::Counters;
+
+/// Why there was no answer, as far as the bytes that did arrive can tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Diagnosis {
+    /// Not one byte arrived. A recorder that is asked at the wrong baud rate hears garbage and is
+    /// silent, too.
+    Silent,
+    /// The recorder is on the Genius bus and did not answer.
+    SilentOnBus {
+        /// Its number.
+        node: u8,
+    },
+    /// The recorder is on the Genius bus, and what was sent to it last did not arrive.
+    Unacknowledged {
+        /// Its number.
+        node: u8,
+    },
+    /// Bytes arrived and none of them made sense: most likely the wrong baud rate.
+    Garbage {
+        /// How many bytes.
+        bytes: u64,
+    },
+    /// Frames arrived damaged and none whole: noise on the line.
+    Damaged {
+        /// How many frames had a wrong checksum or broke off.
+        frames: u64,
+    },
+    /// The recorder did answer this command, with something that is no such message.
+    NotUnderstood(ParseError),
+    /// The recorder talks, with frames or lines of text, but does not answer this command. An original
+    /// recorder is silent on the queries that this project added to the protocol, and on every command
+    /// it refuses.
+    Ignored {
+        /// Frames with other contents.
+        frames: u64,
+        /// Lines of text.
+        lines: u64,
+    },
+}
+
+impl Diagnosis {
+    /// Judges what was counted while the answer was awaited; `not_understood` is the last answer to
+    /// the command that made no sense, `unfinished` whether a frame had begun and never ended.
+    pub(crate) fn of(seen: &Counters, not_understood: Option<ParseError>, unfinished: bool) -> Diagnosis {
+        if seen.bytes == 0 {
+            return Diagnosis::Silent;
+        }
+        if let Some(error) = not_understood {
+            return Diagnosis::NotUnderstood(error);
+        }
+        if seen.frames > 0 || seen.lines > 0 {
+            return Diagnosis::Ignored { frames: seen.frames, lines: seen.lines };
+        }
+        // At a wrong rate an ESC may appear by chance, but hardly ever a length and a body of
+        // digits after it.
+        if seen.bad_checksums > 0 || unfinished {
+            let frames = seen.bad_checksums + seen.broken_frames + u64::from(unfinished);
+            return Diagnosis::Damaged { frames };
+        }
+        Diagnosis::Garbage { bytes: seen.bytes }
+    }
+
+    /// What a person can try next.
+    #[must_use]
+    pub const fn hint(&self) -> &'static str {
+        match self {
+            Diagnosis::Silent => {
+                "check power, port, cable (null modem?) and baud rate (recorders are delivered with 9600)"
+            }
+            Diagnosis::SilentOnBus { .. } => {
+                "is this device a recorder, is it running, and is the bus free of errors? Or wait longer for the answer"
+            }
+            Diagnosis::Unacknowledged { .. } => {
+                "try again; if it persists, look for errors on the bus: cable, terminators, a number given twice"
+            }
+            Diagnosis::Garbage { .. } => "try another baud rate; recorders are delivered with 9600",
+            Diagnosis::Damaged { .. } => "check cable, shielding and ground, or choose a lower baud rate",
+            Diagnosis::NotUnderstood(_) => {
+                "is this a sequential event recorder, and nothing else on the line?"
+            }
+            Diagnosis::Ignored { .. } => "original recorders do not know this query, or refused what was asked",
+        }
+    }
+}
+
+impl fmt::Display for Diagnosis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Diagnosis::Silent => write!(f, "not one byte came back"),
+            Diagnosis::SilentOnBus { node } => {
+                write!(f, "device {node} is on the bus and does not reply")
+            }
+            Diagnosis::Unacknowledged { node } => {
+                write!(f, "device {node} is on the bus and the datagram did not get through to it")
+            }
+            Diagnosis::Garbage { bytes } => write!(f, "{bytes} bytes came back and none made sense"),
+            Diagnosis::Damaged { frames } => write!(f, "{frames} damaged frames came back"),
+            Diagnosis::NotUnderstood(error) => write!(f, "the answer was not understood: {error}"),
+            Diagnosis::Ignored { frames, lines } => {
+                write!(f, "the recorder talks ({frames} frames, {lines} lines of text) but does not answer this")
+            }
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! How time passes for a host.
+
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// How time passes for a host.
+///
+/// Everything here but tests wants [`RealTime`]. A test that plays the other end lets its time pass
+/// in [`wait`](Clock::wait), or in what it does for a transport, and so need not wait for anything.
+pub trait Clock: Send + Sync {
+    /// The time since some moment in the past.
+    fn now(&self) -> Duration;
+
+    /// Lets time pass.
+    fn wait(&self, time: Duration);
+}
+
+/// The time of this computer.
+#[derive(Clone, Copy, Debug)]
+pub struct RealTime {
+    epoch: Instant,
+}
+
+impl RealTime {
+    /// Time zero is now.
+    #[must_use]
+    pub fn new() -> RealTime {
+        RealTime { epoch: Instant::now() }
+    }
+}
+
+impl Default for RealTime {
+    fn default() -> RealTime {
+        RealTime::new()
+    }
+}
+
+impl Clock for RealTime {
+    fn now(&self) -> Duration {
+        self.epoch.elapsed()
+    }
+
+    fn wait(&self, time: Duration) {
+        thread::sleep(time);
+    }
+}

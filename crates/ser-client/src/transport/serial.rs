@@ -1,0 +1,115 @@
+//! A serial port: RS-232 itself, a USB adapter, or a pseudo-terminal.
+//!
+//! The port is opened for this program alone where the system can do that, with 8 data bits, no
+//! parity, one stop bit and no flow control. What arrived before is left in the buffer: it may be
+//! lines that the recorder printed.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::path::Path;
+use std::time::Duration;
+
+use serialport::{DataBits, FlowControl, Parity, SerialPort, StopBits};
+
+use super::open_error::OpenError;
+use super::ports::ports;
+use super::{Transport, bytes_read};
+
+/// Far longer than the kernel needs to take one frame at 300 baud, so only a stuck port runs into
+/// it.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// An open serial port.
+pub struct SerialTransport {
+    port: Box<dyn SerialPort>,
+    bits_per_second: u32,
+}
+
+impl SerialTransport {
+    /// Opens the port `path` at `baud` bits per second.
+    ///
+    /// # Errors
+    /// See [`OpenError`].
+    pub fn open(path: &str, baud: u32) -> Result<SerialTransport, OpenError> {
+        // Some systems take rate 0 for a way to hang up.
+        if baud == 0 {
+            return Err(OpenError::UnsupportedBaud { path: path.to_owned(), baud });
+        }
+        let port = serialport::new(path, baud)
+            .data_bits(DataBits::Eight)
+            .parity(Parity::None)
+            .stop_bits(StopBits::One)
+            .flow_control(FlowControl::None)
+            .exclusive(true)
+            .open()
+            .map_err(|error| why_not_opened(path, baud, &error))?;
+        Ok(SerialTransport { port, bits_per_second: baud })
+    }
+}
+
+fn why_not_opened(path: &str, baud: u32, error: &serialport::Error) -> OpenError {
+    use serialport::ErrorKind as Kind;
+    let owned = || path.to_owned();
+    match error.kind() {
+        Kind::Io(ErrorKind::PermissionDenied) => OpenError::PermissionDenied { path: owned() },
+        Kind::NoDevice if exists(path) => OpenError::Busy { path: owned() },
+        Kind::Io(ErrorKind::NotFound) | Kind::NoDevice => OpenError::NoSuchPort { path: owned() },
+        _ if is_no_terminal(path, error) => OpenError::NotSerial { path: owned() },
+        Kind::InvalidInput => OpenError::UnsupportedBaud { path: owned(), baud },
+        kind => {
+            let kind = if let Kind::Io(kind) = kind { kind } else { ErrorKind::Other };
+            OpenError::Other { name: owned(), error: io::Error::new(kind, error.description.clone()) }
+        }
+    }
+}
+
+fn exists(path: &str) -> bool {
+    Path::new(path).exists() || ports().iter().any(|port| port.path.eq_ignore_ascii_case(path))
+}
+
+#[cfg(unix)]
+fn is_no_terminal(path: &str, error: &serialport::Error) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    // The text of ENOTTY is all that serialport leaves of it: /dev/null is a character device, too.
+    let not_a_terminal = error.description.contains("typewriter") || error.description.contains("terminal");
+    not_a_terminal || std::fs::metadata(path).is_ok_and(|found| !found.file_type().is_char_device())
+}
+
+#[cfg(not(unix))]
+fn is_no_terminal(path: &str, _: &serialport::Error) -> bool {
+    Path::new(path).is_file()
+}
+
+/// Makes one error of the many in which a serial port that was unplugged shows.
+fn unplugged(error: io::Error) -> io::Error {
+    match error.kind() {
+        // The kernel's EIO, ENXIO and ENODEV have no kind of their own and arrive as `Other`.
+        ErrorKind::BrokenPipe | ErrorKind::NotFound | ErrorKind::UnexpectedEof | ErrorKind::Other => {
+            io::Error::new(ErrorKind::NotConnected, error)
+        }
+        _ => error,
+    }
+}
+
+impl Transport for SerialTransport {
+    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.port.set_timeout(timeout)?;
+        // A port that says that it has bytes, and has none, was hung up.
+        let read = self.port.read(buf);
+        bytes_read(read, buf.len(), ErrorKind::NotConnected).map_err(unplugged)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.port.set_timeout(WRITE_TIMEOUT)?;
+        self.port.write_all(bytes).map_err(unplugged)
+    }
+
+    fn set_baud(&mut self, bits_per_second: u32) -> io::Result<()> {
+        self.port.set_baud_rate(bits_per_second)?;
+        self.bits_per_second = bits_per_second;
+        Ok(())
+    }
+
+    fn bits_per_second(&self) -> Option<u32> {
+        Some(self.bits_per_second)
+    }
+}

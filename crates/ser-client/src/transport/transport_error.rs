@@ -1,0 +1,86 @@
+//! How a line fails in the middle of a conversation.
+
+use std::error::Error;
+use std::fmt;
+use std::io::{self, ErrorKind};
+
+use super::genius_error::GeniusError;
+
+/// How a line failed in the middle of a conversation.
+#[derive(Debug)]
+pub enum TransportError {
+    /// The serial device is gone.
+    Unplugged,
+    /// The other end of the connection went away.
+    Closed,
+    /// It did so before it said anything.
+    TurnedAway,
+    /// The GENI board, or the bus behind it.
+    Genius(GeniusError),
+    /// Anything else.
+    Io(io::Error),
+}
+
+impl TransportError {
+    /// What a person can try next, if there is something to say.
+    #[must_use]
+    pub const fn hint(&self) -> Option<&'static str> {
+        match self {
+            TransportError::Unplugged => Some("plug the adapter in again; its name may have changed"),
+            TransportError::Closed => {
+                Some("is the program or the terminal server at the other end still running?")
+            }
+            TransportError::TurnedAway => {
+                Some("perhaps another client has the unit: most terminal servers serve one at a time")
+            }
+            TransportError::Genius(error) => Some(error.hint()),
+            TransportError::Io(_) => None,
+        }
+    }
+}
+
+impl From<GeniusError> for TransportError {
+    fn from(error: GeniusError) -> TransportError {
+        TransportError::Genius(error)
+    }
+}
+
+impl From<io::Error> for TransportError {
+    fn from(error: io::Error) -> TransportError {
+        match error.kind() {
+            ErrorKind::NotConnected => TransportError::Unplugged,
+            ErrorKind::ConnectionRefused => TransportError::TurnedAway,
+            ErrorKind::UnexpectedEof
+            | ErrorKind::BrokenPipe
+            | ErrorKind::ConnectionReset
+            | ErrorKind::ConnectionAborted => TransportError::Closed,
+            _ => TransportError::Io(error),
+        }
+    }
+}
+
+impl fmt::Display for TransportError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            TransportError::Unplugged => write!(f, "the serial port is gone"),
+            TransportError::Closed => write!(f, "the connection was closed by the other end"),
+            TransportError::TurnedAway => {
+                write!(f, "the connection was closed by the other end before the first answer")
+            }
+            TransportError::Genius(error) => error.fmt(f),
+            TransportError::Io(error) => write!(f, "the line failed: {error}"),
+        }
+    }
+}
+
+impl Error for TransportError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            TransportError::Io(error) => Some(error),
+            TransportError::Unplugged
+            | TransportError::Closed
+            | TransportError::TurnedAway
+            | TransportError::Genius(_) => None,
+        }
+    }
+}
