@@ -1,4 +1,5 @@
-//! Puts the board's linker scripts where the linker looks for them, and names those of the libraries.
+//! Puts the board's linker scripts where the linker looks for them, and names those of the
+//! libraries.
 
 use std::path::PathBuf;
 use std::{env, fs};
@@ -10,9 +11,9 @@ fn main() {
         fs::copy(script, out.join(script)).expect("the linker scripts lie beside build.rs");
     }
     println!("cargo::rustc-link-search={}", out.display());
-    // cortex-m-rt's memory layout, which includes memory.x and device.x, and defmt's place for its strings: in the
-    // ELF file, not in the flash. Here and not in .cargo/config.toml, where RUSTFLAGS in the environment would hide
-    // them.
+    // cortex-m-rt's memory layout, which includes memory.x and device.x, and defmt's place for its
+    // strings: in the ELF file, not in the flash. Here and not in .cargo/config.toml, where
+    // RUSTFLAGS in the environment would hide them.
     for script in ["link.x", "defmt.x"] {
         println!("cargo::rustc-link-arg-bins=-T{script}");
     }

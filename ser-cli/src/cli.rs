@@ -16,7 +16,8 @@ Examples:
   ser-cli -p tcp://10.0.0.7:4000 watch  events as they happen
   export SER_PORT=/dev/ttyUSB0          say the port once
 
-Exit codes: 0 done, 1 the recorder did not answer or something else failed, 2 the command line makes no sense. \
+Exit codes: 0 done, 1 the recorder did not answer or something else failed, 2 the command line \
+makes no sense. \
 Only data goes to standard output; everything else goes to standard error.";
 
 /// Subcommands that talk to no unit: how to reach one is accepted there, and not mentioned.
@@ -60,7 +61,10 @@ impl Command {
     /// Whether it does nothing but bring data.
     fn is_for_its_output(&self) -> bool {
         use Command::{CommReq, Completions, Decode, Encode, Print, Read, Watch};
-        matches!(self, Read(_) | Print(_) | Watch(_) | Decode(_) | Encode(_) | CommReq(_) | Completions(_))
+        matches!(
+            self,
+            Read(_) | Print(_) | Watch(_) | Decode(_) | Encode(_) | CommReq(_) | Completions(_)
+        )
     }
 }
 
@@ -226,8 +230,12 @@ mod tests {
 
     #[test]
     fn the_port_may_stand_on_either_side() {
-        for words in [["ser-cli", "-p", "COM3", "status"], ["ser-cli", "status", "--port", "COM3"]] {
-            assert_eq!(Cli::try_from_words(words).unwrap().connection.port.as_deref(), Some("COM3"));
+        for words in [["ser-cli", "-p", "COM3", "status"], ["ser-cli", "status", "--port", "COM3"]]
+        {
+            assert_eq!(
+                Cli::try_from_words(words).unwrap().connection.port.as_deref(),
+                Some("COM3")
+            );
         }
     }
 
@@ -235,8 +243,11 @@ mod tests {
     fn how_to_reach_a_unit_is_not_mentioned_where_none_is_reached() {
         let mut definition = Cli::definition();
         definition.build();
-        for command in definition.get_subcommands_mut().filter(|command| command.get_name() != "help") {
-            let (name, help) = (command.get_name().to_string(), command.render_long_help().to_string());
+        for command in
+            definition.get_subcommands_mut().filter(|command| command.get_name() != "help")
+        {
+            let (name, help) =
+                (command.get_name().to_string(), command.render_long_help().to_string());
             assert_eq!(help.contains("--retries"), !OFFLINE.contains(&&*name), "{name}");
         }
         assert!(Cli::try_from_words(["ser-cli", "-p", "COM3", "demo"]).is_ok());

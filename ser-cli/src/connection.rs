@@ -1,11 +1,13 @@
-//! From `--port` to a recorder that can be talked to, and from the client's errors to what the user is told.
+//! From `--port` to a recorder that can be talked to, and from the client's errors to what the user
+//! is told.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use ser_client::{
-    Diagnosis, Endpoint, GeniusError, LineRate, OpenError, Options, RequestError, TransportError, Unit,
+    Diagnosis, Endpoint, GeniusError, LineRate, OpenError, Options, RequestError, TransportError,
+    Unit,
 };
 use ser_proto::{Baud, Configuration};
 
@@ -18,15 +20,24 @@ use crate::values;
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Connection")]
 pub(crate) struct ConnectionArgs {
-    /// Serial port of the recorder (/dev/ttyUSB0, COM3), tcp://HOST:PORT, or geni:FILE?node=N on a Genius bus.
+    /// Serial port of the recorder (/dev/ttyUSB0, COM3), tcp://HOST:PORT, or geni:FILE?node=N on a
+    /// Genius bus.
     ///
-    /// FILE is the window that this computer shares with its GENI board, N the recorder's number on the bus. For a board in
-    /// this computer FILE is a device for memory; &offset=0x… says where in it the window begins.
-    #[arg(short, long, global = true, env = "SER_PORT", hide_env_values = true, value_name = "PORT")]
+    /// FILE is the window that this computer shares with its GENI board, N the recorder's number on
+    /// the bus. For a board in this computer FILE is a device for memory; &offset=0x… says where in
+    /// it the window begins.
+    #[arg(
+        short,
+        long,
+        global = true,
+        env = "SER_PORT",
+        hide_env_values = true,
+        value_name = "PORT"
+    )]
     pub(crate) port: Option<String>,
 
-    /// Rate of the serial port, 9600 if not given. Over TCP: of the terminal server's port, for `clock set` to reckon
-    /// with.
+    /// Rate of the serial port, 9600 if not given. Over TCP: of the terminal server's port, for
+    /// `clock set` to reckon with.
     #[arg(long, global = true, value_name = "RATE", value_parser = values::baud)]
     pub(crate) baud: Option<Baud>,
 
@@ -101,8 +112,8 @@ pub(crate) fn open_bus(connection: &ConnectionArgs) -> Result<ser_client::GeniHo
     unless_interrupted(|stop| ser_client::GeniHost::open_unless(window, patience, stop))
 }
 
-/// Opens the window to a bus. An interrupt has to wait until what was written there is put back, as the window may
-/// turn out to be none.
+/// Opens the window to a bus. An interrupt has to wait until what was written there is put back, as
+/// the window may turn out to be none.
 fn unless_interrupted<T>(
     open: impl FnOnce(&Arc<AtomicBool>) -> std::result::Result<T, OpenError>,
 ) -> Result<T> {
@@ -115,8 +126,12 @@ fn unless_interrupted<T>(
 fn no_port() -> Failure {
     let failure = Failure::usage("which recorder? No --port is given and SER_PORT is not set");
     let failure = match &ser_client::ports()[..] {
-        [only] => failure.hint(format!("this computer has one serial port: try --port {}", only.path)),
-        _ => failure.hint("name a serial port, as in --port /dev/ttyUSB0; ser-cli ports lists them"),
+        [only] => {
+            failure.hint(format!("this computer has one serial port: try --port {}", only.path))
+        }
+        _ => {
+            failure.hint("name a serial port, as in --port /dev/ttyUSB0; ser-cli ports lists them")
+        }
     };
     failure
         .hint("name a terminal server, as in --port tcp://10.0.0.7:4000")
@@ -129,23 +144,25 @@ fn open_failure(error: &OpenError) -> Failure {
         _ => Failure::new(error),
     };
     if let OpenError::NoSuchPort { .. } = error {
-        return failure
-            .hint("ser-cli ports lists the serial ports of this computer; is the adapter plugged in?");
+        return failure.hint(
+            "ser-cli ports lists the serial ports of this computer; is the adapter plugged in?",
+        );
     }
     let failure = failure.hint(error.hint());
     match error {
         OpenError::NotSerial { .. } => failure.hint("ser-cli ports lists the serial ports"),
-        OpenError::Genius { error: GeniusError::NotOnBus { .. }, path } | OpenError::NoNode { path } => {
-            failure
-                .hint(format!("ser-cli genius devices --port geni:{path} lists the devices that are there"))
-        }
+        OpenError::Genius { error: GeniusError::NotOnBus { .. }, path }
+        | OpenError::NoNode { path } => failure.hint(format!(
+            "ser-cli genius devices --port geni:{path} lists the devices that are there"
+        )),
         _ => failure,
     }
 }
 
 impl From<RequestError> for Failure {
     fn from(error: RequestError) -> Failure {
-        let hint = error.hint().unwrap_or("try again; ser-cli status tells whether the recorder is well");
+        let hint =
+            error.hint().unwrap_or("try again; ser-cli status tells whether the recorder is well");
         let failure = Failure::new(&error).hint(hint);
         match error {
             // A recorder that is asked at another rate sees no question, and says nothing.
@@ -157,20 +174,24 @@ impl From<RequestError> for Failure {
                 diagnosis: Diagnosis::SilentOnBus { .. } | Diagnosis::Unacknowledged { .. },
                 ..
             } => failure.passing(true),
-            RequestError::Transport(TransportError::Genius(error)) => failure.passing(error.may_pass()),
+            RequestError::Transport(TransportError::Genius(error)) => {
+                failure.passing(error.may_pass())
+            }
             _ => failure,
         }
     }
 }
 
-/// When nothing was understood at the rate of the port, looks whether the recorder is there at another one.
+/// When nothing was understood at the rate of the port, looks whether the recorder is there at
+/// another one.
 pub(crate) fn explain_silence(failure: Failure, connection: &ConnectionArgs) -> Failure {
     if !failure.is_unanswered() {
         return failure;
     }
     if !endpoint(connection).is_ok_and(|endpoint| endpoint.has_baud()) {
         return failure.hint(
-            "a recorder stays silent also when a terminal server talks to it at another rate than its own",
+            "a recorder stays silent also when a terminal server talks to it at another rate \
+             than its own",
         );
     }
     inform("no answer: looking for the recorder at other rates …");
@@ -199,23 +220,27 @@ impl From<GeniusError> for Failure {
     }
 }
 
-/// Asks for the settings; `None` from an original recorder, which does not know the question and stays silent.
+/// Asks for the settings; `None` from an original recorder, which does not know the question and
+/// stays silent.
 ///
-/// A read, which every recorder answers, goes first: so a recorder that is not there at all is told apart, and waited for
-/// only once.
+/// A read, which every recorder answers, goes first: so a recorder that is not there at all is told
+/// apart, and waited for only once.
 pub(crate) fn settings(unit: &mut Unit) -> Result<Option<Configuration>> {
     unit.log_position()?;
     unless_unanswered(unit.configuration())
 }
 
 /// `None` where a recorder that is there does not answer.
-pub(crate) fn unless_unanswered<T>(answer: std::result::Result<T, RequestError>) -> Result<Option<T>> {
+pub(crate) fn unless_unanswered<T>(
+    answer: std::result::Result<T, RequestError>,
+) -> Result<Option<T>> {
     use Diagnosis::{Ignored, Silent, SilentOnBus};
     match answer {
         Ok(answer) => Ok(Some(answer)),
-        Err(RequestError::NoReply { diagnosis: Silent | SilentOnBus { .. } | Ignored { .. }, .. }) => {
-            Ok(None)
-        }
+        Err(RequestError::NoReply {
+            diagnosis: Silent | SilentOnBus { .. } | Ignored { .. },
+            ..
+        }) => Ok(None),
         Err(error) => Err(error.into()),
     }
 }
@@ -223,21 +248,31 @@ pub(crate) fn unless_unanswered<T>(answer: std::result::Result<T, RequestError>)
 /// The failure to do without the settings.
 pub(crate) fn settings_unknown() -> Failure {
     Failure::new(
-        "the recorder does not tell its settings: original recorders (HE660SER160, HE660SER320) never answer this query",
+        "the recorder does not tell its settings: original recorders (HE660SER160, HE660SER320) \
+         never answer this query",
     )
 }
 
-/// How many entries the recorder's log holds: as the user says, or as the recorder says, or as it was the last time.
-pub(crate) fn log_size(unit: &mut Unit, given: Option<u16>, remembered: Option<u16>) -> Result<u16> {
+/// How many entries the recorder's log holds: as the user says, or as the recorder says, or as it
+/// was the last time.
+pub(crate) fn log_size(
+    unit: &mut Unit,
+    given: Option<u16>,
+    remembered: Option<u16>,
+) -> Result<u16> {
     match given {
         Some(size) => Ok(size),
-        None => settings(unit)?.map(|settings| settings.size).or(remembered).ok_or_else(log_size_unknown),
+        None => settings(unit)?
+            .map(|settings| settings.size)
+            .or(remembered)
+            .ok_or_else(log_size_unknown),
     }
 }
 
 /// The failure to do without the size of the log.
 pub(crate) fn log_size_unknown() -> Failure {
-    settings_unknown().hint("say with --log-size N how many entries its log has (2048 as delivered)")
+    settings_unknown()
+        .hint("say with --log-size N how many entries its log has (2048 as delivered)")
 }
 
 /// Tells that the recorder talks at another rate from now on, where the rate is ours to follow.
@@ -273,7 +308,10 @@ mod tests {
         for port in [None, Some(""), Some("  ")] {
             let failure = opened(port);
             let text = failure.text();
-            assert!(failure.is_usage() && text.contains("--port") && text.contains("hint: "), "{text}");
+            assert!(
+                failure.is_usage() && text.contains("--port") && text.contains("hint: "),
+                "{text}"
+            );
         }
     }
 

@@ -1,5 +1,5 @@
-//! Where deliveries go: events and losses to standard output, losses also to standard error, the rest to the progress
-//! bar.
+//! Where deliveries go: events and losses to standard output, losses also to standard error, the
+//! rest to the progress bar.
 
 use std::fmt::Display;
 
@@ -42,8 +42,8 @@ impl Outlet {
         self.annotator.life()
     }
 
-    /// Writes deliveries and passes them on; `pending` more events are about to come. Before anything is passed on,
-    /// `remember` gets the life of the log.
+    /// Writes deliveries and passes them on; `pending` more events are about to come. Before
+    /// anything is passed on, `remember` gets the life of the log.
     pub(crate) fn take(
         &mut self,
         deliveries: &[Delivery],

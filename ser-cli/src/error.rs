@@ -1,4 +1,5 @@
-//! What the user is told when something does not work: a message, what to try next, and the exit code.
+//! What the user is told when something does not work: a message, what to try next, and the exit
+//! code.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -16,7 +17,8 @@ pub(crate) const EXIT_FAILURE: u8 = 1;
 /// The command line asks for something that cannot be; clap uses the same code.
 const EXIT_USAGE: u8 = 2;
 
-/// Everything went well, and events are missing in what was delivered; only if the user asked for that.
+/// Everything went well, and events are missing in what was delivered; only if the user asked for
+/// that.
 const EXIT_INCOMPLETE: u8 = 3;
 
 /// Why a command ended early.
@@ -55,8 +57,10 @@ impl Failure {
 
     /// Events are missing in what was delivered: exit code 3.
     pub(crate) fn incomplete(message: impl Display) -> Failure {
-        Failure::with_exit(message, EXIT_INCOMPLETE)
-            .hint("everything that could be read was delivered; each loss is in the output where it belongs")
+        Failure::with_exit(message, EXIT_INCOMPLETE).hint(
+            "everything that could be read was delivered; each loss is in the output where \
+             it belongs",
+        )
     }
 
     fn with_exit(message: impl Display, exit: u8) -> Failure {
@@ -121,7 +125,8 @@ impl Failure {
 
     /// The failure to read `what`.
     pub(crate) fn reading(what: impl Display, error: &io::Error) -> Failure {
-        Failure::new(format!("cannot read {what}: {error}")).hint("check its name and your rights to it")
+        Failure::new(format!("cannot read {what}: {error}"))
+            .hint("check its name and your rights to it")
     }
 
     /// Tells the user; gives the exit code.
@@ -139,9 +144,10 @@ impl Failure {
     pub(crate) fn text(&self) -> String {
         match self {
             Failure::OutputClosed | Failure::Interrupted => String::new(),
-            Failure::Told(report) => {
-                report.hints.iter().fold(report.message.clone(), |text, hint| format!("{text}\nhint: {hint}"))
-            }
+            Failure::Told(report) => report
+                .hints
+                .iter()
+                .fold(report.message.clone(), |text, hint| format!("{text}\nhint: {hint}")),
         }
     }
 
@@ -152,7 +158,8 @@ impl Failure {
     }
 }
 
-/// Writing to standard output is the only I/O that is not turned into a [`Failure`] where it happens.
+/// Writing to standard output is the only I/O that is not turned into a [`Failure`] where it
+/// happens.
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Failure {
         Failure::writing("standard output", &error)

@@ -20,8 +20,9 @@ static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 /// How many look at the flag. An interrupt that nobody looks for ends the program.
 static LOOKING: AtomicUsize = AtomicUsize::new(0);
 
-/// From now on an interrupt sets the flag instead of ending the program. The flag is looked at between two questions
-/// to the recorder; whoever does not want to wait for that presses Ctrl-C once more, which ends the program at once.
+/// From now on an interrupt sets the flag instead of ending the program. The flag is looked at
+/// between two questions to the recorder; whoever does not want to wait for that presses Ctrl-C
+/// once more, which ends the program at once.
 pub(crate) fn catch() -> Result<Arc<AtomicBool>> {
     // Before the first interrupt can come.
     LOOKING.fetch_add(1, Ordering::SeqCst);
@@ -41,7 +42,8 @@ impl Caught {
         &self.0
     }
 
-    /// Looks for the last time. An interrupt that comes later ends the program, unless somebody else looks for it.
+    /// Looks for the last time. An interrupt that comes later ends the program, unless somebody
+    /// else looks for it.
     pub(crate) fn ends_interrupted(self) -> bool {
         let flag = Arc::clone(&self.0);
         drop(self);
@@ -75,7 +77,8 @@ fn flag() -> Result<Arc<AtomicBool>> {
     Ok(flag)
 }
 
-/// Does what may have to wait for others without end, as opening a pipe does, until there is an interrupt.
+/// Does what may have to wait for others without end, as opening a pipe does, until there is an
+/// interrupt.
 pub(crate) fn unless_interrupted<T: Send + 'static>(
     stop: &AtomicBool,
     work: impl FnOnce() -> T + Send + 'static,

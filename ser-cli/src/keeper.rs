@@ -10,18 +10,21 @@ use crate::error::Result;
 use crate::output::{self, Before, Life};
 use crate::state::{Delivered, StateFile, StateLock};
 
-/// How much a crash may repeat, in time: writing the file after every event would wear a memory card.
+/// How much a crash may repeat, in time: writing the file after every event would wear a memory
+/// card.
 const SAVE_EVERY: Duration = Duration::from_secs(1);
 
 /// Where what was delivered is remembered.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct StateArgs {
-    /// Where to remember what was delivered; without it, the user's state directory (~/.local/state/ser-cli).
+    /// Where to remember what was delivered; without it, the user's state directory
+    /// (~/.local/state/ser-cli).
     ///
-    /// A recorder is the same however its port is spelled: by a relative path, by a link, by the device
-    /// behind it, or, on this computer, by localhost, 127.0.0.1 or `::1`. A USB adapter that has a
-    /// serial number is known by that (/dev/serial/by-id), not by the number that it gets when it
-    /// is plugged in. Numbers in /dev/pts are given anew: name a simulated recorder by its link.
+    /// A recorder is the same however its port is spelled: by a relative path, by a link, by the
+    /// device behind it, or, on this computer, by localhost, 127.0.0.1 or `::1`. A USB adapter that
+    /// has a serial number is known by that (/dev/serial/by-id), not by the number that it gets
+    /// when it is plugged in. Numbers in /dev/pts are given anew: name a simulated recorder by its
+    /// link.
     #[arg(long, env = "SER_STATE_DIR", hide_env_values = true, value_name = "DIR")]
     state_dir: Option<PathBuf>,
 }
@@ -32,14 +35,16 @@ pub(crate) struct Keeper {
     saved: Option<Delivered>,
     unsaved: Option<Delivered>,
     saved_at: Instant,
-    /// Held until the end: two that read what is new would deliver it twice, or move the cursor back.
+    /// Held until the end: two that read what is new would deliver it twice, or move the cursor
+    /// back.
     _lock: StateLock,
 }
 
 impl Keeper {
     /// Loads what has been delivered from this recorder.
     pub(crate) fn load(args: &StateArgs, connection: &ConnectionArgs) -> Result<Keeper> {
-        let mut file = StateFile::of_unit(&connection::unit_name(connection)?, args.state_dir.as_deref())?;
+        let mut file =
+            StateFile::of_unit(&connection::unit_name(connection)?, args.state_dir.as_deref())?;
         let lock = file.lock()?;
         let saved = file.load()?;
         Ok(Keeper { file, saved, unsaved: None, saved_at: Instant::now(), _lock: lock })
@@ -60,7 +65,9 @@ impl Keeper {
 
     /// What else is known of the log.
     pub(crate) fn before(&self) -> Before {
-        let Some(Delivered { cursor, next_life, erased, .. }) = self.saved else { return Before::default() };
+        let Some(Delivered { cursor, next_life, erased, .. }) = self.saved else {
+            return Before::default();
+        };
         Before { previous: cursor.and_then(|cursor| cursor.anchor).or(erased), erased, next_life }
     }
 
@@ -69,8 +76,8 @@ impl Keeper {
         self.saved.map(|delivered| delivered.size).filter(|&size| size > 0)
     }
 
-    /// Keeps the name of a life before anything of it is passed on: the next run must not give the same events another
-    /// one.
+    /// Keeps the name of a life before anything of it is passed on: the next run must not give the
+    /// same events another one.
     pub(crate) fn name(&mut self, life: Life, size: u16) -> Result<()> {
         let nothing = Delivered { cursor: None, size, life: None, next_life: None, erased: None };
         let known = self.unsaved.or(self.saved).unwrap_or(nothing);
@@ -85,7 +92,12 @@ impl Keeper {
     }
 
     /// Everything up to `cursor`, in a log of this life, has reached standard output.
-    pub(crate) fn delivered(&mut self, cursor: Option<Cursor>, size: u16, life: Life) -> Result<()> {
+    pub(crate) fn delivered(
+        &mut self,
+        cursor: Option<Cursor>,
+        size: u16,
+        life: Life,
+    ) -> Result<()> {
         if cursor.is_none() {
             return Ok(());
         }
@@ -97,13 +109,14 @@ impl Keeper {
         self.save_if_due()
     }
 
-    /// How many events of a log with this total have not been delivered; 0 as well where nobody reads what is new.
+    /// How many events of a log with this total have not been delivered; 0 as well where nobody
+    /// reads what is new.
     pub(crate) fn unread(&self, total: u16) -> u16 {
         self.cursor().map_or(0, |cursor| total.wrapping_sub(cursor.total()))
     }
 
-    /// The log was erased, and its total was this. If everything in it had been delivered, nothing is lost, and the next
-    /// reading begins a new log.
+    /// The log was erased, and its total was this. If everything in it had been delivered, nothing
+    /// is lost, and the next reading begins a new log.
     pub(crate) fn erased(&mut self, total: u16) -> Result<()> {
         let Some(cursor) = self.cursor() else { return Ok(()) };
         if self.unread(total) == 0 {
@@ -124,8 +137,8 @@ impl Keeper {
     /// Writes what is not written yet.
     pub(crate) fn save(&mut self) -> Result<()> {
         if let Some(delivered) = self.unsaved.take() {
-            // The events have to be on the disk before it is remembered that they are: after a power cut it is better
-            // to get some twice than to miss some.
+            // The events have to be on the disk before it is remembered that they are: after a
+            // power cut it is better to get some twice than to miss some.
             output::sync_stdout()?;
             self.file.save(&delivered)?;
             self.saved = Some(delivered);

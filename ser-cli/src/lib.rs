@@ -1,7 +1,7 @@
 //! The recorder's command line, as a library: the program is [`run`] and nothing else.
 //!
-//! What reads files of any origin can be used by itself, so that tests and fuzzers reach it: captures of a line
-//! ([`CaptureOptions`]), and what a run before has noted down ([`Delivered`]).
+//! What reads files of any origin can be used by itself, so that tests and fuzzers reach it:
+//! captures of a line ([`CaptureOptions`]), and what a run before has noted down ([`Delivered`]).
 
 mod cli;
 mod closed_stdout;

@@ -1,11 +1,12 @@
-//! A live view goes on when board, bus or recorder fail for a while: the failure is told, and only a long one is the
-//! end. `watch` and `genius globals --follow` live with failures in this way.
+//! A live view goes on when board, bus or recorder fail for a while: the failure is told, and only
+//! a long one is the end. `watch` and `genius globals --follow` live with failures in this way.
 
 use std::time::{Duration, Instant};
 
 use crate::error::{Failure, Result, inform};
 
-/// A board that was reset is back on the bus within ten seconds, and somebody may have to reset it first.
+/// A board that was reset is back on the bus within ten seconds, and somebody may have to reset it
+/// first.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A failure that has not passed yet, if there is one.
@@ -20,7 +21,8 @@ impl Outage {
         Outage { patience: patience.max(PATIENCE), since: None }
     }
 
-    /// Tells a failure that may pass, the first time; gives it back when it cannot pass, or has not for too long.
+    /// Tells a failure that may pass, the first time; gives it back when it cannot pass, or has not
+    /// for too long.
     pub(crate) fn bear(&mut self, failure: Failure, now: Instant) -> Result<()> {
         if !failure.may_pass() {
             return Err(failure);
@@ -51,7 +53,8 @@ mod tests {
     fn only_a_failure_that_lasts_too_long_is_the_end() {
         let began = Instant::now();
         let mut outage = Outage::new(Duration::from_secs(1));
-        let mut bear = |failure: Failure, after_s| outage.bear(failure, began + Duration::from_secs(after_s));
+        let mut bear =
+            |failure: Failure, after_s| outage.bear(failure, began + Duration::from_secs(after_s));
         assert!(bear(GeniusError::BoardSilent.into(), 0).is_ok());
         assert!(bear(GeniusError::NotOnBus { node: 5 }.into(), 59).is_ok());
         assert!(bear(GeniusError::OwnNumber { node: 31 }.into(), 59).is_err(), "will not pass");

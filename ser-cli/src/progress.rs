@@ -28,7 +28,8 @@ impl Progress {
 
     /// These events are there, and `pending` more are to come.
     pub(crate) fn advance(&mut self, deliveries: &[Delivery], pending: u32) {
-        let events = deliveries.iter().filter(|delivery| matches!(delivery, Delivery::Event { .. })).count();
+        let events =
+            deliveries.iter().filter(|delivery| matches!(delivery, Delivery::Event { .. })).count();
         self.delivered += u64::try_from(events).unwrap_or_default();
         let length = self.delivered + u64::from(pending);
         if self.wanted && self.bar.is_none() && length >= WORTH_A_BAR {

@@ -1,4 +1,5 @@
-//! What has been delivered already, kept in the user's state directory between two runs: one file per recorder.
+//! What has been delivered already, kept in the user's state directory between two runs: one file
+//! per recorder.
 //!
 //! A recorder that was called otherwise before has its file under that name; it moves when it is
 //! written. Files are replaced as a whole, and only files of ours are: no link is followed, and
@@ -45,7 +46,8 @@ pub struct Delivered {
     pub life: Option<Life>,
     /// The name of the next life, drawn before anything of it was delivered.
     pub next_life: Option<Life>,
-    /// The last event of the log before, if that was erased when everything in it had been delivered.
+    /// The last event of the log before, if that was erased when everything in it had been
+    /// delivered.
     pub erased: Option<Entry>,
 }
 
@@ -81,7 +83,13 @@ impl Delivered {
         let is_exact = content.exact.unwrap_or(false);
         let anchor = content.last.map(Entry::from);
         let cursor = sequence.map(|sequence| Cursor { sequence, is_exact, anchor });
-        Ok(Delivered { cursor, size: content.size, life, next_life, erased: content.erased.map(Entry::from) })
+        Ok(Delivered {
+            cursor,
+            size: content.size,
+            life,
+            next_life,
+            erased: content.erased.map(Entry::from),
+        })
     }
 
     /// The content of the state file of this recorder.
@@ -193,10 +201,11 @@ impl StateFile {
         };
         let cannot = |error| failed("lock", &path, error);
         if let Some(directory) = path.parent() {
-            fs::create_dir_all(directory).map_err(|error| failed("make the directory", directory, error))?;
+            fs::create_dir_all(directory)
+                .map_err(|error| failed("make the directory", directory, error))?;
         }
-        let file =
-            open_ours(&path, File::options().write(true).create(true).truncate(false)).map_err(cannot)?;
+        let file = open_ours(&path, File::options().write(true).create(true).truncate(false))
+            .map_err(cannot)?;
         match file.try_lock() {
             Ok(()) => Ok(StateLock { _file: file }),
             Err(TryLockError::WouldBlock) => Err(Failure::new(format!(
@@ -204,7 +213,10 @@ impl StateFile {
                 self.unit
             ))
             .hint("wait until it has ended, or end it: is a watch running?")
-            .hint("read --all needs no state; with --state-dir DIR a second reader gets everything, too")),
+            .hint(
+                "read --all needs no state; with --state-dir DIR a second reader gets \
+             everything, too",
+            )),
             Err(TryLockError::Error(error)) => Err(cannot(error)),
         }
     }
@@ -227,9 +239,12 @@ impl StateFile {
     /// content.
     pub(crate) fn save(&mut self, delivered: &Delivered) -> Result<()> {
         self.try_save(delivered).map_err(|error| {
-            Failure::new(format!("cannot remember in {} what was delivered: {error}", self.path.display()))
-                .hint("the next --new will deliver the same events again")
-                .hint("choose another directory with --state-dir DIR")
+            Failure::new(format!(
+                "cannot remember in {} what was delivered: {error}",
+                self.path.display()
+            ))
+            .hint("the next --new will deliver the same events again")
+            .hint("choose another directory with --state-dir DIR")
         })
     }
 
@@ -246,7 +261,9 @@ impl StateFile {
         temporary.write_all(text.as_bytes())?;
         temporary.as_file().sync_all()?;
         temporary.persist(&self.path)?;
-        if let Some(other) = self.moves_from.take().filter(|other| matches!(load_from(other), Ok(Some(_)))) {
+        if let Some(other) =
+            self.moves_from.take().filter(|other| matches!(load_from(other), Ok(Some(_))))
+        {
             // Found again, it would be taken for what another recorder has delivered.
             let _ = fs::remove_file(other);
         }
@@ -279,7 +296,10 @@ fn read_ours(path: &Path) -> io::Result<Option<Vec<u8>>> {
     };
     let mut text = Vec::new();
     if file.take(MAX_LEN + 1).read_to_end(&mut text)? as u64 > MAX_LEN {
-        return Err(io::Error::new(ErrorKind::InvalidData, format!("it is longer than {MAX_LEN} bytes")));
+        return Err(io::Error::new(
+            ErrorKind::InvalidData,
+            format!("it is longer than {MAX_LEN} bytes"),
+        ));
     }
     Ok(Some(text))
 }
@@ -326,7 +346,8 @@ fn default_directory() -> Result<PathBuf> {
     Ok(base.join("ser-cli"))
 }
 
-/// A name that any file system takes, that people can read, and that no other recorder's name gives.
+/// A name that any file system takes, that people can read, and that no other recorder's name
+/// gives.
 fn file_name(unit: &str) -> String {
     const SUFFIX: &str = ".json";
     // Windows takes COM3.json for the port itself.
@@ -366,7 +387,15 @@ impl From<LastEntry> for Entry {
         Entry {
             changed: Inputs(last.changed),
             state: Inputs(last.state),
-            time: TimeStamp { year, month, day, hour, minute, second, millisecond: last.millisecond },
+            time: TimeStamp {
+                year,
+                month,
+                day,
+                hour,
+                minute,
+                second,
+                millisecond: last.millisecond,
+            },
         }
     }
 }
@@ -378,8 +407,11 @@ mod tests {
 
     fn of_unit(name: &str, others: &[&str], directory: &Path) -> StateFile {
         let others = others.iter().map(|&other| other.to_owned()).collect();
-        StateFile::of_unit(&UnitName { name: name.to_owned(), others, aliases: Vec::new() }, Some(directory))
-            .unwrap()
+        StateFile::of_unit(
+            &UnitName { name: name.to_owned(), others, aliases: Vec::new() },
+            Some(directory),
+        )
+        .unwrap()
     }
 
     fn state_in(directory: &tempfile::TempDir) -> StateFile {
@@ -409,7 +441,11 @@ mod tests {
         let cursor = |sequence, is_exact, anchor| Some(Cursor { sequence, is_exact, anchor });
         let drawn = || Some(Life::begin().unwrap());
         for delivered in [
-            Delivered { cursor: cursor(u64::MAX, false, Some(last)), next_life: drawn(), ..delivered(0) },
+            Delivered {
+                cursor: cursor(u64::MAX, false, Some(last)),
+                next_life: drawn(),
+                ..delivered(0)
+            },
             Delivered {
                 cursor: cursor(0, true, None),
                 size: 1,
@@ -493,11 +529,18 @@ mod tests {
         of_unit(old, &[], directory.path()).save(&delivered(7)).unwrap();
         let mut state = of_unit(new, &["tcp://[::1]:4000", old], directory.path());
         assert_eq!(state.load().unwrap(), Some(delivered(7)));
-        assert_eq!(of_unit(old, &[], directory.path()).load().unwrap(), Some(delivered(7)), "not yet");
+        assert_eq!(
+            of_unit(old, &[], directory.path()).load().unwrap(),
+            Some(delivered(7)),
+            "not yet"
+        );
         for total in [8, 9] {
             state.save(&delivered(total)).unwrap();
             assert_eq!(of_unit(old, &[], directory.path()).load().unwrap(), None);
-            assert_eq!(of_unit(new, &[old], directory.path()).load().unwrap(), Some(delivered(total)));
+            assert_eq!(
+                of_unit(new, &[old], directory.path()).load().unwrap(),
+                Some(delivered(total))
+            );
         }
     }
 
@@ -509,7 +552,10 @@ mod tests {
         let endless = fs::File::create(&state.path).unwrap();
         endless.set_len(2 << 30).unwrap();
         let text = state.load().unwrap_err().text();
-        assert!(text.contains("longer than 65536 bytes") && text.contains("move the file away"), "{text}");
+        assert!(
+            text.contains("longer than 65536 bytes") && text.contains("move the file away"),
+            "{text}"
+        );
         assert!(state.save(&delivered).is_err());
         assert_eq!(endless.metadata().unwrap().len(), 2 << 30);
 
@@ -521,7 +567,11 @@ mod tests {
         fs::remove_file(&state.path).unwrap();
         fs::create_dir(&state.path).unwrap();
         assert!(state.load().is_err() && state.save(&delivered).is_err());
-        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1, "no temporary files are left");
+        assert_eq!(
+            fs::read_dir(directory.path()).unwrap().count(),
+            1,
+            "no temporary files are left"
+        );
     }
 
     #[cfg(unix)]

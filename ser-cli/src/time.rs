@@ -8,12 +8,12 @@ use ser_proto::TimeStamp;
 const FORMATS: [&str; 4] =
     ["%Y-%m-%dT%H:%M:%S%.f", "%Y-%m-%d %H:%M:%S%.f", "%Y-%m-%dT%H:%M", "%Y-%m-%d %H:%M"];
 
-/// Understands `2026-11-22T10:00:00.250`, also with a blank for the `T`, without fraction or without seconds.
+/// Understands `2026-11-22T10:00:00.250`, also with a blank for the `T`, without fraction or
+/// without seconds.
 pub(crate) fn parse_time(text: &str) -> Result<TimeStamp, String> {
     if text.ends_with(['Z', 'z']) || text.get(19..).is_some_and(|tail| tail.contains(['+', '-'])) {
-        return Err(
-            "a recorder's clock has no time zone: give the local time without Z or offset".to_string()
-        );
+        return Err("a recorder's clock has no time zone: give the local time without Z or offset"
+            .to_string());
     }
     let time = FORMATS
         .iter()
@@ -23,7 +23,9 @@ pub(crate) fn parse_time(text: &str) -> Result<TimeStamp, String> {
         return Err("a recorder's clock has no second 60".to_string());
     }
     if time.nanosecond() % 1_000_000 != 0 {
-        return Err("a recorder's clock has milliseconds, not finer: give up to three decimals".to_string());
+        return Err(
+            "a recorder's clock has milliseconds, not finer: give up to three decimals".to_string()
+        );
     }
     stamp(time).map_err(|year| format!("a recorder's clock runs from 1970 to 2069, not in {year}"))
 }
@@ -53,14 +55,15 @@ pub(crate) fn time_after(time: TimeStamp, elapsed: std::time::Duration) -> TimeS
 /// Milliseconds of the hundred years that two digits tell apart, 1970–2069.
 const CENTURY_MS: i64 = 36_525 * 86_400_000;
 
-/// So close to each other are two stamps on either side of the end of 2069, where the two digits of the year begin
-/// anew: ten years. Further apart, a clock was set.
+/// So close to each other are two stamps on either side of the end of 2069, where the two digits of
+/// the year begin anew: ten years. Further apart, a clock was set.
 const AROUND_2069_MS: i64 = 10 * 366 * 86_400_000;
 
 /// The time between two events, with its sign. 2069 is followed by 1970.
 ///
-/// As `+0.001 s`, `+1m02.003 s`, `+3h01m02 s`, `+2d03h01m`: the further apart, the coarser, so that it is taken in at
-/// a glance and fits a narrow column. The times themselves always show the millisecond.
+/// As `+0.001 s`, `+1m02.003 s`, `+3h01m02 s`, `+2d03h01m`: the further apart, the coarser, so that
+/// it is taken in at a glance and fits a narrow column. The times themselves always show the
+/// millisecond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Delta {
     ms: i64,
@@ -134,7 +137,10 @@ mod tests {
             let told = NaiveDateTime::try_from(local_time_in(ahead).unwrap()).unwrap();
             let after = now();
             // A stamp has whole milliseconds.
-            assert!((before - TimeDelta::milliseconds(1)..=after).contains(&told), "{before} {told} {after}");
+            assert!(
+                (before - TimeDelta::milliseconds(1)..=after).contains(&told),
+                "{before} {told} {after}"
+            );
         }
     }
 

@@ -1,9 +1,9 @@
-//! What a recorder is called: one name however the way to it is spelled, and the names that it may have
-//! had.
+//! What a recorder is called: one name however the way to it is spelled, and the names that it may
+//! have had.
 //!
 //! # Design
-//! Under its name is kept what was delivered from a recorder, so the name has to be the same from one
-//! run to the next.
+//! Under its name is kept what was delivered from a recorder, so the name has to be the same from
+//! one run to the next.
 //!
 //! - A link is a name that somebody has chosen because it lasts (`/dev/serial/by-id/…`,
 //!   `/dev/recorder1`), and stays.
@@ -14,9 +14,9 @@
 //!
 //! All other names of the recorder are looked under when there is nothing under this one. Other
 //! spellings of the same name, and names of versions before this one, give way to it. A name in its
-//! own right, such as that of the device that a link leads to, keeps what is under it: the recorder may be
-//! called by it again. The number of a pseudo-terminal is
-//! none of them, for the next program that wants one gets it.
+//! own right, such as that of the device that a link leads to, keeps what is under it: the recorder
+//! may be called by it again. The number of a pseudo-terminal is none of them, for the next program
+//! that wants one gets it.
 
 use std::fs;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
@@ -41,9 +41,9 @@ impl UnitName {
         let (name, others) = names(text, endpoint);
         let mut unit = UnitName { name, others: Vec::new(), aliases: Vec::new() };
         for other in others.into_iter().chain([text.to_owned()]) {
-            let is_alias = other
-                .parse()
-                .is_ok_and(|endpoint| matches!(names(&other, &endpoint), (name, _) if name == other));
+            let is_alias = other.parse().is_ok_and(
+                |endpoint| matches!(names(&other, &endpoint), (name, _) if name == other),
+            );
             let list = if is_alias { &mut unit.aliases } else { &mut unit.others };
             if other != unit.name && !list.contains(&other) {
                 list.push(other);
@@ -59,23 +59,28 @@ fn names(text: &str, endpoint: &Endpoint) -> (String, Vec<String>) {
         Endpoint::Tcp { address } => tcp_names(address),
         Endpoint::Geni { window, node } => window_names(window, *node),
         // Elsewhere the names of ports are no paths.
-        Endpoint::Serial { path } if cfg!(unix) => Devices::of_this_computer().names(Path::new(path)),
+        Endpoint::Serial { path } if cfg!(unix) => {
+            Devices::of_this_computer().names(Path::new(path))
+        }
         _ => (text.to_owned(), Vec::new()),
     }
 }
 
 fn tcp_names(address: &str) -> (String, Vec<String>) {
     let name = |host: &str, port: &str| format!("tcp://{host}:{port}");
-    let Some((host, port)) = address.rsplit_once(':') else { return (address.to_owned(), Vec::new()) };
+    let Some((host, port)) = address.rsplit_once(':') else {
+        return (address.to_owned(), Vec::new());
+    };
     let port = port.parse::<u16>().map_or(port.to_owned(), |port| port.to_string());
     let host = host.strip_suffix('.').unwrap_or(host).to_lowercase();
     let bare = host.strip_prefix('[').and_then(|host| host.strip_suffix(']')).unwrap_or(&host);
     let ip = bare.parse().map(|ip: IpAddr| ip.to_canonical()).ok();
     let here = ip.is_some_and(|ip| ip == Ipv4Addr::LOCALHOST || ip == Ipv6Addr::LOCALHOST);
     match ip {
-        _ if here || host == "localhost" => {
-            (name("localhost", &port), ["127.0.0.1", "[::1]"].map(|host| name(host, &port)).to_vec())
-        }
+        _ if here || host == "localhost" => (
+            name("localhost", &port),
+            ["127.0.0.1", "[::1]"].map(|host| name(host, &port)).to_vec(),
+        ),
         Some(IpAddr::V4(ip)) => (name(&ip.to_string(), &port), Vec::new()),
         Some(IpAddr::V6(ip)) => (name(&format!("[{ip}]"), &port), Vec::new()),
         None => (name(&host, &port), Vec::new()),
@@ -84,7 +89,8 @@ fn tcp_names(address: &str) -> (String, Vec<String>) {
 
 fn window_names(window: &GeniWindow, node: Option<u8>) -> (String, Vec<String>) {
     let name = |file: Option<PathBuf>, offset| {
-        let file = file.and_then(|file| file.to_str().map(str::to_owned)).unwrap_or(window.file.clone());
+        let file =
+            file.and_then(|file| file.to_str().map(str::to_owned)).unwrap_or(window.file.clone());
         Endpoint::Geni { window: GeniWindow { file, offset }, node }.to_string()
     };
     let absolute = std::path::absolute(&window.file).ok();
@@ -142,9 +148,11 @@ impl Devices {
     }
 
     fn links_by_id(&self, device: &Path) -> Vec<PathBuf> {
-        let links = fs::read_dir(&self.by_id).into_iter().flatten().flatten().map(|link| link.path());
-        let mut links: Vec<PathBuf> =
-            links.filter(|link| fs::canonicalize(link).is_ok_and(|target| target == device)).collect();
+        let links =
+            fs::read_dir(&self.by_id).into_iter().flatten().flatten().map(|link| link.path());
+        let mut links: Vec<PathBuf> = links
+            .filter(|link| fs::canonicalize(link).is_ok_and(|target| target == device))
+            .collect();
         links.sort();
         links
     }
@@ -152,9 +160,12 @@ impl Devices {
     /// Whether the USB adapter of a terminal tells itself from others of its kind.
     fn has_serial_number(&self, device: &Path) -> bool {
         let Some(name) = device.file_name() else { return false };
-        let Ok(device) = fs::canonicalize(self.terminals.join(name).join("device")) else { return false };
+        let Ok(device) = fs::canonicalize(self.terminals.join(name).join("device")) else {
+            return false;
+        };
         // The hubs above have serial numbers, too.
-        let adapter = device.ancestors().take(MAX_LEVELS).find(|folder| folder.join("idVendor").exists());
+        let adapter =
+            device.ancestors().take(MAX_LEVELS).find(|folder| folder.join("idVendor").exists());
         adapter.is_some_and(|adapter| adapter.join("serial").exists())
     }
 }
@@ -162,7 +173,8 @@ impl Devices {
 /// The path without `.`, `..` and links to folders; its last part may be a link.
 fn place(path: &Path) -> Option<PathBuf> {
     let last = path.file_name()?;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder =
+        path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     Some(fs::canonicalize(folder).ok()?.join(last))
 }
 
@@ -185,8 +197,15 @@ mod tests {
 
     #[test]
     fn this_computer_has_one_name() {
-        let spellings =
-            ["localhost", "127.0.0.1", "[::1]", "LocalHost", "localhost.", "[0:0::1]", "[::ffff:127.0.0.1]"];
+        let spellings = [
+            "localhost",
+            "127.0.0.1",
+            "[::1]",
+            "LocalHost",
+            "localhost.",
+            "[0:0::1]",
+            "[::ffff:127.0.0.1]",
+        ];
         for host in spellings {
             let unit = of(&format!("tcp://{host}:4000"));
             assert_eq!(unit.name, "tcp://localhost:4000", "{host}");
@@ -201,8 +220,16 @@ mod tests {
     fn an_address_is_the_same_however_it_is_written() {
         for (text, name, others) in [
             ("tcp://10.0.0.7:4000", "tcp://10.0.0.7:4000", vec![]),
-            ("tcp://10.0.0.7:04000", "tcp://10.0.0.7:4000", vec!["tcp://10.0.0.7:04000".to_owned()]),
-            ("tcp://Server.Local:1", "tcp://server.local:1", vec!["tcp://Server.Local:1".to_owned()]),
+            (
+                "tcp://10.0.0.7:04000",
+                "tcp://10.0.0.7:4000",
+                vec!["tcp://10.0.0.7:04000".to_owned()],
+            ),
+            (
+                "tcp://Server.Local:1",
+                "tcp://server.local:1",
+                vec!["tcp://Server.Local:1".to_owned()],
+            ),
             ("tcp://[FE80::7]:1", "tcp://[fe80::7]:1", vec!["tcp://[FE80::7]:1".to_owned()]),
         ] {
             assert_eq!(of(text), UnitName { name: name.to_owned(), others, aliases: Vec::new() });
@@ -273,7 +300,9 @@ mod tests {
             computer.plug_in("ttyUSB0", "FTDI_A1", Some("A1"));
             let by_id = computer.text("dev/serial/by-id/FTDI_A1");
             let device = computer.text("dev/ttyUSB0");
-            for path in ["dev/ttyUSB0", "dev/serial/by-id/FTDI_A1", "dev/serial/by-id/../../ttyUSB0"] {
+            for path in
+                ["dev/ttyUSB0", "dev/serial/by-id/FTDI_A1", "dev/serial/by-id/../../ttyUSB0"]
+            {
                 let (name, others) = computer.names(path);
                 assert_eq!(name, by_id, "{path}");
                 assert!(others.contains(&device), "{others:?}");
@@ -284,7 +313,8 @@ mod tests {
         fn adapters_that_cannot_be_told_apart_keep_their_numbers() {
             let computer = Computer::new();
             computer.plug_in("ttyUSB0", "CH340", None);
-            let (device, by_id) = (computer.text("dev/ttyUSB0"), computer.text("dev/serial/by-id/CH340"));
+            let (device, by_id) =
+                (computer.text("dev/ttyUSB0"), computer.text("dev/serial/by-id/CH340"));
             let (name, others) = computer.names("dev/ttyUSB0");
             assert_eq!(name, device);
             assert!(others.contains(&by_id));
@@ -320,7 +350,9 @@ mod tests {
             }
             // What an earlier version called it.
             let (_, others) = computer.names("sub/../ser");
-            assert!(others.contains(&format!("{}/sub/../ser", computer.text("").trim_end_matches('/'))));
+            assert!(
+                others.contains(&format!("{}/sub/../ser", computer.text("").trim_end_matches('/')))
+            );
         }
 
         #[test]

@@ -49,7 +49,8 @@ impl From<ReportVia> for AutoReport {
 /// A rate that the recorder has.
 pub(crate) fn baud(text: &str) -> Result<Baud, String> {
     text.parse().ok().and_then(Baud::from_bits_per_second).ok_or_else(|| {
-        let rates: Vec<_> = Baud::ALL.iter().map(|baud| baud.bits_per_second().to_string()).collect();
+        let rates: Vec<_> =
+            Baud::ALL.iter().map(|baud| baud.bits_per_second().to_string()).collect();
         format!("the recorder has the rates {}", rates.join(", "))
     })
 }
@@ -79,7 +80,8 @@ mod tests {
 
     #[test]
     fn time_spans_are_milliseconds_or_seconds() {
-        for (text, ms) in [("500ms", 500), ("2s", 2000), ("1.5", 1500), ("1.5s", 1500), ("1ms", 1)] {
+        for (text, ms) in [("500ms", 500), ("2s", 2000), ("1.5", 1500), ("1.5s", 1500), ("1ms", 1)]
+        {
             assert_eq!(duration(text), Ok(Duration::from_millis(ms)), "{text}");
         }
         for text in ["", "ms", "x", "0", "-1", "nan", "inf", "2h", "3601"] {

@@ -1,4 +1,5 @@
-//! The command line as a user types it, against simulated recorders: the native one and the ARM image.
+//! The command line as a user types it, against simulated recorders: the native one and the ARM
+//! image.
 #![cfg(unix)]
 
 mod common;
@@ -34,7 +35,8 @@ fn contacts_are_recorded_and_read_back_in_every_format(kind: Kind) {
     let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
     assert_eq!(rows[0], ["entry", "time", "input", "state", "sequence", "life", "note"]);
     let changes: Vec<_> = rows[1..].iter().map(|row| (row[0], row[2], row[3], row[4])).collect();
-    let expected = [("1", "3", "1", "1"), ("2", "1", "1", "2"), ("2", "16", "1", "2"), ("3", "3", "0", "3")];
+    let expected =
+        [("1", "3", "1", "1"), ("2", "1", "1", "2"), ("2", "16", "1", "2"), ("3", "3", "0", "3")];
     assert_eq!(changes, expected);
     assert!(rows[1..].iter().all(|row| row[5..] == ["0", ""]), "no memory, no life: {csv}");
     assert!(rows[1][1].starts_with("2026-11-22T10:0"), "{csv}");
@@ -67,7 +69,8 @@ fn read_new_delivers_each_event_once_and_says_what_is_lost(kind: Kind) {
     assert_eq!(bench.ok("read --new --format jsonl").lines().count(), 3);
     assert_eq!(bench.ok("read --new --format jsonl"), "");
     // Twenty more events into eight entries: twelve are overwritten.
-    let steps: Vec<_> = (0..20).map(|index| format!("{},5,{}", 2 * index, (index + 1) % 2)).collect();
+    let steps: Vec<_> =
+        (0..20).map(|index| format!("{},5,{}", 2 * index, (index + 1) % 2)).collect();
     bench.contacts(&steps.join("\n"), 5);
     wait_until("all have moved", || bench.ok("status").contains("23 since"));
     let output = bench.run("read --new --format jsonl");
@@ -84,12 +87,16 @@ fn read_new_delivers_each_event_once_and_says_what_is_lost(kind: Kind) {
 fn every_other_command_does_what_it_says(kind: Kind) {
     let mut bench = Bench::start(kind, &[]);
     let status = bench.ok("status");
-    assert!(status.contains("recording") && status.contains("0.10") && status.contains("2048"), "{status}");
+    assert!(
+        status.contains("recording") && status.contains("0.10") && status.contains("2048"),
+        "{status}"
+    );
 
     assert!(bench.ok("config").contains("9600"));
     let config = bench.ok("config --size 1024 --auto-report genius --report-to 1");
     let shown: Vec<Vec<&str>> = config.lines().map(|line| line.split("  ").collect()).collect();
-    let shown: Vec<_> = shown.iter().map(|words| (words[0], words[words.len() - 1].trim())).collect();
+    let shown: Vec<_> =
+        shown.iter().map(|words| (words[0], words[words.len() - 1].trim())).collect();
     let expected = [
         ("size", "1024 entries"),
         ("line baud", "9600"),
@@ -130,8 +137,9 @@ fn watch_shows_events_as_they_happen_and_puts_the_configuration_back(kind: Kind)
     let mut bench = Bench::start(kind, &[]);
     let before = bench.ok("config");
     bench.contacts("0,1,1", 1);
-    let mut watch =
-        Running::start(bench.command("watch --format csv").stdout(Stdio::piped()).stderr(Stdio::null()));
+    let mut watch = Running::start(
+        bench.command("watch --format csv").stdout(Stdio::piped()).stderr(Stdio::null()),
+    );
     let lines = watch.lines();
     let next = || lines.recv_timeout(PATIENCE).expect("a line of watch");
     assert_eq!(next(), "entry,time,input,state,sequence,life,note");
@@ -190,12 +198,17 @@ fn what_a_killed_simulator_has_left_behind_is_taken_over() {
 #[test]
 fn a_unit_over_tcp_answers_like_one_on_a_port() {
     let mut sim = Running::start(
-        ser_cli().args(["sim", "--tcp", "127.0.0.1:0"]).stdout(Stdio::piped()).stderr(Stdio::null()),
+        ser_cli()
+            .args(["sim", "--tcp", "127.0.0.1:0"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null()),
     );
     let port = sim.lines().recv_timeout(PATIENCE).expect("what to give to --port");
     assert!(port.starts_with("tcp://127.0.0.1:"), "{port}");
-    let status =
-        ser_cli().args(["--timeout", "20s", "--port", &port, "status"]).output().expect("ser-cli runs");
+    let status = ser_cli()
+        .args(["--timeout", "20s", "--port", &port, "status"])
+        .output()
+        .expect("ser-cli runs");
     assert!(text(&status.stdout).contains("recording"), "{}", text(&status.stderr));
 }
 
@@ -236,16 +249,21 @@ fn a_client_that_says_nothing_gives_way_in_the_end() {
     let (_sim, port, told) = sim_on_tcp(&["--tcp-idle", "1s"]);
     let silent = connected(&port);
     wait_until("the place is free", || status_of(&port).status.success());
-    let gives_way = format!("warning: {} has been silent", silent.local_addr().expect("an address"));
+    let gives_way =
+        format!("warning: {} has been silent", silent.local_addr().expect("an address"));
     wait_until("the notice", || told.try_iter().any(|line| line.starts_with(&gives_way)));
 }
 
 #[test]
 fn an_address_whose_host_is_not_known_is_told_apart() {
-    let output = ser_cli().args(["sim", "--tcp", "no-such-host.invalid:4000"]).output().expect("runs");
+    let output =
+        ser_cli().args(["sim", "--tcp", "no-such-host.invalid:4000"]).output().expect("runs");
     let error = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{error}");
-    assert!(error.contains("no host of this name") && error.contains("hint: check the spelling"), "{error}");
+    assert!(
+        error.contains("no host of this name") && error.contains("hint: check the spelling"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -269,7 +287,10 @@ fn a_wrong_contacts_file_is_refused_with_file_line_and_reason() {
             .expect("ser-cli runs");
         let error = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{error}");
-        assert!(error.contains("trip.csv") && error.contains(&format!("line {line}")), "{content}: {error}");
+        assert!(
+            error.contains("trip.csv") && error.contains(&format!("line {line}")),
+            "{content}: {error}"
+        );
     }
 }
 
@@ -331,7 +352,10 @@ fn wrong_rate(port: &str) -> Ended {
 fn silent_unit(bench: &Bench) -> Ended {
     bench.sim.signal("-STOP");
     let (ended, error) = impatient(bench.link().to_str().expect("UTF-8"), "9600");
-    assert!(error.contains("not one byte") && error.contains("at any other rate either"), "{error}");
+    assert!(
+        error.contains("not one byte") && error.contains("at any other rate either"),
+        "{error}"
+    );
     ended
 }
 
@@ -341,11 +365,13 @@ fn print_shows_what_was_asked_for_although_the_unit_prints_new_events_too() {
     bench.contacts("0,1,1\n1,2,1\n2,3,1\n3,4,1\n4,5,1", 5);
     bench.ok("config --auto-print on");
     let input = bench.sim.0.stdin.as_mut().expect("piped");
-    let steps: String = (0..500).map(|index| format!("{},32,{}\n", 20 * index, (index + 1) % 2)).collect();
+    let steps: String =
+        (0..500).map(|index| format!("{},32,{}\n", 20 * index, (index + 1) % 2)).collect();
     write!(input, "ms,input,state\n{steps}\n").expect("the simulator reads");
     wait_until("new events are printed", || bench.entries() > 8);
     let printed = bench.ok("print --from 1 --count 5");
-    let starts: Vec<_> = printed.lines().map(|line| line.split(' ').next().unwrap_or_default()).collect();
+    let starts: Vec<_> =
+        printed.lines().map(|line| line.split(' ').next().unwrap_or_default()).collect();
     assert_eq!(starts, ["0001", "0002", "0003", "0004", "0005"], "{printed}");
 }
 
@@ -363,10 +389,14 @@ fn scenarios_on_standard_input_follow_each_other_until_a_line_is_wrong() {
     );
     wait_until("the link appears", || link.exists());
     let mut input = sim.0.stdin.take().expect("piped");
-    input.write_all(b"ms,input,state\n0,1,1\n20,1,0\n\nms,input,state\n0,2,1\n7,2,0\n\n").expect("read");
+    input
+        .write_all(b"ms,input,state\n0,1,1\n20,1,0\n\nms,input,state\n0,2,1\n7,2,0\n\n")
+        .expect("read");
     let changes = || {
-        let read =
-            ser_cli().args(["--timeout", "20s", "read", "--format", "csv", "--port"]).arg(&link).output();
+        let read = ser_cli()
+            .args(["--timeout", "20s", "read", "--format", "csv", "--port"])
+            .arg(&link)
+            .output();
         let csv = text(&read.expect("ser-cli runs").stdout);
         csv.lines()
             .skip(1)
@@ -404,8 +434,9 @@ fn what_the_simulator_lacks_is_named_with_a_hint_that_fits() {
 #[test]
 fn a_second_reader_of_what_is_new_is_told_of_the_first() {
     let bench = Bench::start(Kind::Native, &[]);
-    let mut watch =
-        Running::start(bench.command("watch --format csv").stdout(Stdio::piped()).stderr(Stdio::null()));
+    let mut watch = Running::start(
+        bench.command("watch --format csv").stdout(Stdio::piped()).stderr(Stdio::null()),
+    );
     watch.lines().recv_timeout(PATIENCE).expect("watch has the state");
     let error = bench.fails(1, "read --new");
     assert!(error.contains("another ser-cli") && error.contains("hint: "), "{error}");
@@ -440,8 +471,9 @@ fn a_unit_is_the_same_however_its_port_is_spelled() {
 fn a_polite_kill_lets_watch_put_the_configuration_back() {
     let bench = Bench::start(Kind::Native, &[]);
     let before = bench.ok("config");
-    let mut watch =
-        Running::start(bench.command("watch --format csv").stdout(Stdio::piped()).stderr(Stdio::null()));
+    let mut watch = Running::start(
+        bench.command("watch --format csv").stdout(Stdio::piped()).stderr(Stdio::null()),
+    );
     watch.lines().recv_timeout(PATIENCE).expect("watch has the unit");
     watch.signal("-TERM");
     assert_eq!(watch.wait(), Some(0));
@@ -452,13 +484,17 @@ fn a_polite_kill_lets_watch_put_the_configuration_back() {
 fn the_second_interrupt_ends_a_command_that_waits_for_a_silent_unit() {
     let bench = Bench::start(Kind::Native, &[]);
     let mut watch = Running::start(
-        bench.command("watch --format csv --interval 10ms").stdout(Stdio::piped()).stderr(Stdio::piped()),
+        bench
+            .command("watch --format csv --interval 10ms")
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped()),
     );
     watch.lines().recv_timeout(PATIENCE).expect("watch has the unit");
     bench.sim.signal("-STOP");
     let began = Instant::now();
     wait_until("watch ends", || {
-        // However far apart they are, and whether the first comes in the middle of a question or before it.
+        // However far apart they are, and whether the first comes in the middle of a question or
+        // before it.
         watch.signal("-INT");
         watch.0.try_wait().expect("a child").is_some()
     });
@@ -494,8 +530,9 @@ fn a_reading_that_is_interrupted_fails_and_the_next_goes_on_there() {
 #[test]
 fn a_port_that_somebody_else_has_is_busy() {
     let bench = Bench::start(Kind::Native, &[]);
-    let mut watch =
-        Running::start(bench.command("watch --format csv").stdout(Stdio::piped()).stderr(Stdio::null()));
+    let mut watch = Running::start(
+        bench.command("watch --format csv").stdout(Stdio::piped()).stderr(Stdio::null()),
+    );
     let lines = watch.lines();
     lines.recv_timeout(PATIENCE).expect("watch has the port");
     let error = bench.fails(1, "status");
@@ -504,8 +541,10 @@ fn a_port_that_somebody_else_has_is_busy() {
 
 #[test]
 fn what_encode_writes_decode_reads() {
-    let output =
-        ser_cli().args(["encode", "read", "--from", "500", "--count", "5"]).output().expect("it runs");
+    let output = ser_cli()
+        .args(["encode", "read", "--from", "500", "--count", "5"])
+        .output()
+        .expect("it runs");
     let frame = text(&output.stdout);
     assert_eq!(frame.trim_end(), "1B 30 34 35 32 30 31 46 34 30 35 34 43");
     let mut decode = Running::start(
@@ -571,16 +610,19 @@ fn every_command_explains_itself_with_an_example() {
         .collect();
     assert!(commands.len() >= 15, "{commands:?}");
     for command in commands {
-        let help = text(&ser_cli().args([command, "--help"]).output().expect("ser-cli runs").stdout);
+        let help =
+            text(&ser_cli().args([command, "--help"]).output().expect("ser-cli runs").stdout);
         let (_, examples) = help.split_once("Examples:\n").expect("examples");
-        let example = |line: &str| line.contains("ser-cli ") && line.contains(&format!(" {command}"));
+        let example =
+            |line: &str| line.contains("ser-cli ") && line.contains(&format!(" {command}"));
         assert!(examples.lines().any(example), "{help}");
     }
 }
 
 #[test]
 fn output_that_nobody_reads_is_no_failure() {
-    let mut demo = Running::start(ser_cli().arg("demo").stdout(Stdio::piped()).stderr(Stdio::piped()));
+    let mut demo =
+        Running::start(ser_cli().arg("demo").stdout(Stdio::piped()).stderr(Stdio::piped()));
     drop(demo.0.stdout.take());
     let code = demo.wait();
     let mut error = String::new();
@@ -591,7 +633,8 @@ fn output_that_nobody_reads_is_no_failure() {
 #[test]
 fn completions_know_the_subcommands() {
     for shell in ["bash", "zsh", "fish"] {
-        let script = text(&ser_cli().args(["completions", shell]).output().expect("ser-cli runs").stdout);
+        let script =
+            text(&ser_cli().args(["completions", shell]).output().expect("ser-cli runs").stdout);
         assert!(script.contains("last-broadcast"), "{shell}");
     }
 }
@@ -628,7 +671,8 @@ mod needs_sqlite3 {
             "1|1|1\n1|16|1\n2|1|0\n3|16|0\n"
         );
         // Both stamps are times to `SQLite`, too, and as far apart as the contacts moved.
-        let apart = "select round((max(julianday(time)) - min(julianday(time))) * 86400000) from events";
+        let apart =
+            "select round((max(julianday(time)) - min(julianday(time))) * 86400000) from events";
         assert_eq!(asked(&csv, apart), "9.0\n");
     }
 }

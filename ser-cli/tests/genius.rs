@@ -1,5 +1,5 @@
-//! The command line on a Genius bus: `ser-cli sim --genius` plays board, bus and recorders, and every command reaches
-//! them through the file that is the host's window.
+//! The command line on a Genius bus: `ser-cli sim --genius` plays board, bus and recorders, and
+//! every command reaches them through the file that is the host's window.
 #![cfg(unix)]
 
 mod common;
@@ -37,14 +37,20 @@ impl Bench {
     fn start(options: &str) -> Bench {
         let folder = tempfile::tempdir().expect("a folder");
         let mut command = ser_cli();
-        command.arg("sim").arg("--genius").arg(folder.path().join("host")).args(["--contacts", "-"]);
+        command
+            .arg("sim")
+            .arg("--genius")
+            .arg(folder.path().join("host"))
+            .args(["--contacts", "-"]);
         command.args(options.split_whitespace()).current_dir(folder.path());
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
         let mut sim = Running::start(&mut command);
         let lines = sim.lines();
-        let ports = options.split_whitespace().filter(|word| ["--node", "--pty"].contains(word)).count();
-        let announced =
-            (0..ports).map(|_| lines.recv_timeout(PATIENCE).expect("the simulator answers")).collect();
+        let ports =
+            options.split_whitespace().filter(|word| ["--node", "--pty"].contains(word)).count();
+        let announced = (0..ports)
+            .map(|_| lines.recv_timeout(PATIENCE).expect("the simulator answers"))
+            .collect();
         let timeout = if options.contains("--bus-noise") { NOISY_TIMEOUT } else { PATIENT_TIMEOUT };
         Bench { folder, sim, announced, timeout }
     }
@@ -119,12 +125,16 @@ fn without_times(csv: &str) -> Vec<String> {
 fn every_command_works_over_the_bus() {
     let mut bench = Bench::start("--node 5 --node 9:ser160");
     assert_eq!(bench.announced, [bench.port(5), bench.port(9)]);
-    let taps =
-        (0..25).map(|tap| format!("{},1,{},5\n{},16,{},9", tap * 2, 1 - tap % 2, tap * 2, 1 - tap % 2));
-    let csv = std::iter::once("ms,input,state,node".to_string()).chain(taps).collect::<Vec<_>>().join("\n");
+    let taps = (0..25)
+        .map(|tap| format!("{},1,{},5\n{},16,{},9", tap * 2, 1 - tap % 2, tap * 2, 1 - tap % 2));
+    let csv = std::iter::once("ms,input,state,node".to_string())
+        .chain(taps)
+        .collect::<Vec<_>>()
+        .join("\n");
     bench.play(&csv, 5, 25);
 
-    // Seven entries fit a datagram of the larger model and ten of the smaller: neither is lost or doubled.
+    // Seven entries fit a datagram of the larger model and ten of the smaller: neither is lost or
+    // doubled.
     for (node, input) in [(5, 1), (9, 16)] {
         let rows = without_times(&bench.ok(node, "read --all --format csv"));
         let expected = (1..=25).map(|entry| format!("{entry},{input},{}", entry % 2));
@@ -143,7 +153,11 @@ fn every_command_works_over_the_bus() {
     assert!(bench.ok(5, "status").contains("recording"));
     assert_eq!(bench.ok(5, "last-broadcast"), "none since power-up\n");
     let printed = bench.run(5, "print --from 1 --count 1");
-    assert!(printed.status.success() && stderr(&printed).contains("RS-232"), "{}", stderr(&printed));
+    assert!(
+        printed.status.success() && stderr(&printed).contains("RS-232"),
+        "{}",
+        stderr(&printed)
+    );
     // What is new is delivered once, to each reader of its own recorder.
     assert_eq!(bench.ok(9, "read --new --format jsonl").lines().count(), 25);
     assert_eq!(bench.ok(9, "read --new --format jsonl"), "");
@@ -171,7 +185,10 @@ fn the_bus_is_seen_and_spoken_to_as_a_whole() {
     for command in ["genius globals --model-number 3", "genius broadcast --model-number 3 stop"] {
         let (code, told) = told(bench.command(&bench.bus(), command));
         assert_eq!(code, Some(1), "{told}");
-        assert!(told.contains("no recorder is logged in") && told.contains("--model-number"), "{told}");
+        assert!(
+            told.contains("no recorder is logged in") && told.contains("--model-number"),
+            "{told}"
+        );
     }
     assert_eq!(
         bench.on_bus("genius forces --node 9 --table input-enable"),
@@ -203,7 +220,8 @@ fn the_bus_is_seen_and_spoken_to_as_a_whole() {
     let [first, second] = [5, 9].map(|node| hour_ms(&stamp(node).expect("an event")));
     assert!(first.abs_diff(second) <= CLOCKS_AGREE_WITHIN_MS, "{:?} {:?}", stamp(5), stamp(9));
 
-    let refused = bench.command(&bench.bus(), "genius broadcast erase").output().expect("ser-cli runs");
+    let refused =
+        bench.command(&bench.bus(), "genius broadcast erase").output().expect("ser-cli runs");
     assert_eq!((refused.status.code(), stderr(&refused).contains("--yes")), (Some(2), true));
     assert!(bench.on_bus("genius broadcast stop").matches("yes").count() == 2);
     assert!(bench.ok(9, "status").contains("stopped"));
@@ -238,7 +256,8 @@ fn live_views_survive_a_board_that_stands_still() {
     survives(&mut bench, &mut watch, ["1,7,1", "2,7,0"], 0);
 }
 
-/// A live view shows one thing, then the simulator stands still until that is told, and then it shows another.
+/// A live view shows one thing, then the simulator stands still until that is told, and then it
+/// shows another.
 fn survives(bench: &mut Bench, view: &mut Command, [before, after]: [&str; 2], contact: u8) {
     let mut view = Running::start(view.stdout(Stdio::piped()).stderr(Stdio::piped()));
     let (rows, told) = (view.lines(), view.told());
@@ -269,17 +288,22 @@ fn events_are_watched_over_the_bus_and_rs_232_works_beside_it() {
     let line = bench.folder.path().join("line");
     assert_eq!(bench.announced, [line.file_name().unwrap().to_str().unwrap(), &bench.port(5)]);
     let mut command = bench.command(&bench.port(5), "watch --format csv");
-    let mut watch =
-        Running(command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("ser-cli runs"));
+    let mut watch = Running(
+        command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("ser-cli runs"),
+    );
     let rows = watch.lines();
-    assert_eq!(rows.recv_timeout(PATIENCE).as_deref(), Ok("entry,time,input,state,sequence,life,note"));
+    assert_eq!(
+        rows.recv_timeout(PATIENCE).as_deref(),
+        Ok("entry,time,input,state,sequence,life,note")
+    );
 
     // The window belongs to one program at a time; the serial line is another way.
     let second = bench.run(5, "status");
     assert_eq!(second.status.code(), Some(1));
     assert!(stderr(&second).contains("is in use"), "{}", stderr(&second));
     let on_line = |arguments: &str| {
-        let output = bench.command(line.to_str().unwrap(), arguments).output().expect("ser-cli runs");
+        let output =
+            bench.command(line.to_str().unwrap(), arguments).output().expect("ser-cli runs");
         succeeded(arguments, &output)
     };
     wait_until("reports go to the host", || {
@@ -295,7 +319,10 @@ fn events_are_watched_over_the_bus_and_rs_232_works_beside_it() {
     assert_eq!(watch.interrupt(), Some(0));
     let line_port = line.to_str().unwrap().to_string();
     let settings = bench.command(&line_port, "config").output().expect("ser-cli runs");
-    assert!(succeeded("config", &settings).contains("auto report     off"), "the recorder's setting is back");
+    assert!(
+        succeeded("config", &settings).contains("auto report     off"),
+        "the recorder's setting is back"
+    );
 }
 
 #[test]
@@ -358,16 +385,17 @@ fn each_mistake_has_a_message_of_its_own() {
 
 #[test]
 fn a_bus_may_be_slow_and_noisy_and_its_host_have_any_number() {
-    let mut bench =
-        Bench::start("--node 5 --node 9:ser160 --bus-rate 38.4k --host-number 0 --bus-noise 0.5 --seed 3");
+    let mut bench = Bench::start(
+        "--node 5 --node 9:ser160 --bus-rate 38.4k --host-number 0 --bus-noise 0.5 --seed 3",
+    );
     let taps = (0..30).map(|tap| format!("\n{},1,{},5", tap * 2, 1 - tap % 2));
     let csv = std::iter::once("ms,input,state,node".to_string()).chain(taps).collect::<String>();
     bench.play(&csv, 5, 30);
     let rows = without_times(&bench.ok(5, "read --all --format csv"));
     let expected = (1..=30).map(|entry| format!("{entry},1,{}", entry % 2));
     assert_eq!(rows[1..], expected.collect::<Vec<_>>(), "neither lost nor doubled");
-    // Which message meets with an accident depends on when the commands above were given, so one may have to wait for
-    // it.
+    // Which message meets with an accident depends on when the commands above were given, so one
+    // may have to wait for it.
     wait_until("the board has counted a bus error", || {
         let devices = bench.command(&bench.bus(), "genius devices").output().expect("ser-cli runs");
         let told = stderr(&devices);
@@ -381,8 +409,9 @@ fn a_bus_may_be_slow_and_noisy_and_its_host_have_any_number() {
 fn inputs_are_followed_live_until_ctrl_c() {
     let mut bench = Bench::start("--node 5 --node 9:ser160");
     let mut command = bench.command(&bench.bus(), "genius globals --follow");
-    let mut follow =
-        Running(command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("ser-cli runs"));
+    let mut follow = Running(
+        command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("ser-cli runs"),
+    );
     let rows = follow.lines();
     let shown = |expected: &str| {
         let row = rows.recv_timeout(PATIENCE).expect("a row");
@@ -436,11 +465,14 @@ fn ctrl_c_ends_the_wait_for_a_board_and_puts_back_what_was_written() {
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn the_image_is_spoken_to_over_the_bus() {
     let image = image();
-    let bench = Bench::start(&format!("--node 5 --node 9 --image {}", image.to_str().expect("UTF-8")));
+    let bench =
+        Bench::start(&format!("--node 5 --node 9 --image {}", image.to_str().expect("UTF-8")));
     assert!(bench.ok(5, "status").contains("recording"));
     let clock = bench.on_bus("genius broadcast clock --at 2026-11-22T10:00:00");
     assert_eq!(clock.matches("yes        set clock at 10:00:00.000").count(), 2, "{clock}");
     assert_eq!(bench.ok(5, "read --all --format jsonl"), "");
     bench.ok(5, "stop");
-    assert!(bench.ok(5, "status").contains("stopped") && bench.ok(9, "status").contains("recording"));
+    assert!(
+        bench.ok(5, "status").contains("stopped") && bench.ok(9, "status").contains("recording")
+    );
 }

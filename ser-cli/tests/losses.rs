@@ -13,8 +13,8 @@ use std::thread;
 use common::bench::{Bench, text};
 use common::ser_cli;
 use ser_proto::{
-    Configuration, Decoded, Entry, FrameDecoder, FrameEncoder, Inputs, MAX_BODY_LEN, Model, ReadReply, Reply,
-    TimeStamp,
+    Configuration, Decoded, Entry, FrameDecoder, FrameEncoder, Inputs, MAX_BODY_LEN, Model,
+    ReadReply, Reply, TimeStamp,
 };
 use ser_sim::testing::Kind;
 
@@ -23,7 +23,8 @@ fn columns(row: &str) -> Vec<&str> {
     row.splitn(7, ',').collect()
 }
 
-/// A recorder of 8 entries whose first three events have been read, and that has had twenty more since.
+/// A recorder of 8 entries whose first three events have been read, and that has had twenty more
+/// since.
 fn overrun() -> Bench {
     let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
     bench.ok("config --size 8");
@@ -45,7 +46,8 @@ impl Seen {
     fn start() -> Seen {
         let window = tempfile::tempdir().expect("a folder");
         let host = window.path().join("host").display().to_string();
-        let bench = Bench::start(Kind::Native, &["--model", "ser160", "--node", "5", "--genius", &host]);
+        let bench =
+            Bench::start(Kind::Native, &["--model", "ser160", "--node", "5", "--genius", &host]);
         Seen { bench, window }
     }
 
@@ -56,7 +58,8 @@ impl Seen {
         let port = format!("geni:{}", self.window.path().join("host").display());
         common::wait_until("the contacts have moved", || {
             let mut command = ser_cli();
-            let globals = command.args(["genius", "globals", "--timeout", "20s", "--port", &port]).output();
+            let globals =
+                command.args(["genius", "globals", "--timeout", "20s", "--port", &port]).output();
             text(&globals.expect("ser-cli runs").stdout).lines().any(|line| line.ends_with(on))
         });
     }
@@ -90,7 +93,10 @@ fn the_rows_of_a_log_and_its_losses_go_on_from_run_to_run() {
     // By somebody who knows nothing of what was read here.
     bench.ok(&format!("erase --yes --state-dir {}", bench.folder.path().join("another").display()));
     bench.contacts("0,1,0", 1);
-    assert_eq!(append(&bench, "read --new --format csv --fail-on-loss", &file).status.code(), Some(3));
+    assert_eq!(
+        append(&bench, "read --new --format csv --fail-on-loss", &file).status.code(),
+        Some(3)
+    );
 
     let csv = fs::read_to_string(&file).expect("text");
     let rows: Vec<_> = csv.lines().map(columns).collect();
@@ -101,7 +107,10 @@ fn the_rows_of_a_log_and_its_losses_go_on_from_run_to_run() {
     let sequences: Vec<_> = rows[2..10].iter().map(|row| (row[4], row[5])).collect();
     let expected: Vec<_> = (16..=23).map(|sequence| sequence.to_string()).collect();
     assert_eq!(sequences, expected.iter().map(|sequence| (&sequence[..], old)).collect::<Vec<_>>());
-    assert_eq!(rows[10], ["", "", "", "", "23", old, "lost an unknown number after 23: log began anew"]);
+    assert_eq!(
+        rows[10],
+        ["", "", "", "", "23", old, "lost an unknown number after 23: log began anew"]
+    );
     assert_eq!((rows[11][0], rows[11][4]), ("1", "1"), "the new log counts from its beginning");
     assert!(old.len() == 16 && new.len() == 16 && old != new, "each log has its name: {csv}");
 }
@@ -117,15 +126,19 @@ fn inputs_that_change_while_recording_is_stopped_are_named() {
     bench.contacts("0,1,0", 1);
     let output = bench.run("read --format jsonl --fail-on-loss");
     let lines = text(&output.stdout);
-    let loss = "{\"lost\":null,\"count\":\"unknown\",\"after\":1,\"why\":\"not recorded\",\"inputs\":[7,9],\"life\":\"0\"}";
+    let loss = "{\"lost\":null,\"count\":\"unknown\",\"after\":1,\"why\":\"not \
+     recorded\",\"inputs\":[7,9],\"life\":\"0\"}";
     assert_eq!(lines.lines().nth(1), Some(loss), "{lines}");
     assert_eq!((lines.lines().count(), output.status.code()), (3, Some(3)));
     assert!(
-        text(&output.stderr).contains("lost ahead of entry 2: inputs 7 9 changed while nothing was recorded")
+        text(&output.stderr)
+            .contains("lost ahead of entry 2: inputs 7 9 changed while nothing was recorded")
     );
     // By number, too.
     let range = bench.run("read --from 1 --count 2 --format csv --fail-on-loss");
-    assert!(text(&range.stdout).contains(",,,,,0,\"lost an unknown number: not recorded, inputs 7 9\""));
+    assert!(
+        text(&range.stdout).contains(",,,,,0,\"lost an unknown number: not recorded, inputs 7 9\"")
+    );
     assert_eq!(range.status.code(), Some(3));
 }
 
@@ -224,8 +237,10 @@ fn read(entries: &[Entry], start: u16, count: u8) -> ReadReply {
 
 #[test]
 fn entries_that_cannot_be_are_delivered_and_marked_and_harm_no_others() {
-    let time = TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 7 };
-    let at = |time: TimeStamp, on: bool| Entry { changed: Inputs(1), state: Inputs(on.into()), time };
+    let time =
+        TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 7 };
+    let at =
+        |time: TimeStamp, on: bool| Entry { changed: Inputs(1), state: Inputs(on.into()), time };
     let mut entries = vec![
         at(time, true),
         at(TimeStamp { month: 13, ..time }, false),
@@ -279,9 +294,14 @@ fn reading_and_erasing_again_and_again_loses_nothing_and_says_so() {
         assert!(!text(&erased.stderr).contains("warning"), "{}", text(&erased.stderr));
     }
     let csv = fs::read_to_string(&file).expect("text");
-    let lives: std::collections::BTreeSet<_> = csv.lines().skip(1).map(|row| columns(row)[5]).collect();
+    let lives: std::collections::BTreeSet<_> =
+        csv.lines().skip(1).map(|row| columns(row)[5]).collect();
     assert_eq!((csv.lines().count(), lives.len()), (1 + 8, 4), "{csv}");
-    assert_eq!(columns(csv.lines().last().expect("a row"))[4], "2", "each log counts from its beginning");
+    assert_eq!(
+        columns(csv.lines().last().expect("a row"))[4],
+        "2",
+        "each log counts from its beginning"
+    );
 }
 
 #[test]
@@ -298,7 +318,8 @@ fn what_an_erase_takes_along_unread_is_told() {
     assert_eq!(output.status.code(), Some(3));
     assert!(text(&output.stdout).contains("lost an unknown number after 1: log began anew"));
 
-    // And so is a change of which the new log has no event, as one between the last look and the erase.
+    // And so is a change of which the new log has no event, as one between the last look and the
+    // erase.
     bench.ok("stop");
     seen.contacts("0,7,1", "  7");
     let bench = &mut seen.bench;
@@ -308,7 +329,10 @@ fn what_an_erase_takes_along_unread_is_told() {
     let output = bench.run("read --new --format csv --fail-on-loss");
     assert_eq!(output.status.code(), Some(3));
     let stdout = text(&output.stdout);
-    assert!(stdout.contains("\"lost an unknown number after 0: not recorded, inputs 7\""), "{stdout}");
+    assert!(
+        stdout.contains("\"lost an unknown number after 0: not recorded, inputs 7\""),
+        "{stdout}"
+    );
 }
 
 #[test]
@@ -352,7 +376,11 @@ fn a_unit_that_is_called_by_a_link_and_by_its_device_in_turn_delivers_each_event
     let names = [bench.link(), link];
     for (round, name) in (0..6).zip(names.iter().cycle()) {
         bench.contacts(&format!("0,1,{}", (round + 1) % 2), 1);
-        let read = bench.command("read --new --format csv --fail-on-loss").arg("--port").arg(name).output();
+        let read = bench
+            .command("read --new --format csv --fail-on-loss")
+            .arg("--port")
+            .arg(name)
+            .output();
         let read = read.expect("ser-cli runs");
         assert_eq!(read.status.code(), Some(0), "round {round}: {}", text(&read.stderr));
         let rows = text(&read.stdout);

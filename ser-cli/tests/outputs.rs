@@ -99,14 +99,16 @@ fn a_full_disk_is_a_failure_and_a_reader_that_has_gone_is_none() {
         }
         printing += 1;
         let full = File::options().write(true).open("/dev/full").expect("/dev/full");
-        let Output { status, stderr, .. } = unit.command(line).stdout(full).output().expect("ser-cli runs");
+        let Output { status, stderr, .. } =
+            unit.command(line).stdout(full).output().expect("ser-cli runs");
         let told = text(&stderr);
         assert_eq!(status.code(), Some(1), "{line} > /dev/full: {told}");
         assert!(told.contains("cannot write standard output: No space left"), "{line}: {told}");
 
         let (reader, writer) = io::pipe().expect("a pipe");
         drop(reader);
-        let Output { status, stderr, .. } = unit.command(line).stdout(writer).output().expect("ser-cli runs");
+        let Output { status, stderr, .. } =
+            unit.command(line).stdout(writer).output().expect("ser-cli runs");
         let told = text(&stderr);
         assert_eq!(status.code(), Some(0), "{line} | true: {told}");
         assert!(!told.contains("error") && !told.contains("panicked"), "{line}: {told}");
@@ -124,7 +126,10 @@ fn what_goes_on_until_it_is_stopped_ends_on_a_full_disk() {
         let told = running.told();
         assert_eq!(running.wait(), Some(1), "{line}");
         let told: Vec<String> = told.iter().collect();
-        assert!(told.iter().any(|line| line.contains("standard output: No space left")), "{line}: {told:?}");
+        assert!(
+            told.iter().any(|line| line.contains("standard output: No space left")),
+            "{line}: {told:?}"
+        );
     }
 }
 
@@ -138,7 +143,9 @@ fn nothing_is_delivered_into_a_closed_output() {
         shell.env("SER_PORT", unit.folder.path().join("unit")).env("SER_STATE_DIR", &state);
         shell.stdin(Stdio::null()).output().expect("sh runs")
     };
-    for line in ["read", "read --new", "watch", "print --from 1 --count 1", "decode -", "completions bash"] {
+    for line in
+        ["read", "read --new", "watch", "print --from 1 --count 1", "decode -", "completions bash"]
+    {
         let Output { status, stderr, .. } = run(&format!("{line} >&-"));
         assert_eq!(status.code(), Some(1), "{line}");
         assert!(text(&stderr).contains("standard output is closed"), "{line}: {}", text(&stderr));
@@ -179,7 +186,13 @@ fn names_and_arguments_do_nothing_to_a_terminal() {
         &["sim".as_ref(), "--node".as_ref(), "5".as_ref(), "--genius".as_ref(), file.as_ref()],
         &["status".as_ref(), "--port".as_ref(), missing.as_ref()],
         &["status".as_ref(), "--port".as_ref(), geni.as_ref()],
-        &["read".as_ref(), "--new".as_ref(), "--port=COM3".as_ref(), "--state-dir".as_ref(), file.as_ref()],
+        &[
+            "read".as_ref(),
+            "--new".as_ref(),
+            "--port=COM3".as_ref(),
+            "--state-dir".as_ref(),
+            file.as_ref(),
+        ],
         &[name],
         &["status".as_ref(), name],
         &["read".as_ref(), "--format".as_ref(), name],
@@ -205,7 +218,8 @@ fn names_and_arguments_do_nothing_to_a_terminal() {
 #[test]
 fn a_second_line_in_a_name_passes_for_no_message_of_ours() {
     let second = "/none\nhint: run this";
-    for words in [&["decode", second][..], &["read", second], &["read", "--all", "--baud", second]] {
+    for words in [&["decode", second][..], &["read", second], &["read", "--all", "--baud", second]]
+    {
         let output = ser_cli().args(words).output().expect("ser-cli runs");
         let told = text(&output.stderr);
         assert!(told.contains("/none") && !told.contains("\nhint: run this"), "{told}");

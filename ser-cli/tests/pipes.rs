@@ -1,4 +1,5 @@
-//! A pipe may stand wherever a file may, and nobody has to write to it or read it: the first Ctrl-C ends the wait.
+//! A pipe may stand wherever a file may, and nobody has to write to it or read it: the first Ctrl-C
+//! ends the wait.
 #![cfg(target_os = "linux")]
 
 mod common;
@@ -30,7 +31,8 @@ fn the_first_ctrl_c_ends_the_wait_for_the_other_end_of_a_pipe() {
     let folder = tempfile::tempdir().expect("a folder");
     let pipe = pipe(folder.path()).display().to_string();
     fs::write(folder.path().join("image"), "").expect("written");
-    for arguments in ["--contacts PIPE", "--genius host --node 5 --contacts PIPE", "--image image --log PIPE"]
+    for arguments in
+        ["--contacts PIPE", "--genius host --node 5 --contacts PIPE", "--image image --log PIPE"]
     {
         let mut waiting = ser_cli();
         waiting.arg("sim").args(arguments.replace("PIPE", &pipe).split_whitespace());
@@ -63,7 +65,8 @@ fn a_pipe_is_no_image() {
     let folder = tempfile::tempdir().expect("a folder");
     let pipe = pipe(folder.path());
     for command in ["sim", "demo"] {
-        let output = ser_cli().args([command, "--image"]).arg(&pipe).output().expect("ser-cli runs");
+        let output =
+            ser_cli().args([command, "--image"]).arg(&pipe).output().expect("ser-cli runs");
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(1), "{told}");
         assert!(told.contains("it is not a regular file") && told.contains("hint: "), "{told}");

@@ -1,18 +1,19 @@
-//! What it costs to find a full read reply in a byte stream and to understand it, beside what one would use instead.
+//! What it costs to find a full read reply in a byte stream and to understand it, beside what one
+//! would use instead.
 //!
 //! Two steps, each in a group with its rivals on the same work:
-//! - `to_bytes`: from characters to bytes. `faster-hex` turns the same characters into the same bytes; it is told
-//!   where they begin and end, and looks neither for a frame nor at a checksum.
-//! - `to_events`: from characters to ten events. For `nmea` each event is a ZDA sentence, cut out already, which
-//!   holds time, date and a checksum, and has no room for the inputs.
+//! - `to_bytes`: from characters to bytes. `faster-hex` turns the same characters into the same
+//!   bytes; it is told where they begin and end, and looks neither for a frame nor at a checksum.
+//! - `to_events`: from characters to ten events. For `nmea` each event is a ZDA sentence, cut out
+//!   already, which holds time, date and a checksum, and has no room for the inputs.
 
 use std::fmt::Write;
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use ser_proto::{
-    Decoded, Entry, FrameDecoder, FrameEncoder, Inputs, MAX_BODY_LEN, MAX_ENTRIES, Model, ReadReply, Reply,
-    TimeStamp,
+    Decoded, Entry, FrameDecoder, FrameEncoder, Inputs, MAX_BODY_LEN, MAX_ENTRIES, Model,
+    ReadReply, Reply, TimeStamp,
 };
 
 const MODELS: [(&str, Model); 2] = [("ser160", Model::Ser160), ("ser320", Model::Ser320)];
@@ -21,7 +22,8 @@ const MODELS: [(&str, Model); 2] = [("ser160", Model::Ser160), ("ser320", Model:
 fn entries() -> impl Iterator<Item = Entry> {
     (0_u16..).take(MAX_ENTRIES).map(|number| {
         let millisecond = 250 + 7 * number;
-        let time = TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond };
+        let time =
+            TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond };
         Entry { changed: Inputs(1 << number), state: Inputs(0xFFFF >> number), time }
     })
 }

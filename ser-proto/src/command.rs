@@ -12,7 +12,8 @@ use crate::{Body, Code, Configure, ParseError, TimeStamp};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
-    /// `C` alone: what configuration is in force? An extension of this project; original recorders stay silent.
+    /// `C` alone: what configuration is in force? An extension of this project; original recorders
+    /// stay silent.
     QueryConfiguration,
     /// `C`: change the configuration.
     Configure(Configure),
@@ -20,7 +21,8 @@ pub enum Command {
     Erase,
     /// `L`: which broadcast came last?
     LastBroadcast,
-    /// `M` alone: is the recorder recording? An extension of this project; original recorders stay silent.
+    /// `M` alone: is the recorder recording? An extension of this project; original recorders stay
+    /// silent.
     QueryMode,
     /// `M`: start or stop recording.
     SetMode {
@@ -49,8 +51,8 @@ impl Command {
     /// Understands a body that came from a host.
     ///
     /// # Errors
-    /// See [`ParseError`]. Start and count of `R` and `P` are never refused here: a recorder answers with what
-    /// exists. A date that does not exist is refused.
+    /// See [`ParseError`]. Start and count of `R` and `P` are never refused here: a recorder
+    /// answers with what exists. A date that does not exist is refused.
     pub fn parse(body: &[u8]) -> Result<Command, ParseError> {
         let (&byte, params) = body.split_first().ok_or(ParseError::Empty)?;
         let code = Code::from_byte(byte).ok_or(ParseError::UnknownCode { code: byte })?;
@@ -62,7 +64,9 @@ impl Command {
             (Code::Mode, 0) => Ok(Command::QueryMode),
             (Code::Mode, _) => parse_set_mode(params),
             (Code::Print, _) => parse_print(params),
-            (Code::Read, _) => parse_request(params).map(|(start, count)| Command::Read { start, count }),
+            (Code::Read, _) => {
+                parse_request(params).map(|(start, count)| Command::Read { start, count })
+            }
             (Code::SetClock, _) => parse_set_clock(params),
             (Code::Erase | Code::LastBroadcast, _) => {
                 Err(ParseError::WrongLength { code: byte, length: body.len() })
@@ -75,7 +79,10 @@ impl Command {
     pub fn to_body(&self) -> Body {
         let mut body = Body::new(self.code());
         match *self {
-            Command::QueryConfiguration | Command::QueryMode | Command::Erase | Command::LastBroadcast => {}
+            Command::QueryConfiguration
+            | Command::QueryMode
+            | Command::Erase
+            | Command::LastBroadcast => {}
             Command::Configure(configure) => return configure.to_body(),
             // The version byte has no meaning in this direction; the manual's example sends one.
             Command::SetMode { recording } => body.put(&[u8::from(recording), 0]),
@@ -177,8 +184,8 @@ mod tests {
             for (length, filling) in (1..=255).flat_map(|length| [(length, 0), (length, 0xFF)]) {
                 let mut body = vec![filling; length];
                 body[0] = code.byte();
-                let refused =
-                    Command::parse(&body) == Err(ParseError::WrongLength { code: code.byte(), length });
+                let refused = Command::parse(&body)
+                    == Err(ParseError::WrongLength { code: code.byte(), length });
                 assert_eq!(
                     refused,
                     !lengths.contains(&length),

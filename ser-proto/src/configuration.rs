@@ -4,7 +4,8 @@
 //! | 43 | size (2) | baud code | auto report | report address | auto print |    7 bytes, both directions
 //! ```
 //!
-//! In the command a size or baud code of 0 keeps what is in force; the reply holds what is in force now.
+//! In the command a size or baud code of 0 keeps what is in force; the reply holds what is in force
+//! now.
 
 use nom::Parser;
 
@@ -183,15 +184,16 @@ impl Configure {
             code => Baud::from_code(code).map(Some),
         });
         let fields =
-            (size, baud, byte(AutoReport::from_code), byte(below(MAX_REPORT_ADDRESS + 1)), byte(flag)).map(
-                |(size, baud, auto_report, report_address, auto_print)| Configure {
-                    size,
-                    baud,
-                    auto_report,
-                    report_address,
-                    auto_print,
-                },
-            );
+            (
+                size,
+                baud,
+                byte(AutoReport::from_code),
+                byte(below(MAX_REPORT_ADDRESS + 1)),
+                byte(flag),
+            )
+                .map(|(size, baud, auto_report, report_address, auto_print)| {
+                    Configure { size, baud, auto_report, report_address, auto_print }
+                });
         parse_params(Code::Configure, params, Configuration::BODY_LEN - 1, fields)
     }
 
@@ -247,7 +249,8 @@ mod tests {
     use super::*;
     use crate::{Command, Reply};
 
-    /// The manual's example: 1024 entries, 9600 bit/s, reports over Genius to address 1, no printing.
+    /// The manual's example: 1024 entries, 9600 bit/s, reports over Genius to address 1, no
+    /// printing.
     const EXAMPLE: [u8; 7] = [0x43, 0x04, 0x00, 0x06, 0x02, 0x01, 0x00];
 
     #[test]
@@ -283,12 +286,17 @@ mod tests {
     #[test]
     fn zero_keeps_size_and_rate_in_a_command_and_is_no_answer() {
         let keep = [0x43, 0, 0, 0, 3, 0, 1];
-        let Ok(Command::Configure(command)) = Command::parse(&keep) else { panic!("not a command") };
+        let Ok(Command::Configure(command)) = Command::parse(&keep) else {
+            panic!("not a command")
+        };
         assert_eq!((command.size, command.baud), (None, None));
         let before = Configuration { size: 7, baud: Baud::B300, ..Configuration::default() };
         let after = command.apply_to(&before);
         assert_eq!((after.size, after.baud, after.auto_report), (7, Baud::B300, AutoReport::Rs232));
-        assert_eq!(Reply::parse(&keep), Err(ParseError::BadValue { code: 0x43, offset: 1, value: 0 }));
+        assert_eq!(
+            Reply::parse(&keep),
+            Err(ParseError::BadValue { code: 0x43, offset: 1, value: 0 })
+        );
     }
 
     #[test]
@@ -301,7 +309,10 @@ mod tests {
             (6, [0x43, 0x04, 0x00, 6, 2, 1, 2], 2),
         ];
         for (offset, body, value) in bad {
-            assert_eq!(Command::parse(&body), Err(ParseError::BadValue { code: 0x43, offset, value }));
+            assert_eq!(
+                Command::parse(&body),
+                Err(ParseError::BadValue { code: 0x43, offset, value })
+            );
         }
     }
 }

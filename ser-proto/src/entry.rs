@@ -67,7 +67,8 @@ impl fmt::Display for Inputs {
     }
 }
 
-/// One event: the inputs that changed in the same millisecond, and the state of all inputs right after.
+/// One event: the inputs that changed in the same millisecond, and the state of all inputs right
+/// after.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Entry {
@@ -80,18 +81,27 @@ pub struct Entry {
 }
 
 impl Entry {
-    pub(crate) fn parser<'a>(model: Model) -> impl Parser<Bytes<'a>, Output = Entry, Error = Fault> {
+    pub(crate) fn parser<'a>(
+        model: Model,
+    ) -> impl Parser<Bytes<'a>, Output = Entry, Error = Fault> {
         let inputs = move |bytes: Bytes<'a>| match model {
             Model::Ser160 => map(be_u16, |bits| Inputs(bits.into())).parse(bytes),
             Model::Ser320 => map(be_u32, Inputs).parse(bytes),
         };
-        (inputs, inputs, TimeStamp::parser()).map(|(changed, state, time)| Entry { changed, state, time })
+        (inputs, inputs, TimeStamp::parser()).map(|(changed, state, time)| Entry {
+            changed,
+            state,
+            time,
+        })
     }
 
     pub(crate) fn put_on(&self, body: &mut Body, model: Model) {
         for inputs in [self.changed, self.state] {
             match model {
-                #[expect(clippy::cast_possible_truncation, reason = "the model has no inputs above 16")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    reason = "the model has no inputs above 16"
+                )]
                 Model::Ser160 => body.put_u16(inputs.0 as u16),
                 Model::Ser320 => body.put_u32(inputs.0),
             }

@@ -50,7 +50,11 @@ impl fmt::Display for ParseError {
                 write!(f, "{} cannot have {value} ({value:02X}h) at byte {offset}", Name(code))
             }
             ParseError::EntrySize { count, bytes } => {
-                write!(f, "read reply with {bytes} bytes for {count} entries (12 or 16 bytes each expected)")
+                write!(
+                    f,
+                    "read reply with {bytes} bytes for {count} entries (12 or 16 bytes each \
+                     expected)"
+                )
             }
         }
     }

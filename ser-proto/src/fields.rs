@@ -1,13 +1,15 @@
 //! Fields of a message, parsed with nom behind our own errors.
 //!
-//! The length is checked before any field, so a message of a wrong length is never mistaken for one with a bad value.
+//! The length is checked before any field, so a message of a wrong length is never mistaken for one
+//! with a bad value.
 
 use nom::Parser;
 use nom::error::{ErrorKind, FromExternalError, ParseError as NomParseError};
 
 pub(crate) type Bytes<'a> = &'a [u8];
 
-/// What nom hands up: how many bytes were left where parsing stopped, and the value that was refused there.
+/// What nom hands up: how many bytes were left where parsing stopped, and the value that was
+/// refused there.
 #[derive(Debug)]
 pub(crate) struct Fault {
     remaining: usize,
@@ -67,7 +69,9 @@ pub(crate) fn parse_exactly<'a, T>(
 pub(crate) fn byte<'a, T>(
     accept: impl Fn(u8) -> Option<T>,
 ) -> impl Parser<Bytes<'a>, Output = T, Error = Fault> {
-    nom::combinator::map_res(nom::number::complete::be_u8, move |value| accept(value).ok_or(u16::from(value)))
+    nom::combinator::map_res(nom::number::complete::be_u8, move |value| {
+        accept(value).ok_or(u16::from(value))
+    })
 }
 
 /// A two-byte field, high byte first, that `accept` turns into its meaning, or refuses.

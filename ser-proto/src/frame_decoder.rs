@@ -1,8 +1,9 @@
 //! Finds ESC frames in a stream of bytes.
 //!
-//! The decoder works one byte at a time and needs no time-out: an ESC always starts a new frame, so a frame
-//! that was cut off costs itself and nothing after it. What stands between frames is text and is handed on.
-//! Every frame that is dropped is reported with its cause and its place in the stream.
+//! The decoder works one byte at a time and needs no time-out: an ESC always starts a new frame, so
+//! a frame that was cut off costs itself and nothing after it. What stands between frames is text
+//! and is handed on. Every frame that is dropped is reported with its cause and its place in the
+//! stream.
 
 use core::fmt;
 
@@ -108,8 +109,8 @@ impl<const N: usize> FrameDecoder<N> {
         self.step(byte).map(|completed| self.show(completed))
     }
 
-    /// Takes bytes from the front of `stream` up to and including the one that completes something; the bytes after
-    /// it stay. `None`: all were taken and nothing more was completed.
+    /// Takes bytes from the front of `stream` up to and including the one that completes something;
+    /// the bytes after it stay. `None`: all were taken and nothing more was completed.
     pub fn push_slice(&mut self, stream: &mut &[u8]) -> Option<Decoded<'_>> {
         while let Some((&byte, rest)) = stream.split_first() {
             *stream = rest;
@@ -125,7 +126,8 @@ impl<const N: usize> FrameDecoder<N> {
         self.position += 1;
         match (self.state, hex_value(byte)) {
             (State::Frame { .. }, _) if byte == ESC => {
-                let dropped = DroppedFrame { start: self.start, at, cause: FrameError::Interrupted };
+                let dropped =
+                    DroppedFrame { start: self.start, at, cause: FrameError::Interrupted };
                 self.begin(at);
                 Some(Completed::Dropped(dropped))
             }
@@ -135,7 +137,8 @@ impl<const N: usize> FrameDecoder<N> {
             }
             (State::Text, _) => Some(Completed::Text(byte)),
             (State::Skip { digits }, Some(_)) => {
-                self.state = if digits > 1 { State::Skip { digits: digits - 1 } } else { State::Text };
+                self.state =
+                    if digits > 1 { State::Skip { digits: digits - 1 } } else { State::Text };
                 None
             }
             (State::Skip { .. }, None) => {
@@ -194,16 +197,22 @@ impl<const N: usize> FrameDecoder<N> {
         self.state = State::Frame { high: None, length: Some(length.unwrap_or(byte)) };
         match length {
             None if byte == 0 => Some(self.drop_frame(at, FrameError::Empty)),
-            None if usize::from(byte) > N => Some(self.drop_frame(at, FrameError::TooLong { length: byte })),
+            None if usize::from(byte) > N => {
+                Some(self.drop_frame(at, FrameError::TooLong { length: byte }))
+            }
             None => None,
             // The vector never refuses: a length above `N` does not get this far.
-            Some(length) if self.body.len() < usize::from(length) => {
-                self.body.push(byte).err().map(|_| self.drop_frame(at, FrameError::TooLong { length }))
-            }
+            Some(length) if self.body.len() < usize::from(length) => self
+                .body
+                .push(byte)
+                .err()
+                .map(|_| self.drop_frame(at, FrameError::TooLong { length })),
             Some(_) => {
                 let computed = checksum(&self.body);
                 if computed != byte {
-                    return Some(self.drop_frame(at, FrameError::Checksum { computed, received: byte }));
+                    return Some(
+                        self.drop_frame(at, FrameError::Checksum { computed, received: byte }),
+                    );
                 }
                 self.state = State::Text;
                 Some(Completed::Frame)
@@ -214,7 +223,9 @@ impl<const N: usize> FrameDecoder<N> {
     fn drop_frame(&mut self, at: u64, cause: FrameError) -> Completed {
         self.state = match cause {
             // ESC and length have been taken; an empty body still has its checksum to come.
-            FrameError::TooLong { length } => State::Skip { digits: encoded_len(length.into()) - 3 },
+            FrameError::TooLong { length } => {
+                State::Skip { digits: encoded_len(length.into()) - 3 }
+            }
             FrameError::Empty => State::Skip { digits: 2 },
             _ => State::Text,
         };
@@ -260,7 +271,8 @@ mod tests {
 
     /// What a stream decodes to, in words that compare and print well.
     fn decode(stream: &[u8]) -> std::vec::Vec<String> {
-        let in_words = |dropped: DroppedFrame| format!("{}..{} {}", dropped.start, dropped.at, dropped.cause);
+        let in_words =
+            |dropped: DroppedFrame| format!("{}..{} {}", dropped.start, dropped.at, dropped.cause);
         let mut decoder = FrameDecoder::<16>::new();
         let mut seen = std::vec::Vec::new();
         for &byte in stream {
@@ -318,7 +330,10 @@ mod tests {
             decode(&stream),
             ["0..2 a body of 17 bytes is too long", "text O", "text K", "frame [45]"]
         );
-        assert_eq!(decode(b"\x1BFF00\x1B014545"), ["0..2 a body of 255 bytes is too long", "frame [45]"]);
+        assert_eq!(
+            decode(b"\x1BFF00\x1B014545"),
+            ["0..2 a body of 255 bytes is too long", "frame [45]"]
+        );
     }
 
     #[test]

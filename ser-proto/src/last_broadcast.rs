@@ -30,18 +30,18 @@ pub struct LastBroadcast {
 }
 
 impl LastBroadcast {
-    const NONE: LastBroadcast = LastBroadcast { code: 0, hour: 0, minute: 0, second: 0, millisecond: 0 };
+    const NONE: LastBroadcast =
+        LastBroadcast { code: 0, hour: 0, minute: 0, second: 0, millisecond: 0 };
 
     pub(crate) fn parse(params: Bytes<'_>) -> Result<Option<LastBroadcast>, ParseError> {
-        let fields = (be_u8, byte(below(24)), byte(below(60)), byte(below(60)), word(below(1000))).map(
-            |(code, hour, minute, second, millisecond)| LastBroadcast {
+        let fields = (be_u8, byte(below(24)), byte(below(60)), byte(below(60)), word(below(1000)))
+            .map(|(code, hour, minute, second, millisecond)| LastBroadcast {
                 code,
                 hour,
                 minute,
                 second,
                 millisecond,
-            },
-        );
+            });
         let reply = parse_params(Code::LastBroadcast, params, 6, fields)?;
         Ok((reply != LastBroadcast::NONE).then_some(reply))
     }
@@ -62,6 +62,10 @@ impl fmt::Display for LastBroadcast {
             Some(code) => write!(f, "{}", code.name())?,
             None => write!(f, "unknown command {:02X}h", self.code)?,
         }
-        write!(f, " at {:02}:{:02}:{:02}.{:03}", self.hour, self.minute, self.second, self.millisecond)
+        write!(
+            f,
+            " at {:02}:{:02}:{:02}.{:03}",
+            self.hour, self.minute, self.second, self.millisecond
+        )
     }
 }

@@ -1,13 +1,15 @@
-//! The language of the sequential event recorder (SER): what a host and a recorder say to each other.
+//! The language of the sequential event recorder (SER): what a host and a recorder say to each
+//! other.
 //!
-//! A message is a *body*: a command byte and its parameters, the same on every medium. [`Command`] is a body on
-//! its way to the recorder, [`Reply`] one on its way back; both `parse` from bytes and turn `to_body`.
-//! On RS-232 a body travels in an ESC frame: [`FrameEncoder`] makes one, [`FrameDecoder`] finds them in a stream
-//! that may also hold text lines and noise.
+//! A message is a *body*: a command byte and its parameters, the same on every medium. [`Command`]
+//! is a body on its way to the recorder, [`Reply`] one on its way back; both `parse` from bytes and
+//! turn `to_body`. On RS-232 a body travels in an ESC frame: [`FrameEncoder`] makes one,
+//! [`FrameDecoder`] finds them in a stream that may also hold text lines and noise.
 //!
 //! Nothing here performs I/O, reads a clock, allocates or panics, whatever the bytes are.
 //!
-//! Page and table names in the documentation refer to the HE660SER160/320 product manual ("the manual").
+//! Page and table names in the documentation refer to the HE660SER160/320 product manual ("the
+//! manual").
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(
     not(test),

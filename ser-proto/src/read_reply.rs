@@ -19,8 +19,8 @@ pub const READ_REPLY_HEADER_LEN: usize = 8;
 
 /// Entries of the log, and where the log stands.
 ///
-/// Entry `n` is slot `n - 1` of the ring. With `total` and `next_slot` a host knows what it has not read yet,
-/// also after the ring or the 16-bit total has wrapped.
+/// Entry `n` is slot `n - 1` of the ring. With `total` and `next_slot` a host knows what it has not
+/// read yet, also after the ring or the 16-bit total has wrapped.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ReadReply {
@@ -83,7 +83,11 @@ fn model_of(count: u8, bytes: usize) -> Result<Option<Model>, ParseError> {
         .ok_or(ParseError::EntrySize { count, bytes })
 }
 
-fn parse_entries(model: Model, count: u8, bytes: Bytes<'_>) -> Result<Vec<Entry, MAX_ENTRIES>, ParseError> {
+fn parse_entries(
+    model: Model,
+    count: u8,
+    bytes: Bytes<'_>,
+) -> Result<Vec<Entry, MAX_ENTRIES>, ParseError> {
     let mut entries = Vec::new();
     for entry in bytes.chunks_exact(model.entry_len()) {
         let entry = parse_params(Code::Read, entry, model.entry_len(), Entry::parser(model))?;

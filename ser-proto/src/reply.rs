@@ -2,7 +2,8 @@
 
 use crate::{Body, Code, Configuration, LastBroadcast, Mode, ParseError, ReadReply};
 
-/// A message from the recorder: the answer to a command, or a read reply that nobody asked for (auto report).
+/// A message from the recorder: the answer to a command, or a read reply that nobody asked for
+/// (auto report).
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reply {
@@ -78,10 +79,20 @@ mod tests {
     use crate::{Entry, Inputs, MAX_BODY_LEN, MAX_ENTRIES, Model, TimeStamp};
 
     fn read_reply(model: Model, count: usize) -> ReadReply {
-        let time =
-            TimeStamp { year: 96, month: 8, day: 15, hour: 14, minute: 30, second: 50, millisecond: 250 };
-        let entry =
-            Entry { changed: Inputs(0x8001_8001 & model.mask()), state: Inputs(0x0102 & model.mask()), time };
+        let time = TimeStamp {
+            year: 96,
+            month: 8,
+            day: 15,
+            hour: 14,
+            minute: 30,
+            second: 50,
+            millisecond: 250,
+        };
+        let entry = Entry {
+            changed: Inputs(0x8001_8001 & model.mask()),
+            state: Inputs(0x0102 & model.mask()),
+            time,
+        };
         ReadReply {
             start: 500,
             total: 32_000,
@@ -117,14 +128,20 @@ mod tests {
         body[3] = 0;
         assert_eq!(Reply::parse(&body), Err(ParseError::EntrySize { count: 0, bytes: 12 }));
         body[3] = 11;
-        assert_eq!(Reply::parse(&body), Err(ParseError::BadValue { code: 0x52, offset: 3, value: 11 }));
+        assert_eq!(
+            Reply::parse(&body),
+            Err(ParseError::BadValue { code: 0x52, offset: 3, value: 11 })
+        );
     }
 
     #[test]
     fn a_next_slot_beyond_the_largest_log_is_refused() {
         let mut body = Reply::Read(read_reply(Model::Ser160, 0)).to_body().to_vec();
         body[6..8].copy_from_slice(&2048_u16.to_be_bytes());
-        assert_eq!(Reply::parse(&body), Err(ParseError::BadValue { code: 0x52, offset: 6, value: 2048 }));
+        assert_eq!(
+            Reply::parse(&body),
+            Err(ParseError::BadValue { code: 0x52, offset: 6, value: 2048 })
+        );
     }
 
     #[test]
@@ -146,7 +163,8 @@ mod tests {
     #[test]
     fn no_broadcast_yet_is_all_zero() {
         assert_eq!(*Reply::LastBroadcast(None).to_body(), [0x4C, 0, 0, 0, 0, 0, 0]);
-        let erase = LastBroadcast { code: 0x45, hour: 14, minute: 30, second: 50, millisecond: 250 };
+        let erase =
+            LastBroadcast { code: 0x45, hour: 14, minute: 30, second: 50, millisecond: 250 };
         let body = [0x4C, 0x45, 0x0E, 0x1E, 0x32, 0x00, 0xFA];
         assert_eq!(Reply::parse(&body), Ok(Reply::LastBroadcast(Some(erase))));
         assert_eq!(erase.to_string(), "erase at 14:30:50.250");

@@ -4,8 +4,8 @@
 //! | year | month | day | hour | minute | second | millisecond (2) |
 //! ```
 //!
-//! A stamp from the wire may hold an impossible date (a recorder whose clock was never set): it is kept as it is,
-//! so that an entry is never lost over it, and [`TimeStamp::check`] tells.
+//! A stamp from the wire may hold an impossible date (a recorder whose clock was never set): it is
+//! kept as it is, so that an entry is never lost over it, and [`TimeStamp::check`] tells.
 
 use core::fmt;
 
@@ -15,7 +15,8 @@ use nom::number::complete::{be_u8, be_u16};
 use crate::Body;
 use crate::fields::{Bytes, Fault};
 
-/// A date and time of day with a resolution of one millisecond, in whatever time zone the recorder was set to.
+/// A date and time of day with a resolution of one millisecond, in whatever time zone the recorder
+/// was set to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TimeStamp {
@@ -61,7 +62,8 @@ impl TimeStamp {
     /// Whether there is such a date and time; if not, which field is the first that is wrong.
     ///
     /// # Errors
-    /// The first field, in wire order, that is out of range; the day also when the month is too short for it.
+    /// The first field, in wire order, that is out of range; the day also when the month is too
+    /// short for it.
     pub fn check(&self) -> Result<(), InvalidTime> {
         let fields = [
             (self.year, 0, 99),
@@ -133,7 +135,8 @@ impl InvalidTime {
     /// The name of the field: `year` … `millisecond`.
     #[must_use]
     pub fn field(&self) -> &'static str {
-        const FIELDS: [&str; 7] = ["year", "month", "day", "hour", "minute", "second", "millisecond"];
+        const FIELDS: [&str; 7] =
+            ["year", "month", "day", "hour", "minute", "second", "millisecond"];
         FIELDS.get(self.offset).copied().unwrap_or("field")
     }
 }
@@ -180,7 +183,10 @@ mod chrono_conversions {
                 1970..=1999 => time.year() - 1900,
                 2000..=2069 => time.year() - 2000,
                 other => {
-                    return Err(InvalidTime { offset: 0, value: u16::try_from(other).unwrap_or(u16::MAX) });
+                    return Err(InvalidTime {
+                        offset: 0,
+                        value: u16::try_from(other).unwrap_or(u16::MAX),
+                    });
                 }
             };
             // chrono shows a leap second as 1000 ms and more.
@@ -203,8 +209,15 @@ mod chrono_conversions {
 mod tests {
     use super::*;
 
-    const TRIP: TimeStamp =
-        TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 250 };
+    const TRIP: TimeStamp = TimeStamp {
+        year: 26,
+        month: 11,
+        day: 22,
+        hour: 10,
+        minute: 0,
+        second: 0,
+        millisecond: 250,
+    };
 
     #[test]
     fn two_digit_years_turn_at_seventy() {
@@ -245,7 +258,8 @@ mod tests {
     fn every_day_of_the_century_converts_to_chrono_and_back() {
         use chrono::{Days, NaiveDate, NaiveDateTime};
 
-        let mut time = NaiveDate::from_ymd_opt(1970, 1, 1).unwrap().and_hms_milli_opt(23, 59, 58, 7).unwrap();
+        let mut time =
+            NaiveDate::from_ymd_opt(1970, 1, 1).unwrap().and_hms_milli_opt(23, 59, 58, 7).unwrap();
         for _ in 0..36_525 {
             let stamp = TimeStamp::try_from(time).unwrap();
             assert_eq!(NaiveDateTime::try_from(stamp), Ok(time));

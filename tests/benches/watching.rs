@@ -8,9 +8,14 @@ const SECONDS: u32 = 60;
 
 fn main() {
     let carried = line_carries();
-    println!("Events for {SECONDS} s, 16 inputs, 19200 bit/s; the line carries {carried:.1} events/s.\n");
+    println!(
+        "Events for {SECONDS} s, 16 inputs, 19200 bit/s; the line carries {carried:.1} events/s.\n"
+    );
     println!("delivered  events a second that are delivered by the time that the last one happens");
-    println!("lost       overwritten before they could be read, and told to be; all others are delivered\n");
+    println!(
+        "lost       overwritten before they could be read, and told to be; all others are \
+         delivered\n"
+    );
     println!("                     watch                         watch --poll");
     println!("events/s  ring       delivered   of possible  lost   delivered   of possible  lost");
     for per_second in [10, 20, 40, 60, 70, 80, 100, 200, 500, 1000] {

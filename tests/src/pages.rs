@@ -1,7 +1,7 @@
 //! Pages of the documentation that name tests, and whether these tests exist.
 //!
-//! Such a page has a table of prefixes, each with the folder that it stands for, and tables whose rows name tests as
-//! `prefix/file.rs::function`.
+//! Such a page has a table of prefixes, each with the folder that it stands for, and tables whose
+//! rows name tests as `prefix/file.rs::function`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -72,13 +72,17 @@ fn code(cell: &str) -> Option<&str> {
 fn has_test(source: &str, name: &str) -> bool {
     let head = format!("fn {name}(");
     let lines: Vec<&str> = source.lines().map(str::trim).collect();
-    let marked = lines.iter().enumerate().filter(|(_, line)| line.starts_with(&head)).any(|(at, _)| {
-        let above =
-            lines[..at].iter().rev().take_while(|line| line.starts_with("#[") || line.starts_with("//"));
-        let above: Vec<_> = above.collect();
-        let is_run = |line: &&&str| !line.starts_with("#[ignore") || line.ends_with(RUN_BY_XTASK);
-        above.contains(&&"#[test]") && above.iter().all(is_run)
-    });
+    let marked =
+        lines.iter().enumerate().filter(|(_, line)| line.starts_with(&head)).any(|(at, _)| {
+            let above = lines[..at]
+                .iter()
+                .rev()
+                .take_while(|line| line.starts_with("#[") || line.starts_with("//"));
+            let above: Vec<_> = above.collect();
+            let is_run =
+                |line: &&&str| !line.starts_with("#[ignore") || line.ends_with(RUN_BY_XTASK);
+            above.contains(&&"#[test]") && above.iter().all(is_run)
+        });
     let is_function = lines.iter().any(|line| line.starts_with(&head));
     let listed = |macros: &[&str]| macros.iter().any(|opening| is_listed(source, opening, name));
     marked || listed(&MAKE_TESTS) || is_function && listed(&MAKE_TESTS_OF_FUNCTIONS)
@@ -103,7 +107,8 @@ fn wrong_with(
     let Some((file, name)) = code(test).and_then(|test| test.split_once("::")) else {
         return Some(format!("\"{test}\" is no test, `file::name`"));
     };
-    let Some((prefix, folder)) = prefixes.iter().find(|(prefix, _)| file.starts_with(**prefix)) else {
+    let Some((prefix, folder)) = prefixes.iter().find(|(prefix, _)| file.starts_with(**prefix))
+    else {
         return Some(format!("{file} begins with no prefix of the page's first table"));
     };
     let path = format!("{folder}{}", &file[prefix.len()..]);
@@ -131,7 +136,10 @@ mod tests {
     #[test]
     fn a_test_is_run_or_ignored_for_a_reason_that_has_it_run_elsewhere() {
         let test = |ignored: &str| has_test(&format!("#[test]\n{ignored}fn trips() {{"), "trips");
-        assert!(test("") && test("#[ignore = \"needs the emulator and the image: cargo xtask test\"]\n"));
+        assert!(
+            test("")
+                && test("#[ignore = \"needs the emulator and the image: cargo xtask test\"]\n")
+        );
         assert!(test("#[ignore = \"takes minutes: cargo xtask test\"]\n"));
         assert!(!test("#[ignore]\n") && !test("#[ignore = \"takes minutes\"]\n"));
         assert!(!has_test("fn trips() {", "trips"));
@@ -139,7 +147,8 @@ mod tests {
 
     #[test]
     fn macros_make_tests_of_the_names_in_their_calls() {
-        let targets = "macro_rules! targets {\n    ($name:ident) => {\n}\n\ntargets! { frames node }\n";
+        let targets =
+            "macro_rules! targets {\n    ($name:ident) => {\n}\n\ntargets! { frames node }\n";
         assert!(has_test(targets, "node") && has_test(targets, "frames"));
         assert!(!has_test(targets, "nod") && !has_test(targets, "ident"));
         let both = "fn trips(kind: Kind) {}\nwith_both_kinds! {\n    trips,\n    missing,\n}\n";

@@ -44,7 +44,9 @@ pub fn all() -> Vec<Vector> {
 
 fn vector(line: usize, text: &str) -> Vector {
     let fields: Vec<_> = text.split('|').map(str::trim).collect();
-    let [verdict, sender, bytes, meaning] = fields[..] else { panic!("line {line}: four fields expected") };
+    let [verdict, sender, bytes, meaning] = fields[..] else {
+        panic!("line {line}: four fields expected")
+    };
     let sender = match sender {
         "host" => Sender::Host,
         "unit" => Sender::Unit,
@@ -67,7 +69,8 @@ fn vector(line: usize, text: &str) -> Vector {
     Vector { line, sender, refused, canonical, wire, meaning: meaning.to_owned() }
 }
 
-/// What a decoder makes of a stream, in the words of `Debug`: messages, refusals and stretches of text.
+/// What a decoder makes of a stream, in the words of `Debug`: messages, refusals and stretches of
+/// text.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Seen {
     /// Messages and refusals, in order.
@@ -82,8 +85,12 @@ impl Seen {
         match (decoded, sender) {
             (Decoded::Text(byte), _) => self.text.push(byte),
             (Decoded::Dropped(dropped), _) => self.messages.push(format!("{:?}", dropped.cause)),
-            (Decoded::Frame(body), Sender::Host) => self.messages.push(in_words(Command::parse(body))),
-            (Decoded::Frame(body), Sender::Unit) => self.messages.push(in_words(Reply::parse(body))),
+            (Decoded::Frame(body), Sender::Host) => {
+                self.messages.push(in_words(Command::parse(body)))
+            }
+            (Decoded::Frame(body), Sender::Unit) => {
+                self.messages.push(in_words(Reply::parse(body)))
+            }
         }
     }
 }

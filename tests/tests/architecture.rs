@@ -28,8 +28,9 @@ fn uses_by_cargo() -> Uses {
 
 /// What the page says.
 fn uses_by_page(page: &str) -> Uses {
-    let names =
-        |cell: &str| -> BTreeSet<String> { cell.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
+    let names = |cell: &str| -> BTreeSet<String> {
+        cell.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+    };
     let rows = pages::rows(page, "crate");
     let of_row = |row: &pages::Row<'_>| {
         let crates = names(row.first);
@@ -47,8 +48,8 @@ fn the_page_names_every_crate_and_what_it_uses() {
 
 #[test]
 fn a_row_is_read_as_it_is_meant() {
-    let page =
-        "| crate | what it is | uses |\n|---|---|---|\n| `a` | with `code` | `b`, `c` |\n| `b` | | – |\n";
+    let page = "| crate | what it is | uses |\n|---|---|---|\n| `a` | with `code` | `b`, `c` \
+     |\n| `b` | | – |\n";
     let uses = uses_by_page(page);
     assert_eq!(uses["a"], BTreeSet::from(["b".to_owned(), "c".to_owned()]));
     assert!(uses["b"].is_empty());

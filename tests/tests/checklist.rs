@@ -1,5 +1,5 @@
-//! The list of rules in `docs/geni-rules.md` stays honest: every test that it names exists, and every rule has a
-//! test or a reason why it has none.
+//! The list of rules in `docs/geni-rules.md` stays honest: every test that it names exists, and
+//! every rule has a test or a reason why it has none.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,12 +12,15 @@ const KEEPERS: [&str; 5] = ["board", "bus", "driver", "port", "host"];
 const NOT_MODELLED: &str = "not modelled: ";
 
 /// The parts of the page that must be there, by what their rules' numbers begin with.
-const CHAPTERS: [&str; 15] = ["2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13", "B", "F", "S"];
+const CHAPTERS: [&str; 15] =
+    ["2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13", "B", "F", "S"];
 
 /// `13.4`, `B.1`: a chapter of the page and a place in it.
 fn is_number(cell: &str) -> bool {
     cell.split_once('.').is_some_and(|(chapter, place)| {
-        CHAPTERS.contains(&chapter) && !place.is_empty() && place.bytes().all(|byte| byte.is_ascii_digit())
+        CHAPTERS.contains(&chapter)
+            && !place.is_empty()
+            && place.bytes().all(|byte| byte.is_ascii_digit())
     })
 }
 
@@ -55,9 +58,12 @@ fn mistakes(page: &str, source_of: impl Fn(&str) -> Option<String>) -> Vec<Strin
     for rule in pages::rows(page, "no.") {
         let twice = (!seen.insert(rule.first)).then(|| "this number is there twice".to_string());
         let wrong = wrong_with_rule(&rule, &prefixes, &source_of);
-        mistakes.extend(twice.into_iter().chain(wrong).map(|wrong| format!("rule {}: {wrong}", rule.first)));
+        mistakes.extend(
+            twice.into_iter().chain(wrong).map(|wrong| format!("rule {}: {wrong}", rule.first)),
+        );
     }
-    let has_rules = |chapter: &&str| seen.iter().any(|number| number.split('.').next() == Some(chapter));
+    let has_rules =
+        |chapter: &&str| seen.iter().any(|number| number.split('.').next() == Some(chapter));
     let empty = CHAPTERS.iter().filter(|chapter| !has_rules(chapter));
     mistakes.extend(empty.map(|chapter| format!("no rules numbered {chapter}.1 and so on")));
     mistakes
@@ -72,7 +78,8 @@ fn every_rule_has_a_test_that_exists_or_a_reason() {
 
 /// A page with one good rule in each of these chapters, and more rows.
 fn page_of(chapters: &[&str], rows: &str) -> String {
-    let good = |chapter| format!("| {chapter}.1 | It is so. | Heading | board | `a/b.rs::good` |\n");
+    let good =
+        |chapter| format!("| {chapter}.1 | It is so. | Heading | board | `a/b.rs::good` |\n");
     let good: String = chapters.iter().map(good).collect();
     let folders = "| prefix | folder |\n|---|---|\n| `a/` | `crate/a/` |";
     let head = "| no. | rule | section | kept by | tests |\n|---|---|---|---|---|";
@@ -84,7 +91,8 @@ fn page(rows: &str) -> String {
 }
 
 fn source_of(path: &str) -> Option<String> {
-    let source = "#[test]\n/// Says more.\nfn good() {}\n\nfn helper() {}\n\n#[test]\n#[ignore = \"slow\"]\nfn idle() {}\n\n\
+    let source = "#[test]\n/// Says more.\nfn good() {}\n\nfn helper() {}\n\n#[test]\n#[ignore = \
+     \"slow\"]\nfn idle() {}\n\n\
                   with_both_kinds! {\n    both,\n}\n\nfn both(kind: Kind) {}\n";
     (path == "crate/a/b.rs").then(|| source.to_string())
 }
@@ -100,30 +108,57 @@ fn a_page_without_mistakes_passes() {
 #[test]
 fn each_mistake_is_named_with_its_rule() {
     for (row, message) in [
-        ("| 3.1 | Twice. | Heading | board | `a/b.rs::good` |", "rule 3.1: this number is there twice"),
-        ("| 14.1 | Which? | Heading | board | `a/b.rs::good` |", "rule 14.1: this is no number of a rule"),
+        (
+            "| 3.1 | Twice. | Heading | board | `a/b.rs::good` |",
+            "rule 3.1: this number is there twice",
+        ),
+        (
+            "| 14.1 | Which? | Heading | board | `a/b.rs::good` |",
+            "rule 14.1: this is no number of a rule",
+        ),
         ("| | Which? | Heading | board | `a/b.rs::good` |", "rule : this is no number of a rule"),
-        ("| 3.2 | No bar. | Heading | board | `a/b.rs::goo` ", "rule 3.2: crate/a/b.rs has no test goo"),
+        (
+            "| 3.2 | No bar. | Heading | board | `a/b.rs::goo` ",
+            "rule 3.2: crate/a/b.rs has no test goo",
+        ),
         ("| 3.2 | Short. | board | `a/b.rs::good` |", "rule 3.2: 4 cells instead of 5"),
-        ("| 3.2 | | Heading | board | `a/b.rs::good` |", "rule 3.2: the rule or its section is missing"),
+        (
+            "| 3.2 | | Heading | board | `a/b.rs::good` |",
+            "rule 3.2: the rule or its section is missing",
+        ),
         (
             "| 3.2 | Whose? | Heading | nobody | `a/b.rs::good` |",
             "rule 3.2: kept by \"nobody\", which is none of board, bus, driver, port, host",
         ),
         ("| 3.2 | Why? | Heading | board | |", "rule 3.2: neither a test nor a reason"),
-        ("| 3.2 | Why? | Heading | board | not modelled: |", "rule 3.2: neither a test nor a reason"),
-        ("| 3.2 | How? | Heading | board | by hand |", "rule 3.2: \"by hand\" is no test, `file::name`"),
+        (
+            "| 3.2 | Why? | Heading | board | not modelled: |",
+            "rule 3.2: neither a test nor a reason",
+        ),
+        (
+            "| 3.2 | How? | Heading | board | by hand |",
+            "rule 3.2: \"by hand\" is no test, `file::name`",
+        ),
         (
             "| 3.2 | Where? | Heading | board | `x/b.rs::good` |",
             "rule 3.2: x/b.rs begins with no prefix of the page's first table",
         ),
-        ("| 3.2 | Gone. | Heading | board | `a/c.rs::good` |", "rule 3.2: there is no file crate/a/c.rs"),
-        ("| 3.2 | Gone. | Heading | board | `a/b.rs::goo` |", "rule 3.2: crate/a/b.rs has no test goo"),
+        (
+            "| 3.2 | Gone. | Heading | board | `a/c.rs::good` |",
+            "rule 3.2: there is no file crate/a/c.rs",
+        ),
+        (
+            "| 3.2 | Gone. | Heading | board | `a/b.rs::goo` |",
+            "rule 3.2: crate/a/b.rs has no test goo",
+        ),
         (
             "| 3.2 | No test. | Heading | board | `a/b.rs::helper` |",
             "rule 3.2: crate/a/b.rs has no test helper",
         ),
-        ("| 3.2 | Not run. | Heading | board | `a/b.rs::idle` |", "rule 3.2: crate/a/b.rs has no test idle"),
+        (
+            "| 3.2 | Not run. | Heading | board | `a/b.rs::idle` |",
+            "rule 3.2: crate/a/b.rs has no test idle",
+        ),
     ] {
         assert_eq!(mistakes(&page(row), source_of), [message], "{row}");
     }

@@ -1,4 +1,5 @@
-//! Everything that fuzzing checks, for the seeds that are kept. The fuzzer itself is `cargo xtask fuzz`.
+//! Everything that fuzzing checks, for the seeds that are kept. The fuzzer itself is `cargo xtask
+//! fuzz`.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -33,7 +34,8 @@ fn replay(name: &str) {
 
 /// The names in a folder, without what follows the dot.
 fn names(folder: &Path) -> BTreeSet<String> {
-    let files = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let files =
+        fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     files.map(|file| stem(&file.expect("a file").path())).collect()
 }

@@ -1,4 +1,5 @@
-//! Many recorders on one bus: one broadcast sets all clocks, and everybody's inputs are seen in every scan.
+//! Many recorders on one bus: one broadcast sets all clocks, and everybody's inputs are seen in
+//! every scan.
 
 use geni_board::CommandError;
 use geni_board::Destination::Broadcast;
@@ -8,8 +9,8 @@ use ser_trial::genius_world::World;
 const NOON: TimeStamp =
     TimeStamp { year: 26, month: 11, day: 22, hour: 12, minute: 0, second: 0, millisecond: 0 };
 
-/// A broadcast reaches all boards at once, but every recorder fetches it from its board by itself: the board says
-/// so and carries out Read Datagram, and the recorder looks once per millisecond.
+/// A broadcast reaches all boards at once, but every recorder fetches it from its board by itself:
+/// the board says so and carries out Read Datagram, and the recorder looks once per millisecond.
 const CLOCKS_AGREE_WITHIN_MS: u32 = 1;
 
 fn milliseconds(time: TimeStamp) -> u32 {
@@ -26,7 +27,8 @@ fn one_broadcast_sets_the_clocks_of_30_recorders() {
         .map(|number| (number, if number % 2 == 0 { Model::Ser160 } else { Model::Ser320 }))
         .collect();
     let mut world = World::started(&units);
-    // A board that still has to assign itself to 30 others has no memory for its host's datagrams, and says so.
+    // A board that still has to assign itself to 30 others has no memory for its host's datagrams,
+    // and says so.
     let sent_ms = loop {
         world.host.sent.clear();
         world.send(Broadcast, &Command::SetClock(NOON));
@@ -37,14 +39,17 @@ fn one_broadcast_sets_the_clocks_of_30_recorders() {
         }
         world.run(1_000);
     };
-    // The host's turn ends; all boards have the datagram. The bus adds no more than the wait for the host's turn.
+    // The host's turn ends; all boards have the datagram. The bus adds no more than the wait for
+    // the host's turn.
     let out_ms = world.now_ms;
     let scan_ns = world.bus.borrow().scan_time_ns().expect("a running bus");
     assert!(out_ms - sent_ms <= 3 * scan_ns.div_ceil(1_000_000));
     world.run(20);
 
     for (number, _) in &units {
-        let Reply::LastBroadcast(Some(last)) = world.ask(*number, &Command::LastBroadcast) else { panic!() };
+        let Reply::LastBroadcast(Some(last)) = world.ask(*number, &Command::LastBroadcast) else {
+            panic!()
+        };
         assert_eq!((last.code, last.hour, last.minute), (Code::SetClock.byte(), 12, 0));
         assert_eq!((last.second, last.millisecond), (0, 0));
     }
@@ -65,9 +70,11 @@ fn one_broadcast_sets_the_clocks_of_30_recorders() {
             milliseconds(reply.entries[0].time)
         };
         let stamps: Vec<_> = units.iter().map(|(number, _)| stamp(*number)).collect();
-        let (earliest, latest) = (stamps.iter().min().expect("30"), stamps.iter().max().expect("30"));
+        let (earliest, latest) =
+            (stamps.iter().min().expect("30"), stamps.iter().max().expect("30"));
         assert!(latest - earliest <= CLOCKS_AGREE_WITHIN_MS, "{stamps:?}");
-        // The clocks are behind a clock that was set when the datagram had left, by what the boards take.
+        // The clocks are behind a clock that was set when the datagram had left, by what the boards
+        // take.
         let elapsed = u32::try_from(edge_ms - out_ms).expect("short");
         let behind = elapsed + milliseconds(NOON) - earliest;
         assert!(behind <= 5, "{behind} ms");

@@ -5,7 +5,8 @@ use std::rc::Rc;
 use geni_board::Destination::{Broadcast, Device};
 use geni_board::{Configuration, Driver, Event, Options, ReceivedDatagram, Start};
 use ser_proto::{
-    AutoReport, Baud, Code, Command, Configure, Entry, Inputs, LastBroadcast, Mode, Model, Reply, TimeStamp,
+    AutoReport, Baud, Code, Command, Configure, Entry, Inputs, LastBroadcast, Mode, Model, Reply,
+    TimeStamp,
 };
 use ser_sim::genius::{Board, BoardOptions, BoardWindow};
 use ser_trial::genius_world::{HOST, World};
@@ -45,7 +46,13 @@ fn log(world: &mut World, start: u16, count: u16) -> Vec<Entry> {
 }
 
 const fn unchanged() -> Configure {
-    Configure { size: None, baud: None, auto_report: AutoReport::Off, report_address: 0, auto_print: false }
+    Configure {
+        size: None,
+        baud: None,
+        auto_report: AutoReport::Off,
+        report_address: 0,
+        auto_print: false,
+    }
 }
 
 #[test]
@@ -60,7 +67,8 @@ fn every_command_is_answered_over_genius() {
     let header = read(&mut world, 1, 0);
     assert_eq!((header.total, header.entries.len()), (3, 0));
 
-    let Reply::Mode(Mode { recording: true, version }) = world.ask(UNIT, &Command::QueryMode) else {
+    let Reply::Mode(Mode { recording: true, version }) = world.ask(UNIT, &Command::QueryMode)
+    else {
         panic!()
     };
     assert_eq!(version, ser_node::VERSION);
@@ -70,9 +78,13 @@ fn every_command_is_answered_over_genius() {
     assert_eq!(read(&mut world, 1, 0).total, 3);
     world.ask(UNIT, &Command::SetMode { recording: true });
 
-    let Reply::Configuration(before) = world.ask(UNIT, &Command::QueryConfiguration) else { panic!() };
+    let Reply::Configuration(before) = world.ask(UNIT, &Command::QueryConfiguration) else {
+        panic!()
+    };
     let configure = Configure { size: Some(100), ..unchanged() };
-    let Reply::Configuration(after) = world.ask(UNIT, &Command::Configure(configure)) else { panic!() };
+    let Reply::Configuration(after) = world.ask(UNIT, &Command::Configure(configure)) else {
+        panic!()
+    };
     assert_eq!((before.size, after.size), (2048, 100));
 
     assert_eq!(world.ask(UNIT, &Command::LastBroadcast), Reply::LastBroadcast(None));
@@ -113,7 +125,8 @@ fn a_baud_rate_set_over_genius_is_in_force_on_rs_232() {
     world.ask(UNIT, &Command::Configure(configure));
     world.step();
     assert_eq!(world.recorders[0].node.baud(), Baud::B19200);
-    let Reply::Configuration(now) = world.recorders[0].serial_ask(&Command::QueryConfiguration) else {
+    let Reply::Configuration(now) = world.recorders[0].serial_ask(&Command::QueryConfiguration)
+    else {
         panic!()
     };
     assert_eq!(now.baud, Baud::B19200);
@@ -133,7 +146,9 @@ fn a_broadcast_is_carried_out_and_not_answered() {
         world.run(50);
         assert_eq!(world.take_message(UNIT), None, "{command:?}");
         assert_eq!(world.recorders[0].serial_said().1, "", "{command:?}");
-        let Reply::LastBroadcast(Some(last)) = world.ask(UNIT, &Command::LastBroadcast) else { panic!() };
+        let Reply::LastBroadcast(Some(last)) = world.ask(UNIT, &Command::LastBroadcast) else {
+            panic!()
+        };
         assert_eq!((last.code, last.hour), (command.code().byte(), 12), "{command:?}");
         assert_eq!(read(&mut world, 1, 0).total, total, "{command:?}");
     }
@@ -141,7 +156,8 @@ fn a_broadcast_is_carried_out_and_not_answered() {
     world.transmit(Broadcast, 0x40, 0x50, &[0x53, 26, 2, 30, 0, 0, 0, 0, 0]);
     world.transmit(Broadcast, 0x40, 0x50, &[0x99]);
     world.run(50);
-    let Reply::LastBroadcast(Some(LastBroadcast { code, .. })) = world.ask(UNIT, &Command::LastBroadcast)
+    let Reply::LastBroadcast(Some(LastBroadcast { code, .. })) =
+        world.ask(UNIT, &Command::LastBroadcast)
     else {
         panic!()
     };
@@ -173,7 +189,9 @@ fn a_command_of_another_length_is_not_carried_out() {
     let mut world = started(Model::Ser160);
     world.ask(UNIT, &Command::SetClock(NOON));
     events(&mut world, 3);
-    let Reply::Configuration(before) = world.ask(UNIT, &Command::QueryConfiguration) else { panic!() };
+    let Reply::Configuration(before) = world.ask(UNIT, &Command::QueryConfiguration) else {
+        panic!()
+    };
     let wrong = [
         &b"E\0"[..],
         b"M\0\0\0",
@@ -190,7 +208,10 @@ fn a_command_of_another_length_is_not_carried_out() {
     }
     assert_eq!(world.take_message(UNIT), None);
     assert_eq!(world.ask(UNIT, &Command::QueryConfiguration), Reply::Configuration(before));
-    assert!(matches!(world.ask(UNIT, &Command::QueryMode), Reply::Mode(Mode { recording: true, .. })));
+    assert!(matches!(
+        world.ask(UNIT, &Command::QueryMode),
+        Reply::Mode(Mode { recording: true, .. })
+    ));
     assert_eq!(world.ask(UNIT, &Command::LastBroadcast), Reply::LastBroadcast(None));
     world.recorders[0].contact(1, false);
     world.step();
@@ -203,7 +224,9 @@ fn datagrams_of_any_content_and_length_are_counted_and_ignored() {
     let mut world = started(Model::Ser160);
     let before = world.recorders[0].node.diagnostics();
     for len in [0, 1, 5, 128, 134] {
-        for (function, subfunction) in [(0x40, 0x50), (0x40, 0x51), (0x20, 0x40), (0x20, 0x13), (112, 255)] {
+        for (function, subfunction) in
+            [(0x40, 0x50), (0x40, 0x51), (0x20, 0x40), (0x20, 0x13), (112, 255)]
+        {
             world.transmit(Device(UNIT), function, subfunction, &vec![0x99; len]);
             world.transmit(Broadcast, function, subfunction, &vec![0x45; len]);
             world.run(20);
@@ -225,7 +248,8 @@ fn datagrams_of_any_content_and_length_are_counted_and_ignored() {
 fn auto_reports_go_to_the_configured_address_once_each() {
     let mut world = started(Model::Ser160);
     events(&mut world, 4);
-    let configure = Configure { auto_report: AutoReport::Genius, report_address: HOST, ..unchanged() };
+    let configure =
+        Configure { auto_report: AutoReport::Genius, report_address: HOST, ..unchanged() };
     world.ask(UNIT, &Command::Configure(configure));
     events(&mut world, 26);
     world.run(300);
@@ -237,7 +261,8 @@ fn auto_reports_go_to_the_configured_address_once_each() {
     // Those from before are not reported.
     assert_eq!(entries, log(&mut world, 5, 26));
     // Recorded while nobody is there to hear: reported when somebody is.
-    let fault = ser_sim::genius::Fault::Disconnect { device: world.host.board.id(), for_us: 5_000_000 };
+    let fault =
+        ser_sim::genius::Fault::Disconnect { device: world.host.board.id(), for_us: 5_000_000 };
     world.bus.borrow_mut().inject(fault);
     events(&mut world, 26);
     world.run(5_000);
@@ -258,11 +283,13 @@ fn auto_reports_go_to_the_configured_address_once_each() {
 fn recorders_that_report_without_end_leave_everybody_a_turn() {
     let numbers = [5, 6, 7];
     let mut world = World::started(&numbers.map(|number| (number, Model::Ser320)));
-    let configure = Configure { auto_report: AutoReport::Genius, report_address: HOST, ..unchanged() };
+    let configure =
+        Configure { auto_report: AutoReport::Genius, report_address: HOST, ..unchanged() };
     for number in numbers {
         world.ask(number, &Command::Configure(configure));
     }
-    // More events than all reports together can bring, for a minute. The host has the last turn in every scan.
+    // More events than all reports together can bring, for a minute. The host has the last turn in
+    // every scan.
     let mut answered = [0; 3];
     let mut asked_at_ms = 0;
     let end_ms = world.now_ms + 60_000;
@@ -298,7 +325,8 @@ fn recorders_that_report_without_end_leave_everybody_a_turn() {
 fn second_host(world: &mut World, number: u8) -> Driver<BoardWindow> {
     let board = world.bus.borrow_mut().connect(Board::new(BoardOptions::at(number)));
     let window = BoardWindow::new(Rc::clone(&world.bus), board);
-    let options = Options { start: Start::Reset { hold_ms: 20 }, ..Options::new(Configuration::DEFAULT) };
+    let options =
+        Options { start: Start::Reset { hold_ms: 20 }, ..Options::new(Configuration::DEFAULT) };
     let mut host = Driver::new(window, options);
     world.until("the second host knows the recorder", |world| {
         look(&mut host, world);
@@ -344,7 +372,8 @@ fn of_two_hosts_that_ask_each_gets_the_answer_to_its_own_question() {
         else {
             panic!("{first_got:?}")
         };
-        let [Ok(Reply::Mode(_))] = second_got.iter().map(|data| Reply::parse(data)).collect::<Vec<_>>()[..]
+        let [Ok(Reply::Mode(_))] =
+            second_got.iter().map(|data| Reply::parse(data)).collect::<Vec<_>>()[..]
         else {
             panic!("{second_got:?}")
         };
@@ -357,7 +386,10 @@ fn what_one_port_configures_or_erases_holds_for_the_other() {
     let mut world = started(Model::Ser160);
     events(&mut world, 4);
     // Auto report moves to RS-232 by a command over Genius, and begins with the next event.
-    world.ask(UNIT, &Command::Configure(Configure { auto_report: AutoReport::Rs232, ..unchanged() }));
+    world.ask(
+        UNIT,
+        &Command::Configure(Configure { auto_report: AutoReport::Rs232, ..unchanged() }),
+    );
     world.step();
     assert_eq!(world.recorders[0].serial_said().0, []);
     events(&mut world, 2);
@@ -368,9 +400,12 @@ fn what_one_port_configures_or_erases_holds_for_the_other() {
         .collect();
     assert_eq!(starts, [5, 6]);
 
-    // Back to Genius, to somebody who is not there: what is erased over RS-232 is owed to nobody any more.
-    let configure = Configure { auto_report: AutoReport::Genius, report_address: 30, ..unchanged() };
-    let Reply::Configuration(_) = world.recorders[0].serial_ask(&Command::Configure(configure)) else {
+    // Back to Genius, to somebody who is not there: what is erased over RS-232 is owed to nobody
+    // any more.
+    let configure =
+        Configure { auto_report: AutoReport::Genius, report_address: 30, ..unchanged() };
+    let Reply::Configuration(_) = world.recorders[0].serial_ask(&Command::Configure(configure))
+    else {
         panic!()
     };
     events(&mut world, 2);

@@ -1,4 +1,5 @@
-//! Boards that fail, queues that fill: the recorder recovers by itself, RS-232 goes on, and no event is lost.
+//! Boards that fail, queues that fill: the recorder recovers by itself, RS-232 goes on, and no
+//! event is lost.
 
 use geni_board::Destination::Device;
 use geni_board::SharedRam;
@@ -20,7 +21,8 @@ fn inject(world: &mut World, fault: DeviceFault) {
     world.bus.borrow_mut().inject(Fault::Inside { device, fault });
 }
 
-/// Toggles input 1 and asks over RS-232 for what was recorded, for so long; says how many events there were.
+/// Toggles input 1 and asks over RS-232 for what was recorded, for so long; says how many events
+/// there were.
 fn live_on(world: &mut World, ms: u64) -> u16 {
     let mut events = 0;
     for _ in 0..ms / 100 {
@@ -37,7 +39,9 @@ fn live_on(world: &mut World, ms: u64) -> u16 {
 /// Everything is as before, over Genius too.
 fn assert_recovered(world: &mut World, events: u16) {
     assert!(world.recorders[0].port.is_ready());
-    let Reply::Read(reply) = world.ask(UNIT, &Command::Read { start: 1, count: 0 }) else { panic!() };
+    let Reply::Read(reply) = world.ask(UNIT, &Command::Read { start: 1, count: 0 }) else {
+        panic!()
+    };
     assert_eq!(reply.total, events);
     assert_eq!(world.global(UNIT, 2), [u8::from(events % 2 == 1), 0]);
     world.assert_lawful_but_for_a_reset();
@@ -106,8 +110,9 @@ fn reports_outlive_a_board() {
     let mut reported = Vec::new();
     while let Some((_, data)) = world.take_message(UNIT) {
         let Ok(Reply::Read(report)) = Reply::parse(&data) else { panic!() };
-        reported
-            .extend(report.start..report.start + u16::try_from(report.entries.len()).expect("at most ten"));
+        reported.extend(
+            report.start..report.start + u16::try_from(report.entries.len()).expect("at most ten"),
+        );
     }
     // One may come twice, when it was acknowledged to a board that then had nobody to tell.
     reported.dedup();
@@ -128,7 +133,8 @@ fn requests_for_memory_are_refused_and_never_fill_the_queue() {
     assert_recovered(&mut world, events);
 }
 
-/// Sends datagrams (destination, function, subfunction, data) while nobody polls the recorder's port: its board keeps them.
+/// Sends datagrams (destination, function, subfunction, data) while nobody polls the recorder's
+/// port: its board keeps them.
 fn send_while_away(world: &mut World, datagrams: &[(u8, u8, u8, &[u8])]) {
     const MS_PER_DATAGRAM: u64 = 20;
     let bus = std::rc::Rc::clone(&world.bus);
@@ -183,9 +189,13 @@ fn a_broadcast_does_not_overtake_the_commands_before_it() {
         let Ok(Reply::Read(read)) = Reply::parse(&reply) else { panic!("{reply:?}") };
         assert_eq!((read.total, read.entries.len()), (3, 3), "read before it was erased");
     }
-    let Reply::Read(after) = world.ask(UNIT, &Command::Read { start: 1, count: 0 }) else { panic!() };
+    let Reply::Read(after) = world.ask(UNIT, &Command::Read { start: 1, count: 0 }) else {
+        panic!()
+    };
     assert_eq!(after.total, 0);
-    let Reply::LastBroadcast(Some(last)) = world.ask(UNIT, &Command::LastBroadcast) else { panic!() };
+    let Reply::LastBroadcast(Some(last)) = world.ask(UNIT, &Command::LastBroadcast) else {
+        panic!()
+    };
     assert_eq!(last.code, erase[0]);
     world.assert_lawful();
 }

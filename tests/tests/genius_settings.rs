@@ -30,7 +30,15 @@ struct Set {
 fn numbered(hour: u8, number: u64) -> Command {
     let part = |unit, of| u8::try_from(number / unit % of).expect("small");
     let (minute, second) = (part(60, 60), part(1, 60));
-    Command::SetClock(TimeStamp { year: 26, month: 11, day: 22, hour, minute, second, millisecond: 0 })
+    Command::SetClock(TimeStamp {
+        year: 26,
+        month: 11,
+        day: 22,
+        hour,
+        minute,
+        second,
+        millisecond: 0,
+    })
 }
 
 /// A recorder whose clock both ports set all the time.
@@ -79,10 +87,12 @@ impl Plant {
             && let Some(index) = number.checked_sub(*read_before + 1)
         {
             let index = usize::try_from(index).expect("few");
-            let already =
-                set.iter().filter(|set| matches!(set.command, Command::SetClock(time) if time.hour == 1));
+            let already = set
+                .iter()
+                .filter(|set| matches!(set.command, Command::SetClock(time) if time.hour == 1));
             if already.count() == index {
-                // Without an interrupt line it counts from the next look, which is in every millisecond.
+                // Without an interrupt line it counts from the next look, which is in every
+                // millisecond.
                 set.push(Set { at_ms: arrived_us.div_ceil(1000), command: sent[index] });
             }
         }
@@ -137,7 +147,11 @@ fn every_setting_that_a_bus_and_a_line_bring_decides_about_the_changes_of_its_ti
             .into_iter()
             .map(|(set_ms, time)| milliseconds(time) + (at_ms - set_ms))
             .collect();
-        assert!(shown.contains(&milliseconds(entry.time)), "moved at {at_ms}: {}, not {shown:?}", entry.time);
+        assert!(
+            shown.contains(&milliseconds(entry.time)),
+            "moved at {at_ms}: {}, not {shown:?}",
+            entry.time
+        );
     }
     // Both ports have had their part, and there were more settings than a line alone can bring.
     let window = began_ms..began_ms + u64::from(DEBOUNCE_MS);
@@ -145,7 +159,11 @@ fn every_setting_that_a_bus_and_a_line_bring_decides_about_the_changes_of_its_ti
         let of = |set: &&Set| matches!(set.command, Command::SetClock(time) if time.hour == hour);
         plant.set.iter().filter(of).filter(|set| window.contains(&set.at_ms)).count()
     };
-    println!("{} settings over the bus and {} over the line in {DEBOUNCE_MS} ms", within(1), within(2));
+    println!(
+        "{} settings over the bus and {} over the line in {DEBOUNCE_MS} ms",
+        within(1),
+        within(2)
+    );
     assert!(within(1) >= 50 && within(2) >= 50, "{} and {}", within(1), within(2));
     plant.world.assert_lawful();
 }

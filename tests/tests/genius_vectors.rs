@@ -1,7 +1,8 @@
 //! The examples of `vectors/genius.txt`: what they mean, and that we produce them.
 
 use ser_proto::genius::{
-    BusAddress, CommReq, Datagram, DipSwitches, GlobalData, Message, PlcReference, Priority, SendDatagram,
+    BusAddress, CommReq, Datagram, DipSwitches, GlobalData, Message, PlcReference, Priority,
+    SendDatagram,
 };
 
 const PLC: BusAddress = BusAddress::new(31).unwrap();
@@ -26,7 +27,9 @@ fn bytes(text: &str) -> Vec<u8> {
 }
 
 fn words(text: &str) -> Vec<u16> {
-    text.split_whitespace().map(|word| u16::from_str_radix(word, 16).expect("hexadecimal")).collect()
+    text.split_whitespace()
+        .map(|word| u16::from_str_radix(word, 16).expect("hexadecimal"))
+        .collect()
 }
 
 #[test]
@@ -34,11 +37,15 @@ fn every_send_block_brings_its_command() {
     for (line, fields) in examples("command") {
         let [block, meaning] = fields[..] else { panic!("line {line}: three fields expected") };
         let block = words(block);
-        let Ok(CommReq::Send(send)) = CommReq::parse(&block) else { panic!("line {line}: no SEND block") };
+        let Ok(CommReq::Send(send)) = CommReq::parse(&block) else {
+            panic!("line {line}: no SEND block")
+        };
         let command = send.to_datagram(PLC).command().expect("a command");
         assert_eq!(format!("{command:?}"), meaning, "line {line}");
-        let datagram =
-            Datagram { priority: send.priority, ..Datagram::from_command(PLC, send.target, &command) };
+        let datagram = Datagram {
+            priority: send.priority,
+            ..Datagram::from_command(PLC, send.target, &command)
+        };
         let again = SendDatagram::new(datagram, PlcReference::register(100).expect("a register"));
         assert_eq!(again.to_words(), block[..], "line {line}");
     }
@@ -59,9 +66,14 @@ fn every_dequeue_block_reads_as_it_should() {
 #[test]
 fn every_datagram_reads_as_it_should() {
     for (line, fields) in examples("datagram") {
-        let [codes, data, meaning] = fields[..] else { panic!("line {line}: four fields expected") };
-        let [function, subfunction] = bytes(codes)[..] else { panic!("line {line}: two codes expected") };
-        let datagram = Datagram::new(PLC, PLC.into(), function, subfunction, &bytes(data)).expect("fits");
+        let [codes, data, meaning] = fields[..] else {
+            panic!("line {line}: four fields expected")
+        };
+        let [function, subfunction] = bytes(codes)[..] else {
+            panic!("line {line}: two codes expected")
+        };
+        let datagram =
+            Datagram::new(PLC, PLC.into(), function, subfunction, &bytes(data)).expect("fits");
         let message = Message::parse(&datagram).expect("a datagram of the bus");
         assert_eq!(message.to_string(), meaning, "line {line}");
         assert_eq!(message.to_datagram(PLC, PLC.into(), Priority::Normal), datagram, "line {line}");

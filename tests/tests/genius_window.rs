@@ -1,4 +1,5 @@
-//! Every command over a host's GENI window, with the real client, against the native node and against the ARM image.
+//! Every command over a host's GENI window, with the real client, against the native node and
+//! against the ARM image.
 #![cfg(unix)]
 
 use std::time::{Duration, Instant};
@@ -65,7 +66,11 @@ fn every_command_is_answered(kind: Kind) {
     assert!(!unit.set_recording(false).expect("stopped").recording);
     recorder.play(&[(0, 5, true)]);
     assert!(unit.set_recording(true).expect("started").recording);
-    assert_eq!(unit.log_position().expect("the log").total, 3, "what changed while stopped is no event");
+    assert_eq!(
+        unit.log_position().expect("the log").total,
+        3,
+        "what changed while stopped is no event"
+    );
 
     assert_eq!(unit.configuration().expect("the defaults"), Configuration::default());
     let smaller = Configuration { size: 100, ..Configuration::default() };
@@ -103,7 +108,9 @@ fn one_datagram(kind: Kind, model: Model, entries: usize, len: usize) {
     recorder.play(&toggling(17, 1));
     let reply = unit.request(&Command::Read { start: 3, count: 10 }).expect("a reply");
     assert_eq!(reply.to_body().len(), len);
-    let Reply::Read(ReadReply { start, total, entries: read, .. }) = reply else { panic!("{reply:?}") };
+    let Reply::Read(ReadReply { start, total, entries: read, .. }) = reply else {
+        panic!("{reply:?}")
+    };
     assert_eq!((start, total, read.len()), (3, 17, entries));
     // The client asks for the rest.
     assert_entries_are(&read_all(&mut unit), &recorder.played());
@@ -167,7 +174,9 @@ fn auto_report_reports_every_event_to_the_host(kind: Kind) {
     recorder.play(&toggling(50, 1));
     let mut reported: Vec<Entry> = Vec::new();
     listen(&mut unit, |message| {
-        let Unsolicited::Report(ReadReply { start, entries, .. }) = message else { panic!("{message:?}") };
+        let Unsolicited::Report(ReadReply { start, entries, .. }) = message else {
+            panic!("{message:?}")
+        };
         assert_eq!(usize::from(start), reported.len() + 1, "in order, without a gap");
         reported.extend(entries);
         reported.len() == 50
@@ -188,8 +197,10 @@ fn a_full_log_is_read_over_both_ports_while_events_keep_arriving(kind: Kind) {
     while !last {
         // One more reading after the last contact has moved finds the rest.
         last = recorder.played().len() == 2000;
-        let units =
-            [(&mut on_bus, &mut bus_cursor, &mut over_bus), (&mut on_line, &mut line_cursor, &mut over_line)];
+        let units = [
+            (&mut on_bus, &mut bus_cursor, &mut over_bus),
+            (&mut on_line, &mut line_cursor, &mut over_line),
+        ];
         for (unit, cursor, entries) in units {
             unit.read_new(cursor, 2048, &mut |delivery| match delivery {
                 Delivery::Event { entry, .. } => entries.push(entry),
@@ -220,9 +231,11 @@ fn a_power_cycle_brings_the_recorder_back_onto_the_bus(kind: Kind) {
 
 /// One message in ten is damaged, lost or not acknowledged.
 fn a_noisy_bus_costs_repetitions_and_no_event(kind: Kind) {
-    let noise = Noise { seed: 7, damaged_ppm: 40_000, lost_ppm: 40_000, unacknowledged_ppm: 20_000 };
+    let noise =
+        Noise { seed: 7, damaged_ppm: 40_000, lost_ppm: 40_000, unacknowledged_ppm: 20_000 };
     let recorder = Recorder::start_on_noisy_bus(kind, Model::Ser320, noise);
-    let mut unit = recorder.host().unit(NODE, Options { timeout: Duration::from_secs(4), retries: 20 });
+    let mut unit =
+        recorder.host().unit(NODE, Options { timeout: Duration::from_secs(4), retries: 20 });
     recorder.play(&toggling(100, 1));
     assert_entries_are(&read_all(&mut unit), &recorder.played());
     recorder.assert_lawful();

@@ -1,4 +1,5 @@
-//! The promises in `docs/guarantees.md` stay honest: each has a test, and every test that the page names exists.
+//! The promises in `docs/guarantees.md` stay honest: each has a test, and every test that the page
+//! names exists.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +14,9 @@ fn wrong_with_promise(row: &Row<'_>) -> Vec<String> {
     };
     let mut wrong = Vec::new();
     let is_number = number.split_once('.').is_some_and(|(part, place)| {
-        PARTS.contains(&part) && !place.is_empty() && place.bytes().all(|byte| byte.is_ascii_digit())
+        PARTS.contains(&part)
+            && !place.is_empty()
+            && place.bytes().all(|byte| byte.is_ascii_digit())
     });
     if !is_number {
         wrong.push("this is no number of a promise".to_string());
@@ -46,8 +49,10 @@ fn mistakes(page: &str, source_of: impl Fn(&str) -> Option<String>) -> Vec<Strin
         mistakes.extend(lonely.map(|number| format!("{number} {wrong}")));
     }
     for (numbers, what) in [(&promised, "promised"), (&tested, "tested")] {
-        let twice: BTreeSet<_> =
-            numbers.iter().filter(|number| numbers.iter().filter(|n| n == number).count() > 1).collect();
+        let twice: BTreeSet<_> = numbers
+            .iter()
+            .filter(|number| numbers.iter().filter(|n| n == number).count() > 1)
+            .collect();
         mistakes.extend(twice.iter().map(|number| format!("{number} is {what} twice")));
     }
     mistakes
@@ -69,11 +74,13 @@ fn every_promise_has_a_test_that_exists() {
 fn each_mistake_is_named_with_its_promise() {
     let page = |promises: &str, tests: &str| {
         format!(
-            "| no. | promise |\n|---|---|\n{promises}\n\n| prefix | folder |\n|---|---|\n| `a/` | `crate/a/` |\n\n\
+            "| no. | promise |\n|---|---|\n{promises}\n\n| prefix | folder |\n|---|---|\n| `a/` \
+             | `crate/a/` |\n\n\
              | promise | shown by |\n|---|---|\n{tests}\n"
         )
     };
-    let source_of = |path: &str| (path == "crate/a/b.rs").then(|| "#[test]\nfn good() {}\n".to_string());
+    let source_of =
+        |path: &str| (path == "crate/a/b.rs").then(|| "#[test]\nfn good() {}\n".to_string());
     let (so, shown) = ("| O.1 | It is so. |", "| O.1 | `a/b.rs::good` |");
     for (promises, tests, wrong) in [
         (so, shown, &[][..]),

@@ -47,7 +47,8 @@ struct Plant<'p> {
 impl<'p> Plant<'p> {
     fn start(parts: &Parts, program: &'p Program) -> Plant<'p> {
         let bench = Bench::start(parts, program, Setup { debounce_ms: 0, genius: true }).unwrap();
-        let mut plant = Plant { bench, frames: FrameDecoder::new(), common_on: false, image_reports: 0 };
+        let mut plant =
+            Plant { bench, frames: FrameDecoder::new(), common_on: false, image_reports: 0 };
         for number in [1, 9] {
             plant.genius().connect(number);
         }
@@ -81,7 +82,8 @@ impl<'p> Plant<'p> {
                 self.toggle(BUSY, now_ms.is_multiple_of(2 * PERIOD_MS));
             }
             let received = self.genius().take_received();
-            let reports = received.iter().filter(|body| matches!(Reply::parse(body), Ok(Reply::Read(_))));
+            let reports =
+                received.iter().filter(|body| matches!(Reply::parse(body), Ok(Reply::Read(_))));
             self.image_reports += u32::try_from(reports.count()).expect("few");
         }
     }
@@ -90,7 +92,10 @@ impl<'p> Plant<'p> {
     fn reports(&mut self) -> Vec<u32> {
         let image = self.image_reports;
         let others = &self.genius().others;
-        [image].into_iter().chain(others.iter().map(|other| other.port.diagnostics().reports_sent)).collect()
+        [image]
+            .into_iter()
+            .chain(others.iter().map(|other| other.port.diagnostics().reports_sent))
+            .collect()
     }
 
     /// Asks the image over its line.
@@ -115,17 +120,24 @@ impl<'p> Plant<'p> {
 
     /// What the recorders stamp the latest move of the common contact with, the image first.
     fn stamps_ms(&mut self) -> Vec<i64> {
-        let Reply::Read(head) = self.ask(&Command::Read { start: 1, count: 1 }) else { panic!("no log") };
+        let Reply::Read(head) = self.ask(&Command::Read { start: 1, count: 1 }) else {
+            panic!("no log")
+        };
         let mut image = Vec::new();
         for start in (1..=head.total).step_by(10) {
-            let Reply::Read(reply) = self.ask(&Command::Read { start, count: 10 }) else { panic!("no log") };
+            let Reply::Read(reply) = self.ask(&Command::Read { start, count: 10 }) else {
+                panic!("no log")
+            };
             image.extend(reply.entries);
         }
         let stamp = |log: Vec<Entry>| {
             let moved = |changed: Inputs| changed.contains(COMMON);
-            milliseconds(log.into_iter().rfind(|entry| moved(entry.changed)).expect("it is recorded").time)
+            milliseconds(
+                log.into_iter().rfind(|entry| moved(entry.changed)).expect("it is recorded").time,
+            )
         };
-        let others = self.genius().others.iter().map(|other| other.node.log().1).collect::<Vec<_>>();
+        let others =
+            self.genius().others.iter().map(|other| other.node.log().1).collect::<Vec<_>>();
         [image].into_iter().chain(others).map(stamp).collect()
     }
 }
@@ -139,7 +151,8 @@ fn milliseconds(time: TimeStamp) -> i64 {
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn one_broadcast_sets_the_image_and_two_recorders_that_report_all_the_time() {
     let plugin = std::env::var_os(PLUGIN_VARIABLE);
-    let plugin = plugin.unwrap_or_else(|| panic!("{PLUGIN_VARIABLE} is not set: run `cargo xtask test`"));
+    let plugin =
+        plugin.unwrap_or_else(|| panic!("{PLUGIN_VARIABLE} is not set: run `cargo xtask test`"));
     let parts = Parts { image: image(), plugin: plugin.into() };
     let program = Program::read(&parts.image).unwrap_or_else(|error| panic!("{error}"));
     let mut plant = Plant::start(&parts, &program);
@@ -166,7 +179,10 @@ fn one_broadcast_sets_the_image_and_two_recorders_that_report_all_the_time() {
         // All of them were busy in this round.
         let reports: Vec<u32> =
             plant.reports().iter().zip(&before).map(|(after, before)| after - before).collect();
-        assert!(reports.iter().all(|&count| count >= REPORTS_PER_ROUND), "round {round}: {reports:?}");
+        assert!(
+            reports.iter().all(|&count| count >= REPORTS_PER_ROUND),
+            "round {round}: {reports:?}"
+        );
         let arrived_ms = plant.genius().read_arrived_ms();
         plant.common_on ^= true;
         plant.toggle(COMMON, plant.common_on);
@@ -178,8 +194,12 @@ fn one_broadcast_sets_the_image_and_two_recorders_that_report_all_the_time() {
         assert!(spread <= CLOCKS_AGREE_WITHIN_MS, "round {round}, set to {time}: {stamps:?}");
         // None of them has an interrupt line, so each goes by its next look at its board.
         for (stamp, arrived_ms) in stamps.iter().zip(arrived_ms) {
-            let off_ms = (stamp - milliseconds(time)) - i64::try_from(moved_ms - arrived_ms).expect("short");
-            assert!((-CLOCKS_AGREE_WITHIN_MS..=0).contains(&off_ms), "round {round}: {off_ms} ms off");
+            let off_ms =
+                (stamp - milliseconds(time)) - i64::try_from(moved_ms - arrived_ms).expect("short");
+            assert!(
+                (-CLOCKS_AGREE_WITHIN_MS..=0).contains(&off_ms),
+                "round {round}: {off_ms} ms off"
+            );
         }
         all.push(stamps.iter().map(|stamp| stamp - stamps[0]).collect::<Vec<_>>());
     }

@@ -1,7 +1,9 @@
-//! What the ARM image does when something goes wrong for good: it starts anew, records again, and says what it was.
+//! What the ARM image does when something goes wrong for good: it starts anew, records again, and
+//! says what it was.
 //!
-//! The faults are brought about in the very image that is to be flashed: a word of the emulated board's external bus
-//! tells it to. Events are lost with the memory that they were in; the configuration and the time are not.
+//! The faults are brought about in the very image that is to be flashed: a word of the emulated
+//! board's external bus tells it to. Events are lost with the memory that they were in; the
+//! configuration and the time are not.
 #![cfg(unix)]
 
 mod image_records;
@@ -26,7 +28,8 @@ const WANTED: Configuration = Configuration {
     auto_print: false,
 };
 
-/// By how much a main loop may come late to set the clock or to read it, on a computer that does other things as well.
+/// By how much a main loop may come late to set the clock or to read it, on a computer that does
+/// other things as well.
 const CLOCK_TOLERANCE: Duration = Duration::from_millis(500);
 
 fn read_all(unit: &mut Unit) -> Vec<Entry> {
@@ -61,7 +64,8 @@ impl SetClock {
         SetClock { not_before, not_after: Instant::now() }
     }
 
-    /// Checks the time of an entry that was recorded between two moments, but for what the bench kept the clock from.
+    /// Checks the time of an entry that was recorded between two moments, but for what the bench
+    /// kept the clock from.
     fn assert_is_right(&self, entry: &Entry, from: Instant, to: Instant, stood_still: Duration) {
         let shown_ms = stamp_ms(entry) - stamp_ms(&Entry { time: TEN_O_CLOCK, ..*entry });
         let tolerance_ms = milliseconds(CLOCK_TOLERANCE + stood_still);
@@ -95,7 +99,8 @@ impl InUse {
         InUse { recorder, unit, clock }
     }
 
-    /// Checks that it goes on with what it was told, right from the start; its line is the one that it had.
+    /// Checks that it goes on with what it was told, right from the start; its line is the one that
+    /// it had.
     fn assert_goes_on(&mut self) {
         let InUse { recorder, unit, clock } = self;
         let board = recorder.board();
@@ -109,7 +114,11 @@ impl InUse {
         assert_eq!(unit.configuration().expect("it answers on the same line"), WANTED);
         let entries = read_all(unit);
         assert_entries_are(&entries, &recorder.played()[played_before..]);
-        assert_eq!(entries[0].state, Inputs(1 << 31 | 1 << 1), "contacts are taken as they are found");
+        assert_eq!(
+            entries[0].state,
+            Inputs(1 << 31 | 1 << 1),
+            "contacts are taken as they are found"
+        );
         clock.assert_is_right(&entries[0], from, to, board.clock_stood_still());
     }
 }
@@ -153,7 +162,9 @@ fn a_panic_is_over_in_a_moment_and_its_text_is_kept() {
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn a_stack_that_runs_out_is_a_fault_and_harms_nothing_else() {
     // The processor finds no room for the registers that would tell where.
-    survives(ForcedFault::StackOverflow, ResetCause::StackOverflow, |words| words.starts_with("status "));
+    survives(ForcedFault::StackOverflow, ResetCause::StackOverflow, |words| {
+        words.starts_with("status ")
+    });
 }
 
 #[test]
@@ -181,7 +192,10 @@ fn last_words_are_told_after_further_resets_until_there_are_newer_ones() {
     assert!(words.ends_with(": forced by the bench"), "{words:?}");
     for starts_ago in [2, 3] {
         force(ForcedFault::SilentReset);
-        assert_eq!((board.reset_cause(), board.last_words()), (Some(ResetCause::Unknown), words.clone()));
+        assert_eq!(
+            (board.reset_cause(), board.last_words()),
+            (Some(ResetCause::Unknown), words.clone())
+        );
         assert_eq!(board.fault_starts_ago(), NonZeroU32::new(starts_ago));
         let told = format!("the latest fault was {starts_ago} starts ago: Panic: {words}");
         image_records::wait_for(&log, &[&told]);
@@ -197,13 +211,17 @@ fn last_words_are_told_after_further_resets_until_there_are_newer_ones() {
 #[test]
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn a_main_loop_that_hangs_is_ended_by_the_watchdog() {
-    survives(ForcedFault::MainLoopHangs, ResetCause::Watchdog, |words| words == "the main loop stands still");
+    survives(ForcedFault::MainLoopHangs, ResetCause::Watchdog, |words| {
+        words == "the main loop stands still"
+    });
 }
 
 #[test]
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn capture_that_stops_is_ended_by_the_watchdog_though_the_main_loop_runs() {
-    survives(ForcedFault::CaptureStops, ResetCause::Watchdog, |words| words == "capture stands still");
+    survives(ForcedFault::CaptureStops, ResetCause::Watchdog, |words| {
+        words == "capture stands still"
+    });
 }
 
 #[test]
@@ -278,7 +296,10 @@ fn contacts_that_move_all_the_time_are_recorded_again_from_the_first_sample_on()
     let anew = played.windows(2).position(|pair| pair[1].tick_before < pair[0].tick_before);
     let (before, after) = played.split_at(anew.expect("contacts moved before and after") + 1);
     assert!(before.len() > 50 && after.len() > 50, "{} and {}", before.len(), after.len());
-    assert!(played.iter().all(|moved| moved.tick_before <= moved.tick_after), "no move is one of both runs");
+    assert!(
+        played.iter().all(|moved| moved.tick_before <= moved.tick_after),
+        "no move is one of both runs"
+    );
     assert_entries_are(&entries, after);
 }
 

@@ -1,4 +1,5 @@
-//! What the ARM image writes to its log: nothing that was dropped, refused or lost goes unmentioned.
+//! What the ARM image writes to its log: nothing that was dropped, refused or lost goes
+//! unmentioned.
 #![cfg(unix)]
 
 mod image_records;
@@ -34,7 +35,8 @@ fn dropped_frames_are_logged_by_cause() {
 fn log_and_memory_are_those_that_were_opened_whatever_comes_under_their_names() {
     let folder = tempfile::tempdir().expect("a folder");
     let [log, memory, first_log, first_memory, victim] =
-        ["log", "memory", "first log", "first memory", "victim"].map(|name| folder.path().join(name));
+        ["log", "memory", "first log", "first memory", "victim"]
+            .map(|name| folder.path().join(name));
     fs::write(&victim, "theirs").expect("a file");
     let recorder = Recorder::start_keeping(&memory, &log);
     for (name, first) in [(&log, &first_log), (&memory, &first_memory)] {
@@ -44,6 +46,9 @@ fn log_and_memory_are_those_that_were_opened_whatever_comes_under_their_names() 
     let logged = fs::metadata(&first_log).expect("the log").len();
     recorder.power_cycle();
     assert_eq!(fs::read_to_string(&victim).expect("a file"), "theirs");
-    assert!(fs::metadata(&first_log).expect("the log").len() > logged, "the board says that it starts");
+    assert!(
+        fs::metadata(&first_log).expect("the log").len() > logged,
+        "the board says that it starts"
+    );
     assert_eq!(recorder.board().boots(), 2);
 }

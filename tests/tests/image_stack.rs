@@ -1,4 +1,5 @@
-//! How much of its stack the ARM image needs when everything happens at once, and that it records all the while.
+//! How much of its stack the ARM image needs when everything happens at once, and that it records
+//! all the while.
 #![cfg(unix)]
 
 use std::thread;
@@ -19,7 +20,8 @@ const BOUND_VARIABLE: &str = "SER_STACK_BOUND_MPS2_AN385";
 /// How deep the stack of the image can get, by its instructions.
 fn bound() -> u32 {
     let bound = std::env::var(BOUND_VARIABLE);
-    let bound = bound.unwrap_or_else(|_| panic!("{BOUND_VARIABLE} is not set: run `cargo xtask test`"));
+    let bound =
+        bound.unwrap_or_else(|_| panic!("{BOUND_VARIABLE} is not set: run `cargo xtask test`"));
     bound.parse().expect("a number of bytes")
 }
 
@@ -62,7 +64,8 @@ fn changes(mut state: u32, steps: &[(u64, u8, bool)]) -> usize {
 
 /// Everything that a host can ask for and have answered at once.
 fn ask_for_everything(unit: &mut Unit, cursor: &mut Option<Cursor>) {
-    let time = TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 0 };
+    let time =
+        TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 0 };
     unit.set_clock(|_| time).expect("the clock is set");
     unit.mode().expect("the mode");
     unit.last_broadcast().expect("a reply");
@@ -136,7 +139,10 @@ fn a_quarter_of_the_stack_is_never_in_use_nor_more_than_the_bound_found_in_the_i
     assert!(board.wait(PATIENCE, |board| board.tick_ms() - now_ms > 2 * LOOK_EVERY_MS));
 
     let used = board.stack_bytes();
-    println!("{used} of {STACK_LEN} bytes of the stack have been in use ({} %)", used * 100 / STACK_LEN);
+    println!(
+        "{used} of {STACK_LEN} bytes of the stack have been in use ({} %)",
+        used * 100 / STACK_LEN
+    );
     assert!(used > 0, "the image has not looked");
     assert!(used <= STACK_LEN / 4 * 3, "{used} of {STACK_LEN} bytes");
     assert!(

@@ -1,5 +1,5 @@
-//! The ARM image in virtual time: what it costs in instructions, and that a load at its limit costs no event. `cargo
-//! xtask timing` prints all the numbers.
+//! The ARM image in virtual time: what it costs in instructions, and that a load at its limit costs
+//! no event. `cargo xtask timing` prints all the numbers.
 #![cfg(target_os = "linux")]
 
 use image_bench::bench::{Carried, Parts, RATE};
@@ -22,8 +22,8 @@ const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";
 /// So long nothing happens before.
 const REST_MS: u64 = 100;
 
-/// So long all inputs change in every millisecond: more events than the log holds. `cargo xtask timing --load-seconds
-/// 60` goes on for a minute, which takes more than one of real time.
+/// So long all inputs change in every millisecond: more events than the log holds. `cargo xtask
+/// timing --load-seconds 60` goes on for a minute, which takes more than one of real time.
 const LOAD_MS: u64 = 3_000;
 
 /// Bytes that a direction of the line may have been behind with when the load began.
@@ -31,7 +31,8 @@ const LINE_SLACK: u64 = 4;
 
 fn parts() -> Parts {
     let plugin = std::env::var_os(PLUGIN_VARIABLE);
-    let plugin = plugin.unwrap_or_else(|| panic!("{PLUGIN_VARIABLE} is not set: run `cargo xtask test`"));
+    let plugin =
+        plugin.unwrap_or_else(|| panic!("{PLUGIN_VARIABLE} is not set: run `cargo xtask test`"));
     Parts { image: image(), plugin: plugin.into() }
 }
 
@@ -64,10 +65,11 @@ fn the_capture_interrupt_keeps_to_its_budget() {
         cases.iter().filter(|(_, instructions)| *instructions > CAPTURE_INSTRUCTIONS).collect();
     assert!(beyond.is_empty(), "more than {CAPTURE_INSTRUCTIONS} instructions: {beyond:?}");
     // Each case is one of its own: changes, debounce and a full queue cost something.
-    let cost = |case: &str| cases.iter().find(|(name, _)| name == case).map_or(0, |(_, cost)| *cost);
+    let cost =
+        |case: &str| cases.iter().find(|(name, _)| name == case).map_or(0, |(_, cost)| *cost);
     let [idle, all] = ["None", "All"].map(|change| cost(&format!("{change}, debounce of 0 ms")));
-    let [idle_debounced, all_debounced] =
-        ["None", "All"].map(|change| cost(&format!("{change}, debounce of {SHORTEST_DEBOUNCE_MS} ms")));
+    let [idle_debounced, all_debounced] = ["None", "All"]
+        .map(|change| cost(&format!("{change}, debounce of {SHORTEST_DEBOUNCE_MS} ms")));
     assert!(0 < idle && idle < all && idle < idle_debounced && idle_debounced < all_debounced);
     assert!(all < cost("queue full, debounce of 0 ms"), "the queue was not full");
     let full = format!("queue full, debounce of {SHORTEST_DEBOUNCE_MS} ms");
@@ -118,8 +120,8 @@ fn two_runs_count_the_same() {
     assert_eq!(costs, run());
 }
 
-/// The measurement measures: where interrupts are masked, here by another instruction in the place of the sleep, the
-/// interrupt is seen to be late.
+/// The measurement measures: where interrupts are masked, here by another instruction in the place
+/// of the sleep, the interrupt is seen to be late.
 #[test]
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn an_interrupt_that_is_masked_is_seen_to_be_late() {

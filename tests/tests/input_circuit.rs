@@ -1,5 +1,5 @@
-//! The circuit in front of each input, as `docs/hardware.md` draws it, reckoned for its worst case: the page's
-//! figures are the ones that come out, and its levels are valid ones.
+//! The circuit in front of each input, as `docs/hardware.md` draws it, reckoned for its worst case:
+//! the page's figures are the ones that come out, and its levels are valid ones.
 
 use std::fs;
 use std::path::Path;
@@ -33,8 +33,8 @@ fn led_current(field: f64, led: f64, [series, shunt]: [f64; 2]) -> f64 {
     (field - led) / (SERIES_FIELD.0 * series) - led / (SHUNT.0 * shunt)
 }
 
-/// Shortest and longest time, in microseconds, that the pin takes to change its level: through a threshold that may lie
-/// anywhere between the two that are guaranteed.
+/// Shortest and longest time, in microseconds, that the pin takes to change its level: through a
+/// threshold that may lie anywhere between the two that are guaranteed.
 fn filter_us(closes: bool) -> [f64; 2] {
     let mut times = Vec::new();
     for (capacitor, resistor) in pairs(CAPACITOR, RESISTOR) {
@@ -61,7 +61,11 @@ fn pairs(a: [f64; 2], b: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
 /// The page with its lines in one.
 fn page() -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/hardware.md");
-    fs::read_to_string(path).expect("docs/hardware.md").split_whitespace().collect::<Vec<_>>().join(" ")
+    fs::read_to_string(path)
+        .expect("docs/hardware.md")
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 fn assert_says(page: &str, figures: &[String]) {
@@ -109,7 +113,9 @@ fn the_chips_pull_up_would_spoil_the_low_of_input_13() {
         let series = SERIES_PIN.0 * RESISTOR[1];
         SATURATED[1] + (SUPPLY[0] - SATURATED[1]) * series / (series + chip)
     };
-    assert!(pulled(30_000.0) < LOW_OF_SUPPLY * SUPPLY[0] && pulled(8_000.0) > LOW_OF_SUPPLY * SUPPLY[0]);
+    assert!(
+        pulled(30_000.0) < LOW_OF_SUPPLY * SUPPLY[0] && pulled(8_000.0) > LOW_OF_SUPPLY * SUPPLY[0]
+    );
     assert_says(&page(), &[format!("would have {:.2} V where", pulled(8_000.0))]);
 }
 
@@ -123,9 +129,13 @@ fn an_open_contact_is_a_valid_high_with_the_leakiest_parts() {
         assert!(high > HIGH_OF_SUPPLY * supply + 0.1, "{high} V at {supply} V");
     }
     let wanted = HIGH_OF_SUPPLY * SUPPLY[0];
-    assert_says(&page(), &[format!("{:.2} V at least | {wanted:.2} V at least", at_pin(SUPPLY[0]))]);
+    assert_says(
+        &page(),
+        &[format!("{:.2} V at least | {wanted:.2} V at least", at_pin(SUPPLY[0]))],
+    );
     // Less than the LED takes at all; what little it takes is less than the dark current.
-    let at_led = 4.2 * SHUNT.0 * RESISTOR[1] / (SHUNT.0 * RESISTOR[1] + SERIES_FIELD.0 * RESISTOR[0]);
+    let at_led =
+        4.2 * SHUNT.0 * RESISTOR[1] / (SHUNT.0 * RESISTOR[1] + SERIES_FIELD.0 * RESISTOR[0]);
     assert!(at_led < 0.8, "{at_led} V");
     assert_says(&page(), &["up to 4.2 V it has less than 0.8 V".to_owned()]);
 }
@@ -150,7 +160,11 @@ fn the_field_side_has_the_currents_of_the_page() {
                 typical(24.0) * 1e3,
                 input(24.0) * 1e3
             ),
-            format!("at 30 V {:.1} and {:.1} mA, with {heat:.2} W", typical(30.0) * 1e3, input(30.0) * 1e3),
+            format!(
+                "at 30 V {:.1} and {:.1} mA, with {heat:.2} W",
+                typical(30.0) * 1e3,
+                input(30.0) * 1e3
+            ),
             format!("are {:.0} mA", 32.0 * input(24.0) * 1e3),
         ],
     );
@@ -174,18 +188,32 @@ fn delays_and_what_the_test_sheet_makes_of_them_are_those_of_the_circuit() {
         &page(),
         &[
             format!(
-                "is {while_on:.0} µs while the transistor pulls, {while_off:.0} µs while the resistors do"
+                "is {while_on:.0} µs while the transistor pulls, {while_off:.0} µs while the \
+                 resistors do"
             ),
             format!(
-                "closes | {closes:.0}–{closes_max:.0} µs | {ON_MAX_US} µs at most | {on:.2}–{:.2} ms",
+                "closes | {closes:.0}–{closes_max:.0} µs | {ON_MAX_US} µs at most | \
+                 {on:.2}–{:.2} ms",
                 up(on_max)
             ),
-            format!("opens | {opens:.0}–{opens_max:.0} µs | {OFF_MAX_US} µs at most, out of saturation"),
+            format!(
+                "opens | {opens:.0}–{opens_max:.0} µs | {OFF_MAX_US} µs at most, out of saturation"
+            ),
             format!("| {off:.2}–{:.2} ms |", up(off_max)),
-            format!("close more than {among_on:.2} ms apart, or open more than {among_off:.2} ms apart"),
+            format!(
+                "close more than {among_on:.2} ms apart, or open more than {among_off:.2} ms apart"
+            ),
             format!("up to {:.2} ms late against one that closes", up(off_max - on)),
-            format!("low within {:.2} ms after closing, high within {:.2} ms", up(on_max), up(off_max)),
-            format!("{:.0} % of the edges ON and {:.0} % of those OFF", among_on * 100.0, among_off * 100.0),
+            format!(
+                "low within {:.2} ms after closing, high within {:.2} ms",
+                up(on_max),
+                up(off_max)
+            ),
+            format!(
+                "{:.0} % of the edges ON and {:.0} % of those OFF",
+                among_on * 100.0,
+                among_off * 100.0
+            ),
             format!("{:.0}–{:.0} % of the pulses", pulse[0] * 100.0, pulse[1] * 100.0),
             format!("stays low for {:.2}–{:.2} ms", pulse[0], pulse[1]),
         ],

@@ -1,20 +1,21 @@
-//! A board's main loop with both ports, in the middle of which time passes: interrupts take samples,
-//! bytes and pulses while it is busy. A clock that comes by broadcast counts from the tick of the
-//! pulse, for every change after it.
+//! A board's main loop with both ports, in the middle of which time passes: interrupts take
+//! samples, bytes and pulses while it is busy. A clock that comes by broadcast counts from the tick
+//! of the pulse, for every change after it.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
 use geni_board::{
-    Completion, Configuration, Data, Destination, Driver, Options, Start, Transmission, TransmitPriority,
+    Completion, Configuration, Data, Destination, Driver, Options, Start, Transmission,
+    TransmitPriority,
 };
 use ser_board::genius::{GeniBoard, Genius};
 use ser_board::main_loop::{self, Line};
 use ser_board::serial_line::ReceivedByte;
 use ser_node::{
-    Capture, CaptureChannel, CopyNumber, Debounce, Event as Change, GeniusOptions, NoRtc, Node, NodeParts,
-    RECORD_LEN, Storage,
+    Capture, CaptureChannel, CopyNumber, Debounce, Event as Change, GeniusOptions, NoRtc, Node,
+    NodeParts, RECORD_LEN, Storage,
 };
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{AutoReport, Baud, Command, Configure, Entry, FrameEncoder, Model, TimeStamp};
@@ -85,7 +86,9 @@ impl Surroundings {
                     self.inputs ^= 1;
                     self.moved_ms = Some(now_ms);
                 }
-                Act::Broadcast(command) => transmit(&mut self.host, Destination::Broadcast, &command),
+                Act::Broadcast(command) => {
+                    transmit(&mut self.host, Destination::Broadcast, &command)
+                }
                 Act::Say(command) => {
                     let bytes = FrameEncoder::new(command.to_body());
                     self.bytes.extend(bytes.map(|byte| ReceivedByte { byte, tick_ms: now_ms }));
@@ -110,7 +113,9 @@ impl Surroundings {
             (MOVE_AFTER_MS, Act::Toggle),
         ];
         let began_ms = self.now_ms;
-        self.acts.extend(acts.into_iter().chain(besides).map(|(after_ms, act)| (began_ms + after_ms, act)));
+        self.acts.extend(
+            acts.into_iter().chain(besides).map(|(after_ms, act)| (began_ms + after_ms, act)),
+        );
     }
 }
 
@@ -220,8 +225,10 @@ impl Bench {
         let connect = |number| bus.borrow_mut().connect(Board::new(BoardOptions::at(number)));
         let (board, host) = (connect(UNIT), connect(HOST));
         let window = |board| BoardWindow::new(Rc::clone(&bus), board);
-        let host =
-            Driver::new(window(host), Options { start: RESET, ..Options::new(Configuration::DEFAULT) });
+        let host = Driver::new(
+            window(host),
+            Options { start: RESET, ..Options::new(Configuration::DEFAULT) },
+        );
         // Memory of the test process goes when it does.
         let (capture, reader) = Box::leak(Box::new(CaptureChannel::new())).split(Debounce::OFF);
         let around = Rc::new(RefCell::new(Surroundings {
@@ -280,7 +287,12 @@ impl Bench {
         let millisecond = u16::try_from(moved_ms - arrived_ms).expect("short");
         let stamps: Vec<TimeStamp> =
             self.node.read(1, 10).entries.iter().map(|entry: &Entry| entry.time).collect();
-        assert_eq!(stamps, [TimeStamp { millisecond, ..TEN_O_CLOCK }], "{:?}", self.node.diagnostics());
+        assert_eq!(
+            stamps,
+            [TimeStamp { millisecond, ..TEN_O_CLOCK }],
+            "{:?}",
+            self.node.diagnostics()
+        );
         assert_eq!(self.node.diagnostics().settings_late, 0);
         assert_eq!(self.genius.diagnostics().broadcasts, 1);
     }

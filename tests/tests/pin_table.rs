@@ -1,4 +1,5 @@
-//! The pins of `docs/hardware.md` are those of `firmware/stm32f407/src/pins.rs`, neither more nor less.
+//! The pins of `docs/hardware.md` are those of `firmware/stm32f407/src/pins.rs`, neither more nor
+//! less.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -80,5 +81,8 @@ fn pins_are_read_as_they_are_written() {
     assert_eq!((pins("NRST"), pins("VBAT"), pins("PB")), (None, None, None));
     let source = "assign(Port::A, pins([1, LAMP]), Role::Output),\n\
                   assign(Port::B, range(0, 1) | range(7, 7), Role::Input),\nconst LAMP: u8 = 9;";
-    assert_eq!(assigned(source), BTreeSet::from([('A', 1), ('A', 9), ('B', 0), ('B', 1), ('B', 7)]));
+    assert_eq!(
+        assigned(source),
+        BTreeSet::from([('A', 1), ('A', 9), ('B', 0), ('B', 1), ('B', 7)])
+    );
 }

@@ -1,4 +1,5 @@
-//! Every command over a pseudo-terminal, with the real client, against the native node and against the ARM image.
+//! Every command over a pseudo-terminal, with the real client, against the native node and against
+//! the ARM image.
 #![cfg(unix)]
 
 use std::time::Duration;
@@ -69,7 +70,8 @@ fn edges_one_millisecond_apart_on_32_inputs(kind: Kind) {
     let entries = read_all(&mut unit);
     assert_entries_are(&entries, &recorder.played());
     if kind == Kind::Native {
-        let deltas: Vec<_> = entries.windows(2).map(|pair| stamp_ms(&pair[1]) - stamp_ms(&pair[0])).collect();
+        let deltas: Vec<_> =
+            entries.windows(2).map(|pair| stamp_ms(&pair[1]) - stamp_ms(&pair[0])).collect();
         assert_eq!(deltas, [1; 63]);
     }
 }
@@ -183,7 +185,9 @@ fn auto_report_reports_every_event(kind: Kind) {
     recorder.play(&toggling(50, 1));
     let mut reported: Vec<Entry> = Vec::new();
     listen(&mut unit, |message| {
-        let Unsolicited::Report(ReadReply { start, entries, .. }) = message else { panic!("{message:?}") };
+        let Unsolicited::Report(ReadReply { start, entries, .. }) = message else {
+            panic!("{message:?}")
+        };
         assert_eq!(usize::from(start), reported.len() + 1, "in order, without a gap");
         reported.extend(entries);
         reported.len() == 50
@@ -246,12 +250,15 @@ fn full_log_while_events_keep_arriving(kind: Kind, model: Model) {
                 delivered += 1;
             }
             Delivery::Lost {
-                lost: Lost::Overwritten { count } | Lost::OverwrittenAtLeast { count }, ..
+                lost: Lost::Overwritten { count } | Lost::OverwrittenAtLeast { count },
+                ..
             } => {
                 entries.clear();
                 lost += count;
             }
-            Delivery::Lost { lost, .. } => panic!("nobody erased the log or stopped recording: {lost:?}"),
+            Delivery::Lost { lost, .. } => {
+                panic!("nobody erased the log or stopped recording: {lost:?}")
+            }
         })
         .expect("the log is read");
         if !last {
@@ -279,8 +286,9 @@ fn an_overrun_log_says_exactly_how_many_are_lost(kind: Kind) {
     // Two and a half times its size more.
     recorder.play(&toggling(250, 1));
     log.clear();
-    let summary =
-        unit.read_new(&mut cursor, size, &mut |delivery| log.push(delivery)).expect("the log is read");
+    let summary = unit
+        .read_new(&mut cursor, size, &mut |delivery| log.push(delivery))
+        .expect("the log is read");
     assert_eq!((summary.delivered, summary.lost, summary.restarted), (100, 150, false));
     assert!(matches!(log[0], Delivery::Lost { lost: Lost::Overwritten { count: 150 }, .. }));
     let entries: Vec<_> = log[1..]

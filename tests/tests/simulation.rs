@@ -1,4 +1,5 @@
-//! Some virtual time of the whole system, left to chance: every event is read once, or reported as lost.
+//! Some virtual time of the whole system, left to chance: every event is read once, or reported as
+//! lost.
 //!
 //! `cargo xtask simulate` goes on for as long as one likes.
 
@@ -90,7 +91,10 @@ fn minutes_on_a_bus() {
     }
     for reader in 0..3 {
         let tally = sum(&reports, reader);
-        assert!(tally.delivered > 1000 && tally.overwritten > 0 && tally.restarts > 0, "{reader}: {tally:?}");
+        assert!(
+            tally.delivered > 1000 && tally.overwritten > 0 && tally.restarts > 0,
+            "{reader}: {tally:?}"
+        );
     }
 }
 
@@ -111,19 +115,25 @@ fn the_same_seed_gives_the_same_run() {
     }
 }
 
-/// Checks that a time in which all inputs toggle in every millisecond is accounted for, and that both ports were busy
-/// in it.
+/// Checks that a time in which all inputs toggle in every millisecond is accounted for, and that
+/// both ports were busy in it.
 fn all_inputs_toggle_for(duration_ms: u64) {
     let options = Options { seed: 1, duration_ms, bus_one_in: 1 };
     let (report, _) = run_flat_out(options).unwrap_or_else(|failure| panic!("{failure}"));
     assert_accounted(&report);
     for (edges, &events) in report.edges.iter().zip(&report.recorded) {
         assert_eq!(events, duration_ms, "{report}");
-        assert!(edges.recorded == edges.applied && (edges.applied / events).is_multiple_of(16), "{report}");
+        assert!(
+            edges.recorded == edges.applied && (edges.applied / events).is_multiple_of(16),
+            "{report}"
+        );
     }
-    assert!(report.tallies.iter().all(|(_, tally)| tally.delivered > 0 && tally.overwritten > 0), "{report}");
-    // The line carries nine replies a second, of which every other one is short, beside some three printed lines; the
-    // bus some twenty datagrams to each host.
+    assert!(
+        report.tallies.iter().all(|(_, tally)| tally.delivered > 0 && tally.overwritten > 0),
+        "{report}"
+    );
+    // The line carries nine replies a second, of which every other one is short, beside some three
+    // printed lines; the bus some twenty datagrams to each host.
     let at_least = |count: u64, per_second: u64| count > per_second * duration_ms / 1000;
     assert!(at_least(report.line.answered, 5) && at_least(report.line.lines, 2), "{report}");
     assert!(report.bus.iter().all(|talk| at_least(talk.answered, 10)), "{report}");

@@ -1,4 +1,5 @@
-//! The manual's examples through the frame decoder and the message types, whole, in pieces and after noise.
+//! The manual's examples through the frame decoder and the message types, whole, in pieces and
+//! after noise.
 
 use proptest::prelude::*;
 use ser_proto::{Command, FrameEncoder, Reply};
@@ -61,7 +62,12 @@ fn what_is_understood_is_sent_the_same_way() {
             Sender::Host => Command::parse(&body).expect("a command").to_body(),
             Sender::Unit => Reply::parse(&body).expect("a reply").to_body(),
         };
-        assert_eq!(FrameEncoder::new(again).collect::<Vec<_>>(), vector.wire, "line {}", vector.line);
+        assert_eq!(
+            FrameEncoder::new(again).collect::<Vec<_>>(),
+            vector.wire,
+            "line {}",
+            vector.line
+        );
         sent += 1;
     }
     assert!(sent >= 16);

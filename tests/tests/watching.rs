@@ -1,6 +1,6 @@
-//! `watch` while events come faster and faster, in virtual time: nothing is lost that the line carries, and beyond that
-//! most of what it carries is delivered. Every event is delivered once and in order, or counted as lost: the run itself
-//! sees to that.
+//! `watch` while events come faster and faster, in virtual time: nothing is lost that the line
+//! carries, and beyond that most of what it carries is delivered. Every event is delivered once and
+//! in order, or counted as lost: the run itself sees to that.
 
 use ser_trial::watching::{Load, Watched, Way, line_carries};
 
@@ -17,11 +17,15 @@ fn watch(way: Way, size: u16, per_second: u32) -> Watched {
 #[test]
 fn nothing_is_lost_that_the_line_carries() {
     // A ring of 64 entries turns over in less than a second then, and bears less.
-    for (size, rates) in [(64, &[20, 40, 60][..]), (128, &[40, 70]), (256, &[40, 60, 70]), (2048, &[40, 70])]
+    for (size, rates) in
+        [(64, &[20, 40, 60][..]), (128, &[40, 70]), (256, &[40, 60, 70]), (2048, &[40, 70])]
     {
         for (&per_second, way) in rates.iter().flat_map(|rate| WAYS.map(|way| (rate, way))) {
             let watched = watch(way, size, per_second);
-            assert_eq!(watched.lost, 0, "{per_second} events/s, ring of {size}, {way:?}: {watched:?}");
+            assert_eq!(
+                watched.lost, 0,
+                "{per_second} events/s, ring of {size}, {way:?}: {watched:?}"
+            );
             assert_eq!(watched.delivered, watched.events);
         }
     }
@@ -29,7 +33,8 @@ fn nothing_is_lost_that_the_line_carries() {
 
 #[test]
 fn a_watcher_with_reports_is_never_far_behind() {
-    // With reports and readings on the line at once, it falls further behind with every second from 35 events/s on.
+    // With reports and readings on the line at once, it falls further behind with every second from
+    // 35 events/s on.
     for per_second in [10, 20, 30, 40, 50, 60] {
         let watched = watch(Way::Reports, 1024, per_second);
         let behind = watched.events - watched.in_time;
@@ -40,7 +45,9 @@ fn a_watcher_with_reports_is_never_far_behind() {
 #[test]
 fn beyond_that_most_of_what_the_line_carries_is_delivered() {
     let carried = line_carries() * f64::from(SECONDS);
-    for (size, per_second) in [(64, 200), (256, 80), (256, 500), (1024, 200), (1024, 500), (2048, 1000)] {
+    for (size, per_second) in
+        [(64, 200), (256, 80), (256, 500), (1024, 200), (1024, 500), (2048, 1000)]
+    {
         for way in WAYS {
             let watched = watch(way, size, per_second);
             let part = watched.in_time as f64 / carried;

@@ -26,7 +26,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_parser = images::board)]
     board: &'static Board,
 
-    /// Which probe, as `probe-rs list` shows it; there is no need to say it where only one is connected.
+    /// Which probe, as `probe-rs list` shows it; there is no need to say it where only one is
+    /// connected.
     #[arg(long, value_name = "VID:PID[:SERIAL]")]
     probe: Option<String>,
 
@@ -58,9 +59,11 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
 }
 
 fn emulated(board: &Board) -> Failure {
-    let flashed: Vec<_> = BOARDS.iter().filter(|board| board.chip.is_some()).map(Board::name).collect();
+    let flashed: Vec<_> =
+        BOARDS.iter().filter(|board| board.chip.is_some()).map(Board::name).collect();
     Failure::new(format!(
-        "{} is emulated and has nothing to flash; run its image with\n  cargo xtask qemu --pty /tmp/ser\n\
+        "{} is emulated and has nothing to flash; run its image with\n  cargo xtask qemu --pty \
+         /tmp/ser\n\
          Boards to flash: {}",
         board.name(),
         flashed.join(", ")
@@ -71,6 +74,7 @@ fn missing() -> Failure {
     Failure::new(
         "probe-rs is missing, which drives the debug probe; get it with\n  \
          cargo install probe-rs-tools --locked\n\
-         or as a program that is ready to run from https://probe.rs/docs/getting-started/installation",
+         or as a program that is ready to run from \
+         https://probe.rs/docs/getting-started/installation",
     )
 }

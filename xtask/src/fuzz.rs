@@ -117,7 +117,8 @@ fn check_tools() -> Result<()> {
     }
     Err(Failure::new(format!(
         "the fuzzer cannot run yet. Install what is missing and try again:{missing}\n\
-         It also needs a C++ compiler, and Linux or macOS. What is known already is checked without all that:\n  \
+         It also needs a C++ compiler, and Linux or macOS. What is known already is checked \
+         without all that:\n  \
          cargo test -p ser-tests --test fuzz_seeds"
     )))
 }
@@ -144,7 +145,8 @@ fn helper(verb: &str, target: &str) -> Command {
 
 fn fuzzer(target: &str, seconds: u32) -> Command {
     let mut cargo = nightly("cargo");
-    // Nothing here is unsafe but the windows of boards, so what sanitizers look for cannot be found, and it is twice as fast.
+    // Nothing here is unsafe but the windows of boards, so what sanitizers look for cannot be
+    // found, and it is twice as fast.
     cargo.args(["fuzz", "run", "--fuzz-dir", "tests/fuzz", "--sanitizer", "none", "--target-dir"]);
     cargo.arg(target_folder()).args([target, "--"]);
     cargo.arg(format!("-max_total_time={seconds}")).arg(format!("-timeout={INPUT_SECONDS}"));
@@ -173,11 +175,14 @@ fn describe(target: &str, found: &[PathBuf]) -> String {
         let file = file.strip_prefix(places::root()).unwrap_or(file).display();
         text += &format!(
             "  {file}\n    \
-             to repeat it:    cargo run -p ser-trial --example fuzzing -- replay {target} {file}\n    \
-             to shorten it:   cargo +{TOOLCHAIN} fuzz tmin --fuzz-dir tests/fuzz --sanitizer none {target} {file}\n"
+             to repeat it:    cargo run -p ser-trial --example fuzzing -- replay {target} \
+             {file}\n    \
+             to shorten it:   cargo +{TOOLCHAIN} fuzz tmin --fuzz-dir tests/fuzz --sanitizer \
+             none {target} {file}\n"
         );
     }
-    text + "  Once it is understood, a test in the crate and a seed with a telling name keep it from coming back.\n"
+    text + "  Once it is understood, a test in the crate and a seed with a telling name keep it \
+     from coming back.\n"
 }
 
 #[cfg(test)]
@@ -198,7 +203,8 @@ mod tests {
         let all = || vec!["client".to_owned(), "node".to_owned()];
         assert_eq!(chosen(&[], all()).unwrap(), all());
         assert_eq!(chosen(&all()[1..], all()).unwrap(), ["node"]);
-        let refused = chosen(&["node".to_owned(), "bogus".to_owned()], all()).unwrap_err().to_string();
+        let refused =
+            chosen(&["node".to_owned(), "bogus".to_owned()], all()).unwrap_err().to_string();
         assert!(refused.contains("bogus") && refused.contains("client, node"), "{refused}");
     }
 

@@ -17,7 +17,8 @@ pub(crate) fn board(name: &str) -> std::result::Result<&'static Board, String> {
     Board::named(name).ok_or_else(|| format!("the boards are {}", names.join(", ")))
 }
 
-/// Boards that can be built for, each with its toolchain; and why the others cannot, which has been said by then.
+/// Boards that can be built for, each with its toolchain; and why the others cannot, which has been
+/// said by then.
 pub(crate) type Toolchains<'a> = (Vec<(&'a Board, CrossToolchain)>, Vec<Failure>);
 
 /// Finds a toolchain for each board.
@@ -51,7 +52,10 @@ fn build(toolchain: &CrossToolchain, board: &Board) -> Result<PathBuf> {
 }
 
 /// Builds images and checks them. One that may not be flashed is a failure.
-pub(crate) fn build_and_check(boards: &[(&Board, CrossToolchain)], stack: bool) -> Result<Vec<Checked>> {
+pub(crate) fn build_and_check(
+    boards: &[(&Board, CrossToolchain)],
+    stack: bool,
+) -> Result<Vec<Checked>> {
     if boards.is_empty() {
         return Ok(Vec::new());
     }

@@ -10,7 +10,8 @@ Examples:
 
 /// Print the log that an image has left in a file.
 ///
-/// The log holds numbers instead of text; the texts are in the image. It has to be the very image that wrote the log.
+/// The log holds numbers instead of text; the texts are in the image. It has to be the very image
+/// that wrote the log.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {

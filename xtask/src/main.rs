@@ -2,8 +2,8 @@
 //!
 //! A verb is a file. What verbs share: [`setup`] finds or installs tools, [`steps`] runs them and
 //! says how to repeat what failed. [`boards`] says what there is to build, [`images`] builds it and
-//! has `image-check` say whether it may be flashed; [`plugin`] and [`ser_cli`] are built for several
-//! verbs.
+//! has `image-check` say whether it may be flashed; [`plugin`] and [`ser_cli`] are built for
+//! several verbs.
 
 mod boards;
 mod demo;
@@ -29,7 +29,8 @@ use clap::{Parser, Subcommand};
 
 use setup::demand::Installing;
 
-/// Everything about the project that is one command. Missing tools are installed where that can be done.
+/// Everything about the project that is one command. Missing tools are installed where that can be
+/// done.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", version, max_term_width = 100)]
 struct Arguments {
@@ -85,8 +86,8 @@ mod tests {
 
     use super::Arguments;
 
-    /// Prose is for clap to break, which knows how wide the terminal is: a line that is broken by hand at more than
-    /// that is broken twice.
+    /// Prose is for clap to break, which knows how wide the terminal is: a line that is broken by
+    /// hand at more than that is broken twice.
     #[test]
     fn examples_fit_the_narrowest_width_that_help_is_printed_in() {
         const WIDTH: usize = 100;

@@ -27,5 +27,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
     let image = images::build_emulated(installing)?;
     ser_cli::build()?;
-    steps::become_program(ser_cli::command("sim").arg("--image").arg(image).args(&arguments.options))
+    steps::become_program(
+        ser_cli::command("sim").arg("--image").arg(image).args(&arguments.options),
+    )
 }

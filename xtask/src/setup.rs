@@ -1,4 +1,5 @@
-//! Finds the tools that do not come with Rust, and installs what is missing where that can be done unasked.
+//! Finds the tools that do not come with Rust, and installs what is missing where that can be done
+//! unasked.
 //!
 //! [`demand`] says what a run wants: what may be installed, and whether anything may be left out.
 //! Each other file knows one kind of tool: whether it is there, and how to install it.
@@ -53,9 +54,9 @@ fn install(plan: &Plan, targets: &[Target]) {
     for tool in &plan.install {
         let installed = match tool.kind {
             Kind::Components => components::find(Installing::Allowed),
-            Kind::CrossRust => {
-                cross::find(targets, Installing::Allowed).into_iter().try_for_each(|found| found.map(drop))
-            }
+            Kind::CrossRust => cross::find(targets, Installing::Allowed)
+                .into_iter()
+                .try_for_each(|found| found.map(drop)),
             Kind::CrossClippy => cross::install_clippy(),
             Kind::Emulator => emulator::find(Installing::Allowed),
             Kind::Program => programs::install(tool.name),

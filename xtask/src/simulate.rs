@@ -4,8 +4,8 @@ use std::ffi::OsString;
 
 use crate::steps::{self, Result};
 
-/// Run recorders, hosts, lines, bus and contacts in virtual time with random operations and faults, and account for every
-/// event.
+/// Run recorders, hosts, lines, bus and contacts in virtual time with random operations and faults,
+/// and account for every event.
 #[derive(Debug, clap::Args)]
 #[command(disable_help_flag = true)]
 pub(crate) struct Arguments {

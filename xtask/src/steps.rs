@@ -38,7 +38,9 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Failure::Told(text) => write!(f, "\nxtask: {}", Harmless(text)),
-            Failure::Unwritten(error) => write!(f, "\nxtask: cannot write standard output: {error}"),
+            Failure::Unwritten(error) => {
+                write!(f, "\nxtask: cannot write standard output: {error}")
+            }
         }
     }
 }
@@ -138,13 +140,16 @@ pub(crate) fn cargo() -> Command {
 
 /// Runs a program to its end; it prints what it likes.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
-    let status = command
-        .status()
-        .map_err(|error| Failure::new(format!("cannot run {}: {error}", command.get_program().display())))?;
+    let status = command.status().map_err(|error| {
+        Failure::new(format!("cannot run {}: {error}", command.get_program().display()))
+    })?;
     if status.success() {
         Ok(())
     } else {
-        Err(Failure::new(format!("this failed ({status}); to repeat it alone:\n  {}", repeat(command))))
+        Err(Failure::new(format!(
+            "this failed ({status}); to repeat it alone:\n  {}",
+            repeat(command)
+        )))
     }
 }
 
@@ -174,7 +179,9 @@ pub(crate) fn works(command: &mut Command) -> bool {
 /// The command as one would type it.
 fn repeat(command: &Command) -> String {
     let mut line = String::new();
-    if let Some(directory) = command.get_current_dir().filter(|&directory| directory != Path::new(".")) {
+    if let Some(directory) =
+        command.get_current_dir().filter(|&directory| directory != Path::new("."))
+    {
         line += &format!("cd {} && ", quoted(directory.as_os_str()));
     }
     for (name, value) in command.get_envs() {
@@ -194,7 +201,11 @@ fn repeat(command: &Command) -> String {
 fn quoted(text: &OsStr) -> String {
     let text = text.to_string_lossy();
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@\\".contains(c);
-    if !text.is_empty() && text.chars().all(plain) { text.into_owned() } else { format!("'{text}'") }
+    if !text.is_empty() && text.chars().all(plain) {
+        text.into_owned()
+    } else {
+        format!("'{text}'")
+    }
 }
 
 #[cfg(test)]
@@ -205,7 +216,11 @@ mod tests {
     fn each_step_lasts_until_the_next_one_begins() {
         let began = Instant::now();
         let at = |seconds| began + Duration::from_secs(seconds);
-        let steps = [("Format".to_owned(), at(0)), ("Tests".to_owned(), at(5)), ("More".to_owned(), at(130))];
+        let steps = [
+            ("Format".to_owned(), at(0)),
+            ("Tests".to_owned(), at(5)),
+            ("More".to_owned(), at(130)),
+        ];
         assert_eq!(
             durations(&steps, at(131)),
             ["    0:05  Format", "    2:05  Tests", "    0:01  More", "    2:11  together"]

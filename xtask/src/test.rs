@@ -18,7 +18,8 @@ Examples:
   cargo xtask test --strict     as in CI: nothing is left out
   cargo test                    only the tests that need no other program, nor minutes
 
-What is missing, and will be installed, is said first. What cannot be built or run here is left out, and \
+What is missing, and will be installed, is said first. What cannot be built or run here is left \
+out, and \
 that is said, too; with --strict, and where CI is \"true\", it is a failure.";
 
 /// Where the tests in the emulator look for the bound of its image's stack, in bytes.
@@ -114,7 +115,9 @@ fn on_images(tests: &mut Command, images: &[Checked]) {
 fn ignored_tests(images: &[Checked]) -> Result<()> {
     heading("Tests with programs of others");
     let mut others = steps::cargo();
-    others.args(["test", "--workspace", "--", "--ignored", programs::MODULE]).args(programs::skipped());
+    others
+        .args(["test", "--workspace", "--", "--ignored", programs::MODULE])
+        .args(programs::skipped());
     steps::run(&mut others)?;
     heading("Tests over the instructions of the images");
     let mut over_images = steps::cargo();

@@ -13,8 +13,8 @@ Seconds are of virtual time, which counts instructions: the numbers are the same
 and on every machine. Exit code 1 when something is over budget, the capture interrupt late, \
 or an event unaccounted for.";
 
-/// Count the instructions of the ARM image in the emulator, hold them against the budgets, and account for every
-/// event of a load.
+/// Count the instructions of the ARM image in the emulator, hold them against the budgets, and
+/// account for every event of a load.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
@@ -45,7 +45,12 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
         "--",
         "--load-seconds",
     ]);
-    timing.arg(arguments.load_seconds.to_string()).arg("--image").arg(image).arg("--plugin").arg(plugin);
+    timing
+        .arg(arguments.load_seconds.to_string())
+        .arg("--image")
+        .arg(image)
+        .arg("--plugin")
+        .arg(plugin);
     steps::become_program(&mut timing)
 }
 

@@ -24,13 +24,19 @@ fn a_full_disk_is_a_failure_and_a_reader_that_has_gone_is_none() {
         let (reader, writer) = io::pipe().unwrap();
         drop(reader);
         let Output { status, stderr, .. } = xtask(line).stdout(writer).output().unwrap();
-        assert_eq!((status.code(), String::from_utf8(stderr).unwrap()), (Some(0), String::new()), "{line}");
+        assert_eq!(
+            (status.code(), String::from_utf8(stderr).unwrap()),
+            (Some(0), String::new()),
+            "{line}"
+        );
     }
 }
 
 #[test]
 fn words_that_a_terminal_would_obey_are_shown() {
-    for words in [&["\u{1B}[2J"][..], &["fuzz", "\u{1B}[2J"], &["firmware", "--board", "\u{9B}2J\u{202E}"]] {
+    for words in
+        [&["\u{1B}[2J"][..], &["fuzz", "\u{1B}[2J"], &["firmware", "--board", "\u{9B}2J\u{202E}"]]
+    {
         let Output { status, stderr, .. } = xtask("").args(words).output().unwrap();
         let told = String::from_utf8(stderr).unwrap();
         assert!(!status.success());

@@ -6,14 +6,15 @@ use crate::datagram::{
 use crate::map;
 use crate::ram::SharedRam;
 
-/// Asks the board to set the status to 0 as soon as it has taken the command, and to say no more about it: "bit 8".
+/// Asks the board to set the status to 0 as soon as it has taken the command, and to say no more
+/// about it: "bit 8".
 const CLEAR_STATUS: u8 = 0x80;
 
 /// Status that the host writes to start a command.
 const INCOMING: u8 = 1;
 
-/// Marks a directed datagram. What else there may be in the byte means broadcast: 0 by the table, 2 by the
-/// example structure.
+/// Marks a directed datagram. What else there may be in the byte means broadcast: 0 by the table, 2
+/// by the example structure.
 const DIRECTED: u8 = 1;
 
 /// The commands.
@@ -84,7 +85,8 @@ impl CommandStatus {
     }
 }
 
-/// Starts a command whose options are in place. The status byte goes last: it is what interrupts the board.
+/// Starts a command whose options are in place. The status byte goes last: it is what interrupts
+/// the board.
 fn start<R: SharedRam>(ram: &mut R, command: u8) {
     ram.write(map::COMMAND_CODE, command);
     ram.write(map::COMMAND_STATUS, INCOMING);
@@ -146,7 +148,8 @@ pub(crate) fn read_datagram<R: SharedRam>(ram: &R) -> Option<ReceivedDatagram> {
     })
 }
 
-/// The reply that a finished Transmit Datagram with Reply command has brought. `None` when it makes no sense.
+/// The reply that a finished Transmit Datagram with Reply command has brought. `None` when it makes
+/// no sense.
 ///
 /// The board may have cleared the block, so who replied to what is not read back.
 pub(crate) fn read_reply<R: SharedRam>(
@@ -156,7 +159,14 @@ pub(crate) fn read_reply<R: SharedRam>(
     subfunction: u8,
 ) -> Option<ReceivedDatagram> {
     let data = read_data(ram, ram.read(map::REPLY_LEN))?;
-    Some(ReceivedDatagram { source, function, subfunction, broadcast: false, arrived_ms: None, data })
+    Some(ReceivedDatagram {
+        source,
+        function,
+        subfunction,
+        broadcast: false,
+        arrived_ms: None,
+        data,
+    })
 }
 
 fn read_data<R: SharedRam>(ram: &R, len: u8) -> Option<Data> {
@@ -212,8 +222,10 @@ mod tests {
     #[test]
     fn broadcasts_go_to_device_255() {
         let mut ram = ArrayRam::new();
-        let broadcast =
-            Transmission { destination: Destination::Broadcast, ..transmission(Completion::Acknowledged) };
+        let broadcast = Transmission {
+            destination: Destination::Broadcast,
+            ..transmission(Completion::Acknowledged)
+        };
         start_transmission(&mut ram, &broadcast);
         assert_eq!(block(&ram)[2], 255);
     }
@@ -222,8 +234,14 @@ mod tests {
     fn the_longest_datagram_fits_both_ways() {
         let mut ram = ArrayRam::new();
         let data = Data::from_slice(&[0xA5; 134]).expect("134 bytes");
-        start_transmission(&mut ram, &Transmission { data, ..transmission(Completion::Acknowledged) });
-        assert_eq!((ram.read(0x08C8), ram.read(0x08D2 + 133), ram.read(0x08D2 + 134)), (134, 0xA5, 0));
+        start_transmission(
+            &mut ram,
+            &Transmission { data, ..transmission(Completion::Acknowledged) },
+        );
+        assert_eq!(
+            (ram.read(0x08C8), ram.read(0x08D2 + 133), ram.read(0x08D2 + 134)),
+            (134, 0xA5, 0)
+        );
         ram.write_bytes(0x08C4, &[31, 0x40, 0x50, 1, 134]);
         assert_eq!(read_datagram(&ram).map(|received| received.data.len()), Some(134));
     }
@@ -235,8 +253,15 @@ mod tests {
             ram.write_bytes(0x08C4, &[31, 0x40, 0x50, indicator, 2]);
             ram.write_bytes(0x09C2, &[0x4D, 1]);
             let received = read_datagram(&ram).expect("a datagram");
-            assert_eq!((received.source, received.function, received.subfunction), (31, 0x40, 0x50));
-            assert_eq!((received.broadcast, &received.data[..]), (broadcast, &[0x4D, 1][..]), "{indicator}");
+            assert_eq!(
+                (received.source, received.function, received.subfunction),
+                (31, 0x40, 0x50)
+            );
+            assert_eq!(
+                (received.broadcast, &received.data[..]),
+                (broadcast, &[0x4D, 1][..]),
+                "{indicator}"
+            );
         }
     }
 

@@ -29,7 +29,8 @@ pub struct Device {
     pub reference: u16,
     /// Bytes of inputs or global data it sends in every scan. Not more than a buffer holds.
     pub input_len: u8,
-    /// Bytes of outputs or directed control data it takes in every scan. Not more than a buffer holds.
+    /// Bytes of outputs or directed control data it takes in every scan. Not more than a buffer
+    /// holds.
     pub output_len: u8,
     /// Direction of its data.
     pub kind: BlockKind,

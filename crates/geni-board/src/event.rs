@@ -14,14 +14,14 @@ use crate::status_table::Status;
 pub enum Event {
     /// The board has dealt with the configuration.
     Configured(ConfigurationOutcome),
-    /// The board is free to join the bus: datagrams are accepted, tables can be locked. Whether it has joined
-    /// is told next, by [`Event::StatusChanged`].
+    /// The board is free to join the bus: datagrams are accepted, tables can be locked. Whether it
+    /// has joined is told next, by [`Event::StatusChanged`].
     Ready(Identity),
-    /// The board has failed and will be reset, if it has a reset line, and started again. All devices are
-    /// gone.
+    /// The board has failed and will be reset, if it has a reset line, and started again. All
+    /// devices are gone.
     Failed(Failure),
-    /// The board came onto the bus or left it, or a monitor or excessive errors came or went. Also once after
-    /// [`Event::Ready`].
+    /// The board came onto the bus or left it, or a monitor or excessive errors came or went. Also
+    /// once after [`Event::Ready`].
     StatusChanged(Status),
     /// A device came, went or changed.
     Device {
@@ -41,7 +41,8 @@ pub enum Event {
     Request(MemoryRequest),
     /// A request for this host's memory was refused.
     RequestRefused(RequestHeader),
-    /// The tables are locked until the next call of `poll`: see [`Driver::tables`](crate::Driver::tables).
+    /// The tables are locked until the next call of `poll`: see
+    /// [`Driver::tables`](crate::Driver::tables).
     TablesLocked,
     /// The board has had its turn on the bus. Only with
     /// [`Interrupts::OUTPUTS_SENT`](crate::Interrupts::OUTPUTS_SENT) enabled.
@@ -105,7 +106,9 @@ impl fmt::Display for Failure {
                 write!(f, "the GENI board did not pass its self-test (faults {faults:02X}h)")
             }
             Failure::NoHeartbeat => f.write_str("the GENI board has lost its heartbeat"),
-            Failure::Hardware { faults } => write!(f, "the GENI board reports hardware faults {faults:02X}h"),
+            Failure::Hardware { faults } => {
+                write!(f, "the GENI board reports hardware faults {faults:02X}h")
+            }
             Failure::Restarted => f.write_str("the GENI board has restarted by itself"),
             Failure::CommandStuck => f.write_str("the GENI board does not finish its commands"),
             Failure::LockoutStuck => f.write_str("the GENI board does not answer lockout requests"),
@@ -134,7 +137,8 @@ pub enum DeviceChange {
 pub enum CommandError {
     /// The board calls it wrong.
     Refused,
-    /// No acknowledgement, no reply within 10 s, or the board had no memory: another attempt may help.
+    /// No acknowledgement, no reply within 10 s, or the board had no memory: another attempt may
+    /// help.
     Failed,
     /// The board cleared the command without carrying it out.
     Cleared,
@@ -152,7 +156,9 @@ impl fmt::Display for CommandError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             CommandError::Refused => f.write_str("the GENI board refused the datagram"),
-            CommandError::Failed => f.write_str("the datagram did not get through, or was not answered"),
+            CommandError::Failed => {
+                f.write_str("the datagram did not get through, or was not answered")
+            }
             CommandError::Cleared => f.write_str("the GENI board dropped the command"),
             CommandError::UnknownStatus(status) => {
                 write!(f, "the GENI board gave the unknown status {status:02X}h")

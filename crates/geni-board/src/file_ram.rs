@@ -75,7 +75,10 @@ impl SharedRam for FileRam {
 pub(crate) fn check_length(file: &File, base: u64) -> io::Result<()> {
     match base.checked_add(RAM_LEN as u64) {
         Some(end) if end <= file.metadata()?.len() => Ok(()),
-        _ => Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the file ends before the window does")),
+        _ => Err(io::Error::new(
+            io::ErrorKind::UnexpectedEof,
+            "the file ends before the window does",
+        )),
     }
 }
 

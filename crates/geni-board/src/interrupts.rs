@@ -42,7 +42,8 @@ impl Interrupts {
         Interrupts(self.0 & !other.0)
     }
 
-    /// Takes the flags that are set, and clears them, the summary first: a flag that is set meanwhile sets it again.
+    /// Takes the flags that are set, and clears them, the summary first: a flag that is set
+    /// meanwhile sets it again.
     pub(crate) fn take<R: SharedRam>(ram: &mut R) -> Interrupts {
         ram.write(map::INTERRUPT_STATUS.at(map::INTERRUPT_SUMMARY), 0);
         let mut taken = Interrupts::NONE;
@@ -67,7 +68,10 @@ impl Interrupts {
             let disabled = !self.contains(Interrupts(1 << index));
             ram.write(map::INTERRUPT_DISABLE.at(map::INTERRUPT_FIRST + index), disabled.into());
         }
-        ram.write(map::INTERRUPT_DISABLE.at(map::INTERRUPT_SUMMARY), (self == Interrupts::NONE).into());
+        ram.write(
+            map::INTERRUPT_DISABLE.at(map::INTERRUPT_SUMMARY),
+            (self == Interrupts::NONE).into(),
+        );
     }
 }
 
@@ -92,7 +96,10 @@ mod tests {
             ram.write(offset, 1);
         }
         assert!(Interrupts::any(&ram));
-        assert_eq!(Interrupts::take(&mut ram), Interrupts::REQUEST_QUEUE | Interrupts::RECEIVE_QUEUE);
+        assert_eq!(
+            Interrupts::take(&mut ram),
+            Interrupts::REQUEST_QUEUE | Interrupts::RECEIVE_QUEUE
+        );
         assert!((0x08A2..0x08B2).all(|offset| ram.read(offset) == 0));
     }
 

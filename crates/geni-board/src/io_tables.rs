@@ -62,7 +62,8 @@ pub(crate) fn present_device<R: SharedRam>(
     }
 }
 
-/// The tables while the board keeps its hands off them. See [`Driver::tables`](crate::Driver::tables).
+/// The tables while the board keeps its hands off them. See
+/// [`Driver::tables`](crate::Driver::tables).
 #[derive(Debug)]
 pub struct Tables<'a, R> {
     ram: &'a mut R,
@@ -75,8 +76,8 @@ impl<'a, R: SharedRam> Tables<'a, R> {
         Tables { ram, buffer_len, directed_len }
     }
 
-    /// Reads the inputs, or the global data, of a device into the beginning of `inputs` and says how many
-    /// bytes they are.
+    /// Reads the inputs, or the global data, of a device into the beginning of `inputs` and says
+    /// how many bytes they are.
     ///
     /// # Errors
     ///
@@ -84,7 +85,8 @@ impl<'a, R: SharedRam> Tables<'a, R> {
     pub fn inputs(&self, device_number: u8, inputs: &mut [u8]) -> Result<usize, TableError> {
         let device = present_device(self.ram, device_number, self.buffer_len)?;
         let len = usize::from(device.input_len);
-        let inputs = inputs.get_mut(..len).ok_or(TableError::WrongLength { expected: device.input_len })?;
+        let inputs =
+            inputs.get_mut(..len).ok_or(TableError::WrongLength { expected: device.input_len })?;
         self.ram.read_bytes(input_buffer(device_number, self.buffer_len).start, inputs);
         Ok(len)
     }
@@ -103,14 +105,16 @@ impl<'a, R: SharedRam> Tables<'a, R> {
         Ok(())
     }
 
-    /// Reads the directed control data for this host into the beginning of `data` and says how many bytes they are.
+    /// Reads the directed control data for this host into the beginning of `data` and says how many
+    /// bytes they are.
     ///
     /// # Errors
     ///
     /// When more is configured than fits.
     pub fn directed_inputs(&self, data: &mut [u8]) -> Result<usize, TableError> {
         let len = usize::from(self.directed_len);
-        let data = data.get_mut(..len).ok_or(TableError::WrongLength { expected: self.directed_len })?;
+        let data =
+            data.get_mut(..len).ok_or(TableError::WrongLength { expected: self.directed_len })?;
         self.ram.read_bytes(map::DIRECTED_INPUT.start, data);
         Ok(len)
     }

@@ -1,14 +1,16 @@
 //! A host's view of a GENI board, the daughterboard that connects a computer to a Genius bus.
 //!
-//! Host and board share 16 KiB of RAM and nothing else but a reset line and an interrupt line. Everything the bus has
-//! to say is found in that RAM, and everything the host wants is written there: settings, commands, datagrams,
-//! data that is repeated in every bus scan.
+//! Host and board share 16 KiB of RAM and nothing else but a reset line and an interrupt line.
+//! Everything the bus has to say is found in that RAM, and everything the host wants is written
+//! there: settings, commands, datagrams, data that is repeated in every bus scan.
 //!
-//! - [`SharedRam`] is how the RAM is reached: [`WindowRam`] is a window in the memory of a processor, [`ArrayRam`] an
-//!   array for tests. With feature `std`, on Unix, `FileRam` is a file and `MappedRam` memory behind one.
+//! - [`SharedRam`] is how the RAM is reached: [`WindowRam`] is a window in the memory of a
+//!   processor, [`ArrayRam`] an array for tests. With feature `std`, on Unix, `FileRam` is a file
+//!   and `MappedRam` memory behind one.
 //! - [`map`] says where each table is; one module per table says what is in it.
-//! - [`Driver`] does the talking. The host calls [`Driver::poll`] as often as it can with its millisecond
-//!   count, sets the reset line to [`Driver::reset_held`] afterwards, and deals with the [`Event`] that comes back.
+//! - [`Driver`] does the talking. The host calls [`Driver::poll`] as often as it can with its
+//!   millisecond count, sets the reset line to [`Driver::reset_held`] afterwards, and deals with
+//!   the [`Event`] that comes back.
 //!
 //! ```
 //! use geni_board::{ArrayRam, Configuration, Driver, Event, Options};
@@ -28,12 +30,13 @@
 //! # Ok::<(), Box<dyn core::error::Error>>(())
 //! ```
 //!
-//! The driver never waits, allocates or panics. One call of `poll` does a bounded amount of work and returns at most
-//! one event. The RAM belongs to somebody else: no number read from it is used before it has been checked, and
-//! whatever
-//! was wrong with it is found in [`Counters`]. A board that has failed is reset, again and again if need be.
+//! The driver never waits, allocates or panics. One call of `poll` does a bounded amount of work
+//! and returns at most one event. The RAM belongs to somebody else: no number read from it is used
+//! before it has been checked, and whatever was wrong with it is found in [`Counters`]. A board
+//! that has failed is reset, again and again if need be.
 //!
-//! Chapters and tables in the documentation are those of the GENI board user's manual GFK-0073 ("the manual").
+//! Chapters and tables in the documentation are those of the GENI board user's manual GFK-0073
+//! ("the manual").
 #![cfg_attr(not(any(test, feature = "std")), no_std)]
 #![cfg_attr(
     not(test),
@@ -66,8 +69,8 @@ mod window_ram;
 pub use command_block::{CommandCode, CommandStatus};
 pub use counters::Counters;
 pub use datagram::{
-    Completion, Data, Destination, MAX_DATA_LEN, MAX_DEVICE_NUMBER, MAX_FUNCTION_CODE, ReceivedDatagram,
-    Transmission, TransmitError, TransmitPriority,
+    Completion, Data, Destination, MAX_DATA_LEN, MAX_DEVICE_NUMBER, MAX_FUNCTION_CODE,
+    ReceivedDatagram, Transmission, TransmitError, TransmitPriority,
 };
 pub use device_table::{BlockKind, Device};
 pub use driver::Driver;

@@ -1,8 +1,8 @@
 //! Where things are in the shared RAM (chapter 3, memory map).
 //!
-//! [`Region`]s are the tables of the memory map in its order; below them the bytes inside each table, named after the
-//! tables of the chapters. Words have their low byte first. Where the manual says *bit 1* it means the least
-//! significant one.
+//! [`Region`]s are the tables of the memory map in its order; below them the bytes inside each
+//! table, named after the tables of the chapters. Words have their low byte first. Where the manual
+//! says *bit 1* it means the least significant one.
 
 /// A run of bytes in the shared RAM.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,9 +61,8 @@ pub const READ_BUFFER: Region = Region::new(0x09C2, 134);
 pub const LOCKOUT_REQUEST: u16 = 0x0A48;
 /// Written by the board only (chapter 9).
 pub const LOCKOUT_STATE: u16 = 0x0A49;
-/// Not for the host, neither to read nor to write. The memory map's 5045 bytes leave out the first one, which
-/// the example
-/// structure of chapter 3 gives a name and no meaning.
+/// Not for the host, neither to read nor to write. The memory map's 5045 bytes leave out the first
+/// one, which the example structure of chapter 3 gives a name and no meaning.
 pub const RESERVED: Region = Region::new(0x0A4A, 5046);
 /// The devices on the bus: 32 records of 8 bytes (chapter 7).
 pub const DEVICE_TABLE: Region = Region::new(0x1E00, 256);
@@ -119,7 +118,8 @@ pub const STATUS_SCAN_TIME: u16 = STATUS_TABLE.at(6);
 
 /// In both interrupt tables: the summary (chapter 6).
 pub const INTERRUPT_SUMMARY: u16 = 0;
-/// In both interrupt tables: the first of the seven conditions, in the order of [`Interrupts`](crate::Interrupts).
+/// In both interrupt tables: the first of the seven conditions, in the order of
+/// [`Interrupts`](crate::Interrupts).
 pub const INTERRUPT_FIRST: u16 = 1;
 /// Number of conditions.
 pub const INTERRUPT_COUNT: u16 = 7;
@@ -278,7 +278,8 @@ mod tests {
             (DEVICE_TABLE.at(DEVICE_DIRECTED_LEN), 0x1E06),
             (DEVICE_TABLE.at(DEVICE_BLOCK), 0x1E07),
             (DEVICE_TABLE.at(31 * DEVICE_LEN), 0x1EF8),
-            // The examples of chapter 8: buffer length 2, device 12; output tables of length 128, 1 and 16.
+            // The examples of chapter 8: buffer length 2, device 12; output tables of length 128, 1
+            // and 16.
             (input_buffer(12, 2).start, 8192 + 24),
             (input_buffer(0, 128).start, 0x2000),
             (output_buffer(0, 128).start, 0x3000),

@@ -13,8 +13,9 @@ use crate::window_ram::WindowRam;
 
 /// A window of 16 KiB that is mapped into this process and reached byte by byte.
 ///
-/// This is the way to a board in the computer itself, whose RAM cannot be read and written as a file can. A regular
-/// file must keep its length as long as it is mapped: an access to what is gone ends the process.
+/// This is the way to a board in the computer itself, whose RAM cannot be read and written as a
+/// file can. A regular file must keep its length as long as it is mapped: an access to what is gone
+/// ends the process.
 #[derive(Debug)]
 pub struct MappedRam {
     window: WindowRam,
@@ -34,8 +35,9 @@ impl MappedRam {
         }
         let map = MmapOptions::new().offset(base).len(RAM_LEN).map_raw(file)?;
         let base = NonNull::new(map.as_mut_ptr()).ok_or(io::ErrorKind::AddrNotAvailable)?;
-        // SAFETY: the mapping is `RAM_LEN` bytes long, may be read and written, and lives as long as the window, which
-        // is the only one to use it. What lies behind it may change at any time and is used by the byte.
+        // SAFETY: the mapping is `RAM_LEN` bytes long, may be read and written, and lives as long
+        // as the window, which is the only one to use it. What lies behind it may change at any
+        // time and is used by the byte.
         let window = unsafe { WindowRam::new(base) };
         Ok(MappedRam { window, _map: map })
     }

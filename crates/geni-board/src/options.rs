@@ -39,10 +39,10 @@ pub struct Options {
     pub start: Start,
     /// Whether the host drives the reset line. Without it a failed board can only be waited for.
     pub reset_line: bool,
-    /// How long the board may go without a heartbeat, [`timing::HEARTBEAT_TIMEOUT_MS`] or, for one that runs
-    /// in the time of a busy computer, more. Such a board may stand still at any moment, so it gets at least
-    /// this long for everything else, too: [`timing::TRANSMIT_TIMEOUT_MS`], [`timing::REPLY_TIMEOUT_MS`],
-    /// [`timing::COMMAND_STUCK_MS`] and [`timing::LOCKOUT_STUCK_MS`].
+    /// How long the board may go without a heartbeat, [`timing::HEARTBEAT_TIMEOUT_MS`] or, for one
+    /// that runs in the time of a busy computer, more. Such a board may stand still at any moment,
+    /// so it gets at least this long for everything else, too: [`timing::TRANSMIT_TIMEOUT_MS`],
+    /// [`timing::REPLY_TIMEOUT_MS`], [`timing::COMMAND_STUCK_MS`] and [`timing::LOCKOUT_STUCK_MS`].
     pub heartbeat_timeout_ms: u32,
     /// What interrupts the host. Flags that do not are found within [`timing::FLAGS_PERIOD_MS`].
     pub interrupts: Interrupts,
@@ -51,8 +51,8 @@ pub struct Options {
 }
 
 impl Options {
-    /// A board that is reset at power-up and whenever it fails, with all interrupts but the one in every
-    /// scan, and all requests for memory refused.
+    /// A board that is reset at power-up and whenever it fails, with all interrupts but the one in
+    /// every scan, and all requests for memory refused.
     #[must_use]
     pub const fn new(configuration: Configuration) -> Options {
         Options {

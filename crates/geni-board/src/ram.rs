@@ -7,10 +7,12 @@ pub const RAM_LEN: usize = 0x4000;
 
 /// The 16 KiB that host and board share, byte by byte.
 ///
-/// Offsets are those of [`map`](crate::map). What lies beyond reads as all ones and ignores writes. There are no
-/// errors: a RAM that cannot be reached reads as all ones too, and is found out by the heartbeat.
+/// Offsets are those of [`map`](crate::map). What lies beyond reads as all ones and ignores writes.
+/// There are no errors: a RAM that cannot be reached reads as all ones too, and is found out by the
+/// heartbeat.
 ///
-/// Both sides may change any byte at any time, so every call has to reach the RAM, in program order.
+/// Both sides may change any byte at any time, so every call has to reach the RAM, in program
+/// order.
 pub trait SharedRam {
     /// The byte at an offset.
     fn read(&self, offset: u16) -> u8;
@@ -34,9 +36,8 @@ pub trait SharedRam {
 
     /// A word, low byte first.
     ///
-    /// The board may change it between two reads. When the high byte has changed meanwhile, the low byte is
-    /// read again; a word
-    /// that keeps changing faster than that does not exist on the board.
+    /// The board may change it between two reads. When the high byte has changed meanwhile, the low
+    /// byte is read again; a word that keeps changing faster than that does not exist on the board.
     fn read_word(&self, offset: u16) -> u16 {
         let high_offset = offset.saturating_add(1);
         let high_before = self.read(high_offset);

@@ -86,7 +86,8 @@ pub enum RequestAnswer<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AnswerError {
-    /// There is no request, or it was refused because no answer came in time, or the board has failed.
+    /// There is no request, or it was refused because no answer came in time, or the board has
+    /// failed.
     NoRequest,
     /// Another number of bytes was asked for.
     WrongLength {
@@ -127,7 +128,8 @@ pub(crate) struct Pointers {
 }
 
 impl Pointers {
-    /// `Err` when the board's pointer makes no sense. The host's own one is put right by the next write.
+    /// `Err` when the board's pointer makes no sense. The host's own one is put right by the next
+    /// write.
     pub(crate) fn read<R: SharedRam>(ram: &R) -> Result<Pointers, u8> {
         let tail = ram.read(map::REQUEST_TAIL);
         if tail >= map::REQUEST_COUNT {
@@ -146,8 +148,8 @@ impl Pointers {
     }
 }
 
-/// Sets the status of a request and gives its buffer back. The head goes last, in one write: it is what
-/// interrupts the board.
+/// Sets the status of a request and gives its buffer back. The head goes last, in one write: it is
+/// what interrupts the board.
 pub(crate) fn finish<R: SharedRam>(ram: &mut R, index: u8, status: RequestStatus) {
     let index = wrapped(index);
     ram.write(request_buffer(index).at(map::REQUEST_STATUS), status.to_byte());
@@ -196,8 +198,13 @@ mod tests {
     fn a_request_is_read_as_chapter_13_has_it() {
         let mut ram = ArrayRam::new();
         ram.write_bytes(15 * 136, &[0x20, 0, 2, 0x56, 0x34, 0x12, 30, 9, 0xAA, 0xBB]);
-        let header =
-            RequestHeader { command: 0x20, len: 2, address: 0x12_3456, source: 30, auxiliary_source: 9 };
+        let header = RequestHeader {
+            command: 0x20,
+            len: 2,
+            address: 0x12_3456,
+            source: 30,
+            auxiliary_source: 9,
+        };
         let request = read_request(&ram, 15).expect("a request");
         assert_eq!((request.header, &request.data[..]), (header, &[0xAA, 0xBB][..]));
         ram.write(15 * 136 + 2, 129);

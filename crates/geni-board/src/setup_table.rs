@@ -91,7 +91,8 @@ impl fmt::Display for InvalidConfiguration {
 impl core::error::Error for InvalidConfiguration {}
 
 impl Configuration {
-    /// What a board has after reset: no global data, no directed control data, buffers of 128 bytes.
+    /// What a board has after reset: no global data, no directed control data, buffers of 128
+    /// bytes.
     pub const DEFAULT: Configuration = Configuration {
         reference: 0xFFFF,
         broadcast_len: 0,
@@ -99,9 +100,9 @@ impl Configuration {
         buffer_len: map::MAX_TABLE_LEN,
     };
 
-    /// `reference` is handed on to devices that ask and means nothing to the board; `broadcast_len` bytes of global
-    /// data are sent, `directed_len` bytes of directed control data taken per scan; devices with more than
-    /// `buffer_len` bytes of inputs or outputs are not logged in.
+    /// `reference` is handed on to devices that ask and means nothing to the board; `broadcast_len`
+    /// bytes of global data are sent, `directed_len` bytes of directed control data taken per scan;
+    /// devices with more than `buffer_len` bytes of inputs or outputs are not logged in.
     ///
     /// # Errors
     ///
@@ -148,7 +149,8 @@ impl Configuration {
         self.buffer_len
     }
 
-    /// Whether the two differ in more than the buffer length: then the board stops sending while it changes.
+    /// Whether the two differ in more than the buffer length: then the board stops sending while it
+    /// changes.
     pub(crate) fn silences_the_bus(self, other: Configuration) -> bool {
         Configuration { buffer_len: other.buffer_len, ..self } != other
     }

@@ -3,8 +3,8 @@
 use crate::map;
 use crate::ram::SharedRam;
 
-/// Either reading of "bit 1" of the active byte, which counts from 0 in some tables and from 1 in others; the other
-/// bits of the byte are not used.
+/// Either reading of "bit 1" of the active byte, which counts from 0 in some tables and from 1 in
+/// others; the other bits of the byte are not used.
 const MONITOR: u8 = 0b0011;
 
 /// Either reading of "bit 3".

@@ -1,7 +1,8 @@
-//! The emulated board on a bench: contacts, a serial line at full rate, perhaps a Genius bus, all in step with the
-//! board's own milliseconds.
+//! The emulated board on a bench: contacts, a serial line at full rate, perhaps a Genius bus, all
+//! in step with the board's own milliseconds.
 //!
-//! The bench acts while the capture interrupt is about to take its sample. What it changes then is in that very sample.
+//! The bench acts while the capture interrupt is about to take its sample. What it changes then is
+//! in that very sample.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -107,7 +108,9 @@ impl<'p> Bench<'p> {
     /// When the emulator does not start.
     pub fn start(parts: &Parts, program: &'p Program, setup: Setup) -> Result<Bench<'p>, String> {
         let mut stops = vec![program.reset(), program.entry(Handler::Capture)];
-        stops.extend([Handler::Receive, Handler::Transmit].into_iter().flat_map(|it| program.returns(it)));
+        stops.extend(
+            [Handler::Receive, Handler::Transmit].into_iter().flat_map(|it| program.returns(it)),
+        );
         let options = LockstepOptions {
             emulator: EmulatorOptions::new(&parts.image),
             plugin: parts.plugin.clone(),

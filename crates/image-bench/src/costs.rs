@@ -16,7 +16,8 @@ const STARTED_MS: u64 = 20;
 /// The longest debounce time there is, in milliseconds: all bits of all counters are in use.
 pub const LONGEST_DEBOUNCE_MS: u8 = 255;
 
-/// The shortest debounce time, with which the queue is full before the watchdog looks at the main loop.
+/// The shortest debounce time, with which the queue is full before the watchdog looks at the main
+/// loop.
 pub const SHORTEST_DEBOUNCE_MS: u8 = 1;
 
 /// Changes that the main loop may still take after it was told to hang.
@@ -70,11 +71,17 @@ pub fn runs_of<'a>(tally: &'a Tally<'_>, handler: Handler) -> impl Iterator<Item
     tally.runs.iter().filter(move |run| run.handler == handler)
 }
 
-/// The longest run of the capture interrupt in which a change is accepted; the longest of all, if nothing changes.
+/// The longest run of the capture interrupt in which a change is accepted; the longest of all, if
+/// nothing changes.
 ///
 /// # Errors
 /// When the board does not do what it must.
-pub fn capture(parts: &Parts, program: &Program, change: Change, debounce_ms: u8) -> Result<u64, String> {
+pub fn capture(
+    parts: &Parts,
+    program: &Program,
+    change: Change,
+    debounce_ms: u8,
+) -> Result<u64, String> {
     let mut bench = Bench::start(parts, program, Setup { debounce_ms, genius: false })?;
     pass(&mut bench, STARTED_MS)?;
     bench.tell(true);
@@ -86,11 +93,16 @@ pub fn capture(parts: &Parts, program: &Program, change: Change, debounce_ms: u8
     Ok(runs_of(&bench.tally, Handler::Capture).map(|run| run.instructions).max().unwrap_or(0))
 }
 
-/// The longest run of the capture interrupt when all inputs change and its queue is full, because the main loop hangs.
+/// The longest run of the capture interrupt when all inputs change and its queue is full, because
+/// the main loop hangs.
 ///
 /// # Errors
 /// When the board does not do what it must.
-pub fn capture_beyond_queue(parts: &Parts, program: &Program, debounce_ms: u8) -> Result<u64, String> {
+pub fn capture_beyond_queue(
+    parts: &Parts,
+    program: &Program,
+    debounce_ms: u8,
+) -> Result<u64, String> {
     let mut bench = Bench::start(parts, program, Setup { debounce_ms, genius: false })?;
     pass(&mut bench, STARTED_MS)?;
     bench.hang_main_loop();
@@ -135,11 +147,12 @@ pub enum Way {
     Bus,
 }
 
-/// What a command cost, from its first byte to the last one of its reply, beyond what an idle board does meanwhile.
+/// What a command cost, from its first byte to the last one of its reply, beyond what an idle board
+/// does meanwhile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
-    /// Instructions of the main loop. A pass that costs less than an idle one counts for nothing: with a full ring in
-    /// front of the transmitter it does not look for what could be sent.
+    /// Instructions of the main loop. A pass that costs less than an idle one counts for nothing:
+    /// with a full ring in front of the transmitter it does not look for what could be sent.
     pub main_loop: u64,
     /// Instructions of the serial interrupts.
     pub handlers: u64,
@@ -161,8 +174,10 @@ impl Idle {
         for pass in passes {
             *counts.entry(pass.instructions).or_insert(0) += 1_u64;
         }
-        let usual =
-            counts.iter().max_by_key(|(_, count)| **count).map_or(0, |(instructions, _)| *instructions);
+        let usual = counts
+            .iter()
+            .max_by_key(|(_, count)| **count)
+            .map_or(0, |(instructions, _)| *instructions);
         let idle = Idle { usual, more_per_ms: 0 };
         Idle { more_per_ms: idle.beyond(passes) * 16 / ms.max(1), ..idle }
     }
@@ -187,7 +202,8 @@ impl<'p> Commands<'p> {
     /// # Errors
     /// When the board does not do what it must.
     pub fn start(parts: &Parts, program: &'p Program, way: Way) -> Result<Commands<'p>, String> {
-        let mut bench = Bench::start(parts, program, Setup { debounce_ms: 0, genius: way == Way::Bus })?;
+        let mut bench =
+            Bench::start(parts, program, Setup { debounce_ms: 0, genius: way == Way::Bus })?;
         pass(&mut bench, STARTED_MS)?;
         for _ in 0..LOGGED {
             bench.toggle(u32::MAX);
@@ -236,7 +252,9 @@ impl<'p> Commands<'p> {
             silent_ms = if bench.take_sent().is_empty() { silent_ms + 1 } else { 0 };
             (silent_ms >= SILENT_MS).then_some(())
         })?;
-        let ready = |bench: &mut Bench<'_>| bench.genius.as_ref().is_none_or(Genius::is_ready).then_some(());
+        let ready = |bench: &mut Bench<'_>| {
+            bench.genius.as_ref().is_none_or(Genius::is_ready).then_some(())
+        };
         until(&mut self.bench, "the host is ready", ready)?;
         let ms = self.bench.now_ms() - began_ms;
         let tally = &self.bench.tally;
@@ -252,7 +270,9 @@ impl<'p> Commands<'p> {
 
 /// Whether these bytes end a frame.
 fn holds_frame(decoder: &mut FrameDecoder<MAX_BODY_LEN>, bytes: &[u8]) -> bool {
-    bytes.iter().fold(false, |found, &byte| found | matches!(decoder.push(byte), Some(Decoded::Frame(_))))
+    bytes
+        .iter()
+        .fold(false, |found, &byte| found | matches!(decoder.push(byte), Some(Decoded::Frame(_))))
 }
 
 /// Lets time pass until there is what is looked for.

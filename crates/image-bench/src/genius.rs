@@ -63,7 +63,8 @@ impl Genius {
         let connect = |number| bus.borrow_mut().connect(Board::powered(BoardOptions::at(number)));
         let (recorder, host) = (connect(RECORDER), connect(HOST));
         let window = BoardWindow::new(Rc::clone(&bus), host);
-        let host = Driver::new(window, Options { start: RESET, ..Options::new(Configuration::DEFAULT) });
+        let host =
+            Driver::new(window, Options { start: RESET, ..Options::new(Configuration::DEFAULT) });
         Genius { bus, recorder, others: Vec::new(), host, received: Vec::new() }
     }
 
@@ -72,7 +73,8 @@ impl Genius {
         let board = self.bus.borrow_mut().connect(Board::powered(BoardOptions::at(number)));
         let window = BoardWindow::new(Rc::clone(&self.bus), board);
         // Memory of the test process goes when it does.
-        let node = SimNode::new(SimNodeOptions::new(Model::Ser320), Box::leak(Box::new(Ram::new())));
+        let node =
+            SimNode::new(SimNodeOptions::new(Model::Ser320), Box::leak(Box::new(Ram::new())));
         let options = GeniusOptions { start: RESET, ..GeniusOptions::new(Model::Ser320) };
         self.others.push(BuiltIn { number, node, port: GeniusPort::new(window, options) });
     }
@@ -138,7 +140,9 @@ impl Genius {
             // No command is longer than a datagram.
             data: Data::from_slice(&command.to_body()).unwrap_or_default(),
         };
-        self.host.transmit(transmission).map_err(|error| format!("the host's board refuses: {error:?}"))
+        self.host
+            .transmit(transmission)
+            .map_err(|error| format!("the host's board refuses: {error:?}"))
     }
 
     /// When each recorder's board received the datagram that it handed over last: the tick of that
@@ -149,7 +153,8 @@ impl Genius {
     #[must_use]
     pub fn read_arrived_ms(&mut self) -> Vec<u64> {
         let image = self.bus.borrow().get(self.recorder).latest_read();
-        let others = self.others.iter_mut().map(|other| other.port.window().look(Board::latest_read));
+        let others =
+            self.others.iter_mut().map(|other| other.port.window().look(Board::latest_read));
         let others = others.collect::<Vec<_>>();
         let arrived_ms = |read: Option<Read>| tick_ms(read.expect("a datagram").arrived_us);
         [image].into_iter().chain(others).map(arrived_ms).collect()
@@ -167,7 +172,9 @@ impl Genius {
     pub fn check(&self) -> Result<(), String> {
         let bus = self.bus.borrow();
         match bus.get(self.recorder).violations().first() {
-            Some(violation) => Err(format!("the image breaks a rule of its GENI board: {violation}")),
+            Some(violation) => {
+                Err(format!("the image breaks a rule of its GENI board: {violation}"))
+            }
             None => Ok(()),
         }
     }

@@ -1,8 +1,10 @@
-//! How late the capture interrupt comes: from the moment its timer expires to the first instruction of its handler.
+//! How late the capture interrupt comes: from the moment its timer expires to the first instruction
+//! of its handler.
 //!
-//! The timer expires every millisecond, which is a fixed number of instructions. The earliest interrupt of a board's
-//! life comes at once, and shows [when that is](expiry); the others are late by what they come later within their
-//! millisecond. Interrupts of a time in which all of them are late need those of another time to be measured by.
+//! The timer expires every millisecond, which is a fixed number of instructions. The earliest
+//! interrupt of a board's life comes at once, and shows [when that is](expiry); the others are late
+//! by what they come later within their millisecond. Interrupts of a time in which all of them are
+//! late need those of another time to be measured by.
 
 use std::fmt;
 
@@ -30,11 +32,12 @@ pub fn expiry(began: &[u64], period: u64) -> u64 {
 }
 
 impl Lateness {
-    /// From the count of instructions at each beginning of the handler, when the timer expires within its period, and
-    /// the period.
+    /// From the count of instructions at each beginning of the handler, when the timer expires
+    /// within its period, and the period.
     #[must_use]
     pub fn of(began: &[u64], expiry: u64, period: u64) -> Lateness {
-        let mut sorted: Vec<u64> = began.iter().map(|&began| (began + period - expiry) % period).collect();
+        let mut sorted: Vec<u64> =
+            began.iter().map(|&began| (began + period - expiry) % period).collect();
         sorted.sort_unstable();
         Lateness { sorted }
     }
@@ -128,7 +131,10 @@ mod tests {
         let lines = ["               0        3  ".to_owned() + &"█".repeat(40)];
         let text = lateness.to_string();
         assert!(text.starts_with(&format!("  {}\n", lines[0])), "{text}");
-        assert!(text.ends_with(&format!("           11–30        1  {}\n", "█".repeat(14))), "{text}");
+        assert!(
+            text.ends_with(&format!("           11–30        1  {}\n", "█".repeat(14))),
+            "{text}"
+        );
         assert_eq!(text.lines().count(), 3);
     }
 }

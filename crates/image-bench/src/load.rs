@@ -1,5 +1,5 @@
-//! A recorder at its limit: all inputs change in every millisecond, while hosts on both ports read as fast as they
-//! can. Every event is delivered once or reported as overwritten, to each of them.
+//! A recorder at its limit: all inputs change in every millisecond, while hosts on both ports read
+//! as fast as they can. Every event is delivered once or reported as overwritten, to each of them.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -74,8 +74,8 @@ pub struct Account {
 }
 
 impl Account {
-    /// Whether nothing is missing: the recorder has counted each change, and each was delivered or reported as lost,
-    /// to each host.
+    /// Whether nothing is missing: the recorder has counted each change, and each was delivered or
+    /// reported as lost, to each host.
     #[must_use]
     pub fn is_settled(&self) -> bool {
         let all = |told: &Told| told.delivered + told.overwritten == self.changes;
@@ -116,7 +116,8 @@ impl<'p> Load<'p> {
         })
     }
 
-    /// Nothing changes and nobody says anything for so many milliseconds; only what comes behind them counts as load.
+    /// Nothing changes and nobody says anything for so many milliseconds; only what comes behind
+    /// them counts as load.
     ///
     /// # Errors
     /// When the board does not do what it must.
@@ -171,8 +172,9 @@ impl<'p> Load<'p> {
         if let Some(outgoing) = next(&mut self.line, now_ms, self.still_since_ms, &self.ledger)? {
             self.bench.send(&outgoing.frame);
         }
-        // The line never rests. Where the board has nothing to answer, it is asked for the mode besides; more questions
-        // would have answers for which the way back has no room, so it is noise that fills the rest.
+        // The line never rests. Where the board has nothing to answer, it is asked for the mode
+        // besides; more questions would have answers for which the way back has no room, so it is
+        // noise that fills the rest.
         if self.bench.waiting() < LINE_AHEAD && self.bench.is_silent() {
             self.bench.send_command(&Command::QueryMode);
         }
@@ -224,7 +226,8 @@ impl<'p> Load<'p> {
         if let Some(genius) = &self.bench.genius {
             genius.check()?;
         }
-        let told = |host: &Conversation| (host.account().name(), host.account().tally(), host.talk());
+        let told =
+            |host: &Conversation| (host.account().name(), host.account().tally(), host.talk());
         Ok(Account {
             changes: self.changes,
             total: self.total,

@@ -1,22 +1,27 @@
-//! The ARM image in QEMU in virtual time: it runs from stop to stop, and the world moves while it is held.
+//! The ARM image in QEMU in virtual time: it runs from stop to stop, and the world moves while it
+//! is held.
 //!
 //! # Design
-//! QEMU counts instructions for time (`-icount`), and a plugin of it (`image-bench-plugin`) holds the processor before
-//! chosen instructions. Between two stops nothing reaches the board from outside. What happens is then the same in
-//! every run and on every machine, and every instruction can be looked at.
+//! QEMU counts instructions for time (`-icount`), and a plugin of it (`image-bench-plugin`) holds
+//! the processor before chosen instructions. Between two stops nothing reaches the board from
+//! outside. What happens is then the same in every run and on every machine, and every instruction
+//! can be looked at.
 //!
-//! Inputs, clock and GENI board are in the memory that both sides map. Bytes for the board's UART go through QEMU's
-//! standard input; the UART's state, read by way of QEMU's test interface (`-qtest`), tells that they have arrived.
-//! QEMU keeps no line rate, but it does keep a byte that its standard output does not take, and that is a pipe for one
-//! byte: the transmitter is busy for as long as the bench leaves it so.
+//! Inputs, clock and GENI board are in the memory that both sides map. Bytes for the board's UART
+//! go through QEMU's standard input; the UART's state, read by way of QEMU's test interface
+//! (`-qtest`), tells that they have arrived. QEMU keeps no line rate, but it does keep a byte that
+//! its standard output does not take, and that is a pipe for one byte: the transmitter is busy for
+//! as long as the bench leaves it so.
 //!
 //! # Tradeoffs
-//! One instruction lasts 2⁵ ns: 31.25 million in a second, less than any chip that one would flash. At 2⁰ ns the
-//! processor would be so fast that no load is one. Numbers of instructions do not depend on it.
+//! One instruction lasts 2⁵ ns: 31.25 million in a second, less than any chip that one would flash.
+//! At 2⁰ ns the processor would be so fast that no load is one. Numbers of instructions do not
+//! depend on it.
 //!
 //! # Notes
-//! An idle processor makes QEMU 7.2 jump two timer periods ahead instead of one. The bench therefore has to see that
-//! the processor never sleeps, with a `nop` in place of each `wfi`: see [`Lockstep::patch`].
+//! An idle processor makes QEMU 7.2 jump two timer periods ahead instead of one. The bench
+//! therefore has to see that the processor never sleeps, with a `nop` in place of each `wfi`: see
+//! [`Lockstep::patch`].
 
 mod line_out;
 mod probe;
@@ -109,15 +114,17 @@ impl Lockstep {
         bus.set_clock(0);
 
         let [plugin_at, probe_at] = ["plugin", "probe"].map(|name| directory.path().join(name));
-        let listen = |path: &Path| UnixListener::bind(path).map_err(SimError::io("listen to the emulator"));
+        let listen =
+            |path: &Path| UnixListener::bind(path).map_err(SimError::io("listen to the emulator"));
         let (plugin, probe) = (listen(&plugin_at)?, listen(&probe_at)?);
         let program = options.emulator.program.clone().unwrap_or_else(|| PROGRAM.into());
-        let printed =
-            File::create(directory.path().join(PRINTED)).map_err(SimError::io("make a temporary file"))?;
+        let printed = File::create(directory.path().join(PRINTED))
+            .map_err(SimError::io("make a temporary file"))?;
         let mut process = Process::new(&program);
         let handed_over = files.hand_over(&bus).map_err(SimError::io("start the emulator"))?;
         process.args(&handed_over.arguments).args(extra(options, &plugin_at, &probe_at));
-        let (output, qemus) = LineOut::new().map_err(SimError::io("make a pipe for the emulator"))?;
+        let (output, qemus) =
+            LineOut::new().map_err(SimError::io("make a pipe for the emulator"))?;
         process.stdin(Stdio::piped()).stdout(qemus).stderr(printed);
         let mut qemu = spawn(&mut process, &program)?;
         // They have our copies of its files, and of its end of the pipe.
@@ -126,18 +133,22 @@ impl Lockstep {
         let mut accept = |listener| accept(listener, &mut qemu, directory.path());
         let (tracer, probe) = (Tracer::new(accept(&plugin)?), Probe::new(accept(&probe)?));
         let geni_reset = bus.geni_reset();
-        let mut lockstep = Lockstep { bus, geni_reset, tracer, probe, input, output, qemu, directory };
+        let mut lockstep =
+            Lockstep { bus, geni_reset, tracer, probe, input, output, qemu, directory };
         lockstep.tracer.read(&mut |_| {}).map_err(|error| lockstep.explain(error))?;
         Ok(lockstep)
     }
 
-    /// Lets the board run to the next stop; gives its address. `executed` is told of every instruction from the one
-    /// it is held at up to, and without, that stop.
+    /// Lets the board run to the next stop; gives its address. `executed` is told of every
+    /// instruction from the one it is held at up to, and without, that stop.
     ///
     /// # Errors
     /// When the emulator has ended or hangs.
     pub fn run_and_tell(&mut self, executed: &mut impl FnMut(u32)) -> Result<u32, SimError> {
-        self.tracer.go(true).and_then(|()| self.tracer.read(executed)).map_err(|error| self.explain(error))
+        self.tracer
+            .go(true)
+            .and_then(|()| self.tracer.read(executed))
+            .map_err(|error| self.explain(error))
     }
 
     /// The same, and nobody is told of instructions, which is faster.
@@ -205,8 +216,8 @@ impl Lockstep {
         Ok(true)
     }
 
-    /// Lets the byte in the transmitter's shift register out, if there is one; the next one takes its place, if there
-    /// is one. The transmitter is busy until then.
+    /// Lets the byte in the transmitter's shift register out, if there is one; the next one takes
+    /// its place, if there is one. The transmitter is busy until then.
     ///
     /// # Errors
     /// When the emulator has ended or hangs.

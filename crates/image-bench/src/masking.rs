@@ -1,8 +1,8 @@
 //! Instructions that write the registers that mask interrupts.
 //!
-//! `CPSID` and `CPSIE` say in their own bits what they do. What `MSR` writes is in a register, which a trace of
-//! addresses does not show. An image may therefore only give back with it what was in force before: anything else
-//! could mask capture unseen.
+//! `CPSID` and `CPSIE` say in their own bits what they do. What `MSR` writes is in a register,
+//! which a trace of addresses does not show. An image may therefore only give back with it what was
+//! in force before: anything else could mask capture unseen.
 
 use std::ops::Range;
 
@@ -26,7 +26,8 @@ pub(super) struct Masking {
 }
 
 impl Masking {
-    /// Notes an instruction if it is one of them; `before` is the first half of the one in front of it.
+    /// Notes an instruction if it is one of them; `before` is the first half of the one in front of
+    /// it.
     pub(super) fn note(&mut self, at: u32, before: u16, first: u16, second: Option<u16>) {
         let Some(second) = second else { return };
         let special = second & 0xFF;
@@ -35,7 +36,9 @@ impl Masking {
         }
         match (first, second & 0xF000) {
             // MRS Rd, special.
-            (0xF3EF, 0x8000) => self.reads.push(Transfer { at, special, register: second >> 8 & 0xF }),
+            (0xF3EF, 0x8000) => {
+                self.reads.push(Transfer { at, special, register: second >> 8 & 0xF })
+            }
             // MSR special, Rn.
             (0xF380..=0xF38F, 0x8000) => {
                 let register = first & 0xF;
@@ -48,9 +51,11 @@ impl Masking {
         }
     }
 
-    /// The first instruction that may mask more than before; `function_around` gives the bounds of functions.
+    /// The first instruction that may mask more than before; `function_around` gives the bounds of
+    /// functions.
     ///
-    /// One that writes the register into which its function has read the same masking register gives back.
+    /// One that writes the register into which its function has read the same masking register
+    /// gives back.
     pub(super) fn unseen(&self, function_around: impl Fn(u32) -> Range<u32>) -> Option<u32> {
         let gives_back = |write: &&Transfer| {
             let function = function_around(write.at);
@@ -84,7 +89,8 @@ mod tests {
     #[test]
     fn what_gives_back_what_was_in_force_masks_nothing() {
         assert_eq!(unseen(&[READ_BASEPRI_TO_R10, [0xF38A, 0x8811]]), None);
-        // Another register, another special one, the wrong order, and nothing read at all; BASEPRI_MAX reads as BASEPRI.
+        // Another register, another special one, the wrong order, and nothing read at all;
+        // BASEPRI_MAX reads as BASEPRI.
         assert_eq!(unseen(&[READ_BASEPRI_TO_R10, [0xF38B, 0x8811]]), Some(0x104));
         assert_eq!(unseen(&[READ_BASEPRI_TO_R10, [0xF38A, 0x8810]]), Some(0x104));
         assert_eq!(unseen(&[[0xF38A, 0x8811], READ_BASEPRI_TO_R10]), Some(0x100));
@@ -102,6 +108,9 @@ mod tests {
             masking.note(0x102, before, 0xF380, Some(0x8811));
             masking.unseen(|_| 0x100..0x200)
         };
-        assert_eq!((written(0x2000), written(0x2001), written(0x2100)), (None, Some(0x102), Some(0x102)));
+        assert_eq!(
+            (written(0x2000), written(0x2001), written(0x2100)),
+            (None, Some(0x102), Some(0x102))
+        );
     }
 }

@@ -1,5 +1,5 @@
-//! What the image's instructions are, as far as timing is concerned: where handlers begin, what calls and returns, what
-//! masks interrupts, where the main loop sleeps.
+//! What the image's instructions are, as far as timing is concerned: where handlers begin, what
+//! calls and returns, what masks interrupts, where the main loop sleeps.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -71,7 +71,8 @@ impl Program {
     /// Reads an ELF file.
     ///
     /// # Errors
-    /// When it is not what an image has to be, or may mask interrupts in a way that a trace of addresses does not show.
+    /// When it is not what an image has to be, or may mask interrupts in a way that a trace of
+    /// addresses does not show.
     pub fn read(path: &Path) -> Result<Program, String> {
         let fails = |what: &dyn std::fmt::Display| format!("{}: {what}", path.display());
         let bytes = fs::read(path).map_err(|error| fails(&error))?;
@@ -97,7 +98,8 @@ impl Program {
             let begin = narrow(section.address());
             let code = section.data().map_err(|error| error.to_string())?;
             let end = begin + narrow(code.len() as u64);
-            let begins: Vec<(u32, bool)> = marks.range(begin..end).map(|(&at, &code)| (at, code)).collect();
+            let begins: Vec<(u32, bool)> =
+                marks.range(begin..end).map(|(&at, &code)| (at, code)).collect();
             for (index, &(from, is_code)) in begins.iter().enumerate() {
                 let to = begins.get(index + 1).map_or(end, |&(at, _)| at);
                 if is_code {
@@ -109,7 +111,8 @@ impl Program {
         match program.masking.unseen(|address| program.function_around(address)) {
             None => Ok(program),
             Some(at) => Err(format!(
-                "the instruction at {at:#x} in {} may mask interrupts, by a value that is not seen here",
+                "the instruction at {at:#x} in {} may mask interrupts, by a value that is not \
+                 seen here",
                 program.name(at)
             )),
         }
@@ -171,7 +174,11 @@ impl Program {
 
     /// Addresses of the instructions that do this.
     pub fn all(&self, kind: Kind) -> impl Iterator<Item = u32> {
-        (0..).step_by(2).zip(&self.kinds).filter(move |(_, of)| **of == kind).map(|(address, _)| address)
+        (0..)
+            .step_by(2)
+            .zip(&self.kinds)
+            .filter(move |(_, of)| **of == kind)
+            .map(|(address, _)| address)
     }
 
     /// The first instruction after a reset.
@@ -260,8 +267,15 @@ mod tests {
         let program = Program::of_code(0x100, &code, &[]);
         let kinds: Vec<Kind> =
             [0x100, 0x102, 0x106, 0x10A, 0x10C, 0x10E, 0x110].map(|at| program.kind(at)).into();
-        let expected =
-            [Kind::Plain, Kind::Call, Kind::Plain, Kind::Mask, Kind::Unmask, Kind::Sleep, Kind::Return];
+        let expected = [
+            Kind::Plain,
+            Kind::Call,
+            Kind::Plain,
+            Kind::Mask,
+            Kind::Unmask,
+            Kind::Sleep,
+            Kind::Return,
+        ];
         assert_eq!(kinds, expected);
         assert_eq!(program.all(Kind::Sleep).collect::<Vec<_>>(), [0x10E]);
         assert_eq!((program.behind(0x100), program.behind(0x102)), (0x102, 0x106));

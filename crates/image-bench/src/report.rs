@@ -6,7 +6,9 @@ use crate::lockstep::INSTRUCTIONS_PER_MS;
 use ser_board::budget::{CAPTURE_INSTRUCTIONS, MAIN_LOOP_STALL_MS};
 
 use super::bench::{Parts, RATE};
-use super::costs::{self, Change, Commands, Cost, LONGEST_DEBOUNCE_MS, SHORTEST_DEBOUNCE_MS, Way, runs_of};
+use super::costs::{
+    self, Change, Commands, Cost, LONGEST_DEBOUNCE_MS, SHORTEST_DEBOUNCE_MS, Way, runs_of,
+};
 use super::lateness::Lateness;
 use super::load::{Account, Load};
 use super::program::{Handler, Program};
@@ -16,7 +18,8 @@ use ser_trial::digits::grouped;
 /// Instructions of the main loop that the rings in front of it cover: a pass must not take longer.
 pub const PASS_BUDGET: u64 = MAIN_LOOP_STALL_MS as u64 * INSTRUCTIONS_PER_MS;
 
-/// Instructions that the capture interrupt may be late, and for which interrupts may be masked under load.
+/// Instructions that the capture interrupt may be late, and for which interrupts may be masked
+/// under load.
 const LATENESS_BUDGET: u64 = 0;
 
 /// So long the interrupt is looked at with nothing else going on, in milliseconds.
@@ -36,7 +39,8 @@ pub struct Report {
     pub idle_passes: [u64; 2],
     /// While the image starts, and under load, with the function that masks.
     pub masked: [(Masked, String); 2],
-    /// With both ports quiet, and with both busy, on one board: against the same expiry of the timer.
+    /// With both ports quiet, and with both busy, on one board: against the same expiry of the
+    /// timer.
     pub lateness: [Lateness; 2],
     /// Under load.
     pub load: Loaded,
@@ -76,15 +80,16 @@ pub struct Loaded {
     pub capture: u64,
     /// The longest pass of the main loop.
     pub pass: u64,
-    /// Instructions of all interrupt handlers, and of the main loop in passes that did more than look whether there is
-    /// something to do, in thousandths of all.
+    /// Instructions of all interrupt handlers, and of the main loop in passes that did more than
+    /// look whether there is something to do, in thousandths of all.
     pub busy_per_mille: [u64; 2],
     /// What became of the events.
     pub account: Account,
 }
 
 impl Report {
-    /// Measures everything; `load_ms` is how long the load lasts. `next` is told what is measured next.
+    /// Measures everything; `load_ms` is how long the load lasts. `next` is told what is measured
+    /// next.
     ///
     /// # Errors
     /// When the board does not do what it must.
@@ -119,8 +124,10 @@ impl Report {
 
     /// The longest pass of the main loop, and in which command; `None` when it was under load.
     fn longest_pass(&self) -> (u64, Option<&str>) {
-        let passes =
-            self.commands.iter().flat_map(|&(name, costs)| costs.map(|cost| (cost.longest_pass, Some(name))));
+        let passes = self
+            .commands
+            .iter()
+            .flat_map(|&(name, costs)| costs.map(|cost| (cost.longest_pass, Some(name))));
         passes.chain([(self.load.pass, None)]).max_by_key(|&(pass, _)| pass).unwrap_or_default()
     }
 
@@ -130,11 +137,19 @@ impl Report {
         let mut wrong = Vec::new();
         let mut keep = |what: &str, instructions: u64, budget: u64| {
             if instructions > budget {
-                wrong.push(format!("{what}: {} of {} instructions", grouped(instructions), grouped(budget)));
+                wrong.push(format!(
+                    "{what}: {} of {} instructions",
+                    grouped(instructions),
+                    grouped(budget)
+                ));
             }
         };
         for capture in &self.capture {
-            keep(&format!("capture interrupt, {}", capture.what), capture.most(), CAPTURE_INSTRUCTIONS);
+            keep(
+                &format!("capture interrupt, {}", capture.what),
+                capture.most(),
+                CAPTURE_INSTRUCTIONS,
+            );
         }
         keep("capture interrupt under load", self.load.capture, CAPTURE_INSTRUCTIONS);
         keep("longest pass of the main loop", self.longest_pass().0, PASS_BUDGET);
@@ -142,7 +157,11 @@ impl Report {
             keep(&format!("capture interrupt late with {what}"), lateness.max(), LATENESS_BUDGET);
         }
         let (masked, name) = &self.masked[1];
-        keep(&format!("interrupts masked under load, in {name}"), masked.instructions, LATENESS_BUDGET);
+        keep(
+            &format!("interrupts masked under load, in {name}"),
+            masked.instructions,
+            LATENESS_BUDGET,
+        );
         if !self.load.account.is_settled() {
             wrong.push(format!("events are unaccounted for: {:?}", self.load.account));
         }
@@ -197,8 +216,10 @@ impl fmt::Display for Report {
         self.show_load(f)?;
         writeln!(
             f,
-            "\nInstructions are not cycles: a chip adds wait states of flash and bus, and a dozen cycles to enter and leave an\n\
-             interrupt. Virtual time has {} instructions a second. Budgets, and the reckoning behind them, are in\n\
+            "\nInstructions are not cycles: a chip adds wait states of flash and bus, and a \
+             dozen cycles to enter and leave an\n\
+             interrupt. Virtual time has {} instructions a second. Budgets, and the reckoning \
+             behind them, are in\n\
              crates/ser-board/src/budget.rs.",
             grouped(INSTRUCTIONS_PER_MS * 1000),
         )
@@ -249,7 +270,11 @@ impl Report {
         let (longest, command) = self.longest_pass();
         let mark = mark(longest, PASS_BUDGET);
         writeln!(f, "\nMain loop")?;
-        writeln!(f, "  {:<26}{without:>12}  and {with} with a GENI board", "a pass with nothing to do")?;
+        writeln!(
+            f,
+            "  {:<26}{without:>12}  and {with} with a GENI board",
+            "a pass with nothing to do"
+        )?;
         let (name, longest, budget) =
             (command.unwrap_or("under load"), grouped(longest), grouped(PASS_BUDGET));
         writeln!(
@@ -271,7 +296,10 @@ impl Report {
     }
 
     fn show_lateness(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "\nCapture interrupt, instructions from its timer's expiry to the first of its own")?;
+        writeln!(
+            f,
+            "\nCapture interrupt, instructions from its timer's expiry to the first of its own"
+        )?;
         let heads = ["interrupts", "min", "p50", "p99", "p99.9", "max"];
         write!(f, "  {:<26}", "")?;
         let [count, ranks @ ..] = heads;
@@ -295,7 +323,8 @@ impl Report {
         let percent = |per_mille: u64| format!("{}.{} %", per_mille / 10, per_mille % 10);
         writeln!(
             f,
-            "\nLoad: all 32 inputs change in every millisecond for {} s, both hosts read all the time",
+            "\nLoad: all 32 inputs change in every millisecond for {} s, both hosts read all the \
+             time",
             *ms / 1000
         )?;
         let total = total.map_or("nothing".to_owned(), |total| grouped(total.into()));
@@ -356,7 +385,13 @@ mod tests {
             idle_passes: [661, 2772],
             masked: [(Masked::default(), String::new()), (Masked::default(), String::new())],
             lateness: [Lateness::default(), Lateness::default()],
-            load: Loaded { ms: 1000, capture: 92, pass: 37_110, busy_per_mille: [57, 310], account },
+            load: Loaded {
+                ms: 1000,
+                capture: 92,
+                pass: 37_110,
+                busy_per_mille: [57, 310],
+                account,
+            },
         }
     }
 
@@ -385,7 +420,10 @@ mod tests {
         for (port, what) in PORTS.iter().enumerate() {
             let mut report = report();
             report.lateness[port] = Lateness::of(&[1_000, 2_000, 3_001], 0, 1_000);
-            assert_eq!(report.wrong(), [format!("capture interrupt late with {what}: 1 of 0 instructions")]);
+            assert_eq!(
+                report.wrong(),
+                [format!("capture interrupt late with {what}: 1 of 0 instructions")]
+            );
             assert_eq!(report.to_string().matches('✗').count(), 1, "{report}");
         }
     }

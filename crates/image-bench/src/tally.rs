@@ -1,10 +1,11 @@
-//! Counts instructions, one after the other as they are executed: per run of a handler, per pass of the main loop,
-//! and while interrupts are masked.
+//! Counts instructions, one after the other as they are executed: per run of a handler, per pass of
+//! the main loop, and while interrupts are masked.
 //!
 //! # Design
-//! A handler begins with its first instruction, which nobody calls, and ends with a return that belongs to no call
-//! inside of it. What a handler of higher priority does in between counts for that one alone. A pass of the main loop
-//! goes from the place that it jumps to behind its sleep to the same place again.
+//! A handler begins with its first instruction, which nobody calls, and ends with a return that
+//! belongs to no call inside of it. What a handler of higher priority does in between counts for
+//! that one alone. A pass of the main loop goes from the place that it jumps to behind its sleep to
+//! the same place again.
 //!
 //! # Notes
 //! Entry and exit of an exception take a dozen cycles each and are no instructions.
@@ -75,7 +76,8 @@ pub struct Tally<'p> {
 enum Head {
     /// It has not slept yet.
     Unknown,
-    /// It has, by the instruction at this address; it goes on to where that, or the branch behind it, leads.
+    /// It has, by the instruction at this address; it goes on to where that, or the branch behind
+    /// it, leads.
     Behind(u32),
     Known(u32),
 }
@@ -132,7 +134,8 @@ impl<'p> Tally<'p> {
         self.latest = Some(address);
     }
 
-    /// Whether the latest instruction did not lead elsewhere: a return whose condition did not hold.
+    /// Whether the latest instruction did not lead elsewhere: a return whose condition did not
+    /// hold.
     fn is_next(&self, address: u32) -> bool {
         self.latest.is_some_and(|latest| self.program.behind(latest) == address)
     }
@@ -156,12 +159,16 @@ impl<'p> Tally<'p> {
     fn follow_main_loop(&mut self, address: u32, kind: Kind) {
         match self.head {
             Head::Unknown if kind == Kind::Sleep => self.head = Head::Behind(address),
-            Head::Behind(at) if self.program.behind(at) == address => self.head = Head::Behind(address),
+            Head::Behind(at) if self.program.behind(at) == address => {
+                self.head = Head::Behind(address)
+            }
             Head::Behind(_) => {
                 self.head = Head::Known(address);
                 self.pass = Some(Pass::default());
             }
-            Head::Known(head) if head == address => self.passes.extend(self.pass.replace(Pass::default())),
+            Head::Known(head) if head == address => {
+                self.passes.extend(self.pass.replace(Pass::default()))
+            }
             _ => {}
         }
     }
@@ -201,8 +208,8 @@ impl<'p> Tally<'p> {
 mod tests {
     use super::*;
 
-    /// Main loop at 100h: NOP, CPSID I, CPSIE I, WFI, MOV, B back to 100h. Capture at 200h: PUSH, BL 210h, POP {PC}.
-    /// Its function at 210h: BX LR. Receive at 220h: NOP, BX LR.
+    /// Main loop at 100h: NOP, CPSID I, CPSIE I, WFI, MOV, B back to 100h. Capture at 200h: PUSH,
+    /// BL 210h, POP {PC}. Its function at 210h: BX LR. Receive at 220h: NOP, BX LR.
     fn program() -> Program {
         let mut code = vec![0xBF00; 0x140 / 2];
         let mut put = |at: usize, halfwords: &[u16]| {
@@ -227,12 +234,16 @@ mod tests {
         for address in [&LOOP[..], &LOOP, &interrupted, &[0x100]].concat() {
             tally.executed(address);
         }
-        let runs: Vec<(u64, u64)> = tally.runs.iter().map(|run| (run.began, run.instructions)).collect();
+        let runs: Vec<(u64, u64)> =
+            tally.runs.iter().map(|run| (run.began, run.instructions)).collect();
         assert_eq!(runs, [(13, 4)]);
         let passes: Vec<(u64, bool)> =
             tally.passes.iter().map(|pass| (pass.instructions, pass.after_sample)).collect();
         assert_eq!(passes, [(6, false), (6, true)]);
-        assert_eq!((tally.times_masked, tally.longest_masked), (3, Masked { instructions: 2, at: 0x102 }));
+        assert_eq!(
+            (tally.times_masked, tally.longest_masked),
+            (3, Masked { instructions: 2, at: 0x102 })
+        );
     }
 
     #[test]
@@ -248,7 +259,12 @@ mod tests {
             tally.runs.iter().map(|run| (run.handler, run.instructions)).collect();
         assert_eq!(
             runs,
-            [(Handler::Capture, 4), (Handler::Receive, 2), (Handler::Capture, 4), (Handler::Receive, 2)]
+            [
+                (Handler::Capture, 4),
+                (Handler::Receive, 2),
+                (Handler::Capture, 4),
+                (Handler::Receive, 2)
+            ]
         );
     }
 }

@@ -1,20 +1,21 @@
 //! All functions that can be reached, and how deep the stack gets below each.
 //!
 //! # Design
-//! A call counts with the depth at which it stands, so the deepest path is the sum of what is really in use at each call
-//! of it and not of whole frames.
+//! A call counts with the depth at which it stands, so the deepest path is the sum of what is
+//! really in use at each call of it and not of whole frames.
 //!
 //! # Tradeoffs
-//! A call through a pointer is taken to lead to any function whose address the image holds somewhere: too many, and never
-//! too few. Recursion has no bound that could be found here, and fails.
+//! A call through a pointer is taken to lead to any function whose address the image holds
+//! somewhere: too many, and never too few. Recursion has no bound that could be found here, and
+//! fails.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::image::{Image, VECTOR_TABLE};
 use crate::walk::{Call, Callee, Walk, walk};
 
-/// So many calls below each other are followed: ten times as many as a program for a board has. What
-/// is deeper is refused, before it needs more stack here than there is.
+/// So many calls below each other are followed: ten times as many as a program for a board has.
+/// What is deeper is refused, before it needs more stack here than there is.
 const DEEPEST: usize = 200;
 
 /// Functions that call each other.
@@ -32,7 +33,8 @@ pub(crate) struct Deepest {
     pub(crate) bytes: u32,
     /// The functions on the way, the first one included.
     pub(crate) path: Vec<u32>,
-    /// Where the stack begins that the first function changes to; none when all is on the stack that it found.
+    /// Where the stack begins that the first function changes to; none when all is on the stack
+    /// that it found.
     pub(crate) other_stack: Option<u32>,
 }
 
@@ -56,17 +58,17 @@ impl<'a> Calls<'a> {
             calls.returns(function, &mut begun, 0);
         }
         calls.pointed_to = pointers(image, &calls.walks);
-        let left_out =
-            |call: &Call| matches!(call.callee, Callee::Function(target) if without.contains(&target));
+        let left_out = |call: &Call| matches!(call.callee, Callee::Function(target) if without.contains(&target));
         calls.walks.values_mut().for_each(|walk| walk.calls.retain(|call| !left_out(call)));
         calls
     }
 
-    /// Walks a function, unless that has been done; says whether it comes back. One that is too deep
-    /// has its turn later, and is taken to come back.
+    /// Walks a function, unless that has been done; says whether it comes back. One that is too
+    /// deep has its turn later, and is taken to come back.
     fn returns(&mut self, function: u32, begun: &mut BTreeSet<u32>, depth: usize) -> bool {
         if depth < DEEPEST && begun.insert(function) {
-            let walk = walk(self.image, function, &mut |callee| self.returns(callee, begun, depth + 1));
+            let walk =
+                walk(self.image, function, &mut |callee| self.returns(callee, begun, depth + 1));
             self.walks.insert(function, walk);
         }
         // One whose walk is not over yet takes part in a recursion, which fails anyway.
@@ -142,7 +144,8 @@ impl<'a> Calls<'a> {
             return Err(Unbounded::NotFollowed(function));
         }
         on_the_way.push(function);
-        let mut deepest = Deepest { bytes: walk.depth, path: vec![function], other_stack: walk.other_stack };
+        let mut deepest =
+            Deepest { bytes: walk.depth, path: vec![function], other_stack: walk.other_stack };
         for call in &walk.calls {
             for target in self.targets(call) {
                 let below = self.deepest_from(target, known, on_the_way)?;
@@ -173,25 +176,34 @@ impl<'a> Calls<'a> {
             Unbounded::NotFollowed(at) => {
                 let troubles = self.walks.values().flat_map(|walk| &walk.troubles);
                 let what = troubles.into_iter().find(|(place, _)| place == at);
-                let what = what
-                    .map_or("is no function, or one that changes the stack".to_owned(), |(_, trouble)| {
-                        trouble.to_string()
-                    });
+                let what = what.map_or(
+                    "is no function, or one that changes the stack".to_owned(),
+                    |(_, trouble)| trouble.to_string(),
+                );
                 format!("{} ({at:#x}) {what}", self.image.name_of(*at))
             }
         }
     }
 }
 
-/// Functions whose address stands in data or is put into a register. What the vector table holds is for the processor.
+/// Functions whose address stands in data or is put into a register. What the vector table holds is
+/// for the processor.
 fn pointers(image: &Image, walks: &BTreeMap<u32, Walk>) -> BTreeSet<u32> {
-    let mut values: BTreeSet<u32> = walks.values().flat_map(|walk| walk.constants.iter().copied()).collect();
-    for piece in image.pieces.iter().filter(|piece| piece.name != VECTOR_TABLE && !piece.bytes.is_empty()) {
-        let places = piece.addresses().filter(|address| address % 4 == 0 && !image.is_code(*address));
+    let mut values: BTreeSet<u32> =
+        walks.values().flat_map(|walk| walk.constants.iter().copied()).collect();
+    for piece in
+        image.pieces.iter().filter(|piece| piece.name != VECTOR_TABLE && !piece.bytes.is_empty())
+    {
+        let places =
+            piece.addresses().filter(|address| address % 4 == 0 && !image.is_code(*address));
         values.extend(places.filter_map(|address| image.word(address)));
     }
     let entry = |value: u32| Some(value & !1).filter(|_| value & 1 == 1);
-    values.into_iter().filter_map(entry).filter(|entry| image.functions.contains_key(entry)).collect()
+    values
+        .into_iter()
+        .filter_map(entry)
+        .filter(|entry| image.functions.contains_key(entry))
+        .collect()
 }
 
 #[cfg(test)]
@@ -249,7 +261,8 @@ mod tests {
 
     #[test]
     fn a_call_through_a_pointer_may_lead_to_every_function_that_is_pointed_to() {
-        // f: push; blx r0; pop; nop; addresses of `deep` and, even and thus no function's, of `other`.
+        // f: push; blx r0; pop; nop; addresses of `deep` and, even and thus no function's, of
+        // `other`.
         let image = Image::of_functions(
             AT,
             &[
@@ -266,7 +279,8 @@ mod tests {
     #[test]
     fn what_cannot_be_followed_has_no_depth_either() {
         // f: push; bl g; pop. g: mov sp, r7; bx lr.
-        let image = Image::of_functions(AT, &[("f", &[PUSH, 0xF000, bl(1), POP]), ("g", &[0x46BD, BX_LR])]);
+        let image =
+            Image::of_functions(AT, &[("f", &[PUSH, 0xF000, bl(1), POP]), ("g", &[0x46BD, BX_LR])]);
         let calls = Calls::of(&image, &BTreeSet::new());
         let unbounded = calls.deepest(AT).unwrap_err();
         assert_eq!(unbounded, Unbounded::NotFollowed(0x108));

@@ -1,7 +1,7 @@
 //! What an image has to keep to before it is flashed.
 //!
-//! Everything here is read off the image: nothing has to run, and nothing is taken on trust. What each board is held to
-//! stands in [`Limits`].
+//! Everything here is read off the image: nothing has to run, and nothing is taken on trust. What
+//! each board is held to stands in [`Limits`].
 
 mod memory;
 mod outcome;

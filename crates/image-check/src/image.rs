@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 
 use object::elf::{SHF_ALLOC, SHF_WRITE};
 use object::{
-    File, Object, ObjectSection, ObjectSymbol, Section, SectionFlags, SectionKind, Symbol, SymbolKind,
+    File, Object, ObjectSection, ObjectSymbol, Section, SectionFlags, SectionKind, Symbol,
+    SymbolKind,
 };
 
 use crate::names;
@@ -206,7 +207,8 @@ impl Image {
 
     /// Address of a function.
     pub(crate) fn function(&self, name: &str) -> Option<u32> {
-        let has_name = |(_, function): &(_, &Function)| function.names.iter().any(|known| known == name);
+        let has_name =
+            |(_, function): &(_, &Function)| function.names.iter().any(|known| known == name);
         self.functions.iter().find(has_name).map(|(&address, _)| address)
     }
 
@@ -228,7 +230,8 @@ impl Image {
     /// Whether there is code at an address.
     pub(crate) fn is_code(&self, address: u32) -> bool {
         let piece = self.pieces.iter().find(|piece| piece.addresses().contains(&address));
-        let mut begins = piece.into_iter().flat_map(|piece| self.code_begins.range(piece.address..=address));
+        let mut begins =
+            piece.into_iter().flat_map(|piece| self.code_begins.range(piece.address..=address));
         begins.next_back().is_some_and(|(_, code)| *code)
     }
 
@@ -249,7 +252,8 @@ impl Image {
         self.bytes(address).map(u32::from_le_bytes)
     }
 
-    /// Stack pointer at reset, and what the processor calls: the reset routine first, then the handlers.
+    /// Stack pointer at reset, and what the processor calls: the reset routine first, then the
+    /// handlers.
     pub(crate) fn vectors(&self) -> Option<(u32, Vec<u32>)> {
         let table = self.pieces.iter().find(|piece| piece.name == VECTOR_TABLE)?;
         let mut words = table.bytes.as_chunks().0.iter().map(|&bytes| u32::from_le_bytes(bytes));
@@ -287,7 +291,13 @@ impl Image {
             bytes.extend(code.iter().flat_map(|halfword| halfword.to_le_bytes()));
         }
         let size = narrow(bytes.len() as u64);
-        image.pieces.push(Piece { name: ".text".to_owned(), address, size, bytes, writable: false });
+        image.pieces.push(Piece {
+            name: ".text".to_owned(),
+            address,
+            size,
+            bytes,
+            writable: false,
+        });
         image
     }
 
@@ -343,7 +353,8 @@ mod tests {
         image.add_function("inner", 0x104, 0);
         image.functions.get_mut(&0x108).unwrap().end = 0x108;
         image.end_functions();
-        let ends: Vec<_> = image.functions.iter().map(|(&begin, function)| (begin, function.end)).collect();
+        let ends: Vec<_> =
+            image.functions.iter().map(|(&begin, function)| (begin, function.end)).collect();
         assert_eq!(ends, [(0x100, 0x108), (0x104, 0x108), (0x108, 0x10C)]);
     }
 

@@ -50,7 +50,8 @@ fn compare(address: u32, first: u16, second: u16) -> Verdict {
     match accepted::reason([first, second], &theirs, &differences) {
         Some(reason) => Verdict::Accepted(reason),
         None => Verdict::Differs(format!(
-            "{first:04x} {second:04x} {}: {differences:?}\n  ours   {ours:x?}\n  theirs {theirs:x?}",
+            "{first:04x} {second:04x} {}: {differences:?}\n  ours   {ours:x?}\n  theirs \
+             {theirs:x?}",
             theirs.text
         )),
     }

@@ -1,6 +1,7 @@
 //! Names of functions, and which of them belong to a panic.
 //!
-//! The linker drops what nobody refers to. An image in which none of these functions is left cannot panic.
+//! The linker drops what nobody refers to. An image in which none of these functions is left cannot
+//! panic.
 
 /// A symbol's name as the source has it, without the hash.
 pub(crate) fn as_in_source(symbol: &str) -> String {
@@ -11,7 +12,8 @@ pub(crate) fn as_in_source(symbol: &str) -> String {
 const LIBRARIES: [&str; 3] = ["core", "alloc", "std"];
 
 /// What a panic ends in: the image's handler, or that of the log.
-const HANDLERS: [&str; 4] = ["rust_begin_unwind", "rust_panic", "_defmt_panic", "__defmt_default_panic"];
+const HANDLERS: [&str; 4] =
+    ["rust_begin_unwind", "rust_panic", "_defmt_panic", "__defmt_default_panic"];
 
 /// Whether a function is there only to panic; takes the name as the source has it.
 pub(crate) fn is_panic(name: &str) -> bool {

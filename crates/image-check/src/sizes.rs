@@ -39,8 +39,11 @@ mod tests {
             bytes: vec![0; bytes],
             writable,
         };
-        let pieces =
-            vec![piece(".text", 100, 100, false), piece(".data", 20, 20, true), piece(".bss", 0, 3, true)];
+        let pieces = vec![
+            piece(".text", 100, 100, false),
+            piece(".data", 20, 20, true),
+            piece(".bss", 0, 3, true),
+        ];
         assert_eq!(Sizes::of(&Image::of_pieces(pieces)), Sizes { flash: 120, variables: 23 });
     }
 }

@@ -17,7 +17,8 @@ pub(crate) fn shown(limits: &Limits, image: &Image, calls: &Calls<'_>) -> String
     shares.sort_by_key(|share| (share.saved > 0, std::cmp::Reverse(share.deepest.bytes)));
     let mut saved = 0;
     for share in &shares {
-        let names: Vec<_> = share.deepest.path.iter().map(|&function| harmless(image, function)).collect();
+        let names: Vec<_> =
+            share.deepest.path.iter().map(|&function| harmless(image, function)).collect();
         let own = if share.deepest.other_stack.is_some() { ", on a stack of its own" } else { "" };
         _ = writeln!(text, "{:7}  {}{own}", share.deepest.bytes, names.join(" → "));
         saved += share.saved;
@@ -33,10 +34,13 @@ pub(crate) fn shown(limits: &Limits, image: &Image, calls: &Calls<'_>) -> String
 
 /// Calls whose target only the running program knows.
 fn computed(image: &Image, calls: &Calls<'_>) -> String {
-    let computed =
-        calls.walks().flat_map(|(_, walk)| &walk.calls).filter(|call| call.callee == Callee::Computed);
+    let computed = calls
+        .walks()
+        .flat_map(|(_, walk)| &walk.calls)
+        .filter(|call| call.callee == Callee::Computed);
     computed.fold(String::new(), |text, call| {
-        let targets: Vec<_> = calls.targets(call).map(|function| harmless(image, function)).collect();
+        let targets: Vec<_> =
+            calls.targets(call).map(|function| harmless(image, function)).collect();
         format!("{text}  {} calls one of: {}\n", harmless(image, call.at), targets.join(", "))
     })
 }

@@ -21,13 +21,15 @@ fn lines(images: &[Checked]) -> Vec<String> {
     let Some(first) = images.first() else { return lines };
     let label = width(first.outcomes.iter().map(|outcome| outcome.what));
     let widths: Vec<usize> = images.iter().map(column_width).collect();
-    let heads = images.iter().zip(&widths).map(|(image, width)| format!("  {:<width$}", image.board));
+    let heads =
+        images.iter().zip(&widths).map(|(image, width)| format!("  {:<width$}", image.board));
     lines.push(trimmed(&heads.fold(format!("{:label$}", ""), |line, head| line + "  " + &head)));
     for (row, outcome) in first.outcomes.iter().enumerate() {
         let cells = images.iter().zip(&widths);
         let cells = cells.filter_map(|(image, width)| Some(cell(image.outcomes.get(row)?, *width)));
-        lines
-            .push(trimmed(&cells.fold(format!("{:label$}", outcome.what), |line, cell| line + "  " + &cell)));
+        lines.push(trimmed(
+            &cells.fold(format!("{:label$}", outcome.what), |line, cell| line + "  " + &cell),
+        ));
     }
     // Names of functions and files may be anything.
     for Checked { board, outcomes, .. } in images {
@@ -45,7 +47,9 @@ fn lines(images: &[Checked]) -> Vec<String> {
 fn cell(outcome: &Outcome, width: usize) -> String {
     let (style, mark) = match outcome {
         Outcome { wrong, .. } if !wrong.is_empty() => (BROKEN, "✗"),
-        Outcome { result, .. } if result.is_empty() => return format!("{FAINT}–{FAINT:#} {:width$}", ""),
+        Outcome { result, .. } if result.is_empty() => {
+            return format!("{FAINT}–{FAINT:#} {:width$}", "");
+        }
         _ => (KEPT, "✓"),
     };
     format!("{style}{mark}{style:#} {:width$}", outcome.result)
@@ -89,7 +93,8 @@ mod tests {
     #[test]
     fn a_row_for_each_check_and_what_is_wrong_below() {
         let first = vec![outcome("flash", "21.7 of 48.0 KiB", &[]), outcome("in RAM", "", &[])];
-        let second = vec![outcome("flash", "9.0 KiB", &[]), outcome("in RAM", "1 way", &["f is in flash"])];
+        let second =
+            vec![outcome("flash", "9.0 KiB", &[]), outcome("in RAM", "1 way", &["f is in flash"])];
         let images = [image("mps2-an385", "a.elf", first), image("stm32f407", "b.elf", second)];
         let expected = "
           mps2-an385          stm32f407
@@ -109,6 +114,9 @@ b.elf
     fn what_a_terminal_would_obey_in_names_is_shown() {
         let outcomes = vec![outcome("in RAM", "1 way", &["f\u{1b}[2J\nmain is in flash"])];
         let text = table(&[image("board", "a\u{1b}[2J\n.elf", outcomes)]);
-        assert!(text.contains(r"f\u{1b}[2J\nmain is") && text.contains(r"a\u{1b}[2J\n.elf"), "{text}");
+        assert!(
+            text.contains(r"f\u{1b}[2J\nmain is") && text.contains(r"a\u{1b}[2J\n.elf"),
+            "{text}"
+        );
     }
 }

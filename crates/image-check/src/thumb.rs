@@ -1,16 +1,17 @@
 //! Thumb-2 instructions, as far as calls, jumps and the stack pointer are concerned.
 //!
 //! # Design
-//! Every instruction is told apart well enough to know its length, where it goes, what it does to the stack pointer, and
-//! which registers it may change. What it computes is of no interest, but for constants: a call through a register
-//! that holds one is a call like any other.
+//! Every instruction is told apart well enough to know its length, where it goes, what it does to
+//! the stack pointer, and which registers it may change. What it computes is of no interest, but
+//! for constants: a call through a register that holds one is a call like any other.
 //!
 //! # Tradeoffs
-//! Where telling exactly would take a longer table, an instruction is taken to change more registers than it
-//! does. Then a constant is forgotten, never made up.
+//! Where telling exactly would take a longer table, an instruction is taken to change more
+//! registers than it does. Then a constant is forgotten, never made up.
 //!
 //! # Notes
-//! Encodings are those of the ARMv7-M architecture reference manual (DDI 0403E), sections A5.2 and A5.3.
+//! Encodings are those of the ARMv7-M architecture reference manual (DDI 0403E), sections A5.2 and
+//! A5.3.
 
 /// Number of the stack pointer.
 const SP: u16 = 13;
@@ -150,7 +151,9 @@ fn narrow(address: u32, op: u16) -> Instruction {
         0xC8..=0xCF => plain(middle | list),
         0xD0..=0xDD => plain(0).going(Flow::Branch(pc.wrapping_add_signed(extended(list, 8) * 2))),
         0xDE => plain(0).going(Flow::Stop),
-        0xE0..=0xE7 => plain(0).going(Flow::Jump(pc.wrapping_add_signed(extended(op & 0x7FF, 11) * 2))),
+        0xE0..=0xE7 => {
+            plain(0).going(Flow::Jump(pc.wrapping_add_signed(extended(op & 0x7FF, 11) * 2)))
+        }
         // Breakpoints, hints, supervisor calls, interrupt masks.
         _ => plain(0),
     }
@@ -225,7 +228,11 @@ fn load_store_dual(first: u16, second: u16) -> Instruction {
     let plain = Instruction::plain(4, named(first, second));
     if first & 0xFFF0 == 0xE8D0 && second & 0xFFE0 == 0xF000 {
         let entry = if second & 1 << 4 == 0 { 1 } else { 2 };
-        return Instruction::plain(4, 0).going(if base == PC { Flow::Table(entry) } else { Flow::Unknown });
+        return Instruction::plain(4, 0).going(if base == PC {
+            Flow::Table(entry)
+        } else {
+            Flow::Unknown
+        });
     }
     if base == SP && back { plain.stack(moved(up, i32::from(second & 0xFF) * 4)) } else { plain }
 }
@@ -288,7 +295,9 @@ fn immediate(first: u16, second: u16) -> Instruction {
         (_, SP) if operand == SP => plain.stack(bytes().map_or(Stack::Unknown, Stack::Deeper)),
         (_, SP) => plain.stack(Stack::Unknown),
         // With flags or without.
-        (0xF040 | 0xF050, _) if operand == PC => plain.holding(register, Constant::Whole(expanded(twelve))),
+        (0xF040 | 0xF050, _) if operand == PC => {
+            plain.holding(register, Constant::Whole(expanded(twelve)))
+        }
         (0xF240, _) => plain.holding(register, Constant::Whole((operand << 12 | twelve).into())),
         (0xF2C0, _) => plain.holding(register, Constant::Upper(operand << 12 | twelve)),
         _ => plain,
@@ -326,7 +335,9 @@ fn control(first: u16, second: u16) -> Instruction {
     let plain = Instruction::plain(4, 1 << (second >> 8 & 0xF));
     match first & 0xFFF0 {
         // Writes to special registers; they name no register to be changed.
-        0xF380 if second & 0xFF == MSP => Instruction::plain(4, 0).stack(Stack::Change(first & 0xF)),
+        0xF380 if second & 0xFF == MSP => {
+            Instruction::plain(4, 0).stack(Stack::Change(first & 0xF))
+        }
         0xF380 if PSP_AND_CONTROL.contains(&(second & 0xFF)) => plain.stack(Stack::Unknown),
         0xF7F0 if second & 0xF000 == 0xA000 => plain.going(Flow::Stop),
         _ => plain,
@@ -465,7 +476,11 @@ mod tests {
         ];
         for (first, second) in others {
             let instruction = decode(0x1000, first, second);
-            assert_eq!((instruction.flow, instruction.stack), (Flow::Next, Stack::Deeper(0)), "{first:04x}");
+            assert_eq!(
+                (instruction.flow, instruction.stack),
+                (Flow::Next, Stack::Deeper(0)),
+                "{first:04x}"
+            );
         }
     }
 

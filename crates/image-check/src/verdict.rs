@@ -13,11 +13,13 @@ pub struct Refused {
 
 impl fmt::Display for Refused {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let images = self.images.iter().map(|(board, checks)| format!("{board} ({})", checks.join(", ")));
+        let images =
+            self.images.iter().map(|(board, checks)| format!("{board} ({})", checks.join(", ")));
         write!(
             f,
             "not to be flashed: {}\n  \
-             The lines above say why; llvm-addr2line -ife IMAGE ADDRESS shows the source of an address.",
+             The lines above say why; llvm-addr2line -ife IMAGE ADDRESS shows the source of an \
+             address.",
             images.collect::<Vec<_>>().join("; ")
         )
     }
@@ -64,6 +66,9 @@ mod tests {
         let other = image("c", [&[], &["one"]]);
         assert_eq!(verdict(std::slice::from_ref(&good)), Ok(()));
         let refused = verdict(&[good, bad, other]).unwrap_err().to_string();
-        assert!(refused.starts_with("not to be flashed: b (flash, panics); c (panics)\n"), "{refused}");
+        assert!(
+            refused.starts_with("not to be flashed: b (flash, panics); c (panics)\n"),
+            "{refused}"
+        );
     }
 }

@@ -1,15 +1,16 @@
 //! One function, along all its paths: how deep the stack gets, and what is called at which depth.
 //!
 //! # Design
-//! Every instruction is visited with the depth of the stack before it and with what is known of registers. The
-//! depth has to be the same on whichever path an instruction is reached, as compilers see to it; a register is known where
-//! all paths agree on it.
+//! Every instruction is visited with the depth of the stack before it and with what is known of
+//! registers. The depth has to be the same on whichever path an instruction is reached, as
+//! compilers see to it; a register is known where all paths agree on it.
 //!
 //! # Tradeoffs
 //! Whatever cannot be followed is trouble, which fails the check, and never a guess.
 //!
 //! # Notes
-//! A call that does not come back ends its path. Whether it does is asked of whoever walks the function that is called.
+//! A call that does not come back ends its path. Whether it does is asked of whoever walks the
+//! function that is called.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -189,10 +190,13 @@ impl Walker<'_> {
             }
             Flow::Call(target) => goes_on |= self.call(address, Callee::Function(target), &after),
             Flow::CallRegister(register) => {
-                let callee = before.function_in(register).map_or(Callee::Computed, Callee::Function);
+                let callee =
+                    before.function_in(register).map_or(Callee::Computed, Callee::Function);
                 goes_on |= self.call(address, callee, &after);
             }
-            Flow::JumpRegister(register) => self.jump_away(address, before.function_in(register), &after),
+            Flow::JumpRegister(register) => {
+                self.jump_away(address, before.function_in(register), &after)
+            }
             Flow::JumpWord(word) => {
                 self.jump_away(address, self.image.word(word).map(|word| word & !1), &after);
             }
@@ -315,7 +319,9 @@ impl Walker<'_> {
         }
         self.walk.calls.insert(Call { at, depth, callee });
         match callee {
-            Callee::Function(target) if self.image.functions.contains_key(&target) => (self.returns)(target),
+            Callee::Function(target) if self.image.functions.contains_key(&target) => {
+                (self.returns)(target)
+            }
             Callee::Function(_) => {
                 self.trouble(at, Trouble::NoFunction);
                 true
@@ -391,7 +397,10 @@ mod tests {
         let image = Image::of_functions(
             AT,
             &[
-                ("f", &[PUSH_R4_LR, 0xF000, 0xF805, SUB_SP_16, 0xF000, 0xF802, ADD_SP_16, POP_R4_PC]),
+                (
+                    "f",
+                    &[PUSH_R4_LR, 0xF000, 0xF805, SUB_SP_16, 0xF000, 0xF802, ADD_SP_16, POP_R4_PC],
+                ),
                 ("g", &[BX_LR]),
             ],
         );
@@ -475,7 +484,8 @@ mod tests {
     #[test]
     fn a_conditional_return_leaves_the_stack_as_it_is_for_those_who_stay() {
         // push; cmp; it eq; popeq {r4, pc}; sub; add; pop
-        let walk = walk_code(&[PUSH_R4_LR, 0x2800, 0xBF08, POP_R4_PC, SUB_SP_16, ADD_SP_16, POP_R4_PC]);
+        let walk =
+            walk_code(&[PUSH_R4_LR, 0x2800, 0xBF08, POP_R4_PC, SUB_SP_16, ADD_SP_16, POP_R4_PC]);
         assert_eq!((walk.depth, walk.returns, walk.troubles), (24, true, vec![]));
     }
 

@@ -84,5 +84,8 @@ fn calls_that_go_deeper_than_any_program_have_no_bound() {
     assert_eq!(image.stack_bytes, None);
     let depth = image.outcomes.iter().find(|outcome| outcome.what == "stack at its deepest");
     let wrong = &depth.expect("a check of the stack").wrong;
-    assert!(wrong.iter().any(|wrong| wrong.contains("more calls deep than any program")), "{wrong:?}");
+    assert!(
+        wrong.iter().any(|wrong| wrong.contains("more calls deep than any program")),
+        "{wrong:?}"
+    );
 }

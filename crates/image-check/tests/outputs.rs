@@ -36,7 +36,11 @@ fn a_full_disk_is_a_failure_and_a_reader_that_has_gone_is_none() {
     let full = File::options().write(true).open("/dev/full").expect("/dev/full");
     let output = image_check(&["--help"]).stdout(full).output().expect("the program runs");
     assert_eq!(output.status.code(), Some(1), "{}", told(&output));
-    assert!(told(&output).contains("cannot write standard output: No space left"), "{}", told(&output));
+    assert!(
+        told(&output).contains("cannot write standard output: No space left"),
+        "{}",
+        told(&output)
+    );
 
     let (reader, writer) = io::pipe().expect("a pipe");
     drop(reader);
@@ -65,7 +69,8 @@ fn wrong_arguments_are_told_harmlessly_and_the_boards_are_named() {
 fn what_is_no_image_is_told_with_what_to_try() {
     for file in ["there-is-none\u{1B}[2J.elf", "Cargo.toml"] {
         let mut command = image_check(&["--board", "stm32f407", file]);
-        let output = command.current_dir(env!("CARGO_MANIFEST_DIR")).output().expect("the program runs");
+        let output =
+            command.current_dir(env!("CARGO_MANIFEST_DIR")).output().expect("the program runs");
         let told = told(&output);
         assert_eq!((output.status.code(), &*output.stdout), (Some(1), &b""[..]), "{told}");
         assert!(told.contains("cargo xtask firmware"), "{told}");

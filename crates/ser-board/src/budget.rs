@@ -1,8 +1,9 @@
-//! Ring lengths, interrupt priorities and what the capture interrupt may take, each with the reckoning behind it.
-//! Both boards take all of theirs from here.
+//! Ring lengths, interrupt priorities and what the capture interrupt may take, each with the
+//! reckoning behind it. Both boards take all of theirs from here.
 //!
-//! The rule for lengths: whatever comes in while the main loop is away for [`MAIN_LOOP_STALL_MS`] has to find room.
-//! The rule for priorities: the less an interrupt can wait, the higher. A build that breaks a rule does not compile.
+//! The rule for lengths: whatever comes in while the main loop is away for [`MAIN_LOOP_STALL_MS`]
+//! has to find room. The rule for priorities: the less an interrupt can wait, the higher. A build
+//! that breaks a rule does not compile.
 //!
 //! | interrupt                      | can wait for                                  | priority                  |
 //! |--------------------------------|-----------------------------------------------|---------------------------|
@@ -11,7 +12,8 @@
 //! | transmitter has room           | as long as it likes: a pause on the line      | [`TRANSMIT_PRIORITY`]     |
 //! | line of the GENI board         | a millisecond: its tick is that of an arrival | [`EXTERNAL_BUS_PRIORITY`] |
 //!
-//! The main loop has priority 0. A UART with one interrupt for both directions has it at that of the receiver.
+//! The main loop has priority 0. A UART with one interrupt for both directions has it at that of
+//! the receiver.
 
 use ser_node::capture::QUEUE_LEN;
 use ser_proto::Baud;
@@ -20,15 +22,17 @@ use crate::serial_line::CHARACTER_BITS;
 
 /// How long the main loop may be away from the rings without a loss, in milliseconds.
 ///
-/// What keeps it away while all is well, by far less than this: a log record of 2 ms, a frame's worth of entries, the
-/// programming of one configuration record (16 bytes of at most 100 µs each, `STM32F40x` data sheet, "Flash memory
-/// programming"). The rest is reserve for interrupts and for what is still to come. The erasing of a flash sector is
-/// *not* covered: 16 KiB take up to half a second, which is due once in a thousand configuration changes or less (see
+/// What keeps it away while all is well, by far less than this: a log record of 2 ms, a frame's
+/// worth of entries, the programming of one configuration record (16 bytes of at most 100 µs each,
+/// `STM32F40x` data sheet, "Flash memory programming"). The rest is reserve for interrupts and for
+/// what is still to come. The erasing of a flash sector is *not* covered: 16 KiB take up to half a
+/// second, which is due once in a thousand configuration changes or less (see
 /// [`flash_log`](crate::flash_log)), and what it costs is counted.
 pub const MAIN_LOOP_STALL_MS: u32 = 100;
 
-/// Changes that capture can come up with in a millisecond: it samples once in each, and all inputs that changed in a
-/// sample go into one entry of the queue. 1000 per second for as long as one likes.
+/// Changes that capture can come up with in a millisecond: it samples once in each, and all inputs
+/// that changed in a sample go into one entry of the queue. 1000 per second for as long as one
+/// likes.
 pub const CHANGES_PER_MS: u32 = 1;
 
 /// Bits per second at the highest rate of the RS-232 line.
@@ -45,8 +49,8 @@ pub const RECEIVE_RING_LEN: usize = ring_len(bytes_in(MAIN_LOOP_STALL_MS));
 
 /// How far ahead of the line the main loop may send, in milliseconds.
 ///
-/// A stall makes the line pause, which loses nothing, so it need not be covered; a short ring has the advantage that
-/// little is in flight when the rate changes or a reset comes.
+/// A stall makes the line pause, which loses nothing, so it need not be covered; a short ring has
+/// the advantage that little is in flight when the rate changes or a reset comes.
 pub const TRANSMIT_AHEAD_MS: u32 = 66;
 
 /// Bytes that may wait for the transmitter.
@@ -55,33 +59,36 @@ pub const TRANSMIT_RING_LEN: usize = ring_len(bytes_in(TRANSMIT_AHEAD_MS));
 /// Instructions that a run of the capture interrupt may take, whatever the inputs do. `cargo xtask
 /// timing` counts them, and a test in the emulator holds every case against this.
 ///
-/// It runs a thousand times a second, and a millisecond has 84,000 cycles at 84 MHz, the clock of the board to flash.
-/// At 4 cycles each, taken high and not measured, 150 instructions are 600 cycles: 0.7 % of the processor, for the 7
-/// µs of which everything else waits; the receiver can wait 520 µs. More would work, too. The bound is as close as
-/// the longest run allows, with debounce of all inputs and a full queue, so that what is added to it has to be worth
-/// it: all that can wait belongs in the main loop.
+/// It runs a thousand times a second, and a millisecond has 84,000 cycles at 84 MHz, the clock of
+/// the board to flash. At 4 cycles each, taken high and not measured, 150 instructions are 600
+/// cycles: 0.7 % of the processor, for the 7 µs of which everything else waits; the receiver can
+/// wait 520 µs. More would work, too. The bound is as close as the longest run allows, with
+/// debounce of all inputs and a full queue, so that what is added to it has to be worth it: all
+/// that can wait belongs in the main loop.
 pub const CAPTURE_INSTRUCTIONS: u64 = 150;
 
-/// Priority of the capture interrupt: above everything, for the millisecond of a sample is the product.
+/// Priority of the capture interrupt: above everything, for the millisecond of a sample is the
+/// product.
 pub const CAPTURE_PRIORITY: u8 = 3;
 
-/// Priority of the receive interrupt: it has one character's time, 520 µs at the highest rate, before a byte is lost.
+/// Priority of the receive interrupt: it has one character's time, 520 µs at the highest rate,
+/// before a byte is lost.
 pub const RECEIVE_PRIORITY: u8 = 2;
 
 /// Priority of the transmit interrupt: being late makes a pause on the line and nothing else.
 pub const TRANSMIT_PRIORITY: u8 = 1;
 
 /// Priority of the GENI board's interrupt line. The line's edge is latched, so the interrupt may
-/// wait, and all that it takes is the tick at which a datagram arrived. The interrupts above it need
-/// some 10 µs of a millisecond.
+/// wait, and all that it takes is the tick at which a datagram arrived. The interrupts above it
+/// need some 10 µs of a millisecond.
 pub const EXTERNAL_BUS_PRIORITY: u8 = 1;
 
-/// Pulses of the GENI board's interrupt line that may wait for the main loop. Each means a datagram.
-/// The board holds 15 of them, and one more may be on its way out.
+/// Pulses of the GENI board's interrupt line that may wait for the main loop. Each means a
+/// datagram. The board holds 15 of them, and one more may be on its way out.
 pub const PULSE_RING_LEN: usize = ring_len(16);
 
-/// Bytes of the log that may wait for a debug probe: all that a start has to say, some 40 records of 25 bytes at
-/// most. What finds no room is dropped; nothing else waits for the log.
+/// Bytes of the log that may wait for a debug probe: all that a start has to say, some 40 records
+/// of 25 bytes at most. What finds no room is dropped; nothing else waits for the log.
 pub const PROBE_RING_LEN: usize = ring_len(40 * 25);
 
 /// The length of a ring for so many items.
@@ -110,6 +117,9 @@ mod tests {
         assert_eq!((PROBE_RING_LEN, PULSE_RING_LEN), (1024, 16));
         assert_eq!(CHARACTER_BITS * 1_000_000 / MAX_BITS_PER_SECOND, 520);
         let capture_cycles = CAPTURE_INSTRUCTIONS * 4;
-        assert_eq!((capture_cycles, capture_cycles * 1000 / 84_000, capture_cycles / 84), (600, 7, 7));
+        assert_eq!(
+            (capture_cycles, capture_cycles * 1000 / 84_000, capture_cycles / 84),
+            (600, 7, 7)
+        );
     }
 }

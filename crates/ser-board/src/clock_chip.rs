@@ -1,22 +1,25 @@
 //! The battery-backed clock: a driver of a clock chip as the `Rtc` that the recorder wants.
 //!
-//! A clock that has stopped while the power was off still shows a date, and one with an empty battery shows any date.
-//! A wrong time in a recorder's log is worse than none, so a time is believed only if the chip has not lost it and it
-//! can be.
+//! A clock that has stopped while the power was off still shows a date, and one with an empty
+//! battery shows any date. A wrong time in a recorder's log is worse than none, so a time is
+//! believed only if the chip has not lost it and it can be.
 //!
 //! # Design
-//! The driver implements `rtcc::DateTimeAccess`, as that of the DS3231 and its relatives does (crate `ds323x`), plus
-//! [`KeepsTime`] for what that trait leaves out. What is wrong with the clock is kept in [`ClockHealth`], which the
-//! board looks at after the recorder has taken the clock over.
+//! The driver implements `rtcc::DateTimeAccess`, as that of the DS3231 and its relatives does
+//! (crate `ds323x`), plus [`KeepsTime`] for what that trait leaves out. What is wrong with the
+//! clock is kept in [`ClockHealth`], which the board looks at after the recorder has taken the
+//! clock over.
 //!
 //! # Tradeoffs
-//! Chips that count whole seconds are read in the middle of the second that they show and are set to the nearest one:
-//! half a second of error at most each time, until a host sets the recorder's clock.
+//! Chips that count whole seconds are read in the middle of the second that they show and are set
+//! to the nearest one: half a second of error at most each time, until a host sets the recorder's
+//! clock.
 //!
 //! # Notes
-//! `stm32f4xx-hal`'s own RTC has no such trait. Its `get_datetime` of version 0.23 panics on registers that hold no
-//! date, waits without bound for the shadow registers, and counts years from 1970, so that the chip sees leap years
-//! where there are none. See [`stm32_rtc`](crate::stm32_rtc) for the registers as date and time.
+//! `stm32f4xx-hal`'s own RTC has no such trait. Its `get_datetime` of version 0.23 panics on
+//! registers that hold no date, waits without bound for the shadow registers, and counts years from
+//! 1970, so that the chip sees leap years where there are none. See [`stm32_rtc`](crate::stm32_rtc)
+//! for the registers as date and time.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
@@ -29,11 +32,12 @@ use crate::counter::Counter;
 
 /// What a clock chip has to say apart from the time.
 pub trait KeepsTime: DateTimeAccess {
-    /// What the chip counts in, in milliseconds: 1000 for whole seconds, 1 for milliseconds and less. Not 0, 1000 at
-    /// most.
+    /// What the chip counts in, in milliseconds: 1000 for whole seconds, 1 for milliseconds and
+    /// less. Not 0, 1000 at most.
     const RESOLUTION_MS: u16;
 
-    /// Whether the clock has stood still since it was last set: oscillator stopped, battery lost, never set.
+    /// Whether the clock has stood still since it was last set: oscillator stopped, battery lost,
+    /// never set.
     ///
     /// # Errors
     /// When the chip does not answer.
@@ -112,9 +116,15 @@ pub struct ClockChip<'a, C> {
 const FIRST_YEAR_BEYOND: i32 = 2070;
 
 impl<'a, C: KeepsTime> ClockChip<'a, C> {
-    /// A clock that is believed from `not_before` on: the day on which the firmware was made, or the board.
+    /// A clock that is believed from `not_before` on: the day on which the firmware was made, or
+    /// the board.
     pub const fn new(chip: C, not_before: NaiveDate, health: &'a ClockHealth) -> ClockChip<'a, C> {
-        const { assert!(C::RESOLUTION_MS >= 1 && C::RESOLUTION_MS <= 1000, "see `KeepsTime::RESOLUTION_MS`") };
+        const {
+            assert!(
+                C::RESOLUTION_MS >= 1 && C::RESOLUTION_MS <= 1000,
+                "see `KeepsTime::RESOLUTION_MS`"
+            )
+        };
         ClockChip { chip, not_before, health }
     }
 
@@ -135,7 +145,8 @@ impl<'a, C: KeepsTime> ClockChip<'a, C> {
         }
         // What the time is ahead of what the chip shows, on average.
         let half_a_step_ms = i64::from(C::RESOLUTION_MS / 2);
-        date_time(shown.and_utc().timestamp_millis() + half_a_step_ms).ok_or(ClockState::Implausible)
+        date_time(shown.and_utc().timestamp_millis() + half_a_step_ms)
+            .ok_or(ClockState::Implausible)
     }
 
     fn set(&mut self, now: NaiveDateTime) -> Result<(), C::Error> {
@@ -227,7 +238,10 @@ mod tests {
     }
 
     /// What the recorder is told, and what the board sees.
-    fn read<const STEP_MS: u16>(shows: Option<&str>, lost: bool) -> (Option<NaiveDateTime>, ClockState) {
+    fn read<const STEP_MS: u16>(
+        shows: Option<&str>,
+        lost: bool,
+    ) -> (Option<NaiveDateTime>, ClockState) {
         let health = ClockHealth::new();
         assert_eq!(health.state(), ClockState::Unknown);
         let read = clock::<STEP_MS>(shows, lost, &health).read();
@@ -255,9 +269,12 @@ mod tests {
 
     #[test]
     fn a_time_that_cannot_be_is_not_believed() {
-        for shows in
-            ["2000-01-01T00:00:17", "2026-10-31T23:59:59.999", "2070-01-01T00:00:00", "2165-06-15T12:00:00"]
-        {
+        for shows in [
+            "2000-01-01T00:00:17",
+            "2026-10-31T23:59:59.999",
+            "2070-01-01T00:00:00",
+            "2165-06-15T12:00:00",
+        ] {
             assert_eq!(read::<1>(Some(shows), false), (None, ClockState::Implausible), "{shows}");
         }
         for shows in ["2026-11-01T00:00:00", "2069-12-31T23:59:59.999"] {
@@ -274,7 +291,8 @@ mod tests {
         clock.write(time("2026-11-22T10:00:00"));
         assert_eq!((health.state(), health.writes_failed.get()), (ClockState::Silent, 2));
         let (inputs, storage) = (InputHealth::new(), FlashHealth::new());
-        let board = Health { inputs: &inputs, serialisers: None, clock: &health, storage: &storage };
+        let board =
+            Health { inputs: &inputs, serialisers: None, clock: &health, storage: &storage };
         assert!(board.is_broken());
     }
 

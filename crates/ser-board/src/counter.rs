@@ -1,6 +1,7 @@
 //! Counts that one side keeps and another one reads, such as an interrupt and the main loop.
 //!
-//! They are plain loads and stores, also on processors without atomic additions, so each has a single writer.
+//! They are plain loads and stores, also on processors without atomic additions, so each has a
+//! single writer.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

@@ -1,26 +1,30 @@
-//! What a hard fault was: a stack that has run out, or something else, and what the registers tell of it.
+//! What a hard fault was: a stack that has run out, or something else, and what the registers tell
+//! of it.
 //!
-//! The board hands over what the processor shows (ARMv7-M: Cortex-M3, M4, M7); what that means is here.
+//! The board hands over what the processor shows (ARMv7-M: Cortex-M3, M4, M7); what that means is
+//! here.
 //!
 //! # Design
-//! A stack runs out in three ways. The processor finds no room for the registers that it saves when an interrupt
-//! comes; a function moves the stack pointer out of the stack and then writes there, and when the processor takes
-//! that fault, it finds no room either; or a function writes several registers at once, which fails as a whole, with
-//! the stack pointer still in the stack and room above it. Only the third one looks like any other bad access: it is
-//! known by its address, right below the stack's end.
+//! A stack runs out in three ways. The processor finds no room for the registers that it saves when
+//! an interrupt comes; a function moves the stack pointer out of the stack and then writes there,
+//! and when the processor takes that fault, it finds no room either; or a function writes several
+//! registers at once, which fails as a whole, with the stack pointer still in the stack and room
+//! above it. Only the third one looks like any other bad access: it is known by its address, right
+//! below the stack's end.
 //!
 //! # Notes
-//! An address counts only while its valid bit is set; without, the register holds that of an earlier fault, or
-//! anything. A processor that puts writes off may report them without an address (`IMPRECISERR`): such a fault tells
-//! no place, and is a hard fault. Where a memory protection unit watches the stack's end, there are none of these.
-//! (ARMv7-M architecture, B3.2.15, B3.2.18.)
+//! An address counts only while its valid bit is set; without, the register holds that of an
+//! earlier fault, or anything. A processor that puts writes off may report them without an address
+//! (`IMPRECISERR`): such a fault tells no place, and is a hard fault. Where a memory protection
+//! unit watches the stack's end, there are none of these. (ARMv7-M architecture, B3.2.15, B3.2.18.)
 
 use crate::last_words::{Fault, Text};
 
 /// What the processor shows of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Evidence {
-    /// The registers that the processor has saved; none when it found no room for them in the stack.
+    /// The registers that the processor has saved; none when it found no room for them in the
+    /// stack.
     pub saved: Option<SavedRegisters>,
     /// Configurable fault status (CFSR).
     pub status: u32,
@@ -41,16 +45,16 @@ pub struct SavedRegisters {
     pub lr: u32,
 }
 
-/// Bits of the status that say that saving registers has failed, those of the floating-point unit included: MSTKERR,
-/// MLSPERR, STKERR, LSPERR.
+/// Bits of the status that say that saving registers has failed, those of the floating-point unit
+/// included: MSTKERR, MLSPERR, STKERR, LSPERR.
 const SAVING_FAILED: u32 = 1 << 4 | 1 << 5 | 1 << 12 | 1 << 13;
 /// MMARVALID.
 const PROTECTED_ADDRESS_VALID: u32 = 1 << 7;
 /// BFARVALID.
 const BUS_ADDRESS_VALID: u32 = 1 << 15;
 
-/// How far below its end an access is still one of the stack, in bytes: more than the largest frame of a function, and
-/// little enough that no null pointer comes near.
+/// How far below its end an access is still one of the stack, in bytes: more than the largest frame
+/// of a function, and little enough that no null pointer comes near.
 pub const BELOW_STACK_LEN: u32 = 4096;
 
 impl Evidence {
@@ -130,7 +134,10 @@ mod tests {
         let bus = PRECISERR | BUS_ADDRESS_VALID;
         let fault = Evidence { status: bus, bus_address: 0xA000_0000, ..EVIDENCE };
         assert_eq!(fault.fault(), Fault::HardFault);
-        assert_eq!(fault.text().as_str(), "pc 00001234 lr 00001201 status 00008200 address a0000000");
+        assert_eq!(
+            fault.text().as_str(),
+            "pc 00001234 lr 00001201 status 00008200 address a0000000"
+        );
         let protection = DACCVIOL | PROTECTED_ADDRESS_VALID;
         let fault = Evidence { status: protection, protected_address: 8, ..EVIDENCE };
         assert_eq!((fault.fault(), fault.address()), (Fault::HardFault, Some(8)), "a null pointer");
@@ -158,7 +165,11 @@ mod tests {
         let none = Evidence { saved: None, status: STKERR, ..EVIDENCE };
         assert_eq!((none.fault(), none.text().as_str()), (Fault::StackOverflow, "status 00001000"));
         for status in [STKERR, MSTKERR, LSPERR, MLSPERR] {
-            assert_eq!(Evidence { status, ..EVIDENCE }.fault(), Fault::StackOverflow, "{status:08x}");
+            assert_eq!(
+                Evidence { status, ..EVIDENCE }.fault(),
+                Fault::StackOverflow,
+                "{status:08x}"
+            );
         }
     }
 
@@ -170,7 +181,10 @@ mod tests {
         ];
         for (status, store) in stores {
             let store = Evidence { status, ..store };
-            assert_eq!((store.fault(), store.address()), (Fault::StackOverflow, Some(STACK_END - 4)));
+            assert_eq!(
+                (store.fault(), store.address()),
+                (Fault::StackOverflow, Some(STACK_END - 4))
+            );
             assert!(store.text().as_str().starts_with("pc 00001234 lr 00001201 status "));
         }
     }

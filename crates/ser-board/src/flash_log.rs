@@ -1,4 +1,5 @@
-//! The configuration in flash memory: each of the two copies has a sector of its own, filled record by record.
+//! The configuration in flash memory: each of the two copies has a sector of its own, filled record
+//! by record.
 //!
 //! ```text
 //! slot   0         1         2         3
@@ -6,26 +7,29 @@
 //! ```
 //!
 //! # Design
-//! Saving writes the next slot. Only when the sector is full it is erased, and then only that one: the newest
-//! configuration stands in the other sector. The marker is cleared before an erase and written after it, so a sector
-//! whose erasing was cut short is erased again before anything is trusted to it, whatever its cells seem to hold.
-//! That a record is whole, and which of the two is newer, is for `ser_node` to say: it checks and numbers them.
+//! Saving writes the next slot. Only when the sector is full it is erased, and then only that one:
+//! the newest configuration stands in the other sector. The marker is cleared before an erase and
+//! written after it, so a sector whose erasing was cut short is erased again before anything is
+//! trusted to it, whatever its cells seem to hold. That a record is whole, and which of the two is
+//! newer, is for `ser_node` to say: it checks and numbers them.
 //!
 //! # Tradeoffs
-//! A general store for keys and values, `sequential-storage`, reads every record of a sector to find the last, takes
-//! six times the code, brings panicking paths into the image, and needs two sectors of one size for each copy that is
-//! to have sectors of its own (of the four of 16 KiB on an STM32F407, the first has to hold the vector table). There
-//! is one value here, it has one length, and its check and number come with it: a log of slots will do. Two sectors
-//! of 16 KiB with 10 000 erasures each are good for 20 million changes.
+//! A general store for keys and values, `sequential-storage`, reads every record of a sector to
+//! find the last, takes six times the code, brings panicking paths into the image, and needs two
+//! sectors of one size for each copy that is to have sectors of its own (of the four of 16 KiB on
+//! an STM32F407, the first has to hold the vector table). There is one value here, it has one
+//! length, and its check and number come with it: a log of slots will do. Two sectors of 16 KiB
+//! with 10 000 erasures each are good for 20 million changes.
 //!
 //! # Notes
-//! A sector of 16 KiB takes 1023 records, one of 128 KiB 8191. As the copies take turns, an erase is due once in as
-//! many changes, and with the very first change of each copy. It takes 250–500 ms for 16 KiB and 1–2 s for 128 KiB on
-//! an STM32F4 (data sheet, "Flash memory programming", 32 bits at a time), and until it is done nothing can be read
-//! from that bank: code that runs from it stands still, interrupts included. So either the capture interrupt, all
-//! that it calls and the vector table are in RAM, and capture goes on while the main loop waits (its queue takes 256
-//! changes), or the samples of that time are missed: `ser_node` counts them. The board sees to
-//! its watchdog meanwhile. Writing a record takes 16 bytes of at most 100 µs.
+//! A sector of 16 KiB takes 1023 records, one of 128 KiB 8191. As the copies take turns, an erase
+//! is due once in as many changes, and with the very first change of each copy. It takes 250–500 ms
+//! for 16 KiB and 1–2 s for 128 KiB on an STM32F4 (data sheet, "Flash memory programming", 32 bits
+//! at a time), and until it is done nothing can be read from that bank: code that runs from it
+//! stands still, interrupts included. So either the capture interrupt, all that it calls and the
+//! vector table are in RAM, and capture goes on while the main loop waits (its queue takes 256
+//! changes), or the samples of that time are missed: `ser_node` counts them. The board sees to its
+//! watchdog meanwhile. Writing a record takes 16 bytes of at most 100 µs.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -91,7 +95,9 @@ impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
     /// Slots of a sector, the marker's included.
     const SLOTS: u32 = {
         assert!(F::ERASE_SIZE.is_multiple_of(RECORD_LEN) && F::ERASE_SIZE >= 2 * RECORD_LEN);
-        assert!(RECORD_LEN.is_multiple_of(F::WRITE_SIZE) && RECORD_LEN.is_multiple_of(F::READ_SIZE));
+        assert!(
+            RECORD_LEN.is_multiple_of(F::WRITE_SIZE) && RECORD_LEN.is_multiple_of(F::READ_SIZE)
+        );
         assert!(F::ERASE_SIZE <= i32::MAX as usize);
         #[expect(clippy::cast_possible_truncation, reason = "checked above")]
         let sector_len = F::ERASE_SIZE as u32;
@@ -103,13 +109,14 @@ impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
 
     const SECTOR_LEN: u32 = Self::SLOTS * SLOT_LEN;
 
-    /// The first copy in the first sector of `flash`, the second one in the second. Nothing is touched yet. A memory
-    /// that is smaller answers with an error of its own when it is.
+    /// The first copy in the first sector of `flash`, the second one in the second. Nothing is
+    /// touched yet. A memory that is smaller answers with an error of its own when it is.
     pub const fn new(flash: F, health: &'a FlashHealth) -> Self {
         FlashLog { flash, health }
     }
 
-    /// How many configurations find room in the sector of `copy` before it has to be erased: 0 when that is due.
+    /// How many configurations find room in the sector of `copy` before it has to be erased: 0 when
+    /// that is due.
     ///
     /// # Errors
     /// When the memory cannot be read.
@@ -133,14 +140,15 @@ impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
         Ok(content)
     }
 
-    /// Slots up to the last one in use, the marker's included; `None` when the sector has to be erased first.
+    /// Slots up to the last one in use, the marker's included; `None` when the sector has to be
+    /// erased first.
     fn slots_used(&mut self, sector: u32) -> Result<Option<u32>, F::Error> {
         if self.slot(sector, 0)? != MARKER {
             return Ok(None);
         }
-        // From the end: behind a record that was cut short there may be nothing, in front of it there are only
-        // records. Not by halves: one that was cut short may hold bits that read now so, now so, and must not hide
-        // those that came after it.
+        // From the end: behind a record that was cut short there may be nothing, in front of it
+        // there are only records. Not by halves: one that was cut short may hold bits that read now
+        // so, now so, and must not hide those that came after it.
         for slot in (1..Self::SLOTS).rev() {
             // As one number: in a sector with few records this is most of what a start does.
             if u128::from_ne_bytes(self.slot(sector, slot)?) != u128::MAX {

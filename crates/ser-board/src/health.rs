@@ -1,7 +1,9 @@
-//! What a board's own parts have to say against themselves: inputs, battery-backed clock, configuration memory.
+//! What a board's own parts have to say against themselves: inputs, battery-backed clock,
+//! configuration memory.
 //!
-//! Each part counts in a static of its own, since an interrupt or the node owns the part itself. [`Health`] brings the
-//! statics together for those who want to know: the log (`report`) and the fault lamp ([`leds`](crate::leds)).
+//! Each part counts in a static of its own, since an interrupt or the node owns the part itself.
+//! [`Health`] brings the statics together for those who want to know: the log (`report`) and the
+//! fault lamp ([`leds`](crate::leds)).
 
 use crate::clock_chip::{ClockHealth, ClockState};
 use crate::flash_log::FlashHealth;
@@ -45,10 +47,13 @@ pub struct Failures {
 }
 
 impl Health<'_> {
-    /// Whether something is broken now: inputs that cannot be read, a clock or memory that does not answer.
+    /// Whether something is broken now: inputs that cannot be read, a clock or memory that does not
+    /// answer.
     #[must_use]
     pub fn is_broken(&self) -> bool {
-        self.inputs.is_failing() || self.clock.state() == ClockState::Silent || self.storage.is_failing()
+        self.inputs.is_failing()
+            || self.clock.state() == ClockState::Silent
+            || self.storage.is_failing()
     }
 
     /// What has gone wrong so far.

@@ -1,9 +1,10 @@
 //! The word of inputs: where its bits come from, and what happens when it cannot be read.
 //!
-//! Inputs on pins of the chip are read in one load each and are always there. Inputs behind a bus can fail to arrive:
-//! a sample that could not be taken must never look like contacts that moved. The [`Sampler`] then gives the inputs as
-//! they were last seen, says so, and counts. The capture interrupt goes on with these: its tick is the recorder's clock
-//! and feeds the watchdog, and a recorder that cannot see its inputs still has something to tell.
+//! Inputs on pins of the chip are read in one load each and are always there. Inputs behind a bus
+//! can fail to arrive: a sample that could not be taken must never look like contacts that moved.
+//! The [`Sampler`] then gives the inputs as they were last seen, says so, and counts. The capture
+//! interrupt goes on with these: its tick is the recorder's clock and feeds the watchdog, and a
+//! recorder that cannot see its inputs still has something to tell.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -66,7 +67,11 @@ impl InputHealth {
     /// Nothing has failed yet.
     #[must_use]
     pub const fn new() -> InputHealth {
-        InputHealth { failed: Counter::new(), outages: Counter::new(), failing: AtomicBool::new(false) }
+        InputHealth {
+            failed: Counter::new(),
+            outages: Counter::new(),
+            failing: AtomicBool::new(false),
+        }
     }
 
     /// Whether the latest sample could not be taken.

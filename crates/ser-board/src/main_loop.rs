@@ -1,8 +1,8 @@
 //! One pass of the main loop between the ports and the node, the same on every board.
 //!
-//! The board's part is a [`Line`]: its UART with the rings in front of it; and, where there is one, the
-//! [`GeniBoard`]. A pass never waits and does no more than the rings hold, so a line that takes and gives bytes as
-//! fast as they come cannot keep the main loop.
+//! The board's part is a [`Line`]: its UART with the rings in front of it; and, where there is one,
+//! the [`GeniBoard`]. A pass never waits and does no more than the rings hold, so a line that takes
+//! and gives bytes as fast as they come cannot keep the main loop.
 
 use geni_board::SharedRam;
 use ser_node::{Node, Rtc, Storage};
@@ -37,12 +37,13 @@ pub trait Line {
     fn set_baud(&mut self, baud: Baud);
 }
 
-/// Hands over what has arrived, records what has changed, and takes what is to be sent. Gives the tick of the pass.
+/// Hands over what has arrived, records what has changed, and takes what is to be sent. Gives the
+/// tick of the pass.
 ///
-/// The order is what makes stamps right: first the tick is read, then the pulses of the GENI board's interrupt line
-/// are taken, and then bytes that arrived no later than that tick. Interrupts come at any point. But a pulse that was
-/// not taken came after the tick was read, and is no older than any byte that is dealt with, nor than any change that
-/// is recorded.
+/// The order is what makes stamps right: first the tick is read, then the pulses of the GENI
+/// board's interrupt line are taken, and then bytes that arrived no later than that tick.
+/// Interrupts come at any point. But a pulse that was not taken came after the tick was read, and
+/// is no older than any byte that is dealt with, nor than any change that is recorded.
 pub fn pass<S: Storage, R: Rtc, L: Line, W: SharedRam, B: GeniBoard>(
     node: &mut Node<'_, S, R>,
     line: &mut L,
@@ -65,7 +66,8 @@ pub fn pass<S: Storage, R: Rtc, L: Line, W: SharedRam, B: GeniBoard>(
 fn take_in<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L, now_ms: u32) {
     node.serial_line_errors(line.errors());
     for _ in 0..L::MAX_BYTES {
-        // Commands that find no room in the node wait in the ring, and so do bytes that came after the tick was read.
+        // Commands that find no room in the node wait in the ring, and so do bytes that came after
+        // the tick was read.
         if !node.serial_has_room() {
             break;
         }

@@ -1,6 +1,8 @@
-//! Tells the log how the runs before ended, which counters have moved, and how far down the stack has been.
+//! Tells the log how the runs before ended, which counters have moved, and how far down the stack
+//! has been.
 //!
-//! The protocol has no place for any of this: the log is the only trace of what was dropped, refused or lost.
+//! The protocol has no place for any of this: the log is the only trace of what was dropped,
+//! refused or lost.
 
 use geni_board::Counters;
 use ser_node::{Diagnostics, GeniusDiagnostics};
@@ -12,8 +14,8 @@ use crate::last_words::Boot;
 /// Counters that run all the time must not fill the log.
 const INTERVAL_MS: u32 = 1000;
 
-/// Logs how the run before ended, if it was a fault, or else what the latest fault had to say. Called once, at
-/// start-up.
+/// Logs how the run before ended, if it was a fault, or else what the latest fault had to say.
+/// Called once, at start-up.
 pub fn last_words(boot: &Boot) {
     let told = boot.last_words.as_ref().filter(|words| words.starts_ago == 1);
     if boot.cause.is_fault() {
@@ -47,8 +49,8 @@ pub struct Report<'a> {
 }
 
 impl<'a> Report<'a> {
-    /// Tells how it stands with the clock; the log knows nothing else, and is told a second from `now_ms` for the first
-    /// time.
+    /// Tells how it stands with the clock; the log knows nothing else, and is told a second from
+    /// `now_ms` for the first time.
     #[must_use]
     pub fn new(now_ms: u32, health: &'a Health<'a>) -> Report<'a> {
         let clock = health.clock.state();
@@ -65,8 +67,9 @@ impl<'a> Report<'a> {
         }
     }
 
-    /// Logs what has changed, once a second at most. Called in every pass of the main loop; asks for the counters, and
-    /// for the most bytes of stack that have been in use, only when it is time.
+    /// Logs what has changed, once a second at most. Called in every pass of the main loop; asks
+    /// for the counters, and for the most bytes of stack that have been in use, only when it is
+    /// time.
     pub fn pass(
         &mut self,
         now_ms: u32,
@@ -105,7 +108,11 @@ impl<'a> Report<'a> {
         if storage != self.storage {
             self.storage = storage;
             let (writes, erases) = storage;
-            defmt::info!("configuration: {=u32} records written, {=u32} sectors erased", writes, erases);
+            defmt::info!(
+                "configuration: {=u32} records written, {=u32} sectors erased",
+                writes,
+                erases
+            );
         }
     }
 }
@@ -114,8 +121,8 @@ fn log_clock(state: ClockState) {
     defmt::info!("battery-backed clock: {}", state);
 }
 
-/// One line for each counter of a structure that has moved. Every field is a counter or named as something else, so
-/// that a new one is not forgotten here.
+/// One line for each counter of a structure that has moved. Every field is a counter or named as
+/// something else, so that a new one is not forgotten here.
 macro_rules! log_counters {
     ($Type:ident, $before:expr, $after:expr, [$($counter:ident),* $(,)?] $(, other [$($other:ident),*])?) => {
         let (before, after): (&$Type, &$Type) = ($before, $after);

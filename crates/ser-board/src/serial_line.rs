@@ -1,9 +1,9 @@
 //! The RS-232 line between the UART's interrupts and the main loop.
 //!
-//! A received byte keeps the tick at which it arrived, because the moment at which a command arrives matters to the
-//! recorder (it may set the clock), however late the main loop looks. A byte that is lost or misread is counted at
-//! once, by a count of its own: it is told even if no other byte ever comes, and when the ring has no room for
-//! anything.
+//! A received byte keeps the tick at which it arrived, because the moment at which a command
+//! arrives matters to the recorder (it may set the clock), however late the main loop looks. A byte
+//! that is lost or misread is counted at once, by a count of its own: it is told even if no other
+//! byte ever comes, and when the ring has no room for anything.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
@@ -25,8 +25,8 @@ pub struct ReceivedByte {
     pub tick_ms: u32,
 }
 
-/// Takes the oldest byte out of the ring, if it arrived no later than at tick `now_ms`. One that has arrived since
-/// that tick was read waits for the next look.
+/// Takes the oldest byte out of the ring, if it arrived no later than at tick `now_ms`. One that
+/// has arrived since that tick was read waits for the next look.
 pub fn take_until<const N: usize>(
     ring: &mut Reader<'_, ReceivedByte, N>,
     now_ms: u32,
@@ -61,7 +61,8 @@ impl Slot for ReceivedByte {
     }
 }
 
-/// Memory of the rings of both directions; belongs into a static. See [`budget`](crate::budget) for the lengths.
+/// Memory of the rings of both directions; belongs into a static. See [`budget`](crate::budget) for
+/// the lengths.
 pub struct SerialRings<const RECEIVE: usize, const TRANSMIT: usize> {
     receive: Ring<ReceivedByte, RECEIVE>,
     transmit: Ring<u8, TRANSMIT>,
@@ -105,14 +106,17 @@ impl<const RECEIVE: usize, const TRANSMIT: usize> Default for SerialRings<RECEIV
     }
 }
 
-/// What a UART shows that keeps one received byte, such as those of STM32: SR's RXNE, ORE, and FE or NF.
+/// What a UART shows that keeps one received byte, such as those of STM32: SR's RXNE, ORE, and FE
+/// or NF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReceiveStatus {
     /// The data register holds a byte that was not taken yet.
     pub has_byte: bool,
-    /// A byte came that found the data register full, and is lost; what is in the data register stays there.
+    /// A byte came that found the data register full, and is lost; what is in the data register
+    /// stays there.
     pub overrun: bool,
-    /// The byte in the data register is not what was sent: its stop bit is missing, or noise was seen.
+    /// The byte in the data register is not what was sent: its stop bit is missing, or noise was
+    /// seen.
     pub misread: bool,
 }
 
@@ -123,8 +127,8 @@ pub struct Receiver<'a, const N: usize> {
 }
 
 impl<const N: usize> Receiver<'_, N> {
-    /// Whether another byte finds room. A UART that can keep bytes, or hold the other side back, is left alone until
-    /// then.
+    /// Whether another byte finds room. A UART that can keep bytes, or hold the other side back, is
+    /// left alone until then.
     #[inline]
     #[must_use]
     pub fn has_room(&self) -> bool {
@@ -145,10 +149,12 @@ impl<const N: usize> Receiver<'_, N> {
         self.errors.count();
     }
 
-    /// Takes what a UART has by what it has shown. `read` reads the data register, which clears all that was shown.
+    /// Takes what a UART has by what it has shown. `read` reads the data register, which clears all
+    /// that was shown.
     ///
-    /// A byte may come between looking and reading. The UART then shows an overrun and no byte the next time, while its
-    /// data register still holds the byte that was read: reading it again has no other use than to clear the overrun.
+    /// A byte may come between looking and reading. The UART then shows an overrun and no byte the
+    /// next time, while its data register still holds the byte that was read: reading it again has
+    /// no other use than to clear the overrun.
     #[inline]
     pub fn take(&mut self, shown: ReceiveStatus, read: impl FnOnce() -> u8, tick_ms: u32) {
         let ReceiveStatus { has_byte, overrun, misread } = shown;
@@ -181,7 +187,8 @@ impl LineErrors<'_> {
     }
 }
 
-/// Tells when everything sent has left the transmitter, for UARTs that say no more than that they have room.
+/// Tells when everything sent has left the transmitter, for UARTs that say no more than that they
+/// have room.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Quiet {
     /// Since when the transmitter has not been seen at work.
@@ -195,16 +202,19 @@ impl Quiet {
         Quiet { since_ms: None }
     }
 
-    /// A byte has been put in line for the transmitter, which may have sent it before anybody looks again.
+    /// A byte has been put in line for the transmitter, which may have sent it before anybody looks
+    /// again.
     pub const fn sent(&mut self) {
         self.since_ms = None;
     }
 
-    /// Looks at the transmitter. `idle` says that no byte waits in the ring or in the UART's data register.
+    /// Looks at the transmitter. `idle` says that no byte waits in the ring or in the UART's data
+    /// register.
     ///
-    /// True two characters' time after the first look that found it idle: one character may be in the shift register.
-    /// Counts from looks and not from bytes, so however late it is asked, no character is cut short; but it has to be
-    /// told of bytes that were [`sent`](Self::sent) in between.
+    /// True two characters' time after the first look that found it idle: one character may be in
+    /// the shift register. Counts from looks and not from bytes, so however late it is asked, no
+    /// character is cut short; but it has to be told of bytes that were [`sent`](Self::sent) in
+    /// between.
     pub fn look(&mut self, idle: bool, now_ms: u32, baud: Baud) -> bool {
         if !idle {
             self.since_ms = None;
@@ -248,8 +258,12 @@ mod tests {
         for tick_ms in [u32::MAX, 0, 1] {
             ends.receiver.push(byte(b'x', tick_ms));
         }
-        let mut take = |now_ms| take_until(&mut ends.received, now_ms).map(|received| received.tick_ms);
-        assert_eq!([take(u32::MAX - 1), take(u32::MAX), take(u32::MAX)], [None, Some(u32::MAX), None]);
+        let mut take =
+            |now_ms| take_until(&mut ends.received, now_ms).map(|received| received.tick_ms);
+        assert_eq!(
+            [take(u32::MAX - 1), take(u32::MAX), take(u32::MAX)],
+            [None, Some(u32::MAX), None]
+        );
         assert_eq!([take(7), take(7), take(7)], [Some(0), Some(1), None]);
     }
 
@@ -262,7 +276,10 @@ mod tests {
         }
         assert!(!ends.receiver.has_room());
         assert_eq!((ends.errors.take(), ends.errors.take()), (3, 0));
-        assert_eq!((ends.received.pop(), ends.received.pop()), (Some(byte(b'x', 1)), Some(byte(b'x', 2))));
+        assert_eq!(
+            (ends.received.pop(), ends.received.pop()),
+            (Some(byte(b'x', 1)), Some(byte(b'x', 2)))
+        );
         ends.receiver.push(byte(b'y', 6));
         assert_eq!((ends.received.pop(), ends.errors.take()), (Some(byte(b'y', 6)), 0));
         // Whoever splits the rings again has nothing to do with what was counted before.
@@ -270,8 +287,9 @@ mod tests {
         assert_eq!(rings.split().errors.take(), 0);
     }
 
-    /// A UART as the reference manual of the STM32F4 describes it (RM0090, "Overrun error"): reading the data register
-    /// takes the byte, and clears the flags that the latest look at the status has shown.
+    /// A UART as the reference manual of the STM32F4 describes it (RM0090, "Overrun error"):
+    /// reading the data register takes the byte, and clears the flags that the latest look at the
+    /// status has shown.
     #[derive(Default)]
     struct Uart {
         data: u8,
@@ -334,7 +352,8 @@ mod tests {
     fn an_overrun_without_a_byte_hands_over_nothing_and_counts_one() {
         let mut uart = Uart::default();
         uart.arrive(b'a');
-        // The second byte comes after the look and before the read, which leaves its overrun without a byte.
+        // The second byte comes after the look and before the read, which leaves its overrun
+        // without a byte.
         assert_eq!(received_by(&mut uart, b"b"), (b"a".to_vec(), 1));
         assert_eq!(uart.reads, 2, "the second one clears the overrun");
         uart.arrive(b'c');

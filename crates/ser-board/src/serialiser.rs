@@ -1,33 +1,37 @@
-//! Inputs behind industrial digital-input serialisers on SPI: the MAX31912/MAX31913 family in 16-bit mode.
+//! Inputs behind industrial digital-input serialisers on SPI: the MAX31912/MAX31913 family in
+//! 16-bit mode.
 //!
-//! Each part turns eight 24 V inputs into a word of a shift register; parts in a chain pass on what comes in behind
-//! their own word. All parts latch their inputs in the moment in which chip select falls, so the inputs of a whole
-//! chain are of one instant, however long it takes to shift them out.
+//! Each part turns eight 24 V inputs into a word of a shift register; parts in a chain pass on what
+//! comes in behind their own word. All parts latch their inputs in the moment in which chip select
+//! falls, so the inputs of a whole chain are of one instant, however long it takes to shift them
+//! out.
 //!
 //! ```text
 //!   | IN8 … IN1 |  CRC (5)  | UV1 | OT | UV2 |      most significant bit first, the part next to the controller first
 //!   |   byte 0  |             byte 1           |
 //! ```
 //!
-//! The check is a CRC over the eight inputs with the polynomial x⁵ + x⁴ + x² + 1, beginning with zero. UV1 is 0 while
-//! the field supply is too low for the inputs to mean anything; UV2 is 0 while it is lower than it should be; OT is 1
-//! while the part is too hot. (Data sheets of the MAX31912, 19-6925, and the MAX31913, "Reading Serial Data". That of
-//! the MAX31911 gives undervoltage the other way round and a stop bit in place of UV2, so it is not of this family.)
+//! The check is a CRC over the eight inputs with the polynomial x⁵ + x⁴ + x² + 1, beginning with
+//! zero. UV1 is 0 while the field supply is too low for the inputs to mean anything; UV2 is 0 while
+//! it is lower than it should be; OT is 1 while the part is too hot. (Data sheets of the MAX31912,
+//! 19-6925, and the MAX31913, "Reading Serial Data". That of the MAX31911 gives undervoltage the
+//! other way round and a stop bit in place of UV2, so it is not of this family.)
 //!
 //! # Design
-//! A word whose check fails, or whose part is without supply, spoils the whole sample: half of the inputs new and
-//! half of them old would be a state that never was. Warnings are counted, and the sample is good. A data line that
-//! is stuck is found either way: all zeros say no supply, all ones fail the check.
+//! A word whose check fails, or whose part is without supply, spoils the whole sample: half of the
+//! inputs new and half of them old would be a state that never was. Warnings are counted, and the
+//! sample is good. A data line that is stuck is found either way: all zeros say no supply, all ones
+//! fail the check.
 //!
 //! # Tradeoffs
-//! With the field supply gone the inputs are held as they were, instead of all contacts seeming to open. That the
-//! supply is gone shows in [`SerialiserHealth::supply_lost`].
+//! With the field supply gone the inputs are held as they were, instead of all contacts seeming to
+//! open. That the supply is gone shows in [`SerialiserHealth::supply_lost`].
 //!
 //! # Notes
-//! Four parts take 64 clocks, 13 µs at 5 MHz, in the capture interrupt. The bus must not be shared with anything that
-//! the main loop uses: the capture interrupt waits for nobody. A controller's SPI has hardly any errors to report, so
-//! the check is what finds trouble: every change of up to three bits, and of words that are noise through and through
-//! all but one in 32.
+//! Four parts take 64 clocks, 13 µs at 5 MHz, in the capture interrupt. The bus must not be shared
+//! with anything that the main loop uses: the capture interrupt waits for nobody. A controller's
+//! SPI has hardly any errors to report, so the check is what finds trouble: every change of up to
+//! three bits, and of words that are noise through and through all but one in 32.
 
 use crc::{Algorithm, Crc, NoTable};
 use embedded_hal::spi::{MODE_0, Mode, SpiDevice};
@@ -56,12 +60,13 @@ const CHECK_SHIFT: u32 = 3;
 const WORD_LEN: usize = 2;
 const INPUTS_PER_PART: usize = 8;
 
-/// How the bus has to be set up: the clock rests low, data are taken with its rising edge and change with the falling
-/// one; the first bit is there as soon as chip select falls.
+/// How the bus has to be set up: the clock rests low, data are taken with its rising edge and
+/// change with the falling one; the first bit is there as soon as chip select falls.
 pub const MODE: Mode = MODE_0;
 
-/// The fastest clock that the parts take, in hertz (data sheet, "SPI timing"; look it up for yours). An isolator in the
-/// lines delays what comes back against the clock that goes out: 5 MHz leave 100 ns for both ways.
+/// The fastest clock that the parts take, in hertz (data sheet, "SPI timing"; look it up for
+/// yours). An isolator in the lines delays what comes back against the clock that goes out: 5 MHz
+/// leave 100 ns for both ways.
 pub const MAX_CLOCK_HZ: u32 = 25_000_000;
 
 /// Why a sample is no good.
@@ -111,8 +116,8 @@ impl SerialiserHealth {
     }
 }
 
-/// A chain of 1–4 parts with chip select and clock in common. Inputs 1–8 are those of the part next to the
-/// controller.
+/// A chain of 1–4 parts with chip select and clock in common. Inputs 1–8 are those of the part next
+/// to the controller.
 pub struct Serialisers<'a, SPI, const PARTS: usize> {
     spi: SPI,
     health: &'a SerialiserHealth,
@@ -121,7 +126,9 @@ pub struct Serialisers<'a, SPI, const PARTS: usize> {
 impl<'a, SPI: SpiDevice, const PARTS: usize> Serialisers<'a, SPI, PARTS> {
     /// A chain behind `spi`. A length that is not 1–4 does not compile.
     pub const fn new(spi: SPI, health: &'a SerialiserHealth) -> Self {
-        const { assert!(PARTS >= 1 && PARTS * INPUTS_PER_PART <= 32, "a recorder has at most 32 inputs") };
+        const {
+            assert!(PARTS >= 1 && PARTS * INPUTS_PER_PART <= 32, "a recorder has at most 32 inputs")
+        };
         Serialisers { spi, health }
     }
 
@@ -199,7 +206,8 @@ mod tests {
 
     /// A bus on which the chain shifts out these words, one sample after the other.
     fn bus<const PARTS: usize>(samples: &[[[u8; WORD_LEN]; PARTS]]) -> Mock<u8> {
-        let transfers: Vec<_> = samples.iter().flat_map(|words| transfer(words.as_flattened())).collect();
+        let transfers: Vec<_> =
+            samples.iter().flat_map(|words| transfer(words.as_flattened())).collect();
         Mock::new(&transfers)
     }
 
@@ -214,8 +222,14 @@ mod tests {
     }
 
     fn counts(health: &SerialiserHealth) -> [u32; 5] {
-        [&health.bus_errors, &health.check_errors, &health.supply_lost, &health.supply_low, &health.too_hot]
-            .map(Counter::get)
+        [
+            &health.bus_errors,
+            &health.check_errors,
+            &health.supply_lost,
+            &health.supply_low,
+            &health.too_hot,
+        ]
+        .map(Counter::get)
     }
 
     #[test]
@@ -229,7 +243,12 @@ mod tests {
     #[test]
     fn inputs_1_to_8_come_from_the_part_next_to_the_controller() {
         let health = SerialiserHealth::new();
-        let words = [word(0x01, ALL_WELL), word(0x80, ALL_WELL), word(0x00, ALL_WELL), word(0xA5, ALL_WELL)];
+        let words = [
+            word(0x01, ALL_WELL),
+            word(0x80, ALL_WELL),
+            word(0x00, ALL_WELL),
+            word(0xA5, ALL_WELL),
+        ];
         assert_eq!(read(words, &health), Ok(0xA500_8001));
         assert_eq!(read([word(0x5A, ALL_WELL), word(0xFF, ALL_WELL)], &health), Ok(0x0000_FF5A));
         assert_eq!(counts(&health), [0; 5]);
@@ -246,8 +265,11 @@ mod tests {
                 for &second in &positions {
                     for &third in &positions {
                         // Twice the same position stands for a single bit.
-                        let flipped =
-                            if second == third { 1 << first } else { 1 << first ^ 1 << second ^ 1 << third };
+                        let flipped = if second == third {
+                            1 << first
+                        } else {
+                            1 << first ^ 1 << second ^ 1 << third
+                        };
                         if flipped == 0 {
                             continue;
                         }
@@ -329,7 +351,8 @@ mod tests {
         let mut channel = CaptureChannel::new();
         let (mut capture, reader) = channel.split(Debounce::OFF);
         run(&mut sampler, &mut capture, 9);
-        // The tick has gone on, the contacts have not moved, and everything that went wrong has been counted.
+        // The tick has gone on, the contacts have not moved, and everything that went wrong has
+        // been counted.
         assert_eq!(state_and_tick(&reader), (0x000F, 9));
         assert_eq!((inputs.failed.get(), inputs.outages.get()), (7, 3));
         assert_eq!(counts(&serialisers), [0, 3, 4, 0, 0]);

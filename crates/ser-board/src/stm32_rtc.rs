@@ -1,7 +1,9 @@
-//! The calendar registers of STM32 clocks (RTC version 2: F2, F4, F7, L4 …) as date and time, without the registers.
+//! The calendar registers of STM32 clocks (RTC version 2: F2, F4, F7, L4 …) as date and time,
+//! without the registers.
 //!
-//! The board gives access to SSR, TR and DR; when what they show can be believed, and what their bits mean, is here.
-//! Names and layouts are those of the reference manual (RM0090, chapter "Real-time clock").
+//! The board gives access to SSR, TR and DR; when what they show can be believed, and what their
+//! bits mean, is here. Names and layouts are those of the reference manual (RM0090, chapter
+//! "Real-time clock").
 //!
 //! ```text
 //! TR   PM(22) hour tens(21:20) units(19:16) | minute tens(14:12) units(11:8) | second tens(6:4) units(3:0)
@@ -10,19 +12,20 @@
 //! ```
 //!
 //! # Design
-//! The two digits of the year are those of 2000–2099: the chip takes every year divisible by four as a leap year,
-//! which holds in these years and with no other first year that is not a multiple of four. Registers that hold no
-//! date give `None`, never a panic.
+//! The two digits of the year are those of 2000–2099: the chip takes every year divisible by four
+//! as a leap year, which holds in these years and with no other first year that is not a multiple
+//! of four. Registers that hold no date give `None`, never a panic.
 //!
-//! The registers go on while they are read, one after the other, and one that is read in the moment in which it
-//! changes may show anything (BYPSHAD; the shadow registers, which spare one that, have to be waited for). So all
-//! three are read until two rounds in a row show the same: [`read`].
+//! The registers go on while they are read, one after the other, and one that is read in the moment
+//! in which it changes may show anything (BYPSHAD; the shadow registers, which spare one that, have
+//! to be waited for). So all three are read until two rounds in a row show the same: [`read`].
 //!
 //! # Notes
-//! With `PREDIV_A` 0 and `PREDIV_S` 7FFFh a 32768 Hz crystal is read back in steps of 31 µs, at the price of a little
-//! more current from the battery; the usual values of 7Fh and 255 give 3.9 ms. Writing TR begins a second anew, so a
-//! time with milliseconds is written in two steps: [`Calendar::from_date_time`], then the [`Shift`]. ISR's INITS bit
-//! says whether the calendar has been set since the backup domain had power.
+//! With `PREDIV_A` 0 and `PREDIV_S` 7FFFh a 32768 Hz crystal is read back in steps of 31 µs, at the
+//! price of a little more current from the battery; the usual values of 7Fh and 255 give 3.9 ms.
+//! Writing TR begins a second anew, so a time with milliseconds is written in two steps:
+//! [`Calendar::from_date_time`], then the [`Shift`]. ISR's INITS bit says whether the calendar has
+//! been set since the backup domain had power.
 
 use chrono::{Datelike, NaiveDate, NaiveDateTime, Timelike};
 use ser_node::calendar::{Date, date_time};
@@ -59,13 +62,15 @@ pub trait CalendarRegisters {
     fn dr(&mut self) -> u32;
 }
 
-/// Rounds until it is given up: the fastest register changes every 31 µs, and a round takes less than one.
+/// Rounds until it is given up: the fastest register changes every 31 µs, and a round takes less
+/// than one.
 const MAX_ROUNDS: u32 = 16;
 
-/// SSR and the calendar, of one moment. `None` when they never stand still, which no clock that works does.
+/// SSR and the calendar, of one moment. `None` when they never stand still, which no clock that
+/// works does.
 ///
-/// Between two looks at an equal SSR the clock has not moved, for a whole second is longer than any round takes: date
-/// and time that were read in between are of that moment.
+/// Between two looks at an equal SSR the clock has not moved, for a whole second is longer than any
+/// round takes: date and time that were read in between are of that moment.
 pub fn read(registers: &mut impl CalendarRegisters) -> Option<(u16, Calendar)> {
     let mut round = || {
         let ssr = registers.ssr();
@@ -99,19 +104,22 @@ impl Calendar {
         })
     }
 
-    /// Date and time in the registers, `ssr` and `prediv_s` giving the fraction. `None` when they hold none.
+    /// Date and time in the registers, `ssr` and `prediv_s` giving the fraction. `None` when they
+    /// hold none.
     ///
-    /// After a shift SSR may be greater than `PREDIV_S` for up to a second: the clock is then that much behind the
-    /// full second that TR shows.
+    /// After a shift SSR may be greater than `PREDIV_S` for up to a second: the clock is then that
+    /// much behind the full second that TR shows.
     #[must_use]
     pub fn to_date_time(self, ssr: u16, prediv_s: u16) -> Option<NaiveDateTime> {
         if self.tr & PM != 0 {
             return None;
         }
         let year = i32::from(FIRST_YEAR).checked_add_unsigned(from_bcd(self.dr >> 16, 0xFF)?)?;
-        let date = NaiveDate::from_ymd_opt(year, from_bcd(self.dr >> 8, 0x1F)?, from_bcd(self.dr, 0x3F)?)?;
+        let date =
+            NaiveDate::from_ymd_opt(year, from_bcd(self.dr >> 8, 0x1F)?, from_bcd(self.dr, 0x3F)?)?;
         let hour = from_bcd(self.tr >> 16, 0x3F)?;
-        let second = date.and_hms_opt(hour, from_bcd(self.tr >> 8, 0x7F)?, from_bcd(self.tr, 0x7F)?)?;
+        let second =
+            date.and_hms_opt(hour, from_bcd(self.tr >> 8, 0x7F)?, from_bcd(self.tr, 0x7F)?)?;
         let nanoseconds = ahead_ns(ssr, prediv_s);
         let second = second.and_utc().timestamp() + nanoseconds.div_euclid(NANOSECONDS);
         let nanosecond = u32::try_from(nanoseconds.rem_euclid(NANOSECONDS)).ok()?;
@@ -120,10 +128,11 @@ impl Calendar {
 }
 
 impl Shift {
-    /// What sets the fraction of the second right after a calendar with the whole seconds of `time` was started;
-    /// `None` when it is less than a step.
+    /// What sets the fraction of the second right after a calendar with the whole seconds of `time`
+    /// was started; `None` when it is less than a step.
     ///
-    /// A clock can only be put back by less than a second, so it is put forward by a whole one first.
+    /// A clock can only be put back by less than a second, so it is put forward by a whole one
+    /// first.
     #[must_use]
     pub fn to_fraction_of(time: NaiveDateTime, prediv_s: u16) -> Option<Shift> {
         let steps = i64::from(prediv_s) + 1;
@@ -135,7 +144,8 @@ impl Shift {
     }
 }
 
-/// What the clock is ahead of the full second, in nanoseconds; negative for up to a second after a shift.
+/// What the clock is ahead of the full second, in nanoseconds; negative for up to a second after a
+/// shift.
 fn ahead_ns(ssr: u16, prediv_s: u16) -> i64 {
     let steps = i64::from(prediv_s) + 1;
     let ahead = i64::from(prediv_s) - i64::from(ssr);
@@ -183,8 +193,10 @@ mod tests {
 
     #[test]
     fn leap_years_are_where_the_chip_expects_them() {
-        for (year, leap) in [(2000, true), (2024, true), (2026, false), (2028, true), (2096, true)] {
-            let new_year = NaiveDate::from_ymd_opt(year, 1, 1).unwrap().and_hms_opt(0, 0, 0).unwrap();
+        for (year, leap) in [(2000, true), (2024, true), (2026, false), (2028, true), (2096, true)]
+        {
+            let new_year =
+                NaiveDate::from_ymd_opt(year, 1, 1).unwrap().and_hms_opt(0, 0, 0).unwrap();
             let digits = Calendar::from_date_time(new_year).unwrap().dr >> 16;
             assert_eq!(from_bcd(digits, 0xFF).unwrap().is_multiple_of(4), leap, "{year}");
         }
@@ -220,8 +232,8 @@ mod tests {
         assert_eq!(Shift::to_fraction_of(time("2026-11-22T10:00:00"), 0x7FFF), None);
     }
 
-    /// A clock that takes a step in front of some of the looks at its registers, counted from 0. The look itself may
-    /// then show anything.
+    /// A clock that takes a step in front of some of the looks at its registers, counted from 0.
+    /// The look itself may then show anything.
     struct Moving {
         steps_at: fn(u32, u32) -> bool,
         argument: u32,
@@ -235,7 +247,14 @@ mod tests {
     impl Moving {
         /// A step before the new year.
         fn new(steps_at: fn(u32, u32) -> bool, argument: u32, torn: u32) -> Moving {
-            Moving { steps_at, argument, torn, looks: 0, ssr: 0, second: time("2026-12-31T23:59:59") }
+            Moving {
+                steps_at,
+                argument,
+                torn,
+                looks: 0,
+                ssr: 0,
+                second: time("2026-12-31T23:59:59"),
+            }
         }
 
         fn calendar(&self) -> Calendar {
@@ -287,11 +306,15 @@ mod tests {
                 let mut clock = clock();
                 let read = read(&mut clock);
                 let new = (0x7FFF, Calendar::from_date_time(time("2027-01-01T00:00:00")).unwrap());
-                assert!(read == Some((0, old)) || read == Some(new), "at {at}, {torn:x}: {read:x?}");
+                assert!(
+                    read == Some((0, old)) || read == Some(new),
+                    "at {at}, {torn:x}: {read:x?}"
+                );
                 mixed += u32::from(seen != (0, old) && seen != new);
             }
         }
-        // Each of the three looks of a single round is one at which it would be wrong, two of them even without noise.
+        // Each of the three looks of a single round is one at which it would be wrong, two of them
+        // even without noise.
         assert_eq!(mixed, 3 * 3 + 2);
     }
 
@@ -301,7 +324,11 @@ mod tests {
             for torn in TORN {
                 let mut clock = Moving::new(|look, every| look % every == every - 1, every, torn);
                 let (ssr, calendar) = read(&mut clock).expect("two rounds without a step");
-                assert_eq!((ssr, calendar), (clock.ssr, clock.calendar()), "every {every}, {torn:x}");
+                assert_eq!(
+                    (ssr, calendar),
+                    (clock.ssr, clock.calendar()),
+                    "every {every}, {torn:x}"
+                );
             }
         }
     }

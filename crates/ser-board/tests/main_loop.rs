@@ -5,13 +5,16 @@ use ser_board::budget;
 use ser_board::genius::{GeniBoard, Genius};
 use ser_board::main_loop::{self, Line};
 use ser_board::ring::{Reader, Writer};
-use ser_board::serial_line::{self, LineErrors, Quiet, ReceivedByte, Receiver, SerialEnds, SerialRings};
+use ser_board::serial_line::{
+    self, LineErrors, Quiet, ReceivedByte, Receiver, SerialEnds, SerialRings,
+};
 use ser_node::{
-    Capture, CaptureChannel, CopyNumber, Debounce, Event, NoRtc, Node, NodeParts, RECORD_LEN, Storage,
+    Capture, CaptureChannel, CopyNumber, Debounce, Event, NoRtc, Node, NodeParts, RECORD_LEN,
+    Storage,
 };
 use ser_proto::{
-    AutoReport, Baud, Command, Configure, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Mode, Model,
-    Reply,
+    AutoReport, Baud, Command, Configure, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Mode,
+    Model, Reply,
 };
 
 const RECEIVE: usize = budget::RECEIVE_RING_LEN;
@@ -116,7 +119,11 @@ struct Memory {
 
 impl Memory {
     fn new() -> Memory {
-        Memory { channel: CaptureChannel::new(), log: vec![Event::EMPTY; 2048], rings: SerialRings::new() }
+        Memory {
+            channel: CaptureChannel::new(),
+            log: vec![Event::EMPTY; 2048],
+            rings: SerialRings::new(),
+        }
     }
 
     fn power_up(&mut self) -> Board<'_> {
@@ -129,8 +136,14 @@ impl Memory {
             rtc: NoRtc,
         });
         let SerialEnds { receiver, received, errors, to_send, transmitter } = self.rings.split();
-        let uart =
-            Uart { received, errors, to_send, quiet: Quiet::new(), baud: node.baud(), is_sending: false };
+        let uart = Uart {
+            received,
+            errors,
+            to_send,
+            quiet: Quiet::new(),
+            baud: node.baud(),
+            is_sending: false,
+        };
         Board { node, capture, uart, receiver, transmitter, tick_ms: 0, sent: Vec::new() }
     }
 }
@@ -180,7 +193,10 @@ fn a_command_goes_in_and_its_reply_comes_out() {
     let mut board = memory.power_up();
     board.arrive(&Command::SetMode { recording: false });
     board.pass_ms(100);
-    assert_eq!(board.replies(), [Reply::Mode(Mode { recording: false, version: ser_node::VERSION })]);
+    assert_eq!(
+        board.replies(),
+        [Reply::Mode(Mode { recording: false, version: ser_node::VERSION })]
+    );
 }
 
 #[test]
@@ -210,7 +226,8 @@ fn what_arrives_during_the_longest_stall_is_not_lost() {
     let mut board = memory.power_up();
     board.pass_ms(1);
     // All inputs change in every millisecond, and the line is never silent.
-    let mut line = std::iter::repeat_with(|| FrameEncoder::new(Command::QueryMode.to_body())).flatten();
+    let mut line =
+        std::iter::repeat_with(|| FrameEncoder::new(Command::QueryMode.to_body())).flatten();
     let mut arrived = 0;
     for ms in 1..=budget::MAIN_LOOP_STALL_MS {
         board.stall_ms(if ms.is_multiple_of(2) { 0 } else { u32::MAX });
@@ -222,7 +239,10 @@ fn what_arrives_during_the_longest_stall_is_not_lost() {
     }
     board.pass_ms(1000);
     let diagnostics = board.node.diagnostics();
-    assert_eq!((diagnostics.edges_lost, diagnostics.samples_missed, diagnostics.line_errors), (0, 0, 0));
+    assert_eq!(
+        (diagnostics.edges_lost, diagnostics.samples_missed, diagnostics.line_errors),
+        (0, 0, 0)
+    );
     let frame_len = FrameEncoder::new(Command::QueryMode.to_body()).count();
     assert_eq!(board.replies().len(), arrived / frame_len);
 }

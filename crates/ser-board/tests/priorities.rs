@@ -1,15 +1,19 @@
-//! RTIC takes nothing but literals for priorities. These are the budget's, on both boards, and there are no others.
+//! RTIC takes nothing but literals for priorities. These are the budget's, on both boards, and
+//! there are no others.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use ser_board::budget::{CAPTURE_PRIORITY, EXTERNAL_BUS_PRIORITY, RECEIVE_PRIORITY, TRANSMIT_PRIORITY};
+use ser_board::budget::{
+    CAPTURE_PRIORITY, EXTERNAL_BUS_PRIORITY, RECEIVE_PRIORITY, TRANSMIT_PRIORITY,
+};
 
 /// Interrupt and priority of every task.
 type Tasks = Vec<(String, u8)>;
 
 fn sources(board: &str) -> Vec<(PathBuf, String)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware").join(board).join("src");
+    let folder =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware").join(board).join("src");
     let files = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
     files.map(|file| (file.clone(), fs::read_to_string(file).unwrap())).collect()
 }
@@ -43,19 +47,26 @@ fn assert_tasks_are(board: &str, expected: &[(&str, u8)]) {
 #[test]
 fn tasks_of_the_emulated_board_have_the_budgets_priorities() {
     let receive = ("UART0_RX", RECEIVE_PRIORITY);
-    assert_tasks_are("mps2-an385", &[("TIMER0", CAPTURE_PRIORITY), receive, ("UART0_TX", TRANSMIT_PRIORITY)]);
+    assert_tasks_are(
+        "mps2-an385",
+        &[("TIMER0", CAPTURE_PRIORITY), receive, ("UART0_TX", TRANSMIT_PRIORITY)],
+    );
 }
 
 #[test]
 fn tasks_of_the_board_to_flash_have_the_budgets_priorities() {
     let geni = ("EXTI9_5", EXTERNAL_BUS_PRIORITY);
-    assert_tasks_are("stm32f407", &[("TIM3", CAPTURE_PRIORITY), ("USART2", RECEIVE_PRIORITY), geni]);
+    assert_tasks_are(
+        "stm32f407",
+        &[("TIM3", CAPTURE_PRIORITY), ("USART2", RECEIVE_PRIORITY), geni],
+    );
 }
 
 #[test]
 fn attributes_are_read_as_rtic_reads_them() {
-    let source =
-        "#[task(binds = A, priority = 7, local = [x])]\nfn a() {}\n#[task(priority = 2)]\n#[task(binds = B)]";
-    let tasks: [(String, u8); 3] = [("A", 7), ("no interrupt", 2), ("B", 1)].map(|(a, b)| (a.to_owned(), b));
+    let source = "#[task(binds = A, priority = 7, local = [x])]\nfn a() {}\n#[task(priority = \
+     2)]\n#[task(binds = B)]";
+    let tasks: [(String, u8); 3] =
+        [("A", 7), ("no interrupt", 2), ("B", 1)].map(|(a, b)| (a.to_owned(), b));
     assert_eq!(tasks_in(source), tasks);
 }

@@ -1,8 +1,9 @@
-//! The promise about configurations: after a power cut at any moment, the recorder comes up with the old one or the
-//! new one.
+//! The promise about configurations: after a power cut at any moment, the recorder comes up with
+//! the old one or the new one.
 //!
-//! A whole recorder is asked over its RS-232 line, as a host would; the power fails at every single write to the
-//! flash memory while it stores, through the erasing of sectors, and again while it recovers.
+//! A whole recorder is asked over its RS-232 line, as a host would; the power fails at every single
+//! write to the flash memory while it stores, through the erasing of sectors, and again while it
+//! recovers.
 
 mod flash;
 
@@ -15,11 +16,12 @@ use ser_board::flash_log::{FlashHealth, FlashLog};
 use ser_board::health::Health;
 use ser_board::inputs::InputHealth;
 use ser_node::{
-    Capture, CaptureChannel, CopyNumber, Debounce, Event, NoRtc, Node, NodeParts, RECORD_LEN, Storage,
+    Capture, CaptureChannel, CopyNumber, Debounce, Event, NoRtc, Node, NodeParts, RECORD_LEN,
+    Storage,
 };
 use ser_proto::{
-    AutoReport, Baud, Command, Configuration, Configure, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN,
-    Model, Reply,
+    AutoReport, Baud, Command, Configuration, Configure, Decoded, FrameDecoder, FrameEncoder,
+    MAX_BODY_LEN, Model, Reply,
 };
 
 /// Sectors small enough for a walk through many erases; the layout does not depend on their size.
@@ -32,7 +34,8 @@ fn configuration(number: u16) -> Configuration {
     Configuration {
         size: 1 + number % 2048,
         baud: Baud::from_code(1 + (number % 7) as u8).unwrap(),
-        auto_report: [AutoReport::Off, AutoReport::Genius, AutoReport::Rs232][usize::from(number % 3)],
+        auto_report: [AutoReport::Off, AutoReport::Genius, AutoReport::Rs232]
+            [usize::from(number % 3)],
         report_address: (number % 32) as u8,
         auto_print: number.is_multiple_of(2),
     }
@@ -53,8 +56,13 @@ impl Ram {
         self.channel = CaptureChannel::new();
         let (mut capture, reader) = self.channel.split(Debounce::OFF);
         capture.sample(1, 0);
-        let parts =
-            NodeParts { model: Model::Ser320, log: &mut self.log, capture: reader, storage, rtc: NoRtc };
+        let parts = NodeParts {
+            model: Model::Ser320,
+            log: &mut self.log,
+            capture: reader,
+            storage,
+            rtc: NoRtc,
+        };
         Recorder { node: Node::new(parts), _capture: capture }
     }
 }
@@ -102,7 +110,8 @@ fn log<const SECTOR: usize, const WORD: usize>(
     FlashLog::new(flash.clone(), &HEALTH)
 }
 
-/// What must not be done: both copies in one sector, which is erased for every change and then written anew.
+/// What must not be done: both copies in one sector, which is erased for every change and then
+/// written anew.
 struct OneSector(Flash<SMALL, 1>);
 
 impl Storage for OneSector {
@@ -136,8 +145,8 @@ fn stored<const SECTOR: usize, const WORD: usize, S: Storage>(
     flash
 }
 
-/// Stores configuration after configuration; cuts the power at every step of each one and, after each power-up, at
-/// some steps of the next one. Gives how many cuts there were.
+/// Stores configuration after configuration; cuts the power at every step of each one and, after
+/// each power-up, at some steps of the next one. Gives how many cuts there were.
 fn cut_everywhere<const SECTOR: usize, const WORD: usize, S: Storage>(
     open: fn(&Flash<SECTOR, WORD>) -> S,
     changes: Range<u16>,
@@ -189,8 +198,8 @@ fn cut<const SECTOR: usize, const WORD: usize, S: Storage>(
     is_cut
 }
 
-/// Goes on with a memory that has seen a cut: the next changes hold, and a second cut does no more harm than the
-/// first.
+/// Goes on with a memory that has seen a cut: the next changes hold, and a second cut does no more
+/// harm than the first.
 fn cut_again<const SECTOR: usize, const WORD: usize, S: Storage>(
     ram: &mut Ram,
     flash: &Flash<SECTOR, WORD>,
@@ -244,7 +253,11 @@ fn memory_that_held_something_else_is_as_good_as_new() {
         assert_eq!(ram.power_up(log(&flash)).configuration(), Configuration::default());
         for number in 1..20 {
             ram.power_up(log(&flash)).configure(&configuration(number));
-            assert_eq!(ram.power_up(log(&flash)).configuration(), configuration(number), "seed {seed}");
+            assert_eq!(
+                ram.power_up(log(&flash)).configuration(),
+                configuration(number),
+                "seed {seed}"
+            );
         }
     }
 }
@@ -254,7 +267,8 @@ fn an_erase_is_as_rare_as_the_documentation_says() {
     assert_eq!(FlashLog::<Flash<REAL, 1>>::RECORDS_PER_SECTOR, 1023);
     assert_eq!(FlashLog::<Flash<{ 128 * 1024 }, 1>>::RECORDS_PER_SECTOR, 8191);
     // One erase prepares each sector; after that the copies take turns.
-    let changes = [(1, [1, 0]), (2, [1, 1]), (2046, [1, 1]), (2047, [2, 1]), (2048, [2, 2]), (4092, [2, 2])];
+    let changes =
+        [(1, [1, 0]), (2, [1, 1]), (2046, [1, 1]), (2047, [2, 1]), (2048, [2, 2]), (4092, [2, 2])];
     for (last, [first, second]) in changes {
         let flash = stored(log::<REAL, 1>, 1..last + 1);
         assert_eq!(flash.erased(), [first, second, 0, 0], "after {last} changes");

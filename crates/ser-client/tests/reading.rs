@@ -73,7 +73,8 @@ impl Host {
         let mut again = VecDeque::new();
         let mut lost = self.lost.iter().cycle();
         let mut last = self.cursor.map(|cursor| cursor.sequence);
-        let in_a_row = self.lost.repeat(2).split(|lost| !lost).map(<[bool]>::len).max().unwrap_or(0);
+        let in_a_row =
+            self.lost.repeat(2).split(|lost| !lost).map(<[bool]>::len).max().unwrap_or(0);
         let rate = self.rate * u32::try_from(1 + in_a_row).unwrap();
         loop {
             while under_way.len() < self.window
@@ -89,7 +90,10 @@ impl Host {
             requests += 1;
             assert!(requests < 20_000, "no end: {reader:?}");
             assert!((1..=10).contains(&request.count));
-            assert!(usize::from(request.start) + usize::from(request.count) <= recorder.size.max(2047) + 2);
+            assert!(
+                usize::from(request.start) + usize::from(request.count)
+                    <= recorder.size.max(2047) + 2
+            );
             let reply = recorder.read(request.start, request.count);
             if lost.next() == Some(&true) {
                 again.push_back(request);
@@ -103,7 +107,11 @@ impl Host {
                     // It may have been overwritten between its reply and the one that proves it.
                     if serial(&entry) >= oldest_serial(recorder) {
                         let held = recorder.read(entry_number, 1);
-                        assert_eq!(held.entries[..], [entry], "entry {entry_number} is another event");
+                        assert_eq!(
+                            held.entries[..],
+                            [entry],
+                            "entry {entry_number} is another event"
+                        );
                     }
                     assert_eq!(model, recorder.model);
                     assert!(!after_loss || given_up <= 4 * rate, "{given_up} could have been read");
@@ -123,14 +131,20 @@ impl Host {
         for &told in told {
             match told {
                 Told::Event(serial) => {
-                    assert_eq!(serial, self.expected.unwrap_or(serial), "not the event that comes next");
+                    assert_eq!(
+                        serial,
+                        self.expected.unwrap_or(serial),
+                        "not the event that comes next"
+                    );
                     self.expected = Some(serial + 1);
                 }
                 Told::Overwritten(count) | Told::AtLeast(count) => {
                     self.expected = self.expected.map(|expected| expected + count);
                 }
                 Told::Restarted => self.expected = Some(first_of_life),
-                Told::Unrecorded(inputs) => panic!("inputs {inputs:#x} did not change without an entry"),
+                Told::Unrecorded(inputs) => {
+                    panic!("inputs {inputs:#x} did not change without an entry")
+                }
             }
         }
     }
@@ -181,7 +195,10 @@ fn a_first_reading_delivers_everything_in_order_and_a_second_one_nothing() {
             }
             let (told, summary) = host.read(&mut recorder, |_| {});
             assert_eq!(told, expected, "size {size}, {count} events");
-            assert_eq!((summary.delivered, summary.lost, summary.restarted), (count - lost, lost, false));
+            assert_eq!(
+                (summary.delivered, summary.lost, summary.restarted),
+                (count - lost, lost, false)
+            );
             assert_eq!(u32::from(summary.position.total), count);
             assert_eq!(host.read(&mut recorder, |_| {}).0, []);
         }
@@ -220,7 +237,9 @@ fn what_was_overwritten_is_counted() {
 
 #[test]
 fn a_sequence_goes_on_where_the_total_wraps_and_is_exact_from_the_beginning_of_a_log() {
-    for (past, exact) in [(0, true), (3, true), (9, true), (10, false), (65_540, false), (200_000, false)] {
+    for (past, exact) in
+        [(0, true), (3, true), (9, true), (10, false), (65_540, false), (200_000, false)]
+    {
         let mut recorder = Recorder::after(10, past);
         let mut host = Host::new();
         host.read(&mut recorder, |_| {});
@@ -239,7 +258,11 @@ fn a_sequence_goes_on_where_the_total_wraps_and_is_exact_from_the_beginning_of_a
         recorder.append_many(4);
         host.read(&mut recorder, |_| {});
         let cursor = host.cursor.unwrap();
-        assert_eq!((cursor.sequence, cursor.is_exact), (4, true), "a new log counts from its beginning");
+        assert_eq!(
+            (cursor.sequence, cursor.is_exact),
+            (4, true),
+            "a new log counts from its beginning"
+        );
     }
 }
 
@@ -396,19 +419,23 @@ fn a_total_that_goes_back_during_the_reading_is_an_erase() {
 
 #[test]
 fn a_total_that_goes_back_by_any_number_is_never_a_loss_of_65536() {
-    for (at_reply, events_after) in (1..=6).flat_map(|reply| (0..60).map(move |events| (reply, events))) {
+    for (at_reply, events_after) in
+        (1..=6).flat_map(|reply| (0..60).map(move |events| (reply, events)))
+    {
         let mut recorder = Recorder::new(4);
         recorder.append_many(8);
         // The log was empty when it was read last: there is no anchor.
-        let mut reader = LogReader::new(Some(Cursor { sequence: 0, is_exact: true, anchor: None }), 4);
+        let mut reader =
+            LogReader::new(Some(Cursor { sequence: 0, is_exact: true, anchor: None }), 4);
         let mut lost = 0;
         for reply in 1..=8 {
             let Some(request) = reader.request() else { break };
-            let taken = reader.take(&recorder.read(request.start, request.count), &mut |delivery| {
-                if let Delivery::Lost { lost: what, .. } = delivery {
-                    lost += what.known_count();
-                }
-            });
+            let taken =
+                reader.take(&recorder.read(request.start, request.count), &mut |delivery| {
+                    if let Delivery::Lost { lost: what, .. } = delivery {
+                        lost += what.known_count();
+                    }
+                });
             if taken.is_err() {
                 break;
             }
@@ -419,7 +446,10 @@ fn a_total_that_goes_back_by_any_number_is_never_a_loss_of_65536() {
                 recorder.append_many(events_after);
             }
         }
-        assert!(lost < 1000, "{lost} events lost, erased at reply {at_reply} and {events_after} since");
+        assert!(
+            lost < 1000,
+            "{lost} events lost, erased at reply {at_reply} and {events_after} since"
+        );
     }
 }
 
@@ -457,7 +487,8 @@ fn what_was_read_ahead_of_a_log_that_is_gone_is_not_delivered() {
 #[test]
 fn resizes_under_a_reading_that_is_behind_spoil_no_count() {
     let sizes = [17, 16, 9, 3, 40];
-    let resizes = |at| sizes.into_iter().flat_map(move |size| (at..at + 5).map(move |at| (at, size)));
+    let resizes =
+        |at| sizes.into_iter().flat_map(move |size| (at..at + 5).map(move |at| (at, size)));
     let pairs = resizes(1).flat_map(|first| resizes(first.0).map(move |second| [first, second]));
     for (resizes, new_events) in pairs.flat_map(|pair| (1..60).map(move |events| (pair, events))) {
         let mut recorder = Recorder::new(18);
@@ -477,7 +508,11 @@ fn resizes_under_a_reading_that_is_behind_spoil_no_count() {
         host.judge(&told, 1);
         let (told, _) = host.read(&mut recorder, |_| {});
         host.judge(&told, 1);
-        assert_eq!(host.expected, recorder.history.last().map(|entry| serial(entry) + 1), "{resizes:?}");
+        assert_eq!(
+            host.expected,
+            recorder.history.last().map(|entry| serial(entry) + 1),
+            "{resizes:?}"
+        );
     }
 }
 
@@ -511,13 +546,19 @@ fn a_log_that_was_empty_and_has_had_more_events_than_the_total_can_tell_is_read(
     // Where the size divides 65536, total and next slot show nothing of it.
     for size in [7, 100, 1000] {
         for new_events in [65_536, 65_537, 65_541, 65_600, 66_500] {
-            let mut host =
-                Host { cursor: Some(Cursor { sequence: 0, is_exact: true, anchor: None }), ..Host::new() };
+            let mut host = Host {
+                cursor: Some(Cursor { sequence: 0, is_exact: true, anchor: None }),
+                ..Host::new()
+            };
             let mut recorder = Recorder::after(size, new_events);
             let newest = serial(recorder.history.last().unwrap());
             let (told, _) = host.read(&mut recorder, |_| {});
             let held = u32::try_from(size).unwrap();
-            assert_eq!(told[told.len() - size..], events(newest + 1 - held..=newest), "{size}, {new_events}");
+            assert_eq!(
+                told[told.len() - size..],
+                events(newest + 1 - held..=newest),
+                "{size}, {new_events}"
+            );
         }
     }
 }
@@ -535,7 +576,11 @@ fn a_reader_that_is_faster_than_events_come_catches_up_with_them() {
             let (_, summary) = host.read(&mut recorder, |recorder| recorder.append_many(rate));
             lost.push(summary.lost);
         }
-        assert_eq!(lost[10..].iter().sum::<u32>(), 0, "size {size}, {rate} events a reply: {lost:?}");
+        assert_eq!(
+            lost[10..].iter().sum::<u32>(),
+            0,
+            "size {size}, {rate} events a reply: {lost:?}"
+        );
     }
 }
 
@@ -545,8 +590,8 @@ fn polling_an_idle_log_takes_one_request_when_the_position_is_known() {
         let mut recorder = Recorder::after(size, 20);
         let mut host = Host::new();
         let (_, summary) = host.read(&mut recorder, |_| {});
-        let mut reader =
-            LogReader::new(host.cursor, u16::try_from(size).unwrap()).starting_near(summary.position);
+        let mut reader = LogReader::new(host.cursor, u16::try_from(size).unwrap())
+            .starting_near(summary.position);
         let request = reader.request().unwrap();
         let reply = recorder.read(request.start, request.count);
         reader.take(&reply, &mut |delivery| panic!("{delivery:?}")).unwrap();
@@ -590,13 +635,17 @@ fn a_size_that_is_too_large_is_noticed_before_anything_is_called_lost() {
     for (size, with_cursor) in [(101, false), (2048, false), (101, true), (2048, true)] {
         let mut recorder = Recorder::new(100);
         recorder.append_many(250);
-        let cursor =
-            with_cursor.then(|| Cursor { sequence: 160, is_exact: true, anchor: anchored(&recorder) });
+        let cursor = with_cursor.then(|| Cursor {
+            sequence: 160,
+            is_exact: true,
+            anchor: anchored(&recorder),
+        });
         let mut reader = LogReader::new(cursor, size);
         let mut result = Ok(());
         while let (Ok(()), Some(request)) = (result, reader.request()) {
             let reply = recorder.read(request.start, request.count);
-            result = reader.take(&reply, &mut |delivery| assert!(!matches!(delivery, Delivery::Lost { .. })));
+            result = reader
+                .take(&reply, &mut |delivery| assert!(!matches!(delivery, Delivery::Lost { .. })));
             // The ring goes on turning under the questions.
             recorder.append();
         }
@@ -608,7 +657,8 @@ fn a_size_that_is_too_large_is_noticed_before_anything_is_called_lost() {
 fn replies_that_make_no_sense_end_the_reading() {
     // Always the same reply, with a total and no entries.
     let recorder = Recorder::new(5);
-    let mut reader = LogReader::new(Some(Cursor { sequence: 3, is_exact: true, anchor: None }), 100);
+    let mut reader =
+        LogReader::new(Some(Cursor { sequence: 3, is_exact: true, anchor: None }), 100);
     let mut result = Ok(());
     for _ in 0..1000 {
         let Some(request) = reader.request() else { break };
@@ -624,7 +674,16 @@ fn replies_that_make_no_sense_end_the_reading() {
 }
 
 fn any_size() -> impl Strategy<Value = usize> {
-    prop_oneof![Just(1), Just(2), Just(7), Just(10), Just(11), Just(2048), 1_usize..40, 40_usize..300]
+    prop_oneof![
+        Just(1),
+        Just(2),
+        Just(7),
+        Just(10),
+        Just(11),
+        Just(2048),
+        1_usize..40,
+        40_usize..300
+    ]
 }
 
 fn any_past() -> impl Strategy<Value = u64> {
@@ -633,7 +692,8 @@ fn any_past() -> impl Strategy<Value = u64> {
 
 /// Requests under way, and which replies are lost: none, or some.
 fn any_window() -> impl Strategy<Value = (usize, Vec<bool>)> {
-    let lost = prop_oneof![Just(Vec::new()), prop::collection::vec(prop::bool::weighted(0.2), 1..20)];
+    let lost =
+        prop_oneof![Just(Vec::new()), prop::collection::vec(prop::bool::weighted(0.2), 1..20)];
     (1_usize..=4, lost).prop_map(|(window, mut lost)| {
         // Sooner or later one comes through.
         lost.push(false);
@@ -654,8 +714,8 @@ fn any_change() -> impl Strategy<Value = Change> {
 fn change(recorder: &mut Recorder, change: Change) -> usize {
     match change {
         Change::Erase if recorder.count() < 60_000 => {
-            let followers =
-                recorder.history.len().min(recorder.size) - usize::from(!recorder.history.is_empty());
+            let followers = recorder.history.len().min(recorder.size)
+                - usize::from(!recorder.history.is_empty());
             recorder.erase();
             followers
         }

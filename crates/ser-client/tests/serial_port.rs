@@ -59,7 +59,8 @@ impl Answering {
                     if let Ok(Command::Read { start, count }) = Command::parse(body) {
                         let reply = Reply::Read(recorder.read(start, count));
                         port.write_all(b"a line\r\n").unwrap();
-                        port.write_all(&FrameEncoder::new(reply.to_body()).collect::<Vec<_>>()).unwrap();
+                        port.write_all(&FrameEncoder::new(reply.to_body()).collect::<Vec<_>>())
+                            .unwrap();
                     }
                 }
             }
@@ -140,7 +141,8 @@ fn a_log_is_read_through_a_terminal() {
 #[test]
 fn a_terminal_that_goes_away_is_an_unplugged_port() {
     let (unit, path) = pair();
-    let mut client = Unit::new(Box::new(SerialTransport::open(&path, 9600).unwrap()), Options::default());
+    let mut client =
+        Unit::new(Box::new(SerialTransport::open(&path, 9600).unwrap()), Options::default());
     drop(unit);
     let error = client.log_position().unwrap_err();
     assert!(matches!(error, RequestError::Transport(TransportError::Unplugged)), "{error:?}");
@@ -171,5 +173,8 @@ fn what_is_no_serial_port_says_so() {
         assert!(!error.hint().is_empty());
     }
     let (_unit, path) = pair();
-    assert!(matches!(SerialTransport::open(&path, 0), Err(OpenError::UnsupportedBaud { baud: 0, .. })));
+    assert!(matches!(
+        SerialTransport::open(&path, 0),
+        Err(OpenError::UnsupportedBaud { baud: 0, .. })
+    ));
 }

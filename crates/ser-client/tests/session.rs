@@ -8,7 +8,8 @@ use common::Recorder;
 use proptest::prelude::*;
 use ser_client::{Busy, Diagnosis, LineRate, NoReply, Session, TextLine, Timing, Unsolicited};
 use ser_proto::{
-    AutoReport, Baud, Code, Command, Configure, FrameEncoder, Mode, ParseError, ReadReply, Reply, TimeStamp,
+    AutoReport, Baud, Code, Command, Configure, FrameEncoder, Mode, ParseError, ReadReply, Reply,
+    TimeStamp,
 };
 
 const TIMEOUT: Duration = Duration::from_secs(1);
@@ -39,7 +40,12 @@ fn read_reply(start: u16, count: u8) -> ReadReply {
     recorder.read(start, count)
 }
 
-fn no_reply(command: Code, attempts: u32, diagnosis: Diagnosis, may_have_been_done: bool) -> NoReply {
+fn no_reply(
+    command: Code,
+    attempts: u32,
+    diagnosis: Diagnosis,
+    may_have_been_done: bool,
+) -> NoReply {
     NoReply { command, attempts, diagnosis, may_have_been_done }
 }
 
@@ -128,7 +134,8 @@ fn what_must_not_be_done_twice_is_sent_once() {
         report_address: 0,
         auto_print: false,
     };
-    let time = TimeStamp { year: 26, month: 1, day: 2, hour: 3, minute: 4, second: 5, millisecond: 6 };
+    let time =
+        TimeStamp { year: 26, month: 1, day: 2, hour: 3, minute: 4, second: 5, millisecond: 6 };
     for (command, attempts) in [
         (Command::Erase, 1),
         (Command::Print { start: 1, count: 9 }, 1),
@@ -139,7 +146,8 @@ fn what_must_not_be_done_twice_is_sent_once() {
     ] {
         let mut session = session(2);
         session.request(command).unwrap();
-        let frames = (0..20).filter(|&second| sent(&mut session, ms(second * 1000)).is_some()).count();
+        let frames =
+            (0..20).filter(|&second| sent(&mut session, ms(second * 1000)).is_some()).count();
         assert_eq!(frames, attempts, "{command:?}");
         let given_up = session.take_answer().unwrap().unwrap_err();
         assert!(given_up.may_have_been_done, "{command:?}");
@@ -233,7 +241,11 @@ fn noise_and_reports_and_lines_before_the_answer_do_not_matter() {
     assert_eq!(session.take_answer(), Some(Ok(answer)));
     assert_eq!(
         session.take_unsolicited(),
-        Some(Unsolicited::Line(TextLine { text: " 7 10:00:00.250".to_owned(), cut: false, noise: 2 }))
+        Some(Unsolicited::Line(TextLine {
+            text: " 7 10:00:00.250".to_owned(),
+            cut: false,
+            noise: 2
+        }))
     );
     assert_eq!(session.take_unsolicited(), Some(Unsolicited::Report(report)));
     // The remains of the two broken frames count against the line in which they were.

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use common::Recorder;
 use ser_client::{
-    Diagnosis, Endpoint, OpenError, Options, RequestError, TcpTransport, Transport, TransportError, Unit,
-    open,
+    Diagnosis, Endpoint, OpenError, Options, RequestError, TcpTransport, Transport, TransportError,
+    Unit, open,
 };
 use ser_proto::{FrameEncoder, Reply};
 
@@ -73,7 +73,8 @@ fn a_peer_that_goes_away_in_the_middle_has_ended() {
 fn a_question_to_a_peer_that_has_hung_up_says_the_same_whichever_way_it_is_noticed() {
     // With something unread, closing resets the connection.
     for read in [false, true] {
-        let (mut client, mut peer) = connect(Options { timeout: Duration::from_secs(20), retries: 0 });
+        let (mut client, mut peer) =
+            connect(Options { timeout: Duration::from_secs(20), retries: 0 });
         let closing = std::thread::spawn(move || {
             peer.peek(&mut [0]).unwrap();
             if read {
@@ -104,7 +105,10 @@ fn nobody_listens() {
     let (listener, address) = listener();
     drop(listener);
     let error = TcpTransport::connect(&address).unwrap_err();
-    assert!(matches!(&error, OpenError::Refused { address: refused } if *refused == address), "{error:?}");
+    assert!(
+        matches!(&error, OpenError::Refused { address: refused } if *refused == address),
+        "{error:?}"
+    );
 }
 
 #[test]

@@ -8,7 +8,8 @@ use std::time::Duration;
 use common::unit::Bench;
 use common::{Told, told};
 use ser_client::{
-    Cursor, Diagnosis, Disturbed, LogPosition, RequestError, Summary, TransportError, Unit, Unsolicited,
+    Cursor, Diagnosis, Disturbed, LogPosition, RequestError, Summary, TransportError, Unit,
+    Unsolicited,
 };
 use ser_proto::{AutoReport, Baud, Command, Configure, Mode, Reply, TimeStamp};
 
@@ -16,7 +17,13 @@ const NOON: TimeStamp =
     TimeStamp { year: 26, month: 11, day: 22, hour: 12, minute: 0, second: 0, millisecond: 0 };
 
 fn keep_everything() -> Configure {
-    Configure { size: None, baud: None, auto_report: AutoReport::Off, report_address: 0, auto_print: false }
+    Configure {
+        size: None,
+        baud: None,
+        auto_report: AutoReport::Off,
+        report_address: 0,
+        auto_print: false,
+    }
 }
 
 fn read_new(
@@ -51,13 +58,18 @@ fn every_command_has_its_call() {
 #[test]
 fn settings_are_checked_against_what_is_in_force() {
     let mut bench = Bench::new(100);
-    let in_force =
-        bench.unit.configure(Configure { size: Some(50), auto_print: true, ..keep_everything() }).unwrap();
+    let in_force = bench
+        .unit
+        .configure(Configure { size: Some(50), auto_print: true, ..keep_everything() })
+        .unwrap();
     assert_eq!((in_force.size, in_force.auto_print, in_force.baud), (50, true, Baud::B19200));
     assert_eq!(bench.fake().recorder.size, 50);
     // A recorder that finds a field out of range changes nothing and answers with what it has.
     let result = bench.unit.configure(Configure { size: Some(2049), ..keep_everything() });
-    assert!(matches!(result, Err(RequestError::Refused { in_force: old }) if old == in_force), "{result:?}");
+    assert!(
+        matches!(result, Err(RequestError::Refused { in_force: old }) if old == in_force),
+        "{result:?}"
+    );
 }
 
 #[test]
@@ -72,7 +84,8 @@ fn an_answer_from_before_the_question_is_none() {
 #[test]
 fn the_line_follows_a_new_baud_rate() {
     let mut bench = Bench::serial(100);
-    let in_force = bench.unit.configure(Configure { baud: Some(Baud::B9600), ..keep_everything() }).unwrap();
+    let in_force =
+        bench.unit.configure(Configure { baud: Some(Baud::B9600), ..keep_everything() }).unwrap();
     assert_eq!(in_force.baud, Baud::B9600);
     assert_eq!(bench.fake().unit_rate, 9600);
     assert_eq!(bench.unit.bits_per_second(), Some(9600));
@@ -84,7 +97,8 @@ fn a_wrong_baud_rate_shows_as_garbage() {
     let mut bench = Bench::new(100);
     bench.unit.set_baud(9600).unwrap();
     let error = bench.unit.mode().unwrap_err();
-    let RequestError::NoReply { attempts: 3, diagnosis, may_have_been_done: false, .. } = error else {
+    let RequestError::NoReply { attempts: 3, diagnosis, may_have_been_done: false, .. } = error
+    else {
         panic!("{error:?}")
     };
     assert_eq!(diagnosis, Diagnosis::Garbage { bytes: 6 });
@@ -102,7 +116,11 @@ fn a_unit_at_another_rate_is_found_and_the_rate_is_left_as_it_was() {
     bench.fake().commands.clear();
     bench.unit.set_baud(19_200).unwrap();
     assert!(bench.unit.mode().unwrap().recording);
-    assert_eq!(bench.fake().commands, [Command::QueryMode], "the right rate is not asked for twice");
+    assert_eq!(
+        bench.fake().commands,
+        [Command::QueryMode],
+        "the right rate is not asked for twice"
+    );
     // Nothing is sent where the rate is nothing that this side could change.
     assert_eq!(Bench::new(100).unit.find_baud().unwrap(), None);
 }
@@ -114,7 +132,10 @@ fn a_unit_that_is_silent_at_every_rate_is_not_found() {
     assert_eq!(bench.unit.find_baud().unwrap(), None);
     assert_eq!(bench.unit.bits_per_second(), Some(19_200));
     bench.fake().broken = Some(ErrorKind::NotConnected);
-    assert!(matches!(bench.unit.find_baud(), Err(RequestError::Transport(TransportError::Unplugged))));
+    assert!(matches!(
+        bench.unit.find_baud(),
+        Err(RequestError::Transport(TransportError::Unplugged))
+    ));
 }
 
 #[test]
@@ -129,7 +150,10 @@ fn lines_from_before_the_reply_to_a_print_are_not_among_its_lines() {
     bench.unit.print(1, 1).unwrap();
     assert_eq!(bench.unit.wait_event(Duration::ZERO).unwrap(), Some(report));
     let line = bench.unit.wait_event(Duration::ZERO).unwrap();
-    assert!(matches!(&line, Some(Unsolicited::Line(line)) if line.text == "1 10:00:00.000 1 ON"), "{line:?}");
+    assert!(
+        matches!(&line, Some(Unsolicited::Line(line)) if line.text == "1 10:00:00.000 1 ON"),
+        "{line:?}"
+    );
     assert_eq!(bench.unit.wait_event(Duration::ZERO).unwrap(), None);
 }
 
@@ -141,7 +165,12 @@ fn an_erase_without_reply_is_not_repeated_and_says_that_it_may_have_been_done() 
     let error = bench.unit.erase().unwrap_err();
     assert!(matches!(
         error,
-        RequestError::NoReply { attempts: 1, diagnosis: Diagnosis::Silent, may_have_been_done: true, .. }
+        RequestError::NoReply {
+            attempts: 1,
+            diagnosis: Diagnosis::Silent,
+            may_have_been_done: true,
+            ..
+        }
     ));
     assert!(error.to_string().ends_with("it may or may not have been carried out"), "{error}");
     assert_eq!(bench.fake().commands, [Command::Erase]);
@@ -286,7 +315,10 @@ fn a_size_that_is_wrong_is_corrected_if_the_unit_tells_it() {
         bench.fake().original = original;
         let (all, result) = read_new(&mut bench.unit, &mut None, 20);
         if original {
-            assert!(matches!(result, Err(RequestError::Disturbed(Disturbed::WrongSize))), "{result:?}");
+            assert!(
+                matches!(result, Err(RequestError::Disturbed(Disturbed::WrongSize))),
+                "{result:?}"
+            );
             assert_eq!(all, []);
         } else {
             assert_eq!(result.unwrap().delivered, 30);
@@ -300,8 +332,10 @@ fn entries_are_read_by_their_numbers() {
     bench.fake().recorder.append_many(35);
     let mut read = |start, count| {
         let mut all = Vec::new();
-        let number =
-            bench.unit.read_range(start, count, 30, &mut |delivery| all.push(told(delivery))).unwrap();
+        let number = bench
+            .unit
+            .read_range(start, count, 30, &mut |delivery| all.push(told(delivery)))
+            .unwrap();
         assert_eq!(usize::from(number), all.len());
         all
     };
@@ -320,7 +354,10 @@ fn a_range_ends_where_the_log_ends_and_short_replies_go_on() {
     bench.fake().recorder.append_many(18);
     bench.fake().recorder.reply_limit = 7;
     let mut all = Vec::new();
-    assert_eq!(bench.unit.read_range(1, 30, 30, &mut |delivery| all.push(told(delivery))).unwrap(), 18);
+    assert_eq!(
+        bench.unit.read_range(1, 30, 30, &mut |delivery| all.push(told(delivery))).unwrap(),
+        18
+    );
     assert_eq!(all, (1..=18).map(Told::Event).collect::<Vec<_>>());
 }
 

@@ -29,7 +29,8 @@ pub fn explain(error: clap::Error) -> ExitCode {
 }
 
 fn rendered(mut error: clap::Error) -> String {
-    let repeated: Vec<_> = error.context().map(|(kind, value)| (kind, harmless(kind, value))).collect();
+    let repeated: Vec<_> =
+        error.context().map(|(kind, value)| (kind, harmless(kind, value))).collect();
     // clap would propose the words that it was given, as they came.
     let is_hostile = repeated.iter().any(|(_, value)| value.is_some());
     for (kind, value) in repeated {
@@ -94,7 +95,8 @@ mod tests {
     const HOSTILE: &str = "\u{1B}[2J\u{9B}2J\u{202E}\nerror: all is lost";
 
     fn said(words: &[&str]) -> String {
-        let of_ab = Arg::new("letter").long("letter").value_parser(PossibleValuesParser::new(["a"]));
+        let of_ab =
+            Arg::new("letter").long("letter").value_parser(PossibleValuesParser::new(["a"]));
         let refused = |text: &str| Err::<u8, _>(format!("what is {text}?"));
         let number = Arg::new("number").short('n').long("number").value_parser(refused);
         let command = Command::new("program").bin_name("program").args([of_ab, number]);

@@ -1,4 +1,5 @@
-//! Cost of one capture tick: the work of the 1 kHz interrupt, without the main loop's share. Times are per tick.
+//! Cost of one capture tick: the work of the 1 kHz interrupt, without the main loop's share. Times
+//! are per tick.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -33,7 +34,8 @@ fn time_ticks(ticks: u64, debounce: Debounce, toggling: u32) -> Duration {
 fn capture_tick(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("capture_tick");
     let filters = [("no_debounce", Debounce::OFF), ("debounce_255_ms", Debounce::uniform(255))];
-    let contacts: [(&str, u32); 3] = [("idle", 0), ("one_input_toggles", 1), ("all_inputs_toggle", u32::MAX)];
+    let contacts: [(&str, u32); 3] =
+        [("idle", 0), ("one_input_toggles", 1), ("all_inputs_toggle", u32::MAX)];
     for (filter, debounce) in filters {
         for (name, toggling) in contacts {
             group.bench_function(format!("{filter}/{name}"), |bencher| {

@@ -1,8 +1,9 @@
 //! What the event log costs, beside the rings of `heapless`, which one would use instead.
 //!
-//! The work is the recorder's: `append` adds an event to a full log, and the oldest one goes; `read_ten` finds the
-//! ten entries of a read reply in the middle of the ring; `read_all` takes all 2048 from the oldest to the newest.
-//! Both rivals do less: they know no entry numbers that outlive a wrap, no total, and no size that can be changed.
+//! The work is the recorder's: `append` adds an event to a full log, and the oldest one goes;
+//! `read_ten` finds the ten entries of a read reply in the middle of the ring; `read_all` takes all
+//! 2048 from the oldest to the newest. Both rivals do less: they know no entry numbers that outlive
+//! a wrap, no total, and no size that can be changed.
 
 use std::hint::black_box;
 
@@ -32,7 +33,9 @@ fn push(deque: &mut Deque<Event, LEN>, event: Event) {
 }
 
 /// A full ring of each kind.
-fn full_rings(storage: &mut [Event]) -> (EventLog<'_>, Box<HistoryBuf<Event, LEN>>, Box<Deque<Event, LEN>>) {
+fn full_rings(
+    storage: &mut [Event],
+) -> (EventLog<'_>, Box<HistoryBuf<Event, LEN>>, Box<Deque<Event, LEN>>) {
     let mut log = EventLog::new(storage);
     let mut history = Box::new(HistoryBuf::new());
     let mut deque = Box::new(Deque::new());
@@ -50,8 +53,12 @@ fn append(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("event_log/append");
     let added = event(1);
     group.bench_function("ser_node", |bencher| bencher.iter(|| log.append(black_box(added))));
-    group.bench_function("heapless_history_buf", |bencher| bencher.iter(|| history.write(black_box(added))));
-    group.bench_function("heapless_deque", |bencher| bencher.iter(|| push(&mut deque, black_box(added))));
+    group.bench_function("heapless_history_buf", |bencher| {
+        bencher.iter(|| history.write(black_box(added)))
+    });
+    group.bench_function("heapless_deque", |bencher| {
+        bencher.iter(|| push(&mut deque, black_box(added)))
+    });
     group.finish();
     black_box((log, history, deque));
 }
@@ -74,7 +81,10 @@ fn read_ten(criterion: &mut Criterion) {
 
 /// Copies entries, as into a reply, and looks at each.
 fn add_up(entry: impl Fn(u16) -> Option<Event>) -> i64 {
-    black_box(ENTRIES).filter_map(|number| black_box(entry(number))).map(|event| event.time_ms).sum()
+    black_box(ENTRIES)
+        .filter_map(|number| black_box(entry(number)))
+        .map(|event| event.time_ms)
+        .sum()
 }
 
 fn read_all(criterion: &mut Criterion) {

@@ -1,8 +1,9 @@
 //! From milliseconds to a date, in the years 1970–2099.
 //!
-//! In these years every fourth one is a leap year, and what is left of the calendar is divisions by constants. A
-//! library for all years looks things up in tables, and the compiler cannot see that it never looks beyond their ends:
-//! each look has a path to a panic, and the interrupts of a recorder must have none.
+//! In these years every fourth one is a leap year, and what is left of the calendar is divisions by
+//! constants. A library for all years looks things up in tables, and the compiler cannot see that
+//! it never looks beyond their ends: each look has a path to a panic, and the interrupts of a
+//! recorder must have none.
 
 use chrono::{NaiveDate, NaiveDateTime};
 

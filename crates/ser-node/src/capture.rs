@@ -1,16 +1,16 @@
 //! The interrupt's half of the recorder: read all inputs, filter, compare, queue.
 //!
-//! [`Capture::sample`] runs once per millisecond at the highest priority and waits for nothing. It hands changes to
-//! the main loop through a queue; a change that finds the queue full is counted, and the main loop notices
-//! from the states that something is missing in between.
+//! [`Capture::sample`] runs once per millisecond at the highest priority and waits for nothing. It
+//! hands changes to the main loop through a queue; a change that finds the queue full is counted,
+//! and the main loop notices from the states that something is missing in between.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use crate::debounce::{Debounce, Filter};
 use crate::ring::{Reader, Ring, Slot, Writer};
 
-/// How many changes may wait for the main loop: a quarter of a second with a change every millisecond. A power of two,
-/// as rings want it.
+/// How many changes may wait for the main loop: a quarter of a second with a change every
+/// millisecond. A power of two, as rings want it.
 pub const QUEUE_LEN: usize = 256;
 
 /// Inputs that changed in one sample.
@@ -79,8 +79,14 @@ impl CaptureChannel {
     /// The interrupt's end and the main loop's end.
     pub fn split(&mut self, debounce: Debounce) -> (Capture<'_>, CaptureReader<'_>) {
         let (writer, reader) = self.queue.split();
-        let capture =
-            Capture { queue: writer, shared: &self.shared, debounce, inputs: 0, tick_ms: 0, filter: None };
+        let capture = Capture {
+            queue: writer,
+            shared: &self.shared,
+            debounce,
+            inputs: 0,
+            tick_ms: 0,
+            filter: None,
+        };
         (capture, CaptureReader { queue: reader, shared: &self.shared, debounce })
     }
 }
@@ -104,10 +110,11 @@ pub struct Capture<'a> {
 }
 
 impl Capture<'_> {
-    /// Takes the state of all inputs at `tick_ms`, a count of milliseconds since power-up that wraps.
+    /// Takes the state of all inputs at `tick_ms`, a count of milliseconds since power-up that
+    /// wraps.
     ///
-    /// The count is expected to grow by one. Where it grows by more, the samples between were missed: they are
-    /// counted, and the inputs are taken to have stayed as they were.
+    /// The count is expected to grow by one. Where it grows by more, the samples between were
+    /// missed: they are counted, and the inputs are taken to have stayed as they were.
     #[inline]
     pub fn sample(&mut self, tick_ms: u32, inputs: u32) {
         match &mut self.filter {
@@ -126,7 +133,8 @@ impl Capture<'_> {
         self.shared.tick_ms.store(tick_ms, Ordering::Release);
     }
 
-    /// Takes the baseline. Apart from the rest, which would have to make room for it on the stack in every millisecond.
+    /// Takes the baseline. Apart from the rest, which would have to make room for it on the stack
+    /// in every millisecond.
     #[cold]
     #[inline(never)]
     fn begin(&mut self, tick_ms: u32, inputs: u32) {
@@ -144,7 +152,8 @@ impl Capture<'_> {
         }
     }
 
-    /// Makes up for the samples between the latest one and that of `tick_ms`. False when that one is none.
+    /// Makes up for the samples between the latest one and that of `tick_ms`. False when that one
+    /// is none.
     ///
     /// Apart from the rest, so that a sample that is on time pays for one comparison.
     #[cold]
@@ -158,7 +167,8 @@ impl Capture<'_> {
         true
     }
 
-    /// Runs the filter over samples that were missed, so that debounce times stay times and do not become counts.
+    /// Runs the filter over samples that were missed, so that debounce times stay times and do not
+    /// become counts.
     fn make_up(&mut self, tick_ms: u32, missed: u32) {
         let count = &self.shared.samples_missed;
         count.store(count.load(Ordering::Relaxed).saturating_add(missed), Ordering::Relaxed);
@@ -286,7 +296,10 @@ mod tests {
         // the stamp.
         capture.sample(21, 0b11);
         capture.sample(22, 0b01);
-        assert_eq!(drain(&mut reader), [(10, 0, 0), (16, 0b01, 0b01), (21, 0b10, 0b11), (22, 0b10, 0b01)]);
+        assert_eq!(
+            drain(&mut reader),
+            [(10, 0, 0), (16, 0b01, 0b01), (21, 0b10, 0b11), (22, 0b10, 0b01)]
+        );
         assert_eq!(reader.samples_missed(), 9);
     }
 

@@ -1,7 +1,8 @@
 //! Date and time: the millisecond tick plus an offset.
 //!
-//! Setting the clock moves the offset and never the tick. A change that happened before the clock was set but is
-//! recorded only afterwards, because debounce held it back, still gets the time of the setting of its moment.
+//! Setting the clock moves the offset and never the tick. A change that happened before the clock
+//! was set but is recorded only afterwards, because debounce held it back, still gets the time of
+//! the setting of its moment.
 
 use chrono::NaiveDateTime;
 use ser_proto::TimeStamp;
@@ -14,7 +15,8 @@ pub trait Rtc {
     /// The time now, asked once at power-up; `None` when it is not known.
     fn read(&mut self) -> Option<NaiveDateTime>;
 
-    /// Takes over the time, when the recorder's clock is set. `now` is that of the call, not of the command's arrival.
+    /// Takes over the time, when the recorder's clock is set. `now` is that of the call, not of the
+    /// command's arrival.
     fn write(&mut self, now: NaiveDateTime);
 }
 
@@ -93,7 +95,8 @@ fn to_calendar_ms(time: NaiveDateTime) -> i64 {
     time.and_utc().timestamp_millis()
 }
 
-/// The date and time `calendar_ms` milliseconds after 1970 began, within the hundred years of two-digit years.
+/// The date and time `calendar_ms` milliseconds after 1970 began, within the hundred years of
+/// two-digit years.
 pub(crate) fn to_time_stamp(calendar_ms: i64) -> TimeStamp {
     const EPOCH: TimeStamp =
         TimeStamp { year: 70, month: 1, day: 1, hour: 0, minute: 0, second: 0, millisecond: 0 };

@@ -1,15 +1,17 @@
-//! The per-input debounce filter: a change counts when the input has held its new state long enough.
+//! The per-input debounce filter: a change counts when the input has held its new state long
+//! enough.
 //!
-//! All inputs are filtered together with bit-parallel counters: plane `p` holds bit `p` of every input's counter,
-//! so one pass over the planes counts for 32 inputs, and the work is the same whatever the inputs do.
+//! All inputs are filtered together with bit-parallel counters: plane `p` holds bit `p` of every
+//! input's counter, so one pass over the planes counts for 32 inputs, and the work is the same
+//! whatever the inputs do.
 
 /// Counters are eight bits wide: debounce times reach 255 ms.
 const PLANES: usize = 8;
 
 /// Debounce time of every input, in milliseconds; 0 is off.
 ///
-/// With `n` milliseconds an input must stay in its new state for `n` ms before the change is recorded, and
-/// the event carries the time at which the new state was first seen.
+/// With `n` milliseconds an input must stay in its new state for `n` ms before the change is
+/// recorded, and the event carries the time at which the new state was first seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Debounce {
@@ -29,7 +31,8 @@ impl Debounce {
     /// The same, but with `time_ms` for input `number` (1–32). Other numbers change nothing.
     #[must_use]
     pub fn with(mut self, number: u8, time_ms: u8) -> Debounce {
-        if let Some(time) = usize::from(number).checked_sub(1).and_then(|index| self.times_ms.get_mut(index))
+        if let Some(time) =
+            usize::from(number).checked_sub(1).and_then(|index| self.times_ms.get_mut(index))
         {
             *time = time_ms;
         }
@@ -39,7 +42,11 @@ impl Debounce {
     /// The time of input `number` (1–32); 0 for other numbers.
     #[must_use]
     pub fn time_ms(&self, number: u8) -> u8 {
-        usize::from(number).checked_sub(1).and_then(|index| self.times_ms.get(index)).copied().unwrap_or(0)
+        usize::from(number)
+            .checked_sub(1)
+            .and_then(|index| self.times_ms.get(index))
+            .copied()
+            .unwrap_or(0)
     }
 
     /// The longest of all times.
@@ -51,8 +58,8 @@ impl Debounce {
 
 /// One bit of the counter of every input.
 ///
-/// A counter starts at 256 less the time and counts up. What is kept is in which bits it differs from its start, so
-/// that starting anew is a mask.
+/// A counter starts at 256 less the time and counts up. What is kept is in which bits it differs
+/// from its start, so that starting anew is a mask.
 #[derive(Clone, Copy, Debug, Default)]
 struct Plane {
     moved: u32,
@@ -60,8 +67,8 @@ struct Plane {
 }
 
 impl Plane {
-    /// Adds the carry to the counters that are `counting`, and starts the others anew. Gives the carry for the next
-    /// plane.
+    /// Adds the carry to the counters that are `counting`, and starts the others anew. Gives the
+    /// carry for the next plane.
     #[inline]
     fn count(&mut self, counting: u32, carry: u32) -> u32 {
         let counter = self.moved ^ self.start;
@@ -75,7 +82,8 @@ impl Plane {
 pub(crate) struct Filter {
     accepted: u32,
     planes: [Plane; PLANES],
-    /// Inputs that have been in their new state for their time: one more sample of it, and it is accepted.
+    /// Inputs that have been in their new state for their time: one more sample of it, and it is
+    /// accepted.
     due: u32,
     /// Inputs without a time, which are always due.
     without: u32,
@@ -115,7 +123,8 @@ impl Filter {
         self.accepted ^= accepted;
         if !self.is_off() {
             let counting = differ ^ accepted;
-            // Written out: this is half of the capture interrupt, and a loop would take half as long again.
+            // Written out: this is half of the capture interrupt, and a loop would take half as
+            // long again.
             let [a, b, c, d, e, f, g, h] = &mut self.planes;
             let carry = a.count(counting, counting);
             let carry = b.count(counting, carry);

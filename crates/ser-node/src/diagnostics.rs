@@ -1,6 +1,7 @@
 //! Counters of everything that was dropped, refused or lost.
 //!
-//! The protocol has no negative reply, so these are the only trace of bad input. A board logs them when they change.
+//! The protocol has no negative reply, so these are the only trace of bad input. A board logs them
+//! when they change.
 
 use ser_proto::{FrameError, ParseError};
 
@@ -59,7 +60,9 @@ impl Diagnostics {
         let counter = match error {
             ParseError::Empty => &mut self.frames_empty,
             ParseError::UnknownCode { .. } => &mut self.commands_unknown,
-            ParseError::WrongLength { .. } | ParseError::EntrySize { .. } => &mut self.commands_wrong_length,
+            ParseError::WrongLength { .. } | ParseError::EntrySize { .. } => {
+                &mut self.commands_wrong_length
+            }
             ParseError::BadValue { .. } => &mut self.parameters_refused,
         };
         count(counter, 1);

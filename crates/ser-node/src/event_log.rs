@@ -1,7 +1,8 @@
 //! The ring of the newest events.
 //!
-//! Inside, every event has a sequence number that never repeats while the power is on; entry numbers, next slot and
-//! the 16-bit total of the protocol are views of it. Appending overwrites the oldest event once the ring is full.
+//! Inside, every event has a sequence number that never repeats while the power is on; entry
+//! numbers, next slot and the 16-bit total of the protocol are views of it. Appending overwrites
+//! the oldest event once the ring is full.
 
 use ser_proto::MAX_SIZE;
 
@@ -26,8 +27,8 @@ impl Event {
 #[derive(Debug)]
 pub struct EventLog<'a> {
     storage: &'a mut [Event],
-    /// Entries in use as ring, at most the storage. Invariant: `len <= size`, `next_slot < size` (or both 0), and
-    /// `next_slot == len` until the ring is full.
+    /// Entries in use as ring, at most the storage. Invariant: `len <= size`, `next_slot < size`
+    /// (or both 0), and `next_slot == len` until the ring is full.
     size: usize,
     len: usize,
     next_slot: usize,
@@ -100,8 +101,8 @@ impl<'a> EventLog<'a> {
         self.erased_at = self.next_sequence;
     }
 
-    /// Changes the size (clamped to 1 … capacity) and keeps the newest events that fit, in order, from slot 0.
-    /// The total stays.
+    /// Changes the size (clamped to 1 … capacity) and keeps the newest events that fit, in order,
+    /// from slot 0. The total stays.
     pub fn resize(&mut self, size: u16) {
         let size = usize::from(size.min(self.capacity()).max(1)).min(self.storage.len());
         if size == self.size {
@@ -109,7 +110,8 @@ impl<'a> EventLog<'a> {
         }
         let kept = self.len.min(size);
         // In a ring that has wrapped, what is newer than the last slot goes on in slot 0.
-        let first = if self.len == self.size { self.next_slot + self.len - kept } else { self.len - kept };
+        let first =
+            if self.len == self.size { self.next_slot + self.len - kept } else { self.len - kept };
         let first = if first < self.size { first } else { first - self.size };
         if let Some(ring) = self.storage.get_mut(..self.size) {
             move_to_front(ring, first);
@@ -126,8 +128,8 @@ impl<'a> EventLog<'a> {
         self.storage.get(..self.len)?.get(slot)
     }
 
-    /// Sequence number of the oldest event that is still there; equal to [`next_sequence`](Self::next_sequence) when
-    /// there is none.
+    /// Sequence number of the oldest event that is still there; equal to
+    /// [`next_sequence`](Self::next_sequence) when there is none.
     #[must_use]
     pub fn oldest_sequence(&self) -> u64 {
         self.next_sequence - self.len as u64
@@ -139,21 +141,25 @@ impl<'a> EventLog<'a> {
         self.next_sequence
     }
 
-    /// The entry number under which the event with this sequence number is found, if it is still there.
+    /// The entry number under which the event with this sequence number is found, if it is still
+    /// there.
     #[must_use]
     pub fn entry_number(&self, sequence: u64) -> Option<u16> {
         let back = usize::try_from(self.next_sequence.checked_sub(sequence)?).ok()?;
         if back == 0 || back > self.len {
             return None;
         }
-        let slot =
-            if back <= self.next_slot { self.next_slot - back } else { self.next_slot + self.size - back };
+        let slot = if back <= self.next_slot {
+            self.next_slot - back
+        } else {
+            self.next_slot + self.size - back
+        };
         Some(narrow(slot + 1))
     }
 }
 
-/// Turns a ring so that slot `first` becomes slot 0. Reversing both parts and then the whole does it without a path to
-/// a panic, which the library's rotation has.
+/// Turns a ring so that slot `first` becomes slot 0. Reversing both parts and then the whole does
+/// it without a path to a panic, which the library's rotation has.
 fn move_to_front(ring: &mut [Event], first: usize) {
     if let Some((before, from_first)) = ring.split_at_mut_checked(first) {
         before.reverse();
@@ -173,7 +179,8 @@ mod tests {
 
     use super::*;
 
-    /// The log as one would write it without caring for memory: everything since the erase, and what was cut off.
+    /// The log as one would write it without caring for memory: everything since the erase, and
+    /// what was cut off.
     #[derive(Default)]
     struct Reference {
         kept: Vec<Event>,

@@ -1,35 +1,37 @@
-//! The Genius port: datagrams in, datagrams out, and the state of all inputs in every bus scan, through a GENI board.
+//! The Genius port: datagrams in, datagrams out, and the state of all inputs in every bus scan,
+//! through a GENI board.
 //!
-//! Commands come as datagrams 40h/50h, directed or by broadcast; replies go to the sender of a directed one. The board
-//! is reset when it fails, and the bus is joined again; RS-232 and recording know nothing of it.
+//! Commands come as datagrams 40h/50h, directed or by broadcast; replies go to the sender of a
+//! directed one. The board is reset when it fails, and the bus is joined again; RS-232 and
+//! recording know nothing of it.
 //!
 //! - **Time of arrival** is the tick at which the board raised its Receive-Queue flag: that of the
 //!   pulse that was handed in ([`interrupt`](GeniusPort::interrupt)), or, without the line, of the
 //!   [`poll`](GeniusPort::poll) that saw the flag. However long the board then takes to hand the
 //!   datagram over, clock, mode and Last Broadcast go by it, and changes that come after it wait
 //!   for it ([`HELD_BACK_MS`](crate::HELD_BACK_MS)).
-//! - **Replies** are sent once. A host that misses one asks again, as on RS-232; a repeated reply might be taken for
-//!   the answer to the next command.
-//! - **Auto reports** are repeated until their receiver has acknowledged one, with growing pauses, as a receiver that
-//!   is not there would cost all others their place in the bus scan. A receiver may get one twice when its
-//!   acknowledgement was lost; total and next slot show it. All devices together have one datagram of normal priority
-//!   per bus scan, and those with low numbers have the first chance: after each report as many scans are left to the
-//!   others as there are others.
-//! - **Read I/O Forces** is answered with the recorder's own input tables: none is forced, and the values are the
-//!   states of the inputs. There are no outputs, so these tables are empty.
+//! - **Replies** are sent once. A host that misses one asks again, as on RS-232; a repeated reply
+//!   might be taken for the answer to the next command.
+//! - **Auto reports** are repeated until their receiver has acknowledged one, with growing pauses,
+//!   as a receiver that is not there would cost all others their place in the bus scan. A receiver
+//!   may get one twice when its acknowledgement was lost; total and next slot show it. All devices
+//!   together have one datagram of normal priority per bus scan, and those with low numbers have
+//!   the first chance: after each report as many scans are left to the others as there are others.
+//! - **Read I/O Forces** is answered with the recorder's own input tables: none is forced, and the
+//!   values are the states of the inputs. There are no outputs, so these tables are empty.
 //! - **Requests for memory** are refused: a recorder has none.
 
 mod reporter;
 
 use geni_board::{
-    Completion, Configuration, Counters, Data, Destination, DeviceChange, Driver, Event, Failure, Interrupts,
-    MAX_DATA_LEN, Options, ReceivedDatagram, SharedRam, Start, Status, Transmission, TransmitPriority,
-    timing,
+    Completion, Configuration, Counters, Data, Destination, DeviceChange, Driver, Event, Failure,
+    Interrupts, MAX_DATA_LEN, Options, ReceivedDatagram, SharedRam, Start, Status, Transmission,
+    TransmitPriority, timing,
 };
 use heapless::{Deque, Vec};
 use ser_proto::genius::{
-    FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, GlobalData, IoForces, SUBFUNCTION_SER, Subfunction,
-    max_entries,
+    FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, GlobalData, IoForces, SUBFUNCTION_SER,
+    Subfunction, max_entries,
 };
 use ser_proto::{AutoReport, Command, Model, Reply};
 
@@ -41,7 +43,8 @@ use crate::settings::Storage;
 
 use reporter::Reporter;
 
-/// Replies that may wait while another one is on its way. The board itself holds no more than 15 commands.
+/// Replies that may wait while another one is on its way. The board itself holds no more than 15
+/// commands.
 const MAX_REPLIES: usize = 16;
 
 /// Things the board has to say that are dealt with in one poll.
@@ -58,7 +61,8 @@ pub struct GeniusOptions {
     pub model: Model,
     /// State of the board when the port begins.
     pub start: Start,
-    /// Whether [`GeniusPort::reset_held`] reaches the board. Without it, a failed board can only be waited for.
+    /// Whether [`GeniusPort::reset_held`] reaches the board. Without it, a failed board can only be
+    /// waited for.
     pub reset_line: bool,
     /// How long the board may go without a heartbeat.
     pub heartbeat_timeout_ms: u32,
@@ -84,8 +88,10 @@ impl GeniusOptions {
             Model::Ser160 => 2,
             Model::Ser320 => 4,
         };
-        // Nobody looks at other devices' inputs, but with shorter buffers the board would not log all of them in.
-        let configuration = Configuration::new(self.reference, len, 0, Configuration::DEFAULT.buffer_len());
+        // Nobody looks at other devices' inputs, but with shorter buffers the board would not log
+        // all of them in.
+        let configuration =
+            Configuration::new(self.reference, len, 0, Configuration::DEFAULT.buffer_len());
         Options {
             start: self.start,
             reset_line: self.reset_line,
@@ -118,8 +124,8 @@ pub struct GeniusDiagnostics {
     pub datagrams_ignored: u32,
     /// Commands that came by broadcast and were carried out.
     pub broadcasts: u32,
-    /// Replies that the board could not send, or that went down with it before or after their commands were carried
-    /// out.
+    /// Replies that the board could not send, or that went down with it before or after their
+    /// commands were carried out.
     pub replies_lost: u32,
     /// Commands that set the clock and were not carried out, because nobody saw them arrive.
     pub clocks_refused: u32,
@@ -167,7 +173,8 @@ pub struct GeniusPort<W> {
 }
 
 impl<W: SharedRam> GeniusPort<W> {
-    /// A port whose board is behind `window`. Nothing is read or written before the first [`poll`](Self::poll).
+    /// A port whose board is behind `window`. Nothing is read or written before the first
+    /// [`poll`](Self::poll).
     pub fn new(window: W, options: GeniusOptions) -> GeniusPort<W> {
         GeniusPort {
             driver: Driver::new(window, options.driver_options()),
@@ -180,7 +187,8 @@ impl<W: SharedRam> GeniusPort<W> {
         }
     }
 
-    /// Does what is due, a bounded amount of it: global data, commands that have arrived, one datagram to be sent.
+    /// Does what is due, a bounded amount of it: global data, commands that have arrived, one
+    /// datagram to be sent.
     pub fn poll<S: Storage, R: Rtc>(&mut self, node: &mut Node<'_, S, R>) {
         // Not that of `Node::poll`: what was done since may have taken long, and a flag is seen
         // now.
@@ -191,8 +199,8 @@ impl<W: SharedRam> GeniusPort<W> {
         for _ in 0..EVENTS_PER_POLL {
             let Some(event) = self.driver.poll(now_ms) else { break };
             self.deal_with(event, node, now_ms);
-            // That may have taken long, as the storing of a configuration does. Pulses are handed in
-            // before flags are looked at again.
+            // That may have taken long, as the storing of a configuration does. Pulses are handed
+            // in before flags are looked at again.
             if node.tick_ms() != now_ms {
                 break;
             }
@@ -237,7 +245,12 @@ impl<W: SharedRam> GeniusPort<W> {
         GeniusDiagnostics { board: self.driver.counters(), ..self.diagnostics }
     }
 
-    fn deal_with<S: Storage, R: Rtc>(&mut self, event: Event, node: &mut Node<'_, S, R>, now_ms: u32) {
+    fn deal_with<S: Storage, R: Rtc>(
+        &mut self,
+        event: Event,
+        node: &mut Node<'_, S, R>,
+        now_ms: u32,
+    ) {
         match event {
             Event::Received(datagram) => self.receive(&datagram, node, now_ms),
             Event::Sent(result) => self.sent(result.is_ok(), node, now_ms),
@@ -249,7 +262,9 @@ impl<W: SharedRam> GeniusPort<W> {
                 self.others = 0;
             }
             Event::Ready(_) => self.reporter.hurry(),
-            Event::Device { number, change: DeviceChange::LoggedOut } => self.others &= !bit(number),
+            Event::Device { number, change: DeviceChange::LoggedOut } => {
+                self.others &= !bit(number)
+            }
             Event::Device { number, .. } => self.others |= bit(number),
             // The driver remembers or has dealt with it, or it is not asked for.
             Event::Configured(_)
@@ -298,7 +313,8 @@ impl<W: SharedRam> GeniusPort<W> {
             return;
         }
         if datagram.arrived_ms.is_none() && matches!(message, Ok(Command::SetMode { .. })) {
-            // Better late than never; but changes of that time have been judged by the mode of before.
+            // Better late than never; but changes of that time have been judged by the mode of
+            // before.
             count(&mut node.recorder.diagnostics.settings_late, 1);
         }
         let arrived_ms = datagram.arrived_ms.unwrap_or(now_ms);
@@ -334,7 +350,8 @@ impl<W: SharedRam> GeniusPort<W> {
         }
     }
 
-    /// How long it takes until each other device could have sent a datagram: a scan each, and what is left of this one.
+    /// How long it takes until each other device could have sent a datagram: a scan each, and what
+    /// is left of this one.
     fn turns_of_others_ms(&self) -> u32 {
         let scan_ms = self.status().and_then(|status| status.scan_ms).unwrap_or(0);
         u32::from(scan_ms) * (self.others.count_ones() + 1)
@@ -345,11 +362,12 @@ impl<W: SharedRam> GeniusPort<W> {
         let max_entries = max_entries(node.recorder.model);
         if let Some(Waiting { to, what }) = self.replies.pop_front() {
             let sent = match what {
-                What::Answer(answer) => {
-                    node.reply(answer, max_entries).is_some_and(|reply| self.transmit_ser(to, &reply))
-                }
+                What::Answer(answer) => node
+                    .reply(answer, max_entries)
+                    .is_some_and(|reply| self.transmit_ser(to, &reply)),
                 What::Forces(table) => {
-                    let data = forces(table, GlobalData { model: self.model, state: node.inputs() });
+                    let data =
+                        forces(table, GlobalData { model: self.model, state: node.inputs() });
                     self.transmit(to, FUNCTION_GENIUS, Subfunction::ReadIoForcesReply.code(), &data)
                 }
             };
@@ -394,8 +412,8 @@ fn bit(number: u8) -> u32 {
     1_u32.checked_shl(number.into()).unwrap_or(0)
 }
 
-/// The reply to Read I/O Forces: the table's number and the table. Nothing is ever forced. A host that shows the values
-/// of inputs without looking which of them are forced sees what they are.
+/// The reply to Read I/O Forces: the table's number and the table. Nothing is ever forced. A host
+/// that shows the values of inputs without looking which of them are forced sees what they are.
 fn forces(table: ForceTable, inputs: GlobalData) -> Vec<u8, { ser_proto::genius::MAX_DATA }> {
     let mut forces = IoForces::none(table, inputs.model);
     if table == ForceTable::InputValues {

@@ -1,9 +1,9 @@
 //! A value, and what it was a short while ago.
 //!
-//! Changes are recorded up to [`HELD_BACK_MS`](crate::HELD_BACK_MS) after they happened. What was in
-//! force when they happened decides about them. A history therefore has a place for every
-//! millisecond of that span. Settings may come over both ports, in any number, and may be read in any
-//! order: none that still decides about a change is forgotten.
+//! Changes are recorded up to [`HELD_BACK_MS`](crate::HELD_BACK_MS) after they happened. What was
+//! in force when they happened decides about them. A history therefore has a place for every
+//! millisecond of that span. Settings may come over both ports, in any number, and may be read in
+//! any order: none that still decides about a change is forgotten.
 
 use crate::sequencer::{WINDOW, slot};
 
@@ -32,7 +32,8 @@ impl<T: Copy> History<T> {
         History { before, latest, values: [value; SPAN], is_set: [0; SPAN / BITS] }
     }
 
-    /// Sets the value in millisecond `tick_ms`. The sample of that millisecond has been taken already.
+    /// Sets the value in millisecond `tick_ms`. The sample of that millisecond has been taken
+    /// already.
     pub(crate) fn set(&mut self, tick_ms: u64, value: T) {
         if tick_ms + SPAN as u64 <= self.latest.0 {
             // All changes of that time have been recorded. The setting may still be the latest one
@@ -100,7 +101,11 @@ impl<T: Copy> History<T> {
                 let at_ms = ms.checked_sub(word.leading_zeros().into())?;
                 // Further back the places are those of the latest milliseconds.
                 let has_place = at_ms + SPAN as u64 > self.latest.0;
-                return self.values.get(slot(at_ms)).filter(|_| has_place).map(|&value| (at_ms, value));
+                return self
+                    .values
+                    .get(slot(at_ms))
+                    .filter(|_| has_place)
+                    .map(|&value| (at_ms, value));
             }
             ms = ms.checked_sub(place as u64 % BITS as u64 + 1)?;
         }

@@ -1,6 +1,7 @@
 //! Decides whether the watchdog may be fed.
 
-/// Feeds only while both halves of the recorder make progress: the main loop by asking, capture by its tick.
+/// Feeds only while both halves of the recorder make progress: the main loop by asking, capture by
+/// its tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Liveness {
     last_tick_ms: Option<u32>,
@@ -13,8 +14,8 @@ impl Liveness {
         Liveness { last_tick_ms: None }
     }
 
-    /// Called at the end of every pass of the main loop with the tick of the latest sample. True when the watchdog
-    /// may be fed: capture has sampled since the last time.
+    /// Called at the end of every pass of the main loop with the tick of the latest sample. True
+    /// when the watchdog may be fed: capture has sampled since the last time.
     pub fn pass(&mut self, tick_ms: u32) -> bool {
         let sampled = self.last_tick_ms != Some(tick_ms);
         self.last_tick_ms = Some(tick_ms);

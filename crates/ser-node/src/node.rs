@@ -1,7 +1,7 @@
 //! The recorder as a board or the simulator sees it: samples, bytes and ticks in, bytes out.
 //!
-//! A main loop reads the tick, hands over the bytes that have arrived, calls [`Node::poll`] with that tick, and takes
-//! bytes to send for as long as there is room for them.
+//! A main loop reads the tick, hands over the bytes that have arrived, calls [`Node::poll`] with
+//! that tick, and takes bytes to send for as long as there is room for them.
 
 use ser_proto::{Baud, Command, Inputs, MAX_ENTRIES, Model, ReadReply, Reply};
 
@@ -65,15 +65,17 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         Node { capture, ticks, sequencer, recorder, serial, commands: 0 }
     }
 
-    /// The tick of the latest sample: what a main loop reads first and passes to [`poll`](Self::poll) last.
+    /// The tick of the latest sample: what a main loop reads first and passes to
+    /// [`poll`](Self::poll) last.
     pub fn tick_ms(&self) -> u32 {
         self.capture.tick_ms()
     }
 
     /// Records all changes up to the sample of `now_ms`.
     ///
-    /// The main loop reads `now_ms` from [`tick_ms`](Self::tick_ms) *before* it hands over received bytes: a command
-    /// that arrives later than `now_ms` then never finds changes recorded that came after it.
+    /// The main loop reads `now_ms` from [`tick_ms`](Self::tick_ms) *before* it hands over received
+    /// bytes: a command that arrives later than `now_ms` then never finds changes recorded that
+    /// came after it.
     pub fn poll(&mut self, now_ms: u32) {
         let now_ms = self.ticks.extend(now_ms);
         self.record_until(now_ms);
@@ -87,9 +89,11 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.sequencer.hold_after(arrived_ms);
     }
 
-    /// Takes a byte from the RS-232 line that arrived at `tick_ms`, and the command that it completes.
+    /// Takes a byte from the RS-232 line that arrived at `tick_ms`, and the command that it
+    /// completes.
     ///
-    /// Clock and mode are set at once, by that tick; everything else is done when the reply has its turn.
+    /// Clock and mode are set at once, by that tick; everything else is done when the reply has its
+    /// turn.
     pub fn serial_receive(&mut self, byte: u8, tick_ms: u32) {
         let Some(received) = self.serial.receive(byte, &mut self.recorder) else { return };
         let answer = match received {
@@ -106,7 +110,8 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         }
     }
 
-    /// Whether another command finds room to wait for its turn. A board that can keep bytes back does so until then.
+    /// Whether another command finds room to wait for its turn. A board that can keep bytes back
+    /// does so until then.
     pub fn serial_has_room(&self) -> bool {
         self.serial.has_room()
     }
@@ -116,7 +121,8 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         count(&mut self.recorder.diagnostics.line_errors, bytes.into());
     }
 
-    /// The next byte for the RS-232 line; `None` when there is nothing to send, or the rate must change first.
+    /// The next byte for the RS-232 line; `None` when there is nothing to send, or the rate must
+    /// change first.
     pub fn serial_transmit(&mut self) -> Option<u8> {
         if let Some(byte) = self.serial.next_byte() {
             return Some(byte);
@@ -133,7 +139,8 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.recorder.configuration.baud
     }
 
-    /// The rate to which the line shall change, as soon as all bytes handed out have left the transmitter.
+    /// The rate to which the line shall change, as soon as all bytes handed out have left the
+    /// transmitter.
     ///
     /// Until [`baud_changed`](Self::baud_changed) is called, nothing more is handed out.
     pub fn baud_change(&self) -> Option<Baud> {
@@ -165,13 +172,14 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         u32::from_le_bytes([a, b, c, d])
     }
 
-    /// What a read of `count` entries (at most 10) from number `start` on would bring now, without a port and without
-    /// a trace.
+    /// What a read of `count` entries (at most 10) from number `start` on would bring now, without
+    /// a port and without a trace.
     pub fn read(&self, start: u16, count: u8) -> ReadReply {
         self.recorder.read(start, count.into())
     }
 
-    /// Commands that have arrived since power-up on any port, those included that were refused; wraps.
+    /// Commands that have arrived since power-up on any port, those included that were refused;
+    /// wraps.
     pub fn commands(&self) -> u32 {
         self.commands
     }
@@ -181,8 +189,8 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         Inputs(self.capture.state())
     }
 
-    /// Carries out a command that was meant for all recorders. Nobody is answered; reading and printing, which are
-    /// requests of one host to one recorder, have no effect.
+    /// Carries out a command that was meant for all recorders. Nobody is answered; reading and
+    /// printing, which are requests of one host to one recorder, have no effect.
     pub(crate) fn genius_broadcast(&mut self, received: Received, tick_ms: u32) {
         let answer = self.arrived(received, tick_ms);
         if let Some(answer @ Answer::To(Command::Configure(_) | Command::Erase)) = answer {
@@ -221,8 +229,8 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.serial.begin_unasked(&mut self.recorder, self.capture.edges_lost());
     }
 
-    /// Takes a command that arrived at `tick_ms`; what is to be answered, if anything. What changed before is recorded
-    /// first, by the clock and mode of that time.
+    /// Takes a command that arrived at `tick_ms`; what is to be answered, if anything. What changed
+    /// before is recorded first, by the clock and mode of that time.
     pub(crate) fn arrived(&mut self, received: Received, tick_ms: u32) -> Option<Answer> {
         self.commands = self.commands.wrapping_add(1);
         let tick_ms = self.ticks.extend(tick_ms);
@@ -244,7 +252,8 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
     fn record_until(&mut self, until_ms: u64) {
         let Node { capture, ticks, sequencer, recorder, .. } = self;
         let mask = recorder.model.mask();
-        while let Some(sample) = capture.next_if(|sample| ticks.extend(sample.tick_ms) <= until_ms) {
+        while let Some(sample) = capture.next_if(|sample| ticks.extend(sample.tick_ms) <= until_ms)
+        {
             let tick_ms = ticks.extend(sample.tick_ms);
             while let Some(change) = sequencer.next(tick_ms) {
                 recorder.record(change);

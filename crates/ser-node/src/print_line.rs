@@ -104,7 +104,10 @@ mod tests {
     #[test]
     fn an_event_is_entry_number_time_and_what_each_input_did() {
         let event = Event { time_ms: 1_795_341_600_250, changed: 0x0001_0004, state: 0x0000_0004 };
-        assert_eq!(text(PrintLine::event(1, &event)), "0001 2026-11-22 10:00:00.250  3 ON  17 OFF\r\n");
+        assert_eq!(
+            text(PrintLine::event(1, &event)),
+            "0001 2026-11-22 10:00:00.250  3 ON  17 OFF\r\n"
+        );
     }
 
     #[test]

@@ -1,9 +1,10 @@
-//! What the recorder knows and does, whichever port asks: log, clock, configuration, recording mode.
+//! What the recorder knows and does, whichever port asks: log, clock, configuration, recording
+//! mode.
 
 use chrono::NaiveDateTime;
 use ser_proto::{
-    Code, Command, Configuration, Configure, Entry, Inputs, LastBroadcast, MAX_ENTRIES, Mode, Model,
-    ParseError, ReadReply, Reply, TimeStamp,
+    Code, Command, Configuration, Configure, Entry, Inputs, LastBroadcast, MAX_ENTRIES, Mode,
+    Model, ParseError, ReadReply, Reply, TimeStamp,
 };
 
 use crate::calendar::date_time;
@@ -17,8 +18,9 @@ use crate::settings::{Settings, Storage};
 
 /// A command that has arrived and whose reply waits for its turn.
 ///
-/// Where the moment of arrival matters, the command has been carried out; all others are carried out when their turn
-/// comes, so that a read is never answered from a log that a later command has erased already.
+/// Where the moment of arrival matters, the command has been carried out; all others are carried
+/// out when their turn comes, so that a read is never answered from a log that a later command has
+/// erased already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) enum Answer {
@@ -85,8 +87,8 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
-    /// Takes a command that arrived at `tick_ms`, which may be a while before `now_ms`, and carries it out if that
-    /// moment matters.
+    /// Takes a command that arrived at `tick_ms`, which may be a while before `now_ms`, and carries
+    /// it out if that moment matters.
     pub(crate) fn arrived(&mut self, command: &Command, tick_ms: u64, now_ms: u64) -> Answer {
         match *command {
             Command::SetClock(time) => {
@@ -115,7 +117,8 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
-    /// Carries out what is still to be done, and gives the reply, with at most `max_entries` entries.
+    /// Carries out what is still to be done, and gives the reply, with at most `max_entries`
+    /// entries.
     pub(crate) fn reply(&mut self, answer: Answer, max_entries: usize) -> Reply {
         match answer {
             Answer::ClockSet => Reply::ClockSet,
@@ -129,7 +132,9 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
                 }
                 Command::Read { start, count } => {
                     let count = usize::from(count);
-                    self.count_refused(start == 0 || start > self.log.size() || count > max_entries);
+                    self.count_refused(
+                        start == 0 || start > self.log.size() || count > max_entries,
+                    );
                     Reply::Read(self.read(start, count.min(max_entries)))
                 }
                 Command::LastBroadcast => Reply::LastBroadcast(self.last_broadcast),
@@ -157,20 +162,24 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
-    /// The oldest events that auto report owes to its receiver, and the sequence number of the first one.
+    /// The oldest events that auto report owes to its receiver, and the sequence number of the
+    /// first one.
     ///
-    /// They stay owed until [`reported`](Self::reported); those that the ring has overwritten meanwhile are counted.
+    /// They stay owed until [`reported`](Self::reported); those that the ring has overwritten
+    /// meanwhile are counted.
     pub(crate) fn report(&mut self, max_entries: usize) -> Option<(u64, ReadReply)> {
         let overwritten = self.log.oldest_sequence().saturating_sub(self.report_next);
         self.report_next += overwritten;
         count(&mut self.diagnostics.events_unreported, overwritten);
         let start = self.log.entry_number(self.report_next)?;
         // In a ring that has wrapped, the slots behind the newest event hold the oldest ones.
-        let owed = usize::try_from(self.log.next_sequence() - self.report_next).unwrap_or(usize::MAX);
+        let owed =
+            usize::try_from(self.log.next_sequence() - self.report_next).unwrap_or(usize::MAX);
         Some((self.report_next, self.read(start, owed.min(max_entries))))
     }
 
-    /// So many events from `first` on have reached their receiver. Means nothing when others are owed by now.
+    /// So many events from `first` on have reached their receiver. Means nothing when others are
+    /// owed by now.
     pub(crate) fn reported(&mut self, first: u64, entries: usize) {
         if self.report_next == first {
             self.report_next += entries as u64;
@@ -179,7 +188,8 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
 
     /// A command came by broadcast and has been carried out.
     ///
-    /// The time is that of reception by the clock as it is now: after a broadcast that set it, the time that was set.
+    /// The time is that of reception by the clock as it is now: after a broadcast that set it, the
+    /// time that was set.
     pub(crate) fn broadcast_received(&mut self, code: Code, tick_ms: u64) {
         let time = to_time_stamp(self.clock.now_ms(tick_ms));
         self.last_broadcast = Some(LastBroadcast {

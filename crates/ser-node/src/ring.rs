@@ -1,23 +1,27 @@
-//! A ring between an interrupt and the main loop: one end puts items in, the other one takes them out, neither waits.
+//! A ring between an interrupt and the main loop: one end puts items in, the other one takes them
+//! out, neither waits.
 //!
 //! # Design
-//! Every cell is made of atomics, so the ring is shared without a line of unsafe code. The two positions run freely
-//! and wrap; a position is turned into a cell by masking with a length that the compiler knows. Hence no division, no
-//! bounds check that could fail and no panicking path, which an interrupt of the highest priority must not have.
+//! Every cell is made of atomics, so the ring is shared without a line of unsafe code. The two
+//! positions run freely and wrap; a position is turned into a cell by masking with a length that
+//! the compiler knows. Hence no division, no bounds check that could fail and no panicking path,
+//! which an interrupt of the highest priority must not have.
 //!
 //! # Tradeoffs
-//! An item has to fit into a handful of atomics (see [`Slot`]). `heapless::spsc` takes any item, but its two ends
-//! forget the length: each step then divides by a number from memory, and the compiler adds the panic for zero.
+//! An item has to fit into a handful of atomics (see [`Slot`]). `heapless::spsc` takes any item,
+//! but its two ends forget the length: each step then divides by a number from memory, and the
+//! compiler adds the panic for zero.
 //!
 //! # Notes
-//! All `N` cells can be in use. On Cortex-M the loads and stores are the ordinary ones; acquire and release cost a
-//! barrier instruction each.
+//! All `N` cells can be in use. On Cortex-M the loads and stores are the ordinary ones; acquire and
+//! release cost a barrier instruction each.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, AtomicUsize, Ordering};
 
 /// Something that a [`Ring`] can hold.
 ///
-/// Its cell is written by one side and read by the other, never both at once, so relaxed loads and stores will do.
+/// Its cell is written by one side and read by the other, never both at once, so relaxed loads and
+/// stores will do.
 pub trait Slot: Copy {
     /// The atomics that hold one item.
     type Cell;

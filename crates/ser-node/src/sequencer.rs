@@ -1,9 +1,9 @@
 //! Puts accepted changes in the order in which they began.
 //!
-//! A debounced change is accepted late but stamped with its first moment. Inputs with different debounce times are
-//! therefore accepted in another order than they changed. The sequencer holds changes back for as long as
-//! an earlier one can still turn up, the longest debounce time, and hands them on in order; without debounce it
-//! holds nothing back.
+//! A debounced change is accepted late but stamped with its first moment. Inputs with different
+//! debounce times are therefore accepted in another order than they changed. The sequencer holds
+//! changes back for as long as an earlier one can still turn up, the longest debounce time, and
+//! hands them on in order; without debounce it holds nothing back.
 //!
 //! It also holds changes back that came after a datagram which has arrived and not been read: what
 //! it says about clock and mode decides about them.
@@ -96,8 +96,8 @@ impl Sequencer {
         self.handed_on_ms > tick_ms
     }
 
-    /// Takes a change that was accepted at `tick_ms`; every earlier one must have been taken out with
-    /// [`next`](Self::next).
+    /// Takes a change that was accepted at `tick_ms`; every earlier one must have been taken out
+    /// with [`next`](Self::next).
     pub(crate) fn push(&mut self, tick_ms: u64, changed: u32, state: u32) {
         // Changes that capture had to drop are in no sample, but the states show them.
         let dropped = state ^ changed ^ self.accepted;
@@ -123,7 +123,9 @@ impl Sequencer {
     pub(crate) fn next(&mut self, before_ms: u64) -> Option<Change> {
         let in_order_ms = before_ms.saturating_sub(self.hold_ms);
         let end_ms = match self.hold_after_ms {
-            Some(tick_ms) => in_order_ms.min((tick_ms + 1).max(before_ms.saturating_sub(HELD_BACK_MS))),
+            Some(tick_ms) => {
+                in_order_ms.min((tick_ms + 1).max(before_ms.saturating_sub(HELD_BACK_MS)))
+            }
             None => in_order_ms,
         };
         while self.waiting_count > 0 && self.front_ms < end_ms {
@@ -166,11 +168,13 @@ mod tests {
     use crate::CaptureChannel;
     use crate::ticks::Ticks;
 
-    /// Runs samples through capture and sequencer, with the main loop looking only every `every` samples.
+    /// Runs samples through capture and sequencer, with the main loop looking only every `every`
+    /// samples.
     fn sequence(debounce: Debounce, samples: &[u32], every: usize) -> Vec<Change> {
         let mut channel = CaptureChannel::new();
         let (mut capture, mut reader) = channel.split(debounce);
-        let (mut sequencer, mut ticks, mut changes) = (Sequencer::new(debounce), Ticks::new(), Vec::new());
+        let (mut sequencer, mut ticks, mut changes) =
+            (Sequencer::new(debounce), Ticks::new(), Vec::new());
         let settling = std::iter::repeat_n(*samples.last().unwrap_or(&0), 2 * 256);
         for (tick_ms, inputs) in (1_u32..).zip(samples.iter().copied().chain(settling)) {
             capture.sample(tick_ms, inputs);
@@ -190,7 +194,8 @@ mod tests {
         changes
     }
 
-    /// What must come out: for each input alone, the first moments of changes that lasted; then sorted by time.
+    /// What must come out: for each input alone, the first moments of changes that lasted; then
+    /// sorted by time.
     fn expected(debounce: Debounce, samples: &[u32]) -> Vec<(u64, u32)> {
         let mut toggles = std::collections::BTreeMap::<u64, u32>::new();
         for bit in 0..32_u8 {
@@ -199,7 +204,9 @@ mod tests {
             let mut accepted = on(0);
             let mut index = 0;
             while index < samples.len() {
-                if on(index) != accepted && (index..=index + time).all(|later| on(later) != accepted) {
+                if on(index) != accepted
+                    && (index..=index + time).all(|later| on(later) != accepted)
+                {
                     accepted ^= 1;
                     *toggles.entry(index as u64 + 1).or_default() |= 1 << bit;
                 }
@@ -232,7 +239,9 @@ mod tests {
 
     #[test]
     fn slots_are_those_of_a_division() {
-        for tick_ms in [0, 1, 319, 320, 321, (1 << 32) - 1, 1 << 32, (1 << 32) + 1, u64::MAX - 1, u64::MAX] {
+        for tick_ms in
+            [0, 1, 319, 320, 321, (1 << 32) - 1, 1 << 32, (1 << 32) + 1, u64::MAX - 1, u64::MAX]
+        {
             assert_eq!(slot(tick_ms) as u64, tick_ms % WINDOW as u64, "{tick_ms}");
         }
     }
@@ -271,7 +280,9 @@ mod tests {
         sequencer.hold_after(Some(0));
         let mut seen = Vec::new();
         for tick_ms in 1..=2_000_u64 {
-            seen.extend(std::iter::from_fn(|| sequencer.next(tick_ms)).map(|change| change.tick_ms));
+            seen.extend(
+                std::iter::from_fn(|| sequencer.next(tick_ms)).map(|change| change.tick_ms),
+            );
             sequencer.push(tick_ms, 1, u32::from(tick_ms % 2 == 1));
         }
         let expected: Vec<u64> = (1..2_000 - HELD_BACK_MS).collect();
@@ -282,11 +293,18 @@ mod tests {
     fn changes_that_capture_dropped_do_not_falsify_the_state() {
         let mut sequencer = Sequencer::new(Debounce::OFF);
         sequencer.baseline(0);
-        // Input 3 came on in a sample that was dropped: the next one shows it as on without a change.
+        // Input 3 came on in a sample that was dropped: the next one shows it as on without a
+        // change.
         sequencer.push(10, 0b0001, 0b0101);
-        assert_eq!(sequencer.next(11), Some(Change { tick_ms: 10, changed: 0b0001, state: 0b0101 }));
+        assert_eq!(
+            sequencer.next(11),
+            Some(Change { tick_ms: 10, changed: 0b0001, state: 0b0101 })
+        );
         sequencer.push(12, 0b0100, 0b0001);
-        assert_eq!(sequencer.next(13), Some(Change { tick_ms: 12, changed: 0b0100, state: 0b0001 }));
+        assert_eq!(
+            sequencer.next(13),
+            Some(Change { tick_ms: 12, changed: 0b0100, state: 0b0001 })
+        );
     }
 
     #[test]

@@ -1,13 +1,14 @@
 //! The RS-232 port: frames in, frames and text lines out.
 //!
-//! Commands wait in line and are answered in the order in which they came. What nobody asked for (print jobs, auto
-//! report, auto print) goes out when no command is waiting, from the log itself: only a position is kept, so nothing
-//! is lost until the ring overwrites it, and then it is counted.
+//! Commands wait in line and are answered in the order in which they came. What nobody asked for
+//! (print jobs, auto report, auto print) goes out when no command is waiting, from the log itself:
+//! only a position is kept, so nothing is lost until the ring overwrites it, and then it is
+//! counted.
 
 use heapless::Deque;
 use ser_proto::{
-    AutoReport, Baud, Command, Configuration, Decoded, FrameDecoder, FrameEncoder, MAX_ENTRIES, ParseError,
-    Reply,
+    AutoReport, Baud, Command, Configuration, Decoded, FrameDecoder, FrameEncoder, MAX_ENTRIES,
+    ParseError, Reply,
 };
 
 use crate::clock::Rtc;
@@ -128,7 +129,12 @@ impl SerialPort {
     }
 
     /// Auto print begins with the next event when it is switched on.
-    pub(crate) fn configured(&mut self, before: &Configuration, after: &Configuration, log: &EventLog<'_>) {
+    pub(crate) fn configured(
+        &mut self,
+        before: &Configuration,
+        after: &Configuration,
+        log: &EventLog<'_>,
+    ) {
         if before.auto_print != after.auto_print {
             self.print_next = log.next_sequence();
         }
@@ -158,8 +164,8 @@ impl SerialPort {
             .unwrap_or(Outgoing::Nothing);
     }
 
-    /// The rate to which the line shall change now. A configuration is carried out when its reply goes out, so that
-    /// reply is the last message at the old rate.
+    /// The rate to which the line shall change now. A configuration is carried out when its reply
+    /// goes out, so that reply is the last message at the old rate.
     pub(crate) fn baud_change(&self, configuration: &Configuration) -> Option<Baud> {
         let drained = matches!(self.outgoing, Outgoing::Nothing);
         (configuration.baud != self.baud && drained).then_some(configuration.baud)
@@ -187,7 +193,10 @@ impl SerialPort {
         None
     }
 
-    fn next_report<S: Storage, R: Rtc>(&self, recorder: &mut Recorder<'_, S, R>) -> Option<Outgoing> {
+    fn next_report<S: Storage, R: Rtc>(
+        &self,
+        recorder: &mut Recorder<'_, S, R>,
+    ) -> Option<Outgoing> {
         if recorder.configuration.auto_report != AutoReport::Rs232 {
             return None;
         }
@@ -208,7 +217,10 @@ impl SerialPort {
         let newly_lost = edges_lost - self.edges_lost_printed;
         if newly_lost > 0 {
             self.edges_lost_printed = edges_lost;
-            return Some(Outgoing::Line(PrintLine::lost(newly_lost, b"INPUT CHANGES NOT RECORDED")));
+            return Some(Outgoing::Line(PrintLine::lost(
+                newly_lost,
+                b"INPUT CHANGES NOT RECORDED",
+            )));
         }
         let overwritten = skip_overwritten(&mut self.print_next, &recorder.log);
         if overwritten > 0 {
@@ -223,7 +235,8 @@ impl SerialPort {
     }
 }
 
-/// Moves a position in the log to the oldest event that is still there; says how many it passed over.
+/// Moves a position in the log to the oldest event that is still there; says how many it passed
+/// over.
 fn skip_overwritten(next: &mut u64, log: &EventLog<'_>) -> u64 {
     let overwritten = log.oldest_sequence().saturating_sub(*next);
     *next += overwritten;

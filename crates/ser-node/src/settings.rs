@@ -4,8 +4,9 @@
 //! | 'S' | format | sequence (4) | configuration (6) | CRC-32 (4) |    16 bytes, numbers little-endian
 //! ```
 //!
-//! Saving writes the older copy and leaves the newer one alone, so a power cut while writing costs the new
-//! configuration at most, never both. The configuration is stored as it stands in a `C` reply.
+//! Saving writes the older copy and leaves the newer one alone, so a power cut while writing costs
+//! the new configuration at most, never both. The configuration is stored as it stands in a `C`
+//! reply.
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use ser_proto::{Code, Configuration, Reply};
@@ -65,15 +66,23 @@ impl<S: Storage> Settings<S> {
         let first = read(&mut storage, CopyNumber::First);
         let second = read(&mut storage, CopyNumber::Second);
         let newest = match (first, second) {
-            // The second is newer when it is ahead by less than half of the range: sequence numbers may wrap.
-            (Some((older, _)), Some((newer, configuration))) if newer.wrapping_sub(older) <= u32::MAX / 2 => {
+            // The second is newer when it is ahead by less than half of the range: sequence numbers
+            // may wrap.
+            (Some((older, _)), Some((newer, configuration)))
+                if newer.wrapping_sub(older) <= u32::MAX / 2 =>
+            {
                 Some((CopyNumber::Second, newer, configuration))
             }
-            (Some((sequence, configuration)), _) => Some((CopyNumber::First, sequence, configuration)),
-            (None, Some((sequence, configuration))) => Some((CopyNumber::Second, sequence, configuration)),
+            (Some((sequence, configuration)), _) => {
+                Some((CopyNumber::First, sequence, configuration))
+            }
+            (None, Some((sequence, configuration))) => {
+                Some((CopyNumber::Second, sequence, configuration))
+            }
             (None, None) => None,
         };
-        let configuration = newest.map_or_else(Configuration::default, |(_, _, configuration)| configuration);
+        let configuration =
+            newest.map_or_else(Configuration::default, |(_, _, configuration)| configuration);
         (Settings { storage, newest }, configuration)
     }
 
@@ -85,8 +94,12 @@ impl<S: Storage> Settings<S> {
     /// Stores the configuration over the older copy and reads it back.
     pub(crate) fn save(&mut self, configuration: &Configuration) -> Result<(), NotStored> {
         let (copy, sequence) = match self.newest {
-            Some((CopyNumber::First, sequence, _)) => (CopyNumber::Second, sequence.wrapping_add(1)),
-            Some((CopyNumber::Second, sequence, _)) => (CopyNumber::First, sequence.wrapping_add(1)),
+            Some((CopyNumber::First, sequence, _)) => {
+                (CopyNumber::Second, sequence.wrapping_add(1))
+            }
+            Some((CopyNumber::Second, sequence, _)) => {
+                (CopyNumber::First, sequence.wrapping_add(1))
+            }
             None => (CopyNumber::First, 0),
         };
         self.storage.write(copy, &encode(sequence, configuration)).map_err(|_| NotStored)?;
@@ -130,7 +143,9 @@ fn decode(record: &[u8; RECORD_LEN]) -> Option<(u32, Configuration)> {
     let mut body = [Code::Configure.byte(); Configuration::BODY_LEN];
     body.get_mut(1..)?.copy_from_slice(params);
     match Reply::parse(&body) {
-        Ok(Reply::Configuration(configuration)) => Some((u32::from_le_bytes(*sequence), configuration)),
+        Ok(Reply::Configuration(configuration)) => {
+            Some((u32::from_le_bytes(*sequence), configuration))
+        }
         _ => None,
     }
 }
@@ -166,7 +181,11 @@ mod tests {
     impl Storage for Memory {
         type Error = PowerCut;
 
-        fn read(&mut self, copy: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), PowerCut> {
+        fn read(
+            &mut self,
+            copy: CopyNumber,
+            record: &mut [u8; RECORD_LEN],
+        ) -> Result<(), PowerCut> {
             if *self.bytes_until_power_cut.borrow() == 0 {
                 return Err(PowerCut);
             }
@@ -253,7 +272,11 @@ mod tests {
         struct Worn;
         impl Storage for Worn {
             type Error = PowerCut;
-            fn read(&mut self, _: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), PowerCut> {
+            fn read(
+                &mut self,
+                _: CopyNumber,
+                record: &mut [u8; RECORD_LEN],
+            ) -> Result<(), PowerCut> {
                 record.fill(0xFF);
                 Ok(())
             }

@@ -1,12 +1,14 @@
-//! Milliseconds from a free-running hardware counter, for boards: what the tick of every sample is made of.
+//! Milliseconds from a free-running hardware counter, for boards: what the tick of every sample is
+//! made of.
 
 use core::num::NonZeroU32;
 
 /// Counts milliseconds by what a free-running 32-bit counter has moved on since the last look.
 ///
-/// An interrupt that comes late, or whose predecessors were swallowed, loses no time this way: the next look makes up
-/// for all of it, as long as there is one a millisecond before the counter has gone round. The first look counts half
-/// a millisecond on, so that looks which jitter around one per millisecond give exactly one each.
+/// An interrupt that comes late, or whose predecessors were swallowed, loses no time this way: the
+/// next look makes up for all of it, as long as there is one a millisecond before the counter has
+/// gone round. The first look counts half a millisecond on, so that looks which jitter around one
+/// per millisecond give exactly one each.
 #[derive(Clone, Copy, Debug)]
 pub struct TickCounter {
     counts_per_ms: NonZeroU32,

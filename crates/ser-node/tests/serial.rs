@@ -5,12 +5,12 @@ use std::rc::Rc;
 
 use chrono::NaiveDateTime;
 use ser_node::{
-    Capture, CaptureChannel, CopyNumber, Debounce, Diagnostics, Event, Node, NodeParts, RECORD_LEN, Rtc,
-    Storage, VERSION,
+    Capture, CaptureChannel, CopyNumber, Debounce, Diagnostics, Event, Node, NodeParts, RECORD_LEN,
+    Rtc, Storage, VERSION,
 };
 use ser_proto::{
-    AutoReport, Baud, Command, Configuration, Configure, Decoded, FrameDecoder, FrameEncoder, Inputs,
-    MAX_BODY_LEN, Mode, Model, ReadReply, Reply, TimeStamp,
+    AutoReport, Baud, Command, Configuration, Configure, Decoded, FrameDecoder, FrameEncoder,
+    Inputs, MAX_BODY_LEN, Mode, Model, ReadReply, Reply, TimeStamp,
 };
 
 /// Non-volatile memory and battery-backed clock that outlive the recorder.
@@ -159,14 +159,20 @@ fn replies(bytes: &[u8]) -> Vec<Reply> {
     bytes
         .iter()
         .filter_map(|&byte| match decoder.push(byte)? {
-            Decoded::Frame(body) => Some(Reply::parse(body).expect("a recorder sends what can be parsed")),
+            Decoded::Frame(body) => {
+                Some(Reply::parse(body).expect("a recorder sends what can be parsed"))
+            }
             other => panic!("the recorder sent {other:?}"),
         })
         .collect()
 }
 
 fn changes(reply: &ReadReply) -> Vec<(u32, u32, String)> {
-    reply.entries.iter().map(|entry| (entry.changed.0, entry.state.0, entry.time.to_string())).collect()
+    reply
+        .entries
+        .iter()
+        .map(|entry| (entry.changed.0, entry.state.0, entry.time.to_string()))
+        .collect()
 }
 
 const TEN_O_CLOCK: TimeStamp =
@@ -213,8 +219,10 @@ fn the_state_at_power_up_is_the_baseline() {
                 bench.contacts(state);
                 bench.pass_ms(20);
             }
-            let seen: Vec<_> =
-                changes(&bench.read(1, 10)).iter().map(|&(changed, state, _)| (changed, state)).collect();
+            let seen: Vec<_> = changes(&bench.read(1, 10))
+                .iter()
+                .map(|&(changed, state, _)| (changed, state))
+                .collect();
             assert_eq!(seen, [(1, inputs ^ 1), (1, inputs)]);
         }
     }
@@ -240,7 +248,8 @@ fn while_stopped_nothing_is_recorded_and_starting_takes_a_new_baseline() {
 #[test]
 fn a_board_can_ask_for_what_its_lamps_tell() {
     let mut bench = Bench::new(Model::Ser160);
-    let told = |bench: &Bench| (bench.node.is_recording(), bench.node.events(), bench.node.commands());
+    let told =
+        |bench: &Bench| (bench.node.is_recording(), bench.node.events(), bench.node.commands());
     assert_eq!(told(&bench), (true, 0, 0));
     bench.events(3);
     assert_eq!(told(&bench), (true, 3, 0));
@@ -248,7 +257,11 @@ fn a_board_can_ask_for_what_its_lamps_tell() {
     bench.ask(&Command::SetMode { recording: false });
     bench.events(2);
     bench.send(*b"\x1B015858");
-    assert_eq!(told(&bench), (false, 3, 3), "erased events have happened, and refused commands have come");
+    assert_eq!(
+        told(&bench),
+        (false, 3, 3),
+        "erased events have happened, and refused commands have come"
+    );
 }
 
 #[test]
@@ -318,7 +331,8 @@ fn stamps_go_on_where_the_tick_wraps() {
         bench.capture.sample(bench.tick_ms, bench.inputs);
         bench.node.poll(bench.tick_ms);
     }
-    let stamps: Vec<_> = bench.read(1, 10).entries.iter().map(|entry| entry.time.millisecond).collect();
+    let stamps: Vec<_> =
+        bench.read(1, 10).entries.iter().map(|entry| entry.time.millisecond).collect();
     assert_eq!(stamps, (1..=9).collect::<Vec<_>>());
 }
 
@@ -344,7 +358,8 @@ fn commands_that_come_in_a_row_are_answered_as_if_they_had_come_one_by_one() {
     bench.send(FrameEncoder::new(Command::SetMode { recording: false }.to_body()));
     bench.send(FrameEncoder::new(Command::SetMode { recording: true }.to_body()));
     let replies = replies(&bench.line());
-    let [Reply::Read(first), Reply::Read(second), Reply::Erased, stopped, started] = &replies[..] else {
+    let [Reply::Read(first), Reply::Read(second), Reply::Erased, stopped, started] = &replies[..]
+    else {
         panic!("{replies:?}")
     };
     assert_eq!((first.entries.len(), second.entries.len(), second.total), (10, 3, 13));
@@ -446,7 +461,8 @@ fn a_main_loop_that_comes_late_stamps_as_if_it_had_been_there() {
     for byte in FrameEncoder::new(Command::SetClock(TEN_O_CLOCK).to_body()) {
         bench.node.serial_receive(byte, arrival_ms);
     }
-    // So does the battery-backed clock, which shows the time from the moment on in which it is written.
+    // So does the battery-backed clock, which shows the time from the moment on in which it is
+    // written.
     let now = survivors.clock.borrow().expect("was set");
     assert_eq!(TimeStamp::try_from(now), Ok(TimeStamp { millisecond: 50, ..TEN_O_CLOCK }));
     bench.node.poll(bench.tick_ms);
@@ -635,9 +651,14 @@ fn auto_report_sends_every_event_once_in_order() {
     assert_eq!(first.entries, bench.read(3, 1).entries);
     // While the line was busy, twelve more events came: ten go into one message.
     bench.events(12);
-    let [Reply::Read(ten), Reply::Read(two)] = &replies(&bench.line())[..] else { panic!("no reports") };
+    let [Reply::Read(ten), Reply::Read(two)] = &replies(&bench.line())[..] else {
+        panic!("no reports")
+    };
     assert_eq!((ten.start, ten.entries.len(), two.start, two.entries.len()), (4, 10, 14, 2));
-    assert_eq!((&ten.entries, &two.entries), (&bench.read(4, 10).entries, &bench.read(14, 10).entries));
+    assert_eq!(
+        (&ten.entries, &two.entries),
+        (&bench.read(4, 10).entries, &bench.read(14, 10).entries)
+    );
     assert_eq!(bench.line(), b"");
 }
 
@@ -651,7 +672,9 @@ fn auto_report_goes_on_at_the_start_of_the_ring() {
     bench.events(4);
     bench.line();
     bench.events(3);
-    let [Reply::Read(end), Reply::Read(start)] = &replies(&bench.line())[..] else { panic!("no reports") };
+    let [Reply::Read(end), Reply::Read(start)] = &replies(&bench.line())[..] else {
+        panic!("no reports")
+    };
     assert_eq!((end.start, end.entries.len(), start.start, start.entries.len()), (5, 1, 1, 2));
 }
 
@@ -817,7 +840,10 @@ fn what_is_no_command_needs_no_place_in_line() {
         bench.send(FrameEncoder::new(Command::QueryMode.to_body()));
     }
     bench.send(*b"\x1B015858");
-    assert_eq!((bench.diagnostics().commands_unknown, bench.diagnostics().commands_overrun), (1, 0));
+    assert_eq!(
+        (bench.diagnostics().commands_unknown, bench.diagnostics().commands_overrun),
+        (1, 0)
+    );
 }
 
 #[test]
@@ -825,7 +851,10 @@ fn a_wrong_length_is_ignored_whatever_the_values_are() {
     let mut bench = Bench::new(Model::Ser160);
     bench.send(*b"\x1B0343FFFF41");
     assert_eq!(bench.line(), b"");
-    assert_eq!((bench.diagnostics().commands_wrong_length, bench.diagnostics().parameters_refused), (1, 0));
+    assert_eq!(
+        (bench.diagnostics().commands_wrong_length, bench.diagnostics().parameters_refused),
+        (1, 0)
+    );
 }
 
 #[test]

@@ -145,7 +145,8 @@ impl fmt::Display for SimError {
             }
             SimError::EmulatorMissing { program } => write!(
                 f,
-                "{} is not installed; it comes with the package qemu-system-arm (Debian, Ubuntu) or qemu (others)",
+                "{} is not installed; it comes with the package qemu-system-arm (Debian, Ubuntu) \
+                 or qemu (others)",
                 program.display()
             ),
             SimError::EmulatorEnded { how, printed } => {
@@ -153,7 +154,11 @@ impl fmt::Display for SimError {
                 write_printed(f, printed)
             }
             SimError::NoAnswer { waited, printed } => {
-                write!(f, "the image in the emulator did not answer within {} s", waited.as_secs())?;
+                write!(
+                    f,
+                    "the image in the emulator did not answer within {} s",
+                    waited.as_secs()
+                )?;
                 write_printed(f, printed)
             }
             SimError::Unsupported(what) => write!(f, "{what} cannot be had on this system"),

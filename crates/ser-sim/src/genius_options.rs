@@ -25,7 +25,8 @@ pub struct GeniusOptions {
 }
 
 impl GeniusOptions {
-    /// A bus at the usual rate on which nothing goes wrong, with the host at the highest number that is free.
+    /// A bus at the usual rate on which nothing goes wrong, with the host at the highest number
+    /// that is free.
     #[must_use]
     pub fn new(window: impl Into<PathBuf>, nodes: Vec<(u8, Model)>) -> GeniusOptions {
         let taken = |number| nodes.iter().any(|&(node, _)| node == number);

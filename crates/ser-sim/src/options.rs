@@ -29,13 +29,13 @@ pub struct SimOptions {
     pub debounce_ms: u8,
     /// What plays the node.
     pub backend: Backend,
-    /// The Genius bus, if the node is on one. Then `model` is of no account, and the bus's first node is the one that
-    /// is played by `backend` and has the port; the others are built in.
+    /// The Genius bus, if the node is on one. Then `model` is of no account, and the bus's first
+    /// node is the one that is played by `backend` and has the port; the others are built in.
     pub genius: Option<GeniusOptions>,
     /// Called with a sentence for the user when something is not as it should be but goes on.
     pub notice: Option<Notice>,
-    /// Whether [`Simulator::played`](crate::Simulator::played) is wanted. It takes memory with every move, as long as the
-    /// simulator runs.
+    /// Whether [`Simulator::played`](crate::Simulator::played) is wanted. It takes memory with
+    /// every move, as long as the simulator runs.
     pub keep_played: bool,
 }
 
@@ -90,8 +90,8 @@ impl Default for Backend {
 pub struct EmulatorOptions {
     /// The image, an ELF file for `mps2-an385`.
     pub image: PathBuf,
-    /// File behind the board's external memory. It holds the stored configuration and the time, so a node that is given
-    /// the same file again remembers them. `None` makes a temporary one.
+    /// File behind the board's external memory. It holds the stored configuration and the time, so
+    /// a node that is given the same file again remembers them. `None` makes a temporary one.
     pub memory: Option<PathBuf>,
     /// File for what the image logs on its second serial port. `None` drops it.
     pub log: Option<PathBuf>,
@@ -106,8 +106,8 @@ impl EmulatorOptions {
         EmulatorOptions { image: image.into(), memory: None, log: None, program: None }
     }
 
-    /// Looks whether the image is a file that can be read: the emulator's own words for one that is not are less
-    /// clear.
+    /// Looks whether the image is a file that can be read: the emulator's own words for one that is
+    /// not are less clear.
     ///
     /// # Errors
     /// When it is none.

@@ -1,4 +1,5 @@
-//! The loop that serves a simulated node: it carries bytes between the machine and its line, and moves contacts.
+//! The loop that serves a simulated node: it carries bytes between the machine and its line, and
+//! moves contacts.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,7 +16,8 @@ use crate::line::{Line, garble, rates_agree};
 use crate::machine::Machine;
 use crate::options::Notice;
 
-/// Contacts of the emulated board move when this computer has time; less than this is not worth a word.
+/// Contacts of the emulated board move when this computer has time; less than this is not worth a
+/// word.
 const NOTICEABLE_MS: u64 = 3;
 
 /// While so many steps wait for their time, the stream that brings them has to wait, too: it may
@@ -59,8 +61,13 @@ impl Shared {
     }
 
     /// Waits until `done` or the time is over; gives the status then.
-    pub(crate) fn wait(&self, timeout: Duration, done: impl Fn(&Status) -> bool) -> MutexGuard<'_, Status> {
-        let waited = self.changed.wait_timeout_while(self.status(), timeout, |status| !done(status));
+    pub(crate) fn wait(
+        &self,
+        timeout: Duration,
+        done: impl Fn(&Status) -> bool,
+    ) -> MutexGuard<'_, Status> {
+        let waited =
+            self.changed.wait_timeout_while(self.status(), timeout, |status| !done(status));
         waited.unwrap_or_else(PoisonError::into_inner).0
     }
 }
@@ -108,7 +115,9 @@ impl Service {
             match stream.try_recv() {
                 Ok(arrived) => {
                     if let Some(late_ms) = machine.stream(&arrived?) {
-                        self.notify(&format!("contacts came {late_ms} ms after their time and moved late"));
+                        self.notify(&format!(
+                            "contacts came {late_ms} ms after their time and moved late"
+                        ));
                     }
                 }
                 Err(TryRecvError::Empty) => return Ok(()),
@@ -311,7 +320,8 @@ mod tests {
         FrameEncoder::new(command.to_body()).collect()
     }
 
-    /// A node, and a function that sends bytes to it at a rate and gives what comes back at that rate.
+    /// A node, and a function that sends bytes to it at a rate and gives what comes back at that
+    /// rate.
     fn with_node(talk: impl FnOnce(&mut dyn FnMut(u32, &[u8]) -> Vec<u8>, &Mutex<Desk>)) {
         let desk = Arc::new(Mutex::new(Desk { takes: usize::MAX, ..Desk::default() }));
         let mut service = Service {

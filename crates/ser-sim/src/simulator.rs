@@ -55,8 +55,16 @@ impl Simulator {
         let (requests, request_receiver) = channel();
         let shared = Arc::new(Shared::default());
         let (ready_sender, ready) = channel();
-        let SimOptions { model, contacts, debounce_ms, backend, genius, notice, keep_played, port: _ } =
-            options;
+        let SimOptions {
+            model,
+            contacts,
+            debounce_ms,
+            backend,
+            genius,
+            notice,
+            keep_played,
+            port: _,
+        } = options;
         let mut service = Service {
             line,
             wire: Wire::new(),
@@ -93,7 +101,9 @@ impl Simulator {
                         run_native(&mut service, options, start)
                     }
                     #[cfg(unix)]
-                    Backend::Emulator(options) => run_emulator(&mut service, &options, debounce_ms, start),
+                    Backend::Emulator(options) => {
+                        run_emulator(&mut service, &options, debounce_ms, start)
+                    }
                     #[cfg(not(unix))]
                     Backend::Emulator(_) => Err(SimError::Unsupported("the emulated board")),
                 };
@@ -133,7 +143,8 @@ impl Simulator {
         self.port.lines().next().unwrap_or_default()
     }
 
-    /// How a host reaches the nodes: the port of the first, if it has one, and then each of them on the bus.
+    /// How a host reaches the nodes: the port of the first, if it has one, and then each of them on
+    /// the bus.
     pub fn ports(&self) -> impl Iterator<Item = &str> {
         self.port.lines()
     }
@@ -145,8 +156,8 @@ impl Simulator {
         self.board.as_ref()
     }
 
-    /// Plays a scenario from the next millisecond on, or after those before it. Says in which millisecond since the
-    /// simulator's start it begins.
+    /// Plays a scenario from the next millisecond on, or after those before it. Says in which
+    /// millisecond since the simulator's start it begins.
     ///
     /// # Errors
     /// When the simulator has ended.
@@ -176,7 +187,8 @@ impl Simulator {
         self.shared.status().played.clone()
     }
 
-    /// Switches the node off and on again, contacts and line staying as they are; returns when it answers.
+    /// Switches the node off and on again, contacts and line staying as they are; returns when it
+    /// answers.
     ///
     /// # Errors
     /// When the simulator has ended, or the node does not come up again.
@@ -189,7 +201,9 @@ impl Simulator {
     /// # Errors
     /// What ended it: contacts that are wrong, an emulator that ended, a line that failed.
     pub fn wait(self, stop: &AtomicBool) -> Result<(), SimError> {
-        while !stop.load(Ordering::Relaxed) && !self.shared.wait(STOP_CHECK, |status| status.ended).ended {}
+        while !stop.load(Ordering::Relaxed)
+            && !self.shared.wait(STOP_CHECK, |status| status.ended).ended
+        {}
         self.stop()
     }
 
@@ -227,12 +241,16 @@ impl fmt::Debug for Simulator {
     }
 }
 
-/// Simulates a node until `stop` is set. `ready` is told, when the node answers, how a host reaches it; with several
-/// ways, one a line.
+/// Simulates a node until `stop` is set. `ready` is told, when the node answers, how a host reaches
+/// it; with several ways, one a line.
 ///
 /// # Errors
 /// As [`Simulator::start`] and [`Simulator::wait`]. Being stopped is none, at no time.
-pub fn run(options: SimOptions, stop: &AtomicBool, ready: impl FnOnce(&str)) -> Result<(), SimError> {
+pub fn run(
+    options: SimOptions,
+    stop: &AtomicBool,
+    ready: impl FnOnce(&str),
+) -> Result<(), SimError> {
     match Simulator::start_unless(options, stop) {
         Ok(simulator) => {
             ready(&simulator.port);
@@ -300,16 +318,22 @@ fn run_on_bus(
     mut start: Start,
 ) -> Result<(), SimError> {
     let shared = Arc::clone(&service.shared);
-    let mut options =
-        SimNodeOptions { debounce: Debounce::uniform(debounce_ms), ..SimNodeOptions::new(start.model) };
+    let mut options = SimNodeOptions {
+        debounce: Debounce::uniform(debounce_ms),
+        ..SimNodeOptions::new(start.model)
+    };
     let image = match backend {
         Backend::Native { line_rate, non_volatile } => {
             options = SimNodeOptions { line_rate, non_volatile, ..options };
             None
         }
-        Backend::Emulator(image) => {
-            Some(crate::qemu::emulator::Emulator::new(&image, start.model, debounce_ms, true, &shared.stop)?)
-        }
+        Backend::Emulator(image) => Some(crate::qemu::emulator::Emulator::new(
+            &image,
+            start.model,
+            debounce_ms,
+            true,
+            &shared.stop,
+        )?),
     };
     start.board = image.as_ref().map(|image| EmulatedBoard::new(image.external_bus()));
     let mut bench = GeniusBench::new(&options, image, genius)?;
@@ -335,7 +359,11 @@ fn run_on_bus(
     }
 }
 
-fn run_native(service: &mut Service, options: SimNodeOptions, start: Start) -> Result<(), SimError> {
+fn run_native(
+    service: &mut Service,
+    options: SimNodeOptions,
+    start: Start,
+) -> Result<(), SimError> {
     let pace = Pace::new();
     let mut ram = Ram::new();
     let mut off = PoweredOff::new(options);
@@ -365,8 +393,13 @@ fn run_emulator(
     mut start: Start,
 ) -> Result<(), SimError> {
     let shared = Arc::clone(&service.shared);
-    let mut emulator =
-        crate::qemu::emulator::Emulator::new(options, start.model, debounce_ms, false, &shared.stop)?;
+    let mut emulator = crate::qemu::emulator::Emulator::new(
+        options,
+        start.model,
+        debounce_ms,
+        false,
+        &shared.stop,
+    )?;
     start.board = Some(EmulatedBoard::new(emulator.external_bus()));
     emulator.power_up(&shared.stop)?;
     start.go(service, &mut emulator)?;

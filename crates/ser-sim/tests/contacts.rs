@@ -13,7 +13,11 @@ use ser_proto::Model;
 use ser_sim::{Contacts, Notice, Played, Port, Scenario, SimError, SimOptions, Simulator, Step};
 
 fn options(contacts: Contacts) -> SimOptions {
-    SimOptions { contacts, keep_played: true, ..SimOptions::new(Model::Ser160, Port::tcp("127.0.0.1:0")) }
+    SimOptions {
+        contacts,
+        keep_played: true,
+        ..SimOptions::new(Model::Ser160, Port::tcp("127.0.0.1:0"))
+    }
 }
 
 /// A simulator whose contacts come through a pipe.
@@ -36,7 +40,8 @@ fn owned(moves: &[(u64, &str)]) -> Vec<(u64, String)> {
 fn scenarios_from_a_stream_play_one_after_the_other() {
     let (simulator, mut stream) = piped();
     stream.write_all(b"ms,input,state\n0,1,1\n7,2,1\n\n3,1,0\n\n").unwrap();
-    let played = wait_for("both scenarios", || Some(simulator.played()).filter(|played| played.len() == 3));
+    let played =
+        wait_for("both scenarios", || Some(simulator.played()).filter(|played| played.len() == 3));
     assert_eq!(summary(&played), owned(&[(0, "1"), (7, "1 2"), (3, "2")]));
     for played in &played {
         assert_eq!(u64::from(played.tick_after), played.start_ms + played.at_ms);
@@ -44,7 +49,8 @@ fn scenarios_from_a_stream_play_one_after_the_other() {
     assert_eq!(played[0].start_ms, played[1].start_ms);
     assert!(played[2].start_ms > played[1].start_ms + 7);
 
-    // A third one, once the others are over; the header may come again, and the end of the stream ends it.
+    // A third one, once the others are over; the header may come again, and the end of the stream
+    // ends it.
     stream.write_all(b"ms,input,state\n0,2,0\n").unwrap();
     drop(stream);
     simulator.wait_played(LONG).unwrap();
@@ -61,8 +67,11 @@ impl Read for Endless {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         while self.rest.len() < buffer.len() {
             let line = self.lines.fetch_add(1, Ordering::Relaxed);
-            let text =
-                if line == 0 { "ms,input,state\n".to_owned() } else { format!("{line},1,{}\n", line % 2) };
+            let text = if line == 0 {
+                "ms,input,state\n".to_owned()
+            } else {
+                format!("{line},1,{}\n", line % 2)
+            };
             self.rest.extend(text.bytes());
         }
         buffer.copy_from_slice(&self.rest[..buffer.len()]);
@@ -79,7 +88,8 @@ fn a_stream_that_is_faster_than_time_has_to_wait() {
     let late = Arc::new(Mutex::new(Vec::new()));
     let heard = Arc::clone(&late);
     let notice = Notice(Box::new(move |text| heard.lock().unwrap().push(text.to_owned())));
-    let simulator = Simulator::start(SimOptions { notice: Some(notice), ..options(contacts) }).unwrap();
+    let simulator =
+        Simulator::start(SimOptions { notice: Some(notice), ..options(contacts) }).unwrap();
     let played = wait_for("a thousand moves", || {
         // What waits for its time, and some reads of 64 KiB.
         assert!(lines.load(Ordering::Relaxed) < 300_000);
@@ -119,7 +129,8 @@ fn lines_that_come_too_late_move_late_and_are_reported() {
     let notices = Arc::new(Mutex::new(Vec::new()));
     let heard = Arc::clone(&notices);
     let notice = Notice(Box::new(move |text| heard.lock().unwrap().push(text.to_owned())));
-    let simulator = Simulator::start(SimOptions { notice: Some(notice), ..options(contacts) }).unwrap();
+    let simulator =
+        Simulator::start(SimOptions { notice: Some(notice), ..options(contacts) }).unwrap();
     stream.write_all(b"ms,input,state\n0,1,1\n").unwrap();
     wait_for("the first contact", || Some(()).filter(|()| simulator.played().len() == 1));
     stream.write_all(b"0,2,1\n\n").unwrap();
@@ -155,15 +166,20 @@ fn a_file_is_checked_before_anything_starts() {
         matches!(Contacts::from_path(&path, Model::Ser160), Err(SimError::Scenario(error)) if error.line == 2)
     );
     let contacts = Contacts::from_path(&path, Model::Ser320).unwrap();
-    let simulator = Simulator::start(SimOptions { model: Model::Ser320, ..options(contacts) }).unwrap();
+    let simulator =
+        Simulator::start(SimOptions { model: Model::Ser320, ..options(contacts) }).unwrap();
     simulator.wait_played(LONG).unwrap();
     assert_eq!(summary(&simulator.played()), owned(&[(0, "17")]));
-    assert!(matches!(Contacts::from_path(Path::new("-"), Model::Ser160), Ok(Contacts::Stream { .. })));
+    assert!(matches!(
+        Contacts::from_path(Path::new("-"), Model::Ser160),
+        Ok(Contacts::Stream { .. })
+    ));
 }
 
 #[test]
 fn a_simulation_that_is_told_to_stop_ends_without_error() {
     let stop = AtomicBool::new(true);
     let mut ready = false;
-    ser_sim::run(options(Contacts::None), &stop, |port| ready = port.starts_with("tcp://")).unwrap();
+    ser_sim::run(options(Contacts::None), &stop, |port| ready = port.starts_with("tcp://"))
+        .unwrap();
 }

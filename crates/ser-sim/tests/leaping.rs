@@ -1,4 +1,5 @@
-//! A node that passes over quiet stretches is the same as one that lives through every millisecond of them.
+//! A node that passes over quiet stretches is the same as one that lives through every millisecond
+//! of them.
 
 use chrono::NaiveDate;
 use proptest::prelude::*;
@@ -21,14 +22,8 @@ enum Deed {
 }
 
 fn time() -> impl Strategy<Value = TimeStamp> {
-    (1..=12_u8, 1..=28_u8, 0..24_u8, 0..1000_u16).prop_map(|(month, day, hour, millisecond)| TimeStamp {
-        year: 26,
-        month,
-        day,
-        hour,
-        minute: 59,
-        second: 59,
-        millisecond,
+    (1..=12_u8, 1..=28_u8, 0..24_u8, 0..1000_u16).prop_map(|(month, day, hour, millisecond)| {
+        TimeStamp { year: 26, month, day, hour, minute: 59, second: 59, millisecond }
     })
 }
 
@@ -64,7 +59,8 @@ fn deed() -> impl Strategy<Value = Deed> {
     ]
 }
 
-/// Milliseconds from one deed to the next: often few, so that deeds meet, and now and then a minute.
+/// Milliseconds from one deed to the next: often few, so that deeds meet, and now and then a
+/// minute.
 fn pause() -> impl Strategy<Value = u64> {
     prop_oneof![3 => 0..20_u64, 3 => 0..2_000_u64, 1 => 0..60_000_u64]
 }
@@ -145,6 +141,9 @@ fn a_leap_ends_where_a_contact_moves() {
     node.leap_to(10 * 86_400_000);
     let played = node.take_played();
     assert_eq!(played.len(), 1);
-    assert_eq!((played[0].tick_before, u64::from(played[0].tick_after)), (node.tick_at(moves_ms), moves_ms));
+    assert_eq!(
+        (played[0].tick_before, u64::from(played[0].tick_after)),
+        (node.tick_at(moves_ms), moves_ms)
+    );
     assert_eq!((node.now_ms(), node.diagnostics().samples_missed), (864_000_000, 0));
 }

@@ -61,8 +61,12 @@ fn a_silent_client_gives_way_to_the_next_and_only_then() {
     assert_eq!(ask(&mut silent, &Command::QueryMode), None);
     assert!(ask(&mut second, &Command::QueryMode).is_some());
     let [silent, second] = [&silent, &second].map(|client| client.local_addr().unwrap());
-    let heard = wait_for("the notice", || notices.try_iter().find(|notice| notice.contains("gives way")));
-    assert!(heard.starts_with(&silent.to_string()) && heard.ends_with(&second.to_string()), "{heard}");
+    let heard =
+        wait_for("the notice", || notices.try_iter().find(|notice| notice.contains("gives way")));
+    assert!(
+        heard.starts_with(&silent.to_string()) && heard.ends_with(&second.to_string()),
+        "{heard}"
+    );
 }
 
 /// Tries until the place is free.
@@ -137,8 +141,11 @@ fn a_client_that_does_not_read_does_not_stop_the_recorder() {
         auto_print: true,
     };
     ask(&mut client, &Command::Configure(configure)).unwrap();
-    let taps =
-        Scenario::from_steps((0..2000).map(|ms| Step { at_ms: ms, input: 1, on: ms.is_multiple_of(2) }));
+    let taps = Scenario::from_steps((0..2000).map(|ms| Step {
+        at_ms: ms,
+        input: 1,
+        on: ms.is_multiple_of(2),
+    }));
     simulator.play(taps).unwrap();
     let print = frame(&Command::Print { start: 1, count: 2048 });
     client.set_nonblocking(true).unwrap();

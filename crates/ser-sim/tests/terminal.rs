@@ -1,4 +1,5 @@
-//! A simulated node on a pseudo-terminal: the life of its link, hosts that come and go, rates that do not agree.
+//! A simulated node on a pseudo-terminal: the life of its link, hosts that come and go, rates that
+//! do not agree.
 #![cfg(unix)]
 
 mod common;
@@ -11,7 +12,9 @@ use std::time::Duration;
 
 use common::{Terminal, wait_for};
 use ser_proto::{AutoReport, Baud, Command, Configure, Model, Reply};
-use ser_sim::{Backend, LineRate, NonVolatile, Port, Scenario, SimError, SimOptions, Simulator, Step};
+use ser_sim::{
+    Backend, LineRate, NonVolatile, Port, Scenario, SimError, SimOptions, Simulator, Step,
+};
 
 fn on(link: &Path) -> SimOptions {
     let port = Port::Pty { link: Some(link.to_owned()) };
@@ -60,7 +63,8 @@ fn the_link_is_there_while_the_node_answers() {
 
 #[test]
 fn without_a_place_the_link_is_in_a_directory_that_goes_with_it() {
-    let simulator = Simulator::start(SimOptions::new(Model::Ser320, Port::Pty { link: None })).unwrap();
+    let simulator =
+        Simulator::start(SimOptions::new(Model::Ser320, Port::Pty { link: None })).unwrap();
     let link = PathBuf::from(simulator.port());
     Terminal::open(&link, 9600).ask(&Command::QueryMode);
     drop(simulator);
@@ -133,8 +137,10 @@ fn of_simulators_that_start_together_under_different_spellings_one_has_the_link(
     let spellings = [place.link(), place.0.path().join("sub/../ser"), place.0.path().join("./ser")];
     for _ in 0..10 {
         let started: Vec<_> = thread::scope(|scope| {
-            let starting: Vec<_> =
-                spellings.iter().map(|link| scope.spawn(|| Simulator::start(on(link)).ok())).collect();
+            let starting: Vec<_> = spellings
+                .iter()
+                .map(|link| scope.spawn(|| Simulator::start(on(link)).ok()))
+                .collect();
             starting.into_iter().filter_map(|starting| starting.join().unwrap()).collect()
         });
         assert_eq!(started.len(), 1);
@@ -199,7 +205,9 @@ fn a_power_cycle_forgets_the_events_and_keeps_configuration_contacts_and_host() 
     simulator.play(Scenario::from_steps([Step { at_ms: 0, input: 7, on: true }])).unwrap();
     simulator.wait_played(common::LONG).unwrap();
     let read = Command::Read { start: 1, count: 1 };
-    wait_for("an event", || matches!(host.ask(&read), Reply::Read(reply) if reply.total == 1).then_some(()));
+    wait_for("an event", || {
+        matches!(host.ask(&read), Reply::Read(reply) if reply.total == 1).then_some(())
+    });
     simulator.power_cycle().unwrap();
     assert!(matches!(host.ask(&read), Reply::Read(reply) if reply.total == 0));
 }
@@ -219,7 +227,9 @@ fn a_node_whose_memory_is_kept_comes_back_as_it_was() {
     drop(simulator);
     let _simulator = Simulator::start(options()).unwrap();
     let reply = Terminal::open(place.link(), 4800).ask(&Command::QueryConfiguration);
-    assert!(matches!(reply, Reply::Configuration(configuration) if configuration.baud == Baud::B4800));
+    assert!(
+        matches!(reply, Reply::Configuration(configuration) if configuration.baud == Baud::B4800)
+    );
 }
 
 #[test]

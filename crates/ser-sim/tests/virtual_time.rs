@@ -4,7 +4,8 @@ use chrono::{NaiveDate, NaiveDateTime, TimeDelta};
 use proptest::prelude::*;
 use ser_node::Debounce;
 use ser_proto::{
-    Baud, Command, Configure, Decoded, Entry, FrameDecoder, FrameEncoder, Inputs, MAX_BODY_LEN, Model, Reply,
+    Baud, Command, Configure, Decoded, Entry, FrameDecoder, FrameEncoder, Inputs, MAX_BODY_LEN,
+    Model, Reply,
 };
 use ser_sim::{LineRate, NonVolatile, Ram, Scenario, SimNode, SimNodeOptions, SimRtc, Step};
 
@@ -24,7 +25,9 @@ fn step(at_ms: u64, input: u8, on: bool) -> Step {
 fn replies(bytes: &[u8]) -> Vec<Reply> {
     let mut decoder = FrameDecoder::<MAX_BODY_LEN>::new();
     let frames = bytes.iter().filter_map(|&byte| match decoder.push(byte) {
-        Some(Decoded::Frame(body)) => Some(Reply::parse(body).expect("the node speaks the protocol")),
+        Some(Decoded::Frame(body)) => {
+            Some(Reply::parse(body).expect("the node speaks the protocol"))
+        }
         _ => None,
     });
     frames.collect()
@@ -74,8 +77,10 @@ fn the_breaker_trip_is_recorded_to_the_millisecond_after_a_stall_of_seconds() {
         }
     }
     let log = log(&mut node);
-    let recorded: Vec<_> =
-        log.iter().map(|entry| (NaiveDateTime::try_from(entry.time).unwrap(), entry.changed.0)).collect();
+    let recorded: Vec<_> = log
+        .iter()
+        .map(|entry| (NaiveDateTime::try_from(entry.time).unwrap(), entry.changed.0))
+        .collect();
     assert_eq!(recorded, expected);
     let played: Vec<_> = node.take_played();
     assert_eq!(played.len(), log.len());
@@ -116,7 +121,8 @@ fn a_log_shows_what_reading_it_brings() {
 }
 
 #[test]
-fn contacts_at_power_up_are_the_baseline_and_a_power_cycle_forgets_the_log_and_keeps_the_configuration() {
+fn contacts_at_power_up_are_the_baseline_and_a_power_cycle_forgets_the_log_and_keeps_the_configuration()
+ {
     let mut ram = Ram::new();
     let mut node = SimNode::new(options(Model::Ser160), &mut ram);
     node.play(&Scenario::from_steps([step(0, 1, true), step(5, 2, true)]));
@@ -161,7 +167,11 @@ fn at_the_real_rate_a_byte_takes_ten_bit_times() {
         node.advance_to(ms);
         arrived.extend(node.take_output());
         // 9600 bit/s: 1.04 ms per byte.
-        assert_eq!(arrived.len(), usize::try_from((ms - 10) * 960 / 1000).unwrap().min(11), "at {ms} ms");
+        assert_eq!(
+            arrived.len(),
+            usize::try_from((ms - 10) * 960 / 1000).unwrap().min(11),
+            "at {ms} ms"
+        );
         if arrived.len() == 11 {
             break;
         }
@@ -171,7 +181,8 @@ fn at_the_real_rate_a_byte_takes_ten_bit_times() {
 
 /// Any scenario of three inputs within a second.
 fn scenario() -> impl Strategy<Value = Scenario> {
-    let step = (0..1000_u64, 1..=3_u8, any::<bool>()).prop_map(|(at_ms, input, on)| step(at_ms, input, on));
+    let step = (0..1000_u64, 1..=3_u8, any::<bool>())
+        .prop_map(|(at_ms, input, on)| step(at_ms, input, on));
     proptest::collection::vec(step, 0..60).prop_map(Scenario::from_steps)
 }
 

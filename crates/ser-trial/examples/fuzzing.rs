@@ -1,5 +1,5 @@
-//! What goes with the fuzzer: `plant` writes the seeds into its corpus, `replay` runs a target on single inputs, in an
-//! ordinary build.
+//! What goes with the fuzzer: `plant` writes the seeds into its corpus, `replay` runs a target on
+//! single inputs, in an ordinary build.
 
 use std::error::Error;
 use std::fs::{self, File};
@@ -19,10 +19,11 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let done = match arguments[..] {
-        ["plant", target, folder] => find(target).and_then(|target| plant(target, Path::new(folder))),
-        ["replay", target, ref files @ ..] if !files.is_empty() => {
-            find(target).and_then(|target| files.iter().try_for_each(|file| replay(target, Path::new(file))))
+        ["plant", target, folder] => {
+            find(target).and_then(|target| plant(target, Path::new(folder)))
         }
+        ["replay", target, ref files @ ..] if !files.is_empty() => find(target)
+            .and_then(|target| files.iter().try_for_each(|file| replay(target, Path::new(file)))),
         _ => Err(USAGE.into()),
     };
     match done {
@@ -65,7 +66,8 @@ fn write_new(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
 
 fn is(path: &Path, bytes: &[u8]) -> bool {
     let len = fs::metadata(path).map(|found| found.len());
-    len.is_ok_and(|len| len == bytes.len() as u64) && fs::read(path).is_ok_and(|found| found == bytes)
+    len.is_ok_and(|len| len == bytes.len() as u64)
+        && fs::read(path).is_ok_and(|found| found == bytes)
 }
 
 fn replay(target: Target, file: &Path) -> Result<(), Box<dyn Error>> {

@@ -1,8 +1,8 @@
 //! How long it takes to read a full log over RS-232, beside the least that it could take.
 //!
-//! The client's own session and log reader talk to the recorder over a line that has its rate in both directions, in
-//! virtual time: the same on every computer. Everything counts, from the first bit of the first request to the moment
-//! in which the last event is delivered.
+//! The client's own session and log reader talk to the recorder over a line that has its rate in
+//! both directions, in virtual time: the same on every computer. Everything counts, from the first
+//! bit of the first request to the moment in which the last event is delivered.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -87,7 +87,8 @@ struct Host<'a> {
 
 impl<'a> Host<'a> {
     fn new(model: Model, ram: &'a mut Ram) -> Host<'a> {
-        let options = SimNodeOptions { line_rate: ser_sim::LineRate::Real, ..SimNodeOptions::new(model) };
+        let options =
+            SimNodeOptions { line_rate: ser_sim::LineRate::Real, ..SimNodeOptions::new(model) };
         let node = SimNode::new(options, ram);
         let line_rate = LineRate::BitsPerSecond(node.baud().bits_per_second());
         let timing = Timing { timeout: Duration::from_secs(1), retries: 2, line_rate };
@@ -96,8 +97,11 @@ impl<'a> Host<'a> {
 
     /// Lets events happen, one in each millisecond.
     fn record(&mut self, events: u16) {
-        let steps =
-            (0..events).map(|event| Step { at_ms: event.into(), input: 1, on: event.is_multiple_of(2) });
+        let steps = (0..events).map(|event| Step {
+            at_ms: event.into(),
+            input: 1,
+            on: event.is_multiple_of(2),
+        });
         self.node.play(&Scenario::from_steps(steps));
         self.node.advance_to(self.node.now_ms() + u64::from(events) + 1);
     }
@@ -112,7 +116,10 @@ impl<'a> Host<'a> {
         };
         self.session.request(Command::Configure(configure)).expect("nothing else is under way");
         let reply = self.next_reply();
-        assert!(matches!(reply, Reply::Configuration(in_force) if in_force.baud == baud), "{reply:?}");
+        assert!(
+            matches!(reply, Reply::Configuration(in_force) if in_force.baud == baud),
+            "{reply:?}"
+        );
         self.session.set_line_rate(LineRate::BitsPerSecond(baud.bits_per_second()));
         self.node.advance_to(self.node.now_ms() + 100);
     }
@@ -129,7 +136,9 @@ impl<'a> Host<'a> {
             if !reader.is_waiting() {
                 return (entries, reader.summary());
             }
-            let Reply::Read(reply) = self.next_reply() else { panic!("another answer than to a read") };
+            let Reply::Read(reply) = self.next_reply() else {
+                panic!("another answer than to a read")
+            };
             let mut take = |delivery| {
                 if let Delivery::Event { entry, .. } = delivery {
                     entries.push(entry);
@@ -151,7 +160,8 @@ impl<'a> Host<'a> {
                 return answer.expect("an answer");
             }
             while let Some(attempt) = self.session.dispatch(now) {
-                let byte_ns = BITS_PER_BYTE * 1_000_000_000 / u64::from(self.node.baud().bits_per_second());
+                let byte_ns =
+                    BITS_PER_BYTE * 1_000_000_000 / u64::from(self.node.baud().bits_per_second());
                 self.free_ns = self.free_ns.max(now_ms * NS_PER_MS);
                 for &byte in attempt.frame() {
                     self.free_ns += byte_ns;

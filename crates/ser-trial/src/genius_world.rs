@@ -1,5 +1,5 @@
-//! Recorders and a host on a Genius bus, in virtual time: nodes with their ports, boards, the bus, and the driver at
-//! the host's board.
+//! Recorders and a host on a Genius bus, in virtual time: nodes with their ports, boards, the bus,
+//! and the driver at the host's board.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -7,15 +7,17 @@ use std::rc::Rc;
 
 use chrono::NaiveDateTime;
 use geni_board::{
-    CommandError, Completion, Configuration, Data, Destination, Driver, Event, Options, ReceivedDatagram,
-    Start,
+    CommandError, Completion, Configuration, Data, Destination, Driver, Event, Options,
+    ReceivedDatagram, Start,
 };
 use ser_node::{Debounce, GeniusOptions, GeniusPort};
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{
     AutoReport, Command, Configure, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Model, Reply,
 };
-use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusTiming, Handle, Noise, ViolationKind};
+use ser_sim::genius::{
+    Board, BoardOptions, BoardWindow, Bus, BusTiming, Handle, Noise, ViolationKind,
+};
 use ser_sim::{NonVolatile, Ram, Scenario, SimNode, SimNodeOptions, SimRtc, Step};
 
 /// Device number of the host.
@@ -33,8 +35,8 @@ pub const REPORT: Configure = Configure {
 /// Reset line at power-up, as short as the boards allow.
 const RESET: Start = Start::Reset { hold_ms: 20 };
 
-/// Time in which whatever is waited for happens. Thirty boards that all want to know who all others are, one datagram
-/// per scan, take more than a minute.
+/// Time in which whatever is waited for happens. Thirty boards that all want to know who all others
+/// are, one datagram per scan, take more than a minute.
 const LIMIT_MS: u64 = 300_000;
 
 /// A host finds out that its board has started anew within a few looks at it.
@@ -81,7 +83,9 @@ impl Recorder {
         let (mut replies, mut text) = (Vec::new(), String::new());
         for byte in self.node.take_output() {
             match self.frames.push(byte) {
-                Some(Decoded::Frame(body)) => replies.push(Reply::parse(body).expect("a recorder's reply")),
+                Some(Decoded::Frame(body)) => {
+                    replies.push(Reply::parse(body).expect("a recorder's reply"))
+                }
                 Some(Decoded::Text(byte)) => text.push(byte.into()),
                 Some(Decoded::Dropped(dropped)) => panic!("the recorder sent {dropped:?}"),
                 None => {}
@@ -127,7 +131,8 @@ pub struct World {
 }
 
 impl World {
-    /// Recorders with these device numbers and a host, all powered at time zero, on a bus that is as it should be.
+    /// Recorders with these device numbers and a host, all powered at time zero, on a bus that is
+    /// as it should be.
     #[must_use]
     pub fn new(recorders: &[(u8, Model)]) -> World {
         World::with_noise(recorders, Noise::default())
@@ -157,10 +162,14 @@ impl World {
             .map(|&(number, model)| {
                 let (board, window) = connect(number);
                 // Every clock shows another time, until somebody sets them.
-                let time = NaiveDateTime::default() + chrono::TimeDelta::days(365 * i64::from(number));
-                let non_volatile =
-                    NonVolatile { storage: ser_sim::MemoryStorage::default(), rtc: SimRtc::held_at(time) };
-                let options = SimNodeOptions { debounce, non_volatile, ..SimNodeOptions::new(model) };
+                let time =
+                    NaiveDateTime::default() + chrono::TimeDelta::days(365 * i64::from(number));
+                let non_volatile = NonVolatile {
+                    storage: ser_sim::MemoryStorage::default(),
+                    rtc: SimRtc::held_at(time),
+                };
+                let options =
+                    SimNodeOptions { debounce, non_volatile, ..SimNodeOptions::new(model) };
                 // Memory of the test process goes when it does.
                 let node = SimNode::new(options, Box::leak(Box::new(Ram::new())));
                 let options = GeniusOptions { start: RESET, ..GeniusOptions::new(model) };
@@ -190,7 +199,8 @@ impl World {
     /// When somebody is not on the bus within five minutes.
     #[must_use]
     pub fn started_with(recorders: &[(u8, Model)], debounce: Debounce) -> World {
-        World::of(recorders, Noise::default(), debounce, BoardOptions::default().model).when_started()
+        World::of(recorders, Noise::default(), debounce, BoardOptions::default().model)
+            .when_started()
     }
 
     fn when_started(self) -> World {
@@ -260,9 +270,17 @@ impl World {
     }
 
     /// Gives the host's board a datagram, as soon as it takes one.
-    pub fn transmit(&mut self, destination: Destination, function: u8, subfunction: u8, data: &[u8]) {
+    pub fn transmit(
+        &mut self,
+        destination: Destination,
+        function: u8,
+        subfunction: u8,
+        data: &[u8],
+    ) {
         let data = Data::from_slice(data).expect("short enough");
-        self.until("the host's board is free", |world| world.host.driver.can_transmit().then_some(()));
+        self.until("the host's board is free", |world| {
+            world.host.driver.can_transmit().then_some(())
+        });
         let transmission = geni_board::Transmission {
             destination,
             function,
@@ -314,8 +332,8 @@ impl World {
         bus.get(self.host.board).ram()[table..table + len].to_vec()
     }
 
-    /// No host did what the manual forbids, except that a recorder's board which has started anew by itself was looked
-    /// at once before it may be: nobody tells the host.
+    /// No host did what the manual forbids, except that a recorder's board which has started anew
+    /// by itself was looked at once before it may be: nobody tells the host.
     ///
     /// # Panics
     /// When one did more.

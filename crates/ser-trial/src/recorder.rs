@@ -10,8 +10,8 @@ use ser_proto::{Entry, Model};
 use ser_sim::genius::Noise;
 use ser_sim::testing::{Kind, PATIENCE, image};
 use ser_sim::{
-    Backend, EmulatedBoard, EmulatorOptions, GeniusOptions, Notice, Played, Port, Scenario, SimOptions,
-    Simulator, Step,
+    Backend, EmulatedBoard, EmulatorOptions, GeniusOptions, Notice, Played, Port, Scenario,
+    SimOptions, Simulator, Step,
 };
 use tempfile::TempDir;
 
@@ -58,7 +58,8 @@ impl Recorder {
         let folder = tempfile::tempdir().expect("a folder");
         let genius = GeniusOptions::new(folder.path().join("host"), vec![(NODE, model)]);
         let genius = GeniusOptions { noise, ..genius };
-        let options = SimOptions { backend: kind.backend(), genius: Some(genius), ..options(model) };
+        let options =
+            SimOptions { backend: kind.backend(), genius: Some(genius), ..options(model) };
         Recorder::start_with(options, Some(folder))
     }
 
@@ -68,7 +69,10 @@ impl Recorder {
     /// When it does not answer, or the image is not there.
     #[must_use]
     pub fn start_logging(log: &Path) -> Recorder {
-        Recorder::start_image(EmulatorOptions { log: Some(log.to_owned()), ..EmulatorOptions::new(image()) })
+        Recorder::start_image(EmulatorOptions {
+            log: Some(log.to_owned()),
+            ..EmulatorOptions::new(image())
+        })
     }
 
     /// Switches on the ARM image with a memory and a log in files.
@@ -143,7 +147,8 @@ impl Recorder {
     #[must_use]
     pub fn host(&self) -> GeniHost {
         let port = self.simulator.ports().last().expect("a port");
-        let window = port.strip_prefix("geni:").and_then(|port| port.split_once('?')).expect("a window").0;
+        let window =
+            port.strip_prefix("geni:").and_then(|port| port.split_once('?')).expect("a window").0;
         GeniHost::open(window, PATIENCE).unwrap_or_else(|error| panic!("{error}"))
     }
 
@@ -232,8 +237,8 @@ pub fn stamp_ms(entry: &Entry) -> i64 {
     time.and_utc().timestamp_millis()
 }
 
-/// Checks that entries are the moves that were played: the same inputs in the same order, stamps exactly as far apart as the
-/// samples that can have seen them.
+/// Checks that entries are the moves that were played: the same inputs in the same order, stamps
+/// exactly as far apart as the samples that can have seen them.
 ///
 /// # Panics
 /// When they are not.
@@ -245,6 +250,9 @@ pub fn assert_entries_are(entries: &[Entry], played: &[Played]) {
         let delta_ms = stamp_ms(entry) - stamp_ms(first);
         let least = i64::from(moved.tick_before) - i64::from(first_move.tick_after);
         let most = i64::from(moved.tick_after) - i64::from(first_move.tick_before);
-        assert!((least..=most).contains(&delta_ms), "{delta_ms} ms after the first, {least}…{most} played");
+        assert!(
+            (least..=most).contains(&delta_ms),
+            "{delta_ms} ms after the first, {least}…{most} played"
+        );
     }
 }

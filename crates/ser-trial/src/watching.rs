@@ -1,5 +1,5 @@
-//! How many events `watch` delivers while they come faster and faster: the client's own watcher against the recorder
-//! over a line that has its rate in both directions, in virtual time.
+//! How many events `watch` delivers while they come faster and faster: the client's own watcher
+//! against the recorder over a line that has its rate in both directions, in virtual time.
 
 use std::collections::VecDeque;
 use std::io;
@@ -78,15 +78,19 @@ impl Load {
     pub fn run(self) -> Watched {
         let world = World::new();
         let options = Options { timeout: Duration::from_secs(1), retries: 2 };
-        let mut unit = Unit::with_clock(Box::new(Line(world.clone())), options, Arc::new(world.clone()));
+        let mut unit =
+            Unit::with_clock(Box::new(Line(world.clone())), options, Arc::new(world.clone()));
         let found = unit.configuration().expect("an answer");
         let configure = Configure { size: Some(self.size), baud: Some(BAUD), ..found.into() };
         let found = unit.configure(configure).expect("it is as it was asked for");
         let mut watcher = self.watcher(found);
-        let mut watched = Watched { events: (self.per_second * self.seconds).into(), ..Watched::default() };
+        let mut watched =
+            Watched { events: (self.per_second * self.seconds).into(), ..Watched::default() };
         // What happens before the first reading is not what is watched.
         while !self.is_set_up(&watcher) {
-            watcher.step::<RequestError>(&mut unit, HEARTBEAT, &mut |_| Ok(())).expect("nothing happens yet");
+            watcher
+                .step::<RequestError>(&mut unit, HEARTBEAT, &mut |_| Ok(()))
+                .expect("nothing happens yet");
         }
         let (load_ends_ms, mut last) = (world.lock().begin(self), 0);
         while watched.delivered + watched.lost < watched.events {
@@ -108,7 +112,8 @@ impl Load {
 
     fn watcher(self, found: Configuration) -> LogWatcher {
         let follower = LogFollower::new(None, found.size);
-        let reporting = |auto_report| Configure { auto_report, size: None, baud: None, ..found.into() };
+        let reporting =
+            |auto_report| Configure { auto_report, size: None, baud: None, ..found.into() };
         match self.way {
             Way::Polling => LogWatcher::polling(follower, Duration::from_secs(1), true),
             Way::Reports => {
@@ -187,8 +192,10 @@ impl World {
     fn new() -> World {
         // The node lives as long as its host, which nothing bounds.
         let ram = Box::leak(Box::new(Ram::new()));
-        let options =
-            SimNodeOptions { line_rate: ser_sim::LineRate::Real, ..SimNodeOptions::new(Model::Ser160) };
+        let options = SimNodeOptions {
+            line_rate: ser_sim::LineRate::Real,
+            ..SimNodeOptions::new(Model::Ser160)
+        };
         let node = SimNode::new(options, ram);
         World(Arc::new(Mutex::new(Recorder { node, on_the_way: VecDeque::new(), free_ns: 0 })))
     }
@@ -236,7 +243,8 @@ impl Transport for Line {
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         let mut recorder = self.0.lock();
-        let byte_ns = BITS_PER_BYTE * 1_000_000_000 / u64::from(recorder.node.baud().bits_per_second());
+        let byte_ns =
+            BITS_PER_BYTE * 1_000_000_000 / u64::from(recorder.node.baud().bits_per_second());
         recorder.free_ns = recorder.free_ns.max(recorder.node.now_ms() * NS_PER_MS);
         for &byte in bytes {
             recorder.free_ns += byte_ns;

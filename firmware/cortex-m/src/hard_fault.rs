@@ -1,9 +1,9 @@
 //! The hard fault handler's way in.
 //!
 //! # Design
-//! It changes to a stack of its own before it does anything, so that a stack that has run out is a fault like any
-//! other. The processor's own attempt to save registers there fails as well, and it then enters the handler without
-//! them (ARMv7-M architecture, B1.5.11, derived exceptions).
+//! It changes to a stack of its own before it does anything, so that a stack that has run out is a
+//! fault like any other. The processor's own attempt to save registers there fails as well, and it
+//! then enters the handler without them (ARMv7-M architecture, B1.5.11, derived exceptions).
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -41,7 +41,8 @@ pub unsafe fn evidence(frame: *const ExceptionFrame) -> Evidence {
         let frame = unsafe { &*frame };
         SavedRegisters { pc: frame.pc(), lr: frame.lr() }
     });
-    // SAFETY: the registers are always there; only status and addresses are read, which has no side effects.
+    // SAFETY: the registers are always there; only status and addresses are read, which has no side
+    // effects.
     let registers = unsafe { &*SCB::PTR };
     #[expect(clippy::cast_possible_truncation, reason = "addresses have 32 bits")]
     let stack_end = stack::end() as u32;

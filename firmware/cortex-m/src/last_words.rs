@@ -1,8 +1,9 @@
 //! The memory that outlives a reset, and the only way to write to it: on the way there.
 //!
 //! # Notes
-//! It is read and written word by word and volatile: nobody gave it a first value, and after a power cut it holds
-//! anything. `ser_board` checks what it finds. A power cut that was short may leave it whole.
+//! It is read and written word by word and volatile: nobody gave it a first value, and after a
+//! power cut it holds anything. `ser_board` checks what it finds. A power cut that was short may
+//! leave it whole.
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -14,8 +15,8 @@ use ser_board::last_words::{self, Boot, Fault, Memory, ResetFlag, Text, WORDS};
 #[repr(transparent)]
 struct Kept(UnsafeCell<MaybeUninit<Memory>>);
 
-// SAFETY: used by `boot`, which runs once and before there are interrupts, and by `end`, which does not return: whoever
-// is interrupted by it does not go on, so no two of them are ever at work.
+// SAFETY: used by `boot`, which runs once and before there are interrupts, and by `end`, which does
+// not return: whoever is interrupted by it does not go on, so no two of them are ever at work.
 unsafe impl Sync for Kept {}
 
 #[unsafe(link_section = ".uninit.LAST_WORDS")]
@@ -37,8 +38,8 @@ fn with_memory<T>(change: impl FnOnce(&mut Memory) -> T) -> T {
     result
 }
 
-/// What is known about the runs before; counts the start. `flag` says why the chip was reset, by the chip's own flags
-/// or by what is in the memory.
+/// What is known about the runs before; counts the start. `flag` says why the chip was reset, by
+/// the chip's own flags or by what is in the memory.
 ///
 /// # Safety
 /// This is called once only, before there are interrupts.

@@ -1,7 +1,8 @@
 //! What the images have in common because their processors do, Cortex-M3 and Cortex-M4F alike: what
 //! ends a run, what is left of it, and what the program is kept from.
 //!
-//! Everything here touches memory or registers of the processor itself. What can be said without is in `ser_board`.
+//! Everything here touches memory or registers of the processor itself. What can be said without is
+//! in `ser_board`.
 #![no_std]
 
 pub mod hard_fault;

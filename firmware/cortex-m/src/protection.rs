@@ -1,9 +1,10 @@
-//! The memory protection unit: what a program never touches is a fault when it is touched all the same.
+//! The memory protection unit: what a program never touches is a fault when it is touched all the
+//! same.
 //!
 //! # Design
-//! A board says what it is kept from; the rest keeps the processor's own map. What lies below the stack belongs on
-//! every board's list: where there is no memory, a store may as well be swallowed, and a stack that has run out would
-//! go unnoticed until something is read back.
+//! A board says what it is kept from; the rest keeps the processor's own map. What lies below the
+//! stack belongs on every board's list: where there is no memory, a store may as well be swallowed,
+//! and a stack that has run out would go unnoticed until something is read back.
 //!
 //! # Notes
 //! Faults end in the hard fault handler, for which the unit is off. (ARMv7-M architecture, B3.5.)
@@ -43,8 +44,8 @@ impl Region {
         Region::new(base, len, NEVER_EXECUTE | FULL_ACCESS | SHAREABLE | BUFFERABLE)
     }
 
-    /// The length is a power of two, 32 at least, and the base a multiple of it. For constants: all else does not
-    /// compile.
+    /// The length is a power of two, 32 at least, and the base a multiple of it. For constants: all
+    /// else does not compile.
     const fn new(base: u32, len: u32, attributes: u32) -> Region {
         assert!(len.is_power_of_two() && len >= 32 && base.is_multiple_of(len));
         // The size is a power of two, given as its exponent less one.
@@ -55,7 +56,8 @@ impl Region {
 /// Switches the protection on, for good. Where regions overlap, the later one holds.
 ///
 /// # Safety
-/// The regions take nothing from the program that it uses, and what it shares with nobody is not among device memory.
+/// The regions take nothing from the program that it uses, and what it shares with nobody is not
+/// among device memory.
 pub unsafe fn enable<const N: usize>(mpu: &MPU, regions: [Region; N]) {
     const { assert!(N <= REGIONS) };
     for (number, region) in (0..).zip(regions) {

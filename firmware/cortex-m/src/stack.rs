@@ -1,4 +1,5 @@
-//! The stack: where it is and how much of it has been in use. The linker script of the board sets it aside.
+//! The stack: where it is and how much of it has been in use. The linker script of the board sets
+//! it aside.
 
 use core::ptr;
 
@@ -24,14 +25,15 @@ fn start() -> usize {
 /// Whether all of `value` lies in the stack. It may point anywhere.
 #[inline]
 pub fn contains<T>(value: *const T) -> bool {
-    value.addr() >= end() && value.addr().checked_add(size_of::<T>()).is_some_and(|above| above <= start())
+    value.addr() >= end()
+        && value.addr().checked_add(size_of::<T>()).is_some_and(|above| above <= start())
 }
 
 /// Bytes of the stack that have been in use at some time since boot.
 pub fn high_water() -> usize {
     let mut lowest = &raw const _stack_end;
-    // SAFETY: from the stack's lowest word up to the frame of this function there is memory, all of it
-    // painted by the start-up code or written since.
+    // SAFETY: from the stack's lowest word up to the frame of this function there is memory, all of
+    // it painted by the start-up code or written since.
     while lowest.addr() < start() && unsafe { ptr::read_volatile(lowest) } == STACK_PAINT_VALUE {
         lowest = lowest.wrapping_add(1);
     }

@@ -1,11 +1,12 @@
 //! The very first step after a reset: the clock behind the tick begins to count.
 //!
-//! So the time that a start takes is known, with what the start-up code does before there are variables: the bench
-//! reads it off the external bus.
+//! So the time that a start takes is known, with what the start-up code does before there are
+//! variables: the bench reads it off the external bus.
 
 use core::arch::naked_asm;
 
-/// Starts timer 1, which counts down from the top and is never stopped again; `timer` goes on with it.
+/// Starts timer 1, which counts down from the top and is never stopped again; `timer` goes on with
+/// it.
 ///
 /// # Safety
 /// Called by the start-up code, before there are variables.

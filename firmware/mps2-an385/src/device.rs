@@ -1,6 +1,7 @@
 //! What ARM's application note AN385 says about the chip: interrupt numbers, clock, addresses.
 //!
-//! Takes the place of a generated device crate; the few registers in use are described where they are driven.
+//! Takes the place of a generated device crate; the few registers in use are described where they
+//! are driven.
 
 use cortex_m::interrupt::InterruptNumber;
 

@@ -1,4 +1,5 @@
-//! The external bus: GENI board, field inputs, straps, lamps, clock, marks for the bench, configuration memory.
+//! The external bus: GENI board, field inputs, straps, lamps, clock, marks for the bench,
+//! configuration memory.
 //!
 //! | offset        | what                                                   | written by |
 //! |---------------|--------------------------------------------------------|------------|
@@ -30,24 +31,29 @@
 //!
 //! Words have 32 bits, little-endian.
 //!
-//! - Causes: 0 unknown, 1 panic, 2 hard fault, 3 watchdog, 4 stack overflow, 5 the program asked for it, 6 power.
-//! - Faults that can be forced: 1 hard fault, 2 the main loop hangs, 3 panic, 4 stack overflow, 5 capture stops, 6
-//!   stack overflow by a store, 7 reset without a word. The recorder clears the word before it obeys.
-//! - Two words with a seal are good when the seal is the inverse of (low xor (high rotated by 16 bits)).
+//! - Causes: 0 unknown, 1 panic, 2 hard fault, 3 watchdog, 4 stack overflow, 5 the program asked
+//!   for it, 6 power.
+//! - Faults that can be forced: 1 hard fault, 2 the main loop hangs, 3 panic, 4 stack overflow, 5
+//!   capture stops, 6 stack overflow by a store, 7 reset without a word. The recorder clears the
+//!   word before it obeys.
+//! - Two words with a seal are good when the seal is the inverse of (low xor (high rotated by 16
+//!   bits)).
 //!
 //! # Design
-//! Straps are read once, at boot. After each sample the recorder writes first its tick and then what it saw: whoever
-//! changes the latch and then finds the change at 8020h knows that it has been sampled, and not later than at the
-//! tick that stands at 8004h. It is what a trigger output is to a scope. Before a boot is counted, both are set to
-//! what no sample can have written, so that nobody takes the run before for this one. The reset line is counted
-//! because the bench looks at it now and then, and a GENI board misses no pulse.
+//! Straps are read once, at boot. After each sample the recorder writes first its tick and then
+//! what it saw: whoever changes the latch and then finds the change at 8020h knows that it has been
+//! sampled, and not later than at the tick that stands at 8004h. It is what a trigger output is to
+//! a scope. Before a boot is counted, both are set to what no sample can have written, so that
+//! nobody takes the run before for this one. The reset line is counted because the bench looks at
+//! it now and then, and a GENI board misses no pulse.
 //!
 //! # Tradeoffs
 //! Everything sits on one bus, so one file on the desktop holds all there is to see and to set.
 //!
 //! # Notes
-//! QEMU backs the bus with a file; what is written on either side is seen on the other at once. The file outlives
-//! the emulator, and so do the configuration and the clock. On the real board the memory there is a PSRAM.
+//! QEMU backs the bus with a file; what is written on either side is seen on the other at once. The
+//! file outlives the emulator, and so do the configuration and the clock. On the real board the
+//! memory there is a PSRAM.
 
 use core::ptr::{self, NonNull};
 
@@ -118,8 +124,8 @@ pub(crate) fn read_inputs() -> u32 {
     INPUT_LATCH.read()
 }
 
-/// Tells the bench that the sample of `tick_ms` has been taken, and what it was. The order is a promise: see the
-/// design.
+/// Tells the bench that the sample of `tick_ms` has been taken, and what it was. The order is a
+/// promise: see the design.
 #[inline]
 pub(crate) fn mark_sample(tick_ms: u32, inputs: u32) {
     SAMPLE_COUNTER.write(tick_ms);
@@ -157,8 +163,10 @@ impl GeniBoard {
         if GENI_STRAP.read() == 0 {
             return None;
         }
-        let window = NonNull::new(ptr::with_exposed_provenance_mut(base::EXTERNAL_BUS + GENI_WINDOW))?;
-        // SAFETY: see the map; nothing else here reaches the window, and the caller has it once only.
+        let window =
+            NonNull::new(ptr::with_exposed_provenance_mut(base::EXTERNAL_BUS + GENI_WINDOW))?;
+        // SAFETY: see the map; nothing else here reaches the window, and the caller has it once
+        // only.
         let window = unsafe { WindowRam::new(window) };
         // A run before this one may have ended while it held the line.
         let board = GeniBoard { reset_held: GENI_RESET.read() & 1 != 0 };

@@ -1,7 +1,7 @@
 //! Faults that the bench forces, to see what this very image does about them.
 //!
-//! A word of the external bus says which; it is cleared before it is obeyed, so that the next start is sane. Only the
-//! emulated board has such a word.
+//! A word of the external bus says which; it is cleared before it is obeyed, so that the next start
+//! is sane. Only the emulated board has such a word.
 
 use core::arch::naked_asm;
 use core::hint::black_box;
@@ -25,7 +25,8 @@ pub(crate) fn obey() {
     }
 }
 
-/// In one piece, so that whoever looks for panics and recursion in the image knows where they are meant to be.
+/// In one piece, so that whoever looks for panics and recursion in the image knows where they are
+/// meant to be.
 #[cold]
 #[inline(never)]
 fn force(number: u32) {
@@ -41,7 +42,8 @@ fn force(number: u32) {
             recurse(0);
         }
         5 => NVIC::mask(Interrupt::TIMER0),
-        // SAFETY: it does not come back, and what it does to the stack nobody sees but the fault handler.
+        // SAFETY: it does not come back, and what it does to the stack nobody sees but the fault
+        // handler.
         6 => unsafe { store_below_stack() },
         7 => SCB::sys_reset(),
         _ => {}
@@ -57,8 +59,8 @@ fn recurse(depth: u32) -> u32 {
     recurse(kept.wrapping_add(1)).wrapping_add(kept)
 }
 
-/// Runs out of stack as a function does that saves many registers at once: nine find no room, and the eight that the
-/// processor saves when it takes the fault do.
+/// Runs out of stack as a function does that saves many registers at once: nine find no room, and
+/// the eight that the processor saves when it takes the fault do.
 ///
 /// # Safety
 /// Nobody needs what is in the stack any more.

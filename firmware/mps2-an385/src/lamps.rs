@@ -35,10 +35,15 @@ pub(crate) struct Lamps {
 }
 
 impl Lamps {
-    /// Run, event, communication, fault: bits 0–3. Whoever has this is the only one to change the word.
+    /// Run, event, communication, fault: bits 0–3. Whoever has this is the only one to change the
+    /// word.
     pub(crate) fn new() -> Lamps {
-        let [run, event, communication, fault] = [0, 1, 2, 3].map(|number| Lamp { bit: 1 << number });
-        Lamps { panel: Panel::new(run, event, communication, fault, PinState::High), leds: Leds::new() }
+        let [run, event, communication, fault] =
+            [0, 1, 2, 3].map(|number| Lamp { bit: 1 << number });
+        Lamps {
+            panel: Panel::new(run, event, communication, fault, PinState::High),
+            leds: Leds::new(),
+        }
     }
 
     /// Called in every pass of the main loop.

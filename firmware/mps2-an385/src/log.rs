@@ -1,15 +1,17 @@
 //! The log: defmt frames on UART 1.
 //!
 //! # Design
-//! Bytes are written by polling. No critical section guards the log, so that logging never delays the capture
-//! interrupt: whoever interrupts a record that is being written writes nothing.
+//! Bytes are written by polling. No critical section guards the log, so that logging never delays
+//! the capture interrupt: whoever interrupts a record that is being written writes nothing.
 //!
 //! # Tradeoffs
-//! Polling holds up the main loop by the length of a record (2 ms at most), which is why events are not logged.
-//! Only `init` and the main loop log: what a fault has to say is logged by the start that follows.
+//! Polling holds up the main loop by the length of a record (2 ms at most), which is why events are
+//! not logged. Only `init` and the main loop log: what a fault has to say is logged by the start
+//! that follows.
 //!
 //! # Notes
-//! `ser-cli sim` writes the frames into a file; `cargo xtask log` turns them into text with the ELF file's help.
+//! `ser-cli sim` writes the frames into a file; `cargo xtask log` turns them into text with the ELF
+//! file's help.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -48,8 +50,8 @@ struct Logger;
 
 struct SharedEncoder(UnsafeCell<defmt::Encoder>);
 
-// SAFETY: touched only while `DEPTH` is 1, that is by the one whose `acquire` found 0. Contexts nest: one that
-// interrupts it has released the log again before it goes on.
+// SAFETY: touched only while `DEPTH` is 1, that is by the one whose `acquire` found 0. Contexts
+// nest: one that interrupts it has released the log again before it goes on.
 unsafe impl Sync for SharedEncoder {}
 
 static ENCODER: SharedEncoder = SharedEncoder(UnsafeCell::new(defmt::Encoder::new()));
@@ -64,7 +66,8 @@ fn with_encoder(step: impl FnOnce(&mut defmt::Encoder)) {
     }
 }
 
-// SAFETY: `acquire` and `release` only count, which is safe from anywhere; see `SharedEncoder` for the rest.
+// SAFETY: `acquire` and `release` only count, which is safe from anywhere; see `SharedEncoder` for
+// the rest.
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
         DEPTH.fetch_add(1, Ordering::Relaxed);

@@ -12,8 +12,9 @@ impl Word {
     /// The word at `address`.
     ///
     /// # Safety
-    /// `address` is a multiple of four, lies outside of the memory that the linker hands out, and the board has
-    /// something there that can be read and written at any time without upsetting memory safety.
+    /// `address` is a multiple of four, lies outside of the memory that the linker hands out, and
+    /// the board has something there that can be read and written at any time without upsetting
+    /// memory safety.
     pub(crate) const unsafe fn at(address: usize) -> Word {
         Word { address }
     }

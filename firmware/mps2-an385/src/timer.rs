@@ -1,16 +1,16 @@
 //! The capture interrupt and the clock behind it.
 //!
 //! # Design
-//! Timer 0 interrupts every millisecond. Timer 1 counts without end from reset on (see `boot`), and the tick is read
-//! off it: the interrupt says *look now*, never *one more millisecond*.
+//! Timer 0 interrupts every millisecond. Timer 1 counts without end from reset on (see `boot`), and
+//! the tick is read off it: the interrupt says *look now*, never *one more millisecond*.
 //!
 //! # Tradeoffs
-//! Two timers instead of one. With a tick that counts interrupts, every interrupt that comes later than the next one is
-//! due would put the clock back for good.
+//! Two timers instead of one. With a tick that counts interrupts, every interrupt that comes later
+//! than the next one is due would put the clock back for good.
 //!
 //! # Notes
-//! The timers count down; timer 1 goes round after 172 s, which is how long the interrupt may stay away
-//! unnoticed. The watchdog acts long before that.
+//! The timers count down; timer 1 goes round after 172 s, which is how long the interrupt may stay
+//! away unnoticed. The watchdog acts long before that.
 
 use core::num::NonZeroU32;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -64,8 +64,8 @@ const TIMER1: Registers = unsafe { Registers::at(base::TIMER1) };
 
 static TICK_MS: AtomicU32 = AtomicU32::new(0);
 
-/// Milliseconds since boot, wrapping. The same tick as that of the latest sample, for those who have no part in
-/// capture.
+/// Milliseconds since boot, wrapping. The same tick as that of the latest sample, for those who
+/// have no part in capture.
 pub(crate) fn tick_ms() -> u32 {
     TICK_MS.load(Ordering::Relaxed)
 }
@@ -87,8 +87,8 @@ impl Timer {
         Timer { ticks: TickCounter::new(COUNTS_PER_MS, count_up()) }
     }
 
-    /// Takes the interrupt back; gives the tick, or `None` when the one before has already counted this
-    /// millisecond.
+    /// Takes the interrupt back; gives the tick, or `None` when the one before has already counted
+    /// this millisecond.
     #[inline]
     pub(crate) fn on_interrupt(&mut self) -> Option<u32> {
         TIMER0.interrupt_clear.write(1);

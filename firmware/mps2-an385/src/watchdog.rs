@@ -1,19 +1,21 @@
 //! The watchdog.
 //!
 //! # Design
-//! The first time-out is the non-maskable interrupt, which only takes note of it (see `fault`); the second one leaves
-//! the last words and resets the board. A main loop that is late, but alive, feeds in between and goes on.
+//! The first time-out is the non-maskable interrupt, which only takes note of it (see `fault`); the
+//! second one leaves the last words and resets the board. A main loop that is late, but alive,
+//! feeds in between and goes on.
 //!
 //! # Tradeoffs
-//! Two seconds each: a recorder that hangs is back after four. Shorter times would reset an emulator whose host is
-//! busy.
+//! Two seconds each: a recorder that hangs is back after four. Shorter times would reset an
+//! emulator whose host is busy.
 //!
 //! # Notes
-//! The interrupt is a level that stays until it is cleared, and whether a processor takes a non-maskable interrupt
-//! again while its level stays is not laid down: so it is cleared, and it is the second interrupt that resets.
-//! Clearing it begins a new period. A processor that takes no interrupt at all does not clear either; then the
-//! watchdog resets it at the second time-out by itself. (Cortex-M System Design Kit, "APB watchdog".) Registers are
-//! locked except while they are written, so that a program gone wild is unlikely to switch the watchdog off.
+//! The interrupt is a level that stays until it is cleared, and whether a processor takes a
+//! non-maskable interrupt again while its level stays is not laid down: so it is cleared, and it is
+//! the second interrupt that resets. Clearing it begins a new period. A processor that takes no
+//! interrupt at all does not clear either; then the watchdog resets it at the second time-out by
+//! itself. (Cortex-M System Design Kit, "APB watchdog".) Registers are locked except while they are
+//! written, so that a program gone wild is unlikely to switch the watchdog off.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -60,8 +62,8 @@ impl Watchdog {
     }
 }
 
-/// Clears the interrupt, which also starts the time anew. One that comes in the middle of another has done what that
-/// was to do.
+/// Clears the interrupt, which also starts the time anew. One that comes in the middle of another
+/// has done what that was to do.
 pub(crate) fn acknowledge() {
     LOCKING.write(UNLOCK);
     INTERRUPT_CLEAR.write(1);

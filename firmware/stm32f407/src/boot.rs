@@ -1,8 +1,8 @@
 //! What runs from flash: until everything else is in RAM.
 //!
-//! Out of reset the processor takes stack and entry from the first two words of the flash. cortex-m-rt's start-up
-//! code then copies the image into RAM, vector table included, and calls `main` there; see `ram-image.x`. The first
-//! thing that `init` does is to go over to that table.
+//! Out of reset the processor takes stack and entry from the first two words of the flash.
+//! cortex-m-rt's start-up code then copies the image into RAM, vector table included, and calls
+//! `main` there; see `ram-image.x`. The first thing that `init` does is to go over to that table.
 
 use core::arch::naked_asm;
 
@@ -29,7 +29,8 @@ unsafe extern "C" {
 const NONE: Vector = Vector { reserved: 0 };
 const FAULT: Vector = Vector { handler: boot_fault };
 
-/// The vector table until [`use_vectors_in_ram`]. Interrupts are off then; whatever happens all the same is a reset.
+/// The vector table until [`use_vectors_in_ram`]. Interrupts are off then; whatever happens all the
+/// same is a reset.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".boot_vectors")]
 static BOOT_VECTORS: [Vector; 16] = [
@@ -51,8 +52,9 @@ static BOOT_VECTORS: [Vector; 16] = [
     FAULT,
 ];
 
-/// The very first step: the watchdog, with the 0.5 s that it has by itself (4096 steps of 4 periods of some 32 kHz).
-/// From here on, a start that gets stuck, be it at a crystal that does not swing, is tried again.
+/// The very first step: the watchdog, with the 0.5 s that it has by itself (4096 steps of 4 periods
+/// of some 32 kHz). From here on, a start that gets stuck, be it at a crystal that does not swing,
+/// is tried again.
 ///
 /// # Safety
 /// Called by the start-up code, before there are variables.

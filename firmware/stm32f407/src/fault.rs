@@ -1,8 +1,9 @@
-//! What happens when something goes wrong for good: it is written down for the next start, and the board resets.
+//! What happens when something goes wrong for good: it is written down for the next start, and the
+//! board resets.
 //!
 //! # Design
-//! Nothing is logged here. The last words are, by the start that follows: the log's memory may be what has gone
-//! wrong, and a probe that comes later finds them too.
+//! Nothing is logged here. The last words are, by the start that follows: the log's memory may be
+//! what has gone wrong, and a probe that comes later finds them too.
 
 use core::panic::PanicInfo;
 
@@ -16,7 +17,8 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     last_words::end(Fault::Panic, &Text::of_panic(info.location(), info.message().as_str()))
 }
 
-/// The crystal has stopped; the processor goes on with its RC oscillator, and so will the next start.
+/// The crystal has stopped; the processor goes on with its RC oscillator, and so will the next
+/// start.
 #[exception]
 unsafe fn NonMaskableInt() -> ! {
     last_words::end(Fault::HardFault, &Text::from("the main crystal has stopped"))

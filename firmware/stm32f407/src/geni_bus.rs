@@ -1,8 +1,8 @@
 //! The GENI board on the external bus: the 16 KiB window, its timing, reset and interrupt.
 //!
 //! # Timing
-//! From the GENI board's manual, chapter 2, "Timing for Shared RAM Read Cycle" and "… Write Cycle"; a clock of the
-//! bus is 1/84 MHz = 11.9 ns.
+//! From the GENI board's manual, chapter 2, "Timing for Shared RAM Read Cycle" and "… Write Cycle";
+//! a clock of the bus is 1/84 MHz = 11.9 ns.
 //!
 //! | what                                 | board asks for  | set up as                              | gives         |
 //! |--------------------------------------|-----------------|----------------------------------------|---------------|
@@ -16,14 +16,16 @@
 //! | cycle (trdcyc, twrcyc)               | 615 ns at least | the sum                                | 1190 ns       |
 //! | data bus free after select (thz2)    | 32 ns at most   | BUSTURN 8 clocks                       | 95 ns         |
 //!
-//! The 60 ns are for the buffers between board and controller, 10 ns each way, for 10 ns of wire, and for what the
-//! controller wants to see before it reads (data sheet, "Asynchronous … read timings": a clock and 4 ns).
+//! The 60 ns are for the buffers between board and controller, 10 ns each way, for 10 ns of wire,
+//! and for what the controller wants to see before it reads (data sheet, "Asynchronous … read
+//! timings": a clock and 4 ns).
 //!
-//! **Hold when writing.** The controller keeps data, address and select for one clock after `/WR` has risen, and has
-//! no field to make that longer. Of the 11.9 ns, 10.9 are left for data and select and 9.9 for the address (data
-//! sheet, "Asynchronous … write timings": `th(Data_NWE)`, `th(NE_NWE)`, `th(A_NWE)`) †. Then each takes its own way,
-//! and it is the worst that counts: `/WR` through a 74AHCT541 at its slowest, 10 ns †; the data through a 74LVC8T245
-//! at its fastest, 0.5 ns †; address and select through a 74AHCT541 at its fastest, 1 ns †.
+//! **Hold when writing.** The controller keeps data, address and select for one clock after `/WR`
+//! has risen, and has no field to make that longer. Of the 11.9 ns, 10.9 are left for data and
+//! select and 9.9 for the address (data sheet, "Asynchronous … write timings": `th(Data_NWE)`,
+//! `th(NE_NWE)`, `th(A_NWE)`) †. Then each takes its own way, and it is the worst that counts:
+//! `/WR` through a 74AHCT541 at its slowest, 10 ns †; the data through a 74LVC8T245 at its fastest,
+//! 0.5 ns †; address and select through a 74AHCT541 at its fastest, 1 ns †.
 //!
 //! | held after `/WR` at the board | from the controller | + fastest buffer | − slowest `/WR` | left   |
 //! |-------------------------------|---------------------|------------------|-----------------|--------|
@@ -31,27 +33,31 @@
 //! | address                       | 9.9 ns              | 1.0 ns           | 10 ns           | 0.9 ns |
 //! | select (the manual has none)  | 10.9 ns             | 1.0 ns           | 10 ns           | 1.9 ns |
 //!
-//! With a clock of 168 MHz, 4.6 ns would be missing for the data. The data buffer stays enabled for as long as the
-//! select line is low and turned to the board for as long as `/RD` is high, so it does not let go earlier. When
-//! reading, the board holds its data for 2 ns (tdh), and the controller asks for none.
+//! With a clock of 168 MHz, 4.6 ns would be missing for the data. The data buffer stays enabled for
+//! as long as the select line is low and turned to the board for as long as `/RD` is high, so it
+//! does not let go earlier. When reading, the board holds its data for 2 ns (tdh), and the
+//! controller asks for none.
 //!
 //! † Look it up in the issue of the data sheet that belongs to the part.
 //!
 //! # Design
-//! Mode D of the controller's asynchronous accesses is the one in which both strobes are high for the whole of
-//! address setup *and* hold, so that the board's recovery time is kept without the program's help.
+//! Mode D of the controller's asynchronous accesses is the one in which both strobes are high for
+//! the whole of address setup *and* hold, so that the board's recovery time is kept without the
+//! program's help.
 //!
-//! `/RST` is driven low from the moment in which the pins are set up, and a pull-down holds it low before that: a
-//! recorder that is not running must not leave a board on the bus that goes on telling old inputs. Hence it is
-//! push-pull.
+//! `/RST` is driven low from the moment in which the pins are set up, and a pull-down holds it low
+//! before that: a recorder that is not running must not leave a board on the bus that goes on
+//! telling old inputs. Hence it is push-pull.
 //!
 //! # Tradeoffs
-//! The board's `/GENRDY` could end the strobe earlier, by half of it at best (ASYNCWAIT with WAITPOL high, since the
-//! line is high while the board is busy; DATAST then is 4 clocks and 30 ns at least). It is not used: the manual says
-//! that the line may stay high for ever after a reset, a broken board may hold it, and an access that waits on the
-//! bus can be interrupted by nothing. Capture would stand still, and the watchdog would reset a recorder that is
-//! well, over and over. With a strobe of fixed length the worst that a GENI board can do is to hand over wrong bytes,
-//! which its driver deals with. A pass of the main loop with 128 bytes of a datagram takes 0.15 ms for them.
+//! The board's `/GENRDY` could end the strobe earlier, by half of it at best (ASYNCWAIT with
+//! WAITPOL high, since the line is high while the board is busy; DATAST then is 4 clocks and 30 ns
+//! at least). It is not used: the manual says that the line may stay high for ever after a reset, a
+//! broken board may hold it, and an access that waits on the bus can be interrupted by nothing.
+//! Capture would stand still, and the watchdog would reset a recorder that is well, over and over.
+//! With a strobe of fixed length the worst that a GENI board can do is to hand over wrong bytes,
+//! which its driver deals with. A pass of the main loop with 128 bytes of a datagram takes 0.15 ms
+//! for them.
 //!
 //! # Notes
 //! `/INT` pulses for 5.44 µs; its edge is latched by the interrupt controller. The port lets
@@ -119,7 +125,8 @@ const DATA_HOLD_LACKS_PS: u32 = 1000;
 const SELECT_HOLD_LACKS_PS: u32 = 1000;
 const ADDRESS_HOLD_LACKS_PS: u32 = 2000;
 
-/// Whether what is held long enough by the controller is so at the board, where the end of `/WR` arrives later.
+/// Whether what is held long enough by the controller is so at the board, where the end of `/WR`
+/// arrives later.
 const fn is_held(lacks_ps: u32, buffer_min_ps: u32) -> bool {
     CLOCK_PS + buffer_min_ps >= STROBE_BUFFER_MAX_PS + lacks_ps + HOLD_MIN_PS
 }
@@ -215,8 +222,8 @@ impl GeniBoard {
             w.wren().enabled().extmod().enabled().asyncwait().disabled().mbken().enabled()
         });
         let window = NonNull::new(ptr::with_exposed_provenance_mut(BANK as usize))?;
-        // SAFETY: the bank is open and as long as the window, nothing else here reaches it, and the caller has it once
-        // only.
+        // SAFETY: the bank is open and as long as the window, nothing else here reaches it, and the
+        // caller has it once only.
         let window = unsafe { WindowRam::new(window) };
         // SAFETY: its set and reset register is all that is used, for one pin.
         let port = unsafe { GPIOG::steal() };

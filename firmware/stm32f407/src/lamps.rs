@@ -16,7 +16,8 @@ pub(crate) struct Lamp {
 
 impl Lamp {
     fn on(number: u8) -> Lamp {
-        // SAFETY: its set and reset register is all that is ever used, and that changes no pin but the one asked for.
+        // SAFETY: its set and reset register is all that is ever used, and that changes no pin but
+        // the one asked for.
         Lamp { port: unsafe { GPIOD::steal() }, set: 1 << number }
     }
 
@@ -52,8 +53,12 @@ impl Lamps {
     /// All lamps; port D is set up and given away.
     pub(crate) fn new(_port: GPIOD) -> Lamps {
         let [run, event, communication, fault] =
-            [pins::LAMP_RUN, pins::LAMP_EVENT, pins::LAMP_COMMUNICATION, pins::LAMP_FAULT].map(Lamp::on);
-        Lamps { panel: Panel::new(run, event, communication, fault, PinState::High), leds: Leds::new() }
+            [pins::LAMP_RUN, pins::LAMP_EVENT, pins::LAMP_COMMUNICATION, pins::LAMP_FAULT]
+                .map(Lamp::on);
+        Lamps {
+            panel: Panel::new(run, event, communication, fault, PinState::High),
+            leds: Leds::new(),
+        }
     }
 
     /// Called in every pass of the main loop.

@@ -1,15 +1,17 @@
-//! The recorder on an STM32F407 (Cortex-M4F at 84 MHz), 144 pins: the board to flash. `docs/hardware.md` says how it is
-//! wired.
+//! The recorder on an STM32F407 (Cortex-M4F at 84 MHz), 144 pins: the board to flash.
+//! `docs/hardware.md` says how it is wired.
 //!
-//! Three interrupts and a main loop: capture (highest priority), RS-232 in both directions, the GENI board's line, and
-//! `idle`, which does all the rest. They share no resource, hence nobody ever locks anything, and capture waits for
-//! nobody, not even for the flash: everything runs from RAM (`ram-image.x`).
+//! Three interrupts and a main loop: capture (highest priority), RS-232 in both directions, the
+//! GENI board's line, and `idle`, which does all the rest. They share no resource, hence nobody
+//! ever locks anything, and capture waits for nobody, not even for the flash: everything runs from
+//! RAM (`ram-image.x`).
 //!
 //! # Tradeoffs
-//! Registers are named by the register crate, and there is no HAL between. `stm32f4xx-hal` takes the ports of 16
-//! inputs pin by pin, waits without bound and unwraps what it reads from the clock (whose leap years it counts from
-//! 1970), knows the flash in sectors of 128 KiB only, and brings paths to a panic into the image. What it would have
-//! saved is a few dozen lines, one file per part of the chip.
+//! Registers are named by the register crate, and there is no HAL between. `stm32f4xx-hal` takes
+//! the ports of 16 inputs pin by pin, waits without bound and unwraps what it reads from the clock
+//! (whose leap years it counts from 1970), knows the flash in sectors of 128 KiB only, and brings
+//! paths to a panic into the image. What it would have saved is a few dozen lines, one file per
+//! part of the chip.
 #![no_std]
 #![no_main]
 
@@ -46,7 +48,9 @@ mod app {
     use ser_board::main_loop;
     use ser_board::report::{self, Report};
     use ser_cortex_m::{last_words, stack};
-    use ser_node::{Capture, CaptureChannel, Event, GeniusOptions, Liveness, Node, NodeParts, VERSION};
+    use ser_node::{
+        Capture, CaptureChannel, Event, GeniusOptions, Liveness, Node, NodeParts, VERSION,
+    };
 
     use crate::clocks::{self, Source};
     use crate::flash::{self, Configuration, ConfigurationFlash};
@@ -66,7 +70,8 @@ mod app {
     /// No clock can show an earlier day: there was no such recorder.
     const NOT_BEFORE: NaiveDate = NaiveDate::from_ymd_opt(2026, 1, 1).unwrap();
 
-    // RTIC takes nothing but literals for priorities; `crates/ser-board/tests/priorities.rs` sees that the tasks have these.
+    // RTIC takes nothing but literals for priorities; `crates/ser-board/tests/priorities.rs` sees
+    // that the tasks have these.
     const _: () = {
         assert!(budget::CAPTURE_PRIORITY == 3);
         assert!(budget::RECEIVE_PRIORITY == 2);
@@ -101,8 +106,12 @@ mod app {
 
     static INPUT_HEALTH: InputHealth = InputHealth::new();
 
-    static HEALTH: Health<'static> =
-        Health { inputs: &INPUT_HEALTH, serialisers: None, clock: &rtc::HEALTH, storage: &flash::HEALTH };
+    static HEALTH: Health<'static> = Health {
+        inputs: &INPUT_HEALTH,
+        serialisers: None,
+        clock: &rtc::HEALTH,
+        storage: &flash::HEALTH,
+    };
 
     #[init(local = [
         channel: CaptureChannel = CaptureChannel::new(),
@@ -141,10 +150,14 @@ mod app {
             model,
             log: events,
             capture: reader,
-            storage: Configuration::new(ConfigurationFlash::new(device.FLASH, watchdog), &flash::HEALTH),
+            storage: Configuration::new(
+                ConfigurationFlash::new(device.FLASH, watchdog),
+                &flash::HEALTH,
+            ),
             rtc: ClockChip::new(clock, NOT_BEFORE, &rtc::HEALTH),
         });
-        let (serial, serial_interrupt) = uart::start(&device.RCC, device.USART2, rings, node.baud());
+        let (serial, serial_interrupt) =
+            uart::start(&device.RCC, device.USART2, rings, node.baud());
         let (pulsed, pulses) = pulses.split();
         let geni_line = InterruptLine::start(&device.RCC, &device.SYSCFG, device.EXTI, pulsed);
         let genius = if straps.has_geni() {
@@ -153,7 +166,8 @@ mod app {
         } else {
             None
         };
-        let genius = genius.map(|(board, window)| Genius::new(board, window, GeniusOptions::new(model)));
+        let genius =
+            genius.map(|(board, window)| Genius::new(board, window, GeniusOptions::new(model)));
         let contacts = InputPins { low: ports.b, middle: ports.c, high: ports.g };
         let sampler = Sampler::new(contacts, inputs::wiring(model), &INPUT_HEALTH);
         let timer = Timer::start(&device.RCC, device.TIM2, device.TIM3);
@@ -179,7 +193,8 @@ mod app {
         report::last_words(boot);
         if clock_source == Source::RcOscillator {
             defmt::error!(
-                "the crystal does not swing: time runs by the RC oscillator, off by up to several percent"
+                "the crystal does not swing: time runs by the RC oscillator, off by up to \
+                 several percent"
             );
         }
         if !guards_brown_out {
@@ -223,8 +238,9 @@ mod app {
             let diagnostics = || (node.diagnostics(), genius.as_ref().map(Genius::diagnostics));
             report.pass(now_ms, diagnostics, stack::high_water);
 
-            // A byte that arrives just now waits for the next interrupt, a millisecond at most. Looking with
-            // interrupts off would spare it that, and delay the capture interrupt instead.
+            // A byte that arrives just now waits for the next interrupt, a millisecond at most.
+            // Looking with interrupts off would spare it that, and delay the capture interrupt
+            // instead.
             if !serial.has_received() {
                 cortex_m::asm::wfi();
             }
@@ -232,7 +248,12 @@ mod app {
     }
 
     /// What the lamps are to tell.
-    fn condition(node: &BoardNode, serial: &SerialLine, genius: Option<&Genius>, start: &Start) -> Condition {
+    fn condition(
+        node: &BoardNode,
+        serial: &SerialLine,
+        genius: Option<&Genius>,
+        start: &Start,
+    ) -> Condition {
         let reports = genius.map_or(0, |genius| genius.diagnostics().reports_sent);
         Condition {
             recording: node.is_recording(),

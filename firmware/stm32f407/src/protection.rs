@@ -8,13 +8,15 @@
 //! | 60000000h–60003FFFh  | shared RAM of the GENI board                       | data, one access at a time    |
 //!
 //! # Design
-//! *That nothing runs from flash* is what capture stands on while a sector is erased, so it is not left to the
-//! linker's word: a jump or a load that leaves the RAM is a fault at once, on the bench, and not a stalled sample
-//! once a year. The same region catches null pointers and a stack that has run out.
+//! *That nothing runs from flash* is what capture stands on while a sector is erased, so it is not
+//! left to the linker's word: a jump or a load that leaves the RAM is a fault at once, on the
+//! bench, and not a stalled sample once a year. The same region catches null pointers and a stack
+//! that has run out.
 //!
 //! # Notes
-//! By itself the processor takes the external bus for ordinary memory, whose accesses may be repeated, joined
-//! and put off. Device memory has every access done once, in order and as it was written.
+//! By itself the processor takes the external bus for ordinary memory, whose accesses may be
+//! repeated, joined and put off. Device memory has every access done once, in order and as it was
+//! written.
 
 use cortex_m::peripheral::MPU;
 use ser_cortex_m::protection::{self, Region};
@@ -30,7 +32,7 @@ const REGIONS: [Region; 4] = [
 
 /// Switches the protection on, for good.
 pub(crate) fn enable(mpu: &MPU) {
-    // SAFETY: the regions forbid only what this program never does; the configuration and the shared RAM are reached by
-    // volatile accesses of their drivers and by nothing else.
+    // SAFETY: the regions forbid only what this program never does; the configuration and the
+    // shared RAM are reached by volatile accesses of their drivers and by nothing else.
     unsafe { protection::enable(mpu, REGIONS) };
 }

@@ -7,7 +7,8 @@ use stm32f4::stm32f407::{FLASH, RCC};
 pub(crate) fn take_flag(rcc: &RCC) -> ResetFlag {
     let flags = rcc.csr().read();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
-    // In the order of `ResetFlag`: power-up sets the brown-out flag too, and all of them set that of the pin.
+    // In the order of `ResetFlag`: power-up sets the brown-out flag too, and all of them set that
+    // of the pin.
     if flags.porrstf().bit_is_set() {
         ResetFlag::PowerOn
     } else if flags.borrstf().bit_is_set() {

@@ -1,16 +1,18 @@
 //! The chip's battery-backed clock, on its 32 kHz crystal.
 //!
 //! # Design
-//! The crystal takes up to seconds to start when the battery is new, and recording waits for no clock: it is switched
-//! on at start-up and looked at again when the clock is set. Every wait is bounded.
+//! The crystal takes up to seconds to start when the battery is new, and recording waits for no
+//! clock: it is switched on at start-up and looked at again when the clock is set. Every wait is
+//! bounded.
 //!
 //! # Tradeoffs
-//! All 15 bits of the divider are synchronous: the clock is read back in steps of 31 µs instead of 4 ms, and the
-//! battery gives a little more current.
+//! All 15 bits of the divider are synchronous: the clock is read back in steps of 31 µs instead of
+//! 4 ms, and the battery gives a little more current.
 //!
 //! # Notes
-//! That the clock was never set, or has lost battery *and* supply, shows in INITS; a crystal that stood still while the
-//! battery held does not show, the chip has no flag for that. (RM0090, chapter "Real-time clock".)
+//! That the clock was never set, or has lost battery *and* supply, shows in INITS; a crystal that
+//! stood still while the battery held does not show, the chip has no flag for that. (RM0090,
+//! chapter "Real-time clock".)
 
 use chrono::NaiveDateTime;
 use rtcc::DateTimeAccess;
@@ -54,8 +56,8 @@ impl ChipClock {
         settle();
         // The battery-backed registers are locked out of reset.
         power.cr().modify(|_, w| w.dbp().set_bit());
-        // What is written before the lock is off is lost. A lock that stays, and a choice that does not, leave a clock
-        // without crystal: it is not believed, and does not let itself be set.
+        // What is written before the lock is off is lost. A lock that stays, and a choice that does
+        // not, leave a clock without crystal: it is not believed, and does not let itself be set.
         let _ = wait_for(|| power.cr().read().dbp().bit_is_set());
         let _ = wait_for(|| {
             choose_crystal(clocks);
@@ -63,7 +65,8 @@ impl ChipClock {
             control.lseon().bit_is_set() && control.rtcsel().is_lse()
         });
         clocks.bdcr().modify(|_, w| w.rtcen().set_bit());
-        // SAFETY: from here on its register of the battery-backed part is all that is used, and that is only read.
+        // SAFETY: from here on its register of the battery-backed part is all that is used, and
+        // that is only read.
         ChipClock { clocks: unsafe { RCC::steal() }, registers }
     }
 
@@ -86,8 +89,8 @@ impl ChipClock {
     fn set(&mut self, calendar: Calendar, shift: Option<Shift>) -> Result<(), RtcError> {
         self.initialise(|registers| {
             registers.cr().modify(|_, w| w.fmt().twenty_four_hour().bypshad().set_bit());
-            // The divider takes two writes, the synchronous part first.
-            // SAFETY: both fields take any value; date and time are what `Calendar` says they are.
+            // The divider takes two writes, the synchronous part first. SAFETY: both fields take
+            // any value; date and time are what `Calendar` says they are.
             #[expect(clippy::multiple_unsafe_ops_per_block, reason = "one reason for all four")]
             unsafe {
                 registers.prer().modify(|_, w| w.prediv_s().bits(PREDIV_S));
@@ -98,8 +101,11 @@ impl ChipClock {
         })?;
         let Some(Shift { add_second, subtract }) = shift else { return Ok(()) };
         wait_for(|| self.registers.isr().read().shpf().bit_is_clear())?;
-        // SAFETY: the field takes any value; a second is added at the same time, so the clock is not put back.
-        self.registers.shiftr().write(|w| unsafe { w.add1s().bit(add_second).subfs().bits(subtract) });
+        // SAFETY: the field takes any value; a second is added at the same time, so the clock is
+        // not put back.
+        self.registers
+            .shiftr()
+            .write(|w| unsafe { w.add1s().bit(add_second).subfs().bits(subtract) });
         wait_for(|| self.registers.isr().read().shpf().bit_is_clear())
     }
 
@@ -119,8 +125,8 @@ impl ChipClock {
 /// Has the clock count the 32 kHz crystal, and switches that on.
 fn choose_crystal(clocks: &RCC) {
     if !clocks.bdcr().read().rtcsel().is_lse() {
-        // A choice that another program has made holds until all of this part is reset; without a choice there is
-        // nothing to lose.
+        // A choice that another program has made holds until all of this part is reset; without a
+        // choice there is nothing to lose.
         clocks.bdcr().modify(|_, w| w.bdrst().set_bit());
         clocks.bdcr().modify(|_, w| w.bdrst().clear_bit());
         clocks.bdcr().modify(|_, w| w.rtcsel().lse());

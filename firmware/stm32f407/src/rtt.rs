@@ -1,7 +1,8 @@
-//! A ring in memory that a debug probe reads while the processor runs: SEGGER's RTT, one channel up.
+//! A ring in memory that a debug probe reads while the processor runs: SEGGER's RTT, one channel
+//! up.
 //!
-//! The probe finds the control block by its symbol, or by its mark in memory. It moves the read position, the program
-//! the write position; what does not fit is dropped.
+//! The probe finds the control block by its symbol, or by its mark in memory. It moves the read
+//! position, the program the write position; what does not fit is dropped.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 

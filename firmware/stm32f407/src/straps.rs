@@ -1,4 +1,5 @@
-//! The straps: what the board is, read once at start-up. A strap is *set* when its jumper is closed.
+//! The straps: what the board is, read once at start-up. A strap is *set* when its jumper is
+//! closed.
 //!
 //! | pin | strap     | open            | set             |
 //! |-----|-----------|-----------------|-----------------|

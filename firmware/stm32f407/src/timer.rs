@@ -1,12 +1,13 @@
 //! The capture interrupt and the clock behind it.
 //!
 //! # Design
-//! Timer 3 interrupts every millisecond. Timer 2 counts microseconds without end, and the tick is read off it: the
-//! interrupt says *look now*, never *one more millisecond*. Both have the same clock, so they do not drift apart.
+//! Timer 3 interrupts every millisecond. Timer 2 counts microseconds without end, and the tick is
+//! read off it: the interrupt says *look now*, never *one more millisecond*. Both have the same
+//! clock, so they do not drift apart.
 //!
 //! # Notes
-//! Timer 2 goes round after 71 minutes, which is how long the interrupt may stay away unnoticed. The watchdog acts
-//! long before that.
+//! Timer 2 goes round after 71 minutes, which is how long the interrupt may stay away unnoticed.
+//! The watchdog acts long before that.
 
 use core::num::NonZeroU32;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -24,8 +25,8 @@ const _: () = assert!(PRESCALER as u32 * COUNTS_PER_SECOND == clocks::TIMER_HZ);
 
 static TICK_MS: AtomicU32 = AtomicU32::new(0);
 
-/// Milliseconds since boot, wrapping. The same tick as that of the latest sample, for those who have no part in
-/// capture.
+/// Milliseconds since boot, wrapping. The same tick as that of the latest sample, for those who
+/// have no part in capture.
 pub(crate) fn tick_ms() -> u32 {
     TICK_MS.load(Ordering::Relaxed)
 }
@@ -60,8 +61,8 @@ impl Timer {
         Timer { interval, counter, ticks }
     }
 
-    /// Takes the interrupt back; gives the tick, or `None` when the one before has already counted this
-    /// millisecond.
+    /// Takes the interrupt back; gives the tick, or `None` when the one before has already counted
+    /// this millisecond.
     #[inline]
     pub(crate) fn on_interrupt(&mut self) -> Option<u32> {
         self.interval.sr().write(|w| w.uif().clear_bit());

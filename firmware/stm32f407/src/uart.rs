@@ -1,17 +1,20 @@
 //! RS-232 on USART 2: 8 data bits, no parity, 1 stop bit.
 //!
 //! # Design
-//! The rings of `ser_board` lie between the interrupt and the main loop. Both directions share one interrupt, at the
-//! priority of the receiver, which has one character's time; the transmitter's part of it is a byte and a half dozen
-//! instructions.
+//! The rings of `ser_board` lie between the interrupt and the main loop. Both directions share one
+//! interrupt, at the priority of the receiver, which has one character's time; the transmitter's
+//! part of it is a byte and a half dozen instructions.
 //!
 //! # Notes
-//! Transmission complete is set when the last stop bit has left, so the line is known to be quiet and not guessed.
-//! What an overrun or a framing error leaves in the data register, `ser_board` knows; both are counted as line errors.
+//! Transmission complete is set when the last stop bit has left, so the line is known to be quiet
+//! and not guessed. What an overrun or a framing error leaves in the data register, `ser_board`
+//! knows; both are counted as line errors.
 
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
 use ser_board::main_loop::Line;
-use ser_board::serial_line::{self, LineErrors, ReceiveStatus, ReceivedByte, Receiver, SerialEnds, SerialRings};
+use ser_board::serial_line::{
+    self, LineErrors, ReceiveStatus, ReceivedByte, Receiver, SerialEnds, SerialRings,
+};
 use ser_node::ring::{Reader, Writer};
 use ser_proto::Baud;
 use stm32f4::stm32f407::{RCC, USART2};
@@ -33,8 +36,8 @@ pub(crate) fn start(
     set_divider(&uart, baud);
     uart.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
     let SerialEnds { receiver, received, errors, to_send, transmitter } = rings.split();
-    // SAFETY: the two ends share the registers. The interrupt alone touches the data register, the main loop alone the
-    // divider; for the one bit that both change see `SerialLine::send`.
+    // SAFETY: the two ends share the registers. The interrupt alone touches the data register, the
+    // main loop alone the divider; for the one bit that both change see `SerialLine::send`.
     let shared = unsafe { USART2::steal() };
     (
         SerialLine { uart: shared, received, errors, to_send, bytes: 0 },
@@ -127,8 +130,9 @@ impl Line for SerialLine {
         self.bytes = self.bytes.wrapping_add(1);
         // There is room, the main loop has asked.
         let _ = self.to_send.push(byte);
-        // The interrupt may clear this bit between reading and writing, because it has found the ring empty just
-        // before. Then it is set here, where it belongs; nothing else in the register ever changes.
+        // The interrupt may clear this bit between reading and writing, because it has found the
+        // ring empty just before. Then it is set here, where it belongs; nothing else in the
+        // register ever changes.
         self.uart.cr1().modify(|_, w| w.txeie().set_bit());
     }
 

@@ -1,18 +1,18 @@
 //! The independent watchdog.
 //!
 //! # Design
-//! It has an RC oscillator of its own, which may run at anything between 17 and 47 kHz (data sheet, "LSI oscillator
-//! characteristics"). So the time-out is 400 ms by the nominal 32 kHz, 272 ms at least and 753 ms at most: a recorder
-//! that hangs is recording again within a second, the start included, and a main loop may stay away for the 100 ms that
-//! the budget grants it.
+//! It has an RC oscillator of its own, which may run at anything between 17 and 47 kHz (data sheet,
+//! "LSI oscillator characteristics"). So the time-out is 400 ms by the nominal 32 kHz, 272 ms at
+//! least and 753 ms at most: a recorder that hangs is recording again within a second, the start
+//! included, and a main loop may stay away for the 100 ms that the budget grants it.
 //!
 //! # Tradeoffs
-//! A time-out that covers the erasing of a flash sector (0.5 s) could not keep that second. Erasing feeds instead, for
-//! as long as capture goes on and no longer than an erase may take: see `flash`.
+//! A time-out that covers the erasing of a flash sector (0.5 s) could not keep that second. Erasing
+//! feeds instead, for as long as capture goes on and no longer than an erase may take: see `flash`.
 //!
 //! # Notes
-//! The chip gives no warning before it bites; what it was is then only known from the reset flag. It was started
-//! before anything else, by `boot`, with a time-out of its own.
+//! The chip gives no warning before it bites; what it was is then only known from the reset flag.
+//! It was started before anything else, by `boot`, with a time-out of its own.
 
 use ser_board::budget::MAIN_LOOP_STALL_MS;
 use stm32f4::stm32f407::{DBGMCU, IWDG};

@@ -26,11 +26,12 @@ pub(crate) struct Args {
 enum What {
     /// Set the clock; events that are recorded already keep their times.
     ///
-    /// The time sent is the one at which the last byte arrives, so that the line adds no delay. The recorder knows no
-    /// time zone and no daylight saving time. Shown is the time that was sent.
+    /// The time sent is the one at which the last byte arrives, so that the line adds no delay. The
+    /// recorder knows no time zone and no daylight saving time. Shown is the time that was sent.
     #[command(after_help = EXAMPLES)]
     Set {
-        /// The time to set, as it will be when the last byte arrives; the local time of this computer if not given.
+        /// The time to set, as it will be when the last byte arrives; the local time of this
+        /// computer if not given.
         #[arg(long, value_name = "TIME", value_parser = parse_time)]
         at: Option<TimeStamp>,
     },
@@ -41,8 +42,10 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     // Checked before anything is sent; no download takes us from one century into the next.
     if at.is_none() {
         local_time_in(std::time::Duration::ZERO).map_err(|year| {
-            Failure::new(format!("a recorder's clock runs from 1970 to 2069; this computer's says {year}"))
-                .hint("set this computer's clock, or give the time with --at")
+            Failure::new(format!(
+                "a recorder's clock runs from 1970 to 2069; this computer's says {year}"
+            ))
+            .hint("set this computer's clock, or give the time with --at")
         })?;
     }
     let mut unit = connection::open(connection)?;

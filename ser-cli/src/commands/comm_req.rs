@@ -40,9 +40,11 @@ Examples:
   ser-cli comm-req parse 7 0 8 99 0 0 13 70 8 199 0040h 0050h 5
   ser-cli comm-req parse --data 014Dh 007Dh --bytes 3";
 
-/// Show the `COMM_REQ` blocks of a PLC that send a message to a recorder or fetch its answer; nothing is sent.
+/// Show the `COMM_REQ` blocks of a PLC that send a message to a recorder or fetch its answer;
+/// nothing is sent.
 ///
-/// Words are shown in decimal and hex, ready to be typed into a PLC. The other way round, words become a message.
+/// Words are shown in decimal and hex, ready to be typed into a PLC. The other way round, words
+/// become a message.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -65,7 +67,8 @@ enum What {
 
 #[derive(Debug, clap::Args)]
 struct SendArgs {
-    /// Bus address of the recorder, 0-31, or `all` for a broadcast, which is carried out and not answered.
+    /// Bus address of the recorder, 0-31, or `all` for a broadcast, which is carried out and not
+    /// answered.
     #[arg(long, value_name = "N", value_parser = values::address)]
     to: Address,
 
@@ -125,7 +128,8 @@ fn write(out: &mut dyn Write, block: &CommReq, line: bool) -> io::Result<()> {
 
 impl SendArgs {
     fn block(&self) -> CommReq {
-        // A block does not say who sends it: that is the PLC's bus controller, whatever its address.
+        // A block does not say who sends it: that is the PLC's bus controller, whatever its
+        // address.
         let datagram = Datagram::from_command(SOMEBODY, self.to, &self.message.command());
         CommReq::Send(SendDatagram {
             priority: self.priority.into(),
@@ -160,7 +164,8 @@ mod tests {
 
     fn output(line: &str) -> String {
         let words = std::iter::once("comm-req").chain(line.split_whitespace());
-        let args = Line::try_parse_from(words).unwrap_or_else(|error| panic!("{line}: {error}")).args;
+        let args =
+            Line::try_parse_from(words).unwrap_or_else(|error| panic!("{line}: {error}")).args;
         let mut out = Vec::new();
         match &args.what {
             What::Send(send) => write(&mut out, &send.block(), send.line).unwrap(),
@@ -245,7 +250,10 @@ mod tests {
         assert_eq!(output("parse --data 014Dh 007Dh --bytes 3"), "recording, version 1.25\n");
         // The PLC does not say how many bytes; one of the last word may be missing.
         assert_eq!(output("parse --data 014Dh 007Dh"), "recording, version 1.25\n");
-        assert_eq!(output("parse --data -32699"), "no message: message E never has 2 bytes (45 80)\n");
+        assert_eq!(
+            output("parse --data -32699"),
+            "no message: message E never has 2 bytes (45 80)\n"
+        );
     }
 
     #[test]

@@ -16,10 +16,12 @@ Examples:
   ser-cli config --size 1024 --auto-print off  change two of them
   ser-cli config --line-baud 19200             from then on: --baud 19200";
 
-/// Show or change the recorder's settings. What is not given stays as it is; the recorder keeps them without power.
+/// Show or change the recorder's settings. What is not given stays as it is; the recorder keeps
+/// them without power.
 ///
-/// To keep what is not given, the recorder is asked first. An original recorder does not answer that: give it at least
-/// --auto-report, --report-to and --auto-print, which its protocol cannot leave out.
+/// To keep what is not given, the recorder is asked first. An original recorder does not answer
+/// that: give it at least --auto-report, --report-to and --auto-print, which its protocol cannot
+/// leave out.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -72,8 +74,8 @@ impl Settings {
             && auto_print.is_none()
     }
 
-    /// Whether the command can be put together without knowing what is in force: it can say itself that size and
-    /// rate shall stay.
+    /// Whether the command can be put together without knowing what is in force: it can say itself
+    /// that size and rate shall stay.
     fn is_sufficient(&self) -> bool {
         self.auto_report.is_some() && self.report_to.is_some() && self.auto_print.is_some()
     }
@@ -107,13 +109,15 @@ fn change(unit: &mut Unit, settings: &Settings) -> Result<Configuration> {
         true => keep,
         false => {
             let now = connection::settings(unit)?.ok_or_else(settings_unknown)?;
-            // Size and rate are kept by leaving them out, so that a rate is set only when one is given.
+            // Size and rate are kept by leaving them out, so that a rate is set only when one is
+            // given.
             Configure { size: None, baud: None, ..now.into() }
         }
     };
     unit.configure(settings.on_top_of(base)).map_err(|error| match error {
         RequestError::Refused { in_force } => Failure::new(format!(
-            "the recorder did not take the settings; in force are: size {}, {} baud, auto report {}, report to {}, auto print {}",
+            "the recorder did not take the settings; in force are: size {}, {} baud, auto report \
+             {}, report to {}, auto print {}",
             in_force.size,
             in_force.baud.bits_per_second(),
             auto_report_name(in_force.auto_report),
@@ -126,12 +130,16 @@ fn change(unit: &mut Unit, settings: &Settings) -> Result<Configuration> {
 }
 
 fn settings_unknown() -> Failure {
-    connection::settings_unknown()
-        .hint("all can be set without asking: give --auto-report, --report-to and --auto-print together")
+    connection::settings_unknown().hint(
+        "all can be set without asking: give --auto-report, --report-to and --auto-print together",
+    )
 }
 
 /// The settings other than the size, one a line.
-pub(crate) fn write_line_settings(out: &mut dyn Write, configuration: &Configuration) -> io::Result<()> {
+pub(crate) fn write_line_settings(
+    out: &mut dyn Write,
+    configuration: &Configuration,
+) -> io::Result<()> {
     field(out, "line baud", configuration.baud.bits_per_second())?;
     field(out, "auto report", auto_report_name(configuration.auto_report))?;
     field(out, "report to", configuration.report_address)?;
@@ -159,8 +167,13 @@ mod tests {
             report_address: 7,
             auto_print: true,
         };
-        let none =
-            Settings { size: None, line_baud: None, auto_report: None, report_to: None, auto_print: None };
+        let none = Settings {
+            size: None,
+            line_baud: None,
+            auto_report: None,
+            report_to: None,
+            auto_print: None,
+        };
         assert!(none.is_empty() && !none.is_sufficient());
         assert_eq!(none.on_top_of(base), base);
         let some = Settings { size: Some(9), auto_print: Some(Switch::Off), ..none };

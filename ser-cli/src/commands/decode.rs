@@ -17,9 +17,10 @@ Examples:
 
 /// Show what the bytes of a capture mean, damaged ones included.
 ///
-/// Each line of the list gives the place (bytes from the start; in hex text line:column), who sent it, and what
-/// it says. Damage is listed where it is found, and decoding goes on behind it; a summary goes to standard
-/// error. The exit code is 0 also when something was damaged: the decoding itself worked.
+/// Each line of the list gives the place (bytes from the start; in hex text line:column), who sent
+/// it, and what it says. Damage is listed where it is found, and decoding goes on behind it; a
+/// summary goes to standard error. The exit code is 0 also when something was damaged: the decoding
+/// itself worked.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -27,12 +28,13 @@ pub(crate) struct Args {
     #[arg(default_value = "-")]
     file: PathBuf,
 
-    /// Who sent the bytes; without it, messages that both sides could have sent are shown with both readings.
+    /// Who sent the bytes; without it, messages that both sides could have sent are shown with both
+    /// readings.
     #[arg(long, value_name = "SIDE")]
     from: Option<Side>,
 
-    /// What the input looks like; without it, it is hex text if its first line is and no ESC byte (1Bh) is in the
-    /// first 64 KiB.
+    /// What the input looks like; without it, it is hex text if its first line is and no ESC byte
+    /// (1Bh) is in the first 64 KiB.
     #[arg(long)]
     format: Option<CaptureFormat>,
 

@@ -23,8 +23,9 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Play a breaker trip to a simulated recorder, and read the sequence of events from it.
 ///
-/// Everything is real but the contacts: the recorder's own code samples them every millisecond, the client asks for
-/// the events in the frames of the RS-232 protocol, at 9600 baud over a pseudo-terminal. It takes a few seconds.
+/// Everything is real but the contacts: the recorder's own code samples them every millisecond, the
+/// client asks for the events in the frames of the RS-232 protocol, at 9600 baud over a
+/// pseudo-terminal. It takes a few seconds.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -51,7 +52,10 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let clock = unit.set_clock(|ahead| local_time_in(ahead).unwrap_or(EPOCH))?;
     story.step(&format!("Its clock is set: {clock}."), "ser-cli -p /tmp/ser clock set")?;
     unit.erase()?;
-    story.step("Its log is erased: what comes now is the incident.", "ser-cli -p /tmp/ser erase --yes")?;
+    story.step(
+        "Its log is erased: what comes now is the incident.",
+        "ser-cli -p /tmp/ser erase --yes",
+    )?;
     story.step(
         &format!(
             "A feeder fault: its relay trips the breaker, which recloses once,\n\
@@ -82,8 +86,8 @@ fn connect(port: &str) -> Result<Unit> {
             .hint("report this as a bug")
     };
     let endpoint: Endpoint = port.parse().map_err(|error| lost(&error))?;
-    let transport =
-        ser_client::open(&endpoint, Baud::default().bits_per_second()).map_err(|error| lost(&error))?;
+    let transport = ser_client::open(&endpoint, Baud::default().bits_per_second())
+        .map_err(|error| lost(&error))?;
     Ok(Unit::new(transport, Options { timeout: Duration::from_secs(5), ..Options::default() }))
 }
 
@@ -110,7 +114,8 @@ impl Trip {
         let incident = Scenario::from_steps(
             incident.into_iter().map(|step| Step { at_ms: step.at_ms - start_ms, ..step }),
         );
-        let names = scenario.names().into_iter().map(|(input, name)| (input, name.to_string())).collect();
+        let names =
+            scenario.names().into_iter().map(|(input, name)| (input, name.to_string())).collect();
         let seconds = Duration::from_millis(incident.duration_ms()).as_secs_f64();
         Trip { before: Scenario::from_steps(before), incident, names, changes, seconds }
     }
@@ -133,12 +138,13 @@ fn download(
     let mut table = Sequence::new(&mut story.out, story.palette, names);
     let mut annotator = Annotator::new(Life::UNKNOWN, Before::default());
     let (bytes, began) = (unit.counters().bytes, Instant::now());
-    let summary = LogFollower::new(None, configuration.size).read_new(unit, &mut |step| -> Result<()> {
-        for delivery in step.deliveries {
-            annotator.write(delivery, &mut table)?;
-        }
-        Ok(table.flush()?)
-    })?;
+    let summary =
+        LogFollower::new(None, configuration.size).read_new(unit, &mut |step| -> Result<()> {
+            for delivery in step.deliveries {
+                annotator.write(delivery, &mut table)?;
+            }
+            Ok(table.flush()?)
+        })?;
     Ok(Download {
         events: summary.delivered,
         lost: summary.lost,
@@ -159,7 +165,10 @@ impl Download {
             _ => format!("{:.1} s", self.took.as_secs_f64()),
         };
         let at = baud.map_or(String::new(), |baud| format!(" at {} baud", baud.bits_per_second()));
-        format!("{} events, {complete}. Downloaded in {took}: {} bytes{at}.", self.events, self.bytes)
+        format!(
+            "{} events, {complete}. Downloaded in {took}: {} bytes{at}.",
+            self.events, self.bytes
+        )
     }
 }
 
@@ -185,5 +194,12 @@ impl<W: Write> Story<W> {
 }
 
 /// What a computer whose clock no recorder can follow gets.
-const EPOCH: ser_proto::TimeStamp =
-    ser_proto::TimeStamp { year: 70, month: 1, day: 1, hour: 0, minute: 0, second: 0, millisecond: 0 };
+const EPOCH: ser_proto::TimeStamp = ser_proto::TimeStamp {
+    year: 70,
+    month: 1,
+    day: 1,
+    hour: 0,
+    minute: 0,
+    second: 0,
+    millisecond: 0,
+};

@@ -39,7 +39,8 @@ pub(crate) struct Args {
 pub(crate) enum Message {
     /// `C` alone: ask for the configuration (original recorders stay silent).
     QueryConfig,
-    /// `C`: change the configuration; size and rate that are not given are kept, the rest becomes 0 or off.
+    /// `C`: change the configuration; size and rate that are not given are kept, the rest becomes 0
+    /// or off.
     Config(Settings),
     /// `E`: erase the event buffer.
     Erase,

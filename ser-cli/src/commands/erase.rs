@@ -8,9 +8,12 @@ const EXAMPLES: &str = "\
 Examples:
   ser-cli read --new --fail-on-loss >> log && ser-cli erase --yes
 
-What read --new and watch have delivered is remembered, and so is this erase: if everything had been delivered, the \
-next read --new goes on with the new log and tells of no loss. What is recorded between a read and the erase is erased, \
-too, and then told as a loss. In the moment of the erase itself, a change that is undone before the next event leaves \
+What read --new and watch have delivered is remembered, and so is this erase: if everything had \
+been delivered, the \
+next read --new goes on with the new log and tells of no loss. What is recorded between a read \
+and the erase is erased, \
+too, and then told as a loss. In the moment of the erase itself, a change that is undone before \
+the next event leaves \
 no trace.";
 
 /// Erase all events in the recorder. There is no way back.
@@ -28,18 +31,23 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let port = connection::port_text(connection)?;
     if !args.yes {
-        return Err(Failure::usage(format!("this erases all events in the recorder at {port} for good"))
-            .hint("keep them first: ser-cli read --all --format csv > events.csv")
-            .hint("then add --yes"));
+        return Err(Failure::usage(format!(
+            "this erases all events in the recorder at {port} for good"
+        ))
+        .hint("keep them first: ser-cli read --all --format csv > events.csv")
+        .hint("then add --yes"));
     }
-    // A memory that cannot be read, or that another run is using, is a reason to stop before anything is gone.
+    // A memory that cannot be read, or that another run is using, is a reason to stop before
+    // anything is gone.
     let mut keeper = Keeper::load(&args.state, connection)?;
     let mut unit = connection::open(connection)?;
     let total = unit.log_position()?.total;
     match keeper.unread(total) {
         0 => {}
         1 => warn("1 event has not been delivered by read --new or watch"),
-        unread => warn(format_args!("{unread} events have not been delivered by read --new or watch")),
+        unread => {
+            warn(format_args!("{unread} events have not been delivered by read --new or watch"))
+        }
     }
     unit.erase()?;
     inform(erased(total));
@@ -49,6 +57,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
 fn erased(total: u16) -> String {
     let events = if total == 1 { "1 event".to_owned() } else { format!("{total} events") };
     format!(
-        "event buffer erased; {events} had been recorded since the erase before (the recorder counts modulo 65536)"
+        "event buffer erased; {events} had been recorded since the erase before (the recorder \
+         counts modulo 65536)"
     )
 }

@@ -33,7 +33,8 @@ Examples:
   ser-cli genius globals
   ser-cli genius globals --follow
 
-With --follow the bus is looked at ten times a second, and the time is that of this computer. What comes and goes \
+With --follow the bus is looked at ten times a second, and the time is that of this computer. \
+What comes and goes \
 in between is not seen here: ser-cli watch shows every event, stamped by the recorder.";
 
 const FORCES_EXAMPLES: &str = "\
@@ -73,7 +74,8 @@ enum What {
         #[command(flatten)]
         who: Who,
     },
-    /// Show the live inputs of every recorder, all of one and the same bus scan. The exit code is 1 when there is none.
+    /// Show the live inputs of every recorder, all of one and the same bus scan. The exit code is 1
+    /// when there is none.
     #[command(after_help = GLOBALS_EXAMPLES)]
     Globals {
         /// Go on and show every recorder again whose inputs have changed, until Ctrl-C.
@@ -94,8 +96,9 @@ enum What {
     },
     /// Tell all recorders something, and check by their last broadcast that each has received it.
     ///
-    /// A broadcast is not answered, so every recorder that is logged in is asked before and afterwards. The exit code
-    /// is 0 when all of them are known to have received it, and 1 otherwise, also when there is none.
+    /// A broadcast is not answered, so every recorder that is logged in is asked before and
+    /// afterwards. The exit code is 0 when all of them are known to have received it, and 1
+    /// otherwise, also when there is none.
     #[command(after_help = BROADCAST_EXAMPLES)]
     Broadcast {
         #[command(subcommand)]
@@ -177,9 +180,13 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         What::Decode { ref bytes } => decode::run(bytes),
         What::Dip { switches, address, rate } => dip::run(switches, address, rate),
         What::Devices { who } => devices::run(connection, who.recognition(connection)),
-        What::Globals { follow, who } => globals::run(connection, follow, who.recognition(connection)),
+        What::Globals { follow, who } => {
+            globals::run(connection, follow, who.recognition(connection))
+        }
         What::Forces { node, table } => forces::run(connection, node.number(), table.into()),
-        What::Broadcast { what, who } => broadcast::run(connection, what, who.recognition(connection)),
+        What::Broadcast { what, who } => {
+            broadcast::run(connection, what, who.recognition(connection))
+        }
     }
 }
 

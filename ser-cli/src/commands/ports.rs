@@ -14,7 +14,8 @@ Examples:
 
 /// List the serial ports of this computer.
 ///
-/// Pseudo-terminals (`ser-cli sim --pty`) and links (/dev/serial/by-id/…) are not listed, but can be used as well.
+/// Pseudo-terminals (`ser-cli sim --pty`) and links (/dev/serial/by-id/…) are not listed, but can
+/// be used as well.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {}
@@ -54,7 +55,11 @@ mod tests {
             description: description.to_owned(),
         };
         let mut out = Vec::new();
-        let ports = [port("/dev/ttyS0", ""), port("/dev/tty\u{1B}c", "FTDI\n\u{202E}"), port("COM3", "PCI")];
+        let ports = [
+            port("/dev/ttyS0", ""),
+            port("/dev/tty\u{1B}c", "FTDI\n\u{202E}"),
+            port("COM3", "PCI"),
+        ];
         table(&mut out, &ports).unwrap();
         let expected = "/dev/ttyS0\n/dev/tty\\u{1b}c  FTDI\\n\\u{202e}\nCOM3             PCI\n";
         assert_eq!(String::from_utf8(out).unwrap(), expected);

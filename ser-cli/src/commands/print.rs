@@ -19,8 +19,9 @@ const LONGEST_LINE: usize = 300;
 
 /// Let the recorder print entries as lines of text, and show them.
 ///
-/// The recorder prints on its RS-232 port whatever the command came by. Through a terminal server or a printer sharer the
-/// lines arrive here only if they are passed on. Waiting ends when all lines are there, or none comes any more.
+/// The recorder prints on its RS-232 port whatever the command came by. Through a terminal server
+/// or a printer sharer the lines arrive here only if they are passed on. Waiting ends when all
+/// lines are there, or none comes any more.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -110,7 +111,8 @@ impl Wanted {
             self.damaged += 1;
             return false;
         }
-        let Some(number) = entry_number(&line.text).filter(|number| self.entries.contains(number)) else {
+        let Some(number) = entry_number(&line.text).filter(|number| self.entries.contains(number))
+        else {
             return false;
         };
         self.missing += number - self.entries.start;
@@ -120,8 +122,8 @@ impl Wanted {
     }
 }
 
-/// The number that an entry's line begins with: four digits, or more, and a blank. What is left of a line whose
-/// beginning is missing has none.
+/// The number that an entry's line begins with: four digits, or more, and a blank. What is left of
+/// a line whose beginning is missing has none.
 fn entry_number(line: &str) -> Option<u32> {
     let (number, _) = line.split_once(' ')?;
     let is_number = number.len() >= 4 && number.bytes().all(|byte| byte.is_ascii_digit());
@@ -160,7 +162,12 @@ mod tests {
         assert!(!take("0777 2026-11-22 10:00:00.250  3 ON"), "a new event");
         assert!(take("0006 x") && !take("0006 x") && take("0007 x") && !take("0006 x"));
         assert!(!take("0009 x") && take("0008 x") && !take("0008 x"));
-        assert!(wanted.is_complete() && wanted.printed == 3 && wanted.missing == 0 && wanted.damaged == 0);
+        assert!(
+            wanted.is_complete()
+                && wanted.printed == 3
+                && wanted.missing == 0
+                && wanted.damaged == 0
+        );
     }
 
     #[test]

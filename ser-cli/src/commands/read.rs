@@ -29,21 +29,26 @@ Formats:
           and per loss: lost, count, after, why, inputs, life
 
 A sequence number counts the events of a log since it was erased. The life names that log; \
-it is 0 where nothing is remembered (without --new). A file that is continued (>>) gets no second header.
+it is 0 where nothing is remembered (without --new). A file that is continued (>>) gets no \
+second header.
 
-What is missing is in the output where it belongs, in every format, and on standard error: how many events were \
-overwritten, that the log began anew, which inputs changed while nothing was recorded. The exit code then is 0, \
+What is missing is in the output where it belongs, in every format, and on standard error: how \
+many events were \
+overwritten, that the log began anew, which inputs changed while nothing was recorded. The exit \
+code then is 0, \
 with --fail-on-loss it is 3, also for a ring that had gone round before it was first read.";
 
 /// Read events.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// Everything the recorder has, oldest first; this is what happens if nothing else is asked for.
+    /// Everything the recorder has, oldest first; this is what happens if nothing else is asked
+    /// for.
     #[arg(long, conflicts_with_all = ["new", "from", "count"])]
     all: bool,
 
-    /// What has not been delivered yet by read --new or watch from this port; remembered from run to run.
+    /// What has not been delivered yet by read --new or watch from this port; remembered from run
+    /// to run.
     #[arg(long, conflicts_with_all = ["from", "count"])]
     new: bool,
 
@@ -63,7 +68,8 @@ pub(crate) struct Args {
     #[arg(long)]
     fail_on_loss: bool,
 
-    /// How many entries the recorder's log holds; then the recorder is not asked (original recorders do not answer).
+    /// How many entries the recorder's log holds; then the recorder is not asked (original
+    /// recorders do not answer).
     #[arg(long, value_name = "N", value_parser = values::entries())]
     log_size: Option<u16>,
 
@@ -92,7 +98,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let remembered = keeper.as_ref().and_then(Keeper::size);
     let size = connection::log_size(&mut unit, args.log_size, remembered)?;
     let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), size, &stop);
-    // What did reach standard output is remembered also when the recorder fell silent in the middle, or after Ctrl-C.
+    // What did reach standard output is remembered also when the recorder fell silent in the
+    // middle, or after Ctrl-C.
     let saved = keeper.as_mut().map_or(Ok(()), Keeper::save);
     let delivered = outlet.finish().and(result)?;
     saved?;
@@ -112,7 +119,8 @@ fn read_by_cursor(
     let cursor: Option<Cursor> = keeper.as_ref().and_then(|keeper| keeper.cursor());
     let mut follower = LogFollower::new(cursor, size);
     let summary = follower.read_new(unit, &mut |step| -> Result<()> {
-        let mut remember = |life| keeper.as_mut().map_or(Ok(()), |keeper| keeper.name(life, step.size));
+        let mut remember =
+            |life| keeper.as_mut().map_or(Ok(()), |keeper| keeper.name(life, step.size));
         outlet.take(step.deliveries, step.pending, &mut remember)?;
         if let Some(keeper) = &mut keeper {
             keeper.delivered(step.cursor, step.size, outlet.life())?;
@@ -122,7 +130,8 @@ fn read_by_cursor(
     Ok(summary.delivered)
 }
 
-/// Reads entries by number. Neither cursor nor size come into it: the recorder answers with what exists.
+/// Reads entries by number. Neither cursor nor size come into it: the recorder answers with what
+/// exists.
 fn read_range(
     unit: &mut Unit,
     outlet: &mut Outlet,
@@ -138,7 +147,8 @@ fn read_range(
             Delivery::Lost { .. } => false,
         };
         // In the order of their numbers the oldest entry comes after the newest.
-        let (newest, oldest) = deliveries.split_at(deliveries.iter().position(is_seam).unwrap_or(0));
+        let (newest, oldest) =
+            deliveries.split_at(deliveries.iter().position(is_seam).unwrap_or(0));
         outlet.take(newest, pending, &mut |_| Ok(()))?;
         if deliveries.first().is_some_and(is_seam) || !newest.is_empty() {
             outlet.begin_anew();
@@ -150,7 +160,8 @@ fn read_range(
     if reader.is_mixed() {
         outlet.miss();
         warn(
-            "events were recorded meanwhile and may have overwritten entries of this range: old and new are mixed",
+            "events were recorded meanwhile and may have overwritten entries of this range: old \
+             and new are mixed",
         );
         advise("repeat the command, or stop recording first (ser-cli stop)");
     }
@@ -174,7 +185,10 @@ fn check_interrupt(stop: &AtomicBool) -> Result<()> {
     }
 }
 
-fn next_of_range(unit: &mut Unit, reader: &mut RangeReader) -> Result<ControlFlow<(), Vec<Delivery>>> {
+fn next_of_range(
+    unit: &mut Unit,
+    reader: &mut RangeReader,
+) -> Result<ControlFlow<(), Vec<Delivery>>> {
     let Some(request) = reader.request() else { return Ok(ControlFlow::Break(())) };
     let Reply::Read(reply) = unit.request(&Command::from(request))? else {
         return Err(RequestError::UnexpectedReply { command: Code::Read }.into());

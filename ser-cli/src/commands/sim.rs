@@ -12,8 +12,8 @@ use ser_console::Harmless;
 use ser_proto::Model;
 use ser_proto::genius::BusAddress;
 use ser_sim::{
-    Backend, Contacts, EmulatorOptions, GeniusOptions, LineRate, MAX_NODES, NonVolatile, Notice, Port,
-    SimError, SimOptions,
+    Backend, Contacts, EmulatorOptions, GeniusOptions, LineRate, MAX_NODES, NonVolatile, Notice,
+    Port, SimError, SimOptions,
 };
 
 use crate::error::{Failure, Result, inform, warn};
@@ -68,7 +68,8 @@ struct BusNode {
     model: Option<ModelName>,
 }
 
-/// Simulate a recorder on a pseudo-terminal or a TCP port, or recorders on a Genius bus, until interrupted.
+/// Simulate a recorder on a pseudo-terminal or a TCP port, or recorders on a Genius bus, until
+/// interrupted.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -76,17 +77,20 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value = "ser320")]
     model: ModelName,
 
-    /// Make this symbolic link to the recorder's pseudo-terminal; it appears when the recorder answers and goes with it.
+    /// Make this symbolic link to the recorder's pseudo-terminal; it appears when the recorder
+    /// answers and goes with it.
     #[arg(long, value_name = "LINK", conflicts_with = "tcp")]
     pty: Option<PathBuf>,
 
-    /// Put recorders on a Genius bus; this file becomes the window of the host's GENI board, and goes with the simulator.
+    /// Put recorders on a Genius bus; this file becomes the window of the host's GENI board, and
+    /// goes with the simulator.
     ///
     /// The first recorder also has its RS-232 port, where --pty or --tcp say.
     #[arg(long, value_name = "FILE", requires = "node", help_heading = bus::HEADING)]
     genius: Option<PathBuf>,
 
-    /// Number of a recorder on the Genius bus, 0-31, and which recorder it is if not --model; may be repeated.
+    /// Number of a recorder on the Genius bus, 0-31, and which recorder it is if not --model; may
+    /// be repeated.
     #[arg(long, value_name = "N[:MODEL]", requires = "genius", value_parser = bus_node, help_heading = bus::HEADING)]
     node: Vec<BusNode>,
 
@@ -112,7 +116,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "MS", default_value_t = 0)]
     debounce: u8,
 
-    /// Send as slowly as the line's rate, as a real recorder does; without it, answers come at once.
+    /// Send as slowly as the line's rate, as a real recorder does; without it, answers come at
+    /// once.
     #[arg(long, conflicts_with = "image")]
     paced: bool,
 
@@ -158,7 +163,11 @@ fn options(args: &Args, stop: &AtomicBool) -> Result<SimOptions> {
 }
 
 /// The emulated board if there is an image, the built-in node otherwise.
-pub(crate) fn backend(image: Option<&Path>, log: Option<PathBuf>, line_rate: LineRate) -> Result<Backend> {
+pub(crate) fn backend(
+    image: Option<&Path>,
+    log: Option<PathBuf>,
+    line_rate: LineRate,
+) -> Result<Backend> {
     let Some(image) = image else {
         return Ok(Backend::Native { line_rate, non_volatile: NonVolatile::new() });
     };
@@ -191,7 +200,9 @@ fn genius(args: &Args, window: &Path, model: Model) -> Result<GeniusOptions> {
         }
     }
     if nodes.len() > MAX_NODES {
-        return Err(Failure::usage("a bus has 32 numbers, and the host needs one").hint("leave a node out"));
+        return Err(
+            Failure::usage("a bus has 32 numbers, and the host needs one").hint("leave a node out")
+        );
     }
     let nodes = nodes.iter().map(|node| (node.number, node.model.map_or(model, Model::from)));
     args.bus.apply(GeniusOptions::new(window, nodes.collect()))
@@ -202,8 +213,8 @@ fn bus_node(text: &str) -> std::result::Result<BusNode, String> {
         Some((number, model)) => (number, Some(ModelName::from_str(model, true)?)),
         None => (text, None),
     };
-    let number =
-        device(number).ok_or_else(|| "not a bus address: 0 to 31, as in 5 or 5:ser160".to_string())?;
+    let number = device(number)
+        .ok_or_else(|| "not a bus address: 0 to 31, as in 5 or 5:ser160".to_string())?;
     Ok(BusNode { number, model })
 }
 
@@ -232,7 +243,9 @@ fn patience(text: &str) -> std::result::Result<Patience, String> {
 /// An address to listen on, as far as one can tell without asking the system.
 fn tcp_address(text: &str) -> std::result::Result<String, String> {
     match text.rsplit_once(':') {
-        Some((host, port)) if !host.is_empty() && port.parse::<u16>().is_ok() => Ok(text.to_string()),
+        Some((host, port)) if !host.is_empty() && port.parse::<u16>().is_ok() => {
+            Ok(text.to_string())
+        }
         _ => Err("it has to be HOST:PORT, as in 127.0.0.1:4000".to_string()),
     }
 }
@@ -257,7 +270,9 @@ fn announce(ports: &str) -> Result<()> {
 impl From<SimError> for Failure {
     fn from(error: SimError) -> Failure {
         let failure = match &error {
-            SimError::NoRecords(no_records) => no_records.hints().fold(Failure::new(&error), Failure::hint),
+            SimError::NoRecords(no_records) => {
+                no_records.hints().fold(Failure::new(&error), Failure::hint)
+            }
             _ => Failure::new(&error),
         };
         failure.hint(match error {
@@ -270,7 +285,10 @@ impl From<SimError> for Failure {
                 "choose a name that does not exist, as in --genius /tmp/host"
             }
             SimError::LogTaken(_) => "choose a name that does not exist, as in --log /tmp/ser.log",
-            SimError::EmulatorMissing { .. } => "or leave --image out: the built-in node needs no emulator",
+            SimError::EmulatorMissing { .. } => {
+                "or leave --image out: the built-in node needs \
+             no emulator"
+            }
             SimError::EmulatorEnded { .. } | SimError::NoAnswer { .. } => {
                 "is this an image for mps2-an385? Build it with cargo xtask firmware"
             }
@@ -279,14 +297,24 @@ impl From<SimError> for Failure {
                 io::ErrorKind::UnexpectedEof => {
                     "the file has been cut short: leave it alone while it is in use"
                 }
-                io::ErrorKind::AddrInUse => "another program listens there: port 0 takes a free one",
+                io::ErrorKind::AddrInUse => {
+                    "another program listens there: port 0 takes a free \
+                 one"
+                }
                 io::ErrorKind::AddrNotAvailable => {
-                    "that is not this computer: 127.0.0.1 is; 0.0.0.0 is, too, and there anybody may erase"
+                    "that is not this computer: 127.0.0.1 is; 0.0.0.0 is, too, and there anybody \
+                     may erase"
                 }
                 _ => "check names, rights, and that no other simulator runs there",
             },
-            SimError::NoRecords(_) => "one of these folders is needed, but not for --tcp without --genius",
-            SimError::Ended | SimError::StillPlaying => "try again; if it persists, report it as a bug",
+            SimError::NoRecords(_) => {
+                "one of these folders is needed, but not for --tcp without \
+             --genius"
+            }
+            SimError::Ended | SimError::StillPlaying => {
+                "try again; if it persists, report it as \
+             a bug"
+            }
         })
     }
 }

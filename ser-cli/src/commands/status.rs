@@ -23,7 +23,8 @@ pub(crate) struct Args {}
 
 pub(crate) fn run(_args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let mut unit = connection::open(connection)?;
-    // Every recorder answers a read: one that does not is not there, and need not be waited for again.
+    // Every recorder answers a read: one that does not is not there, and need not be waited for
+    // again.
     let position = unit.log_position()?;
     let mode = unless_unanswered(unit.mode())?;
     let configuration = match mode {
@@ -34,7 +35,10 @@ pub(crate) fn run(_args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let latest = latest_event(&mut unit, position, size)?;
     write(&mut io::stdout().lock(), mode, position, configuration, latest)?;
     if mode.is_none() {
-        advise("mode and settings are not known: an original recorder does not answer the queries for them");
+        advise(
+            "mode and settings are not known: an original recorder does not answer the queries \
+             for them",
+        );
     }
     Ok(())
 }
@@ -44,7 +48,8 @@ fn latest_event(
     position: LogPosition,
     size: Option<u16>,
 ) -> Result<Option<(u16, Entry, Model)>> {
-    // Entry n is slot n - 1, and the newest is in the slot before the next. Behind slot 0 stands the last one.
+    // Entry n is slot n - 1, and the newest is in the slot before the next. Behind slot 0 stands
+    // the last one.
     let number = match (position.next_slot, size) {
         (0, None) => return Ok(None),
         (0, Some(size)) => size,
@@ -76,7 +81,9 @@ fn write(
     field(out, "events", format_args!("{} since the last erase (modulo 65536)", position.total))?;
     let next = u32::from(position.next_slot) + 1;
     match configuration {
-        Some(Configuration { size, .. }) => field(out, "next entry", format_args!("{next} of {size}"))?,
+        Some(Configuration { size, .. }) => {
+            field(out, "next entry", format_args!("{next} of {size}"))?
+        }
         None => field(out, "next entry", next)?,
     }
     match latest {
@@ -106,7 +113,8 @@ mod tests {
         let mode = Mode { recording: true, version: 105 };
         let latest = (7, entry("00.250", &[3], &[1, 3]), Model::Ser160);
         let position = LogPosition { total: 7, next_slot: 7 };
-        write(&mut out, Some(mode), position, Some(Configuration::default()), Some(latest)).unwrap();
+        write(&mut out, Some(mode), position, Some(Configuration::default()), Some(latest))
+            .unwrap();
         assert_eq!(
             String::from_utf8(out).unwrap(),
             "inputs          16\n\

@@ -24,13 +24,19 @@ Examples:
   ser-cli watch --poll --interval 5s   leaves the recorder's settings alone
   ser-cli watch --log-size 2048        an original recorder
 
-First comes what has not been delivered yet (as read --new), then every event as it happens. The recorder is told to \
-report by itself (auto report on RS-232); on the way out, also after Ctrl-C or an error, it gets back the setting \
-it had. Recorders that report to the Genius bus keep doing so and are asked every second instead, and so are original \
-recorders. Every now and then the log itself is looked at, so that a report lost on the line is an event late, not lost.
-While events come so fast that reports and readings are more than the line carries, the recorder is told not to report \
+First comes what has not been delivered yet (as read --new), then every event as it happens. The \
+recorder is told to \
+report by itself (auto report on RS-232); on the way out, also after Ctrl-C or an error, it gets \
+back the setting \
+it had. Recorders that report to the Genius bus keep doing so and are asked every second \
+instead, and so are original \
+recorders. Every now and then the log itself is looked at, so that a report lost on the line is \
+an event late, not lost.
+While events come so fast that reports and readings are more than the line carries, the recorder \
+is told not to report \
 and is read without a pause. What is overwritten all the same is counted, where it belongs.
-On a Genius bus a board or a recorder that fails is waited for, a minute or as long as --timeout says.";
+On a Genius bus a board or a recorder that fails is waited for, a minute or as long as --timeout \
+says.";
 
 /// How often the recorder is asked when it does not report by itself.
 const POLL_EVERY: Duration = Duration::from_secs(1);
@@ -106,13 +112,16 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
 const fn not_put_back(found: &Configuration) -> &'static str {
     match found.auto_report {
         AutoReport::Off => {
-            "the recorder may still report by itself; ser-cli config --auto-report off puts that back"
+            "the recorder may still report by itself; ser-cli config --auto-report off puts that \
+             back"
         }
         AutoReport::Rs232 => {
-            "the recorder may have stopped reporting; ser-cli config --auto-report rs232 puts that back"
+            "the recorder may have stopped reporting; ser-cli config --auto-report rs232 puts \
+             that back"
         }
         AutoReport::Genius => {
-            "the recorder may have stopped reporting; ser-cli config --auto-report genius puts that back"
+            "the recorder may have stopped reporting; ser-cli config --auto-report genius puts \
+             that back"
         }
     }
 }
@@ -134,14 +143,16 @@ struct Reports {
 }
 
 fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
-    let polling = |size| Plan { size, reports: None, interval: args.interval.unwrap_or(POLL_EVERY) };
+    let polling =
+        |size| Plan { size, reports: None, interval: args.interval.unwrap_or(POLL_EVERY) };
     if let (true, Some(size)) = (args.poll, args.log_size) {
         return Ok(polling(size));
     }
     let Some(found) = connection::settings(unit)? else {
         let size = args.log_size.or(remembered).ok_or_else(connection::log_size_unknown)?;
         inform(
-            "the recorder does not tell its settings, as original recorders do not: it is asked for events",
+            "the recorder does not tell its settings, as original recorders do not: it is asked \
+             for events",
         );
         return Ok(polling(size));
     };
@@ -158,17 +169,24 @@ fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
     match found.auto_report {
         _ if args.poll => Ok(polling(size)),
         auto_report if unit.bus_address().is_some() => match auto_report {
-            AutoReport::Genius if unit.bus_address() == Some(found.report_address) => Ok(reporting(true)),
+            AutoReport::Genius if unit.bus_address() == Some(found.report_address) => {
+                Ok(reporting(true))
+            }
             AutoReport::Off => Ok(reporting(false)),
             AutoReport::Genius | AutoReport::Rs232 => {
-                inform("the recorder reports elsewhere and goes on doing so: it is asked for events");
+                inform(
+                    "the recorder reports elsewhere and goes on doing so: it is asked for events",
+                );
                 Ok(polling(size))
             }
         },
         AutoReport::Rs232 => Ok(reporting(true)),
         AutoReport::Off => Ok(reporting(false)),
         AutoReport::Genius => {
-            inform("the recorder reports to the Genius bus and goes on doing so: it is asked for events");
+            inform(
+                "the recorder reports to the Genius bus and goes on doing so: it is asked for \
+                 events",
+            );
             Ok(polling(size))
         }
     }
@@ -178,7 +196,9 @@ fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
 fn reporting_here(unit: &Unit, found: Configuration) -> Configure {
     let keep = keep_size_and_rate(found);
     match unit.bus_address() {
-        Some(report_address) => Configure { auto_report: AutoReport::Genius, report_address, ..keep },
+        Some(report_address) => {
+            Configure { auto_report: AutoReport::Genius, report_address, ..keep }
+        }
         None => Configure { auto_report: AutoReport::Rs232, ..keep },
     }
 }

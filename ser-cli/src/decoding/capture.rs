@@ -12,25 +12,32 @@ const SNIFF_LEN: usize = 64 * 1024;
 /// How to read a capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CaptureOptions {
-    /// Who sent the bytes; without it, messages that both sides could have sent are shown with both readings.
+    /// Who sent the bytes; without it, messages that both sides could have sent are shown with both
+    /// readings.
     pub from: Option<Side>,
-    /// What the input looks like; without it, it is hex text if its first line is and no ESC is near its beginning.
+    /// What the input looks like; without it, it is hex text if its first line is and no ESC is
+    /// near its beginning.
     pub format: Option<CaptureFormat>,
     /// Whether the input holds bodies without framing: in hex text one per line, raw a single one.
     pub bodies: bool,
 }
 
 impl CaptureOptions {
-    /// Decodes all of `input` and lists what it holds, damage included. Any bytes are a capture. When reading fails,
-    /// what came before is listed, and the error is given back.
+    /// Decodes all of `input` and lists what it holds, damage included. Any bytes are a capture.
+    /// When reading fails, what came before is listed, and the error is given back.
     ///
     /// # Errors
     /// When the list cannot be written.
-    pub fn decode<W: Write>(self, input: impl Read, list: &mut Listing<W>) -> io::Result<Option<io::Error>> {
+    pub fn decode<W: Write>(
+        self,
+        input: impl Read,
+        list: &mut Listing<W>,
+    ) -> io::Result<Option<io::Error>> {
         let mut input = BufReader::with_capacity(SNIFF_LEN, input);
         let (start, mut read_error) = sniff(&mut input);
         let is_hex = self.bodies || (!start.contains(&ESC) && begins_as_hex(&start));
-        let format = self.format.unwrap_or(if is_hex { CaptureFormat::Hex } else { CaptureFormat::Raw });
+        let format =
+            self.format.unwrap_or(if is_hex { CaptureFormat::Hex } else { CaptureFormat::Raw });
         let mut decoder = Decoder::new(self.from, self.bodies, format);
         decoder.take(&start, list)?;
         while read_error.is_none() {
@@ -167,7 +174,8 @@ mod tests {
             ),
             [
                 "1:19  damage    odd number of digits: a single 3, skipped",
-                "1:1  damage    frame given up at line 2, column 1: a new frame began before it was complete",
+                "1:1  damage    frame given up at line 2, column 1: a new frame began before it \
+                 was complete",
                 "2:13  damage    '?' is no hexadecimal digit, skipped",
                 "2:1  host      erase the event buffer",
                 "1 message, 3 damaged places"
@@ -187,7 +195,10 @@ mod tests {
             ]
         );
         let raw = CaptureOptions { bodies: true, format: Some(CaptureFormat::Raw), ..ANY };
-        assert_eq!(decoded(raw, b"\x52\x01\xF4\x05")[0], "0  host      read 5 entries from entry 500");
+        assert_eq!(
+            decoded(raw, b"\x52\x01\xF4\x05")[0],
+            "0  host      read 5 entries from entry 500"
+        );
         assert_eq!(decoded(raw, &[0x52; 300])[0], "0  damage    a body of more than 255 bytes");
     }
 
@@ -196,7 +207,8 @@ mod tests {
         let hex = CaptureOptions { format: Some(CaptureFormat::Hex), ..ANY };
         assert_eq!(
             decoded(hex, b"\x1B")[0],
-            "1:1  damage    an ESC byte in hex text (--format raw?) is no hexadecimal digit, skipped"
+            "1:1  damage    an ESC byte in hex text (--format raw?) is no hexadecimal digit, \
+             skipped"
         );
         let raw = CaptureOptions { format: Some(CaptureFormat::Raw), ..ANY };
         assert_eq!(decoded(raw, b"1B 30")[0], "0  text      1B 30");
@@ -207,7 +219,8 @@ mod tests {
         struct Crumbs<'a>(&'a [u8]);
         impl Read for Crumbs<'_> {
             fn read(&mut self, buf: &mut [u8]) -> io::Result<usize> {
-                let (Some((&byte, rest)), Some(place)) = (self.0.split_first(), buf.first_mut()) else {
+                let (Some((&byte, rest)), Some(place)) = (self.0.split_first(), buf.first_mut())
+                else {
                     return Ok(0);
                 };
                 *place = byte;

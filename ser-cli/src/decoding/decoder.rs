@@ -26,7 +26,8 @@ pub(crate) struct Decoder {
     hex: HexText,
     /// How much of a raw input has been taken.
     offset: u64,
-    // Every length that a frame can announce fits, so that an impossible one is named for what it is.
+    // Every length that a frame can announce fits, so that an impossible one is named for what it
+    // is.
     frames: FrameDecoder<MAX_BODY>,
     frame_start: Place,
     text: LineAssembler,
@@ -129,7 +130,9 @@ impl Decoder {
         self.end_of_body(list)?;
         self.end_of_text(list)?;
         match self.frames.finish() {
-            Some(dropped) => list.add(self.frame_start, Kind::Damage, &dropped.cause.to_string(), &[]),
+            Some(dropped) => {
+                list.add(self.frame_start, Kind::Damage, &dropped.cause.to_string(), &[])
+            }
             None => Ok(()),
         }
     }

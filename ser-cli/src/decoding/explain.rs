@@ -2,8 +2,8 @@
 
 use clap::ValueEnum;
 use ser_proto::{
-    AutoReport, Command, Configuration, Configure, Entry, Mode, Model, ParseError, ReadReply, Reply,
-    TimeStamp,
+    AutoReport, Command, Configuration, Configure, Entry, Mode, Model, ParseError, ReadReply,
+    Reply, TimeStamp,
 };
 
 use super::Kind;
@@ -35,7 +35,8 @@ impl Explanation {
     }
 }
 
-/// Puts a body into words; when `from` is not known and both sides could have sent it, both readings.
+/// Puts a body into words; when `from` is not known and both sides could have sent it, both
+/// readings.
 pub(crate) fn explain(body: &[u8], from: Option<Side>) -> Explanation {
     let command = (from != Some(Side::Recorder)).then(|| Command::parse(body));
     let reply = (from != Some(Side::Host)).then(|| Reply::parse(body));
@@ -46,12 +47,15 @@ pub(crate) fn explain(body: &[u8], from: Option<Side>) -> Explanation {
             format!("host: {} | recorder: {}", command_text(&command), reply_text(&reply)),
         ),
         (Some(Ok(command)), _) => plain(Kind::Host, command_text(&command)),
-        (_, Some(Ok(reply))) => {
-            Explanation { kind: Kind::Recorder, text: reply_text(&reply), details: entry_lines(&reply) }
-        }
-        (command, reply) => {
-            plain(Kind::Damage, no_message(body, command.and_then(Result::err), reply.and_then(Result::err)))
-        }
+        (_, Some(Ok(reply))) => Explanation {
+            kind: Kind::Recorder,
+            text: reply_text(&reply),
+            details: entry_lines(&reply),
+        },
+        (command, reply) => plain(
+            Kind::Damage,
+            no_message(body, command.and_then(Result::err), reply.and_then(Result::err)),
+        ),
     }
 }
 
@@ -81,8 +85,12 @@ fn command_text(command: &Command) -> String {
         Command::SetMode { recording: true } => "start recording".to_string(),
         Command::SetMode { recording: false } => "stop recording".to_string(),
         Command::Print { start, count } => format!("print {} from entry {start}", entries(count)),
-        Command::Read { count: 0, start } => format!("read no entries from entry {start}, the header only"),
-        Command::Read { start, count } => format!("read {} from entry {start}", entries(count.into())),
+        Command::Read { count: 0, start } => {
+            format!("read no entries from entry {start}, the header only")
+        }
+        Command::Read { start, count } => {
+            format!("read {} from entry {start}", entries(count.into()))
+        }
         Command::SetClock(time) => format!("set the clock to {time}"),
     }
 }
@@ -108,8 +116,9 @@ fn mode_text(mode: Mode) -> String {
 
 fn configure_text(configure: &Configure) -> String {
     let size = configure.size.map_or("size kept".to_string(), |size| format!("size {size}"));
-    let baud =
-        configure.baud.map_or("baud kept".to_string(), |baud| format!("{} baud", baud.bits_per_second()));
+    let baud = configure
+        .baud
+        .map_or("baud kept".to_string(), |baud| format!("{} baud", baud.bits_per_second()));
     format!(
         "{size}, {baud}, {}, auto print {}",
         auto_report_text(configure.auto_report, configure.report_address),
@@ -133,7 +142,10 @@ fn read_reply_text(reply: &ReadReply) -> String {
     let ReadReply { start, total, next_slot, model, entries: found } = reply;
     let count = u16::try_from(found.len()).unwrap_or(u16::MAX);
     let inputs = model.map_or(String::new(), |model: Model| format!("; {} inputs", model.inputs()));
-    format!("read reply: {} from entry {start}; total {total}, next slot {next_slot}{inputs}", entries(count))
+    format!(
+        "read reply: {} from entry {start}; total {total}, next slot {next_slot}{inputs}",
+        entries(count)
+    )
 }
 
 fn entry_lines(reply: &Reply) -> Vec<String> {
@@ -154,7 +166,8 @@ fn changes(entry: &Entry) -> String {
     if entry.changed.is_empty() {
         return "no input".to_string();
     }
-    let change = |input| format!("{input} {}", if entry.state.contains(input) { "ON" } else { "OFF" });
+    let change =
+        |input| format!("{input} {}", if entry.state.contains(input) { "ON" } else { "OFF" });
     entry.changed.numbers().map(change).collect::<Vec<_>>().join("  ")
 }
 
@@ -180,7 +193,8 @@ mod tests {
         for (body, meaning) in [
             (
                 &[0x43, 4, 0, 6, 2, 1, 0][..],
-                "Host: configure: size 1024, 9600 baud, auto report to Genius address 1, auto print off",
+                "Host: configure: size 1024, 9600 baud, auto report to Genius address 1, auto \
+                 print off",
             ),
             (&[0x45], "Host: erase the event buffer"),
             (&[0x4C], "Host: query the last broadcast"),
@@ -190,14 +204,18 @@ mod tests {
             (&[0x50, 0x32, 0x64], "Host: print 100 entries from entry 50"),
             (&[0x52, 1, 0xF4, 5], "Host: read 5 entries from entry 500"),
             (&[0x52, 0, 1, 0], "Host: read no entries from entry 1, the header only"),
-            (&[0x53, 96, 11, 21, 22, 30, 50, 0, 250], "Host: set the clock to 1996-11-21T22:30:50.250"),
+            (
+                &[0x53, 96, 11, 21, 22, 30, 50, 0, 250],
+                "Host: set the clock to 1996-11-21T22:30:50.250",
+            ),
         ] {
             assert_eq!(text(body, Some(Side::Host)), meaning);
         }
         for (body, meaning) in [
             (
                 &[0x43, 4, 0, 6, 3, 1, 1][..],
-                "Recorder: configuration: size 1024, 9600 baud, auto report on RS-232 (address 1), auto print on",
+                "Recorder: configuration: size 1024, 9600 baud, auto report on RS-232 (address \
+                 1), auto print on",
             ),
             (&[0x45], "Recorder: event buffer erased"),
             (&[0x4C, 0x45, 14, 30, 50, 0, 250], "Recorder: last broadcast: erase at 14:30:50.250"),
@@ -241,7 +259,10 @@ mod tests {
     fn what_is_no_message_is_shown_with_the_reason() {
         assert_eq!(text(&[0x58, 1], None), "Damage: no message: unknown command byte 58h (58 01)");
         let why = Command::parse(&[0x4D, 2, 0]).unwrap_err();
-        assert_eq!(text(&[0x4D, 2, 0], Some(Side::Host)), format!("Damage: no message: {why} (4D 02 00)"));
+        assert_eq!(
+            text(&[0x4D, 2, 0], Some(Side::Host)),
+            format!("Damage: no message: {why} (4D 02 00)")
+        );
         let no_command = Command::parse(&[0x52, 0, 1, 0, 0, 0, 0, 0, 9]).unwrap_err();
         let both = text(&[0x52, 0, 1, 0, 0, 0, 0, 0, 9], None);
         assert!(both.contains(&format!("as a command: {no_command}; as a reply: ")), "{both}");

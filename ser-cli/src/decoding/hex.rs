@@ -1,6 +1,7 @@
 //! Bytes written as hexadecimal text: `1B 30 31 …`, with or without blanks.
 //!
-//! Blanks and commas separate, `0x` may stand before a byte, `#` starts a comment that ends with the line.
+//! Blanks and commas separate, `0x` may stand before a byte, `#` starts a comment that ends with
+//! the line.
 
 use super::Place;
 
@@ -9,7 +10,8 @@ use super::Place;
 pub(crate) enum HexToken {
     /// A byte, and where its first digit stands.
     Byte(u8, Place),
-    /// A character that has no meaning here; a digit right before it goes with it, and so do more of its kind.
+    /// A character that has no meaning here; a digit right before it goes with it, and so do more
+    /// of its kind.
     Junk(char, Place),
     /// A digit that lacks the second one.
     Half(char, Place),
@@ -31,7 +33,14 @@ pub(crate) struct HexText {
 
 impl HexText {
     pub(crate) fn new() -> HexText {
-        HexText { line: 1, column: 0, digit: None, in_comment: false, in_junk: false, utf8: Utf8::default() }
+        HexText {
+            line: 1,
+            column: 0,
+            digit: None,
+            in_comment: false,
+            in_junk: false,
+            utf8: Utf8::default(),
+        }
     }
 
     /// Takes the next byte of the file; a byte completes two tokens at most.
@@ -159,7 +168,10 @@ mod tests {
         assert_eq!(tokens(b"1B\n30 3G 31"), ["1B", "end", "30", "junk G line 2, column 5", "31"]);
         assert_eq!(tokens("1B\u{e4}30".as_bytes()), ["1B", "junk \u{e4} line 1, column 3", "30"]);
         assert_eq!(tokens(b"1B\xFF30"), ["1B", "junk \u{fffd} line 1, column 3", "30"]);
-        assert_eq!(tokens(b"1B??!30 ?"), ["1B", "junk ? line 1, column 3", "30", "junk ? line 1, column 9"]);
+        assert_eq!(
+            tokens(b"1B??!30 ?"),
+            ["1B", "junk ? line 1, column 3", "30", "junk ? line 1, column 9"]
+        );
     }
 
     #[test]

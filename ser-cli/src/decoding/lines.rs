@@ -11,7 +11,8 @@ pub(crate) struct Line {
     pub(crate) place: Place,
     /// Text, or noise if there is a byte that no printer prints.
     pub(crate) kind: Kind,
-    /// Printable ASCII as it is, everything else as `\x1f`: a capture must not be able to steer the terminal.
+    /// Printable ASCII as it is, everything else as `\x1f`: a capture must not be able to steer the
+    /// terminal.
     pub(crate) text: String,
 }
 
@@ -55,10 +56,15 @@ mod tests {
 
     fn lines(text: &[u8]) -> Vec<String> {
         let mut assembler = LineAssembler::default();
-        let mut lines: Vec<_> =
-            (0..).zip(text).filter_map(|(at, &byte)| assembler.push(byte, Place::Offset(at))).collect();
+        let mut lines: Vec<_> = (0..)
+            .zip(text)
+            .filter_map(|(at, &byte)| assembler.push(byte, Place::Offset(at)))
+            .collect();
         lines.extend(assembler.finish());
-        lines.into_iter().map(|line| format!("{:?} {}: {}", line.kind, line.place, line.text)).collect()
+        lines
+            .into_iter()
+            .map(|line| format!("{:?} {}: {}", line.kind, line.place, line.text))
+            .collect()
     }
 
     #[test]
@@ -69,7 +75,8 @@ mod tests {
     #[test]
     fn what_does_not_print_is_escaped_and_what_does_not_end_is_cut() {
         assert_eq!(lines(b"\x00\xFF'\"\\\t\x07\n"), ["Noise byte 0: \\x00\\xff'\"\\\\t\\x07"]);
-        let cut: Vec<_> = lines(&[b'A'; 600]).iter().map(|line| line.matches('A').count()).collect();
+        let cut: Vec<_> =
+            lines(&[b'A'; 600]).iter().map(|line| line.matches('A').count()).collect();
         assert_eq!(cut, [320, 280]);
     }
 }

@@ -86,7 +86,13 @@ impl<W: Write> Listing<W> {
     }
 
     /// Adds a line, and below it `details`.
-    pub(crate) fn add(&mut self, place: Place, kind: Kind, text: &str, details: &[String]) -> io::Result<()> {
+    pub(crate) fn add(
+        &mut self,
+        place: Place,
+        kind: Kind,
+        text: &str,
+        details: &[String],
+    ) -> io::Result<()> {
         let Palette { faint, alarm, .. } = self.palette;
         let (name, style) = match kind {
             Kind::Host => ("host", anstyle::Style::new()),
@@ -130,8 +136,9 @@ impl Tally {
 /// As `3 messages, 1 line of text, nothing damaged`.
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let of =
-            |count: u64, one: &str, many: &str| format!("{count} {}", if count == 1 { one } else { many });
+        let of = |count: u64, one: &str, many: &str| {
+            format!("{count} {}", if count == 1 { one } else { many })
+        };
         write!(f, "{}", of(self.messages, "message", "messages"))?;
         if self.lines > 0 {
             write!(f, ", {}", of(self.lines, "line of text", "lines of text"))?;

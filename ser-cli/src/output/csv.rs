@@ -7,8 +7,8 @@ use super::{Event, EventWriter, Loss};
 
 pub(super) const HEADER: &str = "entry,time,input,state,sequence,life,note";
 
-/// Writes rows like `17,2026-11-22T10:00:00.250,3,1,120,9f3c5a7e21b04d68,`. The header comes first, also when no event
-/// follows. A loss has nothing in the first four columns.
+/// Writes rows like `17,2026-11-22T10:00:00.250,3,1,120,9f3c5a7e21b04d68,`. The header comes first,
+/// also when no event follows. A loss has nothing in the first four columns.
 pub(crate) struct Csv<W> {
     out: W,
     header_due: bool,
@@ -64,7 +64,11 @@ fn number_or_nothing(number: Option<u64>) -> String {
 
 /// A note as one field.
 fn quoted(note: &str) -> String {
-    if note.contains([',', '"']) { format!("\"{}\"", note.replace('"', "\"\"")) } else { note.to_string() }
+    if note.contains([',', '"']) {
+        format!("\"{}\"", note.replace('"', "\"\""))
+    } else {
+        note.to_string()
+    }
 }
 
 #[cfg(test)]
@@ -88,7 +92,8 @@ mod tests {
                 "2048,2026-11-22T10:00:00.250,3,1,5000,00000000000000ab,",
                 "2048,2026-11-22T10:00:00.250,17,0,5000,00000000000000ab,",
                 ",,,,4996,00000000000000ab,lost 4 (exactly) after 4996: overwritten",
-                "1,2026-11-22T10:00:00.251,32,1,5000,00000000000000ab,month 13 is out of range; the clock went back",
+                "1,2026-11-22T10:00:00.251,32,1,5000,00000000000000ab,month 13 is out of range; \
+                 the clock went back",
                 "2,2026-11-22T10:00:00.252,,,,00000000000000ab,",
             ]
         );

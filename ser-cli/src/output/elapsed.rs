@@ -12,12 +12,14 @@ pub(crate) struct Elapsed {
 }
 
 impl Elapsed {
-    /// The time since the previous and since the first event: empty for the first event itself, `?` where one of the
-    /// two has no possible date.
+    /// The time since the previous and since the first event: empty for the first event itself, `?`
+    /// where one of the two has no possible date.
     pub(crate) fn at(&mut self, time: TimeStamp) -> [String; 2] {
         let since = [self.previous, self.first].map(|earlier| match earlier {
             None => String::new(),
-            Some(earlier) => Delta::between(earlier, time).map_or("?".to_string(), |delta| delta.to_string()),
+            Some(earlier) => {
+                Delta::between(earlier, time).map_or("?".to_string(), |delta| delta.to_string())
+            }
         });
         self.first.get_or_insert(time);
         self.previous = Some(time);

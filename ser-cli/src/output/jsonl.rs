@@ -8,7 +8,8 @@ use serde::Serialize;
 
 use super::{EventWriter, Loss};
 
-/// Writes lines like `{"entry":17,"time":"2026-11-22T10:00:00.250","changed":[3,17],"state":[3],"sequence":120,
+/// Writes lines like
+/// `{"entry":17,"time":"2026-11-22T10:00:00.250","changed":[3,17],"state":[3],"sequence":120,
 /// "life":"9f3c5a7e21b04d68"}` and `{"lost":37,"count":"exactly","after":120,"why":"overwritten",
 /// "life":"9f3c5a7e21b04d68"}`.
 pub(crate) struct JsonLines<W> {
@@ -115,14 +116,17 @@ mod tests {
                     "{{\"entry\":2048,\"time\":\"2026-11-22T10:00:00.250\",\"changed\":[3,17],\"state\":[1,3],\
                      \"sequence\":5000,{life}}}"
                 ),
-                format!("{{\"lost\":4,\"count\":\"exactly\",\"after\":4996,\"why\":\"overwritten\",{life}}}"),
+                format!(
+                    "{{\"lost\":4,\"count\":\"exactly\",\"after\":4996,\"why\":\"overwritten\",{life}}}"
+                ),
                 format!(
                     "{{\"lost\":null,\"count\":\"unknown\",\"after\":4996,\"why\":\"not recorded\",\
                      \"inputs\":[1,3],{life}}}"
                 ),
                 format!(
                     "{{\"entry\":1,\"time\":\"2026-11-22T10:00:00.251\",\"changed\":[],\"state\":[],\
-                     \"sequence\":5000,{life},\"note\":\"month 13 is out of range; the clock went back\"}}"
+                     \"sequence\":5000,{life},\"note\":\"month 13 is out of range; the clock \
+                     went back\"}}"
                 ),
             ]
         );

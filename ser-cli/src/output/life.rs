@@ -1,7 +1,8 @@
 //! Which log an event belongs to.
 //!
-//! A log lives from power-up or erase to the next. The recorder has no name for its lives, so whoever remembers from
-//! run to run what was read draws one at random: together with the sequence it tells an event from all others.
+//! A log lives from power-up or erase to the next. The recorder has no name for its lives, so
+//! whoever remembers from run to run what was read draws one at random: together with the sequence
+//! it tells an event from all others.
 
 use std::fmt;
 use std::io;
@@ -52,7 +53,8 @@ mod tests {
     fn a_name_is_read_as_it_is_written() {
         let life = Life::begin().unwrap();
         assert_ne!(life, Life::begin().unwrap());
-        for (name, life) in [(life.to_string(), Some(life)), ("0".to_string(), Some(Life::UNKNOWN))] {
+        for (name, life) in [(life.to_string(), Some(life)), ("0".to_string(), Some(Life::UNKNOWN))]
+        {
             assert_eq!(Life::from_name(&name), life);
         }
         for wrong in ["", "1", "00", "+000000000000001", "000000000000000g", "AB00000000000000"] {

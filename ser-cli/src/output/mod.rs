@@ -64,7 +64,11 @@ pub(crate) fn to_stdout(format: Format) -> Box<dyn EventWriter> {
 }
 
 /// Writes `name` and what it is in two columns, as `status` and `config` do.
-pub(crate) fn field(out: &mut dyn Write, name: &str, value: impl std::fmt::Display) -> io::Result<()> {
+pub(crate) fn field(
+    out: &mut dyn Write,
+    name: &str,
+    value: impl std::fmt::Display,
+) -> io::Result<()> {
     writeln!(out, "{name:<16}{value}")
 }
 
@@ -81,7 +85,9 @@ pub(crate) mod testing {
 
     /// An event at 10:00 plus `time`, given as `00.250`.
     pub(crate) fn entry(time: &str, changed: &[u8], state: &[u8]) -> Entry {
-        let set = |numbers: &[u8]| Inputs(numbers.iter().fold(0, |bits, number| bits | 1 << (number - 1)));
+        let set = |numbers: &[u8]| {
+            Inputs(numbers.iter().fold(0, |bits, number| bits | 1 << (number - 1)))
+        };
         Entry {
             changed: set(changed),
             state: set(state),

@@ -25,7 +25,8 @@ impl Palette {
         Palette::default()
     }
 
-    /// Styles if standard output is a terminal that takes them and the user has nothing against them.
+    /// Styles if standard output is a terminal that takes them and the user has nothing against
+    /// them.
     pub(crate) fn of_stdout() -> Palette {
         match anstream::AutoStream::choice(&std::io::stdout()) {
             anstream::ColorChoice::Never => Palette::plain(),

@@ -69,7 +69,9 @@ impl Loss {
             _ => format!("{count} events were"),
         };
         match self.lost {
-            Lost::Overwritten { count } => format!("{} overwritten before they were read", events(count)),
+            Lost::Overwritten { count } => {
+                format!("{} overwritten before they were read", events(count))
+            }
             Lost::OverwrittenAtLeast { count: 1 } => {
                 "at least 1 event had been overwritten before the first reading".to_string()
             }
@@ -81,7 +83,9 @@ impl Loss {
                 .to_string(),
             Lost::Unrecorded { inputs } => {
                 let many = if inputs.numbers().count() == 1 { "input" } else { "inputs" };
-                format!("{many} {inputs} changed while nothing was recorded; how often is not known")
+                format!(
+                    "{many} {inputs} changed while nothing was recorded; how often is not known"
+                )
             }
         }
     }
@@ -139,7 +143,8 @@ pub(crate) struct Annotator {
 pub(crate) struct Before {
     /// The last event that was delivered.
     pub(crate) previous: Option<Entry>,
-    /// The same, when the log was erased right after it: the first event of the new log goes on from its state.
+    /// The same, when the log was erased right after it: the first event of the new log goes on
+    /// from its state.
     pub(crate) erased: Option<Entry>,
     /// The name of the next life, if one was drawn already.
     pub(crate) next_life: Option<Life>,
@@ -188,7 +193,8 @@ impl Annotator {
                 let erased = self.before.erased.take().filter(|_| sequence == Some(1));
                 let lost = erased.and_then(|erased| Lost::between(&erased, &entry));
                 let loss = lost.map(|lost| Record::Loss(Loss { after: Some(0), life, lost }));
-                let event = Record::Event(Event { number: entry_number, sequence, life, entry, notes });
+                let event =
+                    Record::Event(Event { number: entry_number, sequence, life, entry, notes });
                 loss.into_iter().chain([event]).collect()
             }
             Delivery::Lost { after, lost } => {
@@ -223,12 +229,17 @@ fn notes(entry: &Entry, model: Model, previous: Option<&Entry>) -> Vec<Note> {
     }
     if (entry.changed.0 | entry.state.0) & !model.mask() != 0 {
         let inputs = ser_proto::Inputs((entry.changed.0 | entry.state.0) & !model.mask());
-        notes.push(Note::Odd(format!("a recorder of {} inputs has no input {inputs}", model.inputs())));
+        notes.push(Note::Odd(format!(
+            "a recorder of {} inputs has no input {inputs}",
+            model.inputs()
+        )));
     }
-    notes.extend(previous.and_then(|previous| match ClockStep::between(previous.time, entry.time)? {
-        ClockStep::Back => Some(Note::ClockWentBack),
-        ClockStep::YearsBeganAnew => Some(Note::YearsBeganAnew),
-        ClockStep::Forward => None,
+    notes.extend(previous.and_then(|previous| {
+        match ClockStep::between(previous.time, entry.time)? {
+            ClockStep::Back => Some(Note::ClockWentBack),
+            ClockStep::YearsBeganAnew => Some(Note::YearsBeganAnew),
+            ClockStep::Forward => None,
+        }
     }));
     notes
 }
@@ -259,7 +270,8 @@ mod tests {
             (
                 Lost::LogRestarted,
                 "lost an unknown number after 120: log began anew",
-                "the log began anew (it was erased, or the power failed); unread events of the old log are \
+                "the log began anew (it was erased, or the power failed); unread events of the \
+                 old log are \
                  lost, how many is not known",
             ),
             (
@@ -318,7 +330,8 @@ mod tests {
         assert!(![life, Life::UNKNOWN].contains(&annotator.life()));
         // A name that was drawn before a crash may be in a file already.
         let next = Life::begin().unwrap();
-        let mut annotator = Annotator::new(life, Before { next_life: Some(next), ..Before::default() });
+        let mut annotator =
+            Annotator::new(life, Before { next_life: Some(next), ..Before::default() });
         annotator.records(&restart).unwrap();
         assert_eq!(annotator.life(), next);
         let mut annotator = Annotator::new(Life::UNKNOWN, Before::default());
@@ -329,8 +342,12 @@ mod tests {
     #[test]
     fn a_step_shows_across_an_entry_without_a_date_and_from_run_to_run() {
         let never = TimeStamp { month: 13, ..entry("00.250", &[3], &[3]).time };
-        let event =
-            |entry| Delivery::Event { entry_number: 1, sequence: Some(9), entry, model: Model::Ser160 };
+        let event = |entry| Delivery::Event {
+            entry_number: 1,
+            sequence: Some(9),
+            entry,
+            model: Model::Ser160,
+        };
         let before = Before { previous: Some(entry("05.000", &[3], &[3])), ..Before::default() };
         let mut annotator = Annotator::new(Life::UNKNOWN, before);
         let mut noted = |entry| {

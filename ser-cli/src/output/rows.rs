@@ -1,8 +1,9 @@
 //! Standard output as a place for whole rows.
 //!
-//! What is written is passed on at each flush, whole rows at a time. If a file takes only a part of it, as on a full
-//! disk, that part is taken back: the file ends with a whole row, and the next run, which delivers the same events
-//! again, goes on there. A file that ends in the middle of a row all the same (the power went) gets a line end first.
+//! What is written is passed on at each flush, whole rows at a time. If a file takes only a part of
+//! it, as on a full disk, that part is taken back: the file ends with a whole row, and the next
+//! run, which delivers the same events again, goes on there. A file that ends in the middle of a
+//! row all the same (the power went) gets a line end first.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -30,8 +31,8 @@ impl Rows {
     pub(crate) fn to_stdout(header: &str) -> (Rows, bool) {
         match stdout_file() {
             Ok(file) if is_regular(&file) => Rows::to_file(file, header, reopen_stdout),
-            // Standard output as the library has it takes a closed one for a good one. A Windows console needs the
-            // library, because it wants other bytes.
+            // Standard output as the library has it takes a closed one for a good one. A Windows
+            // console needs the library, because it wants other bytes.
             file => {
                 let file = file.ok().filter(|_| cfg!(unix));
                 (Rows { rows: Vec::new(), file, is_regular: false }, false)
@@ -79,7 +80,8 @@ impl Rows {
 }
 
 impl Before {
-    /// Whether the first line is this header, however spreadsheets and terminals have dressed it up.
+    /// Whether the first line is this header, however spreadsheets and terminals have dressed it
+    /// up.
     fn begins_with(&self, header: &str) -> bool {
         let text = String::from_utf8_lossy(&self.first_line);
         let plain = anstream::adapter::strip_str(&text).to_string();
@@ -104,7 +106,8 @@ impl Write for Rows {
     }
 }
 
-/// Cuts off the last bytes of a file if these are the ones that were just written: others may write to it, too.
+/// Cuts off the last bytes of a file if these are the ones that were just written: others may write
+/// to it, too.
 fn take_back(file: &mut File, written: usize, error: io::Error) -> io::Result<()> {
     // The first error is the one to tell; a row that stays cut is ended by the next run.
     let _ = cut_off(file, written as u64);
@@ -196,7 +199,8 @@ mod tests {
             fs::write(&path, content).unwrap();
             look(File::open(&path).unwrap()).unwrap()
         };
-        let before = |first_line: &str, ends_in_row| Before { first_line: first_line.into(), ends_in_row };
+        let before =
+            |first_line: &str, ends_in_row| Before { first_line: first_line.into(), ends_in_row };
         assert_eq!(look_at(b"entry,time\n1,2"), before(HEADER, true));
         assert_eq!(look_at(b"entry,time\n1,2\n"), before(HEADER, false));
         assert_eq!(look_at(b"\n"), before("", false));
@@ -205,7 +209,9 @@ mod tests {
 
     #[test]
     fn a_header_is_known_whatever_a_spreadsheet_or_a_terminal_has_made_of_it() {
-        for line in ["entry,time", "entry,time\r", "\u{FEFF}entry,time\r", "\u{1B}[1mentry,time\u{1B}[0m"] {
+        for line in
+            ["entry,time", "entry,time\r", "\u{FEFF}entry,time\r", "\u{1B}[1mentry,time\u{1B}[0m"]
+        {
             let before = Before { first_line: line.into(), ends_in_row: false };
             assert!(before.begins_with(HEADER), "{line:?}");
         }

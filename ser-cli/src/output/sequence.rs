@@ -1,4 +1,5 @@
-//! The sequence of events of one incident: by the names of the inputs, with the event that began it.
+//! The sequence of events of one incident: by the names of the inputs, with the event that began
+//! it.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -75,7 +76,10 @@ impl<W: Write> EventWriter for Sequence<W> {
             [previous, first] if first.is_empty() => {
                 let style = self.palette.first_out;
                 let mark = "first-out";
-                write!(self.out, "{number:>5} {time}  {previous:>WIDTH$} {style}{mark:>WIDTH$}{style:#}  ")?;
+                write!(
+                    self.out,
+                    "{number:>5} {time}  {previous:>WIDTH$} {style}{mark:>WIDTH$}{style:#}  "
+                )?;
             }
             [previous, first] => {
                 write!(self.out, "{number:>5} {time}  {previous:>WIDTH$} {first:>WIDTH$}  ")?;
@@ -110,7 +114,8 @@ mod tests {
     #[test]
     fn every_change_has_a_line_with_its_name_and_the_first_event_is_marked() {
         let mut out = Vec::new();
-        let names = PointNames::from([(3, "52-1 closed".to_string()), (17, "87T trip".to_string())]);
+        let names =
+            PointNames::from([(3, "52-1 closed".to_string()), (17, "87T trip".to_string())]);
         let mut sequence = Sequence::new(&mut out, Palette::plain(), names);
         sequence.event(&event(1, entry("00.250", &[17], &[3, 17]))).unwrap();
         sequence.event(&odd(event(2, entry("00.290", &[3, 4], &[4, 17])))).unwrap();

@@ -1,4 +1,5 @@
-//! A table for people: what changed, when, and how long after the previous and after the first event.
+//! A table for people: what changed, when, and how long after the previous and after the first
+//! event.
 
 use std::io::{self, Write};
 
@@ -63,7 +64,9 @@ impl<W: Write> EventWriter for Table<W> {
         self.changes(entry)?;
         let alarm = self.palette.alarm;
         match event.note() {
-            Some(note) if entry.changed.is_empty() => writeln!(self.out, "{alarm}({note}){alarm:#}"),
+            Some(note) if entry.changed.is_empty() => {
+                writeln!(self.out, "{alarm}({note}){alarm:#}")
+            }
             Some(note) => writeln!(self.out, "  {alarm}({note}){alarm:#}"),
             None => writeln!(self.out),
         }
@@ -128,8 +131,10 @@ mod tests {
         assert_eq!(
             text.lines().skip(2).collect::<Vec<_>>(),
             [
-                "    2  2026-13-22T10:00:00.000             ?             ?  (month 13 is out of range; the clock went back)",
-                "    3  2026-11-22T10:00:00.000             ?      +0.000 s  1 ON  (month 13 is out of range; the clock went back)",
+                "    2  2026-13-22T10:00:00.000             ?             ?  (month 13 is out of \
+                 range; the clock went back)",
+                "    3  2026-11-22T10:00:00.000             ?      +0.000 s  1 ON  (month 13 is \
+                 out of range; the clock went back)",
             ]
         );
     }

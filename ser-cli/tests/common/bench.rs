@@ -28,7 +28,9 @@ impl Bench {
         if kind == Kind::Emulated {
             command.arg("--image").arg(image());
         }
-        let sim = Running::start(command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()));
+        let sim = Running::start(
+            command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()),
+        );
         let bench = Bench { folder, sim };
         wait_until("the link appears", || bench.link().exists());
         bench
@@ -59,10 +61,15 @@ impl Bench {
         text(&output.stdout)
     }
 
-    /// Standard error of a command that must end with this code, and with nothing on standard output.
+    /// Standard error of a command that must end with this code, and with nothing on standard
+    /// output.
     pub(crate) fn fails(&self, code: i32, arguments: &str) -> String {
         let output = self.run(arguments);
-        assert_eq!((output.status.code(), text(&output.stdout)), (Some(code), String::new()), "{arguments}");
+        assert_eq!(
+            (output.status.code(), text(&output.stdout)),
+            (Some(code), String::new()),
+            "{arguments}"
+        );
         text(&output.stderr)
     }
 

@@ -64,7 +64,9 @@ impl Running {
 fn lines_of(output: impl Read + Send + 'static) -> Receiver<String> {
     let output = BufReader::new(output);
     let (sender, lines) = channel();
-    thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+    thread::spawn(move || {
+        output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line))
+    });
     lines
 }
 
@@ -72,8 +74,10 @@ impl Drop for Running {
     /// Politely first: a simulator that is killed outright leaves its emulator behind.
     fn drop(&mut self) {
         for signal in ["-TERM", "-CONT"] {
-            let _ =
-                Command::new("kill").args([signal, &self.0.id().to_string()]).stderr(Stdio::null()).status();
+            let _ = Command::new("kill")
+                .args([signal, &self.0.id().to_string()])
+                .stderr(Stdio::null())
+                .status();
         }
         let deadline = Instant::now() + PATIENCE;
         while matches!(self.0.try_wait(), Ok(None)) && Instant::now() < deadline {

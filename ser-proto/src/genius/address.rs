@@ -95,7 +95,10 @@ mod tests {
             let address = Address::from_number(number);
             assert_eq!(address.is_some(), number <= 31 || number == 255, "{number}");
             assert!(address.is_none_or(|address| address.number() == number));
-            assert_eq!(BusAddress::new(number).map(BusAddress::number), (number <= 31).then_some(number));
+            assert_eq!(
+                BusAddress::new(number).map(BusAddress::number),
+                (number <= 31).then_some(number)
+            );
         }
         assert_eq!(BusAddress::all().count(), 32);
         assert_eq!(Address::Broadcast.to_string(), "all");

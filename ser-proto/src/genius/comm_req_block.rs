@@ -50,9 +50,14 @@ impl<'a> Block<'a> {
         Ok(PlcReference { memory, number })
     }
 
-    /// The words from `index` on, of which there must be `count`, or up to `most` when a PLC hands over the
-    /// words behind them too.
-    pub(super) fn rest(self, index: usize, count: usize, most: usize) -> Result<&'a [u16], CommReqError> {
+    /// The words from `index` on, of which there must be `count`, or up to `most` when a PLC hands
+    /// over the words behind them too.
+    pub(super) fn rest(
+        self,
+        index: usize,
+        count: usize,
+        most: usize,
+    ) -> Result<&'a [u16], CommReqError> {
         let rest = self.0.get(index..).unwrap_or_default();
         match rest.get(..count) {
             None => Err(CommReqError::Missing { index: self.0.len() }),
@@ -105,7 +110,9 @@ pub enum CommReqError {
 impl fmt::Display for CommReqError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            CommReqError::Missing { index } => write!(f, "the COMM_REQ block ends before word {index}"),
+            CommReqError::Missing { index } => {
+                write!(f, "the COMM_REQ block ends before word {index}")
+            }
             CommReqError::BadWord { index, value } => {
                 write!(f, "word {index} of a COMM_REQ block cannot be {value} ({value:04X}h)")
             }

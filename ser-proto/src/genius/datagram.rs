@@ -4,7 +4,9 @@ use core::fmt;
 
 use heapless::Vec;
 
-use super::{Address, BusAddress, FUNCTION_GENIUS, FUNCTION_HORNER, Priority, SUBFUNCTION_SER, Subfunction};
+use super::{
+    Address, BusAddress, FUNCTION_GENIUS, FUNCTION_HORNER, Priority, SUBFUNCTION_SER, Subfunction,
+};
 
 /// The most data bytes of a datagram: what the buffers of a GENI board hold (GENI manual, chapter
 /// 10, tables of the Transmit Datagram commands). Messages of the recorder have at most
@@ -45,7 +47,14 @@ impl Datagram {
         data: &[u8],
     ) -> Result<Datagram, TooMuchData> {
         let data = TooMuchData::check(data)?;
-        Ok(Datagram { source, destination, function, subfunction, priority: Priority::Normal, data })
+        Ok(Datagram {
+            source,
+            destination,
+            function,
+            subfunction,
+            priority: Priority::Normal,
+            data,
+        })
     }
 
     /// The function and subfunction codes in words, where we know them.
@@ -133,7 +142,8 @@ mod tests {
 
     #[test]
     fn a_datagram_reads_well() {
-        let mut datagram = Datagram::new(UNIT, Address::Broadcast, FUNCTION_GENIUS, 0, &[]).unwrap();
+        let mut datagram =
+            Datagram::new(UNIT, Address::Broadcast, FUNCTION_GENIUS, 0, &[]).unwrap();
         datagram.priority = Priority::High;
         assert_eq!(datagram.to_string(), "5 to all: Read ID, no data, high priority");
         datagram.priority = Priority::Normal;

@@ -1,4 +1,5 @@
-//! `COMM_REQ` 13: a PLC fetches a datagram that its bus controller has received (manual, table "Dequeue Datagram").
+//! `COMM_REQ` 13: a PLC fetches a datagram that its bus controller has received (manual, table
+//! "Dequeue Datagram").
 //!
 //! ```text
 //! word  0: 7 | 1–6      | 7       | 8              | 9          | 10       | 11          | 12
@@ -93,8 +94,13 @@ impl DequeueDatagram {
 impl fmt::Display for DequeueDatagram {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let subject = Subject { function: self.function, subfunction: self.subfunction };
-        let (sender, max_words, into, status) = (self.sender, self.max_words, self.into, self.status);
-        write!(f, "fetch {subject} from {sender}, at most {max_words} words into {into}, status in {status}")
+        let (sender, max_words, into, status) =
+            (self.sender, self.max_words, self.into, self.status);
+        write!(
+            f,
+            "fetch {subject} from {sender}, at most {max_words} words into {into}, status in \
+             {status}"
+        )
     }
 }
 
@@ -156,7 +162,10 @@ mod tests {
     fn other_lengths_are_refused() {
         for length in 0..13 {
             let index = if length <= 6 { 6 } else { length };
-            assert_eq!(DequeueDatagram::parse(&WORDS[..length]), Err(CommReqError::Missing { index }));
+            assert_eq!(
+                DequeueDatagram::parse(&WORDS[..length]),
+                Err(CommReqError::Missing { index })
+            );
         }
         let long = [&WORDS[..], &[0]].concat();
         assert_eq!(DequeueDatagram::parse(&long), Err(CommReqError::TooManyWords { words: 14 }));

@@ -8,7 +8,8 @@
 //!                 | 1 0 76.8K, 1 1 153.6K standard   |
 //! ```
 //!
-//! An open switch is a 1. The switches of a GENI board mean the same; there a closed switch 8 holds back outputs.
+//! An open switch is a 1. The switches of a GENI board mean the same; there a closed switch 8 holds
+//! back outputs.
 
 use core::fmt;
 
@@ -116,9 +117,10 @@ mod tests {
 
     /// Rows of the manual's table, switches in the order 1 2 3 4 5, 1 is open.
     const ADDRESSES: [&str; 32] = [
-        "00000", "10000", "01000", "11000", "00100", "10100", "01100", "11100", "00010", "10010", "01010",
-        "11010", "00110", "10110", "01110", "11110", "00001", "10001", "01001", "11001", "00101", "10101",
-        "01101", "11101", "00011", "10011", "01011", "11011", "00111", "10111", "01111", "11111",
+        "00000", "10000", "01000", "11000", "00100", "10100", "01100", "11100", "00010", "10010",
+        "01010", "11010", "00110", "10110", "01110", "11110", "00001", "10001", "01001", "11001",
+        "00101", "10101", "01101", "11101", "00011", "10011", "01011", "11011", "00111", "10111",
+        "01111", "11111",
     ];
 
     /// Rows of the manual's table, switches in the order 6 7.

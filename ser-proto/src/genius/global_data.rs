@@ -1,4 +1,5 @@
-//! The state of all inputs, which a recorder puts on the bus in every scan (manual, section "Global data").
+//! The state of all inputs, which a recorder puts on the bus in every scan (manual, section "Global
+//! data").
 //!
 //! ```text
 //! 16 inputs: | inputs 1–8 | 9–16 |                      2 bytes

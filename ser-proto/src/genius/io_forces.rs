@@ -120,7 +120,10 @@ mod tests {
     #[test]
     fn a_recorder_forces_nothing_and_has_no_outputs() {
         assert_eq!(IoForces::none(ForceTable::InputEnable, Model::Ser160).to_data(), [0, 0, 0]);
-        assert_eq!(IoForces::none(ForceTable::InputValues, Model::Ser320).to_data(), [2, 0, 0, 0, 0]);
+        assert_eq!(
+            IoForces::none(ForceTable::InputValues, Model::Ser320).to_data(),
+            [2, 0, 0, 0, 0]
+        );
         assert_eq!(IoForces::none(ForceTable::OutputEnable, Model::Ser320).to_data(), [1]);
         assert_eq!(IoForces::none(ForceTable::OutputValues, Model::Ser160).to_data(), [3]);
     }
@@ -133,7 +136,10 @@ mod tests {
         assert_eq!(forces.to_data(), &data[..]);
         data.push(0);
         let subfunction = Subfunction::ReadIoForcesReply;
-        assert_eq!(IoForces::parse(&data), Err(MessageError::WrongLength { subfunction, length: 130 }));
+        assert_eq!(
+            IoForces::parse(&data),
+            Err(MessageError::WrongLength { subfunction, length: 130 })
+        );
     }
 
     #[test]

@@ -1,12 +1,14 @@
-//! Read Device, its reply, and Write Device, subfunctions 1Eh, 1Fh and 20h: access to a host's memory.
+//! Read Device, its reply, and Write Device, subfunctions 1Eh, 1Fh and 20h: access to a host's
+//! memory.
 //!
 //! ```text
 //! Read Device:                       | length | address (3, low first) |              4 bytes
 //! Read Device reply, Write Device:   | length | address (3, low first) | contents … | 4 + length bytes
 //! ```
 //!
-//! This is the order in which a GENI board shows such datagrams in its request queue, and in which it sends
-//! them back (GENI manual, chapter 13). The order on the bus is not published; see `docs/genius.md`.
+//! This is the order in which a GENI board shows such datagrams in its request queue, and in which
+//! it sends them back (GENI manual, chapter 13). The order on the bus is not published; see
+//! `docs/genius.md`.
 
 use core::fmt;
 
@@ -77,7 +79,8 @@ pub struct MemoryRange {
 impl MemoryRange {
     pub(super) fn parse(data: &[u8]) -> Result<MemoryRange, MessageError> {
         let length = byte(|length| (usize::from(length) <= MAX_MEMORY_DATA).then_some(length));
-        let range = (length, MemoryAddress::field).map(|(length, address)| MemoryRange { address, length });
+        let range =
+            (length, MemoryAddress::field).map(|(length, address)| MemoryRange { address, length });
         parse_data(Subfunction::ReadDevice, data, HEADER_LEN, range)
     }
 
@@ -98,7 +101,10 @@ pub struct MemoryContents {
 }
 
 impl MemoryContents {
-    pub(super) fn parse(subfunction: Subfunction, data: &[u8]) -> Result<MemoryContents, MessageError> {
+    pub(super) fn parse(
+        subfunction: Subfunction,
+        data: &[u8],
+    ) -> Result<MemoryContents, MessageError> {
         let wrong_length = MessageError::WrongLength { subfunction, length: data.len() };
         let contents = data.get(HEADER_LEN..).ok_or(wrong_length)?;
         let contents = Vec::from_slice(contents).map_err(|_| wrong_length)?;
@@ -111,7 +117,9 @@ impl MemoryContents {
     pub(super) fn to_data(&self) -> Data {
         let length = u8::try_from(self.contents.len()).unwrap_or(u8::MAX);
         gather(
-            core::iter::once(length).chain(self.address.to_le_bytes()).chain(self.contents.iter().copied()),
+            core::iter::once(length)
+                .chain(self.address.to_le_bytes())
+                .chain(self.contents.iter().copied()),
         )
     }
 }
@@ -132,7 +140,8 @@ mod tests {
 
     #[test]
     fn more_than_128_bytes_cannot_be_asked_for() {
-        let bad = MessageError::BadValue { subfunction: Subfunction::ReadDevice, offset: 0, value: 129 };
+        let bad =
+            MessageError::BadValue { subfunction: Subfunction::ReadDevice, offset: 0, value: 129 };
         assert_eq!(MemoryRange::parse(&[129, 0, 0, 0]), Err(bad));
     }
 

@@ -4,8 +4,8 @@ use core::fmt;
 
 use super::datagram::ByteCount;
 use super::{
-    Address, BusAddress, Data, Datagram, FUNCTION_GENIUS, ForceTable, IoForces, MemoryContents, MemoryRange,
-    MessageError, Priority, ReadIdReply, Subfunction, WritePoint,
+    Address, BusAddress, Data, Datagram, FUNCTION_GENIUS, ForceTable, IoForces, MemoryContents,
+    MemoryRange, MessageError, Priority, ReadIdReply, Subfunction, WritePoint,
 };
 
 /// A datagram of function code 20h. Those whose layout we do not know keep their bytes.
@@ -77,7 +77,12 @@ impl Message {
 
     /// The message on its way.
     #[must_use]
-    pub fn to_datagram(&self, source: BusAddress, destination: Address, priority: Priority) -> Datagram {
+    pub fn to_datagram(
+        &self,
+        source: BusAddress,
+        destination: Address,
+        priority: Priority,
+    ) -> Datagram {
         Datagram {
             source,
             destination,
@@ -113,7 +118,9 @@ impl Message {
             Message::ReadIoForces(table) => table.to_data(),
             Message::ReadIoForcesReply(forces) => forces.to_data(),
             Message::ReadDevice(range) => range.to_data(),
-            Message::ReadDeviceReply(contents) | Message::WriteDevice(contents) => contents.to_data(),
+            Message::ReadDeviceReply(contents) | Message::WriteDevice(contents) => {
+                contents.to_data()
+            }
             Message::WritePoint(write) => write.to_data(),
             Message::Unknown { data, .. } => data.clone(),
         }
@@ -187,13 +194,19 @@ mod tests {
                 Message::ReadIoForcesReply(IoForces::none(ForceTable::InputEnable, Model::Ser160)),
                 "Read I/O Forces reply: input enable, 2 bytes",
             ),
-            (Message::ReadDevice(MemoryRange { address, length: 4 }), "Read Device 4 bytes at 000100h"),
+            (
+                Message::ReadDevice(MemoryRange { address, length: 4 }),
+                "Read Device 4 bytes at 000100h",
+            ),
             (
                 Message::Unknown { subfunction: Subfunction::Unknown(0x33), data: Data::new() },
                 "datagram 33h, no data",
             ),
             (
-                Message::Unknown { subfunction: Subfunction::ReportFault, data: Data::from_array([1, 2, 3]) },
+                Message::Unknown {
+                    subfunction: Subfunction::ReportFault,
+                    data: Data::from_array([1, 2, 3]),
+                },
                 "Report Fault, 3 bytes",
             ),
         ];
@@ -221,7 +234,11 @@ mod tests {
             for length in 0..=MAX_DATA {
                 let parsed = Message::parse(&datagram(code, &[0; MAX_DATA][..length]));
                 let refused = parsed == Err(MessageError::WrongLength { subfunction, length });
-                assert_eq!(refused, !allowed.contains(&length), "{subfunction} with {length} bytes");
+                assert_eq!(
+                    refused,
+                    !allowed.contains(&length),
+                    "{subfunction} with {length} bytes"
+                );
             }
         }
     }

@@ -7,7 +7,8 @@ use nom::Parser;
 use super::{FUNCTION_GENIUS, Subfunction};
 use crate::fields::{Bytes, Fault, Refusal, parse_exactly};
 
-/// Why a datagram could not be understood. Offsets count from the first data byte, which is offset 0.
+/// Why a datagram could not be understood. Offsets count from the first data byte, which is offset
+/// 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MessageError {
@@ -55,7 +56,10 @@ impl fmt::Display for MessageError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             MessageError::WrongFunction { function } => {
-                write!(f, "function code {function:02X}h is not the bus's own ({FUNCTION_GENIUS:02X}h)")
+                write!(
+                    f,
+                    "function code {function:02X}h is not the bus's own ({FUNCTION_GENIUS:02X}h)"
+                )
             }
             MessageError::WrongLength { subfunction, length } => {
                 write!(f, "{subfunction} never has {length} data bytes")

@@ -1,4 +1,5 @@
-//! The Genius bus as a recorder sees it: datagrams, global data, a PLC's `COMM_REQ` blocks and the DIP switches.
+//! The Genius bus as a recorder sees it: datagrams, global data, a PLC's `COMM_REQ` blocks and the
+//! DIP switches.
 //!
 //! A [`Datagram`] carries up to 134 bytes from one device to another, or to all. A message of the
 //! recorder is a datagram whose data are the body, without frame: [`Datagram::from_command`],
@@ -44,6 +45,8 @@ pub use plc_reference::{MemoryType, PlcReference};
 pub use priority::Priority;
 pub use read_id::{DeviceStatus, Directions, ReadIdReply};
 pub use send_datagram::SendDatagram;
-pub use ser_datagram::{FUNCTION_HORNER, MAX_SER_DATA, SUBFUNCTION_SER, SerDatagramError, max_entries};
+pub use ser_datagram::{
+    FUNCTION_HORNER, MAX_SER_DATA, SUBFUNCTION_SER, SerDatagramError, max_entries,
+};
 pub use subfunction::{FUNCTION_GENIUS, HIGHEST_FUNCTION, Subfunction};
 pub use write_point::{PointMask, WritePoint};

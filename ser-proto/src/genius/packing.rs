@@ -2,7 +2,8 @@
 
 use heapless::Vec;
 
-/// The words that hold `bytes`. The high half of the last one is 0 when there is an odd number of bytes.
+/// The words that hold `bytes`. The high half of the last one is 0 when there is an odd number of
+/// bytes.
 pub fn words_of_bytes(bytes: &[u8]) -> impl Iterator<Item = u16> + '_ {
     bytes.chunks(2).map(|pair| match *pair {
         [low, high] => u16::from_le_bytes([low, high]),
@@ -16,8 +17,8 @@ pub fn bytes_of_words(words: &[u16], count: usize) -> impl Iterator<Item = u8> +
     words.iter().flat_map(|word| word.to_le_bytes()).take(count)
 }
 
-/// Items in a buffer of their own. Every caller stays below the capacity by construction; more is a bug of ours, and
-/// must not be a panic in a recorder, which `collect` would make it.
+/// Items in a buffer of their own. Every caller stays below the capacity by construction; more is a
+/// bug of ours, and must not be a panic in a recorder, which `collect` would make it.
 pub(super) fn gather<T, const N: usize>(items: impl IntoIterator<Item = T>) -> Vec<T, N> {
     let mut gathered = Vec::new();
     for item in items {

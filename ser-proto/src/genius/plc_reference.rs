@@ -3,7 +3,8 @@
 use core::fmt;
 use core::num::NonZeroU16;
 
-/// A kind of PLC memory, by the code that `COMM_REQ` blocks use. PLCs have more of them than have names here.
+/// A kind of PLC memory, by the code that `COMM_REQ` blocks use. PLCs have more of them than have
+/// names here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MemoryType(pub u16);

@@ -117,7 +117,8 @@ impl fmt::Display for ReadIdReply {
 pub struct DeviceStatus(pub u8);
 
 impl DeviceStatus {
-    /// The bits of a device that goes in these directions, with nothing forced and no hand-held monitor.
+    /// The bits of a device that goes in these directions, with nothing forced and no hand-held
+    /// monitor.
     #[must_use]
     pub const fn new(directions: Directions) -> DeviceStatus {
         DeviceStatus((directions as u8) << 1)
@@ -192,7 +193,11 @@ mod tests {
         bytes[11] = 0x3F;
         assert_eq!(ReadIdReply::parse(&bytes), Ok(RECORDER));
         bytes[11] = 0x40;
-        let bad = MessageError::BadValue { subfunction: Subfunction::ReadIdReply, offset: 11, value: 0x40 };
+        let bad = MessageError::BadValue {
+            subfunction: Subfunction::ReadIdReply,
+            offset: 11,
+            value: 0x40,
+        };
         assert_eq!(ReadIdReply::parse(&bytes), Err(bad));
     }
 
@@ -200,7 +205,8 @@ mod tests {
     fn the_status_bits_are_told_apart() {
         assert!(DeviceStatus(0x01).forced());
         assert!(DeviceStatus(0x08).monitor_present());
-        let directions = [None, Some(Directions::Inputs), Some(Directions::Outputs), Some(Directions::Both)];
+        let directions =
+            [None, Some(Directions::Inputs), Some(Directions::Outputs), Some(Directions::Both)];
         for (bits, expected) in (0..).zip(directions) {
             let status = DeviceStatus(bits << 1);
             assert_eq!(status.directions(), expected);

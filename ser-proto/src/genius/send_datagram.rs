@@ -41,7 +41,8 @@ pub struct SendDatagram {
 }
 
 impl SendDatagram {
-    /// The block that sends `datagram`. Its source is the PLC's bus controller, whatever the datagram says.
+    /// The block that sends `datagram`. Its source is the PLC's bus controller, whatever the
+    /// datagram says.
     #[must_use]
     pub fn new(datagram: Datagram, status: PlcReference) -> SendDatagram {
         SendDatagram {
@@ -69,8 +70,8 @@ impl SendDatagram {
 
     /// Word 0 by the manual's rule: (data length + 1) / 2 + 7.
     ///
-    /// That is one more than the words that follow word 5. A PLC reads one word more than the block needs, and a
-    /// bus controller sends the bytes that word 11 counts.
+    /// That is one more than the words that follow word 5. A PLC reads one word more than the block
+    /// needs, and a bus controller sends the bytes that word 11 counts.
     #[must_use]
     pub fn command_length(&self) -> u16 {
         self.words_from_command() + 1
@@ -97,8 +98,8 @@ impl SendDatagram {
 
     /// Understands the words of a block.
     ///
-    /// Word 0 may also be the true count of the words from word 6 on, and the one word that the manual's rule counts
-    /// in excess may follow.
+    /// Word 0 may also be the true count of the words from word 6 on, and the one word that the
+    /// manual's rule counts in excess may follow.
     ///
     /// # Errors
     /// See [`CommReqError`].
@@ -109,8 +110,9 @@ impl SendDatagram {
         let function = block.word(8, byte)?;
         let subfunction = block.word(9, byte)?;
         let priority = block.word(10, |code| byte(code).and_then(Priority::from_code))?;
-        let length =
-            block.word(11, |length| byte(length).map(usize::from).filter(|&length| length <= MAX_DATA))?;
+        let length = block.word(11, |length| {
+            byte(length).map(usize::from).filter(|&length| length <= MAX_DATA)
+        })?;
         let count = length.div_ceil(2);
         let data = gather(bytes_of_words(block.rest(DATA_INDEX, count, count + 1)?, length));
         let send = SendDatagram { status, target, function, subfunction, priority, data };
@@ -156,8 +158,8 @@ mod tests {
             memory: MemoryType(memory),
             number: number.try_into().unwrap(),
         });
-        let target =
-            (0..=32_u8).prop_map(|number| Address::from_number(number).unwrap_or(Address::Broadcast));
+        let target = (0..=32_u8)
+            .prop_map(|number| Address::from_number(number).unwrap_or(Address::Broadcast));
         let data = prop::collection::vec(any::<u8>(), 0..=MAX_DATA);
         (reference, target, any::<u8>(), any::<u8>(), any::<bool>(), data).prop_map(
             |(status, target, function, subfunction, high, data)| SendDatagram {
@@ -179,8 +181,15 @@ mod tests {
 
     #[test]
     fn the_first_byte_is_in_the_low_half_and_an_odd_one_is_alone() {
-        let time =
-            TimeStamp { year: 96, month: 11, day: 21, hour: 22, minute: 30, second: 50, millisecond: 250 };
+        let time = TimeStamp {
+            year: 96,
+            month: 11,
+            day: 21,
+            hour: 22,
+            minute: 30,
+            second: 50,
+            millisecond: 250,
+        };
         let words = send(&Command::SetClock(time)).to_words();
         assert_eq!(words[0], 12);
         assert_eq!(words[11..], [9, 0x6053, 0x150B, 0x1E16, 0x0032, 0x00FA]);

@@ -27,7 +27,8 @@ pub const fn max_entries(model: Model) -> usize {
 }
 
 impl Datagram {
-    /// A command on its way to a recorder, or to all of them: a broadcast is carried out and not answered.
+    /// A command on its way to a recorder, or to all of them: a broadcast is carried out and not
+    /// answered.
     #[must_use]
     pub fn from_command(source: BusAddress, destination: Address, command: &Command) -> Datagram {
         // No command is longer than nine bytes, so nothing is ever cut off here.
@@ -54,7 +55,8 @@ impl Datagram {
     /// The command in a datagram that a recorder has received.
     ///
     /// # Errors
-    /// See [`SerDatagramError`]. A datagram of another function or subfunction is not meant for a recorder.
+    /// See [`SerDatagramError`]. A datagram of another function or subfunction is not meant for a
+    /// recorder.
     pub fn command(&self) -> Result<Command, SerDatagramError> {
         Command::parse(self.ser_body()?).map_err(SerDatagramError::Message)
     }
@@ -62,7 +64,8 @@ impl Datagram {
     /// The reply in a datagram that a host has received.
     ///
     /// # Errors
-    /// See [`SerDatagramError`]. A datagram of another function or subfunction is not from a recorder.
+    /// See [`SerDatagramError`]. A datagram of another function or subfunction is not from a
+    /// recorder.
     pub fn reply(&self) -> Result<Reply, SerDatagramError> {
         Reply::parse(self.ser_body()?).map_err(SerDatagramError::Message)
     }
@@ -70,7 +73,9 @@ impl Datagram {
     fn ser_body(&self) -> Result<&[u8], SerDatagramError> {
         match (self.function, self.subfunction) {
             (FUNCTION_HORNER, SUBFUNCTION_SER) => Ok(&self.data),
-            (FUNCTION_HORNER, subfunction) => Err(SerDatagramError::WrongSubfunction { subfunction }),
+            (FUNCTION_HORNER, subfunction) => {
+                Err(SerDatagramError::WrongSubfunction { subfunction })
+            }
             (function, _) => Err(SerDatagramError::WrongFunction { function }),
         }
     }
@@ -115,12 +120,16 @@ impl fmt::Display for SerDatagramError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             SerDatagramError::WrongFunction { function } => {
-                write!(f, "function code {function:02X}h is not the recorder's ({FUNCTION_HORNER:02X}h)")
+                write!(
+                    f,
+                    "function code {function:02X}h is not the recorder's ({FUNCTION_HORNER:02X}h)"
+                )
             }
             SerDatagramError::WrongSubfunction { subfunction } => {
                 write!(
                     f,
-                    "subfunction code {subfunction:02X}h is not the recorder's ({SUBFUNCTION_SER:02X}h)"
+                    "subfunction code {subfunction:02X}h is not the recorder's \
+                     ({SUBFUNCTION_SER:02X}h)"
                 )
             }
             SerDatagramError::TooLong { length } => {
@@ -142,8 +151,15 @@ mod tests {
     const UNIT: BusAddress = BusAddress::new(5).unwrap();
 
     fn read_reply(model: Model, count: usize) -> Reply {
-        let time =
-            TimeStamp { year: 96, month: 8, day: 15, hour: 14, minute: 30, second: 50, millisecond: 250 };
+        let time = TimeStamp {
+            year: 96,
+            month: 8,
+            day: 15,
+            hour: 14,
+            minute: 30,
+            second: 50,
+            millisecond: 250,
+        };
         let entry = Entry { changed: Inputs(1), state: Inputs(1), time };
         Reply::Read(ReadReply {
             start: 500,
@@ -208,7 +224,10 @@ mod tests {
         datagram.data.clear();
         assert_eq!(datagram.reply(), Err(SerDatagramError::Message(ParseError::Empty)));
         datagram.subfunction = 0x51;
-        assert_eq!(datagram.command(), Err(SerDatagramError::WrongSubfunction { subfunction: 0x51 }));
+        assert_eq!(
+            datagram.command(),
+            Err(SerDatagramError::WrongSubfunction { subfunction: 0x51 })
+        );
         datagram.function = 0x20;
         assert_eq!(datagram.reply(), Err(SerDatagramError::WrongFunction { function: 0x20 }));
     }

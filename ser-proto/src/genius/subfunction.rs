@@ -8,7 +8,8 @@ use core::fmt;
 /// Function code of the bus's own datagrams.
 pub const FUNCTION_GENIUS: u8 = 0x20;
 
-/// The highest function code that a GENI board sends; it refuses those above (GENI manual, chapter 10).
+/// The highest function code that a GENI board sends; it refuses those above (GENI manual, chapter
+/// 10).
 pub const HIGHEST_FUNCTION: u8 = 112;
 
 /// Which datagram of function code 20h. A code without a name stays what it is.
@@ -63,7 +64,8 @@ pub enum Subfunction {
     ReadIoForces,
     /// 41h: the answer.
     ReadIoForcesReply,
-    /// Any other code. Codes that have a name never appear here when they come from [`Subfunction::from_code`].
+    /// Any other code. Codes that have a name never appear here when they come from
+    /// [`Subfunction::from_code`].
     Unknown(u8),
 }
 
@@ -203,7 +205,9 @@ impl fmt::Display for Subfunction {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::genius::{BusRate, FUNCTION_HORNER, ForceTable, MemoryType, Priority, SUBFUNCTION_SER};
+    use crate::genius::{
+        BusRate, FUNCTION_HORNER, ForceTable, MemoryType, Priority, SUBFUNCTION_SER,
+    };
 
     /// One place for every number that others have fixed.
     #[test]
@@ -241,7 +245,8 @@ mod tests {
             assert_eq!(subfunction.code(), code);
             assert_eq!(Subfunction::from_code(code), subfunction);
         }
-        let rates = [BusRate::K153_6Extended, BusRate::K153_6Standard, BusRate::K76_8, BusRate::K38_4];
+        let rates =
+            [BusRate::K153_6Extended, BusRate::K153_6Standard, BusRate::K76_8, BusRate::K38_4];
         assert_eq!(rates.map(BusRate::code), [0, 1, 2, 3]);
         let tables = [
             ForceTable::InputEnable,

@@ -4,8 +4,8 @@
 //! | length 4 | address (3, low first) | AND | OR | AND | OR |    8 bytes
 //! ```
 //!
-//! The head is that of the other memory accesses; the order of the masks is that of the PLC command that makes
-//! such datagrams. See `docs/genius.md` for how sure this is.
+//! The head is that of the other memory accesses; the order of the masks is that of the PLC command
+//! that makes such datagrams. See `docs/genius.md` for how sure this is.
 
 use nom::Parser;
 use nom::number::complete::be_u8;
@@ -20,7 +20,8 @@ const MASKS_LEN: u8 = 4;
 /// Length, address and masks.
 const LEN: usize = 8;
 
-/// Which bits of a byte change: a bit outside `and` is cleared, a bit in `or` is set, the others stay.
+/// Which bits of a byte change: a bit outside `and` is cleared, a bit in `or` is set, the others
+/// stay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PointMask {
@@ -56,7 +57,8 @@ impl WritePoint {
         let mask = || (be_u8, be_u8).map(|(and, or)| PointMask { and, or });
         let length = byte(|length| (length == MASKS_LEN).then_some(length));
         let fields = (length, MemoryAddress::field, mask(), mask());
-        let write = fields.map(|(_, address, first, second)| WritePoint { address, masks: [first, second] });
+        let write = fields
+            .map(|(_, address, first, second)| WritePoint { address, masks: [first, second] });
         parse_data(Subfunction::WritePoint, data, LEN, write)
     }
 
@@ -87,7 +89,8 @@ mod tests {
         };
         assert_eq!(write.to_data(), [4, 1, 2, 3, 0xFE, 0x01, 0xFF, 0x00]);
         assert_eq!(WritePoint::parse(&write.to_data()), Ok(write));
-        let bad = MessageError::BadValue { subfunction: Subfunction::WritePoint, offset: 0, value: 5 };
+        let bad =
+            MessageError::BadValue { subfunction: Subfunction::WritePoint, offset: 0, value: 5 };
         assert_eq!(WritePoint::parse(&[5; 8]), Err(bad));
     }
 }

@@ -1,5 +1,5 @@
-//! A host's desk: the file that is its window, and behind it boards, bus and recorders, whose time passes while the host
-//! waits for something.
+//! A host's desk: the file that is its window, and behind it boards, bus and recorders, whose time
+//! passes while the host waits for something.
 
 use std::fs::{File, OpenOptions};
 use std::os::unix::fs::FileExt;
@@ -55,7 +55,8 @@ pub(crate) struct Bench {
     pub(crate) in_reset: bool,
     /// A recorder that does nothing, while its board does.
     pub(crate) paused: Option<Recorder>,
-    /// Soon, nothing behind the window moves for a while, as on a computer that is busy with other things.
+    /// Soon, nothing behind the window moves for a while, as on a computer that is busy with other
+    /// things.
     pub(crate) stall: Option<Stall>,
     /// So long it has not moved in all.
     stalled_ms: u64,
@@ -92,7 +93,8 @@ impl Bench {
 
     /// Lets time pass until the host's board has logged all recorders in.
     fn start(&mut self) {
-        let numbers: Vec<u8> = self.world.recorders.iter().map(|recorder| recorder.number).collect();
+        let numbers: Vec<u8> =
+            self.world.recorders.iter().map(|recorder| recorder.number).collect();
         while !numbers.iter().all(|&number| self.is_logged_in(number)) {
             self.step();
             assert!(self.world.now_ms < START_LIMIT_MS, "somebody is not on the bus");
@@ -196,7 +198,10 @@ impl Desk {
     }
 
     /// Does something behind the window.
-    pub(crate) fn with<T: Send + 'static>(&self, order: impl FnOnce(&mut Bench) -> T + Send + 'static) -> T {
+    pub(crate) fn with<T: Send + 'static>(
+        &self,
+        order: impl FnOnce(&mut Bench) -> T + Send + 'static,
+    ) -> T {
         self.clock.with(order)
     }
 
@@ -226,7 +231,8 @@ pub(crate) fn unit(host: &GeniHost, number: u8) -> Unit {
 
 fn window(path: &PathBuf) -> File {
     let mut options = OpenOptions::new();
-    let file = options.read(true).write(true).create(true).truncate(true).open(path).expect("a file");
+    let file =
+        options.read(true).write(true).create(true).truncate(true).open(path).expect("a file");
     file.set_len(RAM_LEN as u64).expect("room");
     file
 }
@@ -244,7 +250,11 @@ impl BenchTime {
             let result = order(bench);
             sender.send((result, bench.world.now_ms + bench.stalled_ms)).expect("somebody waits");
         });
-        self.orders.lock().unwrap_or_else(PoisonError::into_inner).send(order).expect("the bench is there");
+        self.orders
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .send(order)
+            .expect("the bench is there");
         let (result, now_ms) = done.recv().expect("the bench is well");
         // Several threads may wait for the same bench.
         self.now_ms.fetch_max(now_ms, Ordering::Relaxed);

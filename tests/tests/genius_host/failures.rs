@@ -1,10 +1,11 @@
-//! What a host is told when board, bus or recorder fail, and that it goes on where it was when they are back.
+//! What a host is told when board, bus or recorder fail, and that it goes on where it was when they
+//! are back.
 
 use std::time::Duration;
 
 use ser_client::{
-    Cursor, Delivery, Diagnosis, GeniHost, GeniusError, OpenError, Options, RequestError, TransportError,
-    Unit,
+    Cursor, Delivery, Diagnosis, GeniHost, GeniusError, OpenError, Options, RequestError,
+    TransportError, Unit,
 };
 use ser_proto::genius::ForceTable;
 use ser_proto::{Command, Model};
@@ -115,7 +116,8 @@ impl Reading {
         Reading { desk, host, unit, cursor: None, entries: 0 }
     }
 
-    /// Reads on; calls `halfway` once, after the first entries. Every entry comes once and in order.
+    /// Reads on; calls `halfway` once, after the first entries. Every entry comes once and in
+    /// order.
     fn read(&mut self, halfway: impl FnOnce(&Desk)) -> Result<(), RequestError> {
         let Reading { desk, unit, cursor, entries, .. } = self;
         let mut halfway = Some(halfway);
@@ -159,7 +161,8 @@ fn a_recorder_that_leaves_the_bus_while_it_is_read_is_missed_there() {
 #[test]
 fn a_recorder_that_does_not_answer_while_it_is_read_is_told_from_one_that_cannot_hear() {
     let mut reading = Reading::new();
-    let stuck = reading.read(|desk| desk.with(|bench| bench.paused = Some(bench.world.recorders.remove(0))));
+    let stuck = reading
+        .read(|desk| desk.with(|bench| bench.paused = Some(bench.world.recorders.remove(0))));
     assert_eq!(diagnosis(stuck), Diagnosis::SilentOnBus { node: NODE });
     reading.desk.with(|bench| bench.world.recorders.extend(bench.paused.take()));
     reading.finish();
@@ -186,7 +189,10 @@ fn a_board_that_fails_in_the_middle_of_a_command_is_the_reason_given() {
             let result = unit.mode();
             match (fault, result.map_err(|error| of_genius::<()>(Err(error)))) {
                 (DeviceFault::Hang, Err(GeniusError::BoardSilent))
-                | (DeviceFault::FailSelfTest(_) | DeviceFault::Reset, Err(GeniusError::BoardFailed(_))) => {
+                | (
+                    DeviceFault::FailSelfTest(_) | DeviceFault::Reset,
+                    Err(GeniusError::BoardFailed(_)),
+                ) => {
                     failed += 1;
                 }
                 // The answer was there before, or the board was back before the patience was over.
@@ -212,7 +218,8 @@ fn a_board_may_stand_still_for_as_long_as_the_host_is_patient() {
     let desk = desk();
     let patience = Duration::from_secs(10);
     let patient = Options { timeout: Duration::from_secs(60), retries: 0 };
-    let host = desk.open_patiently(desk.window(), patience).unwrap_or_else(|error| panic!("{error}"));
+    let host =
+        desk.open_patiently(desk.window(), patience).unwrap_or_else(|error| panic!("{error}"));
     let mut unit = host.unit(NODE, patient);
     // In every part of an exchange: a look into the queue, a datagram, its reply; and of a lockout.
     for after_ms in [0, 1, 2, 3, 5, 8, 13] {
@@ -237,7 +244,8 @@ fn stall(desk: &Desk, in_ms: u64, for_ms: u64) {
 
 #[test]
 fn a_noisy_bus_costs_time_and_no_entries() {
-    let noise = Noise { seed: 1, damaged_ppm: 20_000, lost_ppm: 20_000, unacknowledged_ppm: 20_000 };
+    let noise =
+        Noise { seed: 1, damaged_ppm: 20_000, lost_ppm: 20_000, unacknowledged_ppm: 20_000 };
     let desk = Desk::with_noise(&[(NODE, Model::Ser160), (9, Model::Ser320)], noise);
     for event in 0..EVENTS {
         desk.contact(0, event % 2 == 0);

@@ -1,4 +1,5 @@
-//! Auto reports that waited, in the board or in the host, while nobody looked: they are neither answers nor news.
+//! Auto reports that waited, in the board or in the host, while nobody looked: they are neither
+//! answers nor news.
 
 use ser_client::{Cursor, Delivery, GeniHost, LogFollower, RequestError, Unsolicited};
 use ser_proto::{AutoReport, Command, Configure, Inputs, Model};
@@ -76,12 +77,13 @@ fn watch(host: &GeniHost) -> Result<Seen, RequestError> {
     let mut unit = unit(host, NODE);
     let mut follower = LogFollower::new(None, SIZE);
     let mut seen = Vec::new();
-    let read_new = &mut |follower: &mut LogFollower, unit: &mut ser_client::Unit, seen: &mut Seen| {
-        follower.read_new(unit, &mut |step| {
-            seen.extend(states(step.deliveries));
-            Ok::<(), RequestError>(())
-        })
-    };
+    let read_new =
+        &mut |follower: &mut LogFollower, unit: &mut ser_client::Unit, seen: &mut Seen| {
+            follower.read_new(unit, &mut |step| {
+                seen.extend(states(step.deliveries));
+                Ok::<(), RequestError>(())
+            })
+        };
     read_new(&mut follower, &mut unit, &mut seen)?;
     while let Some(message) = unit.wait_event(std::time::Duration::from_millis(200))? {
         let Unsolicited::Report(_) = message else { panic!("{message:?}") };
@@ -154,7 +156,8 @@ fn reports_that_come_while_something_else_is_asked_are_not_lost() {
     let mut cursor: Option<Cursor> = None;
     unit.read_new(&mut cursor, SIZE, &mut drop).expect("a log");
     events(&desk, [2, 3]);
-    // The reports wait in the board; the question is answered by its answer, and they are there afterwards.
+    // The reports wait in the board; the question is answered by its answer, and they are there
+    // afterwards.
     assert_eq!(unit.last_broadcast().expect("a reply"), None);
     let mut seen = Vec::new();
     while let Some(message) = unit.wait_event(std::time::Duration::ZERO).expect("all is well") {

@@ -26,7 +26,12 @@ fn connect_blocks(desk: &Desk) {
     desk.with(|bench| {
         let mut bus = bench.world.bus.borrow_mut();
         for (number, circuits) in [(7, Circuits::Sixteen), (8, Circuits::ThirtyTwo)] {
-            bus.connect(DiscreteBlock::new(number, BusTiming::default(), circuits, BlockKind::Inputs));
+            bus.connect(DiscreteBlock::new(
+                number,
+                BusTiming::default(),
+                circuits,
+                BlockKind::Inputs,
+            ));
         }
     });
     desk.run(1_000);
@@ -118,7 +123,8 @@ fn a_force_table_of_128_bytes_is_read() {
     let desk = Desk::new(&[(5, Model::Ser320)]);
     desk.with(|bench| {
         let data = StationData { discrete_bytes: 128, channels: 0 };
-        let station = BusInterfaceUnit::new(STATION, BusTiming::default(), data, StationData::default());
+        let station =
+            BusInterfaceUnit::new(STATION, BusTiming::default(), data, StationData::default());
         let mut bus = bench.world.bus.borrow_mut();
         let station = bus.connect(station);
         bus.get_mut(station).force_point(Side::Inputs, 8 * 128 - 1, Some(true));

@@ -58,8 +58,10 @@ fn a_clock_that_was_set_over_a_quiet_bus_is_off_by_little_more_than_half_a_scan(
         for round in 0..u64::from(ROUNDS) {
             // At every phase of the scan, and never in one that has had its datagram.
             desk.run(3 * scan_ms + round % (scan_ms + 1));
-            unit.set_clock(|ahead| at(desk.now_ms() + u64::try_from(ahead.as_millis()).expect("short")))
-                .expect("the clock is set");
+            unit.set_clock(|ahead| {
+                at(desk.now_ms() + u64::try_from(ahead.as_millis()).expect("short"))
+            })
+            .expect("the clock is set");
             let moved_ms = desk.contact(0, round % 2 == 0);
             desk.run(2);
             let entry = u16::try_from(round + 1).expect("few");
@@ -84,7 +86,10 @@ fn a_broadcast_sets_all_clocks_alike_at_every_phase_of_the_scan() {
         let set = at(began_ms + u64::try_from(host.delay().as_millis()).expect("short"));
         host.broadcast(&Command::SetClock(set)).expect("it is on the bus");
         let waited_ms = desk.now_ms() - began_ms;
-        assert!(waited_ms <= scan_ms + 3, "it went out after {waited_ms} ms at a scan of {scan_ms} ms");
+        assert!(
+            waited_ms <= scan_ms + 3,
+            "it went out after {waited_ms} ms at a scan of {scan_ms} ms"
+        );
         desk.run(5);
         let on = round % 2 == 0;
         let moved_ms = (0..COUNT).map(|index| desk.contact(index.into(), on)).max().expect("some");
@@ -92,7 +97,8 @@ fn a_broadcast_sets_all_clocks_alike_at_every_phase_of_the_scan() {
         let entry = u16::try_from(round + 1).expect("few");
         let off_ms: Vec<_> =
             (1..=COUNT).map(|number| stamp_ms(&host, number, entry) - ms(at(moved_ms))).collect();
-        let (least, most) = (off_ms.iter().min().expect("some"), off_ms.iter().max().expect("some"));
+        let (least, most) =
+            (off_ms.iter().min().expect("some"), off_ms.iter().max().expect("some"));
         assert!(most - least <= 1, "{off_ms:?}");
         let limit_ms = half_and_some(scan_ms);
         assert!(-limit_ms <= *least && *most <= limit_ms, "{limit_ms} ms at most: {off_ms:?}");
@@ -106,7 +112,8 @@ fn half_and_some(scan_ms: u64) -> i64 {
 
 /// When a recorder says that an entry was.
 fn stamp_ms(host: &GeniHost, number: u8, entry: u16) -> i64 {
-    let reply = unit(host, number).request(&Command::Read { start: entry, count: 1 }).expect("a reply");
+    let reply =
+        unit(host, number).request(&Command::Read { start: entry, count: 1 }).expect("a reply");
     let Reply::Read(reply) = reply else { panic!("{reply:?}") };
     ms(reply.entries[0].time)
 }

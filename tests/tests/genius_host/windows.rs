@@ -157,7 +157,8 @@ fn one_host_reads_two_recorders_at_once() {
         let mut unit = unit(&host, number);
         thread::spawn(move || {
             let mut entries = Vec::new();
-            unit.read_new(&mut None, 2048, &mut |delivery| entries.push(delivery)).expect("the log is read");
+            unit.read_new(&mut None, 2048, &mut |delivery| entries.push(delivery))
+                .expect("the log is read");
             entries
         })
     });

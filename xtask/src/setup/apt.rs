@@ -11,13 +11,15 @@ pub(crate) fn there() -> bool {
     cfg!(target_os = "linux") && works(unrelated("apt-get").arg("--version"))
 }
 
-/// Installs packages without asking. What apt prints goes to a file; if it fails, the reason comes back.
+/// Installs packages without asking. What apt prints goes to a file; if it fails, the reason comes
+/// back.
 pub(crate) fn install(packages: &[&str]) -> Result<(), String> {
     let root = output(unrelated("id").arg("-u")).is_some_and(|id| id == "0");
     if !root && !works(unrelated("sudo").args(["-n", "true"])) {
         return Err("installing packages takes root, or sudo without a password".to_owned());
     }
-    let log = places::firmware_target().join(format!("apt-{}.log", packages.first().unwrap_or(&"")));
+    let log =
+        places::firmware_target().join(format!("apt-{}.log", packages.first().unwrap_or(&"")));
 
     fs::create_dir_all(places::firmware_target())
         .and_then(|()| File::create(&log).map(drop))
@@ -43,7 +45,8 @@ pub(crate) fn install(packages: &[&str]) -> Result<(), String> {
         return Ok(());
     }
     let printed = fs::read_to_string(&log).unwrap_or_default();
-    let reason = printed.lines().rev().find(|line| line.starts_with("E:")).unwrap_or("E: apt-get failed");
+    let reason =
+        printed.lines().rev().find(|line| line.starts_with("E:")).unwrap_or("E: apt-get failed");
     Err(format!(
         "{} ({}; all of it: {})",
         reason.trim_start_matches("E: "),

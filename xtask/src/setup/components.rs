@@ -40,9 +40,12 @@ pub(crate) fn find(installing: Installing) -> Result<()> {
     }
     if installing == Installing::Allowed {
         heading(&format!("Installing rustfmt and clippy ({})", TOOL.size));
-        if works(steps::in_use("rustup").args(["component", "add", "rustfmt", "clippy"])) && there() {
+        if works(steps::in_use("rustup").args(["component", "add", "rustfmt", "clippy"])) && there()
+        {
             return Ok(());
         }
     }
-    Err(Failure::new("rustfmt and clippy are missing; get them with\n  rustup component add rustfmt clippy"))
+    Err(Failure::new(
+        "rustfmt and clippy are missing; get them with\n  rustup component add rustfmt clippy",
+    ))
 }

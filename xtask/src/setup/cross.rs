@@ -1,7 +1,8 @@
 //! A Rust that builds for the boards.
 //!
-//! For each target, in this order: the toolchain in use, if it has the target's library; the same after
-//! `rustup target add`; Debian's own Rust, which comes with the library's source and builds that as well.
+//! For each target, in this order: the toolchain in use, if it has the target's library; the same
+//! after `rustup target add`; Debian's own Rust, which comes with the library's source and builds
+//! that as well.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -28,7 +29,8 @@ const OLDEST_RUST: (u32, u32) = (1, 88);
 /// The target's library is a few megabytes; a network that takes longer is as good as none.
 const DOWNLOAD_WITHIN: Duration = Duration::from_secs(180);
 
-/// Debian's packages for Rust: what browsers are built with is the newest there is. Elsewhere the plain names may do.
+/// Debian's packages for Rust: what browsers are built with is the newest there is. Elsewhere the
+/// plain names may do.
 const DEBIAN_RUST: [[&str; 3]; 2] =
     [["rustc-web", "cargo-web", "rust-web-src"], ["rustc", "cargo", "rust-src"]];
 const DEBIAN_CLIPPY: [&str; 2] = ["rust-web-clippy", "rust-clippy"];
@@ -107,7 +109,8 @@ impl CrossToolchain {
     fn debian(&self, program: &str, subcommand: &str, linker: &Path) -> Command {
         let mut cargo = unrelated(program);
         cargo.env("CARGO", DEBIAN_CARGO).env("RUSTC", DEBIAN_RUSTC);
-        // Building the library is not stable yet; the compiler and its source are of one version, so it works.
+        // Building the library is not stable yet; the compiler and its source are of one version,
+        // so it works.
         cargo.env("RUSTC_BOOTSTRAP", "1");
         cargo.env(linker_variable(self.target), linker);
         cargo.args([subcommand, "-Zbuild-std=core"]);
@@ -134,7 +137,8 @@ pub(crate) fn clippy_there(targets: &[Target]) -> bool {
 
 /// Finds a toolchain for each target, or installs one.
 pub(crate) fn find(targets: &[Target], installing: Installing) -> Vec<Result<CrossToolchain>> {
-    let lacking: Vec<Target> = targets.iter().copied().filter(|target| !has_library(target)).collect();
+    let lacking: Vec<Target> =
+        targets.iter().copied().filter(|target| !has_library(target)).collect();
     let debian = match installing {
         _ if lacking.is_empty() => None,
         Installing::Allowed if added(&lacking) => None,
@@ -166,7 +170,8 @@ fn missing(target: Target) -> Failure {
     ))
 }
 
-/// Adds targets to the toolchain in use, if rustup can get them. True when none is lacking any more.
+/// Adds targets to the toolchain in use, if rustup can get them. True when none is lacking any
+/// more.
 fn added(targets: &[Target]) -> bool {
     if !works(unrelated("rustup").arg("--version")) {
         return false;
@@ -219,7 +224,8 @@ pub(crate) fn install_clippy() -> Result<()> {
 
 /// Whether the toolchain in use has the target's library.
 fn has_library(target: Target) -> bool {
-    let library = output(steps::in_use("rustc").args(["--print", "target-libdir", "--target", target]));
+    let library =
+        output(steps::in_use("rustc").args(["--print", "target-libdir", "--target", target]));
     library.is_some_and(|library| {
         let mut files = Path::new(&library).read_dir().into_iter().flatten().flatten();
         files.any(|file| file.file_name().to_string_lossy().starts_with("libcore"))
@@ -251,7 +257,8 @@ fn debian_rust() -> Option<PathBuf> {
     let version = output(unrelated(DEBIAN_RUSTC).arg("--version"))?;
     let sysroot = PathBuf::from(output(unrelated(DEBIAN_RUSTC).args(["--print", "sysroot"]))?);
     let has_source = sysroot.join("lib/rustlib/src/rust/library/core").exists();
-    let complete = parse_version(&version)? >= OLDEST_RUST && has_source && Path::new(DEBIAN_CARGO).exists();
+    let complete =
+        parse_version(&version)? >= OLDEST_RUST && has_source && Path::new(DEBIAN_CARGO).exists();
     let linker = rust_lld().or_else(|| on_path("ld.lld").then(|| "ld.lld".into()))?;
     complete.then_some(linker)
 }
@@ -259,7 +266,8 @@ fn debian_rust() -> Option<PathBuf> {
 /// The linker that comes with rustup's toolchain.
 fn rust_lld() -> Option<PathBuf> {
     // <sysroot>/lib/rustlib/<host>/lib; the programs are beside.
-    let libraries = PathBuf::from(output(steps::in_use("rustc").args(["--print", "target-libdir"]))?);
+    let libraries =
+        PathBuf::from(output(steps::in_use("rustc").args(["--print", "target-libdir"]))?);
     Some(libraries.parent()?.join("bin/rust-lld")).filter(|linker| linker.exists())
 }
 

@@ -63,7 +63,9 @@ pub(crate) struct Size {
 impl std::fmt::Display for Size {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.download_mb {
-            Some(download_mb) => write!(f, "{download_mb} MB to download, {} MB on disk", self.disk_mb),
+            Some(download_mb) => {
+                write!(f, "{download_mb} MB to download, {} MB on disk", self.disk_mb)
+            }
             None => write!(f, "{} MB on disk", self.disk_mb),
         }
     }
@@ -172,7 +174,8 @@ impl Plan {
         }
         let head = "these tools are missing and will be installed (--offline installs nothing):";
         let tools = self.install.iter().flat_map(|tool| {
-            let instead = |(name, size)| format!("    or, where that cannot be had, {name}: {size}");
+            let instead =
+                |(name, size)| format!("    or, where that cannot be had, {name}: {size}");
             let line = format!("  {}: {}; for {}", tool.name, tool.size, tool.serves);
             std::iter::once(line).chain(tool.instead.map(instead))
         });

@@ -19,7 +19,8 @@ pub(crate) static TOOL: Tool = Tool {
 pub(crate) fn find(installing: Installing) -> Result<()> {
     if cfg!(not(unix)) {
         return Err(Failure::new(
-            "the emulator is driven through a pseudo-terminal and shared memory: it takes Linux or macOS",
+            "the emulator is driven through a pseudo-terminal and shared memory: it takes Linux \
+             or macOS",
         ));
     }
     if there() {
@@ -41,7 +42,8 @@ pub(crate) fn find(installing: Installing) -> Result<()> {
     let how = if cfg!(target_os = "macos") {
         "brew install qemu"
     } else {
-        "sudo apt-get install qemu-system-arm     (Debian, Ubuntu)\n  sudo dnf install qemu-system-arm-core    (Fedora)"
+        "sudo apt-get install qemu-system-arm     (Debian, Ubuntu)\n  sudo dnf install \
+         qemu-system-arm-core    (Fedora)"
     };
     Err(Failure::new(format!("{PROGRAM} is missing; get it with\n  {how}")))
 }

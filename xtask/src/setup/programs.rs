@@ -49,12 +49,16 @@ pub(crate) fn install(name: &str) -> Result<()> {
             Err(why) => return Err(Failure::new(why)),
         }
     }
-    Err(Failure::new(format!("{name} is missing; on Debian, get it with\n  sudo apt-get install {package}")))
+    Err(Failure::new(format!(
+        "{name} is missing; on Debian, get it with\n  sudo apt-get install {package}"
+    )))
 }
 
 /// What tells the test harness to leave out the tests whose programs are missing.
 pub(crate) fn skipped() -> Vec<String> {
-    missing().flat_map(|tool| ["--skip".to_owned(), format!("{}::", module_of(tool.name))]).collect()
+    missing()
+        .flat_map(|tool| ["--skip".to_owned(), format!("{}::", module_of(tool.name))])
+        .collect()
 }
 
 fn there(name: &str) -> bool {
@@ -82,7 +86,9 @@ mod tests {
     fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
         for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
             let path = entry.path();
-            if path.is_dir() && path.file_name().is_some_and(|name| name != "target" && name != "xtask") {
+            if path.is_dir()
+                && path.file_name().is_some_and(|name| name != "target" && name != "xtask")
+            {
                 sources(&path, found);
             } else if path.extension().is_some_and(|extension| extension == "rs") {
                 found.push(path);
@@ -111,7 +117,8 @@ mod tests {
 
     #[test]
     fn every_program_that_a_test_needs_is_in_the_list_and_every_one_in_the_list_is_needed() {
-        let known: BTreeSet<String> = PROGRAMS.iter().map(|program| program.tool.name.to_owned()).collect();
+        let known: BTreeSet<String> =
+            PROGRAMS.iter().map(|program| program.tool.name.to_owned()).collect();
         let (modules, reasons) = needed();
         assert_eq!(reasons, known);
         assert_eq!(modules, known.iter().map(|name| name.replace('-', "_")).collect());

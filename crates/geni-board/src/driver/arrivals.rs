@@ -3,21 +3,21 @@
 //! That is often long before they can be read: the command block carries out one command at a time,
 //! and a datagram that is being sent waits for its place in the scan.
 //!
-//! A host sees two signs of an arrival: the Receive-Queue flag, and the pulse of the interrupt line.
-//! A *notice* is the tick of such a sign. The board hands datagrams out in the order in which they
-//! came, so the oldest notice belongs to the datagram that is read next. There are four cases in
-//! which the two do not match:
+//! A host sees two signs of an arrival: the Receive-Queue flag, and the pulse of the interrupt
+//! line. A *notice* is the tick of such a sign. The board hands datagrams out in the order in which
+//! they came, so the oldest notice belongs to the datagram that is read next. There are four cases
+//! in which the two do not match:
 //!
-//! - **Two datagrams, one flag.** Both came between two looks, so there is one notice less than there
-//!   are datagrams. A datagram that finds no notice gets the notice of the one before it. The one
-//!   that finds none need not be the second of the two: where notices of later datagrams are there
-//!   by then, each datagram takes the next one's, and the last of them finds none. With the interrupt
-//!   line each datagram has a pulse of its own, and this does not happen.
-//! - **A flag, and no datagram.** The board has dropped it. A board that says that its queue is empty
-//!   voids all notices that were there when it was asked.
+//! - **Two datagrams, one flag.** Both came between two looks, so there is one notice less than
+//!   there are datagrams. A datagram that finds no notice gets the notice of the one before it. The
+//!   one that finds none need not be the second of the two: where notices of later datagrams are
+//!   there by then, each datagram takes the next one's, and the last of them finds none. With the
+//!   interrupt line each datagram has a pulse of its own, and this does not happen.
+//! - **A flag, and no datagram.** The board has dropped it. A board that says that its queue is
+//!   empty voids all notices that were there when it was asked.
 //! - **A datagram, and no flag.** It came before the board was looked at, or its flag was lost.
-//!   Nobody knows when it arrived, and it is handed out without a time. If a later datagram's notice
-//!   waits, it takes that one instead.
+//!   Nobody knows when it arrived, and it is handed out without a time. If a later datagram's
+//!   notice waits, it takes that one instead.
 //! - **The board has failed.** Its queue is gone, and so are the notices.
 
 use heapless::Deque;
@@ -217,7 +217,9 @@ mod tests {
     #[test]
     fn a_flag_that_is_seen_before_its_pulse_is_handed_in_gets_the_tick_of_the_pulse() {
         // The pulse comes between the handing in and the reading of the tick, or right after that.
-        for (seen_ms, pulsed_ms) in [(101, 100), (100, 101), (100, 100), (0, u32::MAX), (u32::MAX, 0)] {
+        for (seen_ms, pulsed_ms) in
+            [(101, 100), (100, 101), (100, 100), (0, u32::MAX), (u32::MAX, 0)]
+        {
             let mut arrivals = seen([seen_ms]);
             arrivals.pulsed(pulsed_ms);
             assert_eq!(arrivals.oldest(), Some(pulsed_ms));

@@ -28,7 +28,8 @@ pub(super) enum Phase {
     SelfTest { since_ms: u32 },
     /// A board that should be running: once its OK flag has been cleared, it should come back.
     Attaching { since_ms: u32, cleared: bool },
-    /// The OK flag is there. `window_since_ms` says since when, where the board is not on the bus yet.
+    /// The OK flag is there. `window_since_ms` says since when, where the board is not on the bus
+    /// yet.
     Configuring { window_since_ms: Option<u32>, futile: u8 },
     /// The board stays off the bus for a while. When it is `silent`, its tables need no lock.
     Joining { since_ms: Option<u32>, silent: bool },
@@ -38,7 +39,8 @@ pub(super) enum Phase {
     Failed { since_ms: u32, pause_ms: u32 },
 }
 
-/// How long to leave a board alone after so many futile attempts: none, then a second, doubled each time.
+/// How long to leave a board alone after so many futile attempts: none, then a second, doubled each
+/// time.
 pub(super) fn pause_ms(futile_starts: u32) -> u32 {
     match futile_starts {
         0 => 0,
@@ -54,11 +56,15 @@ impl<R: SharedRam> Driver<R> {
                 let phase = self.first_phase(now_ms);
                 self.go(now_ms, phase)
             }
-            Phase::Reset { since_ms, hold_ms } if elapsed_ms(now_ms, since_ms) < hold_ms => Ok(None),
+            Phase::Reset { since_ms, hold_ms } if elapsed_ms(now_ms, since_ms) < hold_ms => {
+                Ok(None)
+            }
             Phase::Reset { .. } => self.go(now_ms, Phase::Released),
             Phase::Released => self.go(now_ms, Phase::SelfTest { since_ms: now_ms }),
             Phase::SelfTest { since_ms } => self.await_self_test(now_ms, since_ms),
-            Phase::Attaching { since_ms, cleared } => self.await_heartbeat(now_ms, since_ms, cleared),
+            Phase::Attaching { since_ms, cleared } => {
+                self.await_heartbeat(now_ms, since_ms, cleared)
+            }
             Phase::Configuring { window_since_ms, futile } => {
                 self.watch_heart(now_ms, timing::OFF_BUS_MS)?;
                 self.look(now_ms);
@@ -75,7 +81,9 @@ impl<R: SharedRam> Driver<R> {
                 self.look(now_ms);
                 self.serve(now_ms)
             }
-            Phase::Failed { since_ms, pause_ms } if elapsed_ms(now_ms, since_ms) < pause_ms => Ok(None),
+            Phase::Failed { since_ms, pause_ms } if elapsed_ms(now_ms, since_ms) < pause_ms => {
+                Ok(None)
+            }
             Phase::Failed { .. } => {
                 let phase = self.phase_after_failure(now_ms);
                 self.go(now_ms, phase)
@@ -86,14 +94,18 @@ impl<R: SharedRam> Driver<R> {
     fn go(&mut self, now_ms: u32, phase: Phase) -> Result<Option<Event>, Failure> {
         self.phase = phase;
         match phase {
-            Phase::Attaching { since_ms, cleared } => self.await_heartbeat(now_ms, since_ms, cleared),
+            Phase::Attaching { since_ms, cleared } => {
+                self.await_heartbeat(now_ms, since_ms, cleared)
+            }
             _ => Ok(None),
         }
     }
 
     fn first_phase(&self, now_ms: u32) -> Phase {
         match self.options.start {
-            Start::Reset { hold_ms } if self.options.reset_line => Phase::Reset { since_ms: now_ms, hold_ms },
+            Start::Reset { hold_ms } if self.options.reset_line => {
+                Phase::Reset { since_ms: now_ms, hold_ms }
+            }
             Start::Reset { .. } | Start::Released => Phase::SelfTest { since_ms: now_ms },
             Start::Running => Phase::Attaching { since_ms: now_ms, cleared: false },
         }
@@ -121,7 +133,8 @@ impl<R: SharedRam> Driver<R> {
                 self.ram.write(map::STATUS_OK, 0);
                 self.phase = Phase::Attaching { since_ms, cleared: true };
             }
-            // With any other value this is a board in its self-test, or none, and not ours to write to.
+            // With any other value this is a board in its self-test, or none, and not ours to write
+            // to.
             _ if elapsed_ms(now_ms, since_ms) >= self.options.heartbeat_timeout_ms => {
                 return Err(Failure::NoHeartbeat);
             }
@@ -135,7 +148,8 @@ impl<R: SharedRam> Driver<R> {
             // What the board says first on the bus is not to be what its memory happened to hold.
             self.global.write(&mut self.ram, self.in_force.broadcast_len());
         }
-        let joined = since_ms.is_none_or(|since_ms| elapsed_ms(now_ms, since_ms) >= timing::OFF_BUS_MS);
+        let joined =
+            since_ms.is_none_or(|since_ms| elapsed_ms(now_ms, since_ms) >= timing::OFF_BUS_MS);
         joined.then(|| self.ready(now_ms))
     }
 
@@ -163,8 +177,8 @@ impl<R: SharedRam> Driver<R> {
         self.phase = Phase::Configuring { window_since_ms, futile: 0 };
     }
 
-    /// With some more patience while the board starts up or changes its configuration: it may have no time
-    /// for beats.
+    /// With some more patience while the board starts up or changes its configuration: it may have
+    /// no time for beats.
     fn watch_heart(&mut self, now_ms: u32, more_ms: u32) -> Result<(), Failure> {
         let patience_ms = self.options.heartbeat_timeout_ms.saturating_add(more_ms);
         if self.heart.watch(&mut self.ram, now_ms, patience_ms)? {
@@ -173,33 +187,40 @@ impl<R: SharedRam> Driver<R> {
         Ok(())
     }
 
-    /// The command is sent even when the setup table already holds what is wanted: somebody may have written
-    /// it without making it known. It costs nothing, the board says that nothing has changed.
+    /// The command is sent even when the setup table already holds what is wanted: somebody may
+    /// have written it without making it known. It costs nothing, the board says that nothing has
+    /// changed.
     fn configuring(
         &mut self,
         now_ms: u32,
         window_since_ms: Option<u32>,
         futile: u8,
     ) -> Result<Option<Event>, Failure> {
-        let status = match self.commander.poll(&self.ram, now_ms, self.in_force, &mut self.counters)? {
-            Some(Done::Configured(status)) => status,
-            Some(_) => return Ok(None),
-            None => {
-                if self.commander.is_idle() {
-                    self.configure_due = false;
-                    let configuration = self.options.configuration;
-                    self.commander.start_configure(&mut self.ram, now_ms, configuration, &mut self.counters);
+        let status =
+            match self.commander.poll(&self.ram, now_ms, self.in_force, &mut self.counters)? {
+                Some(Done::Configured(status)) => status,
+                Some(_) => return Ok(None),
+                None => {
+                    if self.commander.is_idle() {
+                        self.configure_due = false;
+                        let configuration = self.options.configuration;
+                        self.commander.start_configure(
+                            &mut self.ram,
+                            now_ms,
+                            configuration,
+                            &mut self.counters,
+                        );
+                    }
+                    return Ok(None);
                 }
-                return Ok(None);
-            }
-        };
+            };
         let accepted = match status {
             CommandStatus::Complete => ConfigurationOutcome::Changed,
             CommandStatus::ProcessError => ConfigurationOutcome::Unchanged,
             // The board has put back what is in force.
-            CommandStatus::SyntaxError => {
-                ConfigurationOutcome::Refused(Configuration::read(&self.ram).unwrap_or(self.in_force))
-            }
+            CommandStatus::SyntaxError => ConfigurationOutcome::Refused(
+                Configuration::read(&self.ram).unwrap_or(self.in_force),
+            ),
             CommandStatus::Cleared | CommandStatus::Pending | CommandStatus::Unknown(_) => {
                 count(&mut self.counters.commands_unknown);
                 let futile = futile + 1;
@@ -230,7 +251,8 @@ impl<R: SharedRam> Driver<R> {
         let changed = accepted == ConfigurationOutcome::Changed;
         self.phase = Phase::Joining {
             since_ms: if changed { Some(now_ms) } else { window_since_ms },
-            silent: window_since_ms.is_some() || (changed && self.in_force.silences_the_bus(before)),
+            silent: window_since_ms.is_some()
+                || (changed && self.in_force.silences_the_bus(before)),
         };
         self.global.due();
         Ok(self.configured(outcome))

@@ -56,7 +56,8 @@ enum State {
         sending: Sending,
         since_ms: u32,
     },
-    /// Something that nobody waits for is going on: our own command, `given_up`, or somebody else's.
+    /// Something that nobody waits for is going on: our own command, `given_up`, or somebody
+    /// else's.
     Occupied {
         since_ms: u32,
         given_up: bool,
@@ -72,7 +73,8 @@ pub(super) struct Commander {
     outbox: Option<Transmission>,
     /// Something may have arrived since the last Read Datagram was started.
     read_due: bool,
-    /// The last Read Datagram found nothing, and nobody has asked for another one since it was started.
+    /// The last Read Datagram found nothing, and nobody has asked for another one since it was
+    /// started.
     queue_empty: bool,
     /// Whether a datagram was read last: then it is the outbox's turn.
     read_last: bool,
@@ -180,10 +182,15 @@ impl Commander {
         })
     }
 
-    fn still_pending(&mut self, now_ms: u32, counters: &mut Counters) -> Result<Option<Done>, Failure> {
+    fn still_pending(
+        &mut self,
+        now_ms: u32,
+        counters: &mut Counters,
+    ) -> Result<Option<Done>, Failure> {
         match self.state {
             State::Idle => Ok(None),
-            // What a late Read Datagram brings is out of the queue for good, so it is never given up alone.
+            // What a late Read Datagram brings is out of the queue for good, so it is never given
+            // up alone.
             State::Reading { since_ms }
             | State::Configuring { since_ms }
             | State::Occupied { since_ms, .. } => {
@@ -204,7 +211,12 @@ impl Commander {
         }
     }
 
-    fn read<R: SharedRam>(&mut self, ram: &R, status: CommandStatus, counters: &mut Counters) -> Done {
+    fn read<R: SharedRam>(
+        &mut self,
+        ram: &R,
+        status: CommandStatus,
+        counters: &mut Counters,
+    ) -> Done {
         match status {
             CommandStatus::Complete => {
                 // There may be more.
@@ -215,7 +227,8 @@ impl Commander {
                 }
                 Done::Read(received)
             }
-            // The receive queue is empty, or was: something may have arrived while the answer was on its way.
+            // The receive queue is empty, or was: something may have arrived while the answer was
+            // on its way.
             CommandStatus::SyntaxError => {
                 self.queue_empty = !self.read_due;
                 Done::QueueEmpty
@@ -284,7 +297,8 @@ impl Commander {
         }
     }
 
-    /// Whether the block is free. If not, somebody has left a command in it, which has to end first.
+    /// Whether the block is free. If not, somebody has left a command in it, which has to end
+    /// first.
     fn take_block<R: SharedRam>(&mut self, ram: &R, now_ms: u32, counters: &mut Counters) -> bool {
         let free = CommandStatus::read(ram).is_free();
         if !free {
@@ -296,7 +310,12 @@ impl Commander {
 }
 
 /// What became of a datagram.
-fn sent<R: SharedRam>(ram: &R, sending: Sending, status: CommandStatus, counters: &mut Counters) -> Done {
+fn sent<R: SharedRam>(
+    ram: &R,
+    sending: Sending,
+    status: CommandStatus,
+    counters: &mut Counters,
+) -> Done {
     match (status, sending.completion) {
         (CommandStatus::Complete, Completion::Reply { subfunction }) => {
             let reply = read_reply(ram, sending.destination, sending.function, subfunction);
@@ -305,10 +324,12 @@ fn sent<R: SharedRam>(ram: &R, sending: Sending, status: CommandStatus, counters
             }
             Done::Replied(reply.ok_or(CommandError::BadReply))
         }
-        // By the table of status values an acknowledged datagram ends with 4, by the text above it with 0.
-        (CommandStatus::Complete | CommandStatus::Cleared, Completion::Taken | Completion::Acknowledged) => {
-            Done::Sent(Ok(()))
-        }
+        // By the table of status values an acknowledged datagram ends with 4, by the text above it
+        // with 0.
+        (
+            CommandStatus::Complete | CommandStatus::Cleared,
+            Completion::Taken | Completion::Acknowledged,
+        ) => Done::Sent(Ok(())),
         (CommandStatus::SyntaxError, _) => {
             count(&mut counters.commands_refused);
             sending.ended(CommandError::Refused)

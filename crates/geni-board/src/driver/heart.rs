@@ -23,7 +23,8 @@ impl Heart {
 
     /// Whether there was a beat since the last time.
     ///
-    /// The flag is looked at before the clock: a host that was away for long finds it set by a healthy board.
+    /// The flag is looked at before the clock: a host that was away for long finds it set by a
+    /// healthy board.
     pub(super) fn watch<R: SharedRam>(
         &mut self,
         ram: &mut R,

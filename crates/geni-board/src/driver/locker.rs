@@ -46,8 +46,8 @@ impl Locker {
 
     /// True when the board has just been locked out.
     ///
-    /// Between two lockouts there are at least `gap_ms`, so that a host that always wants the tables leaves
-    /// the board a bus scan to exchange them.
+    /// Between two lockouts there are at least `gap_ms`, so that a host that always wants the
+    /// tables leaves the board a bus scan to exchange them.
     pub(super) fn poll<R: SharedRam>(
         &mut self,
         ram: &mut R,
@@ -58,8 +58,9 @@ impl Locker {
     ) -> Result<bool, Failure> {
         match self.state {
             State::Free => {
-                let rested =
-                    self.released_ms.is_none_or(|released_ms| elapsed_ms(now_ms, released_ms) > gap_ms);
+                let rested = self
+                    .released_ms
+                    .is_none_or(|released_ms| elapsed_ms(now_ms, released_ms) > gap_ms);
                 if rested && (wanted || self.due) {
                     self.due = false;
                     self.released_ms = None;
@@ -94,9 +95,15 @@ impl Locker {
         Ok(false)
     }
 
-    /// A request must not be made over another one, and one that is not granted yet must not be withdrawn:
-    /// what somebody else has left behind is seen through to its end first.
-    fn begin<R: SharedRam>(&mut self, ram: &mut R, now_ms: u32, wanted: bool, counters: &mut Counters) {
+    /// A request must not be made over another one, and one that is not granted yet must not be
+    /// withdrawn: what somebody else has left behind is seen through to its end first.
+    fn begin<R: SharedRam>(
+        &mut self,
+        ram: &mut R,
+        now_ms: u32,
+        wanted: bool,
+        counters: &mut Counters,
+    ) {
         self.state = match Lockout::read(ram) {
             Lockout::Free if wanted => {
                 Lockout::request(ram);
@@ -117,7 +124,12 @@ impl Locker {
     }
 
     /// Gives the tables back to the board, if they are held.
-    pub(super) fn end_hold<R: SharedRam>(&mut self, ram: &mut R, now_ms: u32, counters: &mut Counters) {
+    pub(super) fn end_hold<R: SharedRam>(
+        &mut self,
+        ram: &mut R,
+        now_ms: u32,
+        counters: &mut Counters,
+    ) {
         if !self.is_held() {
             return;
         }

@@ -55,18 +55,20 @@ enum Task {
 ///
 /// # What the host has to do
 ///
-/// - Call [`poll`](Driver::poll) in every turn of its main loop. The board tolerates slow hosts, but holds no
-///   more than 15 datagrams and 15 memory requests for them, and answers come as fast as this is called.
-/// - After each call, hold the reset line low if [`reset_held`](Driver::reset_held) says so, and release it
-///   otherwise.
+/// - Call [`poll`](Driver::poll) in every turn of its main loop. The board tolerates slow hosts,
+///   but holds no more than 15 datagrams and 15 memory requests for them, and answers come as fast
+///   as this is called.
+/// - After each call, hold the reset line low if [`reset_held`](Driver::reset_held) says so, and
+///   release it otherwise.
 /// - Call [`interrupt`](Driver::interrupt) with the tick of each pulse of the interrupt line, if it
 ///   is connected at all.
 ///
 /// # When a datagram arrived
 ///
 /// Every poll looks at the board's flags, whatever command is in progress. A datagram is handed out
-/// with the tick at which its flag was seen: [`ReceivedDatagram::arrived_ms`](crate::ReceivedDatagram::arrived_ms).
-/// That is later than the flag by no more than the time between two polls.
+/// with the tick at which its flag was seen:
+/// [`ReceivedDatagram::arrived_ms`](crate::ReceivedDatagram::arrived_ms). That is later than the
+/// flag by no more than the time between two polls.
 ///
 /// Some hosts have to know the tick to the millisecond although their main loop may be away. They
 /// connect the interrupt line and let nothing but [`Interrupts::RECEIVE_QUEUE`] pull it. A datagram
@@ -74,13 +76,15 @@ enum Task {
 ///
 /// # What happens when
 ///
-/// Reset, no access for 1.7 s, OK flag, configuration, 1.5 s off the bus, [`Event::Ready`]. Then traffic,
-/// until [`Event::Failed`], and all over again; the pauses between futile attempts grow up to a minute.
+/// Reset, no access for 1.7 s, OK flag, configuration, 1.5 s off the bus, [`Event::Ready`]. Then
+/// traffic, until [`Event::Failed`], and all over again; the pauses between futile attempts grow up
+/// to a minute.
 ///
 /// # Heartbeat and commands
 ///
-/// The manual wants the OK flag seen before each command. As the flag is cleared to watch the heartbeat, it
-/// is the heartbeat that is checked instead: nothing is asked of a board whose heartbeat is overdue.
+/// The manual wants the OK flag seen before each command. As the flag is cleared to watch the
+/// heartbeat, it is the heartbeat that is checked instead: nothing is asked of a board whose
+/// heartbeat is overdue.
 #[derive(Debug)]
 pub struct Driver<R> {
     ram: R,
@@ -148,7 +152,9 @@ impl<R: SharedRam> Driver<R> {
         if let Some(completion) = self.lost.take() {
             return Some(match completion {
                 Completion::Reply { .. } => Event::Replied(Err(CommandError::BoardFailed)),
-                Completion::Taken | Completion::Acknowledged => Event::Sent(Err(CommandError::BoardFailed)),
+                Completion::Taken | Completion::Acknowledged => {
+                    Event::Sent(Err(CommandError::BoardFailed))
+                }
             });
         }
         match self.step(now_ms) {
@@ -160,10 +166,13 @@ impl<R: SharedRam> Driver<R> {
         }
     }
 
-    /// Whether the reset line is to be held low from now to the next call of [`poll`](Driver::poll).
+    /// Whether the reset line is to be held low from now to the next call of
+    /// [`poll`](Driver::poll).
     pub fn reset_held(&self) -> bool {
         match self.phase {
-            Phase::Begin => self.options.reset_line && matches!(self.options.start, Start::Reset { .. }),
+            Phase::Begin => {
+                self.options.reset_line && matches!(self.options.start, Start::Reset { .. })
+            }
             Phase::Reset { .. } => true,
             _ => false,
         }
@@ -194,20 +203,21 @@ impl<R: SharedRam> Driver<R> {
         self.in_force
     }
 
-    /// Changes the configuration, now or as soon as the board is ready for it. Ends in [`Event::Configured`]
-    /// and [`Event::Ready`]. When it is not the one in force, all devices are logged out for 1.5 s.
+    /// Changes the configuration, now or as soon as the board is ready for it. Ends in
+    /// [`Event::Configured`] and [`Event::Ready`]. When it is not the one in force, all devices are
+    /// logged out for 1.5 s.
     pub fn configure(&mut self, configuration: Configuration) {
         self.options.configuration = configuration;
         self.configure_due = true;
     }
 
-    /// Sends a datagram. Ends in one [`Event::Sent`], or in one [`Event::Replied`] if a reply is wanted,
-    /// whatever happens.
+    /// Sends a datagram. Ends in one [`Event::Sent`], or in one [`Event::Replied`] if a reply is
+    /// wanted, whatever happens.
     ///
     /// # Errors
     ///
-    /// When the board is not ready, when the last datagram has not been dealt with, or for datagrams that the
-    /// board would refuse.
+    /// When the board is not ready, when the last datagram has not been dealt with, or for
+    /// datagrams that the board would refuse.
     pub fn transmit(&mut self, transmission: Transmission) -> Result<(), TransmitError> {
         transmission.check()?;
         if !self.is_ready() {
@@ -221,22 +231,23 @@ impl<R: SharedRam> Driver<R> {
         self.is_ready() && self.commander.can_transmit()
     }
 
-    /// Has the receive queue read until it is empty. It is read also without this, when the board says that
-    /// something has arrived; this is for a host that has to know where it stands: see
+    /// Has the receive queue read until it is empty. It is read also without this, when the board
+    /// says that something has arrived; this is for a host that has to know where it stands: see
     /// [`receive_queue_is_empty`](Driver::receive_queue_is_empty).
     pub fn check_receive_queue(&mut self) {
         self.commander.read_due();
     }
 
     /// Whether a Read Datagram that was started after the last
-    /// [`check_receive_queue`](Driver::check_receive_queue), and after the last sign of the board that
-    /// something has arrived, has found nothing: what was in the queue then has become [`Event::Received`].
+    /// [`check_receive_queue`](Driver::check_receive_queue), and after the last sign of the board
+    /// that something has arrived, has found nothing: what was in the queue then has become
+    /// [`Event::Received`].
     pub fn receive_queue_is_empty(&self) -> bool {
         self.is_ready() && self.commander.queue_is_empty()
     }
 
-    /// Sets what is sent to everybody in every bus scan, from the next scan on that allows it. It survives a
-    /// failure of the board.
+    /// Sets what is sent to everybody in every bus scan, from the next scan on that allows it. It
+    /// survives a failure of the board.
     ///
     /// May be called as often as one likes; at most one version per bus scan gets out.
     ///
@@ -257,8 +268,8 @@ impl<R: SharedRam> Driver<R> {
         self.tables_wanted = true;
     }
 
-    /// The input and output tables, from [`Event::TablesLocked`] to the next call of [`poll`](Driver::poll).
-    /// Meanwhile the board neither takes new inputs nor sends new outputs.
+    /// The input and output tables, from [`Event::TablesLocked`] to the next call of
+    /// [`poll`](Driver::poll). Meanwhile the board neither takes new inputs nor sends new outputs.
     ///
     /// # Errors
     ///
@@ -301,7 +312,8 @@ impl<R: SharedRam> Driver<R> {
     ///
     /// # Errors
     ///
-    /// When the board is not ready or there is no such device number. The device need not be logged in.
+    /// When the board is not ready or there is no such device number. The device need not be logged
+    /// in.
     pub fn enable_outputs(&mut self, device_number: u8, enabled: bool) -> Result<(), TableError> {
         if !self.is_ready() {
             return Err(TableError::NotReady);
@@ -331,7 +343,8 @@ impl<R: SharedRam> Driver<R> {
         self.requests.answer(&mut self.ram, answer)
     }
 
-    /// The status table as it was looked at last; `None` when it was not since the board was started.
+    /// The status table as it was looked at last; `None` when it was not since the board was
+    /// started.
     pub fn status(&self) -> Option<Status> {
         self.status.last()
     }
@@ -379,13 +392,20 @@ impl<R: SharedRam> Driver<R> {
 
     fn run(&mut self, task: Task, now_ms: u32) -> Result<Option<Event>, Failure> {
         match task {
-            Task::Flags => Ok(core::mem::take(&mut self.outputs_sent).then_some(Event::OutputsSent)),
-            Task::Commands => self.command(now_ms),
-            Task::Requests => {
-                Ok(self.requests.poll(&mut self.ram, now_ms, self.options.requests, &mut self.counters))
+            Task::Flags => {
+                Ok(core::mem::take(&mut self.outputs_sent).then_some(Event::OutputsSent))
             }
+            Task::Commands => self.command(now_ms),
+            Task::Requests => Ok(self.requests.poll(
+                &mut self.ram,
+                now_ms,
+                self.options.requests,
+                &mut self.counters,
+            )),
             Task::Status => self.status.poll(&self.ram, self.in_force, &mut self.counters),
-            Task::Devices => Ok(self.devices.poll(&self.ram, self.in_force.buffer_len(), &mut self.counters)),
+            Task::Devices => {
+                Ok(self.devices.poll(&self.ram, self.in_force.buffer_len(), &mut self.counters))
+            }
             Task::Tables => self.exchange(now_ms),
         }
     }
@@ -427,11 +447,14 @@ impl<R: SharedRam> Driver<R> {
         }
         // A finished command and a granted lockout are seen where they are waited for.
         let outputs_sent = Interrupts::OUTPUTS_SENT;
-        self.outputs_sent |= flags.contains(outputs_sent) && self.options.interrupts.contains(outputs_sent);
+        self.outputs_sent |=
+            flags.contains(outputs_sent) && self.options.interrupts.contains(outputs_sent);
     }
 
     fn command(&mut self, now_ms: u32) -> Result<Option<Event>, Failure> {
-        if let Some(done) = self.commander.poll(&self.ram, now_ms, self.in_force, &mut self.counters)? {
+        if let Some(done) =
+            self.commander.poll(&self.ram, now_ms, self.in_force, &mut self.counters)?
+        {
             return Ok(self.report(done, now_ms));
         }
         if self.commander.is_idle() {
@@ -453,8 +476,8 @@ impl<R: SharedRam> Driver<R> {
     fn report(&mut self, done: Done, now_ms: u32) -> Option<Event> {
         match done {
             Done::Read(received) => {
-                // The datagram may have come after the latest look. Its flag is set by now, since the
-                // command has finished.
+                // The datagram may have come after the latest look. Its flag is set by now, since
+                // the command has finished.
                 self.look(now_ms);
                 let arrived_ms = self.arrivals.read();
                 let received = ReceivedDatagram { arrived_ms, ..received? };

@@ -6,7 +6,8 @@ use crate::event::Event;
 use crate::options::Requests;
 use crate::ram::SharedRam;
 use crate::request_queue::{
-    AnswerError, Pointers, RequestAnswer, RequestStatus, finish, read_header, read_request, write_data,
+    AnswerError, Pointers, RequestAnswer, RequestStatus, finish, read_header, read_request,
+    write_data,
 };
 use crate::timing;
 
@@ -19,9 +20,11 @@ struct Waiting {
 }
 
 impl Waiting {
-    /// The head is ours: somewhere else, or in an empty queue, it means that the board has started anew.
+    /// The head is ours: somewhere else, or in an empty queue, it means that the board has started
+    /// anew.
     fn is_still_there<R: SharedRam>(self, ram: &R) -> bool {
-        Pointers::read(ram).is_ok_and(|pointers| pointers.head == self.index && !pointers.is_empty())
+        Pointers::read(ram)
+            .is_ok_and(|pointers| pointers.head == self.index && !pointers.is_empty())
     }
 }
 

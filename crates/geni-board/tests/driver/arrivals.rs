@@ -2,8 +2,8 @@
 //! block is busy.
 
 use geni_board::{
-    Completion, Configuration, Data, Destination, Event, Interrupts, Options, ReceivedDatagram, Start,
-    Transmission, TransmitPriority,
+    Completion, Configuration, Data, Destination, Event, Interrupts, Options, ReceivedDatagram,
+    Start, Transmission, TransmitPriority,
 };
 
 use crate::world::World;
@@ -81,7 +81,8 @@ fn with_the_interrupt_line_a_host_that_was_away_knows_each_arrival() {
     world.step();
     world.pace_ms = 1;
     let expected = [20, 320, 321].map(|after_ms| Some(began_ms + after_ms));
-    let seen: Vec<_> = arrivals(&world.run(100)).into_iter().map(|(_, arrived_ms)| arrived_ms).collect();
+    let seen: Vec<_> =
+        arrivals(&world.run(100)).into_iter().map(|(_, arrived_ms)| arrived_ms).collect();
     assert_eq!(seen, expected);
 }
 

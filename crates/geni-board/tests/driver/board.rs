@@ -237,7 +237,9 @@ impl Board {
                 self.released_ms = now_ms;
                 self.first_access_ms = None;
             }
-            State::SelfTest { since_ms } if now_ms.wrapping_sub(since_ms) >= 1_850 => self.end_self_test(),
+            State::SelfTest { since_ms } if now_ms.wrapping_sub(since_ms) >= 1_850 => {
+                self.end_self_test()
+            }
             State::Running if !self.misbehaviour.hangs => self.run(),
             State::SelfTest { .. } | State::Running | State::Stopped => {}
         }
@@ -273,7 +275,8 @@ impl Board {
     }
 
     fn run_lockout(&mut self) {
-        if self.misbehaviour.ignores_lockout || self.ram[LOCKOUT_STATE] == self.ram[LOCKOUT_REQUEST] {
+        if self.misbehaviour.ignores_lockout || self.ram[LOCKOUT_STATE] == self.ram[LOCKOUT_REQUEST]
+        {
             return;
         }
         self.ram[LOCKOUT_STATE] = self.ram[LOCKOUT_REQUEST];
@@ -312,8 +315,13 @@ impl Board {
 
     fn read_datagram(&mut self) -> u8 {
         let Some(incoming) = self.receive_queue.pop_front() else { return 8 };
-        let header =
-            [incoming.source, incoming.function, incoming.subfunction, incoming.directed, incoming.len];
+        let header = [
+            incoming.source,
+            incoming.function,
+            incoming.subfunction,
+            incoming.directed,
+            incoming.len,
+        ];
         self.ram[COMMAND + 2..COMMAND + 7].copy_from_slice(&header);
         self.ram[0x09C2..][..incoming.data.len()].copy_from_slice(&incoming.data);
         4
@@ -374,7 +382,10 @@ impl Board {
         self.note_access(offset);
         let tables = (0x1F00..0x4000).contains(&offset) && !(0x1F80..0x2000).contains(&offset);
         if tables && self.buffer_len() > 1 {
-            assert!(self.locked() || !self.checks_handshakes, "read of {offset:04X}h without lockout");
+            assert!(
+                self.locked() || !self.checks_handshakes,
+                "read of {offset:04X}h without lockout"
+            );
         }
     }
 
@@ -389,19 +400,27 @@ impl Board {
         }
         let (request, state) = (self.ram[LOCKOUT_REQUEST], self.ram[LOCKOUT_STATE]);
         match offset {
-            LOCKOUT_REQUEST if byte == 1 => assert_eq!((request, state), (0, 0), "request over a request"),
+            LOCKOUT_REQUEST if byte == 1 => {
+                assert_eq!((request, state), (0, 0), "request over a request")
+            }
             LOCKOUT_REQUEST => assert_eq!((byte, request, state), (0, 1, 1), "request withdrawn"),
             COMMAND => {
                 assert_eq!(byte, 1);
                 assert!(self.ram[COMMAND] == 0 || self.ram[COMMAND] >= 4, "command over a command");
             }
-            0x08C3..0x09C2 => assert!(self.ram[COMMAND] == 0 || self.ram[COMMAND] >= 4, "block is busy"),
+            0x08C3..0x09C2 => {
+                assert!(self.ram[COMMAND] == 0 || self.ram[COMMAND] >= 4, "block is busy")
+            }
             OK | 0x08A2..0x08AA => assert_eq!(byte, 0),
             0x1F80..0x2000 if self.on_bus && self.configuration[2] > 1 => {
                 assert!(self.locked(), "global data changed without lockout");
             }
-            0x2000.. if self.buffer_len() > 1 => assert!(self.locked(), "outputs changed without lockout"),
-            0x2000.. => assert!(offset >= 0x2000 + 32 * self.buffer_len(), "write to the input table"),
+            0x2000.. if self.buffer_len() > 1 => {
+                assert!(self.locked(), "outputs changed without lockout")
+            }
+            0x2000.. => {
+                assert!(offset >= 0x2000 + 32 * self.buffer_len(), "write to the input table")
+            }
             _ => {}
         }
     }

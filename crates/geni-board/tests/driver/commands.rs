@@ -1,8 +1,8 @@
 //! Chapter 10: Read Datagram, Transmit Datagram, Transmit Datagram with Reply.
 
 use geni_board::{
-    CommandError, Completion, Configuration, Data, Destination, Event, Failure, Options, ReceivedDatagram,
-    Start, Transmission, TransmitError, TransmitPriority,
+    CommandError, Completion, Configuration, Data, Destination, Event, Failure, Options,
+    ReceivedDatagram, Start, Transmission, TransmitError, TransmitPriority,
 };
 
 use crate::board::Board;
@@ -61,7 +61,9 @@ fn every_status_has_its_meaning() {
         assert_eq!(outcome(completion, status), Event::Sent(expected), "{completion:?} {status:?}");
     }
     let completion = Completion::Reply { subfunction: 0x51 };
-    for (status, expected) in [(0, Cleared), (8, Refused), (0x10, Failed), (0x80, UnknownStatus(0x80))] {
+    for (status, expected) in
+        [(0, Cleared), (8, Refused), (0x10, Failed), (0x80, UnknownStatus(0x80))]
+    {
         assert_eq!(outcome(completion, Some(status)), Event::Replied(Err(expected)), "{status:?}");
     }
 }
@@ -250,17 +252,24 @@ fn what_the_board_would_refuse_is_refused_at_once() {
 
 #[test]
 fn the_status_byte_is_written_last() {
-    for completion in [Completion::Taken, Completion::Acknowledged, Completion::Reply { subfunction: 0x51 }] {
+    for completion in
+        [Completion::Taken, Completion::Acknowledged, Completion::Reply { subfunction: 0x51 }]
+    {
         let mut world = World::ready(Configuration::DEFAULT);
         world.board().reply = Some(vec![1]);
         world.board().written.clear();
         world.driver.transmit(transmission(completion)).expect("accepted");
         world.until(100, is_end_of_transmission);
         let board = world.board();
-        let written: Vec<_> = board.written.iter().filter(|at| (0x08C2..0x09C2).contains(*at)).collect();
+        let written: Vec<_> =
+            board.written.iter().filter(|at| (0x08C2..0x09C2).contains(*at)).collect();
         // Block and buffer, the status byte once and at the end.
         assert!(written.len() >= 7 && written.contains(&&0x08D2), "{written:X?}");
-        assert_eq!(written.iter().position(|at| **at == 0x08C2), Some(written.len() - 1), "{written:X?}");
+        assert_eq!(
+            written.iter().position(|at| **at == 0x08C2),
+            Some(written.len() - 1),
+            "{written:X?}"
+        );
     }
 }
 
@@ -291,7 +300,8 @@ fn the_host_is_told_when_the_receive_queue_is_empty() {
     assert!(!world.driver.receive_queue_is_empty());
     let mut received = 0;
     while !world.driver.receive_queue_is_empty() {
-        received += world.step().into_iter().filter(|event| matches!(event, Event::Received(_))).count();
+        received +=
+            world.step().into_iter().filter(|event| matches!(event, Event::Received(_))).count();
         assert!(world.now_ms < 5_000, "the queue is never empty");
     }
     assert_eq!(received, 3);

@@ -1,8 +1,8 @@
 //! Heartbeat, faults and what becomes of work in progress.
 
 use geni_board::{
-    CommandError, Completion, Configuration, Data, Destination, Event, Failure, Options, Start, Transmission,
-    TransmitError, TransmitPriority,
+    CommandError, Completion, Configuration, Data, Destination, Event, Failure, Options, Start,
+    Transmission, TransmitError, TransmitPriority,
 };
 
 use crate::world::{World, configuration};
@@ -36,8 +36,8 @@ fn a_healthy_board_stays_healthy() {
     assert_eq!(world.driver.counters(), geni_board::Counters::default());
 }
 
-/// What an idle board costs on a slow external bus: the flag and the summary in every poll, and now and then
-/// the rest.
+/// What an idle board costs on a slow external bus: the flag and the summary in every poll, and now
+/// and then the rest.
 #[test]
 fn idle_polls_are_cheap() {
     let mut world = World::ready(configuration(4, 0, 16));
@@ -57,7 +57,10 @@ fn a_board_without_heartbeat_is_reset_and_comes_back() {
     assert_eq!(events, [Event::Failed(Failure::NoHeartbeat)]);
     assert!((800..1_300).contains(&failed_ms), "noticed after {failed_ms} ms");
     assert!(!world.driver.is_ready());
-    assert_eq!(world.driver.transmit(transmission(Completion::Taken)), Err(TransmitError::NotReady));
+    assert_eq!(
+        world.driver.transmit(transmission(Completion::Taken)),
+        Err(TransmitError::NotReady)
+    );
 
     world.board().misbehaviour.no_heartbeat = false;
     world.until(5_000, is_ready);
@@ -104,7 +107,9 @@ fn a_board_that_restarts_by_itself_is_found_out() {
 
 #[test]
 fn a_restart_in_the_middle_of_a_command_is_not_taken_for_its_end() {
-    for completion in [Completion::Taken, Completion::Acknowledged, Completion::Reply { subfunction: 1 }] {
+    for completion in
+        [Completion::Taken, Completion::Acknowledged, Completion::Reply { subfunction: 1 }]
+    {
         let mut world = World::ready(configuration(2, 0, 16));
         world.board().misbehaviour.command_ms = Some(500);
         world.driver.transmit(transmission(completion)).expect("accepted");
@@ -114,7 +119,9 @@ fn a_restart_in_the_middle_of_a_command_is_not_taken_for_its_end() {
         assert_eq!(events, [Event::Failed(Failure::Restarted)]);
         let lost = world.step().expect("the datagram is reported");
         match completion {
-            Completion::Reply { .. } => assert_eq!(lost, Event::Replied(Err(CommandError::BoardFailed))),
+            Completion::Reply { .. } => {
+                assert_eq!(lost, Event::Replied(Err(CommandError::BoardFailed)))
+            }
             _ => assert_eq!(lost, Event::Sent(Err(CommandError::BoardFailed))),
         }
         world.board().misbehaviour.command_ms = None;
@@ -125,8 +132,11 @@ fn a_restart_in_the_middle_of_a_command_is_not_taken_for_its_end() {
 
 #[test]
 fn without_a_reset_line_a_failed_board_is_waited_for() {
-    let options =
-        Options { start: Start::Running, reset_line: false, ..Options::new(configuration(2, 0, 16)) };
+    let options = Options {
+        start: Start::Running,
+        reset_line: false,
+        ..Options::new(configuration(2, 0, 16))
+    };
     let mut world = World::ready_with(options);
     world.board().misbehaviour.hangs = true;
     world.until(2_000, is_failed);

@@ -9,8 +9,8 @@ use proptest::prelude::*;
 use crate::board::Board;
 use crate::world::{World, configuration};
 
-/// Most accesses in one poll. The longest: a lockout is granted (128 bytes of global data), flags are set,
-/// devices are looked at.
+/// Most accesses in one poll. The longest: a lockout is granted (128 bytes of global data), flags
+/// are set, devices are looked at.
 const MAX_ACCESSES: usize = 600;
 
 /// Something that changes between two polls.
@@ -170,7 +170,11 @@ fn watched_step(world: &mut World) -> Option<Event> {
     // The board does what it can with what the noise has left.
     world.board.borrow_mut().step(world.now_ms, world.driver.reset_held());
     let event = world.driver.poll(world.now_ms);
-    assert!(world.board().accesses <= MAX_ACCESSES, "{} accesses in one poll", world.board().accesses);
+    assert!(
+        world.board().accesses <= MAX_ACCESSES,
+        "{} accesses in one poll",
+        world.board().accesses
+    );
     world.pace_ms = 1;
     event
 }
@@ -193,7 +197,8 @@ proptest! {
         for (noise, polls) in script {
             apply(&mut world, &noise);
             for _ in 0..polls {
-                // The heart goes on beating more often than not, so that the noise gets far into the driver.
+                // The heart goes on beating more often than not, so that the noise gets far into
+                // the driver.
                 if world.now_ms.is_multiple_of(3) {
                     world.board().ram[0x0893] = 1;
                     if !responds {
@@ -208,7 +213,8 @@ proptest! {
         }
     }
 
-    /// With a board that does its work, noise in its tables is overcome: in the end there is traffic.
+    /// With a board that does its work, noise in its tables is overcome: in the end there is
+    /// traffic.
     #[test]
     fn a_board_that_calms_down_is_brought_back(
         script in prop::collection::vec(noise(), 1..60),
@@ -246,8 +252,10 @@ fn a_ram_that_is_not_there_is_a_failed_board() {
         let mut board = Board::running(0);
         board.checks_handshakes = false;
         board.ram.fill(byte);
-        let mut world =
-            World::new(board, Options { start: Start::Released, ..Options::new(Configuration::DEFAULT) });
+        let mut world = World::new(
+            board,
+            Options { start: Start::Released, ..Options::new(Configuration::DEFAULT) },
+        );
         let mut failed = false;
         for _ in 0..60_000 {
             world.board().ram.fill(byte);

@@ -1,6 +1,8 @@
-//! The driver and a scripted board that does what the manual's procedures and example algorithms say, step by step.
+//! The driver and a scripted board that does what the manual's procedures and example algorithms
+//! say, step by step.
 //!
-//! Offsets are written out here as the manual has them, so that a slip in the crate's map cannot hide.
+//! Offsets are written out here as the manual has them, so that a slip in the crate's map cannot
+//! hide.
 
 mod arrivals;
 mod board;

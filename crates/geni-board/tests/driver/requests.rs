@@ -1,15 +1,18 @@
 //! Chapter 13: the request queue.
 
 use geni_board::{
-    AnswerError, Configuration, Event, Options, READ_DEVICE, RequestAnswer, RequestHeader, RequestStatus,
-    Requests, Start, WRITE_DEVICE, WRITE_POINT,
+    AnswerError, Configuration, Event, Options, READ_DEVICE, RequestAnswer, RequestHeader,
+    RequestStatus, Requests, Start, WRITE_DEVICE, WRITE_POINT,
 };
 
 use crate::world::World;
 
 fn asking() -> World {
-    let options =
-        Options { start: Start::Running, requests: Requests::Ask, ..Options::new(Configuration::DEFAULT) };
+    let options = Options {
+        start: Start::Running,
+        requests: Requests::Ask,
+        ..Options::new(Configuration::DEFAULT)
+    };
     World::ready_with(options)
 }
 
@@ -27,7 +30,8 @@ fn memory_access_is_refused_with_the_syntax_status() {
     let mut world = World::ready(Configuration::DEFAULT);
     assert!(world.board().request(&READ));
     let (_, events) = world.until(10, |event| matches!(event, Event::RequestRefused(_)));
-    let header = RequestHeader { command: 0x1E, len: 3, address: 0x1234, source: 30, auxiliary_source: 0 };
+    let header =
+        RequestHeader { command: 0x1E, len: 3, address: 0x1234, source: 30, auxiliary_source: 0 };
     assert_eq!(events, [Event::RequestRefused(header)]);
     let board = world.board();
     assert_eq!((board.ram[1], board.ram[0x0880], board.ram[0x0881]), (4, 1, 1));
@@ -116,7 +120,10 @@ fn an_answer_to_a_request_of_a_former_life_goes_nowhere() {
     world.board().request(&READ);
     world.until(10, is_request);
     world.board().restart();
-    assert_eq!(world.driver.answer_request(RequestAnswer::Data(&[1, 2, 3])), Err(AnswerError::NoRequest));
+    assert_eq!(
+        world.driver.answer_request(RequestAnswer::Data(&[1, 2, 3])),
+        Err(AnswerError::NoRequest)
+    );
     assert_eq!(world.peek(0x0880), 0);
 }
 

@@ -1,7 +1,8 @@
 //! Chapter 3, Startup; chapter 4; chapter 10, Configuration Change.
 
 use geni_board::{
-    BoardSwitches, Configuration, ConfigurationOutcome, Event, Failure, Identity, Options, RateSetting, Start,
+    BoardSwitches, Configuration, ConfigurationOutcome, Event, Failure, Identity, Options,
+    RateSetting, Start,
 };
 
 use crate::board::{Board, OK};
@@ -28,7 +29,10 @@ fn reset_self_test_configuration_and_bus_follow_each_other() {
         let board = world.board();
         assert!(board.released_ms >= 2_000, "reset line held {} ms", board.released_ms);
         let first_access_ms = board.first_access_ms.expect("there was one") - board.released_ms;
-        assert!((1_700..1_750).contains(&first_access_ms), "first access after {first_access_ms} ms");
+        assert!(
+            (1_700..1_750).contains(&first_access_ms),
+            "first access after {first_access_ms} ms"
+        );
         assert_eq!(board.ram[0x0882..0x0888], [0xE7, 0xFF, 0xFF, 4, 0, 16]);
         // Only the interrupt in every scan is disabled.
         assert_eq!(board.ram[0x08B2..0x08BA], [0, 0, 0, 0, 1, 0, 0, 0]);
@@ -36,9 +40,15 @@ fn reset_self_test_configuration_and_bus_follow_each_other() {
     assert!(!world.driver.is_ready());
     let (off_bus_ms, events) = world.until(2_000, is_ready);
     assert!((1_495..1_510).contains(&off_bus_ms), "ready after {off_bus_ms} ms");
-    let switches =
-        BoardSwitches { device_number: 7, rate: RateSetting::K153_6Standard, outputs_enabled: true };
-    assert_eq!(events, [Event::Ready(Identity { revision: 0x21, switches, configuration: wanted })]);
+    let switches = BoardSwitches {
+        device_number: 7,
+        rate: RateSetting::K153_6Standard,
+        outputs_enabled: true,
+    };
+    assert_eq!(
+        events,
+        [Event::Ready(Identity { revision: 0x21, switches, configuration: wanted })]
+    );
     assert_eq!(world.driver.configuration(), wanted);
     assert_eq!(world.board().resets, 0, "one reset only, the first");
 }
@@ -88,8 +98,11 @@ fn a_board_that_is_running_is_not_disturbed() {
 
 #[test]
 fn a_flag_left_behind_by_a_dead_board_is_not_believed() {
-    let options =
-        Options { start: Start::Running, reset_line: false, ..Options::new(Configuration::DEFAULT) };
+    let options = Options {
+        start: Start::Running,
+        reset_line: false,
+        ..Options::new(Configuration::DEFAULT)
+    };
     let mut board = Board::running(0);
     board.misbehaviour.hangs = true;
     let mut world = World::new(board, options);
@@ -100,8 +113,11 @@ fn a_flag_left_behind_by_a_dead_board_is_not_believed() {
 
 /// What a window holds that is none, or a board in its self-test.
 fn silent_with(flag: u8) -> World {
-    let options =
-        Options { start: Start::Running, reset_line: false, ..Options::new(Configuration::DEFAULT) };
+    let options = Options {
+        start: Start::Running,
+        reset_line: false,
+        ..Options::new(Configuration::DEFAULT)
+    };
     let mut board = Board::running(0);
     board.misbehaviour.hangs = true;
     board.ram[OK] = flag;

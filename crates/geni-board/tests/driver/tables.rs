@@ -1,6 +1,5 @@
-//! Chapters 8, 9, 11 and 12: what is exchanged in every scan, and lockout. The scripted board panics when the
-//! host touches tables
-//! without lockout, asks twice, or withdraws a request.
+//! Chapters 8, 9, 11 and 12: what is exchanged in every scan, and lockout. The scripted board
+//! panics when the host touches tables without lockout, asks twice, or withdraws a request.
 
 use geni_board::{Configuration, Event, Failure, Options, Start, TableError};
 

@@ -1,7 +1,8 @@
 //! Chapters 5, 6 and 7: status, interrupts, devices.
 
 use geni_board::{
-    BlockKind, Configuration, Device, DeviceChange, Event, Interrupts, Options, Start, Status, TableError,
+    BlockKind, Configuration, Device, DeviceChange, Event, Interrupts, Options, Start, Status,
+    TableError,
 };
 
 use crate::world::{World, configuration};
@@ -25,14 +26,20 @@ fn devices_come_change_and_go() {
         output_len: 4,
         kind: BlockKind::Combination,
     };
-    assert_eq!(world.run(20), [Event::Device { number: 12, change: DeviceChange::LoggedIn(device) }]);
+    assert_eq!(
+        world.run(20),
+        [Event::Device { number: 12, change: DeviceChange::LoggedIn(device) }]
+    );
     assert_eq!(world.driver.device(12), Ok(device));
     // The outputs flag is our own doing.
     world.board().device(12, [64, 0, 1, 0x34, 0x12, 8, 4, 3]);
     assert_eq!(world.run(20), []);
     world.board().device(12, [64, 0, 1, 0x34, 0x12, 6, 4, 3]);
     let changed = Device { input_len: 6, outputs_disabled: false, ..device };
-    assert_eq!(world.run(20), [Event::Device { number: 12, change: DeviceChange::Changed(changed) }]);
+    assert_eq!(
+        world.run(20),
+        [Event::Device { number: 12, change: DeviceChange::Changed(changed) }]
+    );
     world.board().device(12, [64, 0, 0, 0x34, 0x12, 6, 4, 3]);
     assert_eq!(world.run(20), [Event::Device { number: 12, change: DeviceChange::LoggedOut }]);
     assert_eq!(world.driver.device(12), Err(TableError::NotPresent));

@@ -22,7 +22,12 @@ pub(crate) fn configuration(broadcast_len: u8, directed_len: u8, buffer_len: u8)
 impl World {
     pub(crate) fn new(board: Board, options: Options) -> World {
         let board = Rc::new(RefCell::new(board));
-        World { driver: Driver::new(HostSide(board.clone()), options), board, now_ms: 0, pace_ms: 1 }
+        World {
+            driver: Driver::new(HostSide(board.clone()), options),
+            board,
+            now_ms: 0,
+            pace_ms: 1,
+        }
     }
 
     /// A running board with this configuration, attached to.
@@ -61,7 +66,11 @@ impl World {
     }
 
     /// Runs until an event that fits; the time and everything before it.
-    pub(crate) fn until(&mut self, within_ms: u32, fits: impl Fn(&Event) -> bool) -> (u32, Vec<Event>) {
+    pub(crate) fn until(
+        &mut self,
+        within_ms: u32,
+        fits: impl Fn(&Event) -> bool,
+    ) -> (u32, Vec<Event>) {
         let mut events = Vec::new();
         let began_ms = self.now_ms;
         while self.now_ms.wrapping_sub(began_ms) < within_ms {

@@ -32,7 +32,9 @@ impl Link {
             match option.split_once('=') {
                 Some(("socket", path)) => {
                     let connected = UnixStream::connect(path);
-                    socket = Some(connected.map_err(|error| format!("cannot connect to {path}: {error}"))?);
+                    socket = Some(
+                        connected.map_err(|error| format!("cannot connect to {path}: {error}"))?,
+                    );
                 }
                 Some(("stop", address)) => {
                     let address = u64::from_str_radix(address, 16);

@@ -11,8 +11,9 @@ fn main() -> ExitCode {
 fn main() -> ExitCode {
     use std::io::Write;
     // Nobody is left to be told when standard error is gone.
-    let _ = std::io::stderr()
-        .write_all(b"the emulator is driven through local sockets and shared memory: it takes Linux\n");
+    let _ = std::io::stderr().write_all(
+        b"the emulator is driven through local sockets and shared memory: it takes Linux\n",
+    );
     ExitCode::FAILURE
 }
 
@@ -29,7 +30,8 @@ mod measured {
     use image_bench::bench::Parts;
     use image_bench::report::Report;
 
-    /// What `cargo xtask timing` runs when it has understood its options and built image and plugin.
+    /// What `cargo xtask timing` runs when it has understood its options and built image and
+    /// plugin.
     #[derive(Debug, Parser)]
     #[command(version)]
     struct Arguments {
@@ -58,7 +60,9 @@ mod measured {
             Ok(report) => {
                 let printed = ser_console::print(format_args!("\n{report}\n"));
                 let wrong = report.wrong();
-                wrong.iter().for_each(|wrong| tell(format_args!("over budget, late or missing: {wrong}")));
+                wrong
+                    .iter()
+                    .for_each(|wrong| tell(format_args!("over budget, late or missing: {wrong}")));
                 match printed {
                     _ if !wrong.is_empty() => ExitCode::FAILURE,
                     Ok(()) => ExitCode::SUCCESS,

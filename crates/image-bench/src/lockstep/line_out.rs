@@ -1,8 +1,8 @@
 //! The line behind the board's transmitter: QEMU's standard output as a pipe that holds one byte.
 //!
-//! The byte in the pipe is the one in the shift register. While it is there the UART keeps the next one in its data
-//! register and is busy, as on a chip. QEMU moves that one on when the pipe is empty, which is only while the
-//! processor is held.
+//! The byte in the pipe is the one in the shift register. While it is there the UART keeps the next
+//! one in its data register and is busy, as on a chip. QEMU moves that one on when the pipe is
+//! empty, which is only while the processor is held.
 
 use std::fs::File;
 use std::io::{self, Read};

@@ -12,7 +12,11 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    pub(super) fn new(what: &'static str, result: impl Into<String>, wrong: Vec<String>) -> Outcome {
+    pub(super) fn new(
+        what: &'static str,
+        result: impl Into<String>,
+        wrong: Vec<String>,
+    ) -> Outcome {
         Outcome { what, result: result.into(), wrong }
     }
 }

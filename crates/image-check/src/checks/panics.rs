@@ -13,11 +13,13 @@ pub(crate) fn forced(limits: &Limits, image: &Image) -> BTreeSet<u32> {
     limits.forced.iter().filter_map(|(name, _)| image.function(name)).collect()
 }
 
-/// The linker drops what nobody refers to: a function of the panic machinery that is still there can be reached.
+/// The linker drops what nobody refers to: a function of the panic machinery that is still there
+/// can be reached.
 pub(super) fn none(limits: &Limits, image: &Image, calls: &Calls<'_>) -> Outcome {
     let forced = forced(limits, image);
     let missing = limits.forced.iter().filter(|(name, _)| image.function(name).is_none());
-    let mut wrong: Vec<_> = missing.map(|(name, _)| format!("{name} is to panic and is not there")).collect();
+    let mut wrong: Vec<_> =
+        missing.map(|(name, _)| format!("{name} is to panic and is not there")).collect();
     // What matters is who brings a panic in; among themselves, panics call each other.
     let is_harmless = |at| {
         let Some((begin, function)) = image.function_around(at) else { return false };
@@ -67,8 +69,12 @@ mod tests {
 
     #[test]
     fn who_calls_a_panic_is_named_and_panics_that_call_each_other_are_not() {
-        let outcome = outcome(&BOARD, &[("main", &CALL_NEXT), (BOUNDS, &CALL_NEXT), (FMT, &[0xDE00])]);
-        assert_eq!(outcome.wrong, ["core::panicking::panic_bounds_check is called by main+0x2 (0x102)"]);
+        let outcome =
+            outcome(&BOARD, &[("main", &CALL_NEXT), (BOUNDS, &CALL_NEXT), (FMT, &[0xDE00])]);
+        assert_eq!(
+            outcome.wrong,
+            ["core::panicking::panic_bounds_check is called by main+0x2 (0x102)"]
+        );
     }
 
     #[test]

@@ -7,11 +7,12 @@ use crate::checks::outcome::Outcome;
 use crate::image::{Image, Piece};
 use crate::limits::Limits;
 
-/// Below, processors of this family have their flash, and other memory that holds no code; RAM begins here.
+/// Below, processors of this family have their flash, and other memory that holds no code; RAM
+/// begins here.
 const RAM_BEGINS: u32 = 0x2000_0000;
 
-/// Whatever the handlers, and the functions that the board names, can reach has to be in RAM: what they call, and the
-/// constants that they read.
+/// Whatever the handlers, and the functions that the board names, can reach has to be in RAM: what
+/// they call, and the constants that they read.
 pub(super) fn while_erasing(limits: &Limits, image: &Image, calls: &Calls<'_>) -> Outcome {
     const WHAT: &str = "while flash is erased";
     if limits.while_erasing.is_empty() {
@@ -32,13 +33,18 @@ pub(super) fn while_erasing(limits: &Limits, image: &Image, calls: &Calls<'_>) -
         if function < RAM_BEGINS {
             let name = image.name_of(function);
             match calls.calls_of(function).find(|call| call.at >= RAM_BEGINS) {
-                Some(call) => wrong.push(format!("{name} is in flash; {} calls it", image.name_of(call.at))),
+                Some(call) => {
+                    wrong.push(format!("{name} is in flash; {} calls it", image.name_of(call.at)))
+                }
                 None => wrong.push(format!("{name} is in flash")),
             }
         }
         let constants = calls.walk(function).into_iter().flat_map(|walk| &walk.constants);
         for &constant in constants.filter(|constant| in_flash(image, **constant)) {
-            wrong.push(format!("{} has an address in flash, {constant:#010x}", image.name_of(function)));
+            wrong.push(format!(
+                "{} has an address in flash, {constant:#010x}",
+                image.name_of(function)
+            ));
         }
     }
     let result = if wrong.is_empty() {
@@ -49,8 +55,8 @@ pub(super) fn while_erasing(limits: &Limits, image: &Image, calls: &Calls<'_>) -
     Outcome::new(WHAT, result, wrong)
 }
 
-/// Whether the image has something in flash at this address. What else is in flash is not the program's: the
-/// configuration, which is read while nothing is erased.
+/// Whether the image has something in flash at this address. What else is in flash is not the
+/// program's: the configuration, which is read while nothing is erased.
 fn in_flash(image: &Image, address: u32) -> bool {
     let holds = |piece: &Piece| !piece.bytes.is_empty() && piece.addresses().contains(&address);
     address < RAM_BEGINS && image.pieces.iter().any(holds)

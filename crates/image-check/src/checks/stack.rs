@@ -1,12 +1,13 @@
 //! The stack: how deep it can get, and what happens if it did get deeper.
 //!
 //! # Design
-//! The worst case is the deepest path of the main program, interrupted there by every handler at its deepest, each with
-//! the registers that the processor saves for it. A handler that changes to a stack of its own counts there.
+//! The worst case is the deepest path of the main program, interrupted there by every handler at
+//! its deepest, each with the registers that the processor saves for it. A handler that changes to
+//! a stack of its own counts there.
 //!
 //! # Tradeoffs
-//! Priorities are not asked: handlers of the same one cannot interrupt each other, and their sum is then too much. With one
-//! handler to a priority, it is exact.
+//! Priorities are not asked: handlers of the same one cannot interrupt each other, and their sum is
+//! then too much. With one handler to a priority, it is exact.
 
 use crate::calls::{Calls, Deepest};
 use crate::checks::memory::against;
@@ -14,9 +15,11 @@ use crate::checks::outcome::Outcome;
 use crate::image::Image;
 use crate::limits::Limits;
 
-/// Registers that the processor saves when it takes an exception (DDI 0403E, B1.5.6): r0–r3, r12, lr, pc, xPSR, …
+/// Registers that the processor saves when it takes an exception (DDI 0403E, B1.5.6): r0–r3, r12,
+/// lr, pc, xPSR, …
 const SAVED_BYTES: u32 = 8 * 4;
-/// … with those of the floating-point unit, for which room is made whether or not they are saved later …
+/// … with those of the floating-point unit, for which room is made whether or not they are saved
+/// later …
 const SAVED_FLOATING_POINT_BYTES: u32 = 26 * 4;
 /// … at an address that is a multiple of eight.
 const ALIGNMENT_BYTES: u32 = 4;
@@ -49,9 +52,12 @@ impl Share {
 /// # Errors
 /// What cannot be bounded, in words.
 pub(crate) fn shares(image: &Image, calls: &Calls<'_>) -> Result<Vec<Share>, Vec<String>> {
-    let Some((_, vectors)) = image.vectors() else { return Err(vec!["there is no vector table".to_owned()]) };
+    let Some((_, vectors)) = image.vectors() else {
+        return Err(vec!["there is no vector table".to_owned()]);
+    };
     let floating_point = calls.walks().any(|(_, walk)| walk.floating_point);
-    let saved = if floating_point { SAVED_FLOATING_POINT_BYTES } else { SAVED_BYTES } + ALIGNMENT_BYTES;
+    let saved =
+        if floating_point { SAVED_FLOATING_POINT_BYTES } else { SAVED_BYTES } + ALIGNMENT_BYTES;
     let mut shares: Vec<Share> = Vec::new();
     let mut unbounded = Vec::new();
     for (vector, &function) in vectors.iter().enumerate() {
@@ -89,7 +95,8 @@ pub(crate) fn together(shares: &[Share]) -> u32 {
 /// The worst case against what the memory map sets aside.
 pub(super) fn depth(image: &Image, calls: &Calls<'_>) -> Outcome {
     const WHAT: &str = "stack at its deepest";
-    let (Some(start), Some(end)) = (image.symbol("_stack_start"), image.symbol("_stack_end")) else {
+    let (Some(start), Some(end)) = (image.symbol("_stack_start"), image.symbol("_stack_end"))
+    else {
         return Outcome::new(WHAT, "?", vec!["_stack_start or _stack_end is missing".to_owned()]);
     };
     match bound(image, calls) {
@@ -98,16 +105,23 @@ pub(super) fn depth(image: &Image, calls: &Calls<'_>) -> Outcome {
     }
 }
 
-/// The stack that the hard fault handler changes to, if it does. Only the non-maskable interrupt can interrupt it there.
+/// The stack that the hard fault handler changes to, if it does. Only the non-maskable interrupt
+/// can interrupt it there.
 pub(super) fn fault_handler(image: &Image, calls: &Calls<'_>) -> Outcome {
     const WHAT: &str = "hard fault's own stack";
     let shares = shares(image, calls).unwrap_or_default();
-    let own = shares.iter().find_map(|share| Some((share.deepest.bytes, share.deepest.other_stack?)));
+    let own =
+        shares.iter().find_map(|share| Some((share.deepest.bytes, share.deepest.other_stack?)));
     let Some((bytes, top)) = own else { return Outcome::new(WHAT, "", vec![]) };
-    let interrupted = shares.iter().find(|share| share.vector == NON_MASKABLE).map_or(0, Share::bytes);
+    let interrupted =
+        shares.iter().find(|share| share.vector == NON_MASKABLE).map_or(0, Share::bytes);
     match image.size_of_object_before(top) {
         Some(size) => against(WHAT, bytes.saturating_add(interrupted), size),
-        None => Outcome::new(WHAT, "?", vec![format!("it begins at {top:#010x}, where no variable ends")]),
+        None => Outcome::new(
+            WHAT,
+            "?",
+            vec![format!("it begins at {top:#010x}, where no variable ends")],
+        ),
     }
 }
 
@@ -119,7 +133,10 @@ pub(super) fn overflow(limits: &Limits, image: &Image) -> Outcome {
         wrong.push(format!("the stack ends at {}, and there is memory below", shown(end)));
     }
     if image.vectors().map(|(stack, _)| stack) != start {
-        wrong.push(format!("the vector table does not begin with the stack's start, {}", shown(start)));
+        wrong.push(format!(
+            "the vector table does not begin with the stack's start, {}",
+            shown(start)
+        ));
     }
     let stack = end.unwrap_or(0)..start.unwrap_or(u32::MAX);
     for piece in &image.pieces {
@@ -151,7 +168,8 @@ mod tests {
     /// An image whose stack has 256 bytes and begins where the board's memory does.
     fn image(functions: &[(&str, &[u16])], vectors: &[&str]) -> Image {
         let image = Image::of_functions(0x2000_0000, functions);
-        let vectors: Vec<_> = vectors.iter().map(|name| image.function(name).unwrap() | 1).collect();
+        let vectors: Vec<_> =
+            vectors.iter().map(|name| image.function(name).unwrap() | 1).collect();
         let floor = BOARD.stack_floor;
         image.with_vectors(&[&[floor + 256], &vectors[..]].concat()).with_stack(floor, floor + 256)
     }
@@ -183,7 +201,8 @@ mod tests {
     #[test]
     fn a_stack_that_is_not_deep_enough_is_wrong() {
         // sub sp, #252; add sp, #252 below 4 more handlers than fit
-        let functions: [(&str, &[u16]); 2] = [("Reset", &[0xB0BF, 0xB03F, BX_LR]), ("Tick", &[BX_LR])];
+        let functions: [(&str, &[u16]); 2] =
+            [("Reset", &[0xB0BF, 0xB03F, BX_LR]), ("Tick", &[BX_LR])];
         let image = image(&functions, &["Reset", "Tick"]);
         assert_eq!(depth_of(&image).wrong, ["32 bytes more than there are"]);
     }
@@ -198,7 +217,10 @@ mod tests {
         let calls = Calls::of(&image, &BTreeSet::new());
         // Two handlers' registers, and the 8 bytes of one of them.
         assert_eq!(depth_of(&image).result, "0.1 of 0.3 KiB (32 %)");
-        assert_eq!(fault_handler(&image, &calls).wrong, ["it begins at 0x20000400, where no variable ends"]);
+        assert_eq!(
+            fault_handler(&image, &calls).wrong,
+            ["it begins at 0x20000400, where no variable ends"]
+        );
         let image = image.with_object(0x2000_0380, 0x80);
         let calls = Calls::of(&image, &BTreeSet::new());
         // 8 of its own, 44 of the other one.
@@ -218,7 +240,8 @@ mod tests {
                 "the vector table does not begin with the stack's start, 0x10000200"
             ]
         );
-        let over_code = image(&[("Reset", &[BX_LR])], &["Reset"]).with_stack(0x1000_0000, 0x2000_0002);
+        let over_code =
+            image(&[("Reset", &[BX_LR])], &["Reset"]).with_stack(0x1000_0000, 0x2000_0002);
         assert!(overflow(&BOARD, &over_code).wrong.contains(&".text lies in the stack".to_owned()));
     }
 }

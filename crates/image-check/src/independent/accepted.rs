@@ -14,25 +14,32 @@ type Applies = fn([u16; 2], &Theirs, &[Difference]) -> bool;
 pub(super) const REASONS: [(&str, Applies); 8] = [
     (
         "eight bits are no address: the walk may forget them, as it does any other value",
-        |[first, _], _, differences| first & 0xF800 == 0x2000 && differences == [Difference::Constant],
+        |[first, _], _, differences| {
+            first & 0xF800 == 0x2000 && differences == [Difference::Constant]
+        },
     ),
     (
-        "special registers are others on ARMv7-M (B5.1.1): the two stack pointers and the choice of one",
+        "special registers are others on ARMv7-M (B5.1.1): the two stack pointers and the choice \
+         of one",
         |[first, second], _, differences| {
             let is_stack_pointer = matches!(second & 0xFF, 8 | 9 | 20);
             first & 0xFFE0 == 0xF380 && is_stack_pointer && differences == [Difference::Stack]
         },
     ),
-    ("UNDEFINED: only application processors have such an instruction (A5.3)", |[first, _], theirs, _| {
-        match theirs.opcode {
-            Opcode::RFE(..) | Opcode::SRS(..) | Opcode::BXJ | Opcode::ERET => true,
-            // With the address in a register, both have it.
-            Opcode::BLX => is_wide(first),
-            _ => false,
-        }
-    }),
     (
-        "UNPREDICTABLE: a return from an exception of application processors, here a hint with bits \
+        "UNDEFINED: only application processors have such an instruction (A5.3)",
+        |[first, _], theirs, _| {
+            match theirs.opcode {
+                Opcode::RFE(..) | Opcode::SRS(..) | Opcode::BXJ | Opcode::ERET => true,
+                // With the address in a register, both have it.
+                Opcode::BLX => is_wide(first),
+                _ => false,
+            }
+        },
+    ),
+    (
+        "UNPREDICTABLE: a return from an exception of application processors, here a hint with \
+         bits \
          that have to be 0 (A5.3.4)",
         |[first, _], theirs, _| theirs.opcode == Opcode::SUB && first & 0xFFF0 == 0xF3D0,
     ),

@@ -40,7 +40,12 @@ impl Tally {
 
     fn assert_no_difference(&self) {
         let shown: Vec<&str> = self.differs.iter().take(SHOWN).map(String::as_str).collect();
-        assert!(shown.is_empty(), "{} differences, such as:\n{}", self.differs.len(), shown.join("\n"));
+        assert!(
+            shown.is_empty(),
+            "{} differences, such as:\n{}",
+            self.differs.len(),
+            shown.join("\n")
+        );
     }
 }
 
@@ -52,7 +57,8 @@ fn narrow() -> impl Iterator<Item = (u16, u16)> {
 /// one.
 fn wide() -> impl Iterator<Item = (u16, u16)> {
     let seconds = |first: u16| {
-        (0..SECONDS).map(move |count| count.wrapping_mul(40_503).wrapping_add(first.wrapping_mul(25_173)))
+        (0..SECONDS)
+            .map(move |count| count.wrapping_mul(40_503).wrapping_add(first.wrapping_mul(25_173)))
     };
     (WIDE..=u16::MAX).flat_map(move |first| seconds(first).map(move |second| (first, second)))
 }

@@ -55,7 +55,9 @@ fn hold(variable: &str) {
         match compare(placed.at, placed.first, placed.second) {
             Verdict::Agreed | Verdict::Accepted(_) => {}
             Verdict::Unknown if reads_special_register(placed) => {}
-            Verdict::Unknown => wrong.push(format!("{:04x} {:04x}: unknown", placed.first, placed.second)),
+            Verdict::Unknown => {
+                wrong.push(format!("{:04x} {:04x}: unknown", placed.first, placed.second))
+            }
             Verdict::Differs(how) => wrong.push(how),
         }
     }
@@ -68,15 +70,16 @@ fn hold(variable: &str) {
 /// that ours reads as the manual says: one register changes (A7.7.82).
 fn reads_special_register(placed: &Placed) -> bool {
     let ours = placed.ours();
-    let plain =
-        (ours.length, ours.flow, ours.stack, ours.constant) == (4, Flow::Next, Stack::Deeper(0), None);
+    let plain = (ours.length, ours.flow, ours.stack, ours.constant)
+        == (4, Flow::Next, Stack::Deeper(0), None);
     let changes = 1 << (placed.second >> 8 & 0xF);
     placed.first == 0xF3EF && placed.second & 0xF000 == 0x8000 && plain && ours.changes == changes
 }
 
 /// The sweep has met what the walk lives on.
 fn assert_is_a_program(all: &[Placed]) {
-    let count = |is: fn(&Instruction) -> bool| all.iter().filter(|placed| is(&placed.ours())).count();
+    let count =
+        |is: fn(&Instruction) -> bool| all.iter().filter(|placed| is(&placed.ours())).count();
     let calls = count(|instruction| matches!(instruction.flow, Flow::Call(_)));
     let branches = count(|instruction| matches!(instruction.flow, Flow::Branch(_) | Flow::Jump(_)));
     let returns = count(|instruction| instruction.flow == Flow::Return);
@@ -97,10 +100,12 @@ fn assert_is_a_program(all: &[Placed]) {
 fn assert_walk_keeps_to(image: &Image, all: &[Placed]) {
     let begins: BTreeSet<u32> = all.iter().map(|placed| placed.at).collect();
     let calls = Calls::of(image, &BTreeSet::new());
-    let found: BTreeSet<u32> = calls.walks().flat_map(|(_, walk)| &walk.calls).map(|call| call.at).collect();
+    let found: BTreeSet<u32> =
+        calls.walks().flat_map(|(_, walk)| &walk.calls).map(|call| call.at).collect();
     assert!(found.is_subset(&begins), "{:x?}", found.difference(&begins));
     for placed in all {
-        let (Flow::Jump(target) | Flow::Branch(target) | Flow::Call(target)) = placed.ours().flow else {
+        let (Flow::Jump(target) | Flow::Branch(target) | Flow::Call(target)) = placed.ours().flow
+        else {
             continue;
         };
         assert!(begins.contains(&target), "{:#x} leads to {target:#x}", placed.at);

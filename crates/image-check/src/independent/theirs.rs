@@ -3,8 +3,8 @@
 //! That decoder knows the `ARMv7` of application processors, of which ARMv7-M is a part. Where it
 //! says the same in other words, it is put into ours here:
 //!
-//! * It counts the distance of 16-bit conditional branches from the next instruction and all
-//!   others from two instructions on; the manual counts all from there (A7.7.12, A7.7.21).
+//! * It counts the distance of 16-bit conditional branches from the next instruction and all others
+//!   from two instructions on; the manual counts all from there (A7.7.12, A7.7.21).
 //! * It says of loads and stores with an index that is added afterwards that they do not write the
 //!   base back. They always do (A7.7.43: `wback = (P == 0 || W == 1)`).
 //! * It does not know the floating-point unit, which is coprocessors 10 and 11 (A6.1.1). What an
@@ -39,7 +39,8 @@ pub(super) struct Theirs {
 impl Theirs {
     /// The instruction at an address. None when they know no such instruction.
     pub(super) fn of(address: u32, first: u16, second: u16) -> Option<Theirs> {
-        let second = if is_floating_point(first, second) { second & !0x0F00 | 0x0100 } else { second };
+        let second =
+            if is_floating_point(first, second) { second & !0x0F00 | 0x0100 } else { second };
         let bytes = [first.to_le_bytes(), second.to_le_bytes()].concat();
         let instruction = InstDecoder::armv7_thumb().decode(&mut U8Reader::new(&bytes)).ok()?;
         Some(Theirs {
@@ -179,14 +180,19 @@ fn target(address: u32, instruction: &Instruction) -> Option<u32> {
 
 fn flow(address: u32, instruction: &Instruction) -> Flow {
     let Instruction { opcode, operands, .. } = instruction;
-    let through = |register| if register == LR { Flow::Return } else { Flow::JumpRegister(register) };
+    let through =
+        |register| if register == LR { Flow::Return } else { Flow::JumpRegister(register) };
     match (opcode, operands, target(address, instruction)) {
-        (Opcode::B, _, Some(target)) if instruction.condition == ConditionCode::AL => Flow::Jump(target),
+        (Opcode::B, _, Some(target)) if instruction.condition == ConditionCode::AL => {
+            Flow::Jump(target)
+        }
         (Opcode::B | Opcode::CBZ | Opcode::CBNZ, _, Some(target)) => Flow::Branch(target),
         (Opcode::BL, _, Some(target)) => Flow::Call(target),
         (Opcode::BLX, [Operand::Reg(to), ..], _) => Flow::CallRegister(number(*to)),
         (Opcode::BX, [Operand::Reg(to), ..], _) => through(number(*to)),
-        (Opcode::MOV, [to, Operand::Reg(from), Operand::Nothing, _], _) if register(*to) == Some(PC) => {
+        (Opcode::MOV, [to, Operand::Reg(from), Operand::Nothing, _], _)
+            if register(*to) == Some(PC) =>
+        {
             through(number(*from))
         }
         (Opcode::TBB, [Operand::RegDerefPreindexReg(base, ..), ..], _) if number(*base) == PC => {
@@ -217,7 +223,10 @@ fn has_base(operands: &[Operand; 4], wanted: u16) -> bool {
 
 /// Whether it goes where only the processor's state tells.
 fn is_elsewhere(opcode: Opcode) -> bool {
-    matches!(opcode, Opcode::TBB | Opcode::TBH | Opcode::BLX | Opcode::BXJ | Opcode::RFE(..) | Opcode::ERET)
+    matches!(
+        opcode,
+        Opcode::TBB | Opcode::TBH | Opcode::BLX | Opcode::BXJ | Opcode::RFE(..) | Opcode::ERET
+    )
 }
 
 /// Where an instruction goes that writes the program counter.
@@ -251,11 +260,15 @@ fn literal(address: u32, instruction: &Instruction) -> Option<u32> {
 fn constant(address: u32, instruction: &Instruction) -> Option<(u16, Constant)> {
     let to = register(instruction.operands[0])?;
     match (instruction.opcode, instruction.operands) {
-        (Opcode::MOV, [_, Operand::Imm32(value), Operand::Nothing, _]) => Some((to, Constant::Whole(value))),
+        (Opcode::MOV, [_, Operand::Imm32(value), Operand::Nothing, _]) => {
+            Some((to, Constant::Whole(value)))
+        }
         (Opcode::MOVT, [_, Operand::Imm32(value), ..]) => {
             Some((to, Constant::Upper(u16::try_from(value).ok()?)))
         }
-        (Opcode::LDR, _) if to != PC => Some((to, Constant::WordAt(literal(address, instruction)?))),
+        (Opcode::LDR, _) if to != PC => {
+            Some((to, Constant::WordAt(literal(address, instruction)?)))
+        }
         _ => None,
     }
 }

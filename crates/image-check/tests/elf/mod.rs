@@ -35,7 +35,8 @@ fn code() -> Vec<u8> {
     let halfwords: [u16; 16] = [
         0xB510, 0xF000, 0xF803, 0xBD10, // Reset: push; bl work; pop
         0xDE00, 0xBF00, // force: udf; nop
-        0xB510, 0xE8DF, 0xF000, 0x0201, 0x4801, 0x4780, 0xBD10, // work: push; tbb; ldr; blx; pop
+        0xB510, 0xE8DF, 0xF000, 0x0201, 0x4801, 0x4780,
+        0xBD10, // work: push; tbb; ldr; blx; pop
         0xBF00, 0x0109, 0x0000, // the word 0000_0109h
     ];
     halfwords.iter().flat_map(|halfword| halfword.to_le_bytes()).collect()
@@ -77,8 +78,15 @@ fn symbols(names: &[Symbol]) -> (Vec<u8>, Vec<u8>) {
 }
 
 fn sections(code: Vec<u8>, names: &[Symbol]) -> Vec<Section> {
-    let plain =
-        |name, kind, flags, address, bytes| Section { name, kind, flags, address, bytes, link: 0, entry: 0 };
+    let plain = |name, kind, flags, address, bytes| Section {
+        name,
+        kind,
+        flags,
+        address,
+        bytes,
+        link: 0,
+        entry: 0,
+    };
     let (symbols, strings) = symbols(names);
     let vectors = words(&[STACK.end, CODE | 1]);
     vec![
@@ -136,7 +144,18 @@ fn file(mut sections: Vec<Section>) -> Vec<u8> {
     for (section, name) in sections.iter().zip(all) {
         let Section { kind, flags, address, bytes, link, entry, .. } = section;
         let at = HEADER + length(&contents);
-        headers.extend(words(&[name, *kind, *flags, *address, at, length(bytes), *link, 1, 4, *entry]));
+        headers.extend(words(&[
+            name,
+            *kind,
+            *flags,
+            *address,
+            at,
+            length(bytes),
+            *link,
+            1,
+            4,
+            *entry,
+        ]));
         if *kind != RESERVED {
             contents.extend(bytes);
             contents.resize(contents.len().next_multiple_of(4), 0);

@@ -2,9 +2,9 @@
 //!
 //! An auto report is a reason to read, and no more. It names its events by their place in the ring
 //! and the total, and both begin anew after an erase. So nothing in a report shows whether it goes
-//! on with the log that was read last. Earlier reports might have shown it, but they may be lost, or
-//! were never sent. A reading begins with the last event that was delivered. If no more than nine
-//! have happened since, it is one request.
+//! on with the log that was read last. Earlier reports might have shown it, but they may be lost,
+//! or were never sent. A reading begins with the last event that was delivered. If no more than
+//! nine have happened since, it is one request.
 
 use crate::reading::cursor::Cursor;
 use crate::reading::delivery::Delivery;
@@ -154,7 +154,8 @@ impl LogFollower {
         Ok((summary, Ok(())))
     }
 
-    /// Asks for the size again; original recorders do not tell, then it stays what it was said to be.
+    /// Asks for the size again; original recorders do not tell, then it stays what it was said to
+    /// be.
     fn learn_size(&mut self, unit: &mut Unit) -> Result<(), RequestError> {
         match unit.configuration() {
             Ok(configuration) => self.size = configuration.size,

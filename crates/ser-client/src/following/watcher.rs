@@ -109,7 +109,11 @@ impl LogWatcher {
 
     /// Reads a log when the recorder reports, and every `interval` in case a report gets lost.
     #[must_use]
-    pub fn reporting(follower: LogFollower, interval: Duration, switch: ReportSwitch) -> LogWatcher {
+    pub fn reporting(
+        follower: LogFollower,
+        interval: Duration,
+        switch: ReportSwitch,
+    ) -> LogWatcher {
         LogWatcher { switch: Some(switch), ..LogWatcher::polling(follower, interval, true) }
     }
 
@@ -168,7 +172,8 @@ impl LogWatcher {
     /// Whether it is time to tell the recorder to report, or not to.
     fn switch_due(&self, now: Duration) -> Option<bool> {
         let ReportSwitch { is_on, .. } = self.switch.filter(|_| self.has_read)?;
-        let is_busy = self.endangered || self.busy_since.is_some_and(|since| now >= since + BUSY_FOR);
+        let is_busy =
+            self.endangered || self.busy_since.is_some_and(|since| now >= since + BUSY_FOR);
         let is_calm = now >= self.quiet_since + self.calm;
         match is_on {
             true => is_busy.then_some(false),

@@ -2,7 +2,8 @@
 //!
 //! [`GeniHost`] is a handle that can be cloned. Behind it, `Host` owns the driver of the board. The
 //! driver never waits, so `Host` looks at the board until what it waits for has happened, and sorts
-//! what arrives meanwhile: messages into the inbox of their sender, log-ins into the list of devices.
+//! what arrives meanwhile: messages into the inbox of their sender, log-ins into the list of
+//! devices.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,13 +11,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use geni_board::{
-    Completion, Configuration, Data, Destination, Device, DeviceChange, Driver, Event, Failure, Identity,
-    MAX_DEVICE_NUMBER, Options, ReceivedDatagram, SharedRam, Start, Status, TableError, Transmission,
-    TransmitError, TransmitPriority, map,
+    Completion, Configuration, Data, Destination, Device, DeviceChange, Driver, Event, Failure,
+    Identity, MAX_DEVICE_NUMBER, Options, ReceivedDatagram, SharedRam, Start, Status, TableError,
+    Transmission, TransmitError, TransmitPriority, map,
 };
 use ser_proto::Command;
 use ser_proto::genius::{
-    Datagram, FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, IoForces, Message, SUBFUNCTION_SER, Subfunction,
+    Datagram, FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, IoForces, Message, SUBFUNCTION_SER,
+    Subfunction,
 };
 
 use super::answers::Answers;
@@ -194,9 +196,11 @@ impl GeniHost {
     /// # Errors
     /// When it does not get out.
     pub fn broadcast(&self, command: &Command) -> Result<(), GeniusError> {
-        self.lock().deliver(ser_message(Destination::Broadcast, command)?).map_err(|error| match error {
-            GeniusError::Undelivered(error) => GeniusError::BroadcastFailed(error),
-            other => other,
+        self.lock().deliver(ser_message(Destination::Broadcast, command)?).map_err(|error| {
+            match error {
+                GeniusError::Undelivered(error) => GeniusError::BroadcastFailed(error),
+                other => other,
+            }
         })
     }
 
@@ -244,7 +248,11 @@ impl GeniHost {
     }
 
     /// Waits for messages of a recorder.
-    pub(crate) fn receive(&self, node: u8, timeout: Duration) -> Result<Vec<ReceivedDatagram>, GeniusError> {
+    pub(crate) fn receive(
+        &self,
+        node: u8,
+        timeout: Duration,
+    ) -> Result<Vec<ReceivedDatagram>, GeniusError> {
         let until = self.clock.now() + timeout;
         loop {
             let mut host = self.lock();
@@ -278,7 +286,10 @@ impl fmt::Debug for GeniHost {
 /// A message in a datagram whose acknowledgement is waited for. The reply comes as a datagram of
 /// its own: a board that is told to wait for it does nothing else meanwhile, and would take an auto
 /// report for it.
-pub(super) fn ser_message(destination: Destination, command: &Command) -> Result<Transmission, GeniusError> {
+pub(super) fn ser_message(
+    destination: Destination,
+    command: &Command,
+) -> Result<Transmission, GeniusError> {
     let data = Data::from_slice(&command.to_body());
     Ok(Transmission {
         destination,
@@ -295,7 +306,14 @@ pub(super) fn ser_message(destination: Destination, command: &Command) -> Result
 fn bus_datagram(received: &ReceivedDatagram, own_number: u8) -> Option<Datagram> {
     let source = ser_proto::genius::BusAddress::new(received.source)?;
     let own_number = ser_proto::genius::BusAddress::new(own_number)?;
-    Datagram::new(source, own_number.into(), received.function, received.subfunction, &received.data).ok()
+    Datagram::new(
+        source,
+        own_number.into(),
+        received.function,
+        received.subfunction,
+        &received.data,
+    )
+    .ok()
 }
 
 const fn bit(number: u8) -> u32 {
@@ -338,7 +356,9 @@ impl Host {
             start: Start::Running,
             reset_line: false,
             heartbeat_timeout_ms: u32::try_from(patience.as_millis()).unwrap_or(u32::MAX),
-            ..Options::new(configuration.ok().filter(|_| is_set_up).unwrap_or(Configuration::DEFAULT))
+            ..Options::new(
+                configuration.ok().filter(|_| is_set_up).unwrap_or(Configuration::DEFAULT),
+            )
         };
         Host {
             driver: Driver::new(ram, options),
@@ -481,7 +501,11 @@ impl Host {
     }
 
     /// Looks at the board until `done`, or until the time is over. A board that fails ends it.
-    fn wait(&mut self, timeout: Duration, done: impl Fn(&Host) -> bool) -> Result<bool, GeniusError> {
+    fn wait(
+        &mut self,
+        timeout: Duration,
+        done: impl Fn(&Host) -> bool,
+    ) -> Result<bool, GeniusError> {
         let until = self.clock.now() + timeout;
         loop {
             self.look()?;
@@ -525,7 +549,11 @@ impl Host {
             Event::Device { number, change } => {
                 self.answers.forget(number);
                 let others = self.known & !bit(number);
-                self.know(if change == DeviceChange::LoggedOut { others } else { others | bit(number) });
+                self.know(if change == DeviceChange::LoggedOut {
+                    others
+                } else {
+                    others | bit(number)
+                });
             }
             Event::Failed(failure) => self.failure = Some(failure),
             Event::Received(received) => self.inboxes.put(received),

@@ -20,7 +20,8 @@ impl Inboxes {
     /// Keeps a message that a recorder has sent to this host. What is said to all, or is no message
     /// of a recorder, answers nobody here.
     pub(super) fn put(&mut self, received: ReceivedDatagram) {
-        let of_recorder = (received.function, received.subfunction) == (FUNCTION_HORNER, SUBFUNCTION_SER);
+        let of_recorder =
+            (received.function, received.subfunction) == (FUNCTION_HORNER, SUBFUNCTION_SER);
         if received.broadcast || !of_recorder {
             self.ignored += 1;
             return;
@@ -39,7 +40,11 @@ impl Inboxes {
     }
 
     /// The oldest message of a device whose data are of some kind; the others stay.
-    pub(super) fn take_if(&mut self, node: u8, fits: impl Fn(&[u8]) -> bool) -> Option<ReceivedDatagram> {
+    pub(super) fn take_if(
+        &mut self,
+        node: u8,
+        fits: impl Fn(&[u8]) -> bool,
+    ) -> Option<ReceivedDatagram> {
         let inbox = self.boxes.get_mut(&node)?;
         let place = inbox.iter().position(|received| fits(&received.data))?;
         inbox.remove(place)
@@ -64,7 +69,14 @@ mod tests {
 
     fn received(source: u8, broadcast: bool, subfunction: u8, data: u8) -> ReceivedDatagram {
         let data = geni_board::Data::from_slice(&[data]).unwrap();
-        ReceivedDatagram { source, function: FUNCTION_HORNER, subfunction, broadcast, arrived_ms: None, data }
+        ReceivedDatagram {
+            source,
+            function: FUNCTION_HORNER,
+            subfunction,
+            broadcast,
+            arrived_ms: None,
+            data,
+        }
     }
 
     #[test]

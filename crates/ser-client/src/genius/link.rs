@@ -31,7 +31,11 @@ impl Link for GeniusLink {
         Ok(self.host.send(self.node, attempt.command())?)
     }
 
-    fn receive(&mut self, session: &mut Session, timeout: Duration) -> Result<usize, TransportError> {
+    fn receive(
+        &mut self,
+        session: &mut Session,
+        timeout: Duration,
+    ) -> Result<usize, TransportError> {
         let received = self.host.receive(self.node, timeout)?;
         Ok(self.hand_over(&received, session))
     }
@@ -61,7 +65,9 @@ impl Link for GeniusLink {
 
     fn diagnose(&self, diagnosis: Diagnosis) -> Diagnosis {
         match diagnosis {
-            Diagnosis::Silent if self.host.is_undelivered() => Diagnosis::Unacknowledged { node: self.node },
+            Diagnosis::Silent if self.host.is_undelivered() => {
+                Diagnosis::Unacknowledged { node: self.node }
+            }
             Diagnosis::Silent => Diagnosis::SilentOnBus { node: self.node },
             other => other,
         }

@@ -3,8 +3,8 @@
 //! A recorder is behind a GENI board, and so may other things be; what the bus tells of a device
 //! does not say which. So every device that sends as much as a recorder does, and takes nothing, is
 //! asked a question that only recorders answer: what they heard last by broadcast (`L`, which
-//! original recorders answer, too, and which changes nothing). What came out is remembered until the
-//! device logs in anew.
+//! original recorders answer, too, and which changes nothing). What came out is remembered until
+//! the device logs in anew.
 
 use std::time::Duration;
 
@@ -44,8 +44,8 @@ impl BusDevice {
     /// sends 2 or 4 bytes in every scan, and takes nothing.
     #[must_use]
     pub fn candidate_inputs(&self) -> Option<GlobalData> {
-        let sends_only =
-            self.device.output_len == 0 && matches!(self.device.kind, BlockKind::Inputs | BlockKind::Unknown);
+        let sends_only = self.device.output_len == 0
+            && matches!(self.device.kind, BlockKind::Inputs | BlockKind::Unknown);
         GlobalData::parse(&self.inputs).ok().filter(|_| sends_only)
     }
 }
@@ -113,7 +113,11 @@ impl GeniHost {
     }
 
     /// Waits until nobody is unknown any more, or until the time is over.
-    fn wait_for_answers(&self, unknown: &mut Vec<u8>, timeout: Duration) -> Result<(), GeniusError> {
+    fn wait_for_answers(
+        &self,
+        unknown: &mut Vec<u8>,
+        timeout: Duration,
+    ) -> Result<(), GeniusError> {
         let until = self.clock.now() + timeout;
         loop {
             self.lock().collect_answers(unknown)?;

@@ -44,7 +44,9 @@ impl RangeReader {
 
     /// Takes the reply to [`request`](Self::request) and delivers its entries.
     pub fn take(&mut self, reply: &ReadReply, on: &mut dyn FnMut(Delivery)) {
-        let Some(request) = self.request().filter(|request| request.start == reply.start) else { return };
+        let Some(request) = self.request().filter(|request| request.start == reply.start) else {
+            return;
+        };
         let position = LogPosition::from(reply);
         if self.position.is_some_and(|earlier| !self.keeps_before(earlier, position)) {
             self.before = None;
@@ -73,14 +75,16 @@ impl RangeReader {
     /// do with the entry that comes before it by number.
     #[must_use]
     pub fn is_seam(&self, entry_number: u16) -> bool {
-        self.position.is_some_and(|position| entry_number.checked_sub(1) == Some(position.next_slot))
+        self.position
+            .is_some_and(|position| entry_number.checked_sub(1) == Some(position.next_slot))
     }
 
     /// Whether the entry before `next` is still what it was, although the log has moved on between
     /// two replies.
     fn keeps_before(&self, earlier: LogPosition, now: LogPosition) -> bool {
         let Some(slot) = self.next.checked_sub(2) else { return true };
-        earlier == now || went_straight(earlier, now) && !(earlier.next_slot..now.next_slot).contains(&slot)
+        earlier == now
+            || went_straight(earlier, now) && !(earlier.next_slot..now.next_slot).contains(&slot)
     }
 
     /// Where the log stood in the latest reply.
@@ -122,10 +126,18 @@ mod tests {
     use ser_proto::{Inputs, Model, TimeStamp};
 
     fn reply(start: u16, count: usize, total: u16, next_slot: u16) -> ReadReply {
-        let time =
-            TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 250 };
+        let time = TimeStamp {
+            year: 26,
+            month: 11,
+            day: 22,
+            hour: 10,
+            minute: 0,
+            second: 0,
+            millisecond: 250,
+        };
         // Input 1 changes in each entry.
-        let entry = |number: u16| Entry { changed: Inputs(1), state: Inputs((number % 2).into()), time };
+        let entry =
+            |number: u16| Entry { changed: Inputs(1), state: Inputs((number % 2).into()), time };
         let entries = (start..).take(count).map(entry).collect();
         ReadReply { start, total, next_slot, model: Some(Model::Ser160), entries }
     }
@@ -150,7 +162,8 @@ mod tests {
         }
         let mut told = Vec::new();
         RangeReader::new(11, 4, 100).take(&reply, &mut |delivery| told.push(delivery));
-        let lost: Vec<_> = told.iter().filter(|told| matches!(told, Delivery::Lost { .. })).collect();
+        let lost: Vec<_> =
+            told.iter().filter(|told| matches!(told, Delivery::Lost { .. })).collect();
         let input_2 = Lost::Unrecorded { inputs: Inputs(0b10) };
         assert_eq!(lost, [&Delivery::Lost { after: None, lost: input_2 }]);
         assert!(matches!(told[1], Delivery::Lost { .. }), "before entry 12");

@@ -37,9 +37,9 @@ pub enum Diagnosis {
     },
     /// The recorder did answer this command, with something that is no such message.
     NotUnderstood(ParseError),
-    /// The recorder talks, with frames or lines of text, but does not answer this command. An original
-    /// recorder is silent on the queries that this project added to the protocol, and on every command
-    /// it refuses.
+    /// The recorder talks, with frames or lines of text, but does not answer this command. An
+    /// original recorder is silent on the queries that this project added to the protocol, and on
+    /// every command it refuses.
     Ignored {
         /// Frames with other contents.
         frames: u64,
@@ -51,7 +51,11 @@ pub enum Diagnosis {
 impl Diagnosis {
     /// Judges what was counted while the answer was awaited; `not_understood` is the last answer to
     /// the command that made no sense, `unfinished` whether a frame had begun and never ended.
-    pub(crate) fn of(seen: &Counters, not_understood: Option<ParseError>, unfinished: bool) -> Diagnosis {
+    pub(crate) fn of(
+        seen: &Counters,
+        not_understood: Option<ParseError>,
+        unfinished: bool,
+    ) -> Diagnosis {
         if seen.bytes == 0 {
             return Diagnosis::Silent;
         }
@@ -75,20 +79,27 @@ impl Diagnosis {
     pub const fn hint(&self) -> &'static str {
         match self {
             Diagnosis::Silent => {
-                "check power, port, cable (null modem?) and baud rate (recorders are delivered with 9600)"
+                "check power, port, cable (null modem?) and baud rate (recorders are delivered \
+                 with 9600)"
             }
             Diagnosis::SilentOnBus { .. } => {
-                "is this device a recorder, is it running, and is the bus free of errors? Or wait longer for the answer"
+                "is this device a recorder, is it running, and is the bus free of errors? Or \
+                 wait longer for the answer"
             }
             Diagnosis::Unacknowledged { .. } => {
-                "try again; if it persists, look for errors on the bus: cable, terminators, a number given twice"
+                "try again; if it persists, look for errors on the bus: cable, terminators, a \
+                 number given twice"
             }
             Diagnosis::Garbage { .. } => "try another baud rate; recorders are delivered with 9600",
-            Diagnosis::Damaged { .. } => "check cable, shielding and ground, or choose a lower baud rate",
+            Diagnosis::Damaged { .. } => {
+                "check cable, shielding and ground, or choose a lower baud rate"
+            }
             Diagnosis::NotUnderstood(_) => {
                 "is this a sequential event recorder, and nothing else on the line?"
             }
-            Diagnosis::Ignored { .. } => "original recorders do not know this query, or refused what was asked",
+            Diagnosis::Ignored { .. } => {
+                "original recorders do not know this query, or refused what was asked"
+            }
         }
     }
 }
@@ -103,11 +114,17 @@ impl fmt::Display for Diagnosis {
             Diagnosis::Unacknowledged { node } => {
                 write!(f, "device {node} is on the bus and the datagram did not get through to it")
             }
-            Diagnosis::Garbage { bytes } => write!(f, "{bytes} bytes came back and none made sense"),
+            Diagnosis::Garbage { bytes } => {
+                write!(f, "{bytes} bytes came back and none made sense")
+            }
             Diagnosis::Damaged { frames } => write!(f, "{frames} damaged frames came back"),
             Diagnosis::NotUnderstood(error) => write!(f, "the answer was not understood: {error}"),
             Diagnosis::Ignored { frames, lines } => {
-                write!(f, "the recorder talks ({frames} frames, {lines} lines of text) but does not answer this")
+                write!(
+                    f,
+                    "the recorder talks ({frames} frames, {lines} lines of text) but does not \
+                     answer this"
+                )
             }
         }
     }

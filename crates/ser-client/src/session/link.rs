@@ -22,7 +22,11 @@ pub(crate) trait Link: Send {
     fn send(&mut self, attempt: &Attempt<'_>) -> Result<(), TransportError>;
 
     /// Waits up to `timeout` and gives the session what arrived, which is so many bytes.
-    fn receive(&mut self, session: &mut Session, timeout: Duration) -> Result<usize, TransportError>;
+    fn receive(
+        &mut self,
+        session: &mut Session,
+        timeout: Duration,
+    ) -> Result<usize, TransportError>;
 
     /// Gives the session what has arrived before now, wherever it waits.
     fn receive_waiting(&mut self, session: &mut Session) -> Result<(), TransportError>;
@@ -63,7 +67,11 @@ impl Link for SerialLink {
         Ok(self.transport.write_all(attempt.frame())?)
     }
 
-    fn receive(&mut self, session: &mut Session, timeout: Duration) -> Result<usize, TransportError> {
+    fn receive(
+        &mut self,
+        session: &mut Session,
+        timeout: Duration,
+    ) -> Result<usize, TransportError> {
         let mut buf = [0; 1024];
         let count = self.transport.read(&mut buf, timeout)?;
         session.process(self.now(), buf.get(..count).unwrap_or_default());

@@ -30,32 +30,32 @@
 //! finds the next request when it is done with an answer, and the line is never silent. Everything
 //! else is one at a time.
 //!
-//! A recorder answers in the order in which it was asked, and a line keeps the order. So an answer that
-//! comes before that to an earlier request shows that the earlier request or its answer was lost,
-//! and it is sent again at once. Answers are [handed out](Session::take_answer) in the order in
-//! which they come. The time for an answer begins when the one before it is there. A request that
-//! is repeated is alone under way.
+//! A recorder answers in the order in which it was asked, and a line keeps the order. So an answer
+//! that comes before that to an earlier request shows that the earlier request or its answer was
+//! lost, and it is sent again at once. Answers are [handed out](Session::take_answer) in the order
+//! in which they come. The time for an answer begins when the one before it is there. A request
+//! that is repeated is alone under way.
 //!
 //! A recorder need not take a request while it answers another one. When one of the first two goes
 //! unanswered, it is [one at a time](Session::is_one_at_a_time) for the rest of the session, and
-//! nothing of this counts as an attempt: to have tried it costs such a recorder one timeout at most. A
-//! recorder that has taken some is forgiven a loss, but not one in five; one that has taken eight
-//! without a loss is tried again after a hundred answers, because then it was the line.
+//! nothing of this counts as an attempt: to have tried it costs such a recorder one timeout at
+//! most. A recorder that has taken some is forgiven a loss, but not one in five; one that has taken
+//! eight without a loss is tried again after a hundred answers, because then it was the line.
 //!
 //! # What is repeated
 //!
 //! Queries, reads, start, stop and settings are sent again when no answer comes. Not so:
 //! - *Erase*: a repeated one could erase events that were recorded in between, unread;
 //! - *Print*: everything would be printed twice;
-//! - *Configure* with a baud rate: the recorder may have changed the rate already, so the repeat would
-//!   be garbage;
+//! - *Configure* with a baud rate: the recorder may have changed the rate already, so the repeat
+//!   would be garbage;
 //! - *Set clock*, unless each attempt gets a time of its own: see [`Session::request_set_clock`].
 //!
 //! # The files
 //!
 //! `request` knows what may be done with each command, `owed` the late answers, and `pace` whether
-//! the recorder takes two reads at once. `text_line`, `unsolicited`, `counters` and `diagnosis` hold
-//! what else the line brings. A `link` is what a session needs of a line or a bus.
+//! the recorder takes two reads at once. `text_line`, `unsolicited`, `counters` and `diagnosis`
+//! hold what else the line brings. A `link` is what a session needs of a line or a bus.
 
 pub(crate) mod counters;
 pub(crate) mod diagnosis;
@@ -209,7 +209,9 @@ impl Session {
         // What is asked again is alone under way.
         let may_be_joined = |request: &Request| request.is_read() && request.failed == 0;
         let room = if self.is_one_at_a_time() { 1 } else { MAX_READS };
-        self.answers.is_empty() && self.requests.len() < room && self.requests.iter().all(may_be_joined)
+        self.answers.is_empty()
+            && self.requests.len() < room
+            && self.requests.iter().all(may_be_joined)
     }
 
     /// Whether no answer is to come or to be taken.
@@ -285,7 +287,8 @@ impl Session {
         let place = self.requests.iter().position(|request| !request.under_way)?;
         // Two only where neither was asked in vain.
         let together = self.requests.iter().take(place + 1);
-        if place > 0 && (self.is_one_at_a_time() || { together }.any(|request| request.failed > 0)) {
+        if place > 0 && (self.is_one_at_a_time() || { together }.any(|request| request.failed > 0))
+        {
             return None;
         }
         let held_back = self.owed.holds_back(&self.requests.get(place)?.command);
@@ -366,7 +369,11 @@ impl Session {
     fn answered(&mut self, now: Duration, place: usize, reply: Reply) {
         let Some(request) = self.requests.remove(place) else { return };
         let end = now.saturating_add(self.timing.attempt(&request.command));
-        self.owed.remember(&request.command, request.sent - 1, if place == 0 { self.deadline } else { end });
+        self.owed.remember(
+            &request.command,
+            request.sent - 1,
+            if place == 0 { self.deadline } else { end },
+        );
         if reply == Reply::PrintAccepted {
             // Nothing but their time tells earlier lines from those that were asked for.
             self.unsolicited.drop_lines();
@@ -395,7 +402,8 @@ impl Session {
             if let Some(mut request) = self.requests.pop_front() {
                 request.ask_again();
                 request.failed += u32::from(!free);
-                let still_under_way = self.requests.iter().take_while(|request| request.under_way).count();
+                let still_under_way =
+                    self.requests.iter().take_while(|request| request.under_way).count();
                 self.requests.insert(still_under_way, request);
             }
         }
@@ -459,7 +467,8 @@ impl Session {
     }
 
     /// Forgets the reports that came before the last answer. Messages come in the order in which
-    /// the recorder sent them, so these tell of a log that has changed since: the answer knows better.
+    /// the recorder sent them, so these tell of a log that has changed since: the answer knows
+    /// better.
     pub fn forget_earlier_reports(&mut self) {
         self.unsolicited.drop_reports_before_mark();
     }

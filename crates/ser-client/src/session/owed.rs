@@ -40,7 +40,11 @@ impl Owed {
     /// one to it.
     pub(super) fn holds_back(&self, command: &Command) -> Option<Duration> {
         let (code, start) = (command.code(), read_start(command));
-        self.0.iter().filter(|late| late.code == code && late.start == start).map(|late| late.until).max()
+        self.0
+            .iter()
+            .filter(|late| late.code == code && late.start == start)
+            .map(|late| late.until)
+            .max()
     }
 
     /// A reply has come that answers no request under way.
@@ -49,7 +53,9 @@ impl Owed {
             Reply::Read(reply) => Some(reply.start),
             _ => None,
         };
-        if let Some(late) = self.0.iter_mut().find(|late| late.code == reply.code() && late.start == start) {
+        if let Some(late) =
+            self.0.iter_mut().find(|late| late.code == reply.code() && late.start == start)
+        {
             late.replies -= 1;
             self.0.retain(|late| late.replies > 0);
         }

@@ -26,7 +26,8 @@ pub(super) struct Pace {
 
 impl Pace {
     /// That of a recorder, or a way to it, for which one request at a time is right.
-    pub(super) const ONE_AT_A_TIME: Pace = Pace { one_at_a_time: true, credit: 0, proven: false, alone: 0 };
+    pub(super) const ONE_AT_A_TIME: Pace =
+        Pace { one_at_a_time: true, credit: 0, proven: false, alone: 0 };
 
     /// Whether there must be no other request under way.
     pub(super) const fn is_one_at_a_time(&self) -> bool {

@@ -29,7 +29,12 @@ pub(super) struct Request {
 
 impl Request {
     /// A request that has not been sent.
-    pub(super) fn new(command: Command, repeat: bool, wants_time: bool, before: Counters) -> Request {
+    pub(super) fn new(
+        command: Command,
+        repeat: bool,
+        wants_time: bool,
+        before: Counters,
+    ) -> Request {
         Request {
             command,
             wants_time,
@@ -116,7 +121,9 @@ impl Attempt<'_> {
 /// Bytes of the longest body that can answer `command`.
 pub(super) fn longest_reply(command: &Command) -> usize {
     match command {
-        Command::Read { count, .. } => Model::Ser320.read_reply_len(usize::from(*count).min(MAX_ENTRIES)),
+        Command::Read { count, .. } => {
+            Model::Ser320.read_reply_len(usize::from(*count).min(MAX_ENTRIES))
+        }
         Command::QueryConfiguration | Command::Configure(_) | Command::LastBroadcast => 7,
         Command::QueryMode | Command::SetMode { .. } => 3,
         // Some recorders echo the parameters of a print command.
@@ -144,9 +151,10 @@ pub(super) const fn changes_something(command: &Command) -> bool {
         | Command::SetClock(_)
         | Command::Configure(_)
         | Command::SetMode { .. } => true,
-        Command::QueryConfiguration | Command::LastBroadcast | Command::QueryMode | Command::Read { .. } => {
-            false
-        }
+        Command::QueryConfiguration
+        | Command::LastBroadcast
+        | Command::QueryMode
+        | Command::Read { .. } => false,
     }
 }
 

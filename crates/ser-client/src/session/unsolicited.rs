@@ -1,7 +1,7 @@
 //! What a recorder says without being asked, in a queue of bounded length.
 //!
-//! The queue knows which messages came before the last answer: reports among them tell of a log that
-//! has changed since.
+//! The queue knows which messages came before the last answer: reports among them tell of a log
+//! that has changed since.
 
 use std::collections::VecDeque;
 

@@ -12,8 +12,8 @@ const GENI_PREFIX: &str = "geni:";
 const NODE: &str = "node";
 const OFFSET: &str = "offset";
 
-/// Where a recorder is reached: `tcp://HOST:PORT`, `geni:FILE?node=N&offset=X`, or the path or name of
-/// a serial port.
+/// Where a recorder is reached: `tcp://HOST:PORT`, `geni:FILE?node=N&offset=X`, or the path or name
+/// of a serial port.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Endpoint {
@@ -112,7 +112,9 @@ impl FromStr for Endpoint {
 fn geni(window: &str) -> Result<Endpoint, EndpointError> {
     let (file, query) = match window.rsplit_once('?') {
         // A file may be called anything.
-        Some((file, query)) if [NODE, OFFSET].iter().any(|key| is_about(query, key)) => (file, query),
+        Some((file, query)) if [NODE, OFFSET].iter().any(|key| is_about(query, key)) => {
+            (file, query)
+        }
         // Unless it is one that is there, and something misspelled after it.
         Some((file, query)) if is_assignment(query) && exists(file) && !exists(window) => {
             return Err(EndpointError::GeniQuery);
@@ -125,8 +127,12 @@ fn geni(window: &str) -> Result<Endpoint, EndpointError> {
     let (mut node, mut offset) = (None, None);
     for part in query.split('&').filter(|part| !part.is_empty()) {
         let given_before = match part.split_once('=') {
-            Some((NODE, text)) => node.replace(node_number(text).ok_or(EndpointError::GeniNode)?).is_some(),
-            Some((OFFSET, text)) => offset.replace(bytes(text).ok_or(EndpointError::GeniOffset)?).is_some(),
+            Some((NODE, text)) => {
+                node.replace(node_number(text).ok_or(EndpointError::GeniNode)?).is_some()
+            }
+            Some((OFFSET, text)) => {
+                offset.replace(bytes(text).ok_or(EndpointError::GeniOffset)?).is_some()
+            }
             _ => true,
         };
         if given_before {
@@ -142,8 +148,9 @@ fn is_about(query: &str, key: &str) -> bool {
 
 /// Whether this looks like `word=value`.
 fn is_assignment(text: &str) -> bool {
-    text.split_once('=')
-        .is_some_and(|(word, _)| !word.is_empty() && word.chars().all(|letter| letter.is_ascii_alphabetic()))
+    text.split_once('=').is_some_and(|(word, _)| {
+        !word.is_empty() && word.chars().all(|letter| letter.is_ascii_alphabetic())
+    })
 }
 
 fn exists(file: &str) -> bool {
@@ -192,12 +199,16 @@ impl fmt::Display for EndpointError {
             EndpointError::GeniFile => {
                 "geni: needs the window of a GENI board, as in geni:/dev/shm/host?node=5"
             }
-            EndpointError::GeniNode => "a recorder's bus address is 0 to 31, as in geni:FILE?node=5",
+            EndpointError::GeniNode => {
+                "a recorder's bus address is 0 to 31, as in \
+             geni:FILE?node=5"
+            }
             EndpointError::GeniOffset => {
                 "an offset is a number of bytes, as in geni:/dev/mem?node=5&offset=0xD0000"
             }
             EndpointError::GeniQuery => {
-                "after the file come node and offset, each once, as in geni:FILE?node=5&offset=0xD0000"
+                "after the file come node and offset, each once, as in \
+                 geni:FILE?node=5&offset=0xD0000"
             }
             EndpointError::UnknownScheme => {
                 "a port is tcp://HOST:PORT or the name of a serial port, as in /dev/ttyUSB0"
@@ -253,7 +264,10 @@ mod tests {
     fn a_misspelled_word_after_a_file_that_is_there_is_no_part_of_its_name() {
         let here = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
         for query in ["nod=5", "Node=5", "nod=5&offset=0"] {
-            assert_eq!(format!("geni:{here}?{query}").parse::<Endpoint>(), Err(EndpointError::GeniQuery));
+            assert_eq!(
+                format!("geni:{here}?{query}").parse::<Endpoint>(),
+                Err(EndpointError::GeniQuery)
+            );
         }
         for name in ["none?nod=5".to_string(), format!("{here}?5"), format!("{here}?=5")] {
             let window = GeniWindow::from(&*name);

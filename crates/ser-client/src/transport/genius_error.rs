@@ -73,20 +73,27 @@ impl GeniusError {
                 "try again in a few seconds; if it persists, reset the board and look at its lamps"
             }
             GeniusError::OffBus => {
-                "check the bus cable and its terminators, the bus rate, and that no other device has this number"
+                "check the bus cable and its terminators, the bus rate, and that no other device \
+                 has this number"
             }
             GeniusError::NotOnBus { .. } => "check number and bus rate on the device's switches",
-            GeniusError::OwnNumber { .. } => "name the number of the recorder, not that of the host",
+            GeniusError::OwnNumber { .. } => {
+                "name the number of the recorder, not that of the host"
+            }
             GeniusError::BoardBusy => "try again; does another program use the same window?",
             GeniusError::Undelivered(_) => {
-                "try again; if it persists, look for errors on the bus: cable, terminators, a number given twice"
+                "try again; if it persists, look for errors on the bus: cable, terminators, a \
+                 number given twice"
             }
             GeniusError::BroadcastFailed(_) => {
-                "try again in a minute: after a start on a large bus the board is busy with itself for so long"
+                "try again in a minute: after a start on a large bus the board is busy with \
+                 itself for so long"
             }
             GeniusError::OddReply { .. } => "does this kind of device know the question?",
             GeniusError::Window(_) => "is the file still there, and as long as it was?",
-            GeniusError::Interrupted => "nothing has been asked of a recorder; give the board some seconds",
+            GeniusError::Interrupted => {
+                "nothing has been asked of a recorder; give the board some seconds"
+            }
         }
     }
 }
@@ -98,13 +105,23 @@ impl fmt::Display for GeniusError {
             GeniusError::BoardFailed(failure) => failure.fmt(f),
             GeniusError::OffBus => f.write_str("the GENI board is not on the bus"),
             GeniusError::NotOnBus { node } => write!(f, "device {node} is not on the bus"),
-            GeniusError::OwnNumber { node } => write!(f, "{node} is the number of this host's own board"),
+            GeniusError::OwnNumber { node } => {
+                write!(f, "{node} is the number of this host's own board")
+            }
             GeniusError::BoardBusy => f.write_str("the GENI board does not deal with the datagram"),
             GeniusError::Undelivered(error) => error.fmt(f),
-            GeniusError::BroadcastFailed(error) => write!(f, "the broadcast did not get out: {error}"),
-            GeniusError::OddReply { node } => write!(f, "the reply of device {node} makes no sense"),
-            GeniusError::Window(kind) => write!(f, "the window of the GENI board cannot be used: {kind}"),
-            GeniusError::Interrupted => f.write_str("interrupted while the GENI board was waited for"),
+            GeniusError::BroadcastFailed(error) => {
+                write!(f, "the broadcast did not get out: {error}")
+            }
+            GeniusError::OddReply { node } => {
+                write!(f, "the reply of device {node} makes no sense")
+            }
+            GeniusError::Window(kind) => {
+                write!(f, "the window of the GENI board cannot be used: {kind}")
+            }
+            GeniusError::Interrupted => {
+                f.write_str("interrupted while the GENI board was waited for")
+            }
         }
     }
 }

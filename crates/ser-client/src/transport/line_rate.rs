@@ -42,7 +42,10 @@ mod tests {
     #[test]
     fn ten_bits_to_a_byte() {
         assert_eq!(LineRate::BitsPerSecond(9600).time_for(96), Duration::from_millis(100));
-        assert_eq!(LineRate::BitsPerSecond(300).time_for(341), Duration::from_nanos(11_366_666_666));
+        assert_eq!(
+            LineRate::BitsPerSecond(300).time_for(341),
+            Duration::from_nanos(11_366_666_666)
+        );
         assert_eq!(LineRate::Instant.time_for(usize::MAX), Duration::ZERO);
         assert_eq!(LineRate::BitsPerSecond(0).time_for(1), Duration::ZERO);
     }

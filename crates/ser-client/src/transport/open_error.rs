@@ -117,12 +117,17 @@ impl OpenError {
             OpenError::NoSuchPort { .. } => {
                 "list the serial ports of this computer; is the adapter plugged in?"
             }
-            OpenError::Busy { .. } => "close the other program that uses the port (terminal, modem manager)",
+            OpenError::Busy { .. } => {
+                "close the other program that uses the port (terminal, modem manager)"
+            }
             OpenError::PermissionDenied { .. } if cfg!(target_os = "linux") => {
-                "add yourself to the group that owns the port (sudo usermod -aG dialout $USER) and log in again"
+                "add yourself to the group that owns the port (sudo usermod -aG dialout $USER) \
+                 and log in again"
             }
             OpenError::PermissionDenied { .. } => "ask for the right to use the port",
-            OpenError::NotSerial { .. } => "name a serial port, as in /dev/ttyUSB0, or tcp://HOST:PORT",
+            OpenError::NotSerial { .. } => {
+                "name a serial port, as in /dev/ttyUSB0, or tcp://HOST:PORT"
+            }
             OpenError::UnsupportedBaud { .. } => {
                 "recorders have 300, 600, 1200, 2400, 4800, 9600 and 19200 baud"
             }
@@ -130,11 +135,16 @@ impl OpenError {
                 "is the terminal server or the simulated recorder running, on this TCP port?"
             }
             OpenError::HostNotFound { .. } => "check the spelling, or give the IP address",
-            OpenError::Unreachable { .. } => "check network and firewall; does the host answer a ping?",
-            OpenError::NoSuchWindow { .. } => {
-                "check the name; is the program that makes the window (ser-cli sim --genius FILE) running?"
+            OpenError::Unreachable { .. } => {
+                "check network and firewall; does the host answer a ping?"
             }
-            OpenError::NotAWindow { .. } => "name the file that this host shares with its GENI board",
+            OpenError::NoSuchWindow { .. } => {
+                "check the name; is the program that makes the window (ser-cli sim --genius \
+                 FILE) running?"
+            }
+            OpenError::NotAWindow { .. } => {
+                "name the file that this host shares with its GENI board"
+            }
             OpenError::NoMemory { .. } => {
                 "name a device for memory, and check the offset of the window in it"
             }
@@ -144,7 +154,9 @@ impl OpenError {
             OpenError::WindowSize { path, .. } if file_name(path).starts_with("resource") => {
                 "a GENI window has 16384 bytes: add where in this memory it begins, as in offset=0"
             }
-            OpenError::WindowSize { .. } => "is this the right file? A GENI window is a file of 16384 bytes",
+            OpenError::WindowSize { .. } => {
+                "is this the right file? A GENI window is a file of 16384 bytes"
+            }
             OpenError::WindowInUse { .. } => "wait until the other program has ended, or end it",
             OpenError::NoNode { .. } => "say which recorder on the bus, as in geni:FILE?node=5",
             OpenError::Genius { error, .. } => error.hint(),
@@ -160,9 +172,13 @@ impl fmt::Display for OpenError {
             OpenError::Busy { path } => write!(f, "serial port {path} is in use"),
             OpenError::PermissionDenied { path } => write!(f, "no permission to open {path}"),
             OpenError::NotSerial { path } => write!(f, "{path} is not a serial port"),
-            OpenError::UnsupportedBaud { path, baud } => write!(f, "{path} does not have {baud} baud"),
+            OpenError::UnsupportedBaud { path, baud } => {
+                write!(f, "{path} does not have {baud} baud")
+            }
             OpenError::Refused { address } => write!(f, "nothing listens at tcp://{address}"),
-            OpenError::HostNotFound { address } => write!(f, "the host of tcp://{address} is not known"),
+            OpenError::HostNotFound { address } => {
+                write!(f, "the host of tcp://{address} is not known")
+            }
             OpenError::Unreachable { address } => write!(f, "tcp://{address} does not answer"),
             OpenError::NoSuchWindow { path } => write!(f, "there is no GENI window {path}"),
             OpenError::NotAWindow { path } => write!(f, "{path} cannot be a GENI window"),
@@ -172,7 +188,9 @@ impl fmt::Display for OpenError {
             OpenError::NoMemory { path, error } => {
                 write!(f, "{path} cannot be a GENI window: it gives no access to memory ({error})")
             }
-            OpenError::WindowDenied { path } => write!(f, "no permission to use the GENI window {path}"),
+            OpenError::WindowDenied { path } => {
+                write!(f, "no permission to use the GENI window {path}")
+            }
             OpenError::WindowInUse { path } => write!(f, "the GENI window {path} is in use"),
             OpenError::NoNode { path } => {
                 write!(f, "{path} is the window to a whole bus, and no recorder on it is named")
@@ -199,7 +217,8 @@ mod tests {
 
     #[test]
     fn nobody_is_led_to_write_into_a_foreign_file() {
-        let hint = |path: &str| OpenError::WindowSize { path: path.to_string(), len: 40_000 }.hint();
+        let hint =
+            |path: &str| OpenError::WindowSize { path: path.to_string(), len: 40_000 }.hint();
         assert!(hint("/sys/bus/pci/devices/0000:01:00.0/resource2").contains("offset=0"));
         for path in ["big", "/home/resource0/big", ""] {
             assert!(hint(path).starts_with("is this the right file?"), "{path}");

@@ -18,7 +18,8 @@ pub struct PortInfo {
 /// Lists the serial ports, sorted by path.
 ///
 /// On Linux the kernel's list of terminals is read. Not in it are pseudo-terminals (a simulated
-/// recorder) and links such as `/dev/serial/by-id/…`; both can be opened by their path all the same.
+/// recorder) and links such as `/dev/serial/by-id/…`; both can be opened by their path all the
+/// same.
 #[must_use]
 pub fn ports() -> Vec<PortInfo> {
     // serialport panics where the kernel's list is missing, as in some containers.
@@ -30,8 +31,10 @@ pub fn ports() -> Vec<PortInfo> {
 
 /// The ports that a system names, in whatever order.
 fn listed(found: Vec<SerialPortInfo>) -> Vec<PortInfo> {
-    let named =
-        |port: SerialPortInfo| PortInfo { path: port.port_name, description: describe(&port.port_type) };
+    let named = |port: SerialPortInfo| PortInfo {
+        path: port.port_name,
+        description: describe(&port.port_type),
+    };
     let mut ports: Vec<PortInfo> = found.into_iter().map(named).collect();
     ports.sort_by(|a, b| a.path.cmp(&b.path));
     ports
@@ -43,7 +46,11 @@ fn describe(port_type: &SerialPortType) -> String {
             let words = [&usb.manufacturer, &usb.product, &usb.serial_number];
             let words: Vec<&str> = words.into_iter().flatten().map(String::as_str).collect();
             let ids = format!("USB {:04x}:{:04x}", usb.vid, usb.pid);
-            if words.is_empty() { ids } else { format!("{} ({ids})", Harmless(words.join(" ")).line()) }
+            if words.is_empty() {
+                ids
+            } else {
+                format!("{} ({ids})", Harmless(words.join(" ")).line())
+            }
         }
         SerialPortType::PciPort => "PCI".to_owned(),
         SerialPortType::BluetoothPort => "Bluetooth".to_owned(),
@@ -66,8 +73,10 @@ mod tests {
 
     #[test]
     fn ports_are_listed_by_path() {
-        let found = [("/dev/ttyUSB0", SerialPortType::Unknown), ("/dev/ttyS1", SerialPortType::PciPort)];
-        let found = found.map(|(name, port_type)| SerialPortInfo { port_name: name.to_owned(), port_type });
+        let found =
+            [("/dev/ttyUSB0", SerialPortType::Unknown), ("/dev/ttyS1", SerialPortType::PciPort)];
+        let found =
+            found.map(|(name, port_type)| SerialPortInfo { port_name: name.to_owned(), port_type });
         let texts: Vec<_> = listed(found.to_vec()).iter().map(PortInfo::to_string).collect();
         assert_eq!(texts, ["/dev/ttyS1  PCI", "/dev/ttyUSB0"]);
     }

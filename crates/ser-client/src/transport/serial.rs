@@ -57,7 +57,10 @@ fn why_not_opened(path: &str, baud: u32, error: &serialport::Error) -> OpenError
         Kind::InvalidInput => OpenError::UnsupportedBaud { path: owned(), baud },
         kind => {
             let kind = if let Kind::Io(kind) = kind { kind } else { ErrorKind::Other };
-            OpenError::Other { name: owned(), error: io::Error::new(kind, error.description.clone()) }
+            OpenError::Other {
+                name: owned(),
+                error: io::Error::new(kind, error.description.clone()),
+            }
         }
     }
 }
@@ -70,7 +73,8 @@ fn exists(path: &str) -> bool {
 fn is_no_terminal(path: &str, error: &serialport::Error) -> bool {
     use std::os::unix::fs::FileTypeExt;
     // The text of ENOTTY is all that serialport leaves of it: /dev/null is a character device, too.
-    let not_a_terminal = error.description.contains("typewriter") || error.description.contains("terminal");
+    let not_a_terminal =
+        error.description.contains("typewriter") || error.description.contains("terminal");
     not_a_terminal || std::fs::metadata(path).is_ok_and(|found| !found.file_type().is_char_device())
 }
 
@@ -83,9 +87,10 @@ fn is_no_terminal(path: &str, _: &serialport::Error) -> bool {
 fn unplugged(error: io::Error) -> io::Error {
     match error.kind() {
         // The kernel's EIO, ENXIO and ENODEV have no kind of their own and arrive as `Other`.
-        ErrorKind::BrokenPipe | ErrorKind::NotFound | ErrorKind::UnexpectedEof | ErrorKind::Other => {
-            io::Error::new(ErrorKind::NotConnected, error)
-        }
+        ErrorKind::BrokenPipe
+        | ErrorKind::NotFound
+        | ErrorKind::UnexpectedEof
+        | ErrorKind::Other => io::Error::new(ErrorKind::NotConnected, error),
         _ => error,
     }
 }

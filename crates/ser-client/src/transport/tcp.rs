@@ -27,8 +27,9 @@ impl TcpTransport {
     /// # Errors
     /// See [`OpenError`].
     pub fn connect(address: &str) -> Result<TcpTransport, OpenError> {
-        let candidates =
-            address.to_socket_addrs().map_err(|_| OpenError::HostNotFound { address: address.to_owned() })?;
+        let candidates = address
+            .to_socket_addrs()
+            .map_err(|_| OpenError::HostNotFound { address: address.to_owned() })?;
         let mut last_error = None;
         for candidate in candidates {
             match TcpStream::connect_timeout(&candidate, CONNECT_TIMEOUT).and_then(prepare) {

@@ -26,13 +26,15 @@ impl TransportError {
     #[must_use]
     pub const fn hint(&self) -> Option<&'static str> {
         match self {
-            TransportError::Unplugged => Some("plug the adapter in again; its name may have changed"),
+            TransportError::Unplugged => {
+                Some("plug the adapter in again; its name may have changed")
+            }
             TransportError::Closed => {
                 Some("is the program or the terminal server at the other end still running?")
             }
-            TransportError::TurnedAway => {
-                Some("perhaps another client has the unit: most terminal servers serve one at a time")
-            }
+            TransportError::TurnedAway => Some(
+                "perhaps another client has the unit: most terminal servers serve one at a time",
+            ),
             TransportError::Genius(error) => Some(error.hint()),
             TransportError::Io(_) => None,
         }

@@ -10,8 +10,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ser_proto::{
-    Baud, Code, Command, Configuration, Configure, LastBroadcast, Mode, Model, ReadReply, Reply, TimeStamp,
-    encoded_len,
+    Baud, Code, Command, Configuration, Configure, LastBroadcast, Mode, Model, ReadReply, Reply,
+    TimeStamp, encoded_len,
 };
 
 use crate::reading::delivery::Delivery;
@@ -53,15 +53,19 @@ impl Unit {
 
     /// A recorder behind a transport whose time is not that of this computer.
     #[must_use]
-    pub fn with_clock(transport: Box<dyn Transport>, options: Options, clock: Arc<dyn Clock>) -> Unit {
+    pub fn with_clock(
+        transport: Box<dyn Transport>,
+        options: Options,
+        clock: Arc<dyn Clock>,
+    ) -> Unit {
         let Options { timeout, retries } = options;
         let line_rate = LineRate::from(transport.bits_per_second());
         let session = Session::new(Timing { timeout, retries, line_rate });
         Unit { link: Box::new(SerialLink::new(transport, clock)), session, last_position: None }
     }
 
-    /// This host's number on the Genius bus, if that is where the recorder is: auto reports can be sent
-    /// there.
+    /// This host's number on the Genius bus, if that is where the recorder is: auto reports can be
+    /// sent there.
     #[must_use]
     pub fn bus_address(&self) -> Option<u8> {
         self.link.bus_address()
@@ -116,14 +120,15 @@ impl Unit {
     /// soon as the reply is there; the command is then sent only once.
     ///
     /// # Errors
-    /// If no reply comes, the recorder refuses the settings, or the line fails or does not have the new
-    /// rate.
+    /// If no reply comes, the recorder refuses the settings, or the line fails or does not have the
+    /// new rate.
     pub fn configure(&mut self, configure: Configure) -> Result<Configuration, RequestError> {
         let Reply::Configuration(in_force) = self.request(&Command::Configure(configure))? else {
             return Err(unexpected(Code::Configure));
         };
         let rate = in_force.baud.bits_per_second();
-        if configure.baud == Some(in_force.baud) && self.link.bits_per_second().is_some_and(|now| now != rate)
+        if configure.baud == Some(in_force.baud)
+            && self.link.bits_per_second().is_some_and(|now| now != rate)
         {
             self.set_baud(rate)?;
             self.listen_for(BAUD_SETTLING)?;
@@ -241,9 +246,9 @@ impl Unit {
         Ok(())
     }
 
-    /// Looks for a recorder that does not answer: asks once at every other rate. `None` if it answers
-    /// at none of them, or the line has no rate. Takes six seconds at most, unless the line is
-    /// noisy. Afterwards the rate is what it was.
+    /// Looks for a recorder that does not answer: asks once at every other rate. `None` if it
+    /// answers at none of them, or the line has no rate. Takes six seconds at most, unless the line
+    /// is noisy. Afterwards the rate is what it was.
     ///
     /// # Errors
     /// If the line fails.
@@ -257,18 +262,22 @@ impl Unit {
         found
     }
 
-    fn first_answering(&mut self, rates: impl Iterator<Item = Baud>) -> Result<Option<Baud>, RequestError> {
+    fn first_answering(
+        &mut self,
+        rates: impl Iterator<Item = Baud>,
+    ) -> Result<Option<Baud>, RequestError> {
         // Every recorder, also an original one, answers a read.
         let question = Command::Read { start: 1, count: 1 };
-        let bytes = encoded_len(question.to_body().len()) + encoded_len(Model::Ser320.read_reply_len(1));
+        let bytes =
+            encoded_len(question.to_body().len()) + encoded_len(Model::Ser320.read_reply_len(1));
         for baud in rates {
             // A port need not have every rate that recorders have.
             if self.set_baud(baud.bits_per_second()).is_err() {
                 continue;
             }
             let line_rate = LineRate::BitsPerSecond(baud.bits_per_second());
-            // A session also waits for the longest message that the recorder may just be sending; at
-            // 300 baud that is too long for a guess.
+            // A session also waits for the longest message that the recorder may just be sending;
+            // at 300 baud that is too long for a guess.
             self.session.set_line_rate(LineRate::Instant);
             self.session.set_patience(SEARCH_TIMEOUT + line_rate.time_for(bytes), 0);
             match self.request(&question) {
@@ -310,9 +319,9 @@ impl Unit {
         self.session.forget_earlier_reports();
     }
 
-    /// Whether reads go one at a time, because the recorder does not take a request while it answers
-    /// another one, or is on a Genius bus. Otherwise there are two under way, and the line is never
-    /// silent.
+    /// Whether reads go one at a time, because the recorder does not take a request while it
+    /// answers another one, or is on a Genius bus. Otherwise there are two under way, and the line
+    /// is never silent.
     #[must_use]
     pub fn reads_one_at_a_time(&self) -> bool {
         self.session.is_one_at_a_time()
@@ -320,7 +329,10 @@ impl Unit {
 
     /// Asks for what `next` gives, as far as there is room for more reads under way, and does not
     /// wait.
-    pub(crate) fn ask(&mut self, next: &mut dyn FnMut() -> Option<ReadRequest>) -> Result<(), RequestError> {
+    pub(crate) fn ask(
+        &mut self,
+        next: &mut dyn FnMut() -> Option<ReadRequest>,
+    ) -> Result<(), RequestError> {
         if !self.session.has_room() {
             return Ok(());
         }

@@ -136,7 +136,8 @@ impl Recorder {
 /// Event number `serial`, different from every other one: the state is its Gray code, so that from
 /// each event to the next one input changes.
 pub(crate) fn event(serial: u32) -> Entry {
-    let time = TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 0 };
+    let time =
+        TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 0 };
     let changed = gray(serial) ^ gray(serial.wrapping_sub(1));
     Entry { changed: Inputs(changed), state: Inputs(gray(serial)), time }
 }

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use ser_client::{Options, Transport, Unit};
 use ser_proto::{
-    Baud, Command, Configuration, Decoded, FrameDecoder, FrameEncoder, LastBroadcast, Mode, ParseError, Reply,
+    Baud, Command, Configuration, Decoded, FrameDecoder, FrameEncoder, LastBroadcast, Mode,
+    ParseError, Reply,
 };
 
 use super::Recorder;
@@ -90,7 +91,9 @@ impl Fake {
                 second: 3,
                 millisecond: 4,
             }))),
-            Command::QueryMode => Some(Reply::Mode(Mode { recording: self.recording, version: 125 })),
+            Command::QueryMode => {
+                Some(Reply::Mode(Mode { recording: self.recording, version: 125 }))
+            }
             Command::SetMode { recording } => {
                 self.recording = recording;
                 Some(Reply::Mode(Mode { recording, version: 125 }))

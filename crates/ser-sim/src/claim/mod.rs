@@ -49,7 +49,8 @@ pub(crate) struct Claim {
 impl Claim {
     /// Claims a name; `in_use` makes the error when another simulator has it.
     pub(crate) fn on(name: &Path, in_use: fn(PathBuf) -> SimError) -> Result<Claim, SimError> {
-        let file_name = record_name(name).map_err(SimError::io(format!("make {}", name.display())))?;
+        let file_name =
+            record_name(name).map_err(SimError::io(format!("make {}", name.display())))?;
         let doing = || format!("note that {} is in use", name.display());
         let folder = record_folder::open()
             .map_err(|tried| SimError::NoRecords(NoRecords { name: name.to_owned(), tried }))?;
@@ -174,10 +175,17 @@ fn lock_record(folder: &File, name: &str) -> io::Result<Option<File>> {
             Err(TryLockError::Error(error)) => return Err(error),
         }
         // Whoever had it may have taken it away between our opening and our locking.
-        let again = openat(folder, name, OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::CLOEXEC, Mode::empty());
+        let again = openat(
+            folder,
+            name,
+            OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::CLOEXEC,
+            Mode::empty(),
+        );
         let still_there = again.is_ok_and(|again| {
             let (record, again) = (record.metadata(), File::from(again).metadata());
-            record.and_then(|record| Ok(Identity::of(&record) == Identity::of(&again?))).unwrap_or(false)
+            record
+                .and_then(|record| Ok(Identity::of(&record) == Identity::of(&again?)))
+                .unwrap_or(false)
         });
         if still_there {
             return Ok(Some(record));
@@ -224,14 +232,19 @@ mod tests {
     #[test]
     fn a_name_that_ends_nowhere_cannot_be_claimed() {
         for name in ["/", "..", "/tmp/..", ""] {
-            assert!(matches!(Claim::on(Path::new(name), SimError::LinkInUse), Err(SimError::Io { .. })));
+            assert!(matches!(
+                Claim::on(Path::new(name), SimError::LinkInUse),
+                Err(SimError::Io { .. })
+            ));
         }
     }
 
     #[test]
     fn a_record_that_is_damaged_makes_nothing_ours() {
         assert_eq!(Identity::parse(b"1 2 3\n"), Some(Identity { device: 1, inode: 2, born_ns: 3 }));
-        for damaged in ["", "\n", "1 2 3", "1 2\n", "1 2 x\n", "-1 2 3\n", "18446744073709551616 2 3\n"] {
+        for damaged in
+            ["", "\n", "1 2 3", "1 2\n", "1 2 x\n", "-1 2 3\n", "18446744073709551616 2 3\n"]
+        {
             assert_eq!(Identity::parse(damaged.as_bytes()), None, "{damaged:?}");
         }
     }

@@ -104,14 +104,16 @@ mod tests {
         let name = format!("ser-sim-{}", geteuid().as_raw());
         fs::write(first.join(&name), "").unwrap();
         let tried = open_in(&[&first, &second]).unwrap_err();
-        let [wanted, fallback] = [first, second].map(|place| place.join(&name).display().to_string());
+        let [wanted, fallback] =
+            [first, second].map(|place| place.join(&name).display().to_string());
         let no_records = NoRecords { name: "/tmp/ser".into(), tried };
         let hints: Vec<_> = no_records.hints().collect();
         assert_eq!(hints, [format!("remove {wanted}, which is no folder")]);
         let told = SimError::NoRecords(no_records).to_string();
         let reason = "No such file or directory (os error 2)";
         let expected = format!(
-            "cannot note that /tmp/ser is in use: {wanted} is no folder; {fallback} cannot be used: {reason}"
+            "cannot note that /tmp/ser is in use: {wanted} is no folder; {fallback} cannot be \
+             used: {reason}"
         );
         assert_eq!(told, expected);
     }
@@ -120,6 +122,8 @@ mod tests {
     fn a_folder_of_somebody_else_has_to_go() {
         let fault = (PathBuf::from("/var/tmp/ser-sim-7"), FolderFault::NotYours);
         let no_records = NoRecords { name: "/tmp/ser".into(), tried: vec![fault] };
-        assert!(no_records.hints().eq(["remove /var/tmp/ser-sim-7, which is not yours".to_owned()]));
+        assert!(
+            no_records.hints().eq(["remove /var/tmp/ser-sim-7, which is not yours".to_owned()])
+        );
     }
 }

@@ -41,8 +41,8 @@ const NAMES: [(u8, &str); 32] = [
 
 /// `(ms, input, closed)`. The first group is the healthy state; the fault comes 100 ms later.
 ///
-/// Mechanical contacts bounce, coils take a cycle or two, and several things happen in the same millisecond:
-/// the order that an operator needs to see is spread over a second and a half.
+/// Mechanical contacts bounce, coils take a cycle or two, and several things happen in the same
+/// millisecond: the order that an operator needs to see is spread over a second and a half.
 const STEPS: &[(u64, u8, bool)] = &[
     // Healthy: breaker and motors in, spring charged, fan running, tie open.
     (0, 7, true),
@@ -74,7 +74,8 @@ const STEPS: &[(u64, u8, bool)] = &[
     (159, 4, false),
     (166, 5, false),
     (167, 6, false),
-    // The bus is dead: contactors drop out each in its own time, the horn sounds, the UPS takes over.
+    // The bus is dead: contactors drop out each in its own time, the horn sounds, the UPS takes
+    // over.
     (183, 19, false),
     (187, 17, false),
     (187, 18, false),
@@ -134,8 +135,8 @@ const STEPS: &[(u64, u8, bool)] = &[
 ];
 
 impl Scenario {
-    /// A breaker trip on 32 inputs: fault, trip, one unsuccessful reclose, lockout and transfer, in a second and
-    /// a half. [`Scenario::names`] says what the inputs stand for.
+    /// A breaker trip on 32 inputs: fault, trip, one unsuccessful reclose, lockout and transfer, in
+    /// a second and a half. [`Scenario::names`] says what the inputs stand for.
     #[must_use]
     pub fn breaker_trip() -> Scenario {
         let steps = STEPS.iter().map(|&(at_ms, input, on)| Step { at_ms, input, on });
@@ -168,6 +169,9 @@ mod tests {
     #[test]
     fn every_input_has_a_name() {
         let names = Scenario::breaker_trip().names();
-        assert_eq!(names.iter().map(|&(input, _)| input).collect::<Vec<_>>(), (1..=32).collect::<Vec<_>>());
+        assert_eq!(
+            names.iter().map(|&(input, _)| input).collect::<Vec<_>>(),
+            (1..=32).collect::<Vec<_>>()
+        );
     }
 }

@@ -8,9 +8,11 @@ use crate::contacts::scenario::Scenario;
 use crate::contacts::scenario_lines::Item;
 use crate::contacts::step::Step;
 
-/// How long a stream's scenario waits for its further lines when they did not come together with the first.
+/// How long a stream's scenario waits for its further lines when they did not come together with
+/// the first.
 ///
-/// Lines that a script writes one by one reach us one by one; without the wait all but the first would be late.
+/// Lines that a script writes one by one reach us one by one; without the wait all but the first
+/// would be late.
 pub const STREAM_LEAD_MS: u64 = 100;
 
 /// Contacts that moved together, and when the node can have seen it.
@@ -24,7 +26,8 @@ pub struct Played {
     pub changed: Inputs,
     /// The contacts that were closed from then on.
     pub state: Inputs,
-    /// The latest sample that cannot have seen it, or the very sample that did: never later than the stamp's tick.
+    /// The latest sample that cannot have seen it, or the very sample that did: never later than
+    /// the stamp's tick.
     pub tick_before: u32,
     /// The first sample known to have seen it: never earlier than the stamp's tick.
     pub tick_after: u32,
@@ -42,7 +45,14 @@ pub(crate) struct Move {
 impl Move {
     pub(crate) fn played(self, tick_before: u32, tick_after: u32) -> Played {
         let (changed, state) = (Inputs(self.changed), Inputs(self.state));
-        Played { start_ms: self.start_ms, at_ms: self.at_ms, changed, state, tick_before, tick_after }
+        Played {
+            start_ms: self.start_ms,
+            at_ms: self.at_ms,
+            changed,
+            state,
+            tick_before,
+            tick_after,
+        }
     }
 }
 
@@ -75,7 +85,8 @@ impl Player {
         self.state
     }
 
-    /// Lays out a scenario from the next millisecond on, or after the ones before it. Says when it begins.
+    /// Lays out a scenario from the next millisecond on, or after the ones before it. Says when it
+    /// begins.
     pub(crate) fn play(&mut self, now_ms: u64, scenario: &Scenario) -> u64 {
         let start_ms = self.free_from_ms.max(now_ms + 1);
         for &step in scenario.steps() {
@@ -84,7 +95,8 @@ impl Player {
         start_ms
     }
 
-    /// Lays out what arrived together on a stream. Says by how much the latest step was late, if one was.
+    /// Lays out what arrived together on a stream. Says by how much the latest step was late, if
+    /// one was.
     pub(crate) fn stream(&mut self, now_ms: u64, items: &[Item]) -> Option<u64> {
         let mut late_ms = None;
         for (index, item) in items.iter().enumerate() {
@@ -98,7 +110,8 @@ impl Player {
                     });
                     self.stream_start_ms = Some(start_ms);
                     let due_ms = self.add(start_ms, step);
-                    late_ms = late_ms.max((now_ms + 1).checked_sub(due_ms).filter(|&late_ms| late_ms > 0));
+                    late_ms = late_ms
+                        .max((now_ms + 1).checked_sub(due_ms).filter(|&late_ms| late_ms > 0));
                 }
             }
         }
@@ -130,9 +143,12 @@ impl Player {
 
     /// What moves at `now_ms`, to be asked once for every opportunity to move contacts.
     ///
-    /// Contacts that are late move at the next opportunity, but never together with those of another millisecond.
+    /// Contacts that are late move at the next opportunity, but never together with those of
+    /// another millisecond.
     pub(crate) fn due(&mut self, now_ms: u64) -> Option<Move> {
-        while let Some(first) = self.waiting.front().copied().filter(|first| first.due_ms() <= now_ms) {
+        while let Some(first) =
+            self.waiting.front().copied().filter(|first| first.due_ms() <= now_ms)
+        {
             let before = self.state;
             while let Some(next) = self.waiting.front().copied() {
                 if (next.start_ms, next.step.at_ms) != (first.start_ms, first.step.at_ms) {
@@ -203,7 +219,10 @@ mod tests {
         assert_eq!(player.play(0, &tap), 1);
         assert_eq!(player.play(0, &tap), 7);
         assert_eq!(player.play(100, &tap), 101);
-        assert_eq!(moves(&mut player, 1, 200), [(1, 1), (6, 0), (7, 1), (12, 0), (101, 1), (106, 0)]);
+        assert_eq!(
+            moves(&mut player, 1, 200),
+            [(1, 1), (6, 0), (7, 1), (12, 0), (101, 1), (106, 0)]
+        );
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! A contact scenario: which field contact opens or closes at which millisecond.
 //!
-//! In a file it is CSV under the header `ms,input,state`: milliseconds from the start, input number from 1, and
-//! 1 for a contact that closes or 0 for one that opens. A file that is wrong anywhere is refused whole, with the
-//! line and the reason, because a typing error here would falsify the test that plays it.
+//! In a file it is CSV under the header `ms,input,state`: milliseconds from the start, input number
+//! from 1, and 1 for a contact that closes or 0 for one that opens. A file that is wrong anywhere
+//! is refused whole, with the line and the reason, because a typing error here would falsify the
+//! test that plays it.
 
 use std::io::{ErrorKind, Read};
 
@@ -37,18 +38,22 @@ impl Scenario {
 
     /// Reads CSV. `name` is what errors call the file.
     ///
-    /// Line ends may be LF or CR LF, a byte order mark and spaces around fields are ignored, and so are lines that
-    /// start with `#` and empty lines at the end. Times may repeat but not decrease, and an input may not be
-    /// named twice in the same millisecond.
+    /// Line ends may be LF or CR LF, a byte order mark and spaces around fields are ignored, and so
+    /// are lines that start with `#` and empty lines at the end. Times may repeat but not decrease,
+    /// and an input may not be named twice in the same millisecond.
     ///
     /// # Errors
     /// The first line that is wrong, or the failure to read.
-    pub fn from_csv(name: &str, reader: impl Read, model: Model) -> Result<Scenario, ScenarioError> {
+    pub fn from_csv(
+        name: &str,
+        reader: impl Read,
+        model: Model,
+    ) -> Result<Scenario, ScenarioError> {
         Scenario::read(ScenarioLines::new(name, model, Scenarios::One), reader)
     }
 
-    /// The same for several nodes on a bus, the first of which is meant where none is named: under the header
-    /// `ms,input,state,node` each line names one.
+    /// The same for several nodes on a bus, the first of which is meant where none is named: under
+    /// the header `ms,input,state,node` each line names one.
     ///
     /// # Errors
     /// As for [`from_csv`](Self::from_csv).

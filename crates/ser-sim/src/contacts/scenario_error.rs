@@ -84,8 +84,12 @@ impl std::error::Error for ScenarioError {}
 impl fmt::Display for ScenarioFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            ScenarioFault::NoHeader => write!(f, "the first line must be the header ms,input,state"),
-            ScenarioFault::Columns(1) => write!(f, "1 field where three are needed (ms,input,state)"),
+            ScenarioFault::NoHeader => {
+                write!(f, "the first line must be the header ms,input,state")
+            }
+            ScenarioFault::Columns(1) => {
+                write!(f, "1 field where three are needed (ms,input,state)")
+            }
             ScenarioFault::Columns(count) => {
                 write!(f, "{count} fields where three are needed (ms,input,state)")
             }
@@ -93,11 +97,17 @@ impl fmt::Display for ScenarioFault {
                 let plural = if *count == 1 { "" } else { "s" };
                 write!(f, "{count} field{plural} where four are needed (ms,input,state,node)")
             }
-            ScenarioFault::NoBus => write!(f, "only a Genius bus has nodes: leave the fourth column out"),
+            ScenarioFault::NoBus => {
+                write!(f, "only a Genius bus has nodes: leave the fourth column out")
+            }
             ScenarioFault::NotANode(text) => write!(f, "{text:?} is no node number"),
             ScenarioFault::NoSuchNode { node } => write!(f, "there is no node {node} on the bus"),
             ScenarioFault::NotATime(text) => {
-                write!(f, "{text:?} is no time: whole milliseconds from 0 to {} are needed", u32::MAX)
+                write!(
+                    f,
+                    "{text:?} is no time: whole milliseconds from 0 to {} are needed",
+                    u32::MAX
+                )
             }
             ScenarioFault::NotAnInput(text) => write!(f, "{text:?} is no input number"),
             ScenarioFault::NoSuchInput { input, inputs } => {
@@ -109,7 +119,9 @@ impl fmt::Display for ScenarioFault {
             ScenarioFault::TimeDecreases { at_ms, previous_ms } => {
                 write!(f, "{at_ms} ms comes after {previous_ms} ms: times must not decrease")
             }
-            ScenarioFault::Twice { input, at_ms } => write!(f, "input {input} moves twice at {at_ms} ms"),
+            ScenarioFault::Twice { input, at_ms } => {
+                write!(f, "input {input} moves twice at {at_ms} ms")
+            }
             ScenarioFault::EmptyLine => write!(f, "empty line inside the scenario"),
             ScenarioFault::LineTooLong => write!(f, "the line is too long"),
             ScenarioFault::NotText => write!(f, "the line is not UTF-8 text"),

@@ -1,7 +1,7 @@
 //! The lines of contact scenarios, taken from bytes as they come.
 //!
-//! A file holds one scenario. A stream holds any number: an empty line ends one, and the next starts its
-//! milliseconds afresh.
+//! A file holds one scenario. A stream holds any number: an empty line ends one, and the next
+//! starts its milliseconds afresh.
 
 use std::collections::BTreeMap;
 use std::mem;
@@ -91,7 +91,11 @@ impl ScenarioLines {
     }
 
     /// Takes bytes and adds what the lines completed by them say.
-    pub(crate) fn push(&mut self, bytes: &[u8], items: &mut Vec<Item>) -> Result<(), ScenarioError> {
+    pub(crate) fn push(
+        &mut self,
+        bytes: &[u8],
+        items: &mut Vec<Item>,
+    ) -> Result<(), ScenarioError> {
         for &byte in bytes {
             if byte == b'\n' {
                 self.end_line(items)?;
@@ -119,7 +123,8 @@ impl ScenarioLines {
     fn end_line(&mut self, items: &mut Vec<Item>) -> Result<(), ScenarioError> {
         let gathered = mem::take(&mut self.gathered);
         let text = str::from_utf8(&gathered).map_err(|_| self.fault(ScenarioFault::NotText))?;
-        let text = if self.line == 1 { text.strip_prefix('\u{FEFF}').unwrap_or(text) } else { text };
+        let text =
+            if self.line == 1 { text.strip_prefix('\u{FEFF}').unwrap_or(text) } else { text };
         let item = self.line(text.trim()).map_err(|reason| self.fault(reason))?;
         items.extend(item);
         self.line += 1;
@@ -135,7 +140,9 @@ impl ScenarioLines {
         }
         let fields: Vec<&str> = text.split(',').map(str::trim).collect();
         match self.expects {
-            Expects::Header | Expects::HeaderOrStep if fields == HEADER || fields == HEADER_ON_BUS => {
+            Expects::Header | Expects::HeaderOrStep
+                if fields == HEADER || fields == HEADER_ON_BUS =>
+            {
                 self.names_nodes = fields.len() == HEADER_ON_BUS.len();
                 if self.names_nodes && self.nodes.is_empty() {
                     return Err(ScenarioFault::NoBus);
@@ -183,7 +190,12 @@ impl ScenarioLines {
         found.copied().ok_or(ScenarioFault::NoSuchNode { node: number })
     }
 
-    fn step(&mut self, fields: [&str; 3], node: Option<u8>, model: Model) -> Result<Step, ScenarioFault> {
+    fn step(
+        &mut self,
+        fields: [&str; 3],
+        node: Option<u8>,
+        model: Model,
+    ) -> Result<Step, ScenarioFault> {
         let [at_ms, input, state] = fields;
         let at_ms = number(at_ms)
             .filter(|&at_ms| at_ms <= u64::from(u32::MAX))
@@ -250,8 +262,8 @@ mod tests {
 
     #[test]
     fn windows_line_ends_byte_order_mark_comments_spaces_and_empty_lines_at_the_end_are_fine() {
-        let csv =
-            "\u{FEFF}# breaker 52\r\nms, input, state\r\n 5 , 2 , 1 \r\n# reclose\r\n9,2,0\r\n\r\n\n# end\n";
+        let csv = "\u{FEFF}# breaker 52\r\nms, input, state\r\n 5 , 2 , 1 \r\n# \
+         reclose\r\n9,2,0\r\n\r\n\n# end\n";
         assert_eq!(read(csv).unwrap().steps(), [step(5, 2, true), step(9, 2, false)]);
         assert_eq!(read("ms,input,state\n7,3,1").unwrap().steps(), [step(7, 3, true)]);
         assert_eq!(read("ms,input,state\n").unwrap().steps(), []);
@@ -272,7 +284,10 @@ mod tests {
         assert_eq!(scenario.for_node(5, true).steps(), [step(0, 1, true)]);
         assert_eq!(scenario.for_node(9, false).steps(), []);
         for (csv, expected) in [
-            ("ms,input,state,node\n0,1,1\n", "line 2: 3 fields where four are needed (ms,input,state,node)"),
+            (
+                "ms,input,state,node\n0,1,1\n",
+                "line 2: 3 fields where four are needed (ms,input,state,node)",
+            ),
             ("ms,input,state,node\n0,1,1,x\n", "line 2: \"x\" is no node number"),
             ("ms,input,state,node\n0,1,1,6\n", "line 2: there is no node 6 on the bus"),
             (
@@ -296,27 +311,51 @@ mod tests {
             ("0,1,1\n", "line 1: the first line must be the header ms,input,state"),
             ("ms,input\n", "line 1: the first line must be the header ms,input,state"),
             ("ms,input,state,name\n", "line 1: the first line must be the header ms,input,state"),
-            ("ms,input,state\n0,1,1\n0,1\n", "line 3: 2 fields where three are needed (ms,input,state)"),
+            (
+                "ms,input,state\n0,1,1\n0,1\n",
+                "line 3: 2 fields where three are needed (ms,input,state)",
+            ),
             ("ms,input,state\n0\n", "line 2: 1 field where three are needed (ms,input,state)"),
-            ("ms,input,state\n0,1,1,x\n", "line 2: 4 fields where three are needed (ms,input,state)"),
-            ("ms,input,state\n1.5,1,1\n", "\"1.5\" is no time: whole milliseconds from 0 to 4294967295 are"),
+            (
+                "ms,input,state\n0,1,1,x\n",
+                "line 2: 4 fields where three are needed (ms,input,state)",
+            ),
+            (
+                "ms,input,state\n1.5,1,1\n",
+                "\"1.5\" is no time: whole milliseconds from 0 to 4294967295 are",
+            ),
             ("ms,input,state\n-1,1,1\n", "line 2: \"-1\" is no time"),
             ("ms,input,state\n+1,1,1\n", "line 2: \"+1\" is no time"),
             ("ms,input,state\n,1,1\n", "line 2: \"\" is no time"),
             ("ms,input,state\n4294967296,1,1\n", "line 2: \"4294967296\" is no time"),
             ("ms,input,state\n0,a,1\n", "line 2: \"a\" is no input number"),
-            ("ms,input,state\n0,0,1\n", "line 2: there is no input 0: this model has inputs 1 to 16"),
-            ("ms,input,state\n0,17,1\n", "line 2: there is no input 17: this model has inputs 1 to 16"),
+            (
+                "ms,input,state\n0,0,1\n",
+                "line 2: there is no input 0: this model has inputs 1 to 16",
+            ),
+            (
+                "ms,input,state\n0,17,1\n",
+                "line 2: there is no input 17: this model has inputs 1 to 16",
+            ),
             ("ms,input,state\n0,257,1\n", "line 2: there is no input 257"),
-            ("ms,input,state\n0,1,2\n", "line 2: \"2\" is no state: 1 (closed) or 0 (open) is needed"),
+            (
+                "ms,input,state\n0,1,2\n",
+                "line 2: \"2\" is no state: 1 (closed) or 0 (open) is needed",
+            ),
             ("ms,input,state\n0,1,on\n", "line 2: \"on\" is no state"),
-            ("ms,input,state\n9,1,1\n8,2,1\n", "line 3: 8 ms comes after 9 ms: times must not decrease"),
+            (
+                "ms,input,state\n9,1,1\n8,2,1\n",
+                "line 3: 8 ms comes after 9 ms: times must not decrease",
+            ),
             ("ms,input,state\n9,1,1\n9,2,1\n9,1,0\n", "line 4: input 1 moves twice at 9 ms"),
             ("ms,input,state\n9,1,1\n\n10,1,0\n", "line 4: empty line inside the scenario"),
             (&long, "line 3: the line is too long"),
         ] {
             let words = refusal(csv);
-            assert!(words.starts_with("trip.csv, ") && words.contains(expected), "{csv:?}: {words}");
+            assert!(
+                words.starts_with("trip.csv, ") && words.contains(expected),
+                "{csv:?}: {words}"
+            );
         }
     }
 
@@ -371,7 +410,10 @@ mod tests {
 
     #[test]
     fn a_header_inside_a_scenario_is_refused() {
-        assert!(refusal("ms,input,state\n0,1,1\nms,input,state\n").contains("line 3: \"ms\" is no time"));
+        assert!(
+            refusal("ms,input,state\n0,1,1\nms,input,state\n")
+                .contains("line 3: \"ms\" is no time")
+        );
     }
 
     proptest! {

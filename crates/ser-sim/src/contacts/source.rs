@@ -22,8 +22,9 @@ pub enum Contacts {
     None,
     /// A scenario, as soon as the node answers.
     Scenario(Scenario),
-    /// Scenarios that arrive while the node runs, with an empty line after each. Milliseconds count from the
-    /// arrival of the scenario's first line, or from the end of the scenario before if that is later.
+    /// Scenarios that arrive while the node runs, with an empty line after each. Milliseconds count
+    /// from the arrival of the scenario's first line, or from the end of the scenario before if
+    /// that is later.
     Stream {
         /// What errors call the source.
         name: String,
@@ -33,13 +34,18 @@ pub enum Contacts {
 }
 
 impl Contacts {
-    /// Contacts from a path as a user gives it: `-` is standard input, anything else a file with one scenario.
+    /// Contacts from a path as a user gives it: `-` is standard input, anything else a file with
+    /// one scenario.
     ///
     /// # Errors
-    /// When the file cannot be opened or is wrong. What is wrong on standard input shows as it arrives.
+    /// When the file cannot be opened or is wrong. What is wrong on standard input shows as it
+    /// arrives.
     pub fn from_path(path: &Path, model: Model) -> Result<Contacts, SimError> {
         if path == Path::new("-") {
-            return Ok(Contacts::Stream { name: "standard input".to_owned(), source: Box::new(io::stdin()) });
+            return Ok(Contacts::Stream {
+                name: "standard input".to_owned(),
+                source: Box::new(io::stdin()),
+            });
         }
         let name = path.display().to_string();
         let file = File::open(path).map_err(SimError::io(format!("open {name}")))?;
@@ -75,8 +81,8 @@ impl fmt::Debug for Contacts {
     }
 }
 
-/// What one read from a stream brought: lines that were written together stay together, so they all keep their
-/// milliseconds however long it takes until they are looked at.
+/// What one read from a stream brought: lines that were written together stay together, so they all
+/// keep their milliseconds however long it takes until they are looked at.
 pub(crate) type Arrived = Result<Vec<Item>, ScenarioError>;
 
 /// How many reads from a stream may wait to be taken.
@@ -97,7 +103,11 @@ pub(crate) fn read_stream(
     receiver
 }
 
-fn forward(mut lines: ScenarioLines, mut source: Box<dyn Read + Send>, sender: &SyncSender<Arrived>) {
+fn forward(
+    mut lines: ScenarioLines,
+    mut source: Box<dyn Read + Send>,
+    sender: &SyncSender<Arrived>,
+) {
     let mut chunk = [0; 65_536];
     loop {
         let mut items = Vec::new();

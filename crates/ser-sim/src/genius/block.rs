@@ -67,8 +67,8 @@ impl DiscreteBlock {
         self.station.inputs.copy_from_slice(&inputs.to_le_bytes()[..len]);
     }
 
-    /// What the block puts out; circuit 1 is bit 0. All off when no controller has sent outputs for three
-    /// scans.
+    /// What the block puts out; circuit 1 is bit 0. All off when no controller has sent outputs for
+    /// three scans.
     #[must_use]
     pub fn outputs(&self) -> u32 {
         self.station.outputs.iter().rev().fold(0, |outputs, &byte| outputs << 8 | u32::from(byte))

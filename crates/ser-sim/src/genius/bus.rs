@@ -53,8 +53,9 @@ pub struct Traffic {
 
 /// A bus and what is connected to it.
 ///
-/// A *bus scan* here is the token's way from the lowest device number round to the lowest again; in it there
-/// is room for one datagram of normal priority. Devices with low numbers thus have the first chance.
+/// A *bus scan* here is the token's way from the lowest device number round to the lowest again; in
+/// it there is room for one datagram of normal priority. Devices with low numbers thus have the
+/// first chance.
 pub struct Bus {
     rate: BusTiming,
     now_us: u64,
@@ -111,7 +112,11 @@ impl Bus {
     pub fn connect<T: Device>(&mut self, mut device: T) -> Handle<T> {
         device.connect(self.now_us);
         let id = DeviceId(self.connected.len());
-        self.connected.push(Connected { device: Box::new(device), disconnected_until_us: 0, deaf_for: 0 });
+        self.connected.push(Connected {
+            device: Box::new(device),
+            disconnected_until_us: 0,
+            deaf_for: 0,
+        });
         self.wake();
         Handle { id, device: PhantomData }
     }
@@ -215,8 +220,13 @@ impl Bus {
         self.advance_to(self.now_us.saturating_add(us));
     }
 
-    /// Lets time pass, event by event, until the condition holds; says whether it did within `limit_us`.
-    pub fn advance_until(&mut self, limit_us: u64, mut condition: impl FnMut(&Bus) -> bool) -> bool {
+    /// Lets time pass, event by event, until the condition holds; says whether it did within
+    /// `limit_us`.
+    pub fn advance_until(
+        &mut self,
+        limit_us: u64,
+        mut condition: impl FnMut(&Bus) -> bool,
+    ) -> bool {
         let end_us = self.now_us.saturating_add(limit_us);
         loop {
             if condition(self) {
@@ -233,7 +243,8 @@ impl Bus {
     /// Everything that is due at `now_us`.
     fn pass(&mut self, now_us: u64) {
         self.now_us = now_us;
-        while let Some(entry) = self.scheduled.first_entry().filter(|entry| *entry.key() <= now_us) {
+        while let Some(entry) = self.scheduled.first_entry().filter(|entry| *entry.key() <= now_us)
+        {
             for fault in entry.remove() {
                 self.inject(fault);
             }
@@ -301,8 +312,9 @@ impl Bus {
     }
 
     fn begin_turn(&mut self, address: u8, at_ns: u64) {
-        let talkers: Vec<usize> =
-            (0..self.connected.len()).filter(|&index| self.address_of(index) == Some(address)).collect();
+        let talkers: Vec<usize> = (0..self.connected.len())
+            .filter(|&index| self.address_of(index) == Some(address))
+            .collect();
         let (now_us, background_free) = (self.now_us, self.background_free);
         let mut messages = Vec::new();
         let mut duration_ns = 0;
@@ -333,7 +345,8 @@ impl Bus {
             }
             return;
         };
-        // Who was cut off, or stopped, in the middle of its turn has said nothing that anyone can read.
+        // Who was cut off, or stopped, in the middle of its turn has said nothing that anyone can
+        // read.
         let address = self.address_of(talker);
         let arrived: Vec<bool> = messages
             .iter()
@@ -382,7 +395,8 @@ impl Bus {
     /// The number on which a device takes turns; none when it cannot be heard.
     fn address_of(&self, index: usize) -> Option<u8> {
         let connected = &self.connected[index];
-        let heard = connected.disconnected_until_us <= self.now_us && connected.device.rate() == self.rate;
+        let heard =
+            connected.disconnected_until_us <= self.now_us && connected.device.rate() == self.rate;
         connected.device.address().filter(|&address| heard && address < ADDRESSES)
     }
 }

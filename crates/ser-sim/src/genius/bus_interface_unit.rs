@@ -1,5 +1,5 @@
-//! A bus interface unit (BIU): a station of modules behind one device number, some of whose points may be
-//! forced.
+//! A bus interface unit (BIU): a station of modules behind one device number, some of whose points
+//! may be forced.
 
 use super::datagram::{Datagram, subfunction};
 use super::device::{Device, Message};
@@ -10,7 +10,8 @@ use super::station::Station;
 
 const MODEL: u8 = 160;
 
-/// How much data a unit has in one direction: a byte per 8 discrete points, then a word per analog channel.
+/// How much data a unit has in one direction: a byte per 8 discrete points, then a word per analog
+/// channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StationData {
     /// Bytes of discrete points.
@@ -56,7 +57,11 @@ impl Forces {
     /// What the points are when these are their natural values.
     fn applied_to(&self, natural: &[u8]) -> Vec<u8> {
         let masks = self.enabled.iter().zip(&self.values);
-        natural.iter().zip(masks).map(|(&byte, (&mask, &value))| byte & !mask | value & mask).collect()
+        natural
+            .iter()
+            .zip(masks)
+            .map(|(&byte, (&mask, &value))| byte & !mask | value & mask)
+            .collect()
     }
 }
 
@@ -75,8 +80,16 @@ impl BusInterfaceUnit {
     /// # Panics
     /// When there is more data than that.
     #[must_use]
-    pub fn new(number: u8, rate: BusTiming, inputs: StationData, outputs: StationData) -> BusInterfaceUnit {
-        assert!(inputs.len() <= 128 && outputs.len() <= 128, "a device has at most 128 bytes each way");
+    pub fn new(
+        number: u8,
+        rate: BusTiming,
+        inputs: StationData,
+        outputs: StationData,
+    ) -> BusInterfaceUnit {
+        assert!(
+            inputs.len() <= 128 && outputs.len() <= 128,
+            "a device has at most 128 bytes each way"
+        );
         let kind = match (inputs.is_empty(), outputs.is_empty()) {
             (true, true) => BlockKind::Neither,
             (false, true) => BlockKind::Inputs,
@@ -114,7 +127,8 @@ impl BusInterfaceUnit {
         self.output_forces.applied_to(&self.station.outputs)
     }
 
-    /// Forces a discrete point, numbered from 0, or lets it go. A point that does not exist is left alone.
+    /// Forces a discrete point, numbered from 0, or lets it go. A point that does not exist is left
+    /// alone.
     pub fn force_point(&mut self, side: Side, point: usize, force: Option<bool>) {
         let (data, forces) = self.side(side);
         if point < 8 * data.discrete_bytes {
@@ -124,7 +138,8 @@ impl BusInterfaceUnit {
         }
     }
 
-    /// Forces an analog channel, numbered from 0, or lets it go. A channel that does not exist is left alone.
+    /// Forces an analog channel, numbered from 0, or lets it go. A channel that does not exist is
+    /// left alone.
     pub fn force_channel(&mut self, side: Side, channel: usize, force: Option<u16>) {
         let (data, forces) = self.side(side);
         if channel < data.channels {
@@ -190,7 +205,8 @@ impl Device for BusInterfaceUnit {
     fn receive(&mut self, _now_us: u64, from: u8, message: &Message) -> bool {
         let forced = self.is_forced();
         let (inputs, outputs) = (&self.input_forces, &self.output_forces);
-        self.station.receive(from, message, forced, |datagram| read_forces(inputs, outputs, datagram))
+        self.station
+            .receive(from, message, forced, |datagram| read_forces(inputs, outputs, datagram))
     }
 
     fn suffer(&mut self, _now_us: u64, fault: DeviceFault) {

@@ -9,8 +9,8 @@ use super::scan_time::BusTiming;
 /// Something a device says on its turn.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Message {
-    /// Inputs of a block, or global data of a controller, to everyone. Every turn ends with it, even if it is
-    /// empty: it passes the token, and shows that the device is there.
+    /// Inputs of a block, or global data of a controller, to everyone. Every turn ends with it,
+    /// even if it is empty: it passes the token, and shows that the device is there.
     Control(Vec<u8>),
     /// Outputs for a block, or directed control data for a controller.
     Directed {
@@ -55,7 +55,9 @@ impl Message {
     #[must_use]
     pub fn duration_ns(&self, rate: BusTiming) -> u64 {
         match self {
-            Message::Control(data) | Message::Directed { data, .. } => rate.byte_ns() * data.len() as u64,
+            Message::Control(data) | Message::Directed { data, .. } => {
+                rate.byte_ns() * data.len() as u64
+            }
             Message::AssignController { .. } => rate.datagram_ns(0),
             Message::Datagram { datagram, .. } => rate.datagram_ns(datagram.data.len()),
         }
@@ -81,12 +83,12 @@ pub trait Device: Any + Send {
     /// Lets time pass; does what was due meanwhile, and what is due now.
     fn advance_to(&mut self, now_us: u64);
 
-    /// Its turn: what it says, ending with [`Message::Control`]. `background_free` says whether nobody has
-    /// sent a datagram in this scan.
+    /// Its turn: what it says, ending with [`Message::Control`]. `background_free` says whether
+    /// nobody has sent a datagram in this scan.
     fn take_turn(&mut self, now_us: u64, background_free: bool) -> Vec<Message>;
 
-    /// The turn is over; `arrived` says for each message whether its receiver acknowledged it, and is true
-    /// for those to all.
+    /// The turn is over; `arrived` says for each message whether its receiver acknowledged it, and
+    /// is true for those to all.
     fn end_turn(&mut self, now_us: u64, messages: &[Message], arrived: &[bool]);
 
     /// Another device took its turn at the same time.

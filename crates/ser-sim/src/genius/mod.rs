@@ -1,9 +1,10 @@
-//! Genius: a model of the GENI board, of the bus it sits on, and of other devices there, in virtual time.
+//! Genius: a model of the GENI board, of the bus it sits on, and of other devices there, in virtual
+//! time.
 //!
 //! A [`Bus`] knows no time but the one it is told with [`Bus::advance_to`], and says with
 //! [`Bus::next_due_us`] when something happens next. What is connected to it implements [`Device`]:
-//! [`Board`]s, [`DiscreteBlock`]s and
-//! [`BusInterfaceUnit`]s. A host works with its board through the shared RAM alone:
+//! [`Board`]s, [`DiscreteBlock`]s and [`BusInterfaceUnit`]s. A host works with its board through
+//! the shared RAM alone:
 //!
 //! ```
 //! use ser_sim::genius::{Board, BoardOptions, Bus, BusTiming};
@@ -15,9 +16,9 @@
 //! assert_eq!(bus.get_mut(board).host_read(0x0893), 1);
 //! ```
 //!
-//! The manual meant throughout is that of the GENI board, GFK-0073. Nothing in here shares code with the
-//! driver for the board, so that a misreading on one side shows on the other; [`BoardWindow`] lets the driver
-//! reach the board's shared RAM.
+//! The manual meant throughout is that of the GENI board, GFK-0073. Nothing in here shares code
+//! with the driver for the board, so that a misreading on one side shows on the other;
+//! [`BoardWindow`] lets the driver reach the board's shared RAM.
 
 mod block;
 mod board;

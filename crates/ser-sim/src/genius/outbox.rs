@@ -28,9 +28,11 @@ impl<T> Outbox<T> {
         self.waiting.len()
     }
 
-    /// The message for this turn: at most one, and one of normal priority only when the scan has had none.
+    /// The message for this turn: at most one, and one of normal priority only when the scan has
+    /// had none.
     pub(super) fn take(&mut self, background_free: bool) -> Option<Message> {
-        let high = self.waiting.iter().position(|(priority, ..)| *priority == MessagePriority::High);
+        let high =
+            self.waiting.iter().position(|(priority, ..)| *priority == MessagePriority::High);
         let index = high.or((background_free && !self.waiting.is_empty()).then_some(0))?;
         let (_, message, reason) = self.waiting.remove(index)?;
         self.sending = Some(reason);

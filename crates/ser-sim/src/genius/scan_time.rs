@@ -1,7 +1,7 @@
 //! How long things take on a Genius bus.
 //!
-//! The published tables give what one station adds to a bus scan: a fixed part and a part per data byte. Both
-//! are in nanoseconds here because half microseconds occur.
+//! The published tables give what one station adds to a bus scan: a fixed part and a part per data
+//! byte. Both are in nanoseconds here because half microseconds occur.
 
 /// The four speeds of a bus. All devices on it must be set to the same one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -20,8 +20,8 @@ pub enum BusTiming {
 /// No scan is shorter: bus controllers wait for the rest of it.
 pub const MIN_SCAN_NS: u64 = 3_000_000;
 
-/// Control characters, addresses and check characters around a datagram's data. Not published; it only
-/// matters for how long a scan with a datagram takes.
+/// Control characters, addresses and check characters around a datagram's data. Not published; it
+/// only matters for how long a scan with a datagram takes.
 const DATAGRAM_CHARACTERS: u64 = 9;
 
 impl BusTiming {

@@ -1,5 +1,5 @@
-//! What all devices that are not controllers have in common: inputs to broadcast, outputs to take, and a few
-//! datagrams to answer.
+//! What all devices that are not controllers have in common: inputs to broadcast, outputs to take,
+//! and a few datagrams to answer.
 
 use std::collections::BTreeSet;
 
@@ -122,7 +122,8 @@ impl Station {
 
     /// Tells its controllers that it was configured anew.
     ///
-    /// The content of that datagram is not published; the device says what it would say to a Read ID.
+    /// The content of that datagram is not published; the device says what it would say to a Read
+    /// ID.
     pub(super) fn report_configuration(&mut self, forced: bool) {
         let identity = self.identity(forced).to_bytes();
         for to in self.controllers.clone() {

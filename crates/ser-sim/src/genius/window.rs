@@ -11,8 +11,8 @@ use super::bus::{Bus, Handle};
 
 /// The tick, in milliseconds, that an interrupt reads in this microsecond.
 ///
-/// It is that of the latest sample, as in the firmware, and not of the next: a sample is taken at the
-/// beginning of its millisecond, so all samples with a later tick were taken later.
+/// It is that of the latest sample, as in the firmware, and not of the next: a sample is taken at
+/// the beginning of its millisecond, so all samples with a later tick were taken later.
 #[must_use]
 pub const fn tick_ms(at_us: u64) -> u64 {
     at_us / 1000

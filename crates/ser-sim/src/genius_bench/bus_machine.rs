@@ -40,7 +40,8 @@ pub(crate) struct BusMachine<'a> {
 }
 
 impl<'a> BusMachine<'a> {
-    /// Returns when the host's board has logged all recorders in, or should have. False when it was cut short.
+    /// Returns when the host's board has logged all recorders in, or should have. False when it was
+    /// cut short.
     pub(crate) fn come_up(&mut self, stop: &AtomicBool) -> Result<bool, SimError> {
         let cut_short = if self.built_in_nodes().count() == self.recorders.len() {
             self.run_ahead(stop)
@@ -56,8 +57,8 @@ impl<'a> BusMachine<'a> {
         Ok(true)
     }
 
-    /// Lets time run ahead of real time, so that nobody has to wait for self-tests, and for boards that ask each other
-    /// who they are. True when it was cut short.
+    /// Lets time run ahead of real time, so that nobody has to wait for self-tests, and for boards
+    /// that ask each other who they are. True when it was cut short.
     fn run_ahead(&mut self, stop: &AtomicBool) -> bool {
         let until = Instant::now() + LOG_IN_PATIENCE;
         while !self.all_logged_in() && Instant::now() < until {
@@ -83,7 +84,10 @@ impl<'a> BusMachine<'a> {
                 up &= recorder.is_up()?;
             }
             self.advance()?;
-            if up && (self.all_logged_in() || *log_in_by.get_or_insert_with(patience_ends) < Instant::now()) {
+            if up
+                && (self.all_logged_in()
+                    || *log_in_by.get_or_insert_with(patience_ends) < Instant::now())
+            {
                 return Ok(false);
             }
             self.recorders.iter().for_each(Recorder::pause);
@@ -97,7 +101,8 @@ impl<'a> BusMachine<'a> {
         }
     }
 
-    /// What ran ahead are also the recorders' clocks: they are set, as one would do it on their serial lines.
+    /// What ran ahead are also the recorders' clocks: they are set, as one would do it on their
+    /// serial lines.
     fn set_clocks(&mut self) {
         let Ok(now) = TimeStamp::try_from(Local::now().naive_local()) else { return };
         let command: Vec<u8> = FrameEncoder::new(Command::SetClock(now).to_body()).collect();
@@ -145,7 +150,8 @@ impl<'a> BusMachine<'a> {
         if items.iter().any(|item| *item != Item::End) {
             let complete = items.contains(&Item::End);
             let lead_ms = if complete { 1 } else { STREAM_LEAD_MS };
-            let start_ms = *self.stream_start_ms.get_or_insert(free_from_ms.max(*self.now_ms + lead_ms));
+            let start_ms =
+                *self.stream_start_ms.get_or_insert(free_from_ms.max(*self.now_ms + lead_ms));
             for recorder in &mut self.recorders {
                 recorder.player_mut().begin_stream(start_ms);
             }
@@ -236,18 +242,26 @@ impl Machine for BusMachine<'_> {
     }
 
     fn take_lateness_ms(&mut self) -> u64 {
-        self.recorders.iter_mut().map(|recorder| recorder.unit_mut().take_lateness_ms()).max().unwrap_or(0)
+        self.recorders
+            .iter_mut()
+            .map(|recorder| recorder.unit_mut().take_lateness_ms())
+            .max()
+            .unwrap_or(0)
     }
 
     fn bus_ports(&self) -> Vec<String> {
         let window = self.window.path().display();
-        self.recorders.iter().map(|recorder| format!("geni:{window}?node={}", recorder.number())).collect()
+        self.recorders
+            .iter()
+            .map(|recorder| format!("geni:{window}?node={}", recorder.number()))
+            .collect()
     }
 
     fn take_complaints(&mut self) -> Vec<String> {
         let by_host = as_seen_from_afar(self.bus.get_mut(self.host).take_new_violations());
-        let by_host =
-            by_host.iter().map(|broken| format!("the host breaks a rule of its GENI board: {broken}"));
+        let by_host = by_host
+            .iter()
+            .map(|broken| format!("the host breaks a rule of its GENI board: {broken}"));
         let mut complaints: Vec<String> = by_host.collect();
         for recorder in &mut self.recorders {
             let number = recorder.number();
@@ -259,7 +273,10 @@ impl Machine for BusMachine<'_> {
     }
 
     fn patience(&self) -> Duration {
-        self.recorders.iter().map(|recorder| recorder.unit().patience()).fold(PATIENCE, Duration::min)
+        self.recorders
+            .iter()
+            .map(|recorder| recorder.unit().patience())
+            .fold(PATIENCE, Duration::min)
     }
 
     fn descriptors(&self) -> Vec<BorrowedFd<'_>> {

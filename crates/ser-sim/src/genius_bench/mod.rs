@@ -1,4 +1,5 @@
-//! Recorders on a Genius bus, in virtual time that keeps pace with real time, and a host in another process.
+//! Recorders on a Genius bus, in virtual time that keeps pace with real time, and a host in another
+//! process.
 
 mod bus_machine;
 mod host_window;
@@ -42,8 +43,8 @@ struct Station {
 }
 
 impl GeniusBench {
-    /// Connects everything. The first recorder is the image, or else the built-in node as `options` say; the others
-    /// differ from that by their model, and have memory of their own.
+    /// Connects everything. The first recorder is the image, or else the built-in node as `options`
+    /// say; the others differ from that by their model, and have memory of their own.
     pub(crate) fn new(
         options: &SimNodeOptions,
         image: Option<Emulator>,
@@ -74,7 +75,10 @@ impl GeniusBench {
     }
 
     /// Switches all recorders on.
-    pub(crate) fn power_up<'a>(&'a mut self, rams: &'a mut [Ram]) -> Result<BusMachine<'a>, SimError> {
+    pub(crate) fn power_up<'a>(
+        &'a mut self,
+        rams: &'a mut [Ram],
+    ) -> Result<BusMachine<'a>, SimError> {
         let mut image = self.image.as_mut();
         let mut recorders = Vec::new();
         for (station, ram) in self.stations.iter_mut().zip(rams) {
@@ -101,6 +105,7 @@ impl GeniusBench {
 }
 
 fn port(board: &SharedBoard, options: &SimNodeOptions) -> GeniusPort<BoardRam> {
-    let options = PortOptions { start: geni_board::Start::Released, ..PortOptions::new(options.model) };
+    let options =
+        PortOptions { start: geni_board::Start::Released, ..PortOptions::new(options.model) };
     GeniusPort::new(BoardRam(board.clone()), options)
 }

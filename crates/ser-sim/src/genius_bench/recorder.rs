@@ -1,7 +1,9 @@
-//! A recorder on the bus, under power: the built-in node or the ARM image, each with its GENI board.
+//! A recorder on the bus, under power: the built-in node or the ARM image, each with its GENI
+//! board.
 //!
-//! The built-in node lives in virtual time and reaches its board directly. The image lives in real time; its board's
-//! shared RAM is in the emulated board's external memory, and is compared with the board's once per millisecond.
+//! The built-in node lives in virtual time and reaches its board directly. The image lives in real
+//! time; its board's shared RAM is in the emulated board's external memory, and is compared with
+//! the board's once per millisecond.
 
 use std::sync::Arc;
 
@@ -61,7 +63,11 @@ impl<'a> Recorder<'a> {
     }
 
     /// The ARM image, which has been switched on.
-    pub(super) fn with_image(number: u8, board: SharedBoard, emulator: &'a mut Emulator) -> Recorder<'a> {
+    pub(super) fn with_image(
+        number: u8,
+        board: SharedBoard,
+        emulator: &'a mut Emulator,
+    ) -> Recorder<'a> {
         let memory = emulator.external_bus();
         let reset = memory.geni_reset();
         let body = Body::Image(Image { emulator, memory, reset });
@@ -208,8 +214,8 @@ fn restart(board: &SharedBoard) {
     board.release_reset();
 }
 
-/// Without what only seems wrong: when a host in another process lets the reset line go is seen late here, so that it
-/// may seem to begin too early.
+/// Without what only seems wrong: when a host in another process lets the reset line go is seen
+/// late here, so that it may seem to begin too early.
 pub(super) fn as_seen_from_afar(mut violations: Vec<Violation>) -> Vec<Violation> {
     violations.retain(|violation| violation.kind != ViolationKind::TooEarly);
     violations

@@ -22,13 +22,15 @@ pub(crate) trait Line: Send {
     /// What a host has sent; 0 when there is nothing at present.
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
 
-    /// Takes bytes for the host and says how many. Without a host they are all taken, and lost, as on a wire.
+    /// Takes bytes for the host and says how many. Without a host they are all taken, and lost, as
+    /// on a wire.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
 
     /// The rate that the host's end is set to, if there is a host and its end has such a setting.
     fn host_bits_per_second(&self) -> Option<u32>;
 
-    /// Whether another host has come since this was last asked: what was meant for the one before is not for it.
+    /// Whether another host has come since this was last asked: what was meant for the one before
+    /// is not for it.
     fn take_host_change(&mut self) -> bool;
 
     /// Makes the line known, now that the node answers.
@@ -42,7 +44,8 @@ pub(crate) trait Line: Send {
         Vec::new()
     }
 
-    /// Descriptors that become readable when [`read`](Self::read) has something to do; the one of a host comes first.
+    /// Descriptors that become readable when [`read`](Self::read) has something to do; the one of a
+    /// host comes first.
     #[cfg(unix)]
     fn descriptors(&self) -> Vec<BorrowedFd<'_>>;
 }
@@ -52,10 +55,11 @@ pub(crate) fn rates_agree(host: Option<u32>, node: Baud) -> bool {
     host.is_none_or(|bits_per_second| bits_per_second == node.bits_per_second())
 }
 
-/// What bytes look like to a receiver at another rate: nothing that could be part of a frame or a text.
+/// What bytes look like to a receiver at another rate: nothing that could be part of a frame or a
+/// text.
 ///
-/// Real garbage depends on both rates and on the gaps between bytes. What matters here is that it is the same
-/// every time and never passes for sense: every byte has its highest bit set.
+/// Real garbage depends on both rates and on the gaps between bytes. What matters here is that it
+/// is the same every time and never passes for sense: every byte has its highest bit set.
 pub(crate) fn garble(bytes: &mut [u8]) {
     for byte in bytes {
         *byte = (byte.rotate_left(3) ^ 0x5A) | 0x80;
@@ -70,7 +74,8 @@ mod tests {
 
     #[test]
     fn garbled_bytes_are_neither_frame_nor_ascii() {
-        let mut bytes: Vec<u8> = (0..=255).chain(FrameEncoder::new(Command::Erase.to_body())).collect();
+        let mut bytes: Vec<u8> =
+            (0..=255).chain(FrameEncoder::new(Command::Erase.to_body())).collect();
         garble(&mut bytes);
         let mut decoder = FrameDecoder::<168>::new();
         for byte in bytes {

@@ -1,11 +1,13 @@
 //! A serial line over a pseudo-terminal, found under a symbolic link.
 //!
 //! # Notes
-//! The node holds the master end. The slave end is open only while a host has it open, so the kernel tells us when
-//! there is no host: bytes then go nowhere, as on a wire, and do not wait for the next host to be confused by.
+//! The node holds the master end. The slave end is open only while a host has it open, so the
+//! kernel tells us when there is no host: bytes then go nowhere, as on a wire, and do not wait for
+//! the next host to be confused by.
 //!
-//! A host usually takes the terminal for itself (`TIOCEXCL`), and one that is killed never gives it back: nobody but
-//! root could open the terminal again. The link is then moved to a fresh pseudo-terminal.
+//! A host usually takes the terminal for itself (`TIOCEXCL`), and one that is killed never gives it
+//! back: nobody but root could open the terminal again. The link is then moved to a fresh
+//! pseudo-terminal.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -32,7 +34,8 @@ use crate::error::SimError;
 /// The rate of a port that nobody has set: what a factory-fresh node uses.
 const INITIAL_BITS_PER_SECOND: u32 = 9600;
 
-/// How often the terminal is made ready while no host is there: one may have come and gone between two looks.
+/// How often the terminal is made ready while no host is there: one may have come and gone between
+/// two looks.
 const FREE_EVERY: Duration = Duration::from_millis(100);
 
 pub(crate) struct PtyLine {
@@ -87,7 +90,8 @@ struct Pair {
 impl Pair {
     fn new() -> io::Result<Pair> {
         let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY;
-        // In one step where there is one: a child that inherits the master would keep the terminal alive.
+        // In one step where there is one: a child that inherits the master would keep the terminal
+        // alive.
         #[cfg(target_os = "linux")]
         let flags = flags | OpenptFlags::CLOEXEC;
         let master = openpt(flags)?;
@@ -97,7 +101,8 @@ impl Pair {
         rfs::fcntl_setfl(&master, rfs::fcntl_getfl(&master)? | OFlags::NONBLOCK)?;
         let slave = PathBuf::from(OsStr::from_bytes(ptsname(&master, Vec::new())?.as_bytes()));
         let pair = Pair { master: File::from(master), slave };
-        // Raw from the start: otherwise the terminal echoes what the node says before a host has set it up.
+        // Raw from the start: otherwise the terminal echoes what the node says before a host has
+        // set it up.
         let slave = pair.open_slave()?;
         let mut settings: Termios = termios::tcgetattr(&slave)?;
         settings.make_raw();
@@ -194,7 +199,8 @@ impl PtyLine {
         let failed = moved.err();
         if let (Some(error), false) = (&failed, self.failing) {
             let link = self.link.display();
-            self.notices.push(format!("{link} cannot lead to a fresh terminal, tried again: {error}"));
+            self.notices
+                .push(format!("{link} cannot lead to a fresh terminal, tried again: {error}"));
         }
         self.failing = failed.is_some();
     }
@@ -207,13 +213,17 @@ impl Line for PtyLine {
                 self.host_is_there();
                 Ok(read)
             }
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
+            Err(error)
+                if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) =>
+            {
                 self.host_is_there();
                 Ok(0)
             }
             // Linux reports a slave that nobody has open as EIO, others as the end of the file.
             Ok(0) => Ok(self.no_host()),
-            Err(error) if error.raw_os_error() == Some(Errno::IO.raw_os_error()) => Ok(self.no_host()),
+            Err(error) if error.raw_os_error() == Some(Errno::IO.raw_os_error()) => {
+                Ok(self.no_host())
+            }
             Err(error) => Err(error),
         }
     }
@@ -224,7 +234,11 @@ impl Line for PtyLine {
             return Ok(bytes.len());
         }
         match (&self.pair.master).write(bytes) {
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
+            Err(error)
+                if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) =>
+            {
+                Ok(0)
+            }
             Err(error) if error.raw_os_error() == Some(Errno::IO.raw_os_error()) => Ok(bytes.len()),
             written => written,
         }
@@ -261,7 +275,8 @@ impl Line for PtyLine {
     }
 
     fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
-        // Without a host the master reports that over and over and would keep us from waiting at all.
+        // Without a host the master reports that over and over and would keep us from waiting at
+        // all.
         if self.host_present { vec![self.pair.master.as_fd()] } else { Vec::new() }
     }
 }
@@ -297,8 +312,11 @@ fn claim(link: &Path) -> Result<Claim, SimError> {
 /// Puts a link to `target` in the place of the one that is there, with no moment without any. Until
 /// then it has a name that nobody can foresee, so nobody can be in its way.
 fn replace_link(target: &Path, link: &Path) -> io::Result<()> {
-    let folder = link.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let fresh = tempfile::Builder::new().prefix(".ser-sim-").make_in(folder, |path| symlink(target, path))?;
+    let folder =
+        link.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let fresh = tempfile::Builder::new()
+        .prefix(".ser-sim-")
+        .make_in(folder, |path| symlink(target, path))?;
     Ok(fresh.into_temp_path().persist(link)?)
 }
 
@@ -338,7 +356,10 @@ mod tests {
         fs::rename(&link, &away).unwrap();
         fs::write(&link, "theirs").unwrap();
         line.move_to_fresh_terminal().unwrap();
-        assert_eq!((fs::read_to_string(&link).unwrap(), &line.pair.slave), ("theirs".to_owned(), &before));
+        assert_eq!(
+            (fs::read_to_string(&link).unwrap(), &line.pair.slave),
+            ("theirs".to_owned(), &before)
+        );
         fs::remove_file(&link).unwrap();
         line.move_to_fresh_terminal().unwrap();
         assert!(fs::symlink_metadata(&link).is_err(), "what the user has taken away stays away");

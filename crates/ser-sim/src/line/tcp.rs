@@ -1,7 +1,7 @@
 //! A serial line over TCP, for one client at a time.
 //!
-//! A second client is closed at once, so that it notices; a client that goes makes room for the next.
-//! A slow client slows down what the node sends and nothing else.
+//! A second client is closed at once, so that it notices; a client that goes makes room for the
+//! next. A slow client slows down what the node sends and nothing else.
 //!
 //! # Design
 //! Nobody keeps the place for ever. A client whose computer is gone, or the way to it, does not
@@ -57,7 +57,10 @@ struct Client {
 
 impl TcpLine {
     /// Listens; see [`Port::Tcp`](crate::Port::Tcp).
-    pub(crate) fn listen(address: &str, gives_way_after: Option<Duration>) -> Result<TcpLine, SimError> {
+    pub(crate) fn listen(
+        address: &str,
+        gives_way_after: Option<Duration>,
+    ) -> Result<TcpLine, SimError> {
         let found = address.to_socket_addrs();
         let addresses: Vec<SocketAddr> =
             found.map_err(|_| SimError::NoSuchHost(address.to_owned()))?.collect();
@@ -120,7 +123,8 @@ impl TcpLine {
         }
         prepare(&stream)?;
         let heard = Instant::now();
-        self.client = Some(Client { stream, address, heard, has_turned_away: false, last_word: None });
+        self.client =
+            Some(Client { stream, address, heard, has_turned_away: false, last_word: None });
         self.client_changed = true;
         Ok(())
     }
@@ -148,7 +152,10 @@ fn probe(stream: &TcpStream) -> rustix::io::Result<()> {
     #[cfg(target_os = "linux")]
     {
         let given_up = PROBE_AFTER + PROBE_EVERY * PROBES;
-        sockopt::set_tcp_user_timeout(stream, u32::try_from(given_up.as_millis()).unwrap_or(u32::MAX))?;
+        sockopt::set_tcp_user_timeout(
+            stream,
+            u32::try_from(given_up.as_millis()).unwrap_or(u32::MAX),
+        )?;
     }
     Ok(())
 }
@@ -230,7 +237,8 @@ mod tests {
         }
         let stream = &line.client.as_ref().unwrap().stream;
         assert!(sockopt::socket_keepalive(stream).unwrap());
-        let probing = sockopt::tcp_keepintvl(stream).unwrap() * sockopt::tcp_keepcnt(stream).unwrap();
+        let probing =
+            sockopt::tcp_keepintvl(stream).unwrap() * sockopt::tcp_keepcnt(stream).unwrap();
         let within = Duration::from_secs(120);
         assert!(sockopt::tcp_keepidle(stream).unwrap() + probing <= within);
         let unacknowledged = sockopt::tcp_user_timeout(stream).unwrap();

@@ -1,7 +1,8 @@
 //! The wire from the host to the node: bytes take their time on it.
 //!
-//! A client that sets the clock sends the time at which the last byte will arrive. On a pseudo-terminal bytes would
-//! arrive at once, and the clock would be ahead by the length of the message.
+//! A client that sets the clock sends the time at which the last byte will arrive. On a
+//! pseudo-terminal bytes would arrive at once, and the clock would be ahead by the length of the
+//! message.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -45,7 +46,9 @@ impl Wire {
     /// The host sends, at a rate or, where there is none, at once.
     pub(crate) fn send(&mut self, now: Instant, bytes: &[u8], bits_per_second: Option<u32>) {
         let byte_time = match bits_per_second {
-            Some(rate) if self.takes_time && rate > 0 => Duration::from_secs(1) * BITS_PER_BYTE / rate,
+            Some(rate) if self.takes_time && rate > 0 => {
+                Duration::from_secs(1) * BITS_PER_BYTE / rate
+            }
             _ => Duration::ZERO,
         };
         let mut arrival = self.free_from.map_or(now, |free_from| free_from.max(now));

@@ -77,8 +77,8 @@ impl SimRtc {
         SimRtc::new(Time::Host { ahead: TimeDelta::zero() })
     }
 
-    /// A clock that shows `time` at every power-up, or the time to which it was last set: tests that use it give
-    /// the same result every time.
+    /// A clock that shows `time` at every power-up, or the time to which it was last set: tests
+    /// that use it give the same result every time.
     #[must_use]
     pub fn held_at(time: NaiveDateTime) -> SimRtc {
         SimRtc::new(Time::Held(time))

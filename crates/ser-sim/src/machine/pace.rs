@@ -23,6 +23,7 @@ impl Pace {
 
     /// The millisecond that a node should have reached.
     pub(crate) fn now_ms(&self) -> u64 {
-        self.ahead_ms.saturating_add(u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX))
+        self.ahead_ms
+            .saturating_add(u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX))
     }
 }

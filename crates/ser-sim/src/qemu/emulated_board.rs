@@ -1,5 +1,5 @@
-//! What can be seen of the emulated board from outside, and done to it: the words of its external bus that are there
-//! for the bench.
+//! What can be seen of the emulated board from outside, and done to it: the words of its external
+//! bus that are there for the bench.
 
 use std::fmt;
 use std::num::NonZeroU32;
@@ -15,7 +15,8 @@ use crate::qemu::external_bus::ExternalBus;
 /// How often the board is looked at by whoever waits for it.
 const LOOK_EVERY: Duration = Duration::from_millis(2);
 
-/// A fault that the image brings upon itself when it is told to, so that one can see what it does about it.
+/// A fault that the image brings upon itself when it is told to, so that one can see what it does
+/// about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum ForcedFault {
@@ -29,7 +30,8 @@ pub enum ForcedFault {
     StackOverflow = 4,
     /// Its capture interrupt comes no more.
     CaptureStops = 5,
-    /// A store of its main program gets below the stack, in which the processor finds room to save registers.
+    /// A store of its main program gets below the stack, in which the processor finds room to save
+    /// registers.
     StackOverflowByStore = 6,
     /// It resets, and says nothing about it.
     SilentReset = 7,
@@ -70,8 +72,8 @@ impl EmulatedBoard {
         true
     }
 
-    /// Waits until the image has started more than `boots` times and samples its contacts. False when it takes longer
-    /// than `timeout`.
+    /// Waits until the image has started more than `boots` times and samples its contacts. False
+    /// when it takes longer than `timeout`.
     #[must_use]
     pub fn wait_reboot(&self, boots: u32, timeout: Duration) -> bool {
         self.wait(timeout, |board| board.boots() != boots && board.bus.is_sampled())
@@ -89,8 +91,8 @@ impl EmulatedBoard {
         String::from_utf8_lossy(&self.bus.last_words()).into_owned()
     }
 
-    /// How many starts ago its latest fault was: 1 when its last start was the first one after it. None when there was
-    /// none since it had no power.
+    /// How many starts ago its latest fault was: 1 when its last start was the first one after it.
+    /// None when there was none since it had no power.
     #[must_use]
     pub fn fault_starts_ago(&self) -> Option<NonZeroU32> {
         NonZeroU32::new(self.bus.last_words_age())
@@ -121,8 +123,9 @@ impl EmulatedBoard {
         self.bus.stack_bytes()
     }
 
-    /// The longest time for which its battery-backed clock has stood still, because this computer had no time for it.
-    /// It goes on where it should be then; whoever set or read it meanwhile is late by as much.
+    /// The longest time for which its battery-backed clock has stood still, because this computer
+    /// had no time for it. It goes on where it should be then; whoever set or read it meanwhile is
+    /// late by as much.
     #[must_use]
     pub fn clock_stood_still(&self) -> Duration {
         Duration::from_millis(self.bus.clock_gap_ms())

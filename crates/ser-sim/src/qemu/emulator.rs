@@ -1,20 +1,22 @@
 //! The ARM image in QEMU as a machine.
 //!
 //! # Design
-//! QEMU's standard input and output are the RS-232 port. The contacts are a latch in the board's external memory, a
-//! file that both sides map, and there the board says which sample it took last.
+//! QEMU's standard input and output are the RS-232 port. The contacts are a latch in the board's
+//! external memory, a file that both sides map, and there the board says which sample it took last.
 //!
-//! On a Genius bus the file also holds the shared RAM of the board's GENI, and whoever plays the bus plays the GENI
-//! too.
+//! On a Genius bus the file also holds the shared RAM of the board's GENI, and whoever plays the
+//! bus plays the GENI too.
 //!
-//! On the same bus the board finds its battery-backed clock: a count of milliseconds from here, written whenever the
-//! board is looked after, at least every 2 ms unless this computer is busy. It begins with this computer's time of
-//! day, so it goes on from one simulator to the next with the same memory.
+//! On the same bus the board finds its battery-backed clock: a count of milliseconds from here,
+//! written whenever the board is looked after, at least every 2 ms unless this computer is busy. It
+//! begins with this computer's time of day, so it goes on from one simulator to the next with the
+//! same memory.
 //!
-//! A step is written when its time has come, and not before the board has sampled the step before: on a stalled
-//! machine contacts move late, but no two moves become one and none is lost. What was played is recorded with the
-//! samples around it. A board that starts anew by itself takes the contacts as it finds them; they move again when it
-//! samples them, and a move that it was caught in was none.
+//! A step is written when its time has come, and not before the board has sampled the step before:
+//! on a stalled machine contacts move late, but no two moves become one and none is lost. What was
+//! played is recorded with the samples around it. A board that starts anew by itself takes the
+//! contacts as it finds them; they move again when it samples them, and a move that it was caught
+//! in was none.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -152,7 +154,8 @@ impl Emulator {
         &mut self.player
     }
 
-    /// Switches the board on, or off and on again, and waits until it answers. Returns early when told to stop.
+    /// Switches the board on, or off and on again, and waits until it answers. Returns early when
+    /// told to stop.
     pub(crate) fn power_up(&mut self, stop: &AtomicBool) -> Result<(), SimError> {
         self.switch_on()?;
         while !stop.load(Ordering::Relaxed) && !self.is_up()? {
@@ -201,7 +204,8 @@ impl Emulator {
                 running.ask(&Command::QueryConfiguration);
             }
         } else if !coming_up.settled {
-            // Answers come in order: after this one, none to the questions before is left to confuse a host.
+            // Answers come in order: after this one, none to the questions before is left to
+            // confuse a host.
             coming_up.settled = true;
             running.ask(&Command::QueryMode);
         }
@@ -211,15 +215,19 @@ impl Emulator {
     /// Waits a moment, or until the board says something.
     pub(crate) fn pause(&self) {
         let timeout = Timespec::try_from(PATIENCE).unwrap_or_default();
-        let mut output: Vec<PollFd<'_>> =
-            self.running.iter().map(|running| PollFd::new(&running.output, PollFlags::IN)).collect();
+        let mut output: Vec<PollFd<'_>> = self
+            .running
+            .iter()
+            .map(|running| PollFd::new(&running.output, PollFlags::IN))
+            .collect();
         // Whatever comes of it, the caller looks again.
         let _ = poll(&mut output, Some(&timeout));
     }
 
     fn start(&self) -> Result<Running, SimError> {
         let doing = || format!("start {}", self.program.display());
-        let printed = File::create(self.printed_path()).map_err(SimError::io("make a temporary file"))?;
+        let printed =
+            File::create(self.printed_path()).map_err(SimError::io("make a temporary file"))?;
         let mut process = Process::new(&self.program);
         let handed_over = self.files.hand_over(&self.bus).map_err(SimError::io(doing()))?;
         process.args(&handed_over.arguments);
@@ -240,12 +248,16 @@ impl Emulator {
         let Some(running) = &mut self.running else { return Ok(()) };
         let ended = running.qemu.0.try_wait().map_err(SimError::io("look after the emulator"))?;
         if let Some(status) = ended {
-            return Err(SimError::EmulatorEnded { how: status.to_string(), printed: self.printed() });
+            return Err(SimError::EmulatorEnded {
+                how: status.to_string(),
+                printed: self.printed(),
+            });
         }
         running.carry().map_err(SimError::io("talk to the emulator"))
     }
 
-    /// Contacts that were about to be sampled have moved: the board takes them as they are when it starts.
+    /// Contacts that were about to be sampled have moved: the board takes them as they are when it
+    /// starts.
     fn begin_booting(&mut self) {
         self.booting = true;
         self.moving = None;
@@ -266,7 +278,9 @@ impl Emulator {
         if self.is_booting() {
             return;
         }
-        if let Some(moving) = self.moving.take_if(|moving| self.bus.sampled_inputs() == moving.moved.state) {
+        if let Some(moving) =
+            self.moving.take_if(|moving| self.bus.sampled_inputs() == moving.moved.state)
+        {
             self.played.push(moving.moved.played(moving.tick_before, self.bus.sample_counter()));
         }
         if self.moving.is_some() {
@@ -325,8 +339,8 @@ impl Running {
     }
 }
 
-/// Bytes from the board, and the rates at which they are sent: the emulated UART does not tell, but every change of
-/// rate is announced by a configuration reply.
+/// Bytes from the board, and the rates at which they are sent: the emulated UART does not tell, but
+/// every change of rate is announced by a configuration reply.
 struct FromBoard {
     bytes: VecDeque<u8>,
     decoder: FrameDecoder<MAX_BODY_LEN>,
@@ -392,13 +406,16 @@ impl Machine for Emulator {
     }
 
     fn room(&self) -> usize {
-        self.running.as_ref().map_or(0, |running| WAITING_LIMIT.saturating_sub(running.to_board.len()))
+        self.running
+            .as_ref()
+            .map_or(0, |running| WAITING_LIMIT.saturating_sub(running.to_board.len()))
     }
 
     fn receive(&mut self, bytes: &[u8]) {
         if let Some(running) = &mut self.running {
             running.to_board.extend(bytes);
-            // What cannot be written now is written by the next pass, which also reports what is wrong.
+            // What cannot be written now is written by the next pass, which also reports what is
+            // wrong.
             let _ = running.carry();
         }
     }
@@ -447,7 +464,8 @@ impl Machine for Emulator {
 
     fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
         // While nobody takes what waits, more of it is no reason to wake up.
-        let running = self.running.iter().filter(|running| running.from_board.bytes.len() < WAITING_LIMIT);
+        let running =
+            self.running.iter().filter(|running| running.from_board.bytes.len() < WAITING_LIMIT);
         running.map(|running| running.output.as_fd()).collect()
     }
 }
@@ -493,9 +511,13 @@ mod tests {
         let image = tempfile::NamedTempFile::new().unwrap();
         let mut options = EmulatorOptions::new(image.path());
         options.program = Some("/nonexistent/qemu-system-arm".into());
-        let mut emulator = Emulator::new(&options, Model::Ser160, 0, false, &AtomicBool::new(false)).unwrap();
+        let mut emulator =
+            Emulator::new(&options, Model::Ser160, 0, false, &AtomicBool::new(false)).unwrap();
         let error = emulator.power_up(&AtomicBool::new(false)).unwrap_err().to_string();
-        assert!(error.contains("not installed") && error.contains("package qemu-system-arm"), "{error}");
+        assert!(
+            error.contains("not installed") && error.contains("package qemu-system-arm"),
+            "{error}"
+        );
     }
 
     #[test]
@@ -504,7 +526,8 @@ mod tests {
         let mut options = EmulatorOptions::new(image.path());
         // The shell knows no option -M.
         options.program = Some("/bin/sh".into());
-        let mut emulator = Emulator::new(&options, Model::Ser160, 0, false, &AtomicBool::new(false)).unwrap();
+        let mut emulator =
+            Emulator::new(&options, Model::Ser160, 0, false, &AtomicBool::new(false)).unwrap();
         let error = emulator.power_up(&AtomicBool::new(false)).unwrap_err().to_string();
         assert!(error.contains("exit status: 2") && error.contains("-M"), "{error}");
     }

@@ -1,9 +1,9 @@
 //! What the emulator reads and writes besides its standard streams, and how it gets it.
 //!
 //! # Design
-//! A name that is looked up twice may lead to two things: whoever may write to the folder can put a link there in
-//! between. So we open, look at what we have got, and the emulator inherits that; of names it gets only the image's,
-//! which it reads, and those of sockets in a folder of our own.
+//! A name that is looked up twice may lead to two things: whoever may write to the folder can put a
+//! link there in between. So we open, look at what we have got, and the emulator inherits that; of
+//! names it gets only the image's, which it reads, and those of sockets in a folder of our own.
 
 use std::ffi::OsString;
 use std::fs::{self, File, Metadata};
@@ -45,7 +45,8 @@ impl EmulatorFiles {
         Ok(EmulatorFiles { image: options.image.clone(), log })
     }
 
-    /// Copies for an emulator that is about to be started; it must not be started later than this goes.
+    /// Copies for an emulator that is about to be started; it must not be started later than this
+    /// goes.
     ///
     /// # Errors
     /// When this process can open no more files.
@@ -194,7 +195,8 @@ mod tests {
         rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RWXU).unwrap();
         let stopped = super::open_log(&pipe, &AtomicBool::new(true));
         assert!(matches!(stopped, Err(SimError::Ended)));
-        let reader = rustix::fs::open(&pipe, OFlags::RDONLY | OFlags::NONBLOCK, rustix::fs::Mode::empty());
+        let reader =
+            rustix::fs::open(&pipe, OFlags::RDONLY | OFlags::NONBLOCK, rustix::fs::Mode::empty());
         let log = super::open_log(&pipe, &AtomicBool::new(true)).unwrap();
         assert!(!fcntl_getfl(&log).unwrap().contains(OFlags::NONBLOCK));
         drop(reader);
@@ -209,8 +211,11 @@ mod tests {
         let files = EmulatorFiles::open(&options, &AtomicBool::new(false)).unwrap();
         let handed_over = files.hand_over(&ExternalBus::open(&memory).unwrap()).unwrap();
         let ours = folder.path().to_str().unwrap();
-        let named: Vec<_> =
-            handed_over.arguments.iter().filter(|text| text.to_str().unwrap().contains(ours)).collect();
+        let named: Vec<_> = handed_over
+            .arguments
+            .iter()
+            .filter(|text| text.to_str().unwrap().contains(ours))
+            .collect();
         assert_eq!(named, [image.as_os_str()]);
     }
 

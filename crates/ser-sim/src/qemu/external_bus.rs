@@ -1,9 +1,10 @@
 //! The desktop's view of the emulated board's external bus: the file behind its external memory.
 //!
 //! # Design
-//! The file is mapped and used one aligned 32-bit word at a time, except for the GENI window, which has bytes. Plain
-//! writes to the file would show up on the board as well, but the kernel copies a few bytes one by one, and an input
-//! latch caught between two of its bytes would be a contact change that never was.
+//! The file is mapped and used one aligned 32-bit word at a time, except for the GENI window, which
+//! has bytes. Plain writes to the file would show up on the board as well, but the kernel copies a
+//! few bytes one by one, and an input latch caught between two of its bytes would be a contact
+//! change that never was.
 
 use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind};
@@ -68,7 +69,11 @@ fn open_memory(path: &Path) -> io::Result<Option<File>> {
     }
     // By now it may be something else.
     let flags = OFlags::NOFOLLOW | OFlags::NONBLOCK;
-    let file = File::options().read(true).write(true).custom_flags(flags.bits().cast_signed()).open(path)?;
+    let file = File::options()
+        .read(true)
+        .write(true)
+        .custom_flags(flags.bits().cast_signed())
+        .open(path)?;
     if !is_memory(&file.metadata()?) {
         return Ok(None);
     }
@@ -85,7 +90,8 @@ fn is_memory(found: &Metadata) -> bool {
 pub struct ExternalBus {
     memory: MmapRaw,
     file: File,
-    /// When the clock's count was written last, and the longest time between two such moments; 0 for never.
+    /// When the clock's count was written last, and the longest time between two such moments; 0
+    /// for never.
     clock_written_ms: AtomicU64,
     clock_gap_ms: AtomicU64,
 }
@@ -150,7 +156,8 @@ impl ExternalBus {
         self.window_byte(offset.into()).store(byte, Ordering::SeqCst);
     }
 
-    /// The GENI board's reset line: bit 0 is set as long as it is held, and the rest changes with every pulse.
+    /// The GENI board's reset line: bit 0 is set as long as it is held, and the rest changes with
+    /// every pulse.
     pub fn geni_reset(&self) -> u32 {
         self.read(GENI_RESET)
     }
@@ -160,7 +167,8 @@ impl ExternalBus {
         self.write(INPUT_LATCH, inputs);
     }
 
-    /// The inputs as the board's latest sample saw them. Its tick is not later than the counter read after this.
+    /// The inputs as the board's latest sample saw them. Its tick is not later than the counter
+    /// read after this.
     pub(crate) fn sampled_inputs(&self) -> u32 {
         self.read(SAMPLED_INPUTS)
     }
@@ -249,8 +257,8 @@ impl ExternalBus {
     #[expect(unsafe_code, reason = "memory shared with the emulator")]
     fn window_byte(&self, offset: usize) -> &AtomicU8 {
         assert!(offset < RAM_LEN && GENI_WINDOW + RAM_LEN <= self.memory.len());
-        // SAFETY: the byte lies inside the mapping (asserted), which lives as long as `self`. Both sides use the window
-        // byte by byte only, and any value is valid. For the file, see `word`.
+        // SAFETY: the byte lies inside the mapping (asserted), which lives as long as `self`. Both
+        // sides use the window byte by byte only, and any value is valid. For the file, see `word`.
         unsafe { AtomicU8::from_ptr(self.memory.as_mut_ptr().add(GENI_WINDOW + offset)) }
     }
 
@@ -268,9 +276,10 @@ impl ExternalBus {
             offset.is_multiple_of(size_of::<AtomicU32>())
                 && offset + size_of::<AtomicU32>() <= self.memory.len()
         );
-        // SAFETY: the word lies inside the mapping (asserted), which lives as long as `self`; a mapping begins at a
-        // page, so the word is aligned (asserted). Both sides use it as a whole word only, and any value is valid.
-        // The file keeps its size: nobody but us and QEMU, which does not change it, is supposed to know it.
+        // SAFETY: the word lies inside the mapping (asserted), which lives as long as `self`; a
+        // mapping begins at a page, so the word is aligned (asserted). Both sides use it as a whole
+        // word only, and any value is valid. The file keeps its size: nobody but us and QEMU, which
+        // does not change it, is supposed to know it.
         unsafe { AtomicU32::from_ptr(self.memory.as_mut_ptr().add(offset).cast()) }
     }
 }
@@ -322,7 +331,9 @@ mod tests {
         assert_eq!(u64::from(new[1]) << 32 | u64::from(new[0]), counts[1]);
         for mix in 0..8_u32 {
             let mixed: [u32; 3] =
-                std::array::from_fn(|word| if mix >> word & 1 == 0 { old[word] } else { new[word] });
+                std::array::from_fn(
+                    |word| if mix >> word & 1 == 0 { old[word] } else { new[word] },
+                );
             assert_eq!(is_sealed(mixed), mix == 0 || mix == 7, "{mix:03b}");
         }
         assert_eq!(bus.clock_gap_ms(), 1);

@@ -15,16 +15,20 @@ Examples:
   cargo xtask simulate --hours 1 --bus-one-in 1 always on a bus
   cargo xtask simulate --load --hours 1         a change of all inputs in every millisecond
 
-A bus is lived through scan by scan, and everything else from one event to the next, hundreds of times as fast. A life
-on a bus is over in minutes, and another one may take days: of a hundred hours, a few minutes are on a bus. So both
+A bus is lived through scan by scan, and everything else from one event to the next, hundreds of \
+times as fast. A life
+on a bus is over in minutes, and another one may take days: of a hundred hours, a few minutes \
+are on a bus. So both
 paces are told apart.";
 
 const MS_PER_HOUR: f64 = 3_600_000.0;
 
-/// A longer run is better given as more seeds: they go more ways, and what fails is sooner repeated.
+/// A longer run is better given as more seeds: they go more ways, and what fails is sooner
+/// repeated.
 const MAX_HOURS: f64 = 100_000.0;
 
-/// Run the whole system in virtual time, with random operations and faults, and account for every event.
+/// Run the whole system in virtual time, with random operations and faults, and account for every
+/// event.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask simulate", bin_name = "cargo xtask simulate", version, after_help = EXAMPLES)]
 struct Arguments {
@@ -40,12 +44,13 @@ struct Arguments {
     #[arg(long, default_value_t = 1, value_parser = at_least::<1>, allow_negative_numbers = true)]
     seeds: u64,
 
-    /// Of the lives, from power-up to power cut, the first and one in so many of the others are on a Genius bus; with 0
-    /// there is no bus at all.
+    /// Of the lives, from power-up to power cut, the first and one in so many of the others are on
+    /// a Genius bus; with 0 there is no bus at all.
     #[arg(long, value_name = "LIVES", default_value_t = 8, value_parser = at_least::<0>, allow_negative_numbers = true)]
     bus_one_in: u64,
 
-    /// All inputs toggle in every millisecond, and everybody reads, prints and reports as fast as it goes.
+    /// All inputs toggle in every millisecond, and everybody reads, prints and reports as fast as
+    /// it goes.
     #[arg(long)]
     load: bool,
 }
@@ -66,7 +71,11 @@ fn at_least<const LEAST: u64>(text: &str) -> Result<u64, String> {
 /// Hours as milliseconds, at least one: a run of none would find nothing wrong.
 fn duration_ms(text: &str) -> Result<u64, String> {
     let hours = text.parse().ok().filter(|hours| *hours > 0.0 && *hours <= MAX_HOURS);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive, and bounded")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "positive, and bounded"
+    )]
     let ms = hours.map(|hours: f64| (hours * MS_PER_HOUR).round() as u64);
     let ms = ms.filter(|ms| *ms > 0);
     ms.ok_or_else(|| format!("must be hours, from a millisecond (0.0000003) to {MAX_HOURS}"))
@@ -150,7 +159,10 @@ mod tests {
     #[test]
     fn a_time_in_which_nothing_can_happen_or_that_never_ends_is_refused() {
         for hours in ["0", "0.0000001", "-1", "nan", "inf", "100000.1", "1e300", "ten", ""] {
-            assert_refused(&["--hours", hours], "must be hours, from a millisecond (0.0000003) to 100000");
+            assert_refused(
+                &["--hours", hours],
+                "must be hours, from a millisecond (0.0000003) to 100000",
+            );
         }
     }
 
@@ -165,11 +177,17 @@ mod tests {
     #[test]
     fn numbers_that_leave_nothing_to_run_are_refused() {
         for number in ["0", "-1", "1.5", "18446744073709551616"] {
-            assert_refused(&["--seeds", number], "must be a whole number from 1 to 18446744073709551615");
+            assert_refused(
+                &["--seeds", number],
+                "must be a whole number from 1 to 18446744073709551615",
+            );
         }
         for option in ["--seed", "--bus-one-in"] {
             for number in ["-1", "x", "18446744073709551616"] {
-                assert_refused(&[option, number], "must be a whole number from 0 to 18446744073709551615");
+                assert_refused(
+                    &[option, number],
+                    "must be a whole number from 0 to 18446744073709551615",
+                );
             }
         }
     }

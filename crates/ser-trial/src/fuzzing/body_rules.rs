@@ -1,4 +1,5 @@
-//! Which bodies are messages, by the tables of `docs/protocol.md`: the second opinion on what the parsers say.
+//! Which bodies are messages, by the tables of `docs/protocol.md`: the second opinion on what the
+//! parsers say.
 
 use chrono::NaiveDate;
 use ser_proto::{FrameEncoder, ParseError};
@@ -18,7 +19,11 @@ pub(super) struct Rules {
 
 impl Rules {
     /// Whether a body is a message; if not, the error is the right one.
-    pub(super) fn assert_agree<T: std::fmt::Debug>(&self, body: &[u8], parsed: &Result<T, ParseError>) {
+    pub(super) fn assert_agree<T: std::fmt::Debug>(
+        &self,
+        body: &[u8],
+        parsed: &Result<T, ParseError>,
+    ) {
         if let Err(error) = parsed {
             assert!(!error.to_string().is_empty());
         }
@@ -34,19 +39,29 @@ impl Rules {
             );
         } else if !(self.has_length)(code, length) {
             let expected = ParseError::WrongLength { code, length };
-            assert!(matches!(parsed, Err(error) if *error == expected), "{parsed:?}, not {expected:?}");
+            assert!(
+                matches!(parsed, Err(error) if *error == expected),
+                "{parsed:?}, not {expected:?}"
+            );
         } else if let Some((offset, value)) = (self.fault)(body) {
             let expected = ParseError::BadValue { code, offset, value };
-            assert!(matches!(parsed, Err(error) if *error == expected), "{parsed:?}, not {expected:?}");
+            assert!(
+                matches!(parsed, Err(error) if *error == expected),
+                "{parsed:?}, not {expected:?}"
+            );
         } else if let Some(expected) = entry_size(self, body) {
-            assert!(matches!(parsed, Err(error) if *error == expected), "{parsed:?}, not {expected:?}");
+            assert!(
+                matches!(parsed, Err(error) if *error == expected),
+                "{parsed:?}, not {expected:?}"
+            );
         } else {
             assert!(parsed.is_ok(), "{parsed:?}");
         }
     }
 }
 
-/// Entries whose size is that of no model: in read replies, the only bodies of `R` that may be longer than a command.
+/// Entries whose size is that of no model: in read replies, the only bodies of `R` that may be
+/// longer than a command.
 fn entry_size(rules: &Rules, body: &[u8]) -> Option<ParseError> {
     if body[0] != b'R' || !(rules.has_length)(b'R', 9) {
         return None;
@@ -87,7 +102,8 @@ pub(super) fn time_fault(body: &[u8], offset: usize) -> Fault {
         return Some((offset + 2, day.into()));
     }
     let millisecond = word(body, offset + 6);
-    above(body, offset + 3, &[23, 59, 59]).or((millisecond > 999).then_some((offset + 6, millisecond)))
+    above(body, offset + 3, &[23, 59, 59])
+        .or((millisecond > 999).then_some((offset + 6, millisecond)))
 }
 
 /// What is sent is what is canonical, and its frame is what the protocol says.

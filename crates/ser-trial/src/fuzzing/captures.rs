@@ -7,7 +7,8 @@ use ser_proto::{Command, FrameEncoder};
 
 use super::dribble::Dribble;
 
-const FORMATS: [Option<CaptureFormat>; 3] = [None, Some(CaptureFormat::Raw), Some(CaptureFormat::Hex)];
+const FORMATS: [Option<CaptureFormat>; 3] =
+    [None, Some(CaptureFormat::Raw), Some(CaptureFormat::Hex)];
 const SIDES: [Option<Side>; 3] = [None, Some(Side::Host), Some(Side::Recorder)];
 
 /// The capture is `data`, in each format, from each side, with frames and without:
@@ -25,7 +26,11 @@ pub fn captures(data: &[u8]) {
             for bodies in [false, true] {
                 let options = CaptureOptions { from, format, bodies };
                 let (list, tally) = decoded(options, data);
-                assert_eq!(decoded(options, Dribble { data }), (list.clone(), tally), "{options:?}");
+                assert_eq!(
+                    decoded(options, Dribble { data }),
+                    (list.clone(), tally),
+                    "{options:?}"
+                );
                 check_list(&list, tally);
             }
         }
@@ -53,7 +58,8 @@ fn check_list(list: &str, tally: Tally) {
 fn finds_a_frame_at_the_end(data: &[u8]) {
     let frame = FrameEncoder::new(Command::Erase.to_body());
     let capture: Vec<u8> = data.iter().copied().chain(frame).collect();
-    let options = CaptureOptions { from: Some(Side::Host), format: Some(CaptureFormat::Raw), bodies: false };
+    let options =
+        CaptureOptions { from: Some(Side::Host), format: Some(CaptureFormat::Raw), bodies: false };
     let (list, tally) = decoded(options, &capture[..]);
     let last = list.lines().last().unwrap_or_default();
     assert!(last.ends_with("host    erase the event buffer"), "{last}");

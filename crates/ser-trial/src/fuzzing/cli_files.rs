@@ -18,7 +18,8 @@ const NODES: [(u8, Model); 2] = [(5, Model::Ser160), (9, Model::Ser320)];
 ///
 /// - it is read or refused, however slowly it comes, always with the same result;
 /// - an error names the file and one of its lines;
-/// - steps are in order, of inputs that there are, none twice in a millisecond, and not more than there are lines;
+/// - steps are in order, of inputs that there are, none twice in a millisecond, and not more than
+///   there are lines;
 /// - steps that are written down again are read as the same steps.
 ///
 /// # Panics
@@ -29,7 +30,10 @@ pub fn cli_files(data: &[u8]) {
         if let Some(scenario) = check(data, &read) {
             assert_in_order(&scenario, model);
             let written = read(&mut csv(&scenario).as_bytes());
-            assert_eq!(written.map(|scenario| scenario.steps().to_vec()), Ok(scenario.steps().to_vec()));
+            assert_eq!(
+                written.map(|scenario| scenario.steps().to_vec()),
+                Ok(scenario.steps().to_vec())
+            );
         }
     }
     let read = |source: &mut dyn Read| Scenario::from_csv_on_bus(NAME, source, &NODES);

@@ -4,8 +4,8 @@ use ser_proto::genius::{CommReq, CommReqError, MAX_WORDS, bytes_of_words, words_
 
 /// `data` are the words, two bytes each, low byte first.
 ///
-/// - Words are understood if, and only if, the table in `docs/genius.md` has such a block; they go out as the canonical
-///   words, and mean the same then.
+/// - Words are understood if, and only if, the table in `docs/genius.md` has such a block; they go
+///   out as the canonical words, and mean the same then.
 /// - What is refused is refused for a word that is there, is missing, or is too much.
 /// - Bytes come out of words as they went in.
 ///

@@ -1,17 +1,18 @@
 //! Datagrams of the Genius bus, global data and DIP switches.
 
 use ser_proto::genius::{
-    Address, BusAddress, Datagram, DipSwitches, FUNCTION_GENIUS, FUNCTION_HORNER, GlobalData, MAX_DATA,
-    Message, MessageError, Priority, SUBFUNCTION_SER, SerDatagramError, Subfunction,
+    Address, BusAddress, Datagram, DipSwitches, FUNCTION_GENIUS, FUNCTION_HORNER, GlobalData,
+    MAX_DATA, Message, MessageError, Priority, SUBFUNCTION_SER, SerDatagramError, Subfunction,
 };
 use ser_proto::{Command, Reply};
 
 use super::script::Script;
 
-/// `data` is source, destination, function, subfunction, priority and then what the datagram carries.
+/// `data` is source, destination, function, subfunction, priority and then what the datagram
+/// carries.
 ///
-/// - The bus's own datagrams are understood if, and only if, `docs/genius.md` has them so, and go out as the same
-///   bytes; what is refused is refused for a reason that is there.
+/// - The bus's own datagrams are understood if, and only if, `docs/genius.md` has them so, and go
+///   out as the same bytes; what is refused is refused for a reason that is there.
 /// - A recorder's messages are those of `commands` and `replies`, and only under their own codes.
 /// - Global data go out as the bytes that came in; DIP switches are understood or refused.
 ///
@@ -49,9 +50,11 @@ fn bus_message(datagram: &Datagram) {
             assert_eq!((datagram.function, message.subfunction()), (FUNCTION_GENIUS, subfunction));
             assert_eq!(subfunction.code(), datagram.subfunction);
             assert!(message.to_string().starts_with(&subfunction.to_string()));
-            let sent = message.to_datagram(datagram.source, datagram.destination, datagram.priority);
+            let sent =
+                message.to_datagram(datagram.source, datagram.destination, datagram.priority);
             let mut expected = datagram.clone();
-            if let (Subfunction::ReadIdReply, Some(rate)) = (subfunction, expected.data.last_mut()) {
+            if let (Subfunction::ReadIdReply, Some(rate)) = (subfunction, expected.data.last_mut())
+            {
                 // Half a byte of it means nothing.
                 *rate &= 0xF0;
             }
@@ -66,7 +69,10 @@ fn bus_message(datagram: &Datagram) {
             assert_eq!((subfunction.code(), length), (datagram.subfunction, datagram.data.len()));
         }
         Err(MessageError::BadValue { subfunction, offset, value }) => {
-            assert_eq!((subfunction.code(), Some(&value)), (datagram.subfunction, datagram.data.get(offset)));
+            assert_eq!(
+                (subfunction.code(), Some(&value)),
+                (datagram.subfunction, datagram.data.get(offset))
+            );
         }
     }
 }
@@ -80,7 +86,9 @@ fn is_bus_message(datagram: &Datagram) -> bool {
             0x01 => data.len() == 12 && data[11] < 0x40,
             0x0B => data.len() == 8 && data[0] == 4,
             0x1E => data.len() == 4 && data[0] <= 128,
-            0x1F | 0x20 => (4..=132).contains(&data.len()) && usize::from(data[0]) == data.len() - 4,
+            0x1F | 0x20 => {
+                (4..=132).contains(&data.len()) && usize::from(data[0]) == data.len() - 4
+            }
             0x40 => matches!(data, [0..=3]),
             0x41 => matches!(data, [0..=3, ..]) && data.len() <= 129,
             _ => true,

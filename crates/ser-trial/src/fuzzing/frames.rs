@@ -23,13 +23,23 @@ fn for_bodies_of_up_to<const N: usize>(stream: &[u8]) {
     let seen = decode::<N>(stream);
     assert_eq!(seen, by_the_book(stream, N));
     // The byte at which a slice begins says how long it is.
-    assert_eq!(decode_slices::<N>(stream, |slice| 1 + usize::from(slice[0]) % 9), seen, "in slices");
+    assert_eq!(
+        decode_slices::<N>(stream, |slice| 1 + usize::from(slice[0]) % 9),
+        seen,
+        "in slices"
+    );
     assert_eq!(decode_slices::<N>(stream, <[u8]>::len), seen, "in one piece");
 
     let followed = [stream, &frame_of(b"L")].concat();
-    assert_eq!(decode::<N>(&followed).last(), Some(&Seen::Frame(b"L".to_vec())), "the frame after it");
+    assert_eq!(
+        decode::<N>(&followed).last(),
+        Some(&Seen::Frame(b"L".to_vec())),
+        "the frame after it"
+    );
 
-    for body in seen.iter().filter_map(|seen| if let Seen::Frame(body) = seen { Some(body) } else { None }) {
+    for body in
+        seen.iter().filter_map(|seen| if let Seen::Frame(body) = seen { Some(body) } else { None })
+    {
         assert_eq!(decode::<N>(&frame_of(body)), [Seen::Frame(body.clone())]);
     }
 }
@@ -50,8 +60,8 @@ fn decode_slices<const N: usize>(stream: &[u8], slice_len: impl Fn(&[u8]) -> usi
     seen
 }
 
-/// What is in a stream, found by looking at it as a whole: an ESC ends what was before it, so each stretch from one to
-/// the next can be understood alone.
+/// What is in a stream, found by looking at it as a whole: an ESC ends what was before it, so each
+/// stretch from one to the next can be understood alone.
 fn by_the_book(stream: &[u8], longest: usize) -> Vec<Seen> {
     let mut stretches = stream.split(|&byte| byte == ESC);
     let before = stretches.next().unwrap_or_default();
@@ -67,8 +77,8 @@ fn by_the_book(stream: &[u8], longest: usize) -> Vec<Seen> {
     seen
 }
 
-/// What follows an ESC up to the next one, or to the end of the stream: what becomes of the frame, and the text behind
-/// it.
+/// What follows an ESC up to the next one, or to the end of the stream: what becomes of the frame,
+/// and the text behind it.
 fn understand(stretch: &[u8], start: u64, is_last: bool, longest: usize) -> (Option<Seen>, &[u8]) {
     let digits = stretch.iter().take_while(|byte| byte.is_ascii_hexdigit()).count();
     let drop_at = |index: usize, cause| {

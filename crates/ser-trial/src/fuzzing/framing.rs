@@ -34,7 +34,8 @@ impl From<Decoded<'_>> for Seen {
 /// What is in a stream, to its end.
 pub(super) fn decode<const N: usize>(stream: &[u8]) -> Vec<Seen> {
     let mut decoder = FrameDecoder::<N>::new();
-    let mut seen: Vec<Seen> = stream.iter().filter_map(|&byte| decoder.push(byte).map(Seen::from)).collect();
+    let mut seen: Vec<Seen> =
+        stream.iter().filter_map(|&byte| decoder.push(byte).map(Seen::from)).collect();
     seen.extend(decoder.finish().map(Seen::Dropped));
     seen
 }

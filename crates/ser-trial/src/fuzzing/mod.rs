@@ -1,8 +1,10 @@
-//! What must hold whatever arrives: one function per part of the system that takes bytes from outside.
+//! What must hold whatever arrives: one function per part of the system that takes bytes from
+//! outside.
 //!
-//! Each target takes any bytes and panics when a property does not hold; that nothing panics otherwise is the least of
-//! them. The fuzzer in `tests/fuzz` looks for bytes that break one, and the tests in `tests/fuzz_seeds.rs` go through
-//! those that are kept as seeds. Nothing here reads a clock or waits, so the same bytes always do the same.
+//! Each target takes any bytes and panics when a property does not hold; that nothing panics
+//! otherwise is the least of them. The fuzzer in `tests/fuzz` looks for bytes that break one, and
+//! the tests in `tests/fuzz_seeds.rs` go through those that are kept as seeds. Nothing here reads a
+//! clock or waits, so the same bytes always do the same.
 
 mod body_rules;
 mod captures;

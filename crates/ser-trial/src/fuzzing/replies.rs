@@ -23,7 +23,10 @@ pub fn replies(data: &[u8]) {
     if let Reply::Read(read) = &reply {
         assert_eq!(read.entries.len(), usize::from(data[3]));
         assert!(read.entries.len() <= MAX_ENTRIES && data.len() <= MAX_BODY_LEN);
-        assert_eq!(read.model.map(|model| model.read_reply_len(read.entries.len())).unwrap_or(8), data.len());
+        assert_eq!(
+            read.model.map(|model| model.read_reply_len(read.entries.len())).unwrap_or(8),
+            data.len()
+        );
     }
     assert_eq!(Reply::parse(&reply.to_body()), Ok(reply));
 }

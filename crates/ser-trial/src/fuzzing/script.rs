@@ -1,6 +1,7 @@
 //! Bytes that decide what happens.
 
-/// Decisions, taken from bytes in the order in which they are asked for. When there are no more, all are 0.
+/// Decisions, taken from bytes in the order in which they are asked for. When there are no more,
+/// all are 0.
 #[derive(Clone, Debug)]
 pub(super) struct Script<'a> {
     bytes: &'a [u8],

@@ -1,7 +1,8 @@
 //! Seeds: inputs that are kept, each in a file whose name says what it is.
 //!
-//! A file whose name ends with `.hex` is text: pairs of hexadecimal digits, `HH*COUNT` for a byte that is repeated,
-//! `"text"` for its ASCII characters, and `#` for a comment up to the end of the line. Any other file is what it is.
+//! A file whose name ends with `.hex` is text: pairs of hexadecimal digits, `HH*COUNT` for a byte
+//! that is repeated, `"text"` for its ASCII characters, and `#` for a comment up to the end of the
+//! line. Any other file is what it is.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -41,7 +42,8 @@ pub fn of(target: &str) -> Result<Vec<Seed>, String> {
 /// # Errors
 /// As for [`of`].
 pub fn read(path: &Path) -> Result<Seed, String> {
-    let bytes = fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    let bytes =
+        fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     let is_hex = path.extension().is_some_and(|extension| extension == "hex");
     let name = if is_hex { path.file_stem() } else { path.file_name() };
     let name = name.unwrap_or_default().to_string_lossy().into_owned();
@@ -50,8 +52,8 @@ pub fn read(path: &Path) -> Result<Seed, String> {
     }
     let mut seed = Seed { name, bytes: Vec::new() };
     for (number, line) in String::from_utf8_lossy(&bytes).lines().enumerate() {
-        let line =
-            line_bytes(line).map_err(|why| format!("{}, line {}: {why}", path.display(), number + 1))?;
+        let line = line_bytes(line)
+            .map_err(|why| format!("{}, line {}: {why}", path.display(), number + 1))?;
         seed.bytes.extend(line);
     }
     Ok(seed)
@@ -68,7 +70,10 @@ fn line_bytes(line: &str) -> Result<Vec<u8>, String> {
             continue;
         }
         let (word, behind) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
-        bytes.extend(word_bytes(word).ok_or_else(|| format!("{word:?} is neither hex digits nor HH*COUNT"))?);
+        bytes.extend(
+            word_bytes(word)
+                .ok_or_else(|| format!("{word:?} is neither hex digits nor HH*COUNT"))?,
+        );
         rest = behind.trim_start();
     }
     Ok(bytes)
@@ -95,7 +100,10 @@ mod tests {
 
     #[test]
     fn hex_text_is_digits_repeats_text_and_comments() {
-        assert_eq!(line_bytes(r#"1B "01#" 0A0d*2 # the rest"#), Ok(b"\x1B01#\x0A\x0D\x0A\x0D".to_vec()));
+        assert_eq!(
+            line_bytes(r#"1B "01#" 0A0d*2 # the rest"#),
+            Ok(b"\x1B01#\x0A\x0D\x0A\x0D".to_vec())
+        );
         assert_eq!(line_bytes("  # nothing"), Ok(Vec::new()));
         for wrong in ["1", "1G", "*3", "00*x", "1B\"01\"", "\"open"] {
             assert!(line_bytes(wrong).is_err(), "{wrong}");

@@ -2,8 +2,8 @@
 
 use ser_cli::Delivered;
 
-/// The content of the file is `data`: it is read or refused, and what is read is the same after it has been written
-/// down again.
+/// The content of the file is `data`: it is read or refused, and what is read is the same after it
+/// has been written down again.
 ///
 /// # Panics
 /// When this does not hold.

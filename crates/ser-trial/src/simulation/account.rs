@@ -1,4 +1,5 @@
-//! What one reader was told, held against the ledger: each event once and in order, and each loss for what it was.
+//! What one reader was told, held against the ledger: each event once and in order, and each loss
+//! for what it was.
 
 mod silence;
 #[cfg(test)]
@@ -16,11 +17,12 @@ use super::wrong::{Told, Wrong, erases};
 use silence::Silence;
 pub use silence::{Known, Unreported};
 
-/// The recorder's total counts modulo this, so that a reader may miss a multiple of it without a trace.
+/// The recorder's total counts modulo this, so that a reader may miss a multiple of it without a
+/// trace.
 const TOTAL_WRAPS_AT: usize = 65_536;
 
-/// A reader that events come too fast for gives up some of the oldest that are still there: so many times as many as
-/// came during one of its requests.
+/// A reader that events come too fast for gives up some of the oldest that are still there: so many
+/// times as many as came during one of its requests.
 const HASTE: usize = 4;
 
 /// What became of the events of a recorder, for one reader; each is in one of these.
@@ -67,7 +69,8 @@ pub struct Account {
     new_life: bool,
     /// What was told and belongs before the next event.
     restart_told: bool,
-    /// If that was told of an empty log: events from this one on came later, and are not what was told of.
+    /// If that was told of an empty log: events from this one on came later, and are not what was
+    /// told of.
     told_up_to: usize,
     lost_told: usize,
     /// Inputs that were told to have changed unrecorded.
@@ -128,8 +131,8 @@ impl Account {
         self.in_hand.clear();
     }
 
-    /// A reply of the reading says that the log has had so many events. Replies may be late, so how many there are by
-    /// now is not what the reader goes by.
+    /// A reply of the reading says that the log has had so many events. Replies may be late, so how
+    /// many there are by now is not what the reader goes by.
     pub fn see_total(&mut self, total: u16) {
         let before = self.seen_total.replace(total).unwrap_or(total);
         self.came_meanwhile += usize::from(total.wrapping_sub(before));
@@ -152,13 +155,15 @@ impl Account {
     pub fn power_goes(&mut self, ledger: &Ledger, connected: bool) {
         let mut place = self.place(ledger).unwrap_or(0);
         if self.restart_told {
-            self.tally.gone += std::mem::take(&mut self.cut_off) + told(place..ledger.len(), self.told_up_to);
+            self.tally.gone +=
+                std::mem::take(&mut self.cut_off) + told(place..ledger.len(), self.told_up_to);
             place = place.max(self.told_up_to);
             self.end_restart();
         }
         let unread = (ledger.len() - place) as u64;
         *(if connected { &mut self.cut_off } else { &mut self.tally.unwatched }) += unread;
-        self.in_hand = (place..ledger.len()).filter_map(|index| ledger.event(index).copied()).collect();
+        self.in_hand =
+            (place..ledger.len()).filter_map(|index| ledger.event(index).copied()).collect();
         if !connected || self.in_hand.len() as u64 != unread {
             self.in_hand.clear();
         }
@@ -208,7 +213,8 @@ impl Account {
         Ok(())
     }
 
-    /// Erases that the reader may not have got past: of some it is not known exactly where they were.
+    /// Erases that the reader may not have got past: of some it is not known exactly where they
+    /// were.
     fn erases_ahead(&self, ledger: &Ledger) -> impl DoubleEndedIterator<Item = Erase> {
         let next = self.next;
         ledger.erases()[self.erases_behind..].iter().copied().filter(move |erase| erase.to >= next)
@@ -233,7 +239,8 @@ impl Account {
             }
         }
         let power_up = self.new_life.then_some(Erase::POWER_UP);
-        let erases = self.erases_ahead(ledger).rev().chain(power_up).chain(self.looks_erased(ledger));
+        let erases =
+            self.erases_ahead(ledger).rev().chain(power_up).chain(self.looks_erased(ledger));
         let after_erase = { erases }.find_map(|erase| {
             let index = if self.known == Known::Event && !self.restart_told {
                 self.after_traceless(erase, ledger, is)
@@ -248,9 +255,14 @@ impl Account {
         }
     }
 
-    /// Checks what was told of changes between the latest delivery and the event right after it. Where an erase can
-    /// have been between them, the reader need not know that event before.
-    fn check_unrecorded(&mut self, index: usize, inputs: u32, ledger: &Ledger) -> Result<(), String> {
+    /// Checks what was told of changes between the latest delivery and the event right after it.
+    /// Where an erase can have been between them, the reader need not know that event before.
+    fn check_unrecorded(
+        &mut self,
+        index: usize,
+        inputs: u32,
+        ledger: &Ledger,
+    ) -> Result<(), String> {
         let erased = self.erases_ahead(ledger).any(|erase| erase.from <= index);
         let actual = ledger.event(index).map_or(0, |event| event.unrecorded);
         self.tally.unrecorded += u64::from(inputs != 0);
@@ -264,15 +276,17 @@ impl Account {
             .err()
     }
 
-    /// How many of the events in hand come before this one, if it is one of them and these are reported as lost.
+    /// How many of the events in hand come before this one, if it is one of them and these are
+    /// reported as lost.
     fn in_hand_before(&self, entry: &Entry, lost: usize) -> Option<usize> {
         let first = if self.in_hand_uncounted { 0 } else { lost };
         let is = |skipped: &usize| self.in_hand.get(*skipped).is_some_and(|event| event.is(entry));
         (first..=lost.min(self.in_hand.len())).find(is).filter(|_| !self.restart_told)
     }
 
-    /// Delivers an event that was read before the power went. A small ring that is full again, and stands as if the log
-    /// had gone on, leaves no trace of that; the next reading misses the event that was delivered last.
+    /// Delivers an event that was read before the power went. A small ring that is full again, and
+    /// stands as if the log had gone on, leaves no trace of that; the next reading misses the event
+    /// that was delivered last.
     fn deliver_in_hand(&mut self, skipped: usize) {
         self.in_hand.drain(..=skipped);
         self.cut_off -= skipped as u64 + 1;
@@ -281,22 +295,29 @@ impl Account {
         self.known = Known::Event;
     }
 
-    /// Whether so much has happened since the latest delivery that the total tells little of it. It can look as if
-    /// the event delivered last must still be there, and then its absence looks like an erase.
+    /// Whether so much has happened since the latest delivery that the total tells little of it. It
+    /// can look as if the event delivered last must still be there, and then its absence looks like
+    /// an erase.
     fn has_wrapped(&self, ledger: &Ledger) -> bool {
         ledger.len() - self.next >= TOTAL_WRAPS_AT
     }
 
     /// The erase from which on the total counts, where there seems to have been another one since.
     fn looks_erased(&self, ledger: &Ledger) -> Option<Erase> {
-        let latest = ledger.erases()[..self.erases_behind].last().copied().unwrap_or(Erase::POWER_UP);
+        let latest =
+            ledger.erases()[..self.erases_behind].last().copied().unwrap_or(Erase::POWER_UP);
         (self.restart_told && self.has_wrapped(ledger)).then_some(latest)
     }
 
-    /// The event after an erase of which there is no word, to a reader that knows the event before. It leaves no
-    /// trace where the log is full again; the count of what is lost is then that of two totals that have nothing to
-    /// do with each other.
-    fn after_traceless(&self, erase: Erase, ledger: &Ledger, is: impl Fn(usize) -> bool) -> Option<usize> {
+    /// The event after an erase of which there is no word, to a reader that knows the event before.
+    /// It leaves no trace where the log is full again; the count of what is lost is then that of
+    /// two totals that have nothing to do with each other.
+    fn after_traceless(
+        &self,
+        erase: Erase,
+        ledger: &Ledger,
+        is: impl Fn(usize) -> bool,
+    ) -> Option<usize> {
         let found = || (erase.from..ledger.len()).find(|&index| is(index));
         self.silence(erase, ledger).and_then(|_| found())
     }
@@ -308,26 +329,40 @@ impl Account {
         self.known.silence(full_again)
     }
 
-    /// An erase that lies between the latest delivery and the event of this index, that must have been seen and of
-    /// which there is no word.
+    /// An erase that lies between the latest delivery and the event of this index, that must have
+    /// been seen and of which there is no word.
     fn silent_erase(&self, index: usize, ledger: &Ledger) -> Option<Erase> {
         if self.restart_told {
             return None;
         }
         let between = |erase: &Erase| erase.certain && erase.from >= self.next && erase.to <= index;
-        let erases =
-            self.erases_ahead(ledger).filter(between).chain(self.new_life.then_some(Erase::POWER_UP));
+        let erases = self
+            .erases_ahead(ledger)
+            .filter(between)
+            .chain(self.new_life.then_some(Erase::POWER_UP));
         { erases }.find(|&erase| self.silence(erase, ledger).is_none())
     }
 
-    /// How many times the total has wrapped unseen before the event at `index` or so many rings further on.
-    fn wraps_until(&self, index: usize, ledger: &Ledger, is: impl Fn(usize) -> bool) -> Option<usize> {
+    /// How many times the total has wrapped unseen before the event at `index` or so many rings
+    /// further on.
+    fn wraps_until(
+        &self,
+        index: usize,
+        ledger: &Ledger,
+        is: impl Fn(usize) -> bool,
+    ) -> Option<usize> {
         let wraps = ledger.len().saturating_sub(index) / TOTAL_WRAPS_AT;
         (0..=wraps).find(|wraps| is(index + wraps * TOTAL_WRAPS_AT))
     }
 
     /// Delivers an event of the same log, after so many that were reported as lost.
-    fn go_on(&mut self, index: usize, wraps: usize, lost: usize, ledger: &Ledger) -> Result<(), String> {
+    fn go_on(
+        &mut self,
+        index: usize,
+        wraps: usize,
+        lost: usize,
+        ledger: &Ledger,
+    ) -> Result<(), String> {
         if let Some(erase) = self.silent_erase(index, ledger) {
             return Err(self.explain_silence(index, erase, ledger));
         }
@@ -360,25 +395,37 @@ impl Account {
         self.deliver(index, ledger)
     }
 
-    /// Checks that the events before this one, which the reader was not given, can have been overwritten.
+    /// Checks that the events before this one, which the reader was not given, can have been
+    /// overwritten.
     fn check_overwritten(&self, index: usize, lost: usize, ledger: &Ledger) -> Result<(), String> {
         let came = self.came_meanwhile;
         let may_be_lost = ledger.overwritten_before() + HASTE * came;
         if index <= may_be_lost {
             return Ok(());
         }
-        let what = format!("{}: events are reported as lost, or passed over, and are still there", self.name);
+        let what = format!(
+            "{}: events are reported as lost, or passed over, and are still there",
+            self.name
+        );
         Wrong::new(what)
             .fact("came", ledger.numbered(index))
             .fact("due", ledger.numbered(self.next))
             .fact("reported lost", format_args!("{lost} events"))
-            .fact("overwritten", format_args!("at most those before {}", ledger.overwritten_before()))
+            .fact(
+                "overwritten",
+                format_args!("at most those before {}", ledger.overwritten_before()),
+            )
             .fact("meanwhile", format_args!("{came} events came during the reading"))
             .err()
     }
 
     /// These events are gone with this erase, with or without a word.
-    fn count_gone(&mut self, events: Range<usize>, erase: Erase, ledger: &Ledger) -> Result<(), String> {
+    fn count_gone(
+        &mut self,
+        events: Range<usize>,
+        erase: Erase,
+        ledger: &Ledger,
+    ) -> Result<(), String> {
         let all = events.len() as u64;
         let told = match (self.restart_told, self.known) {
             (false, _) => 0,
@@ -400,10 +447,18 @@ impl Account {
         self.count_unreported(cut_off, Erase::POWER_UP, ledger)
     }
 
-    fn count_unreported(&mut self, events: u64, erase: Erase, ledger: &Ledger) -> Result<(), String> {
+    fn count_unreported(
+        &mut self,
+        events: u64,
+        erase: Erase,
+        ledger: &Ledger,
+    ) -> Result<(), String> {
         if events > 0 {
             let silence = self.silence(erase, ledger).ok_or_else(|| {
-                format!("{}: {events} events are gone without a word, and nothing excuses that", self.name)
+                format!(
+                    "{}: {events} events are gone without a word, and nothing excuses that",
+                    self.name
+                )
             })?;
             self.tally.unreported.count(events, silence);
         }
@@ -440,13 +495,17 @@ impl Account {
     }
 
     fn explain(&self, entry: &Entry, lost: usize, ledger: &Ledger) -> String {
-        let found =
-            (0..ledger.len()).rev().find(|&index| ledger.event(index).is_some_and(|event| event.is(entry)));
+        let found = (0..ledger.len())
+            .rev()
+            .find(|&index| ledger.event(index).is_some_and(|event| event.is(entry)));
         let (what, came) = match found {
-            Some(index) if index < self.next => {
-                (format!("event {index} comes twice or too late"), ledger.numbered(index).to_string())
+            Some(index) if index < self.next => (
+                format!("event {index} comes twice or too late"),
+                ledger.numbered(index).to_string(),
+            ),
+            Some(index) => {
+                (format!("event {index} comes too early"), ledger.numbered(index).to_string())
             }
-            Some(index) => (format!("event {index} comes too early"), ledger.numbered(index).to_string()),
             None => ("this event has never been".to_owned(), Told(entry).to_string()),
         };
         let restart = if self.restart_told { ", a restart of the log" } else { "" };
@@ -470,8 +529,10 @@ impl Account {
         let len = ledger.len();
         let place = self.place(ledger).unwrap_or(0);
         // An erase with nothing after it; that one need not be the last to have arrived.
-        let emptied = self.erases_ahead(ledger).find(|erase| erase.to >= len).filter(|_| place < len);
-        if (self.new_life || emptied.is_some()) && self.known == Known::Event && !self.restart_told {
+        let emptied =
+            self.erases_ahead(ledger).find(|erase| erase.to >= len).filter(|_| place < len);
+        if (self.new_life || emptied.is_some()) && self.known == Known::Event && !self.restart_told
+        {
             return Err(format!(
                 "{}: nothing has come of a log that began anew, nor a word of a restart",
                 self.name
@@ -498,7 +559,12 @@ fn told(events: Range<usize>, up_to: usize) -> u64 {
 }
 
 /// The event after an erase with so many reported as lost before it, or a multiple of 65536 more.
-fn after_exactly(erase: Erase, lost: usize, ledger: &Ledger, is: impl Fn(usize) -> bool) -> Option<usize> {
+fn after_exactly(
+    erase: Erase,
+    lost: usize,
+    ledger: &Ledger,
+    is: impl Fn(usize) -> bool,
+) -> Option<usize> {
     let last = erase.to.min(ledger.len());
     let wraps = (ledger.len() - erase.from) / TOTAL_WRAPS_AT;
     (0..=wraps).find_map(|wraps| {

@@ -1,6 +1,8 @@
-//! The Genius bus of one life: recorders and the host with their boards, other devices, and what goes wrong.
+//! The Genius bus of one life: recorders and the host with their boards, other devices, and what
+//! goes wrong.
 //!
-//! A bus is lived through in full, event by event, as its devices have something to do in every scan.
+//! A bus is lived through in full, event by event, as its devices have something to do in every
+//! scan.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -50,7 +52,8 @@ struct UnitPort {
     has_line: bool,
     /// How often the recorder had given its board up when it was served last.
     failures: u32,
-    /// Whether its board has started anew without the recorder's doing, so that it was looked at too early.
+    /// Whether its board has started anew without the recorder's doing, so that it was looked at
+    /// too early.
     restarted: bool,
     /// Since when datagrams had waited that a board which started anew took with it: the recorder
     /// waits for them until it finds that out.
@@ -72,8 +75,9 @@ impl BusHost {
     #[must_use]
     pub fn new(chance: Chance, units: usize) -> BusHost {
         const NAMES: [&str; 2] = ["bus, first", "bus, second"];
-        let talk =
-            |index: usize| Conversation::new(NAMES[index], ser_client::LineRate::Instant).one_at_a_time();
+        let talk = |index: usize| {
+            Conversation::new(NAMES[index], ser_client::LineRate::Instant).one_at_a_time()
+        };
         BusHost {
             talks: (0..units).map(talk).collect(),
             next_order_ms: vec![0; units],
@@ -90,7 +94,8 @@ impl BusHost {
     }
 
     fn begin_next(&mut self, now_ms: u64, errand: Errand, trail: &Trail) {
-        for (index, talk) in self.talks.iter_mut().enumerate().filter(|(_, talk)| talk.is_resting()) {
+        for (index, talk) in self.talks.iter_mut().enumerate().filter(|(_, talk)| talk.is_resting())
+        {
             let order = match errand {
                 Errand::CatchUp { since_ms } if talk.has_read_since(since_ms) => continue,
                 Errand::CatchUp { .. } => Order::Read,
@@ -172,9 +177,11 @@ impl BusLife {
         });
         let units: Vec<UnitPort> = units.collect();
         let (host, window) = connect(HOST);
-        let driver = Driver::new(window, Options { start: RESET, ..Options::new(Configuration::DEFAULT) });
+        let driver =
+            Driver::new(window, Options { start: RESET, ..Options::new(Configuration::DEFAULT) });
         let deaf = bus.borrow_mut().connect(Board::powered(BoardOptions::at(DEAF))).id();
-        let block = DiscreteBlock::new(2, BusTiming::default(), Circuits::Sixteen, BlockKind::Inputs);
+        let block =
+            DiscreteBlock::new(2, BusTiming::default(), Circuits::Sixteen, BlockKind::Inputs);
         let block = bus.borrow_mut().connect(block).id();
         let next_fault_ms = begin_ms + chance.within(5_000..=60_000);
         BusLife {
@@ -218,8 +225,8 @@ impl BusLife {
         ledger.wait_after(self.untaken_since_ms(index));
     }
 
-    /// Since when the oldest datagram waits that a recorder still has to take from its board, by its
-    /// interrupt line or by its looks. From a board that has failed nothing will be taken.
+    /// Since when the oldest datagram waits that a recorder still has to take from its board, by
+    /// its interrupt line or by its looks. From a board that has failed nothing will be taken.
     fn untaken_since_ms(&mut self, index: usize) -> Option<u64> {
         let UnitPort { port, board, tap, has_line, gone_since_ms, .. } = &mut self.units[index];
         if !port.is_ready() {
@@ -235,8 +242,8 @@ impl BusLife {
         gone_since_ms.or(untaken_us.map(|us| self.ms(us)))
     }
 
-    /// When a message counts as arrived: in the millisecond of its pulse, or of the look that saw its
-    /// flag; `None` if there was no such look.
+    /// When a message counts as arrived: in the millisecond of its pulse, or of the look that saw
+    /// its flag; `None` if there was no such look.
     ///
     /// # Errors
     /// When a look lies outside of what it may be.
@@ -247,7 +254,8 @@ impl BusLife {
         }
         match taken.seen_ms {
             Some(seen_ms) if !(came_ms..=now_ms).contains(&seen_ms) => Err(format!(
-                "a datagram of {came_ms} ms counts as arrived at {seen_ms} ms, and is read at {now_ms} ms"
+                "a datagram of {came_ms} ms counts as arrived at {seen_ms} ms, and is read at \
+                 {now_ms} ms"
             )),
             seen_ms => Ok(seen_ms),
         }
@@ -292,7 +300,9 @@ impl BusLife {
                     ledger.set_recording(arrived_ms.unwrap_or(now_ms), recording);
                 }
                 Ok(command) if taken.broadcast => ledger.command_done(&command),
-                Ok(command) => ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS),
+                Ok(command) => {
+                    ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS)
+                }
             }
         }
         ledger.wait_after(self.untaken_since_ms(index));
@@ -376,7 +386,10 @@ impl BusLife {
             3 => {
                 // Somebody turns the switches of another device to a recorder's number, and back.
                 let number = chance.pick(&[FIRST_UNIT, DEAF]);
-                return Fault::Inside { device: self.others[0], fault: DeviceFault::ChangeAddress(number) };
+                return Fault::Inside {
+                    device: self.others[0],
+                    fault: DeviceFault::ChangeAddress(number),
+                };
             }
             4 => DeviceFault::Hang,
             5 => DeviceFault::Reset,
@@ -392,7 +405,10 @@ impl BusLife {
     pub fn mend(&mut self, trail: &Trail) {
         trail.note("bus: mended");
         let mut bus = self.bus.borrow_mut();
-        bus.inject(Fault::Inside { device: self.others[0], fault: DeviceFault::ChangeAddress(DEAF) });
+        bus.inject(Fault::Inside {
+            device: self.others[0],
+            fault: DeviceFault::ChangeAddress(DEAF),
+        });
         for device in self.units.iter().map(|unit| unit.board.id()).chain([self.host.id()]) {
             bus.inject(Fault::Inside { device, fault: DeviceFault::AnswerLate { by_us: 0 } });
         }
@@ -406,9 +422,11 @@ impl BusLife {
         let bus = self.bus.borrow();
         let boards = self.units.iter().map(|unit| (unit.number, unit.board, unit.restarted));
         for (number, board, restarted) in boards.chain([(HOST, self.host, self.host_restarted)]) {
-            // Nobody tells a host that its board has started anew by itself: it finds out by looking.
+            // Nobody tells a host that its board has started anew by itself: it finds out by
+            // looking.
             let allowed = |kind| restarted && kind == ViolationKind::TooEarly;
-            let broken = bus.get(board).violations().iter().find(|violation| !allowed(violation.kind));
+            let broken =
+                bus.get(board).violations().iter().find(|violation| !allowed(violation.kind));
             if let Some(violation) = broken {
                 return Err(format!("device {number} breaks a rule of its board: {violation}"));
             }

@@ -15,7 +15,8 @@ impl Chance {
         Chance(SplitMix64::new(seed))
     }
 
-    /// Decisions of its own for one part of the run, so that it stays the same when another part asks more often.
+    /// Decisions of its own for one part of the run, so that it stays the same when another part
+    /// asks more often.
     #[must_use]
     pub fn branch(&mut self) -> Chance {
         Chance::new(self.0.next())
@@ -31,7 +32,8 @@ impl Chance {
         range.start() + self.below(range.end() - range.start() + 1)
     }
 
-    /// A number in a range, small ones as often as large ones: as many from 1 to 10 as from 100 to 1000.
+    /// A number in a range, small ones as often as large ones: as many from 1 to 10 as from 100 to
+    /// 1000.
     pub fn spread(&mut self, range: RangeInclusive<u64>) -> u64 {
         let (low, high) = (*range.start(), *range.end());
         let doublings = (high / low.max(1)).max(1).ilog2();

@@ -1,4 +1,5 @@
-//! A host's conversation with one recorder: the client's own session and log reader, driven in virtual time.
+//! A host's conversation with one recorder: the client's own session and log reader, driven in
+//! virtual time.
 
 use std::time::Duration;
 
@@ -20,7 +21,8 @@ pub enum Order {
     Read,
     /// The answer to a command.
     Ask(Command),
-    /// The clock to be set, with a time of its own for every attempt: this much later than the first.
+    /// The clock to be set, with a time of its own for every attempt: this much later than the
+    /// first.
     SetClock(TimeStamp),
 }
 
@@ -108,7 +110,8 @@ impl Conversation {
         Conversation { session: self.session.one_at_a_time(), ..self }
     }
 
-    /// From now on every other reading goes on for as long as there is enough for a full reply, which may be for ever.
+    /// From now on every other reading goes on for as long as there is enough for a full reply,
+    /// which may be for ever.
     pub fn keep_up(&mut self) {
         self.may_keep_up = true;
     }
@@ -158,7 +161,8 @@ impl Conversation {
         self.in_force.take()
     }
 
-    /// Whether the latest order was a reading that began at this time or later and came to the end of the log.
+    /// Whether the latest order was a reading that began at this time or later and came to the end
+    /// of the log.
     #[must_use]
     pub fn has_read_since(&self, ms: u64) -> bool {
         self.at_end && self.began_ms >= ms
@@ -176,7 +180,9 @@ impl Conversation {
         };
         let Conversation { account, failures, size, cursor, talk, .. } = self;
         let (name, cursor) = (account.name(), cursor.map(|cursor| cursor.total()));
-        format!("{name} ({job}; {failures} failures, size {size}, total at cursor {cursor:?}, {talk:?})")
+        format!(
+            "{name} ({job}; {failures} failures, size {size}, total at cursor {cursor:?}, {talk:?})"
+        )
     }
 
     /// Begins something. The host must be resting.
@@ -186,7 +192,8 @@ impl Conversation {
         match order {
             Order::Read => {
                 self.behind = false;
-                // Another host may have changed it, and a reading is only as good as the size that it goes by.
+                // Another host may have changed it, and a reading is only as good as the size that
+                // it goes by.
                 self.job = Job::LearnSize { resyncs: 0 };
                 self.request(Command::QueryConfiguration, now_ms);
             }
@@ -291,7 +298,8 @@ impl Conversation {
         let mut attempt = self.session.dispatch(duration(now_ms))?;
         // Each attempt has a time of its own, so that one sees which of them it was.
         let millisecond = (u32::from(time.millisecond) + attempt.number()) % 1000;
-        attempt.set_time(TimeStamp { millisecond: u16::try_from(millisecond).unwrap_or(0), ..time });
+        attempt
+            .set_time(TimeStamp { millisecond: u16::try_from(millisecond).unwrap_or(0), ..time });
         Some(Outgoing { command: *attempt.command(), frame: attempt.frame().to_vec() })
     }
 

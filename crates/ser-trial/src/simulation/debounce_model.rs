@@ -1,5 +1,5 @@
-//! Debounce as one would explain it: a change counts when the input has stayed in its new state long enough, and it
-//! happened when the input went there.
+//! Debounce as one would explain it: a change counts when the input has stayed in its new state
+//! long enough, and it happened when the input went there.
 
 use ser_node::Debounce;
 
@@ -48,7 +48,8 @@ impl DebounceModel {
                 self.filtered += 2;
             }
             input.since_ms = at_ms;
-            self.unsettled = self.unsettled & !(1 << bit) | u32::from(input.now != input.accepted) << bit;
+            self.unsettled =
+                self.unsettled & !(1 << bit) | u32::from(input.now != input.accepted) << bit;
         }
     }
 

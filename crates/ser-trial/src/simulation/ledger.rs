@@ -1,8 +1,10 @@
-//! What a recorder must have recorded, worked out from what was done to it and from nothing that it says.
+//! What a recorder must have recorded, worked out from what was done to it and from nothing that it
+//! says.
 //!
-//! Every edge of every contact goes through here: filtered by debounce, stamped by the clock as it was set at that
-//! moment, recorded or not as the mode was. The result is a list of events that is never erased nor overwritten; erases
-//! are marks in it, between the events that they can have come between.
+//! Every edge of every contact goes through here: filtered by debounce, stamped by the clock as it
+//! was set at that moment, recorded or not as the mode was. The result is a list of events that is
+//! never erased nor overwritten; erases are marks in it, between the events that they can have come
+//! between.
 
 #[cfg(test)]
 mod tests;
@@ -20,8 +22,8 @@ use super::wrong::{Numbered, Told, Wrong, erases};
 /// A hundred years, 1970–2069: what two-digit years can tell apart.
 const CENTURY_MS: i64 = 36_525 * 86_400_000;
 
-/// So many events are kept at least: more than a log holds and a plant does while a printed line waits for a host
-/// that is stuck.
+/// So many events are kept at least: more than a log holds and a plant does while a printed line
+/// waits for a host that is stuck.
 const KEPT: usize = 1 << 17;
 
 /// For so long a reply may be on its way that tells older settings.
@@ -64,7 +66,8 @@ enum Due {
     Size {
         /// `None` if it leaves the size alone.
         to: Option<u16>,
-        /// Whether the size was changed over another port meanwhile, so that the answer may be of before.
+        /// Whether the size was changed over another port meanwhile, so that the answer may be of
+        /// before.
         doubtful: bool,
     },
 }
@@ -95,7 +98,8 @@ pub struct Ledger {
     /// Contacts, and inputs as the latest event has them.
     contacts: u32,
     state: u32,
-    /// Inputs that changed since the latest event, with recording stopped or beyond the capture queue.
+    /// Inputs that changed since the latest event, with recording stopped or beyond the capture
+    /// queue.
     unrecorded: u32,
     /// From which millisecond on the clock shows that much more than the simulation's time.
     clock: Vec<(u64, i64)>,
@@ -184,7 +188,8 @@ impl Ledger {
 
     /// Edges that are not decided upon.
     fn undecided(&self) -> u64 {
-        let waiting: u64 = self.waiting.values().map(|waiting| u64::from(waiting.changed.count_ones())).sum();
+        let waiting: u64 =
+            self.waiting.values().map(|waiting| u64::from(waiting.changed.count_ones())).sum();
         waiting + self.debounce.unsettled()
     }
 
@@ -199,7 +204,8 @@ impl Ledger {
         self.accepted = accepted;
     }
 
-    /// Contacts move, one move per millisecond, while the main loop is held up. For recorders without debounce.
+    /// Contacts move, one move per millisecond, while the main loop is held up. For recorders
+    /// without debounce.
     pub fn contacts_moved_unseen(&mut self, moves: impl Iterator<Item = (u64, u32)>) {
         for (count, (at_ms, changed)) in moves.enumerate() {
             if count < QUEUE_LEN {
@@ -309,7 +315,8 @@ impl Ledger {
         (ahead_ms + signed(now_ms)).rem_euclid(CENTURY_MS)
     }
 
-    /// A command has arrived that waits for its turn; what it changes is done by this time, or never.
+    /// A command has arrived that waits for its turn; what it changes is done by this time, or
+    /// never.
     pub fn command_arrived(&mut self, port: Port, command: &Command, until_ms: u64) {
         match command {
             Command::Erase => {
@@ -322,7 +329,11 @@ impl Ledger {
             }
             Command::Configure(configure) => {
                 self.forget_configuration(port);
-                self.due.push_back((port, until_ms, Due::Size { to: configure.size, doubtful: false }));
+                self.due.push_back((
+                    port,
+                    until_ms,
+                    Due::Size { to: configure.size, doubtful: false },
+                ));
                 self.note_overwritten();
             }
             _ => {}
@@ -369,7 +380,8 @@ impl Ledger {
             Reply::Configuration(configuration) => {
                 let done = self.finish(|of, _, due| of == port && matches!(due, Due::Size { .. }));
                 let certain = matches!(done, Some(Due::Size { doubtful: false, .. }));
-                self.size = if certain { configuration.size } else { self.size.min(configuration.size) };
+                self.size =
+                    if certain { configuration.size } else { self.size.min(configuration.size) };
                 self.note_overwritten();
                 if port == Port::Line {
                     self.see_configuration(*configuration)?;
@@ -417,7 +429,8 @@ impl Ledger {
         Some(due)
     }
 
-    /// The size is another one now. Answers that are waiting in the queue of a port may be of before.
+    /// The size is another one now. Answers that are waiting in the queue of a port may be of
+    /// before.
     fn doubt_answers(&mut self, of: impl Fn(Port) -> bool) {
         for (_, _, due) in self.due.iter_mut().filter(|(port, ..)| of(*port)) {
             if let Due::Size { doubtful, .. } = due {
@@ -426,7 +439,8 @@ impl Ledger {
         }
     }
 
-    /// Checks what a recorder holds in its log: the total, and its entries from the oldest to the newest.
+    /// Checks what a recorder holds in its log: the total, and its entries from the oldest to the
+    /// newest.
     ///
     /// # Errors
     /// The first difference.
@@ -448,11 +462,13 @@ impl Ledger {
         }
         let counts_from = |from: usize| from <= first && low_16(len - from) == total;
         let Some(from) = self.may_count_from().find(|&from| counts_from(from)) else {
-            return Wrong::new(format!("the log counts {total} events, and cannot have had so many"))
-                .fact("recorded", format_args!("{len} events since power-up"))
-                .fact("holds", format_args!("{} entries", entries.len()))
-                .fact("erases", erases(self.erases.iter().copied()))
-                .err();
+            return Wrong::new(format!(
+                "the log counts {total} events, and cannot have had so many"
+            ))
+            .fact("recorded", format_args!("{len} events since power-up"))
+            .fact("holds", format_args!("{} entries", entries.len()))
+            .fact("erases", erases(self.erases.iter().copied()))
+            .err();
         };
         let oldest_kept = self.overwritten_before.max(from);
         if first > oldest_kept {
@@ -468,8 +484,8 @@ impl Ledger {
         Ok(())
     }
 
-    /// Indices from which on the total can count: all places where the latest erase can have been. They are not done
-    /// in the order in which they arrive, as each port has its own queue.
+    /// Indices from which on the total can count: all places where the latest erase can have been.
+    /// They are not done in the order in which they arrive, as each port has its own queue.
     fn may_count_from(&self) -> impl Iterator<Item = usize> {
         let certain = self.erases.iter().filter(|erase| erase.certain);
         let earliest = certain.map(|erase| erase.from).max().unwrap_or(0);

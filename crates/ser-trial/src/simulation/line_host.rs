@@ -158,8 +158,9 @@ impl LineHost {
     /// Bytes from elsewhere get onto the line.
     pub fn stray_bytes(&mut self, now_ms: u64) {
         let count = self.chance.spread(1..=60);
-        let bytes: Vec<u8> =
-            (0..count).map(|_| if self.chance.one_in(4) { 0x1B } else { self.chance.byte() }).collect();
+        let bytes: Vec<u8> = (0..count)
+            .map(|_| if self.chance.one_in(4) { 0x1B } else { self.chance.byte() })
+            .collect();
         self.send(now_ms, &bytes);
     }
 
@@ -304,7 +305,13 @@ impl LineHost {
     ///
     /// # Errors
     /// When the recorder's log is not what it must be.
-    pub fn act(&mut self, now_ms: u64, errand: Errand, ledger: &Ledger, trail: &Trail) -> Result<(), String> {
+    pub fn act(
+        &mut self,
+        now_ms: u64,
+        errand: Errand,
+        ledger: &Ledger,
+        trail: &Trail,
+    ) -> Result<(), String> {
         if now_ms < self.stuck_until_ms {
             return Ok(());
         }
@@ -328,7 +335,9 @@ impl LineHost {
             return self.seek(now_ms, trail);
         }
         let order = match errand {
-            Errand::Any if !self.talk.is_behind() => orders::next_order(&mut self.chance, Way::Line),
+            Errand::Any if !self.talk.is_behind() => {
+                orders::next_order(&mut self.chance, Way::Line)
+            }
             Errand::Any | Errand::CatchUp { .. } => Order::Read,
         };
         if !matches!(order, Order::Read) {
@@ -362,7 +371,8 @@ impl LineHost {
         self.seeking = Some((index, usual));
         self.set_baud(baud);
         let question = Command::Read { start: 1, count: 1 };
-        let bytes = encoded_len(question.to_body().len()) + encoded_len(Model::Ser320.read_reply_len(1));
+        let bytes =
+            encoded_len(question.to_body().len()) + encoded_len(Model::Ser320.read_reply_len(1));
         let patience = SEARCH_TIMEOUT + self.line_rate().time_for(bytes);
         self.talk.session().set_line_rate(LineRate::Instant);
         self.talk.session().set_patience(patience, 0);

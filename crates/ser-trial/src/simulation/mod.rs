@@ -1,16 +1,19 @@
-//! The whole system in one virtual time, left to chance and held to account: recorders with both their ports, the hosts that
-//! read them with the client's own code, boards, bus and contacts; and everything that goes wrong with them.
+//! The whole system in one virtual time, left to chance and held to account: recorders with both
+//! their ports, the hosts that read them with the client's own code, boards, bus and contacts; and
+//! everything that goes wrong with them.
 //!
-//! - [`world`] lets it all live: [`mod@unit`] is a recorder, [`line_host`] and [`bus`] are its surroundings, [`activity`]
-//!   moves the contacts, [`orders`] says what hosts want, [`noise`] spoils the line.
-//! - [`ledger`] works out from what was done to a recorder which events it must have recorded, with which stamps;
-//!   [`taps`] tell it what the recorder was given, and [`debounce_model`] what its inputs came to.
+//! - [`world`] lets it all live: [`mod@unit`] is a recorder, [`line_host`] and [`bus`] are its
+//!   surroundings, [`activity`] moves the contacts, [`orders`] says what hosts want, [`noise`]
+//!   spoils the line.
+//! - [`ledger`] works out from what was done to a recorder which events it must have recorded, with
+//!   which stamps; [`taps`] tell it what the recorder was given, and [`debounce_model`] what its
+//!   inputs came to.
 //! - [`printout`] reads what a recorder prints.
-//! - [`account`] holds what a reader was told against the ledger: every event once and in order, or reported as lost
-//!   with the right count.
+//! - [`account`] holds what a reader was told against the ledger: every event once and in order, or
+//!   reported as lost with the right count.
 //!
-//! Everything follows from one seed. [`run`] gives a [`Report`] with a digest of all that happened, and the [`Paces`]
-//! at which it did; or a [`Failure`] that says how to repeat it.
+//! Everything follows from one seed. [`run`] gives a [`Report`] with a digest of all that happened,
+//! and the [`Paces`] at which it did; or a [`Failure`] that says how to repeat it.
 
 pub mod account;
 pub mod activity;
@@ -62,7 +65,8 @@ impl fmt::Display for Failure {
         writeln!(f, "{}\n", self.what)?;
         writeln!(
             f,
-            "to repeat it:\n  cargo xtask simulate --seed {seed} --hours {hours} --bus-one-in {bus_one_in}{load}\n"
+            "to repeat it:\n  cargo xtask simulate --seed {seed} --hours {hours} --bus-one-in \
+             {bus_one_in}{load}\n"
         )?;
         write!(f, "what was done last:\n{}", self.trail)
     }
@@ -78,7 +82,8 @@ pub fn run(options: Options) -> Result<(Report, Paces), Box<Failure>> {
     live(options, "", World::run)
 }
 
-/// Runs a recorder at the limit of what it can record, with both ports busy all the time; the seed is of little consequence.
+/// Runs a recorder at the limit of what it can record, with both ports busy all the time; the seed
+/// is of little consequence.
 ///
 /// # Errors
 /// As [`run`].
@@ -93,7 +98,8 @@ fn live(
 ) -> Result<(Report, Paces), Box<Failure>> {
     let trail = Trail::default();
     let world = World::new(options, trail.clone());
-    let result = catch_unwind(AssertUnwindSafe(|| live(world))).unwrap_or_else(|panic| Err(words(&*panic)));
+    let result =
+        catch_unwind(AssertUnwindSafe(|| live(world))).unwrap_or_else(|panic| Err(words(&*panic)));
     result.map_err(|what| {
         Box::new(Failure { options, load, what, at_ms: trail.now_ms(), trail: trail.to_string() })
     })

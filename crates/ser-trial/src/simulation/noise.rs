@@ -1,9 +1,9 @@
 //! What happens to bytes on a bad line, and what bytes become at the wrong rate.
 //!
-//! The protocol's checksum has eight bits, so that one in 256 frames that are damaged beyond a single bit gets through as
-//! something else, and no host and no recorder could know. Towards the host such frames are stopped here, as
-//! the simulation is about what can be known; they are counted. Towards the recorder they go: the ledger hears what the
-//! recorder hears.
+//! The protocol's checksum has eight bits, so that one in 256 frames that are damaged beyond a
+//! single bit gets through as something else, and no host and no recorder could know. Towards the
+//! host such frames are stopped here, as the simulation is about what can be known; they are
+//! counted. Towards the recorder they go: the ledger hears what the recorder hears.
 
 use ser_proto::{Decoded, FrameDecoder, MAX_BODY_LEN};
 
@@ -61,7 +61,12 @@ impl FrameGuard {
     /// For a line on which nothing has been said.
     #[must_use]
     pub fn new() -> FrameGuard {
-        FrameGuard { said: FrameDecoder::new(), heard: FrameDecoder::new(), bodies: Vec::new(), stopped: 0 }
+        FrameGuard {
+            said: FrameDecoder::new(),
+            heard: FrameDecoder::new(),
+            bodies: Vec::new(),
+            stopped: 0,
+        }
     }
 
     /// The recorder says a byte.

@@ -48,15 +48,27 @@ pub fn next_broadcast(chance: &mut Chance) -> Command {
 fn set_clock(chance: &mut Chance) -> Order {
     if chance.one_in(8) {
         // There is no such day: refused by silence.
-        return Order::Ask(Command::SetClock(TimeStamp { month: 2, day: 30, ..valid_time(chance) }));
+        return Order::Ask(Command::SetClock(TimeStamp {
+            month: 2,
+            day: 30,
+            ..valid_time(chance)
+        }));
     }
     Order::SetClock(valid_time(chance))
 }
 
-/// Often a few seconds before midnight, before a New Year, a leap day or the end of the hundred years.
+/// Often a few seconds before midnight, before a New Year, a leap day or the end of the hundred
+/// years.
 fn valid_time(chance: &mut Chance) -> TimeStamp {
-    let eve =
-        |year, month, day| TimeStamp { year, month, day, hour: 23, minute: 59, second: 50, millisecond: 0 };
+    let eve = |year, month, day| TimeStamp {
+        year,
+        month,
+        day,
+        hour: 23,
+        minute: 59,
+        second: 50,
+        millisecond: 0,
+    };
     let time = match chance.below(6) {
         0 => eve(26, 12, 31),
         1 => eve(69, 12, 31),
@@ -81,8 +93,10 @@ fn small(chance: &mut Chance, from: u64, to: u64) -> u8 {
 }
 
 fn configure(chance: &mut Chance, way: Way) -> Configure {
-    // The slowest rates take minutes for what others do in seconds; a plant would not choose them either.
-    let rates = [Baud::B300, Baud::B1200, Baud::B2400, Baud::B4800, Baud::B9600, Baud::B9600, Baud::B19200];
+    // The slowest rates take minutes for what others do in seconds; a plant would not choose them
+    // either.
+    let rates =
+        [Baud::B300, Baud::B1200, Baud::B2400, Baud::B4800, Baud::B9600, Baud::B9600, Baud::B19200];
     let rate = chance.pick(&rates);
     let size = match chance.below(8) {
         0 => Some(u16::from(small(chance, 1, 40))),

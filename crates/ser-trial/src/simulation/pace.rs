@@ -37,8 +37,8 @@ impl Add for Pace {
     }
 }
 
-/// Both paces of a run, hundreds apart: a bus is lived through scan by scan, everything else from one event to the
-/// next.
+/// Both paces of a run, hundreds apart: a bus is lived through scan by scan, everything else from
+/// one event to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Paces {
     /// Of lives without a bus.
@@ -54,8 +54,8 @@ impl AddAssign for Paces {
     }
 }
 
-/// As `20.02 h in 1.9 s: 1672 virtual hours a minute without a bus, 4.4 with one`, with a dash for what there was none
-/// of.
+/// As `20.02 h in 1.9 s: 1672 virtual hours a minute without a bus, 4.4 with one`, with a dash for
+/// what there was none of.
 impl fmt::Display for Paces {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let all = self.without_bus + self.on_bus;
@@ -103,7 +103,10 @@ mod tests {
     #[test]
     fn the_sum_of_runs_has_the_pace_of_all() {
         let mut paces = Paces { without_bus: WITHOUT, on_bus: ON };
-        paces += Paces { without_bus: Pace { real: Duration::from_millis(5_400), ..WITHOUT }, on_bus: ON };
+        paces += Paces {
+            without_bus: Pace { real: Duration::from_millis(5_400), ..WITHOUT },
+            on_bus: ON,
+        };
         let text = "20.20 h in 8.4 s: 200 virtual hours a minute without a bus, 5.0 with one";
         assert_eq!(paces.to_string(), text);
     }

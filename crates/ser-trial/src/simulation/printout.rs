@@ -1,4 +1,5 @@
-//! What a recorder prints: every line is an event of the ledger, or says how many there is no line for.
+//! What a recorder prints: every line is an event of the ledger, or says how many there is no line
+//! for.
 
 use chrono::NaiveDateTime;
 
@@ -35,13 +36,15 @@ impl Printout {
         self.events += 1;
         let known = event(line).is_some_and(|(stamp_ms, changed, on)| {
             ledger.latest().any(|event| {
-                (event.stamp_ms, event.changed, event.state & event.changed) == (stamp_ms, changed, on)
+                (event.stamp_ms, event.changed, event.state & event.changed)
+                    == (stamp_ms, changed, on)
             })
         });
         if known { Ok(()) } else { Err(format!("this line is printed and no event: {line:?}")) }
     }
 
-    /// Events that were printed, by command or by themselves, and events and edges that are said not to be.
+    /// Events that were printed, by command or by themselves, and events and edges that are said
+    /// not to be.
     #[must_use]
     pub fn counts(&self) -> (u64, u64) {
         (self.events, self.missing)

@@ -14,7 +14,8 @@ pub struct Recorded {
     pub state: u32,
     /// When it happened.
     pub at_ms: u64,
-    /// Inputs that changed since the event before, and of which no event tells; those that changed back are not in it.
+    /// Inputs that changed since the event before, and of which no event tells; those that changed
+    /// back are not in it.
     pub unrecorded: u32,
 }
 
@@ -32,7 +33,8 @@ pub(super) fn stamp_ms(time: TimeStamp) -> Option<i64> {
     NaiveDateTime::try_from(time).ok().map(|time| time.and_utc().timestamp_millis())
 }
 
-/// An erase, between two events: `from` is the index of the first event that may be after it, `to` of the last.
+/// An erase, between two events: `from` is the index of the first event that may be after it, `to`
+/// of the last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Erase {
     /// The earliest it can have been.

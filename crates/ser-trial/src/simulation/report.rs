@@ -48,8 +48,8 @@ pub struct Report {
     pub line: Talk,
     /// What was talked about on the bus, per recorder.
     pub bus: Vec<Talk>,
-    /// Events that the first recorder has printed, each one an event of the ledger; and events and edges that it has
-    /// printed not to be printed.
+    /// Events that the first recorder has printed, each one an event of the ledger; and events and
+    /// edges that it has printed not to be printed.
     pub printed: (u64, u64),
     /// Damaged frames that an eight-bit checksum would have let through, stopped by the simulation.
     pub forged: u64,
@@ -120,7 +120,11 @@ impl Row {
     }
 }
 
-fn table<'a>(f: &mut fmt::Formatter<'_>, heads: impl Iterator<Item = &'a str>, rows: &[Row]) -> fmt::Result {
+fn table<'a>(
+    f: &mut fmt::Formatter<'_>,
+    heads: impl Iterator<Item = &'a str>,
+    rows: &[Row],
+) -> fmt::Result {
     write!(f, "\n  {:36}", "")?;
     heads.into_iter().try_for_each(|head| write!(f, "  {head:>15}"))?;
     for row in rows {
@@ -136,7 +140,8 @@ impl fmt::Display for Report {
         writeln!(f, "seed {}, digest {:016x}", self.seed, self.digest)?;
         writeln!(
             f,
-            "  {:.2} h of virtual time, {:.2} h of them on a bus; {} steps, {} operations and faults",
+            "  {:.2} h of virtual time, {:.2} h of them on a bus; {} steps, {} operations and \
+             faults",
             hours(total_ms),
             hours(bus_ms),
             grouped(steps),
@@ -149,7 +154,8 @@ impl fmt::Display for Report {
         let (printed, missing) = self.printed;
         write!(
             f,
-            "\n  printed by recorder 1: {} events, {} said to be missing; {} damaged frames looked whole",
+            "\n  printed by recorder 1: {} events, {} said to be missing; {} damaged frames \
+             looked whole",
             grouped(printed),
             grouped(missing),
             grouped(self.forged),

@@ -1,6 +1,8 @@
-//! What a recorder has been given: the bytes of its line, and the datagrams that it has taken from its board.
+//! What a recorder has been given: the bytes of its line, and the datagrams that it has taken from
+//! its board.
 //!
-//! The ledger lives on this. Each side is decoded here once more, next to the recorder and not by it.
+//! The ledger lives on this. Each side is decoded here once more, next to the recorder and not by
+//! it.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -9,7 +11,9 @@ use std::rc::Rc;
 use geni_board::{SharedRam, map};
 use ser_node::Diagnostics;
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
-use ser_proto::{Code, Command, Decoded, FrameDecoder, FrameError, MAX_BODY_LEN, ParseError, Reply};
+use ser_proto::{
+    Code, Command, Decoded, FrameDecoder, FrameError, MAX_BODY_LEN, ParseError, Reply,
+};
 use ser_sim::genius::{Board, BoardWindow, Read};
 
 use super::ledger::Ledger;
@@ -67,7 +71,11 @@ impl Expected {
             ("empty frames", expected.frames_empty, counted.frames_empty),
             ("line errors", expected.line_errors, counted.line_errors),
             ("unknown commands", expected.commands_unknown, counted.commands_unknown),
-            ("commands of a wrong length", expected.commands_wrong_length, counted.commands_wrong_length),
+            (
+                "commands of a wrong length",
+                expected.commands_wrong_length,
+                counted.commands_wrong_length,
+            ),
             ("lost edges", expected.edges_lost, counted.edges_lost),
             ("missed samples", 0, counted.samples_missed),
             ("storage errors", 0, counted.storage_errors),
@@ -77,14 +85,17 @@ impl Expected {
                 return Err(format!("{expected} {what}, and the recorder has counted {counted}"));
             }
         }
-        // A read behind the end is refused too, and a print job that finds no place is one more overrun.
+        // A read behind the end is refused too, and a print job that finds no place is one more
+        // overrun.
         let least = [
             ("refused parameters", expected.parameters_refused, counted.parameters_refused),
             ("overruns", expected.commands_overrun, counted.commands_overrun),
         ];
         for (what, expected, counted) in least {
             if expected > counted {
-                return Err(format!("at least {expected} {what}, and the recorder has counted {counted}"));
+                return Err(format!(
+                    "at least {expected} {what}, and the recorder has counted {counted}"
+                ));
             }
         }
         Ok(())
@@ -103,12 +114,21 @@ impl LineTap {
     /// At power-up.
     #[must_use]
     pub fn new() -> LineTap {
-        LineTap { commands: FrameDecoder::new(), replies: FrameDecoder::new(), printout: Printout::default() }
+        LineTap {
+            commands: FrameDecoder::new(),
+            replies: FrameDecoder::new(),
+            printout: Printout::default(),
+        }
     }
 
-    /// A byte goes in. Gives the command that it completes, if the recorder has room for it; a configuration that is
-    /// refused is as good as a question.
-    pub fn goes_in(&mut self, byte: u8, has_room: bool, expected: &mut Expected) -> Option<Command> {
+    /// A byte goes in. Gives the command that it completes, if the recorder has room for it; a
+    /// configuration that is refused is as good as a question.
+    pub fn goes_in(
+        &mut self,
+        byte: u8,
+        has_room: bool,
+        expected: &mut Expected,
+    ) -> Option<Command> {
         match self.commands.push(byte)? {
             Decoded::Text(_) => None,
             Decoded::Dropped(dropped) => {
@@ -138,7 +158,9 @@ impl LineTap {
             Some(Decoded::Frame(body)) => Reply::parse(body)
                 .map(Some)
                 .map_err(|error| format!("the recorder sends {body:02X?}: {error:?}")),
-            Some(Decoded::Dropped(dropped)) => Err(format!("the recorder sends a broken frame: {dropped:?}")),
+            Some(Decoded::Dropped(dropped)) => {
+                Err(format!("the recorder sends a broken frame: {dropped:?}"))
+            }
             Some(Decoded::Text(byte)) => self.printout.take(byte, ledger).map(|()| None),
             None => Ok(None),
         }
@@ -225,7 +247,8 @@ impl Taking {
         self.looks.seen_ms.front().copied()
     }
 
-    /// The flag of a datagram that came while another one was read is seen before that is passed on.
+    /// The flag of a datagram that came while another one was read is seen before that is passed
+    /// on.
     fn put_to_a_look(&mut self) {
         let Some(is_message) = self.unseen.take() else { return };
         self.looks.latest_ms = self.looks.seen_ms.pop_front().or(self.looks.latest_ms);

@@ -10,7 +10,8 @@ use super::digest::Digest;
 /// So many operations are kept.
 const KEPT: usize = 60;
 
-/// The latest operations with their times, and the digest of all there were. Clones are the same trail.
+/// The latest operations with their times, and the digest of all there were. Clones are the same
+/// trail.
 #[derive(Clone, Default)]
 pub struct Trail {
     now_ms: Rc<Cell<u64>>,

@@ -51,7 +51,8 @@ impl Unit {
             _ => Debounce::OFF,
         };
         let has_clock = !chance.one_in(4);
-        let rtc = if has_clock { SimRtc::held_at(date_time(FIRST_DAY_MS)) } else { SimRtc::absent() };
+        let rtc =
+            if has_clock { SimRtc::held_at(date_time(FIRST_DAY_MS)) } else { SimRtc::absent() };
         Unit {
             model,
             debounce,
@@ -107,7 +108,8 @@ impl Unit {
         self.ledger.expire(now_ms);
     }
 
-    /// Lets contacts begin what they do next, if it is time, or all at once if nothing else is under way.
+    /// Lets contacts begin what they do next, if it is time, or all at once if nothing else is
+    /// under way.
     pub fn play(&mut self, node: &mut SimNode<'_>, now_ms: u64, tempo: Tempo) {
         let may_begin = tempo == Tempo::Flat && node.next_move_ms().is_none();
         if may_begin || now_ms >= self.activity.next_ms() {
@@ -115,8 +117,8 @@ impl Unit {
         }
     }
 
-    /// Checks what the recorder has counted since power-up, and every entry of its log, whether or not somebody reads
-    /// it.
+    /// Checks what the recorder has counted since power-up, and every entry of its log, whether or
+    /// not somebody reads it.
     ///
     /// # Errors
     /// When it is not what it must be.

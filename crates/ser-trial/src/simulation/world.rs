@@ -1,5 +1,5 @@
-//! Recorders, hosts, lines and bus in one virtual time, life after life: a life is what lies between power-up and
-//! power cut.
+//! Recorders, hosts, lines and bus in one virtual time, life after life: a life is what lies
+//! between power-up and power cut.
 
 use std::time::Instant;
 
@@ -80,9 +80,12 @@ impl World {
     #[must_use]
     pub fn new(options: Options, trail: Trail) -> World {
         let mut chance = Chance::new(options.seed);
-        let models =
-            [chance.pick(&[Model::Ser160, Model::Ser320]), chance.pick(&[Model::Ser160, Model::Ser320])];
-        let units: Vec<Unit> = models.into_iter().map(|model| Unit::new(chance.branch(), model)).collect();
+        let models = [
+            chance.pick(&[Model::Ser160, Model::Ser320]),
+            chance.pick(&[Model::Ser160, Model::Ser320]),
+        ];
+        let units: Vec<Unit> =
+            models.into_iter().map(|model| Unit::new(chance.branch(), model)).collect();
         let line = LineHost::new(chance.branch());
         let bus_host = BusHost::new(chance.branch(), units.len());
         let recorded = vec![0; units.len()];
@@ -107,14 +110,15 @@ impl World {
         self.report()
     }
 
-    /// Lives one life on a bus in which all inputs toggle in every millisecond, and all hosts read as fast as they
-    /// can while the first recorder prints and reports everything.
+    /// Lives one life on a bus in which all inputs toggle in every millisecond, and all hosts read
+    /// as fast as they can while the first recorder prints and reports everything.
     ///
     /// # Errors
     /// The first thing that is not as it must be.
     pub fn run_flat_out(mut self) -> Result<(Report, Paces), String> {
         self.units.iter_mut().for_each(|unit| unit.debounce = Debounce::OFF);
-        let off: Vec<PoweredOff> = self.units.iter().map(|unit| PoweredOff::new(unit.options())).collect();
+        let off: Vec<PoweredOff> =
+            self.units.iter().map(|unit| PoweredOff::new(unit.options())).collect();
         let mut rams: Vec<Ram> = self.units.iter().map(|_| Ram::new()).collect();
         let (began, before) = (Instant::now(), self.hours);
         let mut life = self.power_up(off, &mut rams);
@@ -135,7 +139,8 @@ impl World {
 
     /// A life has ended that began then; it was on a bus all the time or never.
     fn clock_life(&mut self, began: Instant, before: Hours) {
-        let pace = Pace { virtual_ms: self.hours.total_ms - before.total_ms, real: began.elapsed() };
+        let pace =
+            Pace { virtual_ms: self.hours.total_ms - before.total_ms, real: began.elapsed() };
         let on_bus = self.hours.bus_ms > before.bus_ms;
         let of = if on_bus { &mut self.paces.on_bus } else { &mut self.paces.without_bus };
         *of = *of + pace;
@@ -143,8 +148,9 @@ impl World {
 
     fn report(self) -> Result<(Report, Paces), String> {
         let World { trail, units, line, bus_host, hours, paces, recorded, .. } = self;
-        let accounts =
-            [line.talk.account()].into_iter().chain(bus_host.talks.iter().map(Conversation::account));
+        let accounts = [line.talk.account()]
+            .into_iter()
+            .chain(bus_host.talks.iter().map(Conversation::account));
         // The line is the first recorder's, and then each has its conversation on the bus.
         for (account, unit) in accounts.clone().zip([0, 0, 1]) {
             let tally = account.tally();
@@ -200,7 +206,8 @@ impl World {
             (false, true) => self.chance.spread(60_000..=2 * 3_600_000),
             (false, false) => self.chance.spread(60_000..=3 * 86_400_000),
         };
-        self.trail.note(format_args!("power up, {}", if on_bus { "on a bus" } else { "without a bus" }));
+        self.trail
+            .note(format_args!("power up, {}", if on_bus { "on a bus" } else { "without a bus" }));
         let off_ms = self.chance.spread(1..=3_600_000);
         let mut nodes = Vec::new();
         for ((unit, off), ram) in self.units.iter_mut().zip(off).zip(rams) {
@@ -244,7 +251,8 @@ impl World {
         let scenes = self.units.iter().map(|unit| unit.activity.next_ms());
         let scenes = scenes.filter(|_| errand == Errand::Any);
         let next_ms = moves.chain(scenes).fold(self.line.next_ms(self.now_ms, errand), u64::min);
-        let end_ms = if errand == Errand::Any { life.end_ms.min(life.next_fault_ms) } else { u64::MAX };
+        let end_ms =
+            if errand == Errand::Any { life.end_ms.min(life.next_fault_ms) } else { u64::MAX };
         // Nobody waits longer than that for nothing.
         next_ms.min(end_ms).clamp(soon_ms, self.now_ms + CATCH_UP_MS)
     }
@@ -319,7 +327,10 @@ impl World {
                 self.line.disturb(until_ms, one_in);
             }
             1 => {
-                self.trail.note(format_args!("line: the host is stuck for {} ms", until_ms - self.now_ms));
+                self.trail.note(format_args!(
+                    "line: the host is stuck for {} ms",
+                    until_ms - self.now_ms
+                ));
                 self.line.get_stuck(until_ms);
             }
             2 => {
@@ -378,9 +389,13 @@ impl World {
         while !self.has_settled(life, quiet_ms) {
             if self.now_ms > deadline_ms {
                 let talks = [&self.line.talk].into_iter().chain(&self.bus_host.talks);
-                let behind = talks.filter(|talk| !talk.has_read_since(quiet_ms)).map(Conversation::describe);
+                let behind =
+                    talks.filter(|talk| !talk.has_read_since(quiet_ms)).map(Conversation::describe);
                 let behind: Vec<String> = behind.collect();
-                return Err(format!("hosts have not read the log to its end: {}", behind.join(", ")));
+                return Err(format!(
+                    "hosts have not read the log to its end: {}",
+                    behind.join(", ")
+                ));
             }
             let moving = life.nodes.iter().any(|node| node.next_move_ms().is_some());
             self.step(life, Errand::CatchUp { since_ms: quiet_ms })?;
@@ -404,7 +419,8 @@ impl World {
 
     fn has_settled(&self, life: &Life<'_>, quiet_ms: u64) -> bool {
         let on_bus = life.bus.is_some();
-        let bus = self.bus_host.talks.iter().filter(|_| on_bus).all(|talk| talk.has_read_since(quiet_ms));
+        let bus =
+            self.bus_host.talks.iter().filter(|_| on_bus).all(|talk| talk.has_read_since(quiet_ms));
         bus && self.line.talk.has_read_since(quiet_ms)
     }
 
@@ -414,7 +430,9 @@ impl World {
         if let Some(bus) = &life.bus {
             bus.check()?;
         }
-        for ((unit, node), recorded) in self.units.iter_mut().zip(&life.nodes).zip(&mut self.recorded) {
+        for ((unit, node), recorded) in
+            self.units.iter_mut().zip(&life.nodes).zip(&mut self.recorded)
+        {
             unit.check(node)?;
             *recorded += unit.ledger.len() as u64;
         }
@@ -433,7 +451,8 @@ impl World {
         for (index, unit) in self.units.iter_mut().enumerate() {
             let ledger = &unit.ledger;
             let line = (index == 0).then(|| line.place(ledger).unwrap_or(0));
-            let bus = on_bus.then(|| self.bus_host.talks[index].account().place(ledger).unwrap_or(0));
+            let bus =
+                on_bus.then(|| self.bus_host.talks[index].account().place(ledger).unwrap_or(0));
             let all_past = line.into_iter().chain(bus).min().unwrap_or(ledger.len());
             unit.ledger.forget_before(all_past);
         }

@@ -69,9 +69,12 @@ impl Display for Told<'_> {
         let Entry { changed, state, time } = *self.0;
         match stamp_ms(time) {
             Some(stamp_ms) => {
-                Recorded { stamp_ms, changed: changed.0, state: state.0, at_ms: 0, unrecorded: 0 }.fmt(f)
+                Recorded { stamp_ms, changed: changed.0, state: state.0, at_ms: 0, unrecorded: 0 }
+                    .fmt(f)
             }
-            None => write!(f, "{time}, which is no date  changed {:08x}  on {:08x}", changed.0, state.0),
+            None => {
+                write!(f, "{time}, which is no date  changed {:08x}  on {:08x}", changed.0, state.0)
+            }
         }
     }
 }
@@ -99,8 +102,8 @@ impl Display for Numbered<'_> {
     }
 }
 
-/// As `at 3`, `between 3 and 7`, `from 3 on`: before the event of this number; one that may not have been is in
-/// brackets.
+/// As `at 3`, `between 3 and 7`, `from 3 on`: before the event of this number; one that may not
+/// have been is in brackets.
 impl Display for Erase {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Erase { from, to, certain } = *self;
@@ -116,7 +119,8 @@ impl Display for Erase {
 
 /// Erases one after the other, the latest of them if there are many.
 pub fn erases(erases: impl DoubleEndedIterator<Item = Erase>) -> String {
-    let mut latest: Vec<String> = erases.rev().take(SHOWN + 1).map(|erase| erase.to_string()).collect();
+    let mut latest: Vec<String> =
+        erases.rev().take(SHOWN + 1).map(|erase| erase.to_string()).collect();
     if latest.len() > SHOWN {
         latest[SHOWN] = "…".to_owned();
     }
@@ -129,13 +133,22 @@ mod tests {
     use super::*;
     use ser_proto::{Inputs, TimeStamp};
 
-    const EVENT: Recorded =
-        Recorded { stamp_ms: 1_795_341_600_250, changed: 0x20_0001, state: 1, at_ms: 7, unrecorded: 0 };
+    const EVENT: Recorded = Recorded {
+        stamp_ms: 1_795_341_600_250,
+        changed: 0x20_0001,
+        state: 1,
+        at_ms: 7,
+        unrecorded: 0,
+    };
 
     #[test]
     fn facts_are_told_one_a_line_and_in_a_column() {
-        let wrong = Wrong::new("line: event 3 comes twice").fact("came", 1).fact("told before", "nothing");
-        assert_eq!(wrong.to_string(), "line: event 3 comes twice\n  came         1\n  told before  nothing");
+        let wrong =
+            Wrong::new("line: event 3 comes twice").fact("came", 1).fact("told before", "nothing");
+        assert_eq!(
+            wrong.to_string(),
+            "line: event 3 comes twice\n  came         1\n  told before  nothing"
+        );
     }
 
     #[test]

@@ -29,7 +29,9 @@ pub(super) fn run(args: &Args, out: &mut dyn Write) -> Result<()> {
     }
     let block = CommReq::parse(&args.words).map_err(|error| {
         Failure::usage(error)
-            .hint("words count from 0; word 6 is 14 in a block that sends and 13 in one that fetches")
+            .hint(
+                "words count from 0; word 6 is 14 in a block that sends and 13 in one that fetches",
+            )
             .hint("for data that a PLC has fetched, add --data")
     })?;
     writeln!(out, "{block}")?;
@@ -57,7 +59,8 @@ fn is_for_a_recorder(function: u8, subfunction: u8) -> bool {
 
 /// Where nobody says how many bytes there are, the high half of the last word may be none.
 fn fetched(words: &[u16], bytes: Option<usize>) -> Explanation {
-    let explained = |count| explain(&bytes_of_words(words, count).collect::<Vec<_>>(), Some(Side::Recorder));
+    let explained =
+        |count| explain(&bytes_of_words(words, count).collect::<Vec<_>>(), Some(Side::Recorder));
     match bytes {
         Some(bytes) => explained(bytes),
         None => {

@@ -31,7 +31,9 @@ pub(super) fn device(text: &str) -> Result<BusAddress, String> {
 pub(super) fn address(text: &str) -> Result<Address, String> {
     match text {
         "all" | "255" => Ok(Address::Broadcast),
-        _ => device(text).map(Address::from).map_err(|_| "not a bus address: 0 to 31, or all".to_string()),
+        _ => device(text)
+            .map(Address::from)
+            .map_err(|_| "not a bus address: 0 to 31, or all".to_string()),
     }
 }
 
@@ -51,7 +53,9 @@ pub(super) fn reference(text: &str) -> Result<PlcReference, String> {
         .into_iter()
         .filter_map(|(prefix, memory)| Some((memory, name.strip_prefix(prefix)?)))
         .find_map(|(memory, digits)| Some(PlcReference { memory, number: digits.parse().ok()? }))
-        .ok_or_else(|| "not a place like %R100 (%R, %AI, %AQ, %I, %Q or %W, and a number from 1)".to_string())
+        .ok_or_else(|| {
+            "not a place like %R100 (%R, %AI, %AQ, %I, %Q or %W, and a number from 1)".to_string()
+        })
 }
 
 /// A word: decimal, with a sign as PLCs show them, or hex as `0045h` or `0x45`.
@@ -74,7 +78,9 @@ mod tests {
 
     #[test]
     fn a_place_is_a_memory_and_a_number() {
-        for (text, shown) in [("%R100", "%R100"), ("r1", "%R1"), ("%ai7", "%AI7"), ("%W65535", "%W65535")] {
+        for (text, shown) in
+            [("%R100", "%R100"), ("r1", "%R1"), ("%ai7", "%AI7"), ("%W65535", "%W65535")]
+        {
             assert_eq!(reference(text).map(|place| place.to_string()), Ok(shown.to_string()));
         }
         for text in ["", "%", "%R", "%R0", "%R65536", "%M1", "100", "%R-1"] {
@@ -84,9 +90,14 @@ mod tests {
 
     #[test]
     fn a_word_may_be_written_in_the_ways_of_plcs() {
-        for (text, value) in
-            [("69", 69), ("0045h", 69), ("0x45", 69), ("16#45", 69), ("-1", 65535), ("65535", 65535)]
-        {
+        for (text, value) in [
+            ("69", 69),
+            ("0045h", 69),
+            ("0x45", 69),
+            ("16#45", 69),
+            ("-1", 65535),
+            ("65535", 65535),
+        ] {
             assert_eq!(word(text), Ok(value), "{text}");
         }
         for text in ["", "h", "65536", "-32769", "10000h", "4G", "1.5"] {

@@ -47,7 +47,8 @@ pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> 
     if nodes.is_empty() {
         return Err(no_recorder());
     }
-    let ask = || nodes.iter().map(|&node| last_broadcast(&host, node, connection)).collect::<Vec<_>>();
+    let ask =
+        || nodes.iter().map(|&node| last_broadcast(&host, node, connection)).collect::<Vec<_>>();
     // The same command may have come before.
     let before = ask();
     let command = send(what, &host)?;
@@ -55,7 +56,11 @@ pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> 
         .iter()
         .zip(before)
         .zip(ask())
-        .map(|((&node, before), after)| Check { node, heard: Heard::of(&command, &before, &after), after })
+        .map(|((&node, before), after)| Check {
+            node,
+            heard: Heard::of(&command, &before, &after),
+            after,
+        })
         .collect();
     let mut out = io::stdout().lock();
     writeln!(out, "node  received   last broadcast")?;
@@ -68,10 +73,14 @@ pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> 
 fn send(what: What, host: &GeniHost) -> Result<Command> {
     let command = match what {
         What::Clock { at: Some(time) } => Command::SetClock(time),
-        What::Clock { at: None } => Command::SetClock(local_time_in(host.delay()).map_err(|year| {
-            Failure::new(format!("a recorder's clock runs from 1970 to 2069; this computer's says {year}"))
+        What::Clock { at: None } => {
+            Command::SetClock(local_time_in(host.delay()).map_err(|year| {
+                Failure::new(format!(
+                    "a recorder's clock runs from 1970 to 2069; this computer's says {year}"
+                ))
                 .hint("set this computer's clock, or give the time with --at")
-        })?),
+            })?)
+        }
         What::Start => Command::SetMode { recording: true },
         What::Stop => Command::SetMode { recording: false },
         What::Erase { .. } => Command::Erase,
@@ -87,7 +96,9 @@ fn send(what: What, host: &GeniHost) -> Result<Command> {
 type Answer = std::result::Result<Option<LastBroadcast>, String>;
 
 fn last_broadcast(host: &GeniHost, node: u8, connection: &ConnectionArgs) -> Answer {
-    host.unit(node, connection::options(connection)).last_broadcast().map_err(|error| error.to_string())
+    host.unit(node, connection::options(connection))
+        .last_broadcast()
+        .map_err(|error| error.to_string())
 }
 
 /// Whether a recorder has heard a broadcast.
@@ -103,11 +114,14 @@ impl Heard {
     /// Judges by what the recorder heard last before it and after it.
     fn of(command: &Command, before: &Answer, after: &Answer) -> Heard {
         let Ok(after) = after else { return Heard::NotKnown };
-        let Some(last) = after.filter(|last| last.code == command.code().byte()) else { return Heard::No };
+        let Some(last) = after.filter(|last| last.code == command.code().byte()) else {
+            return Heard::No;
+        };
         match before {
             Err(_) => Heard::NotKnown,
             Ok(before) if *before != Some(last) => Heard::Yes,
-            // It shows the time that was set, not the time at which it was: twice the same looks like once.
+            // It shows the time that was set, not the time at which it was: twice the same looks
+            // like once.
             Ok(_) if matches!(command, Command::SetClock(_)) => Heard::NotKnown,
             Ok(_) => Heard::No,
         }
@@ -158,7 +172,8 @@ fn conclude(checks: &[Check]) -> Result<()> {
         }
     };
     Err(Failure::new(message).hint(
-        "send it again (a clock with another time); if it persists, look for bus errors and at the devices",
+        "send it again (a clock with another time); if it persists, look for bus errors and at \
+         the devices",
     ))
 }
 
@@ -194,10 +209,17 @@ mod tests {
 
     #[test]
     fn without_an_answer_before_or_after_nothing_is_known() {
-        for (before, after) in
-            [(silent(), last(0x45, 1)), (last(0x45, 1), silent()), (silent(), silent()), (Ok(None), silent())]
-        {
-            assert_eq!(Heard::of(&Command::Erase, &before, &after), Heard::NotKnown, "{before:?} {after:?}");
+        for (before, after) in [
+            (silent(), last(0x45, 1)),
+            (last(0x45, 1), silent()),
+            (silent(), silent()),
+            (Ok(None), silent()),
+        ] {
+            assert_eq!(
+                Heard::of(&Command::Erase, &before, &after),
+                Heard::NotKnown,
+                "{before:?} {after:?}"
+            );
         }
     }
 
@@ -219,7 +241,8 @@ mod tests {
     fn who_is_not_known_to_have_heard_is_named() {
         let check = |node, heard| Check { node, heard, after: last(0x45, 1) };
         assert!(conclude(&[check(5, Heard::Yes), check(9, Heard::Yes)]).is_ok());
-        let failure = conclude(&[check(5, Heard::No), check(7, Heard::Yes), check(9, Heard::NotKnown)]);
+        let failure =
+            conclude(&[check(5, Heard::No), check(7, Heard::Yes), check(9, Heard::NotKnown)]);
         let text = failure.expect_err("two are missing").text();
         assert!(
             text.starts_with("not received by 5, and not known whether it was received by 9\n"),

@@ -3,7 +3,8 @@
 use std::io::{self, Write};
 
 use ser_proto::genius::{
-    Data, FUNCTION_GENIUS, FUNCTION_HORNER, MAX_DATA, Message, PointMask, SUBFUNCTION_SER, WritePoint,
+    Data, FUNCTION_GENIUS, FUNCTION_HORNER, MAX_DATA, Message, PointMask, SUBFUNCTION_SER,
+    WritePoint,
 };
 
 use crate::decoding::{explain, hex_text};
@@ -61,17 +62,23 @@ fn lines_of(bytes: &[u8]) -> Result<Vec<String>> {
                 false => Ok(std::iter::once(message.text).chain(message.details).collect()),
             }
         }
-        _ => Ok(vec![format!("function {function:02X}h, subfunction {subfunction:02X}h: {}", shown(data))]),
+        _ => Ok(vec![format!(
+            "function {function:02X}h, subfunction {subfunction:02X}h: {}",
+            shown(data)
+        )]),
     }
 }
 
 fn of_the_bus(subfunction: u8, data: &Data) -> Result<Vec<String>> {
     let message = Message::from_data(subfunction, data).map_err(|error| {
-        Failure::new(error).hint("the first byte is the function code, the second the subfunction code")
+        Failure::new(error)
+            .hint("the first byte is the function code, the second the subfunction code")
     })?;
     let details = match &message {
         Message::ReadIoForcesReply(forces) => vec![shown(&forces.contents)],
-        Message::ReadDeviceReply(piece) | Message::WriteDevice(piece) => vec![shown(&piece.contents)],
+        Message::ReadDeviceReply(piece) | Message::WriteDevice(piece) => {
+            vec![shown(&piece.contents)]
+        }
         Message::WritePoint(write) => changes(write),
         Message::Unknown { data, .. } if !data.is_empty() => vec![shown(data)],
         _ => Vec::new(),
@@ -83,11 +90,16 @@ fn of_the_bus(subfunction: u8, data: &Data) -> Result<Vec<String>> {
 /// The bits that a Write Point changes, a byte a line.
 fn changes(write: &WritePoint) -> Vec<String> {
     let bits = |mask: u8| {
-        let bits: Vec<_> = (0..8).filter(|bit| mask >> bit & 1 != 0).map(|bit: u8| bit.to_string()).collect();
+        let bits: Vec<_> =
+            (0..8).filter(|bit| mask >> bit & 1 != 0).map(|bit: u8| bit.to_string()).collect();
         if bits.is_empty() { "none".to_owned() } else { bits.join(" ") }
     };
     let line = |(offset, mask): (usize, &PointMask)| {
-        format!("byte {offset}: sets bits {}, clears bits {}", bits(mask.or), bits(!mask.and & !mask.or))
+        format!(
+            "byte {offset}: sets bits {}, clears bits {}",
+            bits(mask.or),
+            bits(!mask.and & !mask.or)
+        )
     };
     write.masks.iter().enumerate().map(line).collect()
 }

@@ -36,7 +36,8 @@ fn tell_about_board(host: &GeniHost) {
     if status.is_some_and(|status| status.excessive_errors) {
         warn("ten bus errors or more within the last 10 s");
         advise(
-            "check the bus cable, its shield and its terminators, and that all devices have the same bus rate",
+            "check the bus cable, its shield and its terminators, and that all devices have the \
+             same bus rate",
         );
     }
 }

@@ -36,7 +36,11 @@ impl From<Rate> for BusRate {
 }
 
 /// Shows what the switches say, or how to set them.
-pub(super) fn run(switches: Option<DipSwitches>, address: Option<BusAddress>, rate: Rate) -> Result<()> {
+pub(super) fn run(
+    switches: Option<DipSwitches>,
+    address: Option<BusAddress>,
+    rate: Rate,
+) -> Result<()> {
     let switches = match (switches, address) {
         (Some(switches), _) => switches,
         (None, Some(address)) => BusSettings { address, rate: rate.into() }.switches(),
@@ -66,7 +70,8 @@ pub(super) fn switches(text: &str) -> std::result::Result<DipSwitches, String> {
 }
 
 fn text(switches: DipSwitches) -> String {
-    let digits: Vec<&str> = (1..=8).map(|number| if switches.is_open(number) { "1" } else { "0" }).collect();
+    let digits: Vec<&str> =
+        (1..=8).map(|number| if switches.is_open(number) { "1" } else { "0" }).collect();
     format!(
         "switch  1 2 3 4 5 6 7 8\n        {}   (1 is open)\naddress {}, {}",
         digits.join(" "),
@@ -84,7 +89,8 @@ mod tests {
         let read = switches("10100111").expect("switches");
         assert_eq!(
             text(read),
-            "switch  1 2 3 4 5 6 7 8\n        1 0 1 0 0 1 1 1   (1 is open)\naddress 5, 153.6K standard"
+            "switch  1 2 3 4 5 6 7 8\n        1 0 1 0 0 1 1 1   (1 is open)\naddress 5, 153.6K \
+             standard"
         );
         let address = BusAddress::new(5).expect("an address");
         assert_eq!(BusSettings { address, rate: Rate::Standard.into() }.switches(), read);

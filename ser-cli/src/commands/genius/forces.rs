@@ -16,13 +16,16 @@ pub(super) fn run(connection: &ConnectionArgs, node: u8, table: ForceTable) -> R
     Ok(())
 }
 
-/// The bytes, the first one first, and the points that are set in them, should they be discrete ones.
+/// The bytes, the first one first, and the points that are set in them, should they be discrete
+/// ones.
 fn text(table: ForceTable, contents: &[u8]) -> String {
     if contents.is_empty() {
         return format!("{table}: the device has no such points");
     }
-    let bits = (1_usize..).zip(contents.iter().flat_map(|byte| (0..8).map(move |bit| byte >> bit & 1 != 0)));
-    let points: Vec<_> = bits.filter(|(_, set)| *set).map(|(number, _)| number.to_string()).collect();
+    let bits = (1_usize..)
+        .zip(contents.iter().flat_map(|byte| (0..8).map(move |bit| byte >> bit & 1 != 0)));
+    let points: Vec<_> =
+        bits.filter(|(_, set)| *set).map(|(number, _)| number.to_string()).collect();
     let points = match &points[..] {
         [] => "no point is on".to_owned(),
         [point] => format!("point {point} is on"),
@@ -42,6 +45,9 @@ mod tests {
             "input values: 05 80 (points 1 3 16 are on)"
         );
         assert_eq!(text(ForceTable::InputEnable, &[0, 0]), "input enable: 00 00 (no point is on)");
-        assert_eq!(text(ForceTable::OutputEnable, &[]), "output enable: the device has no such points");
+        assert_eq!(
+            text(ForceTable::OutputEnable, &[]),
+            "output enable: the device has no such points"
+        );
     }
 }

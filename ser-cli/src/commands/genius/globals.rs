@@ -44,7 +44,9 @@ pub(super) fn run(connection: &ConnectionArgs, follow: bool, how: Recognition) -
         None if globals.is_empty() => Err(no_recorder()),
         None => {
             writeln!(out, "{HEADER}")?;
-            globals.iter().try_for_each(|(&node, global)| writeln!(out, "{}", row(node, Some(global))))?;
+            globals
+                .iter()
+                .try_for_each(|(&node, global)| writeln!(out, "{}", row(node, Some(global))))?;
             Ok(out.flush()?)
         }
     }
@@ -77,7 +79,8 @@ impl Follow {
         }
     }
 
-    /// What the recorders say a moment later, or when what is wrong has passed; `None` at an interrupt.
+    /// What the recorders say a moment later, or when what is wrong has passed; `None` at an
+    /// interrupt.
     fn next(&mut self) -> Result<Option<Globals>> {
         while !self.stop.load(Ordering::Relaxed) {
             thread::sleep(LOOK_EVERY);

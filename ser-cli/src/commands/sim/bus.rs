@@ -50,8 +50,8 @@ pub(super) struct BusArgs {
     #[arg(long, value_name = "N", requires = "genius", value_parser = host_number, help_heading = HEADING)]
     host_number: Option<u8>,
 
-    /// Disturb the Genius bus: of all messages so many percent are damaged, as many are missed by one receiver, and as
-    /// many arrive without the sender knowing.
+    /// Disturb the Genius bus: of all messages so many percent are damaged, as many are missed by
+    /// one receiver, and as many arrive without the sender knowing.
     #[arg(long, value_name = "PERCENT", requires = "genius", value_parser = ppm, help_heading = HEADING)]
     bus_noise: Option<u32>,
 
@@ -72,7 +72,8 @@ impl BusArgs {
             .hint("leave --host-number out, and the host gets one that is free"));
         }
         let ppm = self.bus_noise.unwrap_or(0);
-        let noise = Noise { seed: self.seed, damaged_ppm: ppm, lost_ppm: ppm, unacknowledged_ppm: ppm };
+        let noise =
+            Noise { seed: self.seed, damaged_ppm: ppm, lost_ppm: ppm, unacknowledged_ppm: ppm };
         Ok(GeniusOptions { host_number, rate: self.bus_rate.into(), noise, ..bus })
     }
 }
@@ -86,7 +87,11 @@ fn ppm(text: &str) -> std::result::Result<u32, String> {
     match text.parse() {
         Ok(percent @ 0.0..=100.0) => {
             let percent: f64 = percent;
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1000000")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "0 to 1000000"
+            )]
             let ppm = (percent * 10_000.0).round() as u32;
             Ok(ppm)
         }

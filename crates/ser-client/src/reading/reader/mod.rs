@@ -12,9 +12,9 @@
 //! # How it works
 //!
 //! Events have a running index, 0 for the first after an erase. A recorder with total `T` and next
-//! slot `S` keeps event `q` in slot `(S - (T - q)) mod size`, and has overwritten it once
-//! `T - q > size`. Every reply carries `T` and `S` of the very moment at which its entries were
-//! copied. So it is certain which event each entry is, as long as the log is the same as before.
+//! slot `S` keeps event `q` in slot `(S - (T - q)) mod size`, and has overwritten it once `T - q >
+//! size`. Every reply carries `T` and `S` of the very moment at which its entries were copied. So
+//! it is certain which event each entry is, as long as the log is the same as before.
 //!
 //! Only an entry can tell that it is the same log. After an erase, total and next slot may agree by
 //! chance with what recording would have made of them. So nothing is delivered before a reply has
@@ -64,8 +64,7 @@
 //!
 //! Between two neighbouring entries, the inputs that changed must lead from one state to the other.
 //! Where they do not, something changed without an entry, because recording was stopped or the
-//! recorder could not take all changes:
-//! [`Lost::Unrecorded`](crate::Lost::Unrecorded).
+//! recorder could not take all changes: [`Lost::Unrecorded`](crate::Lost::Unrecorded).
 //!
 //! # What cannot be known
 //!
@@ -175,8 +174,8 @@ impl LogReader {
     }
 
     /// The entries to ask for next, each time others: several requests may be under way. `None` if
-    /// there are none before a reply comes. The reading is done when none
-    /// [is awaited](Self::is_waiting) either.
+    /// there are none before a reply comes. The reading is done when none [is
+    /// awaited](Self::is_waiting) either.
     pub fn request(&mut self) -> Option<ReadRequest> {
         match &mut self.progress {
             None => self.locating.request(),
@@ -203,7 +202,11 @@ impl LogReader {
     ///
     /// # Errors
     /// See [`Disturbed`].
-    pub fn take(&mut self, reply: &ReadReply, on: &mut dyn FnMut(Delivery)) -> Result<(), Disturbed> {
+    pub fn take(
+        &mut self,
+        reply: &ReadReply,
+        on: &mut dyn FnMut(Delivery),
+    ) -> Result<(), Disturbed> {
         let position = LogPosition::from(reply);
         let Some(progress) = &mut self.progress else {
             let Some(request) = self.locating.take_asked(reply.start) else { return Ok(()) };

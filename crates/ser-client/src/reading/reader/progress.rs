@@ -151,7 +151,8 @@ impl Progress {
             self.delivered = self.delivered.saturating_add(1);
             self.cursor = Some(Cursor { sequence, is_exact: self.is_exact, anchor: Some(entry) });
             // Nobody looks for the anchor while the reading is overrun.
-            self.footing = if self.overrun.is_on() { Footing::RingSize } else { Footing::Anchor(entry) };
+            self.footing =
+                if self.overrun.is_on() { Footing::RingSize } else { Footing::Anchor(entry) };
             self.checked = true;
         }
     }
@@ -175,7 +176,8 @@ impl Progress {
     pub(super) fn leave_anchor_if_overrun(&mut self) {
         let is_anchored = self.footing.is_anchor();
         if is_anchored && self.overrun.is_on() && self.growth != Growth::Asking {
-            self.footing = if self.ahead.is_empty() { Footing::RingSize } else { Footing::Unconfirmed };
+            self.footing =
+                if self.ahead.is_empty() { Footing::RingSize } else { Footing::Unconfirmed };
         }
     }
 

@@ -80,7 +80,8 @@ impl Progress {
         }
         if expected.unproven > 0 || within_reach(expected.next) || !self.checked {
             let end = total.min(expected.next + with_anchor);
-            let fitting = (expected.next..end).take_while(|&index| !self.is_known_or_asked(index, all));
+            let fitting =
+                (expected.next..end).take_while(|&index| !self.is_known_or_asked(index, all));
             return asked(expected.next - 1, 1 + fitting.count() as u64);
         }
         None

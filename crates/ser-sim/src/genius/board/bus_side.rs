@@ -106,7 +106,9 @@ impl Device for Board {
             Message::Control(_) => {}
             Message::Directed { data, .. } => self.live.copies.set_directed(data),
             Message::AssignController { .. } => self.live.controller = Some(from),
-            Message::Datagram { to, datagram } => self.take_datagram(from, *to == BROADCAST, datagram),
+            Message::Datagram { to, datagram } => {
+                self.take_datagram(from, *to == BROADCAST, datagram)
+            }
         }
         true
     }
@@ -167,7 +169,8 @@ impl Board {
         }
     }
 
-    /// Sorts an incoming datagram: some the board answers itself, some go to the host one way or another.
+    /// Sorts an incoming datagram: some the board answers itself, some go to the host one way or
+    /// another.
     fn take_datagram(&mut self, from: u8, broadcast: bool, datagram: &Datagram) {
         if datagram.is(subfunction::READ_ID) {
             let reply = Datagram::standard(subfunction::READ_ID_REPLY, self.identity().to_bytes());
@@ -186,7 +189,8 @@ impl Board {
         if self.is_reply(from, datagram) || is_identity {
             return;
         }
-        if let Some(identity) = identity.filter(|_| datagram.is(subfunction::CONFIGURATION_CHANGE)) {
+        if let Some(identity) = identity.filter(|_| datagram.is(subfunction::CONFIGURATION_CHANGE))
+        {
             self.configuration_changed(from, identity);
         }
         self.queue_received(from, broadcast, datagram.clone());

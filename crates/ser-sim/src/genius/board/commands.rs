@@ -1,13 +1,15 @@
 //! The command block (chapter 10).
 //!
-//! Completion values are 4, 8 and 10h. A Transmit Datagram clears the block's options and the transmit buffer
-//! when the message is out; with the clear-status bit, which leaves the block to the host at once, when they
-//! have been read.
+//! Completion values are 4, 8 and 10h. A Transmit Datagram clears the block's options and the
+//! transmit buffer when the message is out; with the clear-status bit, which leaves the block to
+//! the host at once, when they have been read.
 
 use super::Board;
 use super::interrupts::Condition;
 use super::reason::Reason;
-use crate::genius::datagram::{BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, MessagePriority};
+use crate::genius::datagram::{
+    BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, MessagePriority,
+};
 use crate::genius::device::Message;
 use crate::genius::map;
 
@@ -59,9 +61,8 @@ impl Board {
     pub(super) fn command_due_us(&self) -> Option<u64> {
         let done_us = match self.live.command {
             CommandState::Free | CommandState::Sending => None,
-            CommandState::Working { until_us, .. } | CommandState::AwaitingReply { until_us, .. } => {
-                Some(until_us)
-            }
+            CommandState::Working { until_us, .. }
+            | CommandState::AwaitingReply { until_us, .. } => Some(until_us),
         };
         [self.live.command_look_us, done_us].into_iter().flatten().min()
     }
@@ -69,7 +70,8 @@ impl Board {
     /// The host has written a status or a command.
     pub(super) fn look_at_command(&mut self) {
         self.live.command_look_us = None;
-        if self.live.command != CommandState::Free || self.ram.get(map::COMMAND_STATUS) != INCOMING {
+        if self.live.command != CommandState::Free || self.ram.get(map::COMMAND_STATUS) != INCOMING
+        {
             return;
         }
         let byte = self.ram.get(map::COMMAND);
@@ -128,7 +130,8 @@ impl Board {
         let len = data.len().min(map::READ_BUFFER_LEN);
         self.ram.write(map::READ_BUFFER, &data[..len]);
         #[expect(clippy::cast_possible_truncation, reason = "at most the buffer's 134 bytes")]
-        let options = [received.from, function, subfunction, u8::from(!received.broadcast), len as u8];
+        let options =
+            [received.from, function, subfunction, u8::from(!received.broadcast), len as u8];
         self.ram.write(map::COMMAND_OPTIONS, &options);
         COMPLETE
     }
@@ -170,7 +173,8 @@ impl Board {
 
     fn transmit_with_reply(&mut self) {
         let options = self.ram.read(map::COMMAND_OPTIONS, 6);
-        let (to, function, subfunction, reply_subfunction) = (options[0], options[1], options[2], options[3]);
+        let (to, function, subfunction, reply_subfunction) =
+            (options[0], options[1], options[2], options[3]);
         let (priority, len) = (options[4], options[5]);
         let message = self.message(to, function, subfunction, priority, len);
         let Some((priority, message)) = message.filter(|_| to != BROADCAST) else {
@@ -182,13 +186,18 @@ impl Board {
         // Whatever keeps the reply from coming shows after ten seconds, and not before.
         self.live.outbox.push(priority, message, Reason::Command);
         let until_us = self.now_us + REPLY_WITHIN_US;
-        self.live.command =
-            CommandState::AwaitingReply { until_us, from: to, function, subfunction: reply_subfunction };
+        self.live.command = CommandState::AwaitingReply {
+            until_us,
+            from: to,
+            function,
+            subfunction: reply_subfunction,
+        };
     }
 
     /// Takes a datagram when it is the reply that the command waits for.
     pub(super) fn is_reply(&mut self, from: u8, datagram: &Datagram) -> bool {
-        let CommandState::AwaitingReply { from: expected, function, subfunction, .. } = self.live.command
+        let CommandState::AwaitingReply { from: expected, function, subfunction, .. } =
+            self.live.command
         else {
             return false;
         };
@@ -223,7 +232,10 @@ impl Board {
         }
         let priority = if priority == 0 { MessagePriority::Normal } else { MessagePriority::High };
         let data = self.ram.read(map::TRANSMIT_BUFFER, len.into()).to_vec();
-        Some((priority, Message::Datagram { to, datagram: Datagram { function, subfunction, data } }))
+        Some((
+            priority,
+            Message::Datagram { to, datagram: Datagram { function, subfunction, data } },
+        ))
     }
 
     fn has_memory(&mut self) -> bool {

@@ -6,7 +6,8 @@ use super::presence::Power;
 use super::violations::{Violation, ViolationKind};
 use crate::genius::map::{self, RAM_LEN};
 
-/// What a host writes last to hand something over, so it is to be read first from a RAM that both can change.
+/// What a host writes last to hand something over, so it is to be read first from a RAM that both
+/// can change.
 const HANDED_OVER: [usize; 3] = [map::REQUEST_HEAD, map::COMMAND_STATUS, map::LOCKOUT_REQUEST];
 
 impl Board {
@@ -76,14 +77,14 @@ impl Board {
     /// Takes over what another process has written to its image of the shared RAM since the latest
     /// [`publish`](Board::publish).
     ///
-    /// `image` is the whole RAM as that process sees it, and must not change meanwhile; otherwise see
-    /// [`sync_with`](Board::sync_with). A file that stands for the RAM begins as zeros.
+    /// `image` is the whole RAM as that process sees it, and must not change meanwhile; otherwise
+    /// see [`sync_with`](Board::sync_with). A file that stands for the RAM begins as zeros.
     pub fn sync_from_host(&mut self, image: &[u8; RAM_LEN]) {
         self.sync_with(|offset| image[usize::from(offset)]);
     }
 
-    /// The same for an image that changes while it is read: pointers and flags are read first, so that what
-    /// they hand over is complete.
+    /// The same for an image that changes while it is read: pointers and flags are read first, so
+    /// that what they hand over is complete.
     pub fn sync_with(&mut self, mut read: impl FnMut(u16) -> u8) {
         let handed_over = HANDED_OVER.map(|at| (at, read(low_bits(at))));
         for at in 0..RAM_LEN {
@@ -103,8 +104,8 @@ impl Board {
         }
     }
 
-    /// Hands out every byte that differs from what the host's image holds, to be written there in this order:
-    /// data before the flags that announce them.
+    /// Hands out every byte that differs from what the host's image holds, to be written there in
+    /// this order: data before the flags that announce them.
     pub fn publish(&mut self, mut write: impl FnMut(u16, u8)) {
         let (ram, image) = (self.ram.bytes(), &mut self.host_image);
         let mut changed: Vec<usize> = (0..RAM_LEN).filter(|&at| ram[at] != image[at]).collect();
@@ -120,7 +121,9 @@ impl Board {
             map::REQUEST_TAIL => ViolationKind::TailPointer,
             map::BOARD_OK => return,
             map::DIP_SWITCHES | map::STATUS..map::INTERRUPT_STATUS => ViolationKind::ReadOnly,
-            map::COMMAND_STATUS if self.live.command != CommandState::Free => ViolationKind::CommandBusy,
+            map::COMMAND_STATUS if self.live.command != CommandState::Free => {
+                ViolationKind::CommandBusy
+            }
             map::LOCKOUT_STATE => ViolationKind::Lockout,
             map::LOCKOUT_REQUEST => {
                 // Requested only when neither byte is set, released only when both are.

@@ -57,7 +57,8 @@ impl Board {
 
     /// Sets a flag; then, unless the host disabled it, the summary flag, and pulls the line.
     ///
-    /// Every occurrence pulls it, whether or not the host has cleared the flag since the one before.
+    /// Every occurrence pulls it, whether or not the host has cleared the flag since the one
+    /// before.
     pub(super) fn raise(&mut self, condition: Condition) {
         let index = condition as usize;
         let status = self.ram.get(INTERRUPT_STATUS + index);

@@ -1,5 +1,5 @@
-//! The board's private copies of inputs and outputs, and their way to and from the shared RAM (chapters 8, 11
-//! and 12).
+//! The board's private copies of inputs and outputs, and their way to and from the shared RAM
+//! (chapters 8, 11 and 12).
 
 use super::Board;
 use crate::genius::map::{self, MAX_CONTROL_LEN};
@@ -69,7 +69,8 @@ impl Board {
         }
         let len = usize::from(setup.buffer_len);
         for (address, outputs) in (0..).zip(&mut copies.outputs) {
-            outputs[..len].copy_from_slice(self.ram.read(map::output_buffer(address, setup.buffer_len), len));
+            outputs[..len]
+                .copy_from_slice(self.ram.read(map::output_buffer(address, setup.buffer_len), len));
         }
         copies.global.copy_from_slice(self.ram.read(map::BROADCAST_OUT, MAX_CONTROL_LEN));
         self.live.log_ins.outputs_were_read();

@@ -97,21 +97,29 @@ impl Board {
             State::Absent if !asking && !refuse && device.asked_scans == 0 => {
                 let datagram = Datagram::standard(subfunction::READ_ID, []);
                 let message = Message::Datagram { to: from, datagram };
-                self.live.outbox.push(MessagePriority::Normal, message, Reason::LogIn { address: from });
+                self.live.outbox.push(
+                    MessagePriority::Normal,
+                    message,
+                    Reason::LogIn { address: from },
+                );
             }
             State::Absent | State::Refused => {}
         }
     }
 
-    /// A Read ID of the board's own is out; without an acknowledgement it asks again when it hears the device
-    /// again.
+    /// A Read ID of the board's own is out; without an acknowledgement it asks again when it hears
+    /// the device again.
     pub(super) fn asked_for_identity(&mut self, address: u8, arrived: bool) {
         let device = &mut self.live.log_ins.devices[usize::from(address)];
         device.asked_scans = if arrived { ASK_AGAIN_SCANS } else { 0 };
     }
 
     pub(super) fn waits_for_identity(&self, address: u8) -> bool {
-        self.live.log_ins.devices.get(usize::from(address)).is_some_and(|device| device.asked_scans > 0)
+        self.live
+            .log_ins
+            .devices
+            .get(usize::from(address))
+            .is_some_and(|device| device.asked_scans > 0)
     }
 
     /// A Read ID reply to the board's question.
@@ -137,7 +145,9 @@ impl Board {
     pub(super) fn configuration_changed(&mut self, address: u8, identity: Identity) {
         let Some(device) = self.live.log_ins.devices.get_mut(usize::from(address)) else { return };
         let State::Present { input_len, output_len, kind } = device.state else { return };
-        let Identity { input_len: new_input_len, output_len: new_output_len, kind: new_kind, .. } = identity;
+        let Identity {
+            input_len: new_input_len, output_len: new_output_len, kind: new_kind, ..
+        } = identity;
         if (new_input_len, new_output_len, new_kind as u8) == (input_len, output_len, kind) {
             return;
         }
@@ -145,8 +155,11 @@ impl Board {
             self.log_out(address);
             self.live.log_ins.devices[usize::from(address)].state = State::Refused;
         } else {
-            device.state =
-                State::Present { input_len: new_input_len, output_len: new_output_len, kind: new_kind as u8 };
+            device.state = State::Present {
+                input_len: new_input_len,
+                output_len: new_output_len,
+                kind: new_kind as u8,
+            };
         }
         self.raise(Condition::DeviceStatus);
         self.show_identity(address, identity);
@@ -188,9 +201,9 @@ impl Board {
     fn log_out(&mut self, address: u8) {
         self.live.log_ins.devices[usize::from(address)] = LogIn::default();
         self.live.copies.forget_inputs(address);
-        self.live
-            .outbox
-            .remove(|&reason| reason == Reason::LogIn { address } || reason == Reason::Assign { address });
+        self.live.outbox.remove(|&reason| {
+            reason == Reason::LogIn { address } || reason == Reason::Assign { address }
+        });
         self.ram.set(map::device(address) + map::DEVICE_PRESENT, 0);
     }
 
@@ -207,8 +220,8 @@ impl Board {
         }
     }
 
-    /// Follows the outputs flags of the device table: who is to take outputs from this board is told so
-    /// first.
+    /// Follows the outputs flags of the device table: who is to take outputs from this board is
+    /// told so first.
     pub(super) fn follow_outputs_flags(&mut self) {
         for address in 0..32 {
             let disabled = self.ram.bit0(map::device(address) + map::DEVICE_OUTPUTS);
@@ -216,7 +229,8 @@ impl Board {
             let device = &mut self.live.log_ins.devices[usize::from(address)];
             if disabled {
                 device.assigned = false;
-            } else if !device.assigned && !telling && matches!(device.state, State::Present { .. }) {
+            } else if !device.assigned && !telling && matches!(device.state, State::Present { .. })
+            {
                 let message = Message::AssignController { to: address };
                 self.live.outbox.push(MessagePriority::Normal, message, Reason::Assign { address });
             }
@@ -234,9 +248,12 @@ impl Board {
         (0..32)
             .filter_map(|to| {
                 let device = &self.live.log_ins.devices[usize::from(to)];
-                let State::Present { output_len: len @ 1.., .. } = device.state else { return None };
+                let State::Present { output_len: len @ 1.., .. } = device.state else {
+                    return None;
+                };
                 let data = || self.live.copies.outputs(to, len);
-                (device.assigned && device.outputs_read).then(|| Message::Directed { to, data: data() })
+                (device.assigned && device.outputs_read)
+                    .then(|| Message::Directed { to, data: data() })
             })
             .collect()
     }

@@ -1,7 +1,7 @@
 //! A GENI board, as a host sees it through the shared RAM and other devices see it on the bus.
 //!
-//! Chapters and tables named here are those of the GENI board's manual. Readings of unclear places are in the
-//! comments of the module that acts on them.
+//! Chapters and tables named here are those of the GENI board's manual. Readings of unclear places
+//! are in the comments of the module that acts on them.
 
 mod bus_side;
 mod commands;
@@ -36,11 +36,11 @@ use super::map::RAM_LEN;
 
 /// A GENI board.
 ///
-/// The host's side: [`host_read`](Board::host_read) and [`host_write`](Board::host_write) at any time, or
-/// [`sync_from_host`](Board::sync_from_host) and [`publish`](Board::publish) when host and board share a
-/// file; the
-/// [`interrupt`](Board::take_interrupt) pin, the reset pin, the [lamps](Board::leds) and the switches.
-/// [`violations`](Board::violations) tells what the host did that the manual forbids.
+/// The host's side: [`host_read`](Board::host_read) and [`host_write`](Board::host_write) at any
+/// time, or [`sync_from_host`](Board::sync_from_host) and [`publish`](Board::publish) when host and
+/// board share a file; the [`interrupt`](Board::take_interrupt) pin, the reset pin, the
+/// [lamps](Board::leds) and the switches. [`violations`](Board::violations) tells what the host did
+/// that the manual forbids.
 pub struct Board {
     options: BoardOptions,
     now_us: u64,
@@ -98,7 +98,8 @@ impl Board {
         board
     }
 
-    /// Turns the switches: takes effect at the next reset, and a device number also ends a conflict.
+    /// Turns the switches: takes effect at the next reset, and a device number also ends a
+    /// conflict.
     pub fn set_switches(&mut self, switches: u8) {
         self.switches = switches;
         self.leave_conflict();

@@ -36,7 +36,8 @@ impl BoardOptions {
 }
 
 impl Default for BoardOptions {
-    /// As delivered: all switches open, which is device 31 at 153.6 kbaud standard with outputs enabled.
+    /// As delivered: all switches open, which is device 31 at 153.6 kbaud standard with outputs
+    /// enabled.
     fn default() -> Self {
         BoardOptions { switches: 0xFF, revision: 0x21, model: 4, timing: Timing::default() }
     }

@@ -37,7 +37,12 @@ impl Board {
     pub(super) fn queue_received(&mut self, from: u8, broadcast: bool, datagram: Datagram) {
         if self.live.received.waiting.len() < LEN {
             let at_us = self.now_us;
-            self.live.received.waiting.push_back(QueuedDatagram { at_us, from, broadcast, datagram });
+            self.live.received.waiting.push_back(QueuedDatagram {
+                at_us,
+                from,
+                broadcast,
+                datagram,
+            });
             self.raise(Condition::ReceiveQueue);
         }
     }

@@ -1,8 +1,8 @@
 //! Requests of other devices to read or write the host's memory (chapter 13).
 //!
-//! The header in front of a request's data on the bus is not described in the manual; here it is length and
-//! address as in the queue, which is also how `ser-proto` lays these datagrams out. It leaves no room for an
-//! auxiliary source address, so that is 0.
+//! The header in front of a request's data on the bus is not described in the manual; here it is
+//! length and address as in the queue, which is also how `ser-proto` lays these datagrams out. It
+//! leaves no room for an auxiliary source address, so that is 0.
 
 use super::Board;
 use super::interrupts::Condition;

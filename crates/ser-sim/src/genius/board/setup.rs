@@ -42,7 +42,9 @@ impl Setup {
     }
 
     fn is_valid(self) -> bool {
-        self.broadcast_len <= 128 && self.directed_len <= 128 && (1..=128).contains(&self.buffer_len)
+        self.broadcast_len <= 128
+            && self.directed_len <= 128
+            && (1..=128).contains(&self.buffer_len)
     }
 }
 
@@ -58,8 +60,9 @@ impl Board {
 
     /// Takes what the host wrote into the setup table; gives the command's completion status.
     ///
-    /// With a new buffer length alone the board keeps taking its turns, but all devices are logged out and
-    /// none is logged in for the time. Before the board first enters the bus a change costs no extra time.
+    /// With a new buffer length alone the board keeps taking its turns, but all devices are logged
+    /// out and none is logged in for the time. Before the board first enters the bus a change costs
+    /// no extra time.
     pub(super) fn change_configuration(&mut self) -> u8 {
         let old = self.live.setup;
         let new = Setup {

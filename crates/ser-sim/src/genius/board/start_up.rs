@@ -77,7 +77,9 @@ impl Board {
     #[must_use]
     pub fn leds(&self) -> Leds {
         let (board_ok, comm_ok) = match (self.power, self.live.presence) {
-            (Power::Running, Presence::On) if self.live.turn_missed_us.is_some() => (Led::On, Led::On),
+            (Power::Running, Presence::On) if self.live.turn_missed_us.is_some() => {
+                (Led::On, Led::On)
+            }
             (Power::Running, Presence::On | Presence::Off { .. }) => (Led::On, Led::Off),
             (Power::Running, Presence::Conflict { .. }) => (Led::Flashing, Led::Flashing),
             _ => (Led::Off, Led::Off),
@@ -135,7 +137,8 @@ impl Board {
                     reach(Stage::RamReady);
                     self.set_defaults();
                 } else {
-                    // The faults are all that the host gets to see; the rest of the RAM stays as it is.
+                    // The faults are all that the host gets to see; the rest of the RAM stays as it
+                    // is.
                     self.power = Power::Stopped;
                     self.ram.write(map::STATUS, &[0; map::STATUS_LEN]);
                     self.ram.set(map::HARDWARE, faults);
@@ -205,7 +208,8 @@ impl Board {
         self.live.turn_missed_us = Some(self.now_us + TURN_MISSED_US);
     }
 
-    /// There is no getting at the bus: whoever was there is not, and what waits for its turn has failed.
+    /// There is no getting at the bus: whoever was there is not, and what waits for its turn has
+    /// failed.
     pub(super) fn miss_turns(&mut self) {
         self.live.turn_missed_us = None;
         self.live.last_turn_us = None;

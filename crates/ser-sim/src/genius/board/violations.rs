@@ -9,8 +9,8 @@ pub enum ViolationKind {
     TooEarly,
     /// Access to the reserved area (chapter 3).
     ReservedArea,
-    /// A write to something only the board writes: the switches in the setup table, the status table but for
-    /// the OK flag, the device table but for the outputs flag (chapters 4, 5, 7).
+    /// A write to something only the board writes: the switches in the setup table, the status
+    /// table but for the OK flag, the device table but for the outputs flag (chapters 4, 5, 7).
     ReadOnly,
     /// A write to the lockout state, or a request that does not fit it (chapter 9).
     Lockout,
@@ -42,7 +42,9 @@ impl fmt::Display for Violation {
             ViolationKind::Lockout => "lockout request that does not fit its state",
             ViolationKind::CommandBusy => "command while another one was being carried out",
             ViolationKind::TailPointer => "write to the tail pointer of the request queue",
-            ViolationKind::RequestQueue => "head pointer of the request queue beyond its tail, or no status",
+            ViolationKind::RequestQueue => {
+                "head pointer of the request queue beyond its tail, or no status"
+            }
         };
         write!(f, "{what} (at {:04X}h)", self.offset)
     }

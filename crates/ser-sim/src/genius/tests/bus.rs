@@ -4,7 +4,8 @@ use std::thread;
 
 use super::rig::{Rig, SECOND_US};
 use crate::genius::{
-    Board, BoardOptions, Bus, BusInterfaceUnit, BusTiming, Device, MIN_SCAN_NS, Message, StationData,
+    Board, BoardOptions, Bus, BusInterfaceUnit, BusTiming, Device, MIN_SCAN_NS, Message,
+    StationData,
 };
 
 /// Published contributions in hundredths of a millisecond: rate, bytes, time.
@@ -46,7 +47,10 @@ fn a_station_adds_its_published_time_to_the_scan() {
         bus.advance_by(5 * SECOND_US);
         // What the tables give is rounded, not always the same way. The number was skipped before.
         let added_ns = bus.scan_time_ns().unwrap() - without_ns + rate.skip_ns();
-        assert!(added_ns.abs_diff(hundredths * 10_000) <= 10_000, "{rate:?} {bytes}: {added_ns} ns");
+        assert!(
+            added_ns.abs_diff(hundredths * 10_000) <= 10_000,
+            "{rate:?} {bytes}: {added_ns} ns"
+        );
         assert_eq!(added_ns, rate.contribution_ns(bytes));
     }
 }

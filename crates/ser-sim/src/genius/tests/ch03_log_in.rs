@@ -2,8 +2,8 @@
 
 use super::rig::{PROCESS_ERROR, Rig, SECOND_US, lengths};
 use crate::genius::{
-    BlockKind, Board, BoardOptions, BusInterfaceUnit, BusTiming, Circuits, DiscreteBlock, Fault, StationData,
-    ViolationKind,
+    BlockKind, Board, BoardOptions, BusInterfaceUnit, BusTiming, Circuits, DiscreteBlock, Fault,
+    StationData, ViolationKind,
 };
 
 fn block(number: u8, circuits: Circuits) -> DiscreteBlock {

@@ -2,8 +2,8 @@
 
 use super::rig::{Rig, SECOND_US};
 use crate::genius::{
-    BlockKind, Board, BoardOptions, BusTiming, Circuits, DeviceFault, DiscreteBlock, Fault, Led, Leds,
-    ViolationKind,
+    BlockKind, Board, BoardOptions, BusTiming, Circuits, DeviceFault, DiscreteBlock, Fault, Led,
+    Leds, ViolationKind,
 };
 
 #[test]
@@ -59,7 +59,8 @@ fn the_ram_is_of_no_use_before_that_and_an_access_is_noticed() {
     rig.bus.advance_to(1_000_000);
     rig.write(host, 0x0885, 2);
     assert_ne!(rig.read(host, 0x0893), 1);
-    let kinds: Vec<_> = rig.bus.get(host).violations().iter().map(|violation| violation.kind).collect();
+    let kinds: Vec<_> =
+        rig.bus.get(host).violations().iter().map(|violation| violation.kind).collect();
     assert_eq!(kinds, [ViolationKind::TooEarly; 2]);
     rig.bus.advance_to(2 * SECOND_US);
     assert_eq!(rig.read(host, 0x0885), 0, "what was written is gone");
@@ -134,7 +135,8 @@ fn the_lamps_follow_board_and_bus() {
 fn nothing_is_taken_from_the_bus_before_the_board_is_on_it() {
     let mut rig = Rig::new();
     let [host] = rig.connect([31]);
-    let block = DiscreteBlock::new(4, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
+    let block =
+        DiscreteBlock::new(4, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
     let block = rig.bus.connect(block);
     rig.bus.get_mut(block).set_inputs(0xA5);
     rig.bus.advance_to(2 * SECOND_US);
@@ -156,6 +158,10 @@ fn the_reserved_area_is_not_the_hosts() {
     rig.read(host, 0x0A4A);
     rig.write(host, 0x1DFF, 1);
     let violations = rig.bus.get(host).violations();
-    let seen: Vec<_> = violations.iter().map(|violation| (violation.kind, violation.offset)).collect();
-    assert_eq!(seen, [(ViolationKind::ReservedArea, 0x0A4A), (ViolationKind::ReservedArea, 0x1DFF)]);
+    let seen: Vec<_> =
+        violations.iter().map(|violation| (violation.kind, violation.offset)).collect();
+    assert_eq!(
+        seen,
+        [(ViolationKind::ReservedArea, 0x0A4A), (ViolationKind::ReservedArea, 0x1DFF)]
+    );
 }

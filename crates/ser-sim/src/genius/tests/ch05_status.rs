@@ -2,8 +2,8 @@
 
 use super::rig::{Rig, SECOND_US};
 use crate::genius::{
-    BlockKind, BusInterfaceUnit, BusTiming, Circuits, DeviceFault, DiscreteBlock, Fault, StationData,
-    ViolationKind,
+    BlockKind, BusInterfaceUnit, BusTiming, Circuits, DeviceFault, DiscreteBlock, Fault,
+    StationData, ViolationKind,
 };
 
 #[test]
@@ -60,7 +60,8 @@ fn bus_errors_are_counted_and_the_count_wraps() {
     rig.advance_ms(100);
     assert_eq!(rig.read_word(host, 0x0896), 3);
     rig.bus.inject(Fault::Deafen { device: host.id(), messages: 65_533 });
-    let wrapped = rig.bus.advance_until(300 * SECOND_US, |bus| bus.get(host).ram()[0x0896..0x0898] == [0, 0]);
+    let wrapped =
+        rig.bus.advance_until(300 * SECOND_US, |bus| bus.get(host).ram()[0x0896..0x0898] == [0, 0]);
     assert!(wrapped);
 }
 
@@ -139,7 +140,8 @@ fn the_revision_can_be_read() {
 #[test]
 fn a_board_that_fails_sends_no_more_outputs() {
     let (mut rig, [host]) = Rig::started([31]);
-    let block = DiscreteBlock::new(4, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
+    let block =
+        DiscreteBlock::new(4, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
     let block = rig.bus.connect(block);
     rig.write(host, 0x3000 + 128 * 4, 0x3C);
     assert!(rig.bus.advance_until(SECOND_US, |bus| bus.get(block).outputs() == 0x3C));

@@ -7,7 +7,8 @@ use crate::genius::{BlockKind, BusInterfaceUnit, BusTiming, Circuits, DiscreteBl
 fn inputs_and_outputs_are_in_the_buffers_of_their_devices() {
     let (mut rig, [host]) = Rig::started([31]);
     let rate = BusTiming::default();
-    let block = rig.bus.connect(DiscreteBlock::new(12, rate, Circuits::Eight, BlockKind::Combination));
+    let block =
+        rig.bus.connect(DiscreteBlock::new(12, rate, Circuits::Eight, BlockKind::Combination));
     let unit = rig.bus.connect(BusInterfaceUnit::new(
         3,
         rate,
@@ -31,8 +32,12 @@ fn shorter_buffers_shorten_the_whole_table() {
     assert_eq!(rig.configure(host, lengths(0, 0, 1)), COMPLETE);
     let blocks: Vec<_> = (0..31)
         .map(|number| {
-            let block =
-                DiscreteBlock::new(number, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
+            let block = DiscreteBlock::new(
+                number,
+                BusTiming::default(),
+                Circuits::Eight,
+                BlockKind::Combination,
+            );
             rig.bus.connect(block)
         })
         .collect();
@@ -100,7 +105,12 @@ fn every_type_of_device_has_its_shortest_buffer() {
             let (mut rig, [host]) = Rig::started([31]);
             assert_eq!(rig.configure(host, lengths(0, 0, buffer)), COMPLETE);
             let data = |discrete_bytes| StationData { discrete_bytes, channels: 0 };
-            rig.bus.connect(BusInterfaceUnit::new(5, BusTiming::default(), data(inputs), data(outputs)));
+            rig.bus.connect(BusInterfaceUnit::new(
+                5,
+                BusTiming::default(),
+                data(inputs),
+                data(outputs),
+            ));
             rig.advance_ms(2_000);
             assert_eq!(rig.device(host, 5)[2], u8::from(buffer == shortest), "{name}, {buffer}");
         }

@@ -49,7 +49,8 @@ fn it_is_not_granted_in_the_same_moment() {
 #[test]
 fn during_a_lockout_inputs_wait_and_outputs_repeat() {
     let (mut rig, [host]) = Rig::started([31]);
-    let block = DiscreteBlock::new(2, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
+    let block =
+        DiscreteBlock::new(2, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
     let block = rig.bus.connect(block);
     rig.bus.get_mut(block).set_inputs(1);
     rig.write(host, 0x3100, 11);
@@ -128,6 +129,7 @@ fn breaking_the_rules_is_noticed() {
     rig.advance_ms(10);
     assert!(request(&mut rig, host));
     rig.write(host, 0x0A48, 1);
-    let kinds: Vec<_> = rig.bus.get(host).violations().iter().map(|violation| violation.kind).collect();
+    let kinds: Vec<_> =
+        rig.bus.get(host).violations().iter().map(|violation| violation.kind).collect();
     assert_eq!(kinds, [ViolationKind::Lockout; 3]);
 }

@@ -24,7 +24,8 @@ fn the_board_leaves_the_bus_for_1_5_seconds_and_logs_everyone_out() {
 #[test]
 fn with_a_new_buffer_length_alone_the_board_goes_on_transmitting() {
     let (mut rig, [host, other]) = Rig::started([30, 31]);
-    let block = DiscreteBlock::new(2, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
+    let block =
+        DiscreteBlock::new(2, BusTiming::default(), Circuits::Eight, BlockKind::Combination);
     let block = rig.bus.connect(block);
     rig.write(host, 0x3100, 5);
     assert!(rig.bus.advance_until(SECOND_US, |bus| bus.get(block).outputs() == 5));
@@ -45,7 +46,8 @@ fn with_a_new_buffer_length_alone_the_board_goes_on_transmitting() {
 #[test]
 fn what_is_out_of_range_is_refused_and_the_old_values_come_back() {
     let (mut rig, [host]) = Rig::started([31]);
-    for wrong in [lengths(129, 0, 128), lengths(0, 129, 128), lengths(0, 0, 129), lengths(0, 0, 0)] {
+    for wrong in [lengths(129, 0, 128), lengths(0, 129, 128), lengths(0, 0, 129), lengths(0, 0, 0)]
+    {
         assert_eq!(rig.configure(host, wrong), SYNTAX_ERROR);
         assert_eq!(rig.read_array(host, 0x0883), lengths(0, 0, 128));
         assert!(rig.bus.get(host).is_on_bus());

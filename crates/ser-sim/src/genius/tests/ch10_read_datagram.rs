@@ -121,7 +121,11 @@ fn every_end_of_every_command_sets_the_flag_and_interrupts() {
         rig.write_all(host, 0x08A2, &[0; 8]);
         let pulses = rig.bus.get(host).interrupt_pulses();
         assert_eq!(rig.command(host, command, &options), status, "{command} {options:?}");
-        assert_eq!((rig.read(host, 0x08A2), rig.read(host, 0x08A7)), (1, 1), "{command} {options:?}");
+        assert_eq!(
+            (rig.read(host, 0x08A2), rig.read(host, 0x08A7)),
+            (1, 1),
+            "{command} {options:?}"
+        );
         assert_eq!(rig.bus.get(host).interrupt_pulses(), pulses + 1, "{command} {options:?}");
     }
 }

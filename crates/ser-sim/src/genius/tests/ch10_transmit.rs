@@ -2,7 +2,8 @@
 
 use super::rig::{COMPLETE, PROCESS_ERROR, Rig, SYNTAX_ERROR};
 use crate::genius::{
-    BlockKind, BusInterfaceUnit, BusTiming, Circuits, DeviceFault, DiscreteBlock, Fault, StationData,
+    BlockKind, BusInterfaceUnit, BusTiming, Circuits, DeviceFault, DiscreteBlock, Fault,
+    StationData,
 };
 
 #[test]
@@ -112,7 +113,12 @@ fn normal_priority_waits_for_a_scan_without_a_datagram_and_high_priority_does_no
 #[test]
 fn a_block_takes_no_more_than_16_bytes() {
     let (mut rig, [host]) = Rig::started([31]);
-    rig.bus.connect(DiscreteBlock::new(2, BusTiming::default(), Circuits::Eight, BlockKind::Inputs));
+    rig.bus.connect(DiscreteBlock::new(
+        2,
+        BusTiming::default(),
+        Circuits::Eight,
+        BlockKind::Inputs,
+    ));
     rig.advance_ms(100);
     assert_eq!(rig.transmit(host, 2, [0x20, 0x04], 0, &[0; 16]), COMPLETE);
     assert_eq!(rig.transmit(host, 2, [0x20, 0x04], 0, &[0; 17]), PROCESS_ERROR);
@@ -162,7 +168,11 @@ fn a_datagram_lengthens_the_scan_in_which_it_is_sent() {
         let end = rig.bus.traffic().scans + 1;
         assert!(rig.bus.advance_until(1_000_000, |bus| bus.traffic().scans == end));
         longest_ns = longest_ns.max(rig.bus.scan_time_ns().unwrap());
-        assert_eq!(longest_ns - quiet_ns, BusTiming::default().datagram_ns(len), "{priority} {len}");
+        assert_eq!(
+            longest_ns - quiet_ns,
+            BusTiming::default().datagram_ns(len),
+            "{priority} {len}"
+        );
         rig.advance_ms(100);
         assert!(rig.read_datagram(other).is_some());
     }

@@ -7,7 +7,12 @@ use crate::genius::{BusInterfaceUnit, BusTiming, DeviceFault, Fault, Side, Stati
 fn the_reply_comes_into_the_read_buffer_and_not_into_the_queue() {
     let (mut rig, [host]) = Rig::started([31]);
     let data = StationData { discrete_bytes: 6, channels: 6 };
-    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusTiming::default(), data, StationData::default()));
+    let unit = rig.bus.connect(BusInterfaceUnit::new(
+        3,
+        BusTiming::default(),
+        data,
+        StationData::default(),
+    ));
     rig.bus.get_mut(unit).force_point(Side::Inputs, 9, Some(true));
     rig.bus.get_mut(unit).force_channel(Side::Inputs, 5, Some(0x0102));
     rig.advance_ms(200);
@@ -48,7 +53,12 @@ fn each_of_the_four_force_tables_is_another_one() {
 fn a_table_of_128_bytes_comes_whole() {
     let (mut rig, [host]) = Rig::started([31]);
     let data = StationData { discrete_bytes: 128, channels: 0 };
-    let unit = rig.bus.connect(BusInterfaceUnit::new(3, BusTiming::default(), data, StationData::default()));
+    let unit = rig.bus.connect(BusInterfaceUnit::new(
+        3,
+        BusTiming::default(),
+        data,
+        StationData::default(),
+    ));
     rig.bus.get_mut(unit).force_point(Side::Inputs, 8 * 128 - 1, Some(true));
     rig.advance_ms(200);
     rig.write(host, 0x08D2, 0);

@@ -9,8 +9,13 @@ fn each_host_gets_its_own_data() {
     assert_eq!(rig.configure(b, lengths(0, 128, 128)), COMPLETE);
     assert_eq!(rig.configure(c, lengths(0, 56, 128)), COMPLETE);
     rig.advance_ms(3_000);
-    assert_eq!((rig.device(a, 29)[6], rig.device(a, 31)[6]), (128, 56), "how much the sender may send");
-    // Boards that start with outputs enabled send to everyone who takes data; only one of them should.
+    assert_eq!(
+        (rig.device(a, 29)[6], rig.device(a, 31)[6]),
+        (128, 56),
+        "how much the sender may send"
+    );
+    // Boards that start with outputs enabled send to everyone who takes data; only one of them
+    // should.
     rig.write(b, 0x1E01 + 8 * 31, 1);
     rig.write(c, 0x1E01 + 8 * 29, 1);
     rig.write_all(a, 0x3000 + 128 * 29, &[2; 128]);

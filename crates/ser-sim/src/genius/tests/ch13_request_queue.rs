@@ -1,6 +1,8 @@
 //! Chapter 13: memory access datagrams and the request queue.
 
-use ser_proto::genius::{MemoryAddress, MemoryContents, MemoryRange, Message, PointMask, WritePoint};
+use ser_proto::genius::{
+    MemoryAddress, MemoryContents, MemoryRange, Message, PointMask, WritePoint,
+};
 
 use super::rig::{COMPLETE, Host, Rig, SECOND_US};
 use crate::genius::ViolationKind;
@@ -100,7 +102,11 @@ fn the_tail_never_reaches_the_head_from_behind_and_what_does_not_fit_is_lost() {
     let (mut rig, [host, other]) = Rig::started([30, 31]);
     for byte in 0..17 {
         let data = access(0, &[byte]);
-        assert_eq!(rig.transmit(other, 30, [0x20, WRITE_DEVICE], 0, &data), COMPLETE, "no word of it");
+        assert_eq!(
+            rig.transmit(other, 30, [0x20, WRITE_DEVICE], 0, &data),
+            COMPLETE,
+            "no word of it"
+        );
     }
     assert_eq!(rig.read_array(host, 0x0880), [0, 15]);
     for byte in 0..15 {
@@ -153,7 +159,8 @@ fn a_head_beyond_the_tail_or_a_missing_status_is_noticed() {
     assert_eq!(rig.transmit(other, 30, [0x20, WRITE_DEVICE], 0, &access(0, &[1])), COMPLETE);
     let at = next_request(&mut rig, host).unwrap();
     finish_request(&mut rig, host, at, 0);
-    let kinds: Vec<_> = rig.bus.get(host).violations().iter().map(|violation| violation.kind).collect();
+    let kinds: Vec<_> =
+        rig.bus.get(host).violations().iter().map(|violation| violation.kind).collect();
     assert_eq!(kinds, [ViolationKind::RequestQueue; 2]);
 }
 

@@ -2,7 +2,8 @@
 
 use super::rig::{COMPLETE, PROCESS_ERROR, Rig, SECOND_US, lengths};
 use crate::genius::{
-    BlockKind, Board, BoardOptions, BusTiming, Circuits, DeviceFault, DiscreteBlock, Fault, Led, Noise,
+    BlockKind, Board, BoardOptions, BusTiming, Circuits, DeviceFault, DiscreteBlock, Fault, Led,
+    Noise,
 };
 
 #[test]

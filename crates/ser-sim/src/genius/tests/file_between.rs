@@ -11,8 +11,8 @@ impl File {
         File(Box::new([0; RAM_LEN]))
     }
 
-    /// One round of whoever plays the board: take what the host wrote, let time pass, hand out what the board
-    /// wrote.
+    /// One round of whoever plays the board: take what the host wrote, let time pass, hand out what
+    /// the board wrote.
     fn exchange(&mut self, rig: &mut Rig, host: Host, us: u64) -> Vec<u16> {
         rig.bus.get_mut(host).sync_from_host(&self.0);
         rig.bus.advance_by(us);
@@ -72,8 +72,9 @@ fn data_is_published_before_what_announces_it() {
     assert_eq!(rig.transmit(other, 30, [0x20, 0x20], 0, &[1, 0, 0, 0, 5]), COMPLETE);
     rig.read_datagram(host);
     let written = file.exchange(&mut rig, host, 1_000);
-    let place =
-        |offset| written.iter().position(|&at| at == offset).unwrap_or_else(|| panic!("{offset:04X}h"));
+    let place = |offset| {
+        written.iter().position(|&at| at == offset).unwrap_or_else(|| panic!("{offset:04X}h"))
+    };
     assert!(place(0x09C2) < place(0x08A7), "datagram before command complete");
     assert!(place(0x0008) < place(0x0881), "request before tail pointer");
     assert!(place(0x0881) < place(0x08A3) && place(0x08A3) < place(0x08A2), "summary last");

@@ -38,7 +38,11 @@ impl Rig {
             assert_eq!(rig.read(host, 0x0893), 1, "OK flag");
             for number in numbers {
                 let present = rig.device(host, number)[2];
-                assert_eq!(present, u8::from(number != rig.bus.get(host).number()), "{number} present");
+                assert_eq!(
+                    present,
+                    u8::from(number != rig.bus.get(host).number()),
+                    "{number} present"
+                );
             }
         }
         (rig, hosts)
@@ -105,22 +109,38 @@ impl Rig {
     }
 
     /// Transmit Datagram: directed, or to 255 for all.
-    pub(super) fn transmit(&mut self, host: Host, to: u8, codes: [u8; 2], priority: u8, data: &[u8]) -> u8 {
+    pub(super) fn transmit(
+        &mut self,
+        host: Host,
+        to: u8,
+        codes: [u8; 2],
+        priority: u8,
+        data: &[u8],
+    ) -> u8 {
         self.start_transmit(host, to, codes, priority, data);
         self.complete_command(host)
     }
 
-    pub(super) fn start_transmit(&mut self, host: Host, to: u8, codes: [u8; 2], priority: u8, data: &[u8]) {
+    pub(super) fn start_transmit(
+        &mut self,
+        host: Host,
+        to: u8,
+        codes: [u8; 2],
+        priority: u8,
+        data: &[u8],
+    ) {
         self.write_all(host, 0x08D2, data);
         let length = u8::try_from(data.len()).unwrap();
         self.start_command(host, 2, &[to, codes[0], codes[1], priority, length]);
     }
 
-    /// Read Datagram: source, function, subfunction, directed, and the data; or none when the queue is empty.
+    /// Read Datagram: source, function, subfunction, directed, and the data; or none when the queue
+    /// is empty.
     pub(super) fn read_datagram(&mut self, host: Host) -> Option<([u8; 4], Vec<u8>)> {
         match self.command(host, 1, &[]) {
             COMPLETE => {
-                let [source, function, subfunction, directed, length] = self.read_array(host, 0x08C4);
+                let [source, function, subfunction, directed, length] =
+                    self.read_array(host, 0x08C4);
                 let mut data = vec![0; length.into()];
                 self.bus.get_mut(host).host_read_to(0x09C2, &mut data);
                 Some(([source, function, subfunction, directed], data))
@@ -130,7 +150,8 @@ impl Rig {
         }
     }
 
-    /// Writes a setup (reference, broadcast, directed and buffer length) and sends a Configuration Change.
+    /// Writes a setup (reference, broadcast, directed and buffer length) and sends a Configuration
+    /// Change.
     pub(super) fn configure(&mut self, host: Host, setup: [u8; 5]) -> u8 {
         self.write_all(host, 0x0883, &setup);
         self.command(host, 4, &[])

@@ -33,7 +33,8 @@ pub(super) fn talk(mut script: Script<'_>) {
     };
     let timing = Timing { timeout: TIMEOUT, retries: script.byte().into(), line_rate: rate };
     let readers = Readers::new(&mut script);
-    let mut talk = Talk { session: Session::new(timing), now: Duration::ZERO, asked: Vec::new(), readers };
+    let mut talk =
+        Talk { session: Session::new(timing), now: Duration::ZERO, asked: Vec::new(), readers };
     while !script.is_over() {
         talk.act(&mut script);
         talk.check();
@@ -86,7 +87,10 @@ impl Talk {
             self.asked.push(command);
         }
         let only_reads = self.asked.iter().all(|asked| matches!(asked, Command::Read { .. }));
-        assert!(self.asked.len() <= 1 || (only_reads && self.asked.len() == 2), "two reads at most");
+        assert!(
+            self.asked.len() <= 1 || (only_reads && self.asked.len() == 2),
+            "two reads at most"
+        );
     }
 
     /// Does what is due, and takes what there is.
@@ -222,7 +226,9 @@ impl Readers {
         match self.reader.cursor() {
             Some(cursor) if delivered > 0 => assert_eq!(cursor.anchor, last),
             // An empty log is the only one in which a cursor can stand without an event.
-            cursor => assert!(cursor == before || cursor.is_some_and(|cursor| cursor.anchor.is_none())),
+            cursor => {
+                assert!(cursor == before || cursor.is_some_and(|cursor| cursor.anchor.is_none()))
+            }
         }
         let summary = self.reader.summary();
         assert!(
@@ -235,7 +241,8 @@ impl Readers {
             // As a program does: on from where this reading stopped.
             self.asked.clear();
             self.shown.clear();
-            let reader = LogReader::new(self.reader.cursor(), self.size).starting_near(summary.position);
+            let reader =
+                LogReader::new(self.reader.cursor(), self.size).starting_near(summary.position);
             self.reader = reader.keeping_up(self.keeps_up);
         }
     }

@@ -1,5 +1,5 @@
-//! The host's side: a session and readers of the log, against a line that brings anything, and against a recorder that
-//! tells the truth over a line that does not always.
+//! The host's side: a session and readers of the log, against a line that brings anything, and
+//! against a recorder that tells the truth over a line that does not always.
 
 mod anything;
 mod truth;
@@ -10,13 +10,16 @@ use super::script::Script;
 /// The first byte of `data` says which it is.
 ///
 /// Against anything:
-/// - an answer belongs to the request; what nobody asked for is kept up to a limit; lines have an end;
+/// - an answer belongs to the request; what nobody asked for is kept up to a limit; lines have an
+///   end;
 /// - readers take any reply to any request, and their cursors move as far as they deliver.
 ///
-/// Against a recorder that tells the truth, on a line that loses, cuts and damages messages and brings some late:
+/// Against a recorder that tells the truth, on a line that loses, cuts and damages messages and
+/// brings some late:
 /// - no event is delivered twice, out of order, or other than it was;
 /// - what is delivered and what is told to be lost are all events of a log;
-/// - no erase goes untold, unless the log is full again when it is looked at, or nothing was known of it before.
+/// - no erase goes untold, unless the log is full again when it is looked at, or nothing was known
+///   of it before.
 ///
 /// # Panics
 /// When one of these does not hold.

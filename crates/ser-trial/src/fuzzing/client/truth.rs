@@ -3,7 +3,9 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use ser_client::{Cursor, Delivery, Disturbed, LineRate, LogPosition, LogReader, Lost, Session, Timing};
+use ser_client::{
+    Cursor, Delivery, Disturbed, LineRate, LogPosition, LogReader, Lost, Session, Timing,
+};
 use ser_proto::{Command, Decoded, FrameDecoder, ReadReply, Reply};
 
 use super::truthful_unit::{TruthfulUnit, number_of};
@@ -44,7 +46,8 @@ struct Received {
     erased_meanwhile: bool,
     /// How often it was resized since.
     resized_meanwhile: u32,
-    /// Whether it was resized more than once during one reading, which may spoil the host's count for good.
+    /// Whether it was resized more than once during one reading, which may spoil the host's count
+    /// for good.
     muddled: bool,
 }
 
@@ -160,7 +163,9 @@ impl World {
                 self.session.forget_earlier_reports();
             }
             let (received, unit) = (&mut self.received, &self.unit);
-            if let Err(disturbed) = reader.take(&reply, &mut |delivery| received.take(delivery, unit)) {
+            if let Err(disturbed) =
+                reader.take(&reply, &mut |delivery| received.take(delivery, unit))
+            {
                 return Some(Err(disturbed));
             }
         }
@@ -181,7 +186,11 @@ impl World {
                 None => {}
             }
             let due = self.under_way.front().map(|(at, _)| *at);
-            let next = due.into_iter().chain(self.session.poll_at()).min().expect("a request has a deadline");
+            let next = due
+                .into_iter()
+                .chain(self.session.poll_at())
+                .min()
+                .expect("a request has a deadline");
             self.now = self.now.max(next);
         }
     }
@@ -192,7 +201,9 @@ impl World {
         }
         for &byte in frame {
             let command = match self.to_unit.push(byte) {
-                Some(Decoded::Frame(body)) => Command::parse(body).expect("a session sends commands"),
+                Some(Decoded::Frame(body)) => {
+                    Command::parse(body).expect("a session sends commands")
+                }
                 _ => continue,
             };
             match script.byte() {
@@ -296,7 +307,11 @@ impl Received {
             0 => true,
             wrong => self.turned && wrong.is_multiple_of(TOTAL_TURNS_AT),
         };
-        assert!(right || unseen, "after {from}, {} are told to be lost, and {number} comes", self.lost);
+        assert!(
+            right || unseen,
+            "after {from}, {} are told to be lost, and {number} comes",
+            self.lost
+        );
         self.next = number + 1;
         self.anchored = true;
         (self.restart_told, self.lost, self.turned) = (false, 0, false);

@@ -36,14 +36,20 @@ impl TruthfulUnit {
         self.happened
     }
 
-    /// Where the log began in which this event is: the running number of the first one after an erase.
+    /// Where the log began in which this event is: the running number of the first one after an
+    /// erase.
     pub(super) fn log_began(&self, number: u32) -> u32 {
         self.erased_before.iter().rev().copied().find(|&began| began <= number).unwrap_or(0)
     }
 
     /// Whether the log that began with this event may have been full.
     pub(super) fn was_full(&self, began: u32) -> bool {
-        let end = self.erased_before.iter().copied().find(|&other| other > began).unwrap_or(self.happened);
+        let end = self
+            .erased_before
+            .iter()
+            .copied()
+            .find(|&other| other > began)
+            .unwrap_or(self.happened);
         end - began >= self.smallest.into()
     }
 
@@ -107,13 +113,15 @@ impl TruthfulUnit {
         let newest = self.next_slot.checked_sub(1).unwrap_or(usize::from(self.size) - 1);
         let first = newest.saturating_sub(usize::from(count % 10));
         let count = u8::try_from(newest - first + 1).expect("at most ten");
-        (newest < self.slots.len()).then(|| self.read(u16::try_from(first + 1).expect("an entry"), count))
+        (newest < self.slots.len())
+            .then(|| self.read(u16::try_from(first + 1).expect("an entry"), count))
     }
 }
 
 /// The event with that running number. What changed goes together with the state before.
 fn entry(number: u32) -> Entry {
-    let time = TimeStamp { year: 26, month: 1, day: 1, hour: 0, minute: 0, second: 0, millisecond: 0 };
+    let time =
+        TimeStamp { year: 26, month: 1, day: 1, hour: 0, minute: 0, second: 0, millisecond: 0 };
     Entry { changed: Inputs(number ^ number.wrapping_sub(1)), state: Inputs(number), time }
 }
 

@@ -5,14 +5,14 @@ use std::collections::HashSet;
 use std::rc::Rc;
 
 use geni_board::{
-    Configuration, ConfigurationOutcome, Counters, Driver, Event, Interrupts, Options, Start, Transmission,
-    map, timing,
+    Configuration, ConfigurationOutcome, Counters, Driver, Event, Interrupts, Options, Start,
+    Transmission, map, timing,
 };
 
 use super::ram::{Ram, Window};
 
-/// Most accesses in one poll. The longest: a lockout is granted (128 bytes of global data), flags are set, devices are
-/// looked at.
+/// Most accesses in one poll. The longest: a lockout is granted (128 bytes of global data), flags
+/// are set, devices are looked at.
 const MAX_ACCESSES: usize = 600;
 
 /// How a datagram that was accepted has to end.
@@ -144,7 +144,10 @@ impl Bench {
         }
         let without_ms = self.now_ms.wrapping_sub(self.beat_ms);
         let is_trusted = was_ready && self.driver.is_ready();
-        assert!(!is_trusted || without_ms < self.heartbeat_timeout_ms, "{without_ms} ms without a beat");
+        assert!(
+            !is_trusted || without_ms < self.heartbeat_timeout_ms,
+            "{without_ms} ms without a beat"
+        );
     }
 
     /// Looks at what was written since this was last asked.
@@ -186,7 +189,10 @@ impl Bench {
                 assert!(received.source < map::DEVICE_COUNT);
                 let arrived_ms = received.arrived_ms;
                 let is_sign = |tick_ms| self.signs_ms.contains(tick_ms);
-                assert!(arrived_ms.as_ref().is_none_or(is_sign), "nothing was seen at {arrived_ms:?}");
+                assert!(
+                    arrived_ms.as_ref().is_none_or(is_sign),
+                    "nothing was seen at {arrived_ms:?}"
+                );
             }
             _ => {}
         }
@@ -249,8 +255,12 @@ fn may_write(offset: u16, byte: u8, buffer_len: u16) -> bool {
             at == map::REQUEST_STATUS || at >= map::REQUEST_DATA
         }
         map::SETUP_REFERENCE..=map::SETUP_BUFFER_LEN => true,
-        _ if map::INTERRUPT_STATUS.contains(offset) => offset <= map::INTERRUPT_STATUS.at(7) && byte == 0,
-        _ if map::INTERRUPT_DISABLE.contains(offset) => offset <= map::INTERRUPT_DISABLE.at(7) && byte <= 1,
+        _ if map::INTERRUPT_STATUS.contains(offset) => {
+            offset <= map::INTERRUPT_STATUS.at(7) && byte == 0
+        }
+        _ if map::INTERRUPT_DISABLE.contains(offset) => {
+            offset <= map::INTERRUPT_DISABLE.at(7) && byte <= 1
+        }
         _ if map::COMMAND_BLOCK.contains(offset) => offset <= map::REPLY_LEN,
         _ if map::TRANSMIT_BUFFER.contains(offset) => offset < map::TRANSMIT_BUFFER.start + 134,
         _ if map::DEVICE_TABLE.contains(offset) => {

@@ -1,4 +1,5 @@
-//! The GENI driver against a shared RAM that nobody is in charge of, and then against a board that works.
+//! The GENI driver against a shared RAM that nobody is in charge of, and then against a board that
+//! works.
 
 mod bench;
 mod ram;
@@ -16,18 +17,20 @@ use ram::Puppet;
 /// Milliseconds that the hostility lasts at most.
 const MAX_POLLS: u32 = 4_000;
 
-/// `data` says how the driver is set up, what changes in the RAM between two accesses and between two polls, what the
-/// host wants, and how time passes.
+/// `data` says how the driver is set up, what changes in the RAM between two accesses and between
+/// two polls, what the host wants, and how time passes.
 ///
 /// - A poll does a bounded number of accesses, and none while the board must be left alone.
-/// - Nothing is written but what belongs to the host, and nothing read from the reserved area. Lockout is asked for and
-///   given back when it may be, by what the driver has seen.
+/// - Nothing is written but what belongs to the host, and nothing read from the reserved area.
+///   Lockout is asked for and given back when it may be, by what the driver has seen.
 /// - A board without a heartbeat is not trusted any longer than agreed.
-/// - A datagram is handed out with a tick at which its flag was seen or, where the interrupt line is for datagrams only,
-///   at which that was pulsed, or with none.
-/// - Counters never go back; each datagram that was accepted ends once, in the way that was asked for.
-/// - When a board that works takes over, the driver is ready within a bounded time, sends, keeps the board's global
-///   data up to date, knows when datagrams arrive and breaks no rule of the board.
+/// - A datagram is handed out with a tick at which its flag was seen or, where the interrupt line
+///   is for datagrams only, at which that was pulsed, or with none.
+/// - Counters never go back; each datagram that was accepted ends once, in the way that was asked
+///   for.
+/// - When a board that works takes over, the driver is ready within a bounded time, sends, keeps
+///   the board's global data up to date, knows when datagrams arrive and breaks no rule of the
+///   board.
 ///
 /// # Panics
 /// When one of these does not hold.
@@ -87,8 +90,11 @@ fn act(bench: &mut Bench, script: &mut Script<'_>) {
         8 => bench.transmit(transmission(script)),
         9 => bench.driver.request_tables(),
         10 => {
-            let len =
-                if script.byte().is_multiple_of(4) { script.byte() } else { bench.wanted.broadcast_len() };
+            let len = if script.byte().is_multiple_of(4) {
+                script.byte()
+            } else {
+                bench.wanted.broadcast_len()
+            };
             bench.set_global_data(&vec![script.byte(); len.into()]);
         }
         11 => bench.configure(configuration(script)),
@@ -118,7 +124,8 @@ fn transmission(script: &mut Script<'_>) -> Transmission {
             1 => Completion::Acknowledged,
             _ => Completion::Reply { subfunction: bits },
         },
-        data: Data::from_slice(&vec![bits; usize::from(script.byte() % 135)]).expect("134 bytes fit"),
+        data: Data::from_slice(&vec![bits; usize::from(script.byte() % 135)])
+            .expect("134 bytes fit"),
     }
 }
 

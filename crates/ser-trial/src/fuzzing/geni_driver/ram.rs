@@ -23,7 +23,8 @@ impl SharedRam for Window {
     }
 }
 
-/// What the RAM does after each poll, so that the driver gets further than to a board that does nothing.
+/// What the RAM does after each poll, so that the driver gets further than to a board that does
+/// nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Puppet {
     beats: bool,

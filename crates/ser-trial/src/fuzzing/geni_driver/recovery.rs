@@ -3,7 +3,9 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use geni_board::{Completion, Configuration, Data, Destination, Event, Transmission, TransmitPriority, map};
+use geni_board::{
+    Completion, Configuration, Data, Destination, Event, Transmission, TransmitPriority, map,
+};
 use ser_sim::genius::{
     Board, BoardOptions, BoardWindow, Bus, BusTiming, Handle, Violation, ViolationKind, tick_ms,
 };
@@ -17,8 +19,8 @@ const DRIVER: u8 = 5;
 /// A main loop that is in no hurry.
 const PACE_MS: u32 = 10;
 
-/// The longest pause between two attempts to start a board, all that a board may take before it counts as failed, and
-/// one start.
+/// The longest pause between two attempts to start a board, all that a board may take before it
+/// counts as failed, and one start.
 const LIMIT_MS: u32 = 150_000;
 
 /// Whatever the driver still waits for from before the change is given up in this time.
@@ -45,8 +47,8 @@ struct Recovery {
     began_ms: u32,
 }
 
-/// Checks that the driver brings a board onto the bus that takes the place of the hostile RAM now: one that has just
-/// been switched on or, if it is `warm`, one that has been running for a while.
+/// Checks that the driver brings a board onto the bus that takes the place of the hostile RAM now:
+/// one that has just been switched on or, if it is `warm`, one that has been running for a while.
 pub(super) fn assert_recovers(bench: Bench, warm: bool) {
     let mut recovery = Recovery::begin(bench, warm);
     recovery.settle();
@@ -100,7 +102,8 @@ impl Recovery {
         self.began_ms.wrapping_add(tick_ms(bus_us) as u32)
     }
 
-    /// Until the driver has been on the bus for a while, and what it still had to send is dealt with.
+    /// Until the driver has been on the bus for a while, and what it still had to send is dealt
+    /// with.
     fn settle(&mut self) {
         let (mut waited_ms, mut settled_ms) = (0, 0);
         while settled_ms < SETTLED_MS {
@@ -121,8 +124,8 @@ impl Recovery {
         self.bus.borrow().get(self.board).violations().len()
     }
 
-    /// What the driver believes of the board that was there before may mislead it at first, but not to requests that
-    /// this board has never had.
+    /// What the driver believes of the board that was there before may mislead it at first, but not
+    /// to requests that this board has never had.
     fn assert_lawful(&self, violations_before: usize) {
         let bus = self.bus.borrow();
         let violations = bus.get(self.board).violations();
@@ -152,18 +155,19 @@ impl Recovery {
         assert!(self.bench.driver.can_transmit());
         self.bench.transmit(transmission);
         assert!(self.bench.is_sending());
-        let sent = (0..1_000).find_map(|_| self.step().filter(|event| matches!(event, Event::Sent(_))));
+        let sent =
+            (0..1_000).find_map(|_| self.step().filter(|event| matches!(event, Event::Sent(_))));
         assert_eq!(sent, Some(Event::Sent(Ok(()))));
     }
 
-    /// Whether the board pulls its line for datagrams and nothing else. One that has taken the place
-    /// of another unseen was not told to, and its pulses may mean anything.
+    /// Whether the board pulls its line for datagrams and nothing else. One that has taken the
+    /// place of another unseen was not told to, and its pulses may mean anything.
     fn pulls_for_datagrams(&self) -> bool {
         self.ram(INTERRUPT_DISABLE, 8) == [0, 1, 1, 1, 1, 1, 0, 1]
     }
 
-    /// With the interrupt line a datagram arrived in the millisecond of its pulse, by the board's own
-    /// word; without it, when its flag was looked for next.
+    /// With the interrupt line a datagram arrived in the millisecond of its pulse, by the board's
+    /// own word; without it, when its flag was looked for next.
     fn assert_knows_arrivals(&mut self) {
         if self.bench.has_line && !self.pulls_for_datagrams() {
             return;

@@ -17,7 +17,8 @@ const MAX_ENTRIES: u8 = 10;
 /// Virtual time under one supply of power: it bounds the work.
 const MAX_MS: u64 = 20_000;
 
-/// A node that has something to say sends a byte in this time, at every rate that a slow host lets it have.
+/// A node that has something to say sends a byte in this time, at every rate that a slow host lets
+/// it have.
 const SILENCE_MS: u32 = 10;
 
 /// After this time no change of an input is held back any more.
@@ -105,7 +106,9 @@ impl<'a, 'm> Bench<'a, 'm> {
         for said in self.model.sample(self.tick_ms, self.inputs) {
             match said {
                 // Without a port nobody will ever ask for it.
-                Said::Owed(entry) => self.genius.iter_mut().for_each(|genius| genius.owed.push_back(entry)),
+                Said::Owed(entry) => {
+                    self.genius.iter_mut().for_each(|genius| genius.owed.push_back(entry))
+                }
                 said => self.expected.push_back(said),
             }
         }
@@ -119,7 +122,11 @@ impl<'a, 'm> Bench<'a, 'm> {
     pub(super) fn toggle(&mut self, contacts: u32) {
         self.inputs ^= contacts;
         let moved = (0..32).filter(|index| contacts >> index & 1 != 0);
-        let steps = moved.map(|index| Step { at_ms: 0, input: index + 1, on: self.inputs >> index & 1 != 0 });
+        let steps = moved.map(|index| Step {
+            at_ms: 0,
+            input: index + 1,
+            on: self.inputs >> index & 1 != 0,
+        });
         let start_ms = self.node.play(&Scenario::from_steps(steps));
         assert_eq!(start_ms, self.node.now_ms() + 1);
         self.pass(1);
@@ -137,7 +144,9 @@ impl<'a, 'm> Bench<'a, 'm> {
                     let body = body.to_vec();
                     self.expected.extend(self.model.body(&body, self.tick_ms, MAX_ENTRIES));
                 }
-                Some(Decoded::Frame(_)) => assert_eq!(self.host, Host::Slow, "a command found no room"),
+                Some(Decoded::Frame(_)) => {
+                    assert_eq!(self.host, Host::Slow, "a command found no room")
+                }
                 Some(Decoded::Dropped(_)) => self.frames_dropped += 1,
                 Some(Decoded::Text(_)) | None => {}
             }
@@ -175,7 +184,10 @@ impl<'a, 'm> Bench<'a, 'm> {
                     Said::Line(line.strip_suffix('\r').expect("CR LF").to_owned())
                 }
                 Some(Decoded::Text(byte)) => {
-                    assert!(byte == b'\r' || (b' '..=b'~').contains(&byte), "{byte:02X}h in a line");
+                    assert!(
+                        byte == b'\r' || (b' '..=b'~').contains(&byte),
+                        "{byte:02X}h in a line"
+                    );
                     self.line.push(byte);
                     continue;
                 }
@@ -212,7 +224,8 @@ impl<'a, 'm> Bench<'a, 'm> {
         }
     }
 
-    /// From here on all that the node says is compared: what it still owes to a slow host has been said then.
+    /// From here on all that the node says is compared: what it still owes to a slow host has been
+    /// said then.
     pub(super) fn settle(&mut self) {
         if self.host == Host::Slow {
             // On a busy line a report brings together what debounce lets pass one after the other.

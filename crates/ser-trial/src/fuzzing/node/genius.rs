@@ -32,8 +32,8 @@ impl Genius {
         Genius { port, board, has_line, reply: None, owed: VecDeque::new(), ignored: 0 }
     }
 
-    /// The port works in the present millisecond. Reports are compared with the events that are owed to
-    /// `report_address`; `is_overwritten` says which of these the ring has lost.
+    /// The port works in the present millisecond. Reports are compared with the events that are
+    /// owed to `report_address`; `is_overwritten` says which of these the ring has lost.
     pub(super) fn serve(
         &mut self,
         node: &mut SimNode<'_>,
@@ -50,7 +50,8 @@ impl Genius {
         }
     }
 
-    /// Whether a datagram must be a report: everything that was asked has been answered, and events are owed.
+    /// Whether a datagram must be a report: everything that was asked has been answered, and events
+    /// are owed.
     fn awaits_no_reply(&self, sent: &Outgoing) -> bool {
         !self.owed.is_empty() && matches!(Reply::parse(&sent.data), Ok(Reply::Read(_)))
     }
@@ -58,10 +59,13 @@ impl Genius {
     fn compare(&mut self, sent: &Outgoing, address: u8, is_overwritten: &impl Fn(&Entry) -> bool) {
         let header = (sent.destination, sent.function, sent.subfunction);
         assert_eq!(header, (address, FUNCTION_HORNER, SUBFUNCTION_SER));
-        let Ok(Reply::Read(report)) = Reply::parse(&sent.data) else { panic!("{sent:?} is no report") };
+        let Ok(Reply::Read(report)) = Reply::parse(&sent.data) else {
+            panic!("{sent:?} is no report")
+        };
         assert!(!report.entries.is_empty(), "an empty report");
         for entry in report.entries {
-            let place = self.owed.iter().position(|owed| *owed == entry).expect("an event that is owed");
+            let place =
+                self.owed.iter().position(|owed| *owed == entry).expect("an event that is owed");
             // What comes later is written on top of what comes first.
             assert!(
                 self.owed.drain(..=place).rev().skip(1).all(|skipped| is_overwritten(&skipped)),
@@ -72,7 +76,13 @@ impl Genius {
 
     pub(super) fn bring_command(&mut self, source: u8, is_broadcast: bool, body: &[u8]) {
         let (function, subfunction) = (FUNCTION_HORNER, SUBFUNCTION_SER);
-        self.board.bring(Incoming { source, is_broadcast, function, subfunction, data: body.to_vec() });
+        self.board.bring(Incoming {
+            source,
+            is_broadcast,
+            function,
+            subfunction,
+            data: body.to_vec(),
+        });
     }
 
     /// The board pulls its interrupt line for what it has been brought.

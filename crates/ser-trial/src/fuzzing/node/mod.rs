@@ -19,18 +19,20 @@ use model::Recorder;
 /// How often the power goes at most.
 const MAX_POWER_CYCLES: u32 = 8;
 
-/// `data` says which model it is, what debounce times it has, whether it is on a bus, with or without the interrupt
-/// line, and what its clock shows, and then what happens: contacts move, bytes, commands and datagrams arrive, the UART
-/// misreads a byte, time passes, with or without the main loop, the power goes.
+/// `data` says which model it is, what debounce times it has, whether it is on a bus, with or
+/// without the interrupt line, and what its clock shows, and then what happens: contacts move,
+/// bytes, commands and datagrams arrive, the UART misreads a byte, time passes, with or without the
+/// main loop, the power goes.
 ///
-/// - What the node says is, to the byte and in its millisecond, what the model says: every reply, report and line.
+/// - What the node says is, to the byte and in its millisecond, what the model says: every reply,
+///   report and line.
 /// - The log is that of the model, with stamps by the clock of the model.
 /// - What was refused is counted.
-/// - Commands in datagrams are answered in the same way, and count from the millisecond of their pulse, or of the look
-///   that sees their flag; auto reports bring every event once; global data are the
-///   inputs.
-/// - The same log comes out when the host is slow and the line has its real rate; what is said is always a whole
-///   message.
+/// - Commands in datagrams are answered in the same way, and count from the millisecond of their
+///   pulse, or of the look that sees their flag; auto reports bring every event once; global data
+///   are the inputs.
+/// - The same log comes out when the host is slow and the line has its real rate; what is said is
+///   always a whole message.
 ///
 /// # Panics
 /// When one of these does not hold.
@@ -91,7 +93,8 @@ impl Setup {
         } else {
             i64::from(script.double_word()) * 734
         };
-        // What is asked over the bus is carried out a few milliseconds later, when no contact may move.
+        // What is asked over the bus is carried out a few milliseconds later, when no contact may
+        // move.
         let host = if bits & 2 == 0 { Host::Prompt } else { Host::Slow };
         let is_on_bus = bits & 0x20 != 0 && host == Host::Prompt && debounce_ms == [0; 32];
         Setup {
@@ -111,7 +114,10 @@ impl Setup {
         SimNodeOptions {
             debounce,
             line_rate: if self.host == Host::Slow { LineRate::Real } else { LineRate::Unlimited },
-            non_volatile: NonVolatile { storage: MemoryStorage::default(), rtc: SimRtc::held_at(self.rtc) },
+            non_volatile: NonVolatile {
+                storage: MemoryStorage::default(),
+                rtc: SimRtc::held_at(self.rtc),
+            },
             ..SimNodeOptions::new(self.model)
         }
     }
@@ -173,8 +179,8 @@ fn body<'a>(script: &mut Script<'a>) -> &'a [u8] {
     script.take(len)
 }
 
-/// Whether the log will be the same whenever the command is carried out after its arrival, and the host need not wait
-/// for hours until everything is said.
+/// Whether the log will be the same whenever the command is carried out after its arrival, and the
+/// host need not wait for hours until everything is said.
 fn is_free_of_order(body: &[u8]) -> bool {
     match Command::parse(body) {
         Ok(Command::Configure(configure)) => configure.size.is_none() && configure.baud.is_none(),

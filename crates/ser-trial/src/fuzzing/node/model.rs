@@ -1,12 +1,13 @@
-//! A recorder with nothing in it but what the manual and `docs/protocol.md` say: plain vectors, no queue, no rush.
+//! A recorder with nothing in it but what the manual and `docs/protocol.md` say: plain vectors, no
+//! queue, no rush.
 
 use std::collections::BTreeMap;
 
 use chrono::{DateTime, NaiveDateTime};
 use ser_node::VERSION;
 use ser_proto::{
-    AutoReport, Command, Configuration, Configure, Entry, Inputs, LastBroadcast, Mode, Model, ParseError,
-    ReadReply, Reply, TimeStamp,
+    AutoReport, Command, Configuration, Configure, Entry, Inputs, LastBroadcast, Mode, Model,
+    ParseError, ReadReply, Reply, TimeStamp,
 };
 
 /// A hundred years, 1970–2069: what two-digit years can tell apart.
@@ -36,7 +37,8 @@ pub(super) struct Refused {
 struct History<T>(Vec<(u64, T)>);
 
 impl<T: Copy> History<T> {
-    /// What was in force when the sample of `tick_ms` was taken: it is taken before anything else in its millisecond.
+    /// What was in force when the sample of `tick_ms` was taken: it is taken before anything else
+    /// in its millisecond.
     fn at_sample(&self, tick_ms: u64) -> T {
         let earlier = self.0.iter().rev().find(|(since_ms, _)| *since_ms < tick_ms);
         earlier.unwrap_or(&self.0[0]).1
@@ -168,8 +170,8 @@ impl Recorder {
         said
     }
 
-    /// Takes the body of a good frame, or of a datagram, in millisecond `tick_ms`; what is said because of it, with at
-    /// most `max_entries` entries in a reply.
+    /// Takes the body of a good frame, or of a datagram, in millisecond `tick_ms`; what is said
+    /// because of it, with at most `max_entries` entries in a reply.
     pub(super) fn body(&mut self, body: &[u8], tick_ms: u64, max_entries: u8) -> Vec<Said> {
         match Command::parse(body) {
             Ok(command) => self.command(&command, tick_ms, max_entries),
@@ -177,14 +179,18 @@ impl Recorder {
         }
     }
 
-    /// Takes the body of a datagram to everybody, which is not answered; the command, if there is one.
+    /// Takes the body of a datagram to everybody, which is not answered; the command, if there is
+    /// one.
     pub(super) fn broadcast(&mut self, body: &[u8], tick_ms: u64) -> Option<Command> {
         match Command::parse(body) {
             Ok(command) => {
                 // What only asks one recorder for something has no effect.
                 if matches!(
                     command,
-                    Command::Configure(_) | Command::Erase | Command::SetMode { .. } | Command::SetClock(_)
+                    Command::Configure(_)
+                        | Command::Erase
+                        | Command::SetMode { .. }
+                        | Command::SetClock(_)
                 ) {
                     self.command(&command, tick_ms, 0);
                 }
@@ -204,8 +210,9 @@ impl Recorder {
 
     /// The battery-backed clock is set to the time of this millisecond.
     pub(super) fn set_battery_clock(&mut self, tick_ms: u64) {
-        self.rtc =
-            DateTime::from_timestamp_millis(self.now_ms(tick_ms)).expect("within the century").naive_utc();
+        self.rtc = DateTime::from_timestamp_millis(self.now_ms(tick_ms))
+            .expect("within the century")
+            .naive_utc();
     }
 
     /// Whether an entry is not in the ring any more.
@@ -314,7 +321,8 @@ impl Recorder {
 
     /// The entries from number `start` on that exist, at most `count`.
     fn read(&self, start: usize, count: usize) -> Reply {
-        let existing = start.checked_sub(1).and_then(|slot| self.slots.get(slot..)).unwrap_or_default();
+        let existing =
+            start.checked_sub(1).and_then(|slot| self.slots.get(slot..)).unwrap_or_default();
         let entries = existing.iter().copied().take(count).collect::<Vec<_>>();
         Reply::Read(ReadReply {
             start: u16::try_from(start).expect("a number of two bytes"),

@@ -1,6 +1,8 @@
 //! What a host on the Genius bus does to the recorder, and what must come of it.
 
-use ser_proto::genius::{FUNCTION_GENIUS, FUNCTION_HORNER, SUBFUNCTION_SER, Subfunction, max_entries};
+use ser_proto::genius::{
+    FUNCTION_GENIUS, FUNCTION_HORNER, SUBFUNCTION_SER, Subfunction, max_entries,
+};
 use ser_proto::{AutoReport, Command, Decoded, FrameDecoder, LastBroadcast, MAX_BODY_LEN, Reply};
 use ser_sim::{Scenario, Step};
 
@@ -13,8 +15,8 @@ use crate::fuzzing::framing::frame_of;
 /// Everything that was brought over the bus is dealt with in this time.
 const BUS_MS: u32 = 20;
 
-/// The main loop sees the flag of a datagram in the next millisecond, and a prompt board that is not
-/// busy hands it over in the one after that.
+/// The main loop sees the flag of a datagram in the next millisecond, and a prompt board that is
+/// not busy hands it over in the one after that.
 const SEEN_AFTER_MS: u64 = 1;
 const READ_AFTER_MS: u64 = 2;
 
@@ -126,10 +128,17 @@ impl Bench<'_, '_> {
     /// The same with the interrupt line while the main loop is away: it comes back after so long,
     /// and finds contacts that have moved again and again since then. A recorder that says
     /// something about each change would say it later than the model, so it must not.
-    pub(super) fn broadcast_while_away(&mut self, source: u8, body: &[u8], for_ms: u8, contacts: u8) {
-        let is_quiet =
-            self.model.configuration.auto_report == AutoReport::Off && !self.model.configuration.auto_print;
-        let decides = matches!(Command::parse(body), Ok(Command::SetClock(_) | Command::SetMode { .. }));
+    pub(super) fn broadcast_while_away(
+        &mut self,
+        source: u8,
+        body: &[u8],
+        for_ms: u8,
+        contacts: u8,
+    ) {
+        let is_quiet = self.model.configuration.auto_report == AutoReport::Off
+            && !self.model.configuration.auto_print;
+        let decides =
+            matches!(Command::parse(body), Ok(Command::SetClock(_) | Command::SetMode { .. }));
         if !self.genius.as_ref().is_some_and(|genius| genius.has_line) || !is_quiet || !decides {
             return;
         }
@@ -149,7 +158,11 @@ impl Bench<'_, '_> {
             self.inputs ^= contacts.rotate_left(u32::from(for_ms));
             self.tick_ms += 1;
             let inputs = self.inputs;
-            steps.extend((0..32).map(|index| Step { at_ms, input: index + 1, on: inputs >> index & 1 != 0 }));
+            steps.extend((0..32).map(|index| Step {
+                at_ms,
+                input: index + 1,
+                on: inputs >> index & 1 != 0,
+            }));
             assert_eq!(self.model.sample(self.tick_ms, self.inputs), []);
         }
         self.node.play(&Scenario::from_steps(steps));
@@ -158,7 +171,12 @@ impl Bench<'_, '_> {
 
     /// What the recorder will have to say about a broadcast that it reads so long from now, if it
     /// heeds it.
-    fn expect_broadcast(&mut self, source: u8, body: &[u8], read_after_ms: u64) -> Option<(Command, i64)> {
+    fn expect_broadcast(
+        &mut self,
+        source: u8,
+        body: &[u8],
+        read_after_ms: u64,
+    ) -> Option<(Command, i64)> {
         let arrives_ms = self.arrives_ms();
         // A board receives its own broadcasts, and the driver drops them.
         let command = if source == NUMBER { None } else { self.model.broadcast(body, arrives_ms) }?;
@@ -185,7 +203,8 @@ impl Bench<'_, '_> {
         let question = frame_of(&Command::LastBroadcast.to_body());
         for &byte in &question {
             // It may stand in the middle of another frame.
-            self.frames_dropped += u32::from(matches!(self.commands.push(byte), Some(Decoded::Dropped(_))));
+            self.frames_dropped +=
+                u32::from(matches!(self.commands.push(byte), Some(Decoded::Dropped(_))));
         }
         self.node.receive(&question);
         let mut decoder = FrameDecoder::<MAX_BODY_LEN>::new();

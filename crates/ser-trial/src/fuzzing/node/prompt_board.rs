@@ -1,4 +1,5 @@
-//! A GENI board that does everything in the moment in which it is told, so that it is certain when a datagram arrives.
+//! A GENI board that does everything in the moment in which it is told, so that it is certain when
+//! a datagram arrives.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -51,7 +52,8 @@ const SCAN_MS: u8 = 3;
 
 impl PromptBoard {
     pub(super) fn new() -> PromptBoard {
-        let mut state = State { bytes: vec![0; RAM_LEN], inbox: VecDeque::new(), sent: VecDeque::new() };
+        let mut state =
+            State { bytes: vec![0; RAM_LEN], inbox: VecDeque::new(), sent: VecDeque::new() };
         state.set(map::SETUP_DIP_SWITCHES, NUMBER);
         state.set(map::STATUS_SCAN_TIME, SCAN_MS);
         PromptBoard(Rc::new(RefCell::new(state)))

@@ -1,5 +1,5 @@
-//! Why events may be gone with the log and nobody be told. Each reason is a limit that `docs/guarantees.md` names, or
-//! that the run ended; for anything else, silence is wrong.
+//! Why events may be gone with the log and nobody be told. Each reason is a limit that
+//! `docs/guarantees.md` names, or that the run ended; for anything else, silence is wrong.
 
 /// What a reader has to go by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,8 +30,8 @@ pub struct Unreported {
     pub first_reading: u64,
     /// Came and went while the reader knew only that the log was empty.
     pub empty_log: u64,
-    /// Gone from a log that was full again at the next look. What is reported as overwritten there is the difference of
-    /// two totals that have nothing to do with each other.
+    /// Gone from a log that was full again at the next look. What is reported as overwritten there
+    /// is the difference of two totals that have nothing to do with each other.
     pub full_again: u64,
     /// Gone with the power at the end of a life after which this reader has not read.
     pub not_read_since: u64,
@@ -55,8 +55,8 @@ impl Unreported {
 }
 
 impl Known {
-    /// Why a reader with this to go by finds no trace of an erase, after which the log is full again or is not;
-    /// nothing if it must find one.
+    /// Why a reader with this to go by finds no trace of an erase, after which the log is full
+    /// again or is not; nothing if it must find one.
     pub(super) fn silence(self, full_again: bool) -> Option<Silence> {
         match self {
             Known::Nothing => Some(Silence::FirstReading),

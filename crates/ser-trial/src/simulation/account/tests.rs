@@ -116,7 +116,8 @@ fn changes_that_were_not_recorded_are_told_before_the_event_after_them() {
         case.record(2);
         case
     };
-    let told = |inputs| Delivery::Lost { after: None, lost: Lost::Unrecorded { inputs: Inputs(inputs) } };
+    let told =
+        |inputs| Delivery::Lost { after: None, lost: Lost::Unrecorded { inputs: Inputs(inputs) } };
     let mut case = stopped_for_one();
     case.read(&[told(0b10)]).and_then(|()| case.deliver(3, 2)).expect("that is how it was");
     assert_eq!(case.finish(), Ok(Tally { delivered: 5, unrecorded: 1, ..Tally::default() }));
@@ -154,7 +155,10 @@ fn overwritten_events_are_lost_with_their_count() {
 fn events_that_are_still_there_are_not_lost() {
     let mut case = Case::read_up_to(3);
     case.record(5);
-    assert_refused(case.read(&[overwritten(2)]).and_then(|()| case.deliver(5, 1)), "are still there");
+    assert_refused(
+        case.read(&[overwritten(2)]).and_then(|()| case.deliver(5, 1)),
+        "are still there",
+    );
 }
 
 #[test]
@@ -188,7 +192,10 @@ fn a_reported_restart_accounts_for_what_went_unread() {
     for how in [Case::erase, Case::power_cycle] {
         let mut case = began_anew(how);
         case.read(&[RESTARTED]).and_then(|()| case.deliver(6, 5)).expect("it was told");
-        assert_eq!(case.finish(), Ok(Tally { delivered: 8, gone: 3, restarts: 1, ..Tally::default() }));
+        assert_eq!(
+            case.finish(),
+            Ok(Tally { delivered: 8, gone: 3, restarts: 1, ..Tally::default() })
+        );
     }
 }
 
@@ -220,10 +227,16 @@ fn a_log_that_is_empty_is_told_too() {
         case.record(3);
         how(&mut case);
         case.read(&[]).expect("nothing yet");
-        assert_refused(case.account.clone().finish_reading(&case.ledger), "nor a word of a restart");
+        assert_refused(
+            case.account.clone().finish_reading(&case.ledger),
+            "nor a word of a restart",
+        );
         case.read(&[RESTARTED]).expect("it did begin anew");
         let tally = case.finish().expect("it was told");
-        assert_eq!(Tally { restarts: 0, ..tally }, Tally { delivered: 3, gone: 3, ..Tally::default() });
+        assert_eq!(
+            Tally { restarts: 0, ..tally },
+            Tally { delivered: 3, gone: 3, ..Tally::default() }
+        );
     }
 }
 
@@ -248,10 +261,13 @@ fn what_follows_a_restart_can_be_overwritten() {
     for how in [Case::erase, Case::power_cycle] {
         let mut case = began_anew(how);
         case.record(SIZE.into());
-        let told = case
-            .read(&[RESTARTED, Delivery::Lost { after: None, lost: Lost::OverwrittenAtLeast { count: 5 } }]);
+        let told = case.read(&[
+            RESTARTED,
+            Delivery::Lost { after: None, lost: Lost::OverwrittenAtLeast { count: 5 } },
+        ]);
         told.and_then(|()| case.deliver(11, SIZE.into())).expect("it was told");
-        let expected = Tally { delivered: 103, overwritten: 5, gone: 3, restarts: 1, ..Tally::default() };
+        let expected =
+            Tally { delivered: 103, overwritten: 5, gone: 3, restarts: 1, ..Tally::default() };
         assert_eq!(case.finish(), Ok(expected));
     }
 }
@@ -279,7 +295,10 @@ fn a_reader_that_found_the_log_empty_can_miss_what_came_and_went() {
         case.read(&[]).and_then(|()| case.deliver(3, 2)).expect("it has nothing to go by");
         let tally = case.finish().expect("nor at the end");
         let unreported = Unreported { empty_log: 3, ..Unreported::default() };
-        assert_eq!(Tally { traceless: 0, ..tally }, Tally { delivered: 2, unreported, ..Tally::default() });
+        assert_eq!(
+            Tally { traceless: 0, ..tally },
+            Tally { delivered: 2, unreported, ..Tally::default() }
+        );
     }
 }
 
@@ -307,7 +326,9 @@ fn a_log_that_is_full_again_can_hide_an_erase() {
     let mut case = began_anew(Case::erase);
     case.record(SIZE.into());
     // Two totals, 3 and 105, and the log holds the latest 100.
-    case.read(&[overwritten(2)]).and_then(|()| case.deliver(11, SIZE.into())).expect("it cannot know");
+    case.read(&[overwritten(2)])
+        .and_then(|()| case.deliver(11, SIZE.into()))
+        .expect("it cannot know");
     let unreported = Unreported { full_again: 8, ..Unreported::default() };
     let expected = Tally { delivered: 103, unreported, traceless: 1, ..Tally::default() };
     assert_eq!(case.finish(), Ok(expected));
@@ -317,7 +338,9 @@ fn a_log_that_is_full_again_can_hide_an_erase() {
 fn a_log_that_is_full_again_can_hide_that_the_power_went() {
     let mut case = began_anew(Case::power_cycle);
     case.record(SIZE.into());
-    case.read(&[overwritten(5)]).and_then(|()| case.deliver(11, SIZE.into())).expect("it cannot know");
+    case.read(&[overwritten(5)])
+        .and_then(|()| case.deliver(11, SIZE.into()))
+        .expect("it cannot know");
     let tally = case.finish().expect("nor at the end");
     assert_eq!(tally.unreported.all() + tally.overwritten, 8);
     assert_eq!(tally.unreported, Unreported { full_again: 3, ..Unreported::default() });

@@ -104,7 +104,8 @@ fn an_erase_that_arrived_earlier_can_be_the_latest() {
 
 #[test]
 fn an_answer_that_waited_in_its_queue_does_not_undo_a_resize_over_the_other_port() {
-    let configuration = |size| Reply::Configuration(Configuration { size, ..Configuration::default() });
+    let configuration =
+        |size| Reply::Configuration(Configuration { size, ..Configuration::default() });
     let resize = |size| {
         let (auto_report, report_address) = (AutoReport::Off, 31);
         Command::Configure(Configure {
