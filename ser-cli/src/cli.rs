@@ -58,13 +58,17 @@ enum Command {
 }
 
 impl Command {
-    /// Whether it does nothing but bring data.
+    /// Whether it does nothing but print.
     fn is_for_its_output(&self) -> bool {
         use Command::{CommReq, Completions, Decode, Encode, Print, Read, Watch};
-        matches!(
-            self,
-            Read(_) | Print(_) | Watch(_) | Decode(_) | Encode(_) | CommReq(_) | Completions(_)
-        )
+        match self {
+            Read(_) | Print(_) | Watch(_) => true,
+            Decode(_) | Encode(_) | CommReq(_) | Completions(_) => true,
+            #[cfg(unix)]
+            Command::Genius(args) => args.is_offline(),
+            // Their exit code alone says something: is the recorder there?
+            _ => false,
+        }
     }
 }
 

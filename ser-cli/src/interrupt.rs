@@ -1,15 +1,20 @@
 //! Ctrl-C, and a polite kill, as something to ask for in a loop.
 
+use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::error::{EXIT_FAILURE, Failure, Result, advise};
 
 /// How soon an interrupt is noticed.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// Signals so close together are one wish: `timeout` sends one to the program and one to its group,
+/// and a supervisor may send two of different kinds.
+const ONE_WISH: Duration = Duration::from_millis(500);
 
 /// What to tell when the program ends before it has tidied up.
 static LEFT_BEHIND: Mutex<Option<&str>> = Mutex::new(None);
@@ -63,18 +68,50 @@ fn flag() -> Result<Arc<AtomicBool>> {
     }
     let flag = Arc::clone(INTERRUPTED.get_or_init(Arc::default));
     let set = Arc::clone(&flag);
+    let mut first = None;
     let caught = move || {
-        if set.swap(true, Ordering::SeqCst) || LOOKING.load(Ordering::SeqCst) == 0 {
+        let first: Instant = *first.get_or_insert_with(Instant::now);
+        let is_second = set.swap(true, Ordering::SeqCst) && first.elapsed() >= ONE_WISH;
+        if is_second || LOOKING.load(Ordering::SeqCst) == 0 {
             if let Some(hint) = *LEFT_BEHIND.lock().unwrap_or_else(PoisonError::into_inner) {
                 advise(hint);
             }
             std::process::exit(EXIT_FAILURE.into());
         }
     };
-    ctrlc::set_handler(caught).map_err(|error| {
+    on_every_signal(caught).map_err(|error| {
         Failure::new(format!("cannot catch Ctrl-C: {error}")).hint("report this as a bug")
     })?;
     Ok(flag)
+}
+
+/// Calls a function at every Ctrl-C, polite kill and hang-up. A signal that was ignored when the
+/// program was started (`nohup`) stays ignored.
+#[cfg(unix)]
+fn on_every_signal(mut caught: impl FnMut() + Send + 'static) -> io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use signal_hook::iterator::Signals;
+
+    let ignored = ignored_signals();
+    let is_heard = |signal: &i32| ignored >> (signal - 1) & 1 == 0;
+    let mut signals = Signals::new([SIGHUP, SIGINT, SIGTERM].into_iter().filter(is_heard))?;
+    thread::Builder::new()
+        .name("signals".to_owned())
+        .spawn(move || signals.forever().for_each(|_| caught()))?;
+    Ok(())
+}
+
+/// The signals that are ignored, a bit each; 0 where the system does not tell.
+#[cfg(unix)]
+fn ignored_signals() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+}
+
+#[cfg(not(unix))]
+fn on_every_signal(caught: impl FnMut() + Send + 'static) -> io::Result<()> {
+    ctrlc::set_handler(caught).map_err(io::Error::other)
 }
 
 /// Does what may have to wait for others without end, as opening a pipe does, until there is an

@@ -239,6 +239,9 @@ fn a_second_client_hears_of_the_first() {
     assert_eq!(refused.status.code(), Some(1));
     assert!(why.contains("before the first answer") && why.contains("another client"), "{why}");
     let has = format!("{} has the line", first.local_addr().expect("an address"));
+    let mut said = String::new();
+    connected(&port).read_to_string(&mut said).expect("text");
+    assert_eq!(said, format!("busy: {has}\r\n"));
     wait_until("the notice", || told.try_iter().any(|line| line.ends_with(&has)));
     drop(first);
     wait_until("the place is free", || status_of(&port).status.success());
@@ -478,6 +481,45 @@ fn a_polite_kill_lets_watch_put_the_configuration_back() {
     watch.signal("-TERM");
     assert_eq!(watch.wait(), Some(0));
     assert_eq!(bench.ok("config"), before);
+}
+
+#[test]
+fn two_signals_in_one_moment_are_one_wish() {
+    let bench = Bench::start(Kind::Native, &[]);
+    let before = bench.ok("config");
+    for signals in ["INT TERM", "HUP HUP HUP", "TERM TERM"] {
+        let mut watch = Running::start(
+            bench.command("watch --format csv").stdout(Stdio::piped()).stderr(Stdio::null()),
+        );
+        let lines = watch.lines();
+        lines.recv_timeout(PATIENCE).expect("watch has the recorder");
+        // One shell sends them all, so that they come within milliseconds.
+        let pid = watch.0.id();
+        let all: Vec<_> = signals.split(' ').map(|name| format!("kill -{name} {pid}")).collect();
+        let mut shell = Command::new("sh");
+        // One that comes too late finds nobody.
+        let _ = shell.arg("-c").arg(all.join("; ")).stderr(Stdio::null()).status();
+        assert_eq!(watch.wait(), Some(0), "{signals}");
+        assert_eq!(bench.ok("config"), before, "{signals}");
+    }
+}
+
+#[test]
+fn a_hang_up_that_is_to_be_ignored_is() {
+    let mut bench = Bench::start(Kind::Native, &[]);
+    let mut shell = Command::new("sh");
+    let watch = "trap '' HUP; exec \"$0\" --timeout 20s watch --format csv";
+    shell.args(["-c", watch, env!("CARGO_BIN_EXE_ser-cli")]);
+    shell.env("SER_PORT", bench.link()).env("SER_STATE_DIR", bench.folder.path().join("state"));
+    let mut watch = Running::start(shell.stdout(Stdio::piped()).stderr(Stdio::null()));
+    let lines = watch.lines();
+    lines.recv_timeout(PATIENCE).expect("watch has the recorder");
+    watch.signal("-HUP");
+    let input = bench.sim.0.stdin.as_mut().expect("piped");
+    write!(input, "ms,input,state\n0,7,1\n\n").expect("the simulator reads");
+    let row = lines.recv_timeout(PATIENCE).expect("it goes on");
+    assert!(row.contains(",7,1,"), "{row}");
+    assert_eq!(watch.interrupt(), Some(0));
 }
 
 #[test]

@@ -143,9 +143,16 @@ fn nothing_is_delivered_into_a_closed_output() {
         shell.env("SER_PORT", unit.folder.path().join("unit")).env("SER_STATE_DIR", &state);
         shell.stdin(Stdio::null()).output().expect("sh runs")
     };
-    for line in
-        ["read", "read --new", "watch", "print --from 1 --count 1", "decode -", "completions bash"]
-    {
+    for line in [
+        "read",
+        "read --new",
+        "watch",
+        "print --from 1 --count 1",
+        "decode -",
+        "completions bash",
+        "genius dip 10100111",
+        "genius decode 20 00",
+    ] {
         let Output { status, stderr, .. } = run(&format!("{line} >&-"));
         assert_eq!(status.code(), Some(1), "{line}");
         assert!(text(&stderr).contains("standard output is closed"), "{line}: {}", text(&stderr));

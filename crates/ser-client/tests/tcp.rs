@@ -52,20 +52,41 @@ fn a_peer_that_goes_away_before_it_has_said_anything_serves_somebody_else() {
     );
     drop(peer);
     let error = client.wait_event(Duration::from_secs(20)).unwrap_err();
-    assert!(matches!(error, RequestError::Transport(TransportError::TurnedAway)), "{error:?}");
+    assert!(
+        matches!(error, RequestError::Transport(TransportError::TurnedAway { .. })),
+        "{error:?}"
+    );
     let error = client.mode().unwrap_err();
-    assert!(matches!(error, RequestError::Transport(TransportError::TurnedAway)), "{error:?}");
+    assert!(
+        matches!(error, RequestError::Transport(TransportError::TurnedAway { .. })),
+        "{error:?}"
+    );
     assert!(error.to_string().ends_with("before the first answer"), "{error}");
     assert!(error.hint().is_some_and(|hint| hint.contains("another client")), "{:?}", error.hint());
 }
 
 #[test]
+fn a_peer_that_says_why_it_goes_is_quoted() {
+    let (mut client, mut peer) = connect(Options { timeout: Duration::from_secs(20), retries: 0 });
+    peer.write_all(b"busy: 10.0.0.9:4711\r\n has the line\r\n").unwrap();
+    peer.write_all(&[b'.'; 1000]).unwrap();
+    peer.shutdown(std::net::Shutdown::Write).unwrap();
+    let error = client.mode().unwrap_err().to_string();
+    assert!(error.contains("which said: busy: 10.0.0.9:4711 has the line ..."), "{error}");
+    assert!(error.len() < 400, "{error}");
+}
+
+#[test]
 fn a_peer_that_goes_away_in_the_middle_has_ended() {
     let (mut client, mut peer) = connect(Options { timeout: Duration::from_millis(1), retries: 0 });
-    peer.write_all(b"a line\r\n").unwrap();
+    peer.write_all(b"\x1B\r\na line\r\n").unwrap();
     client.wait_event(Duration::from_secs(20)).unwrap();
     drop(peer);
-    let error = client.wait_event(Duration::from_secs(20)).unwrap_err();
+    let error = loop {
+        if let Err(error) = client.wait_event(Duration::from_secs(20)) {
+            break error;
+        }
+    };
     assert!(matches!(error, RequestError::Transport(TransportError::Closed)), "{error:?}");
 }
 
@@ -83,7 +104,10 @@ fn a_question_to_a_peer_that_has_hung_up_says_the_same_whichever_way_it_is_notic
         });
         let error = client.mode().unwrap_err();
         closing.join().unwrap();
-        assert!(matches!(error, RequestError::Transport(TransportError::TurnedAway)), "{error:?}");
+        assert!(
+            matches!(error, RequestError::Transport(TransportError::TurnedAway { .. })),
+            "{error:?}"
+        );
     }
 }
 

@@ -67,6 +67,13 @@ pub(crate) struct Args {
     what: What,
 }
 
+impl Args {
+    /// Whether no bus is needed, and nothing is done but printing.
+    pub(crate) fn is_offline(&self) -> bool {
+        matches!(self.what, What::Decode { .. } | What::Dip { .. })
+    }
+}
+
 #[derive(Debug, clap::Subcommand)]
 enum What {
     /// List the devices that are logged in.

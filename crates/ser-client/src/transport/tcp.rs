@@ -4,6 +4,8 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
+use ser_proto::ESC;
+
 use super::open_error::OpenError;
 use super::{Transport, bytes_read};
 
@@ -13,12 +15,15 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 /// A peer that takes nothing for so long has gone.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 
+/// So much of what the other end says before the first frame is shown.
+const MAX_GREETING_LEN: usize = 200;
+
 /// An open TCP connection.
 #[derive(Debug)]
 pub struct TcpTransport {
     stream: TcpStream,
-    /// Whether the other end has said anything.
-    heard: bool,
+    /// The text that came before the first frame, as far as it is shown; nothing from then on.
+    greeting: Option<Vec<u8>>,
 }
 
 impl TcpTransport {
@@ -33,7 +38,7 @@ impl TcpTransport {
         let mut last_error = None;
         for candidate in candidates {
             match TcpStream::connect_timeout(&candidate, CONNECT_TIMEOUT).and_then(prepare) {
-                Ok(stream) => return Ok(TcpTransport { stream, heard: false }),
+                Ok(stream) => return Ok(TcpTransport { stream, greeting: Some(Vec::new()) }),
                 Err(error) => last_error = Some(error),
             }
         }
@@ -45,7 +50,18 @@ impl TcpTransport {
 }
 
 impl TcpTransport {
-    /// An end before the first word has another cause than one in the middle of a conversation.
+    /// Keeps what the other end says before the first frame: it may say why it goes.
+    fn listen(&mut self, bytes: &[u8]) {
+        if bytes.contains(&ESC) {
+            self.greeting = None;
+        }
+        if let Some(greeting) = &mut self.greeting {
+            let room = MAX_GREETING_LEN.saturating_sub(greeting.len());
+            greeting.extend(bytes.iter().take(room));
+        }
+    }
+
+    /// An end before the first frame has another cause than one in the middle of a conversation.
     fn ended(&self, error: io::Error) -> io::Error {
         let is_end = matches!(
             error.kind(),
@@ -54,7 +70,17 @@ impl TcpTransport {
                 | ErrorKind::ConnectionReset
                 | ErrorKind::ConnectionAborted
         );
-        if is_end && !self.heard { ErrorKind::ConnectionRefused.into() } else { error }
+        match &self.greeting {
+            Some(greeting) if is_end => {
+                let said = String::from_utf8_lossy(greeting);
+                let words: Vec<&str> = said.split_whitespace().collect();
+                match words.is_empty() {
+                    true => ErrorKind::ConnectionRefused.into(),
+                    false => io::Error::new(ErrorKind::ConnectionRefused, words.join(" ")),
+                }
+            }
+            _ => error,
+        }
     }
 }
 
@@ -86,7 +112,9 @@ impl Transport for TcpTransport {
         }
         let read = self.stream.read(buf);
         let read = bytes_read(read, buf.len(), ErrorKind::UnexpectedEof);
-        self.heard |= read.as_ref().is_ok_and(|&read| read > 0);
+        if let Some(bytes) = read.as_ref().ok().and_then(|&read| buf.get(..read)) {
+            self.listen(bytes);
+        }
         read.map_err(|error| self.ended(error))
     }
 

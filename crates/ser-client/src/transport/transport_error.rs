@@ -13,8 +13,11 @@ pub enum TransportError {
     Unplugged,
     /// The other end of the connection went away.
     Closed,
-    /// It did so before it said anything.
-    TurnedAway,
+    /// It did so before the first answer.
+    TurnedAway {
+        /// The text that it sent instead, on one line; empty if it said nothing.
+        said: String,
+    },
     /// The GENI board, or the bus behind it.
     Genius(GeniusError),
     /// Anything else.
@@ -32,8 +35,8 @@ impl TransportError {
             TransportError::Closed => {
                 Some("is the program or the terminal server at the other end still running?")
             }
-            TransportError::TurnedAway => Some(
-                "perhaps another client has the unit: most terminal servers serve one at a time",
+            TransportError::TurnedAway { .. } => Some(
+                "perhaps another client has the recorder: most terminal servers serve one at a time",
             ),
             TransportError::Genius(error) => Some(error.hint()),
             TransportError::Io(_) => None,
@@ -51,7 +54,10 @@ impl From<io::Error> for TransportError {
     fn from(error: io::Error) -> TransportError {
         match error.kind() {
             ErrorKind::NotConnected => TransportError::Unplugged,
-            ErrorKind::ConnectionRefused => TransportError::TurnedAway,
+            ErrorKind::ConnectionRefused => {
+                let said = error.get_ref().map(ToString::to_string).unwrap_or_default();
+                TransportError::TurnedAway { said }
+            }
             ErrorKind::UnexpectedEof
             | ErrorKind::BrokenPipe
             | ErrorKind::ConnectionReset
@@ -66,8 +72,9 @@ impl fmt::Display for TransportError {
         match self {
             TransportError::Unplugged => write!(f, "the serial port is gone"),
             TransportError::Closed => write!(f, "the connection was closed by the other end"),
-            TransportError::TurnedAway => {
-                write!(f, "the connection was closed by the other end before the first answer")
+            TransportError::TurnedAway { said } => {
+                write!(f, "the connection was closed by the other end before the first answer")?;
+                if said.is_empty() { Ok(()) } else { write!(f, ", which said: {said}") }
             }
             TransportError::Genius(error) => error.fmt(f),
             TransportError::Io(error) => write!(f, "the line failed: {error}"),
@@ -81,7 +88,7 @@ impl Error for TransportError {
             TransportError::Io(error) => Some(error),
             TransportError::Unplugged
             | TransportError::Closed
-            | TransportError::TurnedAway
+            | TransportError::TurnedAway { .. }
             | TransportError::Genius(_) => None,
         }
     }

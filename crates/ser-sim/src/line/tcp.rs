@@ -1,18 +1,19 @@
 //! A serial line over TCP, for one client at a time.
 //!
-//! A second client is closed at once, so that it notices; a client that goes makes room for the
+//! A second client is told who has the line, and closed; a client that goes makes room for the
 //! next. A slow client slows down what the node sends and nothing else.
 //!
 //! # Design
 //! Nobody keeps the place for ever. A client whose computer is gone, or the way to it, does not
 //! answer the probes of TCP and is given up within two minutes. One that is there and says nothing
 //! may be listening, as long as it likes; but when another one comes, and it has not said anything
-//! for ten minutes, it gives way. A second client is told nothing: whatever it was, it would be
-//! taken for a word of the recorder's.
+//! for ten minutes, it gives way.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::mem;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
+use std::net::{
+    IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs,
+};
 #[cfg(unix)]
 use std::os::fd::{AsFd, BorrowedFd};
 use std::time::{Duration, Instant};
@@ -113,6 +114,7 @@ impl TcpLine {
                     let has = format!("{address} was turned away: {} has the line", client.address);
                     self.notices.push(has);
                 }
+                turn_away(stream, client.address);
                 return Ok(());
             }
             let seconds = silent.as_secs();
@@ -127,6 +129,19 @@ impl TcpLine {
             Some(Client { stream, address, heard, has_turned_away: false, last_word: None });
         self.client_changed = true;
         Ok(())
+    }
+}
+
+/// Says why in a line of text, which is no frame, and closes the connection. A client that has gone
+/// meanwhile is told nothing.
+fn turn_away(mut stream: TcpStream, holder: SocketAddr) {
+    let told = stream
+        .set_nonblocking(true)
+        .and_then(|()| write!(stream, "busy: {holder} has the line\r\n"))
+        .and_then(|()| stream.shutdown(Shutdown::Write));
+    // Unread bytes would reset the connection, and with it what it was told.
+    if told.is_ok() {
+        let _ = stream.read(&mut [0; 1024]);
     }
 }
 

@@ -18,19 +18,20 @@ pub(super) fn run(words: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// The bytes of words such as `20`, `0x20` or `201E0001`.
+/// The bytes of words such as `20`, `0x20`, `20h` or `201E0001`, with blanks or commas between them.
 fn bytes_of(words: &[String]) -> Result<Vec<u8>> {
+    let parts = words.iter().flat_map(|word| word.split([' ', ',', '\t', '\n']));
     let mut bytes = Vec::new();
-    for word in words {
-        let digits = word.strip_prefix("0x").unwrap_or(word);
-        let pairs = digits.as_bytes().chunks(2);
+    for part in parts.filter(|part| !part.is_empty()) {
+        let digits = part.strip_prefix("0x").or_else(|| part.strip_prefix("0X")).unwrap_or(part);
+        let digits = digits.strip_suffix(['h', 'H']).unwrap_or(digits);
         let of_pair = |pair: &[u8]| match pair {
             [high, low] => Some(hex_digit(*high)? << 4 | hex_digit(*low)?),
             _ => None,
         };
-        let of_word: Option<Vec<u8>> = pairs.map(of_pair).collect();
-        bytes.extend(of_word.ok_or_else(|| {
-            Failure::usage(format!("{word:?} is no hexadecimal byte"))
+        let of_part: Option<Vec<u8>> = digits.as_bytes().chunks(2).map(of_pair).collect();
+        bytes.extend(of_part.filter(|of_part| !of_part.is_empty()).ok_or_else(|| {
+            Failure::usage(format!("{part:?} is no hexadecimal byte"))
                 .hint("every byte has two digits: ser-cli genius decode 20 00")
         })?);
     }
@@ -58,7 +59,8 @@ fn lines_of(bytes: &[u8]) -> Result<Vec<String>> {
         (FUNCTION_HORNER, SUBFUNCTION_SER) => {
             let message = explain(data, None);
             match message.is_damage() {
-                true => Err(Failure::new(message.text)),
+                true => Err(Failure::usage(message.text)
+                    .hint("after 40 50 comes the message: ser-cli genius decode 40 50 45")),
                 false => Ok(std::iter::once(message.text).chain(message.details).collect()),
             }
         }
@@ -71,11 +73,12 @@ fn lines_of(bytes: &[u8]) -> Result<Vec<String>> {
 
 fn of_the_bus(subfunction: u8, data: &Data) -> Result<Vec<String>> {
     let message = Message::from_data(subfunction, data).map_err(|error| {
-        Failure::new(error)
-            .hint("the first byte is the function code, the second the subfunction code")
+        Failure::usage(error).hint("docs/genius.md has the layout of every datagram")
     })?;
     let details = match &message {
-        Message::ReadIoForcesReply(forces) => vec![shown(&forces.contents)],
+        Message::ReadIoForcesReply(forces) if !forces.contents.is_empty() => {
+            vec![shown(&forces.contents)]
+        }
         Message::ReadDeviceReply(piece) | Message::WriteDevice(piece) => {
             vec![shown(&piece.contents)]
         }
@@ -135,7 +138,8 @@ mod tests {
             ("20 0F 01 02", "Report Fault, 2 bytes\n  01 02"),
             ("20 33", "datagram 33h, no data"),
             ("40 50 45", "host: erase the event buffer | recorder: event buffer erased"),
-            ("0x33 0x01 0xFF", "function 33h, subfunction 01h: FF"),
+            ("0x33 0X01 FFh", "function 33h, subfunction 01h: FF"),
+            ("20,41,02", "Read I/O Forces reply: input values, no data"),
         ] {
             assert_eq!(decoded(words), text, "{words}");
         }

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use clap::ValueEnum;
 use ser_proto::genius::{BusAddress, BusRate, BusSettings, DipSwitches};
 
-use crate::error::{Failure, Result, warn};
+use crate::error::{Failure, Result};
 
 /// The rate of a bus as the switches have it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -53,10 +53,10 @@ pub(super) fn run(
     let mut out = io::stdout().lock();
     writeln!(out, "{}", text(switches))?;
     out.flush()?;
-    if let Err(closed) = switches.settings() {
-        warn(closed);
+    match switches.settings() {
+        Ok(_) => Ok(()),
+        Err(closed) => Err(Failure::new(closed).hint("open switch 8 of the recorder")),
     }
-    Ok(())
 }
 
 /// Eight digits, switch 1 first, 1 for an open switch.
