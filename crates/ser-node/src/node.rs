@@ -115,6 +115,9 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
 
     /// Does what is due on the Genius bus, a bounded amount of it: global data, commands that have
     /// arrived, one datagram to be sent. Called after [`poll`](Self::poll).
+    // Apart from the main loop: in one function they are longer than a table of jumps reaches, and
+    // what a compiler does instead, no check of an image follows.
+    #[inline(never)]
     pub fn genius_poll<W: SharedRam>(&mut self, port: &mut GeniusPort<W>) {
         // Not that of `poll`: what was done since may have taken long, and a flag is seen now.
         let now_ms = self.tick_ms();
@@ -176,8 +179,6 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         }
     }
 
-    /// Apart from the main loop, which is long: a jump within it is out of a jump table's reach.
-    #[inline(never)]
     fn deal_with<W: SharedRam>(&mut self, said: FromBus, port: &mut GeniusPort<W>) {
         match said {
             FromBus::Arrived(arrival) => self.recorder.arrived(&arrival),
