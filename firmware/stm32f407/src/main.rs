@@ -21,6 +21,10 @@ mod clocks;
 mod fault;
 mod flash;
 mod geni_bus;
+#[cfg(not(feature = "serialiser"))]
+mod inputs;
+#[cfg(feature = "serialiser")]
+#[path = "serialisers.rs"]
 mod inputs;
 mod lamps;
 mod log;
@@ -92,8 +96,12 @@ mod app {
 
     static INPUT_HEALTH: InputHealth = InputHealth::new();
 
-    static HEALTH: Health<'static> =
-        Health { inputs: &INPUT_HEALTH, serialisers: None, clock: &rtc::HEALTH, storage: &flash::HEALTH };
+    static HEALTH: Health<'static> = Health {
+        inputs: &INPUT_HEALTH,
+        serialisers: inputs::SERIALISERS,
+        clock: &rtc::HEALTH,
+        storage: &flash::HEALTH,
+    };
 
     #[init(local = [
         memory: Memory = Memory::new(),
@@ -142,7 +150,10 @@ mod app {
             None
         };
         let genius = genius.map(|(board, window)| Genius::new(board, window, GeniusOptions::new(model)));
+        #[cfg(not(feature = "serialiser"))]
         let contacts = InputPins { low: ports.b, middle: ports.c, high: ports.g };
+        #[cfg(feature = "serialiser")]
+        let contacts = InputPins::start(&device.RCC, device.SPI1, ports.a, model);
         let sampler = Sampler::new(contacts, inputs::wiring(model), &INPUT_HEALTH);
         let timer = Timer::start(&device.RCC, device.TIM2, device.TIM3);
         (
