@@ -39,7 +39,7 @@ const CALLS: [&str; 26] = [
 ];
 
 /// File, call, how often, and why that is right.
-const JUDGED: [(&str, &str, usize, &str); 28] = [
+const JUDGED: [(&str, &str, usize, &str); 29] = [
     (
         "crates/geni-board/src/mapped_ram.rs",
         "map_raw(",
