@@ -37,7 +37,8 @@ struct Plant {
 
 impl Plant {
     fn new(recorders: u8) -> Plant {
-        let units: Vec<(u8, Model)> = (1..=recorders).map(|number| (number, Model::Ser160)).collect();
+        let units: Vec<(u8, Model)> =
+            (1..=recorders).map(|number| (number, Model::Ser160)).collect();
         let mut world = World::started(&units);
         world.report_to_host();
         let chance = Chance::new(recorders.into());
@@ -93,7 +94,8 @@ impl Plant {
             let now_ms = self.world.now_ms;
             let moves = first_ms.is_some_and(|first_ms| first_ms + move_after_ms == now_ms);
             self.step(moves);
-            let done = self.carried_out().iter().zip(&before).filter(|(now, before)| now > before).count();
+            let done =
+                self.carried_out().iter().zip(&before).filter(|(now, before)| now > before).count();
             if done > 0 {
                 first_ms.get_or_insert(self.world.now_ms);
             }
@@ -108,13 +110,21 @@ impl Plant {
                 return last_ms - first_ms;
             }
         }
-        panic!("not all of {} have carried out the broadcast: {:?}", before.len(), self.carried_out());
+        panic!(
+            "not all of {} have carried out the broadcast: {:?}",
+            before.len(),
+            self.carried_out()
+        );
     }
 
-    /// When each recorder's board received the broadcast that was carried out last, and the recorder
-    /// looked at it: in every millisecond, and there is no interrupt line here.
+    /// When each recorder's board received the broadcast that was carried out last, and the
+    /// recorder looked at it: in every millisecond, and there is no interrupt line here.
     fn seen_ms(&mut self) -> Vec<u64> {
-        self.world.recorders.iter_mut().map(|recorder| recorder.read_arrived_us().div_ceil(1000)).collect()
+        self.world
+            .recorders
+            .iter_mut()
+            .map(|recorder| recorder.read_arrived_us().div_ceil(1000))
+            .collect()
     }
 
     /// What the clocks show in the millisecond in which the common contact moved last, if a
@@ -141,11 +151,15 @@ impl Plant {
         TimeStamp { year: 26, month: 11, day, hour, minute, second, millisecond }
     }
 
-    /// The boards of all recorders were busy sending when broadcasts came, and these were handed over
-    /// late.
+    /// The boards of all recorders were busy sending when broadcasts came, and these were handed
+    /// over late.
     fn assert_was_busy(&self, rounds: u32, longest_ms: u64) {
-        let sent = self.world.recorders.iter().map(|recorder| recorder.port.diagnostics().reports_sent);
-        assert!(longest_ms > 10, "the last recorder is no more than {longest_ms} ms behind the first");
+        let sent =
+            self.world.recorders.iter().map(|recorder| recorder.port.diagnostics().reports_sent);
+        assert!(
+            longest_ms > 10,
+            "the last recorder is no more than {longest_ms} ms behind the first"
+        );
         assert!(sent.clone().all(|sent| sent >= rounds / 4), "{:?}", sent.collect::<Vec<_>>());
         self.world.assert_lawful();
     }
@@ -190,11 +204,16 @@ fn clocks_agree(recorders: u8, rounds: u32, soon_ms: Option<u64>) {
         longest_ms = longest_ms.max(took_ms);
         if soon_ms.is_some() && took_ms <= HELD_BACK_MS {
             let stamps = plant.stamps_ms(moved);
-            assert_eq!(stamps, plant.true_stamps_ms(time), "{move_after_ms} ms after it, round {round}");
+            assert_eq!(
+                stamps,
+                plant.true_stamps_ms(time),
+                "{move_after_ms} ms after it, round {round}"
+            );
         }
         beyond += u32::from(took_ms > HELD_BACK_MS);
         // Who has recorded changes too early knows it.
-        let late = plant.world.recorders.iter().map(|recorder| recorder.node.diagnostics().settings_late);
+        let late =
+            plant.world.recorders.iter().map(|recorder| recorder.node.diagnostics().settings_late);
         assert_eq!(late.sum::<u32>() > 0, beyond > 0, "round {round}, {took_ms} ms");
         plant.step(true);
         let stamps = plant.stamps_ms(moved);
@@ -207,8 +226,10 @@ fn clocks_agree(recorders: u8, rounds: u32, soon_ms: Option<u64>) {
         }
     }
     println!(
-        "{recorders} recorders, {rounds} rounds: within {widest_ms} ms of each other, though the last carried the \
-         broadcast out up to {longest_ms} ms after the first, and in {beyond} rounds later than changes wait for it"
+        "{recorders} recorders, {rounds} rounds: within {widest_ms} ms of each other, though the \
+         last carried the \
+         broadcast out up to {longest_ms} ms after the first, and in {beyond} rounds later than \
+         changes wait for it"
     );
     // In nearly all rounds changes soon after a broadcast waited for it.
     assert!(soon_ms.is_none() || beyond <= rounds / 100, "{beyond}");
@@ -253,10 +274,16 @@ fn one_broadcast_stops_and_starts_recorders_that_report_all_the_time_in_the_same
         if !recording {
             // The sample of the millisecond in which a stop is seen is still recorded.
             let last_ms = plant.seen_ms().into_iter().map(|seen_ms| seen_ms - seen_ms % PERIOD_MS);
-            let since = last_ms.zip(&set_ms).map(|(last_ms, &set_ms)| signed(last_ms) - signed(set_ms));
-            assert_eq!(stamps, since.map(|ms| milliseconds(time) + ms).collect::<Vec<_>>(), "round {round}");
+            let since =
+                last_ms.zip(&set_ms).map(|(last_ms, &set_ms)| signed(last_ms) - signed(set_ms));
+            assert_eq!(
+                stamps,
+                since.map(|ms| milliseconds(time) + ms).collect::<Vec<_>>(),
+                "round {round}"
+            );
         }
-        let counts: Vec<u16> = plant.world.recorders.iter().map(|recorder| recorder.node.log().0).collect();
+        let counts: Vec<u16> =
+            plant.world.recorders.iter().map(|recorder| recorder.node.log().0).collect();
         assert!(counts.iter().all(|count| *count == counts[0]), "{of}, round {round}: {counts:?}");
     }
     plant.assert_was_busy(ROUNDS, longest_ms);
@@ -285,7 +312,8 @@ fn away(has_line: bool) -> Away {
     world.send(Broadcast, &Command::SetClock(TEN_O_CLOCK));
     // Contacts move all the time.
     let began_ms = world.now_ms;
-    let steps = (0..MOVES).map(|index| Step { at_ms: 35 * u64::from(index), input: 3 + index, on: true });
+    let steps =
+        (0..MOVES).map(|index| Step { at_ms: 35 * u64::from(index), input: 3 + index, on: true });
     world.recorders[0].node.play(&Scenario::from_steps(steps));
     for _ in 0..AWAY_MS {
         world.now_ms += 1;

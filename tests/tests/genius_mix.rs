@@ -1,5 +1,5 @@
-//! Commands of all kinds on both ports at once, with a tenth of all messages lost or damaged: whoever reads the log
-//! gets every event once.
+//! Commands of all kinds on both ports at once, with a tenth of all messages lost or damaged:
+//! whoever reads the log gets every event once.
 
 use geni_board::Destination::Device;
 use ser_proto::{
@@ -29,11 +29,12 @@ struct Reader {
 }
 
 impl Reader {
-    /// Takes what is new in a read reply, and nothing else: total and next slot say which events they are.
+    /// Takes what is new in a read reply, and nothing else: total and next slot say which events
+    /// they are.
     fn take(&mut self, reply: &ReadReply) {
         let total = u64::from(reply.total);
-        let back =
-            (u64::from(reply.next_slot) + u64::from(SIZE) - u64::from(reply.start - 1)) % u64::from(SIZE);
+        let back = (u64::from(reply.next_slot) + u64::from(SIZE) - u64::from(reply.start - 1))
+            % u64::from(SIZE);
         let back = if back == 0 { u64::from(SIZE) } else { back };
         let Some(first) = total.checked_sub(back) else { return };
         let known = self.events.len() as u64;
@@ -100,7 +101,8 @@ struct Outcome {
 
 fn run(seed: u64) -> Outcome {
     let mut chance = Chance::new(seed);
-    let noise = Noise { seed, damaged_ppm: NOISE_PPM, lost_ppm: NOISE_PPM, unacknowledged_ppm: 10_000 };
+    let noise =
+        Noise { seed, damaged_ppm: NOISE_PPM, lost_ppm: NOISE_PPM, unacknowledged_ppm: 10_000 };
     let mut world = World::with_noise(&[(UNIT, Model::Ser160)], noise);
     let configure = Configure {
         size: Some(SIZE),

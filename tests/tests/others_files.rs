@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What makes room for itself, writes, follows links, replaces or removes; what panics on a closed pipe.
+/// What makes room for itself, writes, follows links, replaces or removes; what panics on a closed
+/// pipe.
 const CALLS: [&str; 26] = [
     "File::create(",
     "File::create_buffered(",
@@ -44,7 +45,8 @@ const JUDGED: [(&str, &str, usize, &str); 29] = [
         "crates/geni-board/src/mapped_ram.rs",
         "map_raw(",
         1,
-        "what the caller has opened; the client puts back what it writes there before a board answers",
+        "what the caller has opened; the client puts back what it writes there before a board \
+         answers",
     ),
     ("ser-cli/src/closed_stdout.rs", "OFlags::RDWR", 1, "compared, and nothing is opened with it"),
     (
@@ -54,9 +56,19 @@ const JUDGED: [(&str, &str, usize, &str); 29] = [
         "what was just written to standard output, if nobody has written after it",
     ),
     ("ser-cli/src/state.rs", ".persist(", 1, "over a state file, which it was read as just before"),
-    ("ser-cli/src/state.rs", ".write(true)", 1, "the lock, which is never written to; no link is followed"),
+    (
+        "ser-cli/src/state.rs",
+        ".write(true)",
+        1,
+        "the lock, which is never written to; no link is followed",
+    ),
     ("ser-cli/src/state.rs", "remove_file(", 1, "a state file, which it was read as just before"),
-    ("crates/image-check/src/independent/images.rs", "println!(", 1, "in a test, which cargo reads"),
+    (
+        "crates/image-check/src/independent/images.rs",
+        "println!(",
+        1,
+        "in a test, which cargo reads",
+    ),
     (
         "crates/ser-client/src/genius/window.rs",
         ".write(true)",
@@ -87,7 +99,12 @@ const JUDGED: [(&str, &str, usize, &str); 29] = [
         1,
         "the claim's record, by its open directory, while it is locked",
     ),
-    ("crates/ser-sim/src/qemu/emulator.rs", "File::create(", 1, "in a temporary directory of its own"),
+    (
+        "crates/ser-sim/src/qemu/emulator.rs",
+        "File::create(",
+        1,
+        "in a temporary directory of its own",
+    ),
     (
         "crates/ser-sim/src/qemu/emulator.rs",
         "Process::new(",
@@ -132,7 +149,12 @@ const JUDGED: [(&str, &str, usize, &str); 29] = [
         1,
         "as in emulator.rs; sockets are in a temporary directory, and the plugin is read",
     ),
-    ("crates/ser-sim/src/line/pty.rs", ".persist(", 1, "over a link that the claim's record says is ours"),
+    (
+        "crates/ser-sim/src/line/pty.rs",
+        ".persist(",
+        1,
+        "over a link that the claim's record says is ours",
+    ),
     (
         "crates/ser-sim/src/line/pty.rs",
         "OFlags::RDWR",
@@ -153,7 +175,12 @@ const JUDGED: [(&str, &str, usize, &str); 29] = [
         "makes the file, and fails where anything is",
     ),
     ("xtask/src/setup/apt.rs", "File::create(", 1, "in the build folder"),
-    ("xtask/src/setup/apt.rs", "append(true)", 1, "the file that was just made in the build folder"),
+    (
+        "xtask/src/setup/apt.rs",
+        "append(true)",
+        1,
+        "the file that was just made in the build folder",
+    ),
 ];
 
 fn root() -> PathBuf {
@@ -162,7 +189,9 @@ fn root() -> PathBuf {
 
 /// The source of programs and libraries, without that of tests.
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path()) {
+    for entry in
+        fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path())
+    {
         let name = entry.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let is_test = name == "tests" || name == "tests.rs";
         if entry.is_dir() && !is_test {
@@ -215,7 +244,8 @@ fn every_call_that_could_touch_a_file_of_others_has_been_judged() {
     assert!(files.len() > 200, "{}", files.len());
     let mut found = BTreeMap::new();
     for file in files {
-        let name = file.strip_prefix(root()).expect("below the root").to_string_lossy().into_owned();
+        let name =
+            file.strip_prefix(root()).expect("below the root").to_string_lossy().into_owned();
         for (call, count) in calls(&fs::read_to_string(&file).expect("a source")) {
             found.insert((name.clone(), call), count);
         }
@@ -233,7 +263,8 @@ fn calls_in_comments_and_tests_are_none() {
 
 #[test]
 fn a_module_of_tests_in_another_file_ends_nothing() {
-    let source = "#[cfg(test)]\nmod mutants;\nfs::write(a);\n\n#[cfg(test)]\nmod tests {\nfs::write(a)\n}";
+    let source =
+        "#[cfg(test)]\nmod mutants;\nfs::write(a);\n\n#[cfg(test)]\nmod tests {\nfs::write(a)\n}";
     for mark in ["#[cfg(test)]", "#[cfg(all(test, unix))]"] {
         let source = source.replace("#[cfg(test)]", mark);
         assert_eq!(calls(&source), BTreeMap::from([("fs::write(", 1)]), "{mark}");

@@ -48,11 +48,17 @@ pub(crate) fn host(strict: bool) -> Result<()> {
         heading("Clippy");
         let deny = ["--", "-D", "warnings"];
         steps::run(steps::cargo().args(["clippy", "--workspace", "--all-targets"]).args(deny))?;
-        steps::run(steps::cargo().args(["clippy", "--package", "xtask", "--features", "log"]).args(deny))?;
+        steps::run(
+            steps::cargo().args(["clippy", "--package", "xtask", "--features", "log"]).args(deny),
+        )?;
     }
 
     heading("Documentation");
-    steps::run(steps::cargo().env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--no-deps", "--workspace"]))
+    steps::run(steps::cargo().env("RUSTDOCFLAGS", "-D warnings").args([
+        "doc",
+        "--no-deps",
+        "--workspace",
+    ]))
 }
 
 /// What is flashed. A toolchain without clippy is a failure where nothing may be left out.

@@ -1,7 +1,9 @@
-//! What a recorder keeps across resets: why it was reset, what the latest fault had to say, how often it has started.
+//! What a recorder keeps across resets: why it was reset, what the latest fault had to say, how
+//! often it has started.
 //!
-//! It lives in memory that start-up code leaves alone. After a power cut such memory holds anything, so nothing in it
-//! is believed without its check; after any other reset it holds what was written.
+//! It lives in memory that start-up code leaves alone. After a power cut such memory holds
+//! anything, so nothing in it is believed without its check; after any other reset it holds what
+//! was written.
 //!
 //! ```text
 //! word  0        1       2       3       4       5       6–28           29
@@ -10,18 +12,20 @@
 //! ```
 //!
 //! # Design
-//! Two records, each with its own CRC-32: a fault that is cut short while it writes its words costs the words, never
-//! the count of boots. A fault's words stay, however many starts come after it, until the next fault's take their
-//! place or the power goes: whoever comes to see what happened comes late. The number of the boot that they belong to
-//! tells whether they are why the recorder starts, so they need not be touched to become old.
+//! Two records, each with its own CRC-32: a fault that is cut short while it writes its words costs
+//! the words, never the count of boots. A fault's words stay, however many starts come after it,
+//! until the next fault's take their place or the power goes: whoever comes to see what happened
+//! comes late. The number of the boot that they belong to tells whether they are why the recorder
+//! starts, so they need not be touched to become old.
 //!
 //! # Tradeoffs
-//! A panic's message is kept as far as it fits, 92 bytes; formatting it is up to the board, by [`Text`]'s
-//! `fmt::Write`.
+//! A panic's message is kept as far as it fits, 92 bytes; formatting it is up to the board, by
+//! [`Text`]'s `fmt::Write`.
 //!
 //! # Notes
-//! The board puts the array into a section that is neither zeroed nor loaded (`.uninit` of cortex-m-rt), reads it at
-//! start-up and writes it back; what is in it never has to be a valid value of any type but `u32`.
+//! The board puts the array into a section that is neither zeroed nor loaded (`.uninit` of
+//! cortex-m-rt), reads it at start-up and writes it back; what is in it never has to be a valid
+//! value of any type but `u32`.
 
 use core::fmt;
 use core::panic::Location;
@@ -73,7 +77,8 @@ impl Fault {
     }
 }
 
-/// What the chip's reset flags say. Where several are set, the board gives the first of them in this order.
+/// What the chip's reset flags say. Where several are set, the board gives the first of them in
+/// this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ResetFlag {
@@ -121,12 +126,15 @@ impl ResetCause {
     pub const fn is_fault(self) -> bool {
         matches!(
             self,
-            ResetCause::Watchdog | ResetCause::HardFault | ResetCause::Panic | ResetCause::StackOverflow
+            ResetCause::Watchdog
+                | ResetCause::HardFault
+                | ResetCause::Panic
+                | ResetCause::StackOverflow
         )
     }
 
-    /// A number for each, for memory that others read; it never changes. 0 is [`Unknown`](Self::Unknown), 1–4 are those
-    /// of [`Fault`].
+    /// A number for each, for memory that others read; it never changes. 0 is
+    /// [`Unknown`](Self::Unknown), 1–4 are those of [`Fault`].
     #[must_use]
     pub const fn code(self) -> u8 {
         match self {
@@ -159,9 +167,9 @@ impl ResetCause {
         })
     }
 
-    /// `fault` is that of the run before. The flags know about the power; whatever the program wrote down before a
-    /// sag is not why it starts now. In all other cases the program knew better than the flags: a panic ends in a
-    /// software reset, a locked-up processor in the watchdog.
+    /// `fault` is that of the run before. The flags know about the power; whatever the program
+    /// wrote down before a sag is not why it starts now. In all other cases the program knew better
+    /// than the flags: a panic ends in a software reset, a locked-up processor in the watchdog.
     const fn new(flag: ResetFlag, fault: Option<Fault>) -> ResetCause {
         match (flag, fault) {
             (ResetFlag::PowerOn, _) => ResetCause::PowerOn,
@@ -194,7 +202,8 @@ impl Text {
     #[must_use]
     pub fn as_str(&self) -> &str {
         let bytes = self.bytes.get(..self.len).unwrap_or_default();
-        // Always valid: only whole characters go in. Memory that claims otherwise gives what is valid of it.
+        // Always valid: only whole characters go in. Memory that claims otherwise gives what is
+        // valid of it.
         match core::str::from_utf8(bytes) {
             Ok(text) => text,
             Err(error) => bytes
@@ -251,7 +260,8 @@ impl Text {
 
     /// What a panic has to say: place and message, as in `node.rs:42: no room`.
     ///
-    /// Messages with arguments would bring the formatting machinery with them: of these there is the place alone.
+    /// Messages with arguments would bring the formatting machinery with them: of these there is
+    /// the place alone.
     #[must_use]
     pub fn of_panic(place: Option<&Location<'_>>, message: Option<&str>) -> Text {
         let mut text = Text::EMPTY;
@@ -332,20 +342,21 @@ pub struct Boot {
     pub count: u32,
     /// Why it starts.
     pub cause: ResetCause,
-    /// The latest fault since the memory was last lost, whether or not it is why the recorder starts.
+    /// The latest fault since the memory was last lost, whether or not it is why the recorder
+    /// starts.
     pub last_words: Option<LastWords>,
 }
 
-/// Whether the memory holds what an earlier run of the program left. Where the chip does not tell why it was reset,
-/// memory that does not has been without power.
+/// Whether the memory holds what an earlier run of the program left. Where the chip does not tell
+/// why it was reset, memory that does not has been without power.
 #[must_use]
 pub fn is_kept(memory: &Memory) -> bool {
     let (boots, _) = memory.split_at(BOOT_WORDS);
     matches!(open(boots), Some([BOOT_MAGIC, _]))
 }
 
-/// Reads what the runs before left, counts the boot, and makes the memory ready for this run's last words. Those of
-/// an earlier run stay.
+/// Reads what the runs before left, counts the boot, and makes the memory ready for this run's last
+/// words. Those of an earlier run stay.
 pub fn boot(memory: &mut Memory, flag: ResetFlag) -> Boot {
     let (boots, words) = memory.split_at_mut(BOOT_WORDS);
     let before = match open(boots) {
@@ -389,7 +400,11 @@ struct Left {
 fn read_fault(words: &[u32]) -> Option<Left> {
     let [FAULT_MAGIC, head, boot, text @ ..] = content(words)? else { return None };
     let [code, len, 0, 0] = head.to_le_bytes() else { return None };
-    Some(Left { fault: Fault::from_code(code)?, text: Text::from_words(text, len.into()), boot: *boot })
+    Some(Left {
+        fault: Fault::from_code(code)?,
+        text: Text::from_words(text, len.into()),
+        boot: *boot,
+    })
 }
 
 fn write_fault(words: &mut [u32], fault: Fault, text: &Text, boot: u32) {
@@ -466,7 +481,9 @@ mod tests {
         assert_eq!((told.count, told.cause), (2, ResetCause::Panic));
         assert!(told.cause.is_fault());
         assert_eq!(told.last_words, said(Fault::Panic, "node.rs:42: no room", 1));
-        for (starts_ago, flag) in (2..).zip([ResetFlag::Software, ResetFlag::Pin, ResetFlag::Watchdog]) {
+        for (starts_ago, flag) in
+            (2..).zip([ResetFlag::Software, ResetFlag::Pin, ResetFlag::Watchdog])
+        {
             let after = boot(&mut memory, flag);
             assert_eq!((after.count, after.cause), (starts_ago + 1, ResetCause::new(flag, None)));
             assert_eq!(after.last_words, said(Fault::Panic, "node.rs:42: no room", starts_ago));
@@ -503,7 +520,8 @@ mod tests {
         memory[1] ^= 1;
         for starts_ago in 1..4 {
             let told = boot(&mut memory, ResetFlag::Software);
-            let cause = if starts_ago == 1 { ResetCause::StackOverflow } else { ResetCause::Software };
+            let cause =
+                if starts_ago == 1 { ResetCause::StackOverflow } else { ResetCause::Software };
             assert_eq!((told.count, told.cause), (starts_ago, cause));
             assert_eq!(told.last_words, said(Fault::StackOverflow, "pc 1", starts_ago));
         }
@@ -515,7 +533,10 @@ mod tests {
         write(&mut memory, Fault::HardFault, &Text::from("the crystal"));
         let told = boot(&mut memory, ResetFlag::Software);
         assert_eq!((told.count, told.cause), (1, ResetCause::HardFault));
-        assert_eq!(boot(&mut memory, ResetFlag::Pin).last_words, said(Fault::HardFault, "the crystal", 2));
+        assert_eq!(
+            boot(&mut memory, ResetFlag::Pin).last_words,
+            said(Fault::HardFault, "the crystal", 2)
+        );
     }
 
     #[test]
@@ -592,7 +613,8 @@ mod tests {
         let _ = boot(&mut before, ResetFlag::Watchdog);
         let mut after = before;
         write(&mut after, Fault::Panic, &Text::from("a text that takes a few words"));
-        // The words begin behind the boots; with none of them written, those of the earlier run stand.
+        // The words begin behind the boots; with none of them written, those of the earlier run
+        // stand.
         for cut in BOOT_WORDS + 2..WORDS {
             let mut memory = before;
             memory[..cut].copy_from_slice(&after[..cut]);

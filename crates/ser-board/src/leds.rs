@@ -7,9 +7,9 @@
 //! | communication | –                     | one message after the other   | –              | nobody asks     |
 //! | fault         | something was lost    | reset by a fault, first 10 s  | broken now     | all is well     |
 //!
-//! A single event or message lights its lamp for 100 ms. The run lamp blinks out of the main loop, so one that has
-//! stopped is a main loop that has stopped. Of several faults the fault lamp shows the worst: broken, then reset,
-//! then lost.
+//! A single event or message lights its lamp for 100 ms. The run lamp blinks out of the main loop,
+//! so one that has stopped is a main loop that has stopped. Of several faults the fault lamp shows
+//! the worst: broken, then reset, then lost.
 
 use embedded_hal::digital::{OutputPin, PinState};
 use geni_board::SharedRam;
@@ -17,7 +17,8 @@ use ser_node::{Diagnostics, Node, Rtc, Storage};
 
 use crate::genius::{GeniBoard, Genius};
 
-/// How long a lamp is lit for one event, and dark before the next one lights it again, in milliseconds.
+/// How long a lamp is lit for one event, and dark before the next one lights it again, in
+/// milliseconds.
 pub const PULSE_MS: u32 = 100;
 
 /// Half a period of the slow blink, in milliseconds.
@@ -29,7 +30,8 @@ pub const FAST_MS: u32 = 100;
 /// How long a reset by a fault is shown, in milliseconds.
 pub const SHOW_RESET_MS: u32 = 10_000;
 
-/// What the lamps are to tell. Counts may wrap; they only need to differ when something has happened.
+/// What the lamps are to tell. Counts may wrap; they only need to differ when something has
+/// happened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Condition {
@@ -39,8 +41,8 @@ pub struct Condition {
     pub events: u32,
     /// Messages received or sent so far, on any port.
     pub messages: u32,
-    /// Something is broken now: see [`Health::is_broken`](crate::health::Health::is_broken), and what the board knows
-    /// besides.
+    /// Something is broken now: see [`Health::is_broken`](crate::health::Health::is_broken), and
+    /// what the board knows besides.
     pub broken: bool,
     /// The run before this one ended in a fault (panic, hard fault, stack overflow, watchdog).
     pub reset_by_fault: bool,
@@ -144,8 +146,8 @@ impl Pulse {
 pub struct Leds {
     event: Pulse,
     communication: Pulse,
-    /// The first tick seen, and whether the time for showing a reset is over: the tick wraps, the lamp must not come
-    /// back.
+    /// The first tick seen, and whether the time for showing a reset is over: the tick wraps, the
+    /// lamp must not come back.
     started_ms: Option<u32>,
     reset_shown: bool,
 }
@@ -268,7 +270,10 @@ mod tests {
         let run = |lamps: &Lamps| lamps.run;
         assert_eq!(edges(1400, |_| RECORDING, run), [(0, true), (500, false), (1000, true)]);
         let stopped = Condition { recording: false, ..RECORDING };
-        assert_eq!(edges(350, |_| stopped, run), [(0, true), (100, false), (200, true), (300, false)]);
+        assert_eq!(
+            edges(350, |_| stopped, run),
+            [(0, true), (100, false), (200, true), (300, false)]
+        );
     }
 
     #[test]
@@ -285,8 +290,10 @@ mod tests {
 
     #[test]
     fn an_event_that_comes_while_the_lamp_is_between_pulses_is_not_forgotten() {
-        let two =
-            |now_ms| Condition { events: u32::from(now_ms >= 10) + u32::from(now_ms >= 150), ..RECORDING };
+        let two = |now_ms| Condition {
+            events: u32::from(now_ms >= 10) + u32::from(now_ms >= 150),
+            ..RECORDING
+        };
         let expected = [(10, true), (110, false), (210, true), (310, false)];
         assert_eq!(edges(1000, two, |lamps| lamps.event), expected);
         let messages = |now_ms| Condition { messages: two(now_ms).events, ..RECORDING };
@@ -319,8 +326,12 @@ mod tests {
 
     #[test]
     fn what_the_other_side_did_wrong_is_no_loss() {
-        let rude =
-            Diagnostics { frames_checksum: 7, line_errors: 1, commands_unknown: 2, ..Diagnostics::default() };
+        let rude = Diagnostics {
+            frames_checksum: 7,
+            line_errors: 1,
+            commands_unknown: 2,
+            ..Diagnostics::default()
+        };
         assert!(!has_lost(&rude));
         assert!(has_lost(&Diagnostics { edges_lost: 1, ..rude }));
         assert!(has_lost(&Diagnostics { samples_missed: 1, ..Diagnostics::default() }));
@@ -355,7 +366,8 @@ mod tests {
         let dark = Transaction::set(State::Low);
         let lit = Transaction::set(State::High);
         let broken = dark.clone().with_error(MockError::Io(ErrorKind::Other));
-        let [event, communication] = [(); 2].map(|()| Mock::new(&[dark.clone(), dark.clone(), dark.clone()]));
+        let [event, communication] =
+            [(); 2].map(|()| Mock::new(&[dark.clone(), dark.clone(), dark.clone()]));
         let run = Mock::new(&[lit.clone(), dark.clone(), lit.clone()]);
         let fault = Mock::new(&[dark.clone(), broken, dark]);
         let mut panel = Panel::new(run, event, communication, fault, PinState::High);

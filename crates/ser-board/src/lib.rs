@@ -1,7 +1,8 @@
-//! What the recorder's boards share, apart from registers: everything here is tested on a desktop, with mocks.
+//! What the recorder's boards share, apart from registers: everything here is tested on a desktop,
+//! with mocks.
 //!
-//! A board brings up its chip, says in its interrupts which byte came and which pin is up, and leaves the rest to
-//! `ser_node` (what a recorder does) and to this crate (what a board does):
+//! A board brings up its chip, says in its interrupts which byte came and which pin is up, and
+//! leaves the rest to `ser_node` (what a recorder does) and to this crate (what a board does):
 //!
 //! | module             | what it holds                                                                          |
 //! |--------------------|----------------------------------------------------------------------------------------|

@@ -2,8 +2,8 @@
 //!
 //! # Design
 //! Logging never delays the capture interrupt, so nothing guards a record that is being written.
-//! Whoever interrupts it writes nothing: contexts nest, and one that interrupts another has released
-//! the log again before the other goes on.
+//! Whoever interrupts it writes nothing: contexts nest, and one that interrupts another has
+//! released the log again before the other goes on.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

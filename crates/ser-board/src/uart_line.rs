@@ -5,7 +5,7 @@ use ser_proto::Baud;
 
 use crate::main_loop::Line;
 use crate::ring::{Reader, Writer};
-use crate::serial_line::{self, LineErrors, Received};
+use crate::serial_line::{self, LineErrors, ReceivedByte};
 
 /// A UART as the main loop's end of the line sees it. Bytes come and go in the interrupts.
 pub trait Uart {
@@ -30,7 +30,7 @@ pub trait Uart {
 /// The rings' ends that are the main loop's, with the UART behind them.
 pub struct UartLine<'a, U, const RECEIVE: usize, const TRANSMIT: usize> {
     uart: U,
-    received: Reader<'a, Received, RECEIVE>,
+    received: Reader<'a, ReceivedByte, RECEIVE>,
     errors: LineErrors<'a>,
     to_send: Writer<'a, u8, TRANSMIT>,
     bytes: u32,
@@ -40,7 +40,7 @@ impl<'a, U: Uart, const RECEIVE: usize, const TRANSMIT: usize> UartLine<'a, U, R
     /// The ends as [`SerialEnds`](crate::serial_line::SerialEnds) has them.
     pub const fn new(
         uart: U,
-        received: Reader<'a, Received, RECEIVE>,
+        received: Reader<'a, ReceivedByte, RECEIVE>,
         errors: LineErrors<'a>,
         to_send: Writer<'a, u8, TRANSMIT>,
     ) -> Self {
@@ -58,10 +58,12 @@ impl<'a, U: Uart, const RECEIVE: usize, const TRANSMIT: usize> UartLine<'a, U, R
     }
 }
 
-impl<U: Uart, const RECEIVE: usize, const TRANSMIT: usize> Line for UartLine<'_, U, RECEIVE, TRANSMIT> {
+impl<U: Uart, const RECEIVE: usize, const TRANSMIT: usize> Line
+    for UartLine<'_, U, RECEIVE, TRANSMIT>
+{
     const MAX_BYTES: usize = RECEIVE;
 
-    fn receive(&mut self, now_ms: u32) -> Option<Received> {
+    fn receive(&mut self, now_ms: u32) -> Option<ReceivedByte> {
         let received = serial_line::take_until(&mut self.received, now_ms);
         if received.is_some() {
             self.bytes = self.bytes.wrapping_add(1);
@@ -147,7 +149,8 @@ mod tests {
         let SerialEnds { mut receiver, received, errors, to_send, .. } = rings.split();
         let mut line = UartLine::new(Mock::default(), received, errors, to_send);
         assert!(!line.has_received());
-        let [first, late] = [(b'a', 5), (b'b', 7)].map(|(byte, tick_ms)| Received { byte, tick_ms });
+        let [first, late] =
+            [(b'a', 5), (b'b', 7)].map(|(byte, tick_ms)| ReceivedByte { byte, tick_ms });
         receiver.push(first);
         receiver.push(late);
         assert!(line.has_received());
@@ -205,7 +208,8 @@ mod tests {
         assert_eq!((transmitter.pop(), transmitter.pop()), (Some(b'x'), Some(b'y')));
         assert!(line.is_quiet(4));
         line.set_baud(Baud::B300);
-        let looks = [(false, 3), (true, 4)].map(|(ring_empty, now_ms)| Did::Look { ring_empty, now_ms });
+        let looks =
+            [(false, 3), (true, 4)].map(|(ring_empty, now_ms)| Did::Look { ring_empty, now_ms });
         let sends = [Did::WillSend, Did::Wake, Did::WillSend, Did::Wake];
         assert_eq!(line.uart.did, [&sends[..], &looks, &[Did::SetBaud(Baud::B300)]].concat());
     }

@@ -53,7 +53,12 @@ struct Parts {
 
 impl Parts {
     fn health(&self) -> Health<'_> {
-        Health { inputs: &self.inputs, serialisers: None, clock: &self.clock, storage: &self.storage }
+        Health {
+            inputs: &self.inputs,
+            serialisers: None,
+            clock: &self.clock,
+            storage: &self.storage,
+        }
     }
 }
 
@@ -64,8 +69,12 @@ fn run(
     then: impl FnOnce(&mut ser_node::Capture<'_>, &mut BoardNode<'_, BoardFlash, Clock>),
 ) -> ClockState {
     let (mut memory, parts) = (Box::new(Memory::new()), Parts::default());
-    let board =
-        BoardParts { model: Model::Ser320, debounce: Debounce::OFF, flash: flash.clone(), clock: Clock(day) };
+    let board = BoardParts {
+        model: Model::Ser320,
+        debounce: Debounce::OFF,
+        flash: flash.clone(),
+        clock: Clock(day),
+    };
     let (mut capture, mut node) = start(&mut memory, board, &parts.health());
     then(&mut capture, &mut node);
     parts.clock.state()
@@ -103,7 +112,10 @@ fn the_log_has_room_for_the_largest_size() {
             capture.sample(tick_ms, tick_ms % 2);
             node.poll(tick_ms);
         }
-        assert_eq!((node.events(), node.diagnostics().parameters_refused), (u32::from(MAX_SIZE), 0));
+        assert_eq!(
+            (node.events(), node.diagnostics().parameters_refused),
+            (u32::from(MAX_SIZE), 0)
+        );
         assert_eq!(node.read(MAX_SIZE, 1).entries.len(), 1);
     });
 }
@@ -111,7 +123,8 @@ fn the_log_has_room_for_the_largest_size() {
 #[test]
 fn a_clock_that_shows_a_day_before_there_was_a_recorder_is_not_believed() {
     let flash = BoardFlash::new(2);
-    let states = [NOT_BEFORE.pred_opt().unwrap(), NOT_BEFORE].map(|day| run(&flash, day, |_, _| {}));
+    let states =
+        [NOT_BEFORE.pred_opt().unwrap(), NOT_BEFORE].map(|day| run(&flash, day, |_, _| {}));
     assert_eq!(states, [ClockState::Implausible, ClockState::Good]);
 }
 

@@ -49,7 +49,8 @@ impl<'a> Changes<'a> {
     /// Hands on the changes of all samples up to `until_ms`, in the order in which they began.
     pub(crate) fn take_until(&mut self, until_ms: u64, mut record: impl FnMut(Change)) {
         let Changes { capture, ticks, sequencer, mask } = self;
-        while let Some(sample) = capture.next_if(|sample| ticks.extend(sample.tick_ms) <= until_ms) {
+        while let Some(sample) = capture.next_if(|sample| ticks.extend(sample.tick_ms) <= until_ms)
+        {
             let tick_ms = ticks.extend(sample.tick_ms);
             while let Some(change) = sequencer.next(tick_ms) {
                 record(change);

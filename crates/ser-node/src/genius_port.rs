@@ -1,25 +1,27 @@
-//! The Genius port: datagrams in, datagrams out, and the state of all inputs in every bus scan, through a GENI board.
+//! The Genius port: datagrams in, datagrams out, and the state of all inputs in every bus scan,
+//! through a GENI board.
 //!
-//! Commands come as datagrams 40h/50h, directed or by broadcast; replies go to the sender of a directed one. The board
-//! is reset when it fails, and the bus is joined again; RS-232 and recording know nothing of it.
+//! Commands come as datagrams 40h/50h, directed or by broadcast; replies go to the sender of a
+//! directed one. The board is reset when it fails, and the bus is joined again; RS-232 and
+//! recording know nothing of it.
 //!
-//! The port turns datagrams into commands and replies into datagrams; what a command means, and who waits for
-//! which reply, is not known here. A [`Node`](crate::Node) carries from one to the other.
+//! The port turns datagrams into commands and replies into datagrams; what a command means, and who
+//! waits for which reply, is not known here. A [`Node`](crate::Node) carries from one to the other.
 //!
 //! - **Time of arrival** is the tick at which the board raised its Receive-Queue flag: that of the
-//!   pulse that was handed in ([`genius_interrupt`](crate::Node::genius_interrupt)), or, without the line, of the
-//!   [`genius_poll`](crate::Node::genius_poll) that saw the flag. However long the board then takes to hand the
-//!   datagram over, clock, mode and Last Broadcast go by it, and changes that come after it wait
-//!   for it ([`HELD_BACK_MS`](crate::HELD_BACK_MS)).
-//! - **Replies** are sent once. A host that misses one asks again, as on RS-232; a repeated reply might be taken for
-//!   the answer to the next command.
-//! - **Auto reports** are repeated until their receiver has acknowledged one, with growing pauses, as a receiver that
-//!   is not there would cost all others their place in the bus scan. A receiver may get one twice when its
-//!   acknowledgement was lost; total and next slot show it. All devices together have one datagram of normal priority
-//!   per bus scan, and those with low numbers have the first chance: after each report as many scans are left to the
-//!   others as there are others.
-//! - **Read I/O Forces** is answered with the recorder's own input tables: none is forced, and the values are the
-//!   states of the inputs. There are no outputs, so these tables are empty.
+//!   pulse that was handed in ([`genius_interrupt`](crate::Node::genius_interrupt)), or, without
+//!   the line, of the [`genius_poll`](crate::Node::genius_poll) that saw the flag. However long the
+//!   board then takes to hand the datagram over, clock, mode and Last Broadcast go by it, and
+//!   changes that come after it wait for it ([`HELD_BACK_MS`](crate::HELD_BACK_MS)).
+//! - **Replies** are sent once. A host that misses one asks again, as on RS-232; a repeated reply
+//!   might be taken for the answer to the next command.
+//! - **Auto reports** are repeated until their receiver has acknowledged one, with growing pauses,
+//!   as a receiver that is not there would cost all others their place in the bus scan. A receiver
+//!   may get one twice when its acknowledgement was lost; total and next slot show it. All devices
+//!   together have one datagram of normal priority per bus scan, and those with low numbers have
+//!   the first chance: after each report as many scans are left to the others as there are others.
+//! - **Read I/O Forces** is answered with the recorder's own input tables: none is forced, and the
+//!   values are the states of the inputs. There are no outputs, so these tables are empty.
 //! - **Requests for memory** are refused: a recorder has none.
 
 mod diagnostics;
@@ -27,12 +29,13 @@ mod options;
 mod reporter;
 
 use geni_board::{
-    Completion, Data, Destination, DeviceChange, Driver, Event, MAX_DATA_LEN, Priority, Received, SharedRam,
-    Status, Transmission,
+    Completion, Data, Destination, DeviceChange, Driver, Event, MAX_DATA_LEN, ReceivedDatagram,
+    SharedRam, Status, Transmission, TransmitPriority,
 };
 use heapless::Vec;
 use ser_proto::genius::{
-    FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, GlobalData, IoForces, SUBFUNCTION_SER, Subfunction,
+    FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, GlobalData, IoForces, SUBFUNCTION_SER,
+    Subfunction,
 };
 use ser_proto::{Command, Inputs, Model, ReadReply, Reply};
 
@@ -70,8 +73,8 @@ enum OnItsWay {
 ///
 /// In every turn of its main loop a board hands in the pulses of the interrupt line
 /// ([`Node::genius_interrupt`](crate::Node::genius_interrupt)), calls
-/// [`Node::poll`](crate::Node::poll), then [`Node::genius_poll`](crate::Node::genius_poll), and then
-/// drives the GENI board's reset line with [`reset_held`](Self::reset_held).
+/// [`Node::poll`](crate::Node::poll), then [`Node::genius_poll`](crate::Node::genius_poll), and
+/// then drives the GENI board's reset line with [`reset_held`](Self::reset_held).
 pub struct GeniusPort<W> {
     driver: Driver<W>,
     model: Model,
@@ -212,7 +215,7 @@ impl<W: SharedRam> GeniusPort<W> {
         self.reporter.hurry();
     }
 
-    fn receive(&mut self, datagram: &Received, now_ms: u32) -> FromBus {
+    fn receive(&mut self, datagram: &ReceivedDatagram, now_ms: u32) -> FromBus {
         const READ_IO_FORCES: u8 = Subfunction::ReadIoForces.code();
         match (datagram.function, datagram.subfunction) {
             (FUNCTION_HORNER, SUBFUNCTION_SER) => self.receive_message(datagram, now_ms),
@@ -235,7 +238,7 @@ impl<W: SharedRam> GeniusPort<W> {
         FromBus::DealtWith
     }
 
-    fn receive_message(&mut self, datagram: &Received, now_ms: u32) -> FromBus {
+    fn receive_message(&mut self, datagram: &ReceivedDatagram, now_ms: u32) -> FromBus {
         let command = Command::parse(&datagram.data);
         // The time that it brings was that of its arrival, and no other is known to be right.
         if datagram.arrived_ms.is_none() && matches!(command, Ok(Command::SetClock(_))) {
@@ -269,7 +272,8 @@ impl<W: SharedRam> GeniusPort<W> {
         FromBus::DealtWith
     }
 
-    /// How long it takes until each other device could have sent a datagram: a scan each, and what is left of this one.
+    /// How long it takes until each other device could have sent a datagram: a scan each, and what
+    /// is left of this one.
     fn turns_of_others_ms(&self) -> u32 {
         let scan_ms = self.status().and_then(|status| status.scan_ms).unwrap_or(0);
         u32::from(scan_ms) * (self.others.count_ones() + 1)
@@ -294,7 +298,7 @@ impl<W: SharedRam> GeniusPort<W> {
             destination: Destination::Device(to),
             function,
             subfunction,
-            priority: Priority::Normal,
+            priority: TransmitPriority::Normal,
             completion: Completion::Acknowledged,
             data,
         };
@@ -307,8 +311,8 @@ fn bit(number: u8) -> u32 {
     1_u32.checked_shl(number.into()).unwrap_or(0)
 }
 
-/// The reply to Read I/O Forces: the table's number and the table. Nothing is ever forced. A host that shows the values
-/// of inputs without looking which of them are forced sees what they are.
+/// The reply to Read I/O Forces: the table's number and the table. Nothing is ever forced. A host
+/// that shows the values of inputs without looking which of them are forced sees what they are.
 fn forces(table: ForceTable, inputs: GlobalData) -> Vec<u8, { ser_proto::genius::MAX_DATA }> {
     let mut forces = IoForces::none(table, inputs.model);
     if table == ForceTable::InputValues {

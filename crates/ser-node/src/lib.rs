@@ -2,20 +2,21 @@
 //!
 //! One contact change goes through these files, in this order:
 //!
-//! 1. [`capture`]: the 1 kHz interrupt reads all inputs, filters them ([`debounce`]) and queues what changed;
+//! 1. [`capture`]: the 1 kHz interrupt reads all inputs, filters them ([`debounce`]) and queues
+//!    what changed;
 //! 2. [`sequencer`]: the main loop puts changes in the order in which they began;
 //! 3. [`clock`]: ticks since power-up become date and time;
 //! 4. [`event_log`]: the ring of up to 2048 events;
 //! 5. `recorder`: owns all of that, serves the commands and says what is to go out;
-//! 6. `serial_port`: the bytes of the RS-232 line; [`genius_port`]: the datagrams of the Genius bus,
-//!    for boards that have one.
+//! 6. `serial_port`: the bytes of the RS-232 line; [`genius_port`]: the datagrams of the Genius
+//!    bus, for boards that have one.
 //!
 //! A port knows no recorder: it makes an `arrival` of what came in, and bytes of what is to go out.
 //! [`Node`] carries from one to the other.
 //!
-//! Time and bytes are passed in; bytes come out. A board or the simulator calls
-//! [`Capture::sample`] every millisecond and [`Node::poll`] as often as it can.
-//! Nothing here blocks, allocates or panics, whatever arrives from outside.
+//! Time and bytes are passed in; bytes come out. A board or the simulator calls [`Capture::sample`]
+//! every millisecond and [`Node::poll`] as often as it can. Nothing here blocks, allocates or
+//! panics, whatever arrives from outside.
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(
     not(test),

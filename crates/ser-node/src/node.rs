@@ -2,8 +2,8 @@
 //!
 //! A main loop reads the tick, hands over the bytes that have arrived, calls [`Node::poll`] with
 //! that tick, and takes bytes to send for as long as there is room for them. Nothing is decided
-//! here: the ports know bytes, the recorder knows what they mean, and a node
-//! carries from one to the other.
+//! here: the ports know bytes, the recorder knows what they mean, and a node carries from one to
+//! the other.
 
 use geni_board::SharedRam;
 use ser_proto::genius::max_entries;
@@ -198,10 +198,12 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
     fn send_on_bus<W: SharedRam>(&mut self, port: &mut GeniusPort<W>, now_ms: u32) {
         let max_entries = max_entries(self.recorder.model());
         match self.recorder.next_bus_request() {
-            Some((device, Request::Command(pending))) => match self.recorder.reply(pending, max_entries) {
-                Some(reply) => port.reply(device, &reply),
-                None => port.count_lost(1),
-            },
+            Some((device, Request::Command(pending))) => {
+                match self.recorder.reply(pending, max_entries) {
+                    Some(reply) => port.reply(device, &reply),
+                    None => port.count_lost(1),
+                }
+            }
             Some((device, Request::Forces(table))) => {
                 port.reply_forces(device, table, self.recorder.inputs());
             }
@@ -209,7 +211,12 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         }
     }
 
-    fn report_on_bus<W: SharedRam>(&mut self, port: &mut GeniusPort<W>, max_entries: usize, now_ms: u32) {
+    fn report_on_bus<W: SharedRam>(
+        &mut self,
+        port: &mut GeniusPort<W>,
+        max_entries: usize,
+        now_ms: u32,
+    ) {
         if self.recorder.configuration().auto_report != AutoReport::Genius {
             port.forget_pause();
         } else if port.may_report(now_ms)

@@ -233,7 +233,9 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
                 Command::Print { start, count } => return self.print(start, count),
                 Command::Read { start, count } => {
                     let count = usize::from(count);
-                    self.count_refused(start == 0 || start > self.log.size() || count > max_entries);
+                    self.count_refused(
+                        start == 0 || start > self.log.size() || count > max_entries,
+                    );
                     Reply::Read(self.read(start, count.min(max_entries)))
                 }
                 Command::LastBroadcast => Reply::LastBroadcast(self.last_broadcast),
@@ -340,7 +342,12 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
 
     /// Carries out the rest of a command that was meant for all recorders. Reading and printing,
     /// which are requests of one host to one recorder, have no effect.
-    fn finish_broadcast(&mut self, command: Option<Command>, pending: Option<Pending>, tick_ms: u64) {
+    fn finish_broadcast(
+        &mut self,
+        command: Option<Command>,
+        pending: Option<Pending>,
+        tick_ms: u64,
+    ) {
         if let Some(pending @ Pending::To(Command::Configure(_) | Command::Erase)) = pending {
             self.reply(pending, 0);
         }
@@ -423,5 +430,9 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
 }
 
 fn entry(event: &Event) -> Entry {
-    Entry { changed: Inputs(event.changed), state: Inputs(event.state), time: to_time_stamp(event.time_ms) }
+    Entry {
+        changed: Inputs(event.changed),
+        state: Inputs(event.state),
+        time: to_time_stamp(event.time_ms),
+    }
 }

@@ -48,7 +48,11 @@ impl SerialPort {
 
     /// Takes a byte that arrived at `tick_ms`; gives the command that it completes, or what was
     /// wrong with the frame.
-    pub(crate) fn receive(&mut self, byte: u8, tick_ms: u32) -> Option<Result<Arrival, FrameError>> {
+    pub(crate) fn receive(
+        &mut self,
+        byte: u8,
+        tick_ms: u32,
+    ) -> Option<Result<Arrival, FrameError>> {
         match self.decoder.push(byte)? {
             Decoded::Frame(body) => {
                 let command = Command::parse(body);

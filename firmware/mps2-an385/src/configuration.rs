@@ -1,17 +1,19 @@
 //! The configuration's memory: flash of two small sectors, played on the external bus.
 //!
 //! # Design
-//! Cells do what those of flash do: writing takes bits from 1 to 0 and never back, erasing sets a whole sector. So
-//! the image stores through the same `flash_log` as the board to flash, and the bench, which can end the emulator at
-//! any moment, finds what a power cut leaves. Sectors are small so that erasing comes round within a few changes.
+//! Cells do what those of flash do: writing takes bits from 1 to 0 and never back, erasing sets a
+//! whole sector. So the image stores through the same `flash_log` as the board to flash, and the
+//! bench, which can end the emulator at any moment, finds what a power cut leaves. Sectors are
+//! small so that erasing comes round within a few changes.
 //!
 //! # Notes
-//! Nothing takes time here, nothing refuses, and cells keep what is half done as clean bits. What a chip's own
-//! controller does (locks, busy flags, the stalled bank) is in the board to flash alone, and has not been tried.
+//! Nothing takes time here, nothing refuses, and cells keep what is half done as clean bits. What a
+//! chip's own controller does (locks, busy flags, the stalled bank) is in the board to flash alone,
+//! and has not been tried.
 
 use embedded_storage::nor_flash::{
-    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read,
-    check_write,
+    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase,
+    check_read, check_write,
 };
 use ser_board::flash_log::FlashHealth;
 

@@ -1,14 +1,17 @@
 //! The log: defmt frames on UART 1.
 //!
 //! # Design
-//! Bytes are written by polling, and no critical section guards the log: see `ser_board::log_writer`.
+//! Bytes are written by polling, and no critical section guards the log: see
+//! `ser_board::log_writer`.
 //!
 //! # Tradeoffs
-//! Polling holds up the main loop by the length of a record (2 ms at most), which is why events are not logged.
-//! Only `init` and the main loop log: what a fault has to say is logged by the start that follows.
+//! Polling holds up the main loop by the length of a record (2 ms at most), which is why events are
+//! not logged. Only `init` and the main loop log: what a fault has to say is logged by the start
+//! that follows.
 //!
 //! # Notes
-//! `ser-cli sim` writes the frames into a file; `cargo xtask log` turns them into text with the ELF file's help.
+//! `ser-cli sim` writes the frames into a file; `cargo xtask log` turns them into text with the ELF
+//! file's help.
 
 use crate::device::{self, base};
 use crate::mmio::Word;

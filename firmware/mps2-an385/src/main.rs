@@ -1,8 +1,8 @@
 //! The recorder on ARM's MPS2 board with the AN385 image (Cortex-M3), as QEMU emulates it.
 //!
-//! Three interrupts and a main loop: capture (highest priority), RS-232 in, RS-232 out, and `idle`, which
-//! does all the rest, the GENI board included. They share no resource, hence nobody ever locks anything, and capture
-//! waits for nobody.
+//! Three interrupts and a main loop: capture (highest priority), RS-232 in, RS-232 out, and `idle`,
+//! which does all the rest, the GENI board included. They share no resource, hence nobody ever
+//! locks anything, and capture waits for nobody.
 #![no_std]
 #![no_main]
 
@@ -51,7 +51,8 @@ mod app {
     /// There is nothing below the stack, and nobody says so: QEMU swallows what is written there.
     const BELOW_STACK: Region = Region::nothing(0x1000_0000, 0x1000_0000);
 
-    // RTIC takes nothing but literals for priorities; `crates/ser-board/tests/priorities.rs` sees that the tasks have these.
+    // RTIC takes nothing but literals for priorities; `crates/ser-board/tests/priorities.rs` sees
+    // that the tasks have these.
     const _: () = {
         assert!(budget::CAPTURE_PRIORITY == 3);
         assert!(budget::RECEIVE_PRIORITY == 2);
@@ -107,7 +108,8 @@ mod app {
         let (serial, receive, transmit) = uart::start(rings, node.baud());
         // SAFETY: as above.
         let genius = unsafe { GeniBoard::find() };
-        let genius = genius.map(|(board, window)| Genius::new(board, window, GeniusOptions::new(model)));
+        let genius =
+            genius.map(|(board, window)| Genius::new(board, window, GeniusOptions::new(model)));
         let sampler = Sampler::new(InputLatch, inputs::wiring(model), &inputs::HEALTH);
         let watchdog = Watchdog::start();
         let timer = Timer::start();
@@ -161,13 +163,17 @@ mod app {
 
     #[idle(local = [serial, node, genius, lamps, watchdog, was_fault])]
     fn idle(cx: idle::Context) -> ! {
-        let idle::LocalResources { serial, node, genius, lamps, watchdog, was_fault, .. } = cx.local;
+        let idle::LocalResources { serial, node, genius, lamps, watchdog, was_fault, .. } =
+            cx.local;
         let mut liveness = Liveness::new();
         let mut report = Report::new(node.tick_ms(), &HEALTH);
         loop {
             let now_ms = main_loop::pass(node, serial, genius.as_mut());
             let broken = HEALTH.is_broken();
-            lamps.show(now_ms, &Condition::of(node, serial.bytes(), genius.as_ref(), broken, *was_fault));
+            lamps.show(
+                now_ms,
+                &Condition::of(node, serial.bytes(), genius.as_ref(), broken, *was_fault),
+            );
             if liveness.pass(now_ms) {
                 watchdog.feed(now_ms);
                 if fault::watchdog_fed() {
@@ -181,8 +187,9 @@ mod app {
             );
             forced::obey();
 
-            // A byte that arrives just now waits for the next interrupt, a millisecond at most. Looking with
-            // interrupts off would spare it that, and delay the capture interrupt instead.
+            // A byte that arrives just now waits for the next interrupt, a millisecond at most.
+            // Looking with interrupts off would spare it that, and delay the capture interrupt
+            // instead.
             if !serial.has_received() {
                 cortex_m::asm::wfi();
             }

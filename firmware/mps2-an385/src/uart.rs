@@ -1,24 +1,24 @@
 //! RS-232 on UART 0.
 //!
 //! # Design
-//! The rings of `ser_board` lie between the interrupts and the main loop. When the main loop is behind and the ring is
-//! full, the interrupt is masked and the byte stays in the UART, so that what is lost is lost there, and the UART's
-//! overrun flag tells.
+//! The rings of `ser_board` lie between the interrupts and the main loop. When the main loop is
+//! behind and the ring is full, the interrupt is masked and the byte stays in the UART, so that
+//! what is lost is lost there, and the UART's overrun flag tells.
 //!
 //! # Tradeoffs
-//! The UART holds one byte per direction; at 19200 bit/s the receive interrupt has half a millisecond, which only the
-//! capture interrupt delays.
+//! The UART holds one byte per direction; at 19200 bit/s the receive interrupt has half a
+//! millisecond, which only the capture interrupt delays.
 //!
 //! # Notes
-//! The transmit interrupt comes when the byte buffer becomes *empty*, never because it *is* empty, hence the main
-//! loop pends it. "Not full" says nothing about the shift register: that the line is quiet is found out by waiting.
-//! QEMU keeps no line speed: bytes come and go as fast as the other side takes them, and it holds back what the UART
-//! has no room for.
+//! The transmit interrupt comes when the byte buffer becomes *empty*, never because it *is* empty,
+//! hence the main loop pends it. "Not full" says nothing about the shift register: that the line is
+//! quiet is found out by waiting. QEMU keeps no line speed: bytes come and go as fast as the other
+//! side takes them, and it holds back what the UART has no room for.
 
 use cortex_m::peripheral::NVIC;
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
 use ser_board::ring::Reader;
-use ser_board::serial_line::{Quiet, Received, Receiver, SerialEnds, SerialRings};
+use ser_board::serial_line::{Quiet, ReceivedByte, Receiver, SerialEnds, SerialRings};
 use ser_board::uart_line::{Uart, UartLine};
 use ser_proto::Baud;
 
@@ -61,7 +61,9 @@ pub(crate) fn start(
     BAUD_DIVIDER.write(divider(baud));
     STATE.write(RECEIVE_OVERRUN);
     INTERRUPT_CLEAR.write(TRANSMIT_INTERRUPT | RECEIVE_INTERRUPT);
-    CONTROL.write(TRANSMIT_ENABLE | RECEIVE_ENABLE | TRANSMIT_INTERRUPT_ENABLE | RECEIVE_INTERRUPT_ENABLE);
+    CONTROL.write(
+        TRANSMIT_ENABLE | RECEIVE_ENABLE | TRANSMIT_INTERRUPT_ENABLE | RECEIVE_INTERRUPT_ENABLE,
+    );
     (
         UartLine::new(Uart0 { baud, quiet: Quiet::new() }, received, errors, to_send),
         ReceiveInterrupt { receiver },
@@ -93,7 +95,7 @@ impl ReceiveInterrupt {
                 STATE.write(RECEIVE_OVERRUN);
                 self.receiver.count_error();
             }
-            self.receiver.push(Received { byte, tick_ms });
+            self.receiver.push(ReceivedByte { byte, tick_ms });
         }
     }
 }
@@ -126,7 +128,8 @@ pub(crate) struct Uart0 {
 impl Uart for Uart0 {
     fn let_through(&mut self) {
         if !NVIC::is_enabled(Interrupt::UART0_RX) {
-            // SAFETY: the interrupt masked itself outside of any critical section, waiting for this.
+            // SAFETY: the interrupt masked itself outside of any critical section, waiting for
+            // this.
             unsafe { NVIC::unmask(Interrupt::UART0_RX) };
         }
     }

@@ -8,22 +8,24 @@
 //! ```
 //!
 //! # Design
-//! A crystal that does not swing, or stops later, leaves the recorder with the chip's RC oscillator in its place: the
-//! same clocks, 1 % off at 25 °C and by several percent where it is hot or cold (data sheet, "HSI oscillator
-//! characteristics"). It goes on recording, and the fault lamp is lit for as long. Beyond some 4 % off, both ends
-//! together, RS-232 does not answer any more.
+//! A crystal that does not swing, or stops later, leaves the recorder with the chip's RC oscillator
+//! in its place: the same clocks, 1 % off at 25 °C and by several percent where it is hot or cold
+//! (data sheet, "HSI oscillator characteristics"). It goes on recording, and the fault lamp is lit
+//! for as long. Beyond some 4 % off, both ends together, RS-232 does not answer any more.
 //!
 //! # Tradeoffs
-//! The chip could run twice as fast. But the external bus has the processor's clock, and holds what it writes for one
-//! period of it and no more: at 168 MHz the buffers in front of the GENI board would eat that up (see `geni_bus`,
-//! which does not compile then). The recorder has time to spare at either speed.
+//! The chip could run twice as fast. But the external bus has the processor's clock, and holds what
+//! it writes for one period of it and no more: at 168 MHz the buffers in front of the GENI board
+//! would eat that up (see `geni_bus`, which does not compile then). The recorder has time to spare
+//! at either speed.
 //!
-//! PCLK1 is a quarter of what it could be, because the serial line's divider has 16 bits: at 42 MHz it ends at
-//! 641 bit/s, and the protocol has 300.
+//! PCLK1 is a quarter of what it could be, because the serial line's divider has 16 bits: at 42 MHz
+//! it ends at 641 bit/s, and the protocol has 300.
 //!
 //! # Notes
-//! The flash is read by the start-up code and for the configuration only; its wait states are set all the same, its
-//! caches stay off. (RM0090, chapters "Reset and clock control" and "Embedded flash memory interface".)
+//! The flash is read by the start-up code and for the configuration only; its wait states are set
+//! all the same, its caches stay off. (RM0090, chapters "Reset and clock control" and "Embedded
+//! flash memory interface".)
 
 use cortex_m::asm;
 use stm32f4::stm32f407::{FLASH, RCC};
@@ -39,7 +41,8 @@ const OUTPUT_DIVIDER: u32 = 4;
 const USB_DIVIDER: u8 = 7;
 
 /// Clock of the processor and of the external bus.
-pub(crate) const HCLK_HZ: u32 = CRYSTAL_HZ / CRYSTAL_DIVIDER as u32 * MULTIPLIER as u32 / OUTPUT_DIVIDER;
+pub(crate) const HCLK_HZ: u32 =
+    CRYSTAL_HZ / CRYSTAL_DIVIDER as u32 * MULTIPLIER as u32 / OUTPUT_DIVIDER;
 /// Clock of the serial line.
 pub(crate) const PCLK1_HZ: u32 = HCLK_HZ / PCLK1_DIVIDER;
 /// Clock of SPI1.
@@ -54,7 +57,9 @@ const FLASH_WAIT_STATES: u8 = 2;
 const _: () = {
     assert!(HCLK_HZ == 84_000_000);
     // The PLL's input should be 2 MHz, its oscillator has to stay within 100–432 MHz.
-    assert!(CRYSTAL_HZ / CRYSTAL_DIVIDER as u32 == 2_000_000 && RC_HZ / RC_DIVIDER as u32 == 2_000_000);
+    assert!(
+        CRYSTAL_HZ / CRYSTAL_DIVIDER as u32 == 2_000_000 && RC_HZ / RC_DIVIDER as u32 == 2_000_000
+    );
     assert!(2 * MULTIPLIER >= 100 && 2 * MULTIPLIER <= 432);
     // The slowest rate has to fit into the divider of the serial line.
     assert!(PCLK1_HZ / 300 < 1 << 16);
@@ -63,7 +68,8 @@ const _: () = {
 /// What PCLK1 is divided by.
 const PCLK1_DIVIDER: u32 = 8;
 
-/// Looks at the crystal before it is given up, some 10 clocks of 16 MHz each: 125 ms, where 2 ms are typical.
+/// Looks at the crystal before it is given up, some 10 clocks of 16 MHz each: 125 ms, where 2 ms
+/// are typical.
 const CRYSTAL_LOOKS: u32 = 200_000;
 
 /// What the clocks are made of.
@@ -112,8 +118,9 @@ pub(crate) fn start(rcc: &RCC, flash: &FLASH) -> Source {
     source
 }
 
-/// Waits until a part whose clock has just been switched on can be written to: a clock of its bus, and one more (device
-/// errata, "Delay after an RCC peripheral clock enabling"). What is written earlier may be lost.
+/// Waits until a part whose clock has just been switched on can be written to: a clock of its bus,
+/// and one more (device errata, "Delay after an RCC peripheral clock enabling"). What is written
+/// earlier may be lost.
 pub(crate) fn settle() {
     asm::dsb();
     asm::delay(2 * PCLK1_DIVIDER + 2);

@@ -1,22 +1,22 @@
 //! The configuration's flash: sectors 2 and 3, 16 KiB each.
 //!
 //! # Design
-//! Everything runs from RAM, so erasing and writing stop nobody: capture and the serial interrupts go on, and the
-//! main loop waits here. While it waits for an erase it feeds the watchdog, as long as capture makes progress and the
-//! erase takes no longer than it may.
+//! Everything runs from RAM, so erasing and writing stop nobody: capture and the serial interrupts
+//! go on, and the main loop waits here. While it waits for an erase it feeds the watchdog, as long
+//! as capture makes progress and the erase takes no longer than it may.
 //!
 //! # Notes
-//! 32 bits at a time, which wants 2.7 V at least: the brown-out reset has to be at its highest level, which
-//! `reset` tells the log if it is not. Times (data sheet, "Flash memory programming"): 250–500 ms to erase a sector of
-//! 16 KiB, 16–100 µs to write a word.
+//! 32 bits at a time, which wants 2.7 V at least: the brown-out reset has to be at its highest
+//! level, which `reset` tells the log if it is not. Times (data sheet, "Flash memory programming"):
+//! 250–500 ms to erase a sector of 16 KiB, 16–100 µs to write a word.
 
 use core::arch::global_asm;
 use core::ptr;
 
 use cortex_m::asm;
 use embedded_storage::nor_flash::{
-    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase,
-    check_read, check_write,
+    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+    check_erase, check_read, check_write,
 };
 use ser_board::flash_log::FlashHealth;
 use ser_node::Liveness;
@@ -25,7 +25,8 @@ use stm32f4::stm32f407::FLASH;
 use crate::timer;
 use crate::watchdog::Watchdog;
 
-/// Where sector 2 begins; ram-image.x keeps the image away from it, and does not link with another place.
+/// Where sector 2 begins; ram-image.x keeps the image away from it, and does not link with another
+/// place.
 pub(crate) const BASE: u32 = 0x0800_8000;
 /// Sectors 2 and 3.
 pub(crate) const LEN: u32 = 2 * SECTOR_LEN;
@@ -86,7 +87,10 @@ impl ConfigurationFlash {
     }
 
     /// Takes the lock off for as long as `change` takes, and sees whether it went well.
-    fn change(&mut self, change: impl FnOnce(&mut Self) -> Result<(), FlashError>) -> Result<(), FlashError> {
+    fn change(
+        &mut self,
+        change: impl FnOnce(&mut Self) -> Result<(), FlashError>,
+    ) -> Result<(), FlashError> {
         // While the flash is at work a write to its registers stalls the bus, and capture with it.
         if self.is_busy() {
             return Err(FlashError::TimedOut);
@@ -122,7 +126,9 @@ impl ConfigurationFlash {
 
     fn erase_sector(&mut self, number: u8) -> Result<(), FlashError> {
         // SAFETY: the sector is one of the configuration's.
-        self.registers.cr().modify(|_, w| unsafe { w.psize().psize32().ser().set_bit().snb().bits(number) });
+        self.registers
+            .cr()
+            .modify(|_, w| unsafe { w.psize().psize32().ser().set_bit().snb().bits(number) });
         self.registers.cr().modify(|_, w| w.strt().set_bit());
         let started_ms = timer::tick_ms();
         let mut liveness = Liveness::new();
@@ -138,16 +144,19 @@ impl ConfigurationFlash {
         Ok(())
     }
 
-    /// Writes the word at `offset`, a multiple of four less than `LEN`, into flash that is unlocked and idle.
+    /// Writes the word at `offset`, a multiple of four less than `LEN`, into flash that is unlocked
+    /// and idle.
     fn write_word(&mut self, offset: u32, word: u32) -> Result<(), FlashError> {
         self.registers.cr().modify(|_, w| w.psize().psize32().pg().set_bit());
-        // SAFETY: as memory, the word is nobody's. ram-image.x hands sectors 2 and 3 to no section, and does not link
-        // if these are others: no variable and no code is there. Nothing forms a reference to it; it is read by `read`
-        // alone, through this value, of which there is one and which is borrowed for writing. It is aligned and inside
-        // of the sectors (`check_write` has looked at the whole range), where the protection unit grants access. As
-        // hardware, unlocked flash takes a store of 32 bits with PG set and PSIZE at 32 bits. Whatever bits are written
-        // over whatever others, the worst is a cell that holds something else, and the record's check finds that. That
-        // nothing can be read from the bank meanwhile stops nobody: everything runs from RAM.
+        // SAFETY: as memory, the word is nobody's. ram-image.x hands sectors 2 and 3 to no section,
+        // and does not link if these are others: no variable and no code is there. Nothing forms a
+        // reference to it; it is read by `read` alone, through this value, of which there is one
+        // and which is borrowed for writing. It is aligned and inside of the sectors (`check_write`
+        // has looked at the whole range), where the protection unit grants access. As hardware,
+        // unlocked flash takes a store of 32 bits with PG set and PSIZE at 32 bits. Whatever bits
+        // are written over whatever others, the worst is a cell that holds something else, and the
+        // record's check finds that. That nothing can be read from the bank meanwhile stops nobody:
+        // everything runs from RAM.
         unsafe { ptr::write_volatile(address(offset).cast::<u32>(), word) };
         asm::dsb();
         if (0..WRITE_LOOKS).any(|_| !self.is_busy()) { Ok(()) } else { Err(FlashError::TimedOut) }
@@ -174,8 +183,8 @@ impl ReadNorFlash for ConfigurationFlash {
             return Err(FlashError::TimedOut);
         }
         for (offset, word) in (offset..).step_by(WORD_LEN).zip(bytes.as_chunks_mut().0) {
-            // SAFETY: inside of the memory and aligned, as just checked; see `write_word` for whose it is. Any value is
-            // a word.
+            // SAFETY: inside of the memory and aligned, as just checked; see `write_word` for whose
+            // it is. Any value is a word.
             *word = unsafe { ptr::read_volatile(address(offset).cast::<u32>()) }.to_le_bytes();
         }
         Ok(())
@@ -213,6 +222,6 @@ impl NorFlash for ConfigurationFlash {
     }
 }
 
-/// A bit that is 0 stays 0 and the others may follow, one write after the other: there is no check word beside the
-/// data.
+/// A bit that is 0 stays 0 and the others may follow, one write after the other: there is no check
+/// word beside the data.
 impl MultiwriteNorFlash for ConfigurationFlash {}

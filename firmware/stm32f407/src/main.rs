@@ -1,15 +1,17 @@
-//! The recorder on an STM32F407 (Cortex-M4F at 84 MHz), 144 pins: the board to flash. `docs/hardware.md` says how it is
-//! wired.
+//! The recorder on an STM32F407 (Cortex-M4F at 84 MHz), 144 pins: the board to flash.
+//! `docs/hardware.md` says how it is wired.
 //!
-//! Three interrupts and a main loop: capture (highest priority), RS-232 in both directions, the GENI board's line, and
-//! `idle`, which does all the rest. They share no resource, hence nobody ever locks anything, and capture waits for
-//! nobody, not even for the flash: everything runs from RAM (`ram-image.x`).
+//! Three interrupts and a main loop: capture (highest priority), RS-232 in both directions, the
+//! GENI board's line, and `idle`, which does all the rest. They share no resource, hence nobody
+//! ever locks anything, and capture waits for nobody, not even for the flash: everything runs from
+//! RAM (`ram-image.x`).
 //!
 //! # Tradeoffs
-//! Registers are named by the register crate, and there is no HAL between. `stm32f4xx-hal` takes the ports of 16
-//! inputs pin by pin, waits without bound and unwraps what it reads from the clock (whose leap years it counts from
-//! 1970), knows the flash in sectors of 128 KiB only, and brings paths to a panic into the image. What it would have
-//! saved is a few dozen lines, one file per part of the chip.
+//! Registers are named by the register crate, and there is no HAL between. `stm32f4xx-hal` takes
+//! the ports of 16 inputs pin by pin, waits without bound and unwraps what it reads from the clock
+//! (whose leap years it counts from 1970), knows the flash in sectors of 128 KiB only, and brings
+//! paths to a panic into the image. What it would have saved is a few dozen lines, one file per
+//! part of the chip.
 #![no_std]
 #![no_main]
 
@@ -63,7 +65,8 @@ mod app {
     use crate::watchdog::Watchdog;
     use crate::{boot, log, pins, protection, reset};
 
-    // RTIC takes nothing but literals for priorities; `crates/ser-board/tests/priorities.rs` sees that the tasks have these.
+    // RTIC takes nothing but literals for priorities; `crates/ser-board/tests/priorities.rs` sees
+    // that the tasks have these.
     const _: () = {
         assert!(budget::CAPTURE_PRIORITY == 3);
         assert!(budget::RECEIVE_PRIORITY == 2);
@@ -140,7 +143,8 @@ mod app {
             clock: ChipClock::start(&device.RCC, &device.PWR, device.RTC),
         };
         let (capture, node) = start::start(memory, parts, &HEALTH);
-        let (serial, serial_interrupt) = uart::start(&device.RCC, device.USART2, rings, node.baud());
+        let (serial, serial_interrupt) =
+            uart::start(&device.RCC, device.USART2, rings, node.baud());
         let (pulsed, pulses) = pulses.split();
         let geni_line = InterruptLine::start(&device.RCC, &device.SYSCFG, device.EXTI, pulsed);
         let genius = if straps.has_geni() {
@@ -149,7 +153,8 @@ mod app {
         } else {
             None
         };
-        let genius = genius.map(|(board, window)| Genius::new(board, window, GeniusOptions::new(model)));
+        let genius =
+            genius.map(|(board, window)| Genius::new(board, window, GeniusOptions::new(model)));
         #[cfg(not(feature = "serialiser"))]
         let contacts = InputPins { low: ports.b, middle: ports.c, high: ports.g };
         #[cfg(feature = "serialiser")]
@@ -178,7 +183,8 @@ mod app {
         report::last_words(boot);
         if clock_source == Source::RcOscillator {
             defmt::error!(
-                "the crystal does not swing: time runs by the RC oscillator, off by up to several percent"
+                "the crystal does not swing: time runs by the RC oscillator, off by up to \
+                 several percent"
             );
         }
         if !guards_brown_out {
@@ -216,16 +222,19 @@ mod app {
         loop {
             let now_ms = main_loop::pass(node, serial, genius.as_mut());
             let broken = start.clock_source != Source::Crystal || HEALTH.is_broken();
-            lamps
-                .show(now_ms, &Condition::of(node, serial.bytes(), genius.as_ref(), broken, start.was_fault));
+            lamps.show(
+                now_ms,
+                &Condition::of(node, serial.bytes(), genius.as_ref(), broken, start.was_fault),
+            );
             if liveness.pass(now_ms) {
                 watchdog.feed();
             }
             let diagnostics = || (node.diagnostics(), genius.as_ref().map(Genius::diagnostics));
             report.pass(now_ms, diagnostics, stack::high_water);
 
-            // A byte that arrives just now waits for the next interrupt, a millisecond at most. Looking with
-            // interrupts off would spare it that, and delay the capture interrupt instead.
+            // A byte that arrives just now waits for the next interrupt, a millisecond at most.
+            // Looking with interrupts off would spare it that, and delay the capture interrupt
+            // instead.
             if !serial.has_received() {
                 cortex_m::asm::wfi();
             }

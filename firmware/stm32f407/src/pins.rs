@@ -1,21 +1,24 @@
 //! Every pin, once: what it is for and how it is set up.
 //!
 //! # Design
-//! [`ASSIGNMENTS`] is the only place where pins are given away. The compiler turns it into register values and refuses
-//! a table in which two assignments share a pin. `docs/hardware.md` tells the same with package pins and parts.
+//! [`ASSIGNMENTS`] is the only place where pins are given away. The compiler turns it into register
+//! values and refuses a table in which two assignments share a pin. `docs/hardware.md` tells the
+//! same with package pins and parts.
 //!
 //! # Tradeoffs
-//! With the external bus in place no chip of the family has two whole ports left: of the 144 pins' ports only B is
-//! whole. So inputs 17–32 are half a port each, taken where no shifting is needed: one load per port and one OR. The
-//! three loads lie some 0.1 µs apart, which samples a millisecond apart do not see.
+//! With the external bus in place no chip of the family has two whole ports left: of the 144 pins'
+//! ports only B is whole. So inputs 17–32 are half a port each, taken where no shifting is needed:
+//! one load per port and one OR. The three loads lie some 0.1 µs apart, which samples a millisecond
+//! apart do not see.
 //!
 //! # Notes
-//! Only straps and the serial line's receiver have the chip's pull-ups. They are 30–50 kΩ, but 8–15 kΩ at PA10 and
-//! PB12 (data sheet, "I/O static characteristics"), which a closed contact on PB12 could not pull to a valid low; and
-//! they must be off on a pin that is driven above the chip's supply, as 5 V logic may do. So field inputs and the
-//! GENI board's lines are held from outside, and where nothing is fitted outside nothing holds them;
-//! `docs/hardware.md` says with what. Ports that are not listed, and pins such as those of debugger and crystals,
-//! stay as they are out of reset.
+//! Only straps and the serial line's receiver have the chip's pull-ups. They are 30–50 kΩ, but 8–15
+//! kΩ at PA10 and PB12 (data sheet, "I/O static characteristics"), which a closed contact on PB12
+//! could not pull to a valid low; and they must be off on a pin that is driven above the chip's
+//! supply, as 5 V logic may do. So field inputs and the GENI board's lines are held from outside,
+//! and where nothing is fitted outside nothing holds them; `docs/hardware.md` says with what. Ports
+//! that are not listed, and pins such as those of debugger and crystals, stay as they are out of
+//! reset.
 
 use stm32f4::stm32f407::{GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG, RCC};
 
@@ -188,7 +191,8 @@ const OUTPUT: u32 = 0b01;
 const ALTERNATE: u32 = 0b10;
 const PULL_UP: u32 = 0b01;
 const NO_PULL: u32 = 0b00;
-/// 50 MHz at 40 pF: edges of the external bus in a few nanoseconds, without the overshoot of the fastest setting.
+/// 50 MHz at 40 pF: edges of the external bus in a few nanoseconds, without the overshoot of the
+/// fastest setting.
 const FAST: u32 = 0b10;
 
 impl SetUp {
@@ -201,8 +205,8 @@ impl SetUp {
         data: Bits::NONE,
     };
 
-    /// Of a port, from the table. Does not compile when a pin has two roles, or a pull-up that is stronger than is
-    /// reckoned.
+    /// Of a port, from the table. Does not compile when a pin has two roles, or a pull-up that is
+    /// stronger than is reckoned.
     const fn of(port: Port) -> SetUp {
         let mut set_up = SetUp::NONE;
         let mut taken = 0;
@@ -212,7 +216,10 @@ impl SetUp {
             if *its_port as u8 == port as u8 {
                 assert!(taken & *pins == 0, "a pin has two roles");
                 taken |= *pins;
-                assert!(!role.is_pulled() || *pins & strongly_pulled(port) == 0, "a pull-up of 8–15 kΩ");
+                assert!(
+                    !role.is_pulled() || *pins & strongly_pulled(port) == 0,
+                    "a pull-up of 8–15 kΩ"
+                );
                 let mut number = 0;
                 while number < 16 {
                     if *pins >> number & 1 != 0 {
@@ -267,8 +274,8 @@ macro_rules! set_up {
     ($($port:ident: $registers:expr),* $(,)?) => {$({
         const SET_UP: SetUp = SetUp::of(Port::$port);
         let registers = $registers;
-        // SAFETY: the table's values, in registers that take any; the level and function of a pin are set before its
-        // mode, so that none ever drives what it should not.
+        // SAFETY: the table's values, in registers that take any; the level and function of a pin
+        // are set before its mode, so that none ever drives what it should not.
         unsafe {
             registers.odr().modify(|r, w| w.bits(SET_UP.data.in_place_of(r.bits())));
             registers.pupdr().modify(|r, w| w.bits(SET_UP.pull.in_place_of(r.bits())));

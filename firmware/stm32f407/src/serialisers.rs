@@ -2,11 +2,12 @@
 //!
 //! # Design
 //! What the parts say is `ser_board::serialiser`'s to read; here are the registers. The bytes are
-//! waited for, in the capture interrupt: four parts take 12 µs at 5.25 MHz. Nobody else uses the bus.
+//! waited for, in the capture interrupt: four parts take 12 µs at 5.25 MHz. Nobody else uses the
+//! bus.
 //!
 //! # Notes
-//! Chip select is a pin that the program drives. Out of `pins` it is low, which lets parts latch and
-//! changes nothing: without a clock they shift nothing out.
+//! Chip select is a pin that the program drives. Out of `pins` it is low, which lets parts latch
+//! and changes nothing: without a clock they shift nothing out.
 
 use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
 use ser_board::inputs::{InputPorts, Wiring};
@@ -52,7 +53,8 @@ impl InputPins {
         clocks::settle();
         let bus = Bus { spi, port };
         bus.select(false);
-        // 8 bits, the most significant one first; the pin that would select this chip is not in use.
+        // 8 bits, the most significant one first; the pin that would select this chip is not in
+        // use.
         bus.spi.cr1().write(|w| {
             w.mstr().set_bit().br().div8().cpol().clear_bit().cpha().clear_bit();
             w.ssm().set_bit().ssi().set_bit().spe().set_bit()

@@ -1,13 +1,14 @@
 //! RS-232 on USART 2: 8 data bits, no parity, 1 stop bit.
 //!
 //! # Design
-//! The rings of `ser_board` lie between the interrupt and the main loop. Both directions share one interrupt, at the
-//! priority of the receiver, which has one character's time; the transmitter's part of it is a byte and a half dozen
-//! instructions.
+//! The rings of `ser_board` lie between the interrupt and the main loop. Both directions share one
+//! interrupt, at the priority of the receiver, which has one character's time; the transmitter's
+//! part of it is a byte and a half dozen instructions.
 //!
 //! # Notes
-//! Transmission complete is set when the last stop bit has left, so the line is known to be quiet and not guessed.
-//! What an overrun or a framing error leaves in the data register, `ser_board` knows; both are counted as line errors.
+//! Transmission complete is set when the last stop bit has left, so the line is known to be quiet
+//! and not guessed. What an overrun or a framing error leaves in the data register, `ser_board`
+//! knows; both are counted as line errors.
 
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
 use ser_board::ring::Reader;
@@ -33,8 +34,8 @@ pub(crate) fn start(
     set_divider(&uart, baud);
     uart.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
     let SerialEnds { receiver, received, errors, to_send, transmitter } = rings.split();
-    // SAFETY: the two ends share the registers. The interrupt alone touches the data register, the main loop alone the
-    // divider; for the one bit that both change see `Usart2::wake_transmitter`.
+    // SAFETY: the two ends share the registers. The interrupt alone touches the data register, the
+    // main loop alone the divider; for the one bit that both change see `Usart2::wake_transmitter`.
     let shared = unsafe { USART2::steal() };
     (
         UartLine::new(Usart2(shared), received, errors, to_send),
@@ -98,8 +99,9 @@ impl Uart for Usart2 {
     fn will_send(&mut self) {}
 
     fn wake_transmitter(&mut self) {
-        // The interrupt may clear this bit between reading and writing, because it has found the ring empty just
-        // before. Then it is set here, where it belongs; nothing else in the register ever changes.
+        // The interrupt may clear this bit between reading and writing, because it has found the
+        // ring empty just before. Then it is set here, where it belongs; nothing else in the
+        // register ever changes.
         self.0.cr1().modify(|_, w| w.txeie().set_bit());
     }
 

@@ -1,8 +1,8 @@
 //! Flash memory as on an STM32F4, whose power can fail at any single write.
 //!
-//! Bits go from 1 to 0 when written and back only by erasing a whole sector. Power is a budget of steps: each byte
-//! written is a step, and so is each part of an erase. When it runs out, the step under way is done in part,
-//! and nothing works any more until [`Flash::power_up`].
+//! Bits go from 1 to 0 when written and back only by erasing a whole sector. Power is a budget of
+//! steps: each byte written is a step, and so is each part of an erase. When it runs out, the step
+//! under way is done in part, and nothing works any more until [`Flash::power_up`].
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -23,7 +23,8 @@ pub(crate) struct Flash<const SECTOR: usize, const WORD: usize>(Rc<RefCell<Cells
 struct Cells {
     bytes: Vec<u8>,
     erased: Vec<u32>,
-    /// Sectors whose erasing was cut short. Whatever their cells seem to hold, nothing written there would stay.
+    /// Sectors whose erasing was cut short. Whatever their cells seem to hold, nothing written
+    /// there would stay.
     weak: Vec<bool>,
     /// Steps until the power fails; `None` when it does not.
     power: Option<u64>,
@@ -176,7 +177,10 @@ impl<const SECTOR: usize, const WORD: usize> NorFlash for Flash<SECTOR, WORD> {
     fn erase(&mut self, from: u32, to: u32) -> Result<(), PowerCut> {
         let mut cells = self.0.borrow_mut();
         let (from, to) = (from as usize, to as usize);
-        assert!(from.is_multiple_of(SECTOR) && to.is_multiple_of(SECTOR) && from < to, "not whole sectors");
+        assert!(
+            from.is_multiple_of(SECTOR) && to.is_multiple_of(SECTOR) && from < to,
+            "not whole sectors"
+        );
         for sector in from / SECTOR..to / SECTOR {
             cells.has_power()?;
             cells.erased[sector] += 1;
@@ -192,7 +196,10 @@ impl<const SECTOR: usize, const WORD: usize> NorFlash for Flash<SECTOR, WORD> {
         let offset = offset as usize;
         assert!(offset.is_multiple_of(WORD) && bytes.len().is_multiple_of(WORD), "not whole words");
         let is_weak = cells.weak[offset / SECTOR];
-        assert!(!is_weak || bytes.iter().all(|&byte| byte == 0), "writing to a sector that is not erased");
+        assert!(
+            !is_weak || bytes.iter().all(|&byte| byte == 0),
+            "writing to a sector that is not erased"
+        );
         for (at, &byte) in (offset..).zip(bytes) {
             cells.write(at, byte)?;
         }

@@ -15,8 +15,8 @@ pub struct GeniusDiagnostics {
     pub datagrams_ignored: u32,
     /// Commands that came by broadcast and were carried out.
     pub broadcasts: u32,
-    /// Replies that the board could not send, or that went down with it before or after their commands were carried
-    /// out.
+    /// Replies that the board could not send, or that went down with it before or after their
+    /// commands were carried out.
     pub replies_lost: u32,
     /// Commands that set the clock and were not carried out, because nobody saw them arrive.
     pub clocks_refused: u32,

@@ -14,7 +14,8 @@ pub struct GeniusOptions {
     pub model: Model,
     /// State of the board when the port begins.
     pub start: Start,
-    /// Whether [`GeniusPort::reset_held`](super::GeniusPort::reset_held) reaches the board. Without it, a failed board can only be waited for.
+    /// Whether [`GeniusPort::reset_held`](super::GeniusPort::reset_held) reaches the board. Without
+    /// it, a failed board can only be waited for.
     pub reset_line: bool,
     /// How long the board may go without a heartbeat.
     pub heartbeat_timeout_ms: u32,
@@ -40,8 +41,10 @@ impl GeniusOptions {
             Model::Ser160 => 2,
             Model::Ser320 => 4,
         };
-        // Nobody looks at other devices' inputs, but with shorter buffers the board would not log all of them in.
-        let configuration = Configuration::new(self.reference, len, 0, Configuration::DEFAULT.buffer_len());
+        // Nobody looks at other devices' inputs, but with shorter buffers the board would not log
+        // all of them in.
+        let configuration =
+            Configuration::new(self.reference, len, 0, Configuration::DEFAULT.buffer_len());
         Options {
             start: self.start,
             reset_line: self.reset_line,

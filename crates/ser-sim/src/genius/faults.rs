@@ -50,7 +50,8 @@ pub enum Fault {
 /// Something that goes wrong inside a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DeviceFault {
-    /// A self-test during operation finds these faults (bits of the hardware status byte); the board stops.
+    /// A self-test during operation finds these faults (bits of the hardware status byte); the
+    /// board stops.
     FailSelfTest(u8),
     /// The self-test at the next reset, and only that one, finds these faults.
     FailNextStart(u8),

@@ -1,23 +1,24 @@
-//! Genius: a model of the GENI board, of the bus it sits on, and of other devices there, in virtual time.
+//! Genius: a model of the GENI board, of the bus it sits on, and of other devices there, in virtual
+//! time.
 //!
 //! A [`Bus`] knows no time but the one it is told with [`Bus::advance_to`], and says with
 //! [`Bus::next_due_us`] when something happens next. What is connected to it implements [`Device`]:
-//! [`Board`]s, [`DiscreteBlock`]s and
-//! [`BusInterfaceUnit`]s. A host works with its board through the shared RAM alone:
+//! [`Board`]s, [`DiscreteBlock`]s and [`BusInterfaceUnit`]s. A host works with its board through
+//! the shared RAM alone:
 //!
 //! ```
-//! use ser_sim::genius::{Board, BoardOptions, Bus, BusRate};
+//! use ser_sim::genius::{Board, BoardOptions, Bus, BusTiming};
 //!
-//! let mut bus = Bus::new(BusRate::default());
+//! let mut bus = Bus::new(BusTiming::default());
 //! let board = bus.connect(Board::powered(BoardOptions::at(31)));
 //! // The manual: no access for 1.7 seconds, then wait for the OK flag.
 //! bus.advance_to(2_000_000);
 //! assert_eq!(bus.get_mut(board).host_read(0x0893), 1);
 //! ```
 //!
-//! The manual meant throughout is that of the GENI board, GFK-0073. Nothing in here shares code with the
-//! driver for the board, so that a misreading on one side shows on the other; [`BoardWindow`] lets the driver
-//! reach the board's shared RAM.
+//! The manual meant throughout is that of the GENI board, GFK-0073. Nothing in here shares code
+//! with the driver for the board, so that a misreading on one side shows on the other;
+//! [`BoardWindow`] lets the driver reach the board's shared RAM.
 
 mod block;
 mod board;
@@ -40,11 +41,13 @@ pub use block::{Circuits, DiscreteBlock};
 pub use board::{Board, BoardOptions, Led, Leds, Read, Timing, Violation, ViolationKind};
 pub use bus::{ADDRESSES, Bus, Handle, Traffic};
 pub use bus_interface_unit::{BusInterfaceUnit, Side, StationData};
-pub use datagram::{BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, Priority, STANDARD, subfunction};
+pub use datagram::{
+    BROADCAST, Datagram, MAX_DATAGRAM_LEN, MAX_FUNCTION, MessagePriority, STANDARD, subfunction,
+};
 pub use device::{Device, Message};
 pub use device_id::DeviceId;
 pub use faults::{DeviceFault, Fault, Noise};
 pub use identity::{BlockKind, Identity};
 pub use map::RAM_LEN;
-pub use scan_time::{BusRate, MIN_SCAN_NS};
+pub use scan_time::{BusTiming, MIN_SCAN_NS};
 pub use window::{BoardWindow, tick_ms};

@@ -1,14 +1,17 @@
 //! A node in virtual time: the recorder itself, its contacts and both ends of its line.
 //!
-//! Time passes only when [`SimNode::advance_to`] says so, and then every millisecond of it, in order: contacts due in
-//! that millisecond move, all inputs are sampled, the node's main loop runs. However the caller is delayed, a contact
-//! lands on exactly the millisecond that its scenario gives. [`SimNode::leap_to`] comes to the same and passes over
-//! stretches in which nothing can happen, so that a quiet month takes no longer than a busy second.
+//! Time passes only when [`SimNode::advance_to`] says so, and then every millisecond of it, in
+//! order: contacts due in that millisecond move, all inputs are sampled, the node's main loop runs.
+//! However the caller is delayed, a contact lands on exactly the millisecond that its scenario
+//! gives. [`SimNode::leap_to`] comes to the same and passes over stretches in which nothing can
+//! happen, so that a quiet month takes no longer than a busy second.
 
 use std::collections::VecDeque;
 
 use geni_board::SharedRam;
-use ser_node::{Capture, CaptureChannel, Debounce, Diagnostics, Event, GeniusPort, Node, NodeParts};
+use ser_node::{
+    Capture, CaptureChannel, Debounce, Diagnostics, Event, GeniusPort, Node, NodeParts,
+};
 use ser_proto::{Baud, Entry, MAX_SIZE, Model};
 
 use crate::contacts::player::{Played, Player};
@@ -21,10 +24,12 @@ const OUTPUT_LIMIT: usize = 4096;
 
 const NANOSECONDS_PER_MS: u64 = 1_000_000;
 
-/// Start bit, eight data bits, stop bit: what a byte takes on the line, in nanoseconds at one bit per second.
+/// Start bit, eight data bits, stop bit: what a byte takes on the line, in nanoseconds at one bit
+/// per second.
 const BYTE_AT_1_BAUD_NS: u64 = 10 * 1_000_000_000;
 
-/// The longest stretch that is passed over at once: a node tells two ticks apart that are less than 24.8 days apart.
+/// The longest stretch that is passed over at once: a node tells two ticks apart that are less than
+/// 24.8 days apart.
 const LONGEST_LEAP_MS: u64 = 1 << 30;
 
 /// How fast the node's bytes leave it.
@@ -177,7 +182,8 @@ impl<'a> SimNode<'a> {
         tick
     }
 
-    /// Plays a scenario from the next millisecond on, or after those before it. Says in which millisecond it begins.
+    /// Plays a scenario from the next millisecond on, or after those before it. Says in which
+    /// millisecond it begins.
     pub fn play(&mut self, scenario: &Scenario) -> u64 {
         self.player.play(self.now_ms, scenario)
     }
@@ -220,11 +226,12 @@ impl<'a> SimNode<'a> {
         }
     }
 
-    /// The same, much faster where nothing happens. For a node whose Genius port is not served meanwhile.
+    /// The same, much faster where nothing happens. For a node whose Genius port is not served
+    /// meanwhile.
     ///
-    /// A node whose inputs stay as they are, whose line is silent and which has nothing to say has nothing to do
-    /// either: it has no other reason to act. The samples that are passed over are such as the node itself takes
-    /// to have been the same when it missed them.
+    /// A node whose inputs stay as they are, whose line is silent and which has nothing to say has
+    /// nothing to do either: it has no other reason to act. The samples that are passed over are
+    /// such as the node itself takes to have been the same when it missed them.
     pub fn leap_to(&mut self, ms: u64) {
         while self.now_ms < ms {
             let next_move_ms = self.player.next_due_ms().unwrap_or(u64::MAX);
@@ -237,8 +244,8 @@ impl<'a> SimNode<'a> {
         }
     }
 
-    /// Lets time pass while the node's main loop is held up, and only its interrupts run: changes queue up. It
-    /// runs again in the last of these milliseconds.
+    /// Lets time pass while the node's main loop is held up, and only its interrupts run: changes
+    /// queue up. It runs again in the last of these milliseconds.
     pub fn hold_up_to(&mut self, ms: u64) {
         while self.now_ms < ms {
             self.pass_ms();
@@ -247,8 +254,8 @@ impl<'a> SimNode<'a> {
         self.pump();
     }
 
-    /// Makes the node as old as if it had been on for that much longer, with nothing happening: its tick goes on,
-    /// around its 32 bits if need be, and so does its clock.
+    /// Makes the node as old as if it had been on for that much longer, with nothing happening: its
+    /// tick goes on, around its 32 bits if need be, and so does its clock.
     pub fn grow_older(&mut self, by_ms: u64) {
         let mut left_ms = by_ms;
         while left_ms > 0 {
@@ -348,17 +355,19 @@ impl<'a> SimNode<'a> {
         self.baud
     }
 
-    /// What the node dropped, refused or lost since power-up. Milliseconds that were passed over are not missed.
+    /// What the node dropped, refused or lost since power-up. Milliseconds that were passed over
+    /// are not missed.
     #[must_use]
     pub fn diagnostics(&self) -> Diagnostics {
         let seen = self.node.diagnostics();
-        // The node's own count stops at its largest value, after 49 days that were passed over; then it says nothing.
+        // The node's own count stops at its largest value, after 49 days that were passed over;
+        // then it says nothing.
         let leapt_ms = u32::try_from(self.leapt_ms).unwrap_or(u32::MAX);
         Diagnostics { samples_missed: seen.samples_missed.saturating_sub(leapt_ms), ..seen }
     }
 
-    /// The log as it is now: the total since the last erase, modulo 65536, and its entries from the oldest to the
-    /// newest. Nothing goes over the line for it.
+    /// The log as it is now: the total since the last erase, modulo 65536, and its entries from the
+    /// oldest to the newest. Nothing goes over the line for it.
     #[must_use]
     pub fn log(&self) -> (u16, Vec<Entry>) {
         const COUNT: u8 = 10;
@@ -406,7 +415,8 @@ impl<'a> SimNode<'a> {
         }
     }
 
-    /// Ends the byte on the line and begins the next. False when there is nothing to do in this millisecond.
+    /// Ends the byte on the line and begins the next. False when there is nothing to do in this
+    /// millisecond.
     fn pump_at_real_rate(&mut self) -> bool {
         let now_ns = self.now_ms * NANOSECONDS_PER_MS;
         let start_ns = match self.on_the_line {

@@ -15,7 +15,8 @@ impl Chance {
         Chance(Rand64::new(seed.into()))
     }
 
-    /// Decisions of its own for one part of the run, so that it stays the same when another part asks more often.
+    /// Decisions of its own for one part of the run, so that it stays the same when another part
+    /// asks more often.
     #[must_use]
     pub fn branch(&mut self) -> Chance {
         Chance::new(self.0.rand_u64())
@@ -31,7 +32,8 @@ impl Chance {
         range.start() + self.below(range.end() - range.start() + 1)
     }
 
-    /// A number in a range, small ones as often as large ones: as many from 1 to 10 as from 100 to 1000.
+    /// A number in a range, small ones as often as large ones: as many from 1 to 10 as from 100 to
+    /// 1000.
     pub fn spread(&mut self, range: RangeInclusive<u64>) -> u64 {
         let (low, high) = (*range.start(), *range.end());
         let doublings = (high / low.max(1)).max(1).ilog2();
@@ -64,7 +66,8 @@ mod tests {
     #[test]
     fn a_seed_means_the_same_run_with_every_version() {
         let mut chance = Chance::new(1_234_567);
-        let drawn = [chance.below(1 << 32), chance.branch().below(1 << 32), chance.spread(1..=1_000_000)];
+        let drawn =
+            [chance.below(1 << 32), chance.branch().below(1 << 32), chance.spread(1..=1_000_000)];
         assert_eq!(drawn, [1_721_271_454, 2_249_846_495, 10_311]);
     }
 }

@@ -2,7 +2,8 @@
 
 use super::rig::{COMPLETE, PROCESS_ERROR, Rig, SECOND_US, lengths};
 use crate::genius::{
-    BlockKind, Board, BoardOptions, BusRate, Circuits, DeviceFault, DiscreteBlock, Fault, Led, Noise,
+    BlockKind, Board, BoardOptions, BusTiming, Circuits, DeviceFault, DiscreteBlock, Fault, Led,
+    Noise,
 };
 
 #[test]
@@ -84,7 +85,7 @@ fn a_board_that_finds_its_number_taken_stays_off_until_it_is_free() {
 #[test]
 fn blocks_with_the_same_number_collide_until_one_is_changed() {
     let (mut rig, [host]) = Rig::started([31]);
-    let block = || DiscreteBlock::new(4, BusRate::default(), Circuits::Eight, BlockKind::Inputs);
+    let block = || DiscreteBlock::new(4, BusTiming::default(), Circuits::Eight, BlockKind::Inputs);
     let [one, _] = [block(), block()].map(|block| rig.bus.connect(block));
     rig.advance_ms(500);
     assert_eq!(rig.device(host, 4)[2], 0);
