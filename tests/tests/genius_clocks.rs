@@ -5,9 +5,10 @@ use chrono::NaiveDateTime;
 use geni_board::Destination::Broadcast;
 use ser_node::HELD_BACK_MS;
 use ser_proto::{Code, Command, Entry, Inputs, LastBroadcast, Model, Reply, TimeStamp};
-use ser_sim::genius::{SplitMix64, tick_ms};
+use ser_sim::genius::tick_ms;
 use ser_sim::{Scenario, Step};
 use ser_trial::genius_world::{Recorder, World};
+use ser_trial::simulation::chance::Chance;
 
 /// Recorders look at their boards in the same moment here; those of real ones can lie up to 1 ms
 /// apart.
@@ -28,7 +29,7 @@ const CARRIED_OUT_WITHIN_MS: u64 = 10_000;
 /// Recorders that report all the time.
 struct Plant {
     world: World,
-    random: SplitMix64,
+    chance: Chance,
     common_on: bool,
     /// When the common contact moved last.
     moved_ms: u64,
@@ -40,8 +41,8 @@ impl Plant {
             (1..=recorders).map(|number| (number, Model::Ser160)).collect();
         let mut world = World::started(&units);
         world.report_to_host();
-        let random = SplitMix64::new(recorders.into());
-        let mut plant = Plant { world, random, common_on: false, moved_ms: 0 };
+        let chance = Chance::new(recorders.into());
+        let mut plant = Plant { world, chance, common_on: false, moved_ms: 0 };
         plant.run(2_000);
         plant
     }
@@ -144,9 +145,9 @@ impl Plant {
     }
 
     fn any_time(&mut self) -> TimeStamp {
-        let mut part = |end| u8::try_from(self.random.next() % end).expect("small");
+        let mut part = |end| u8::try_from(self.chance.below(end)).expect("small");
         let (day, hour, minute, second) = (1 + part(30), part(24), part(60), part(60));
-        let millisecond = u16::try_from(self.random.next() % 1000).expect("small");
+        let millisecond = u16::try_from(self.chance.below(1000)).expect("small");
         TimeStamp { year: 26, month: 11, day, hour, minute, second, millisecond }
     }
 
@@ -195,10 +196,10 @@ fn clocks_agree(recorders: u8, rounds: u32, soon_ms: Option<u64>) {
     let (mut widest_ms, mut longest_ms, mut beyond) = (0, 0, 0);
     let moved = |changed: Inputs| changed.contains(COMMON);
     for round in 0..rounds {
-        let pause_ms = plant.random.next() % 60;
+        let pause_ms = plant.chance.below(60);
         plant.run(pause_ms);
         let time = plant.any_time();
-        let move_after_ms = soon_ms.map_or(0, |soon_ms| plant.random.next() % (soon_ms + 1));
+        let move_after_ms = soon_ms.map_or(0, |soon_ms| plant.chance.below(soon_ms + 1));
         let took_ms = plant.broadcast(&Command::SetClock(time), move_after_ms);
         longest_ms = longest_ms.max(took_ms);
         if soon_ms.is_some() && took_ms <= HELD_BACK_MS {
@@ -263,7 +264,7 @@ fn one_broadcast_stops_and_starts_recorders_that_report_all_the_time_in_the_same
     let set_ms = plant.seen_ms();
     let mut longest_ms = 0;
     for round in 0..ROUNDS {
-        let pause_ms = plant.random.next() % 60;
+        let pause_ms = plant.chance.below(60);
         plant.run(pause_ms);
         let recording = round % 2 == 1;
         longest_ms = longest_ms.max(plant.broadcast(&Command::SetMode { recording }, 5));

@@ -8,6 +8,7 @@ use ser_proto::{
 use ser_sim::genius::Noise;
 use ser_sim::{Scenario, Step};
 use ser_trial::genius_world::{HOST, World};
+use ser_trial::simulation::chance::Chance;
 
 const UNIT: u8 = 5;
 const SIZE: u16 = 512;
@@ -18,22 +19,6 @@ const NOISE_PPM: u32 = 50_000;
 
 /// A host gives a reply up after this time and asks again.
 const PATIENCE_MS: u64 = 250;
-
-/// xorshift64*: the same numbers for the same seed everywhere.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33) % end
-    }
-
-    fn one_in(&mut self, of: u64) -> bool {
-        self.below(of) == 0
-    }
-}
 
 /// A host's place in the log: how many events it has, and what they were.
 #[derive(Default)]
@@ -69,15 +54,15 @@ impl Reader {
     }
 }
 
-fn any_command(random: &mut Random, reader: &Reader) -> Command {
-    match random.below(10) {
+fn any_command(chance: &mut Chance, reader: &Reader) -> Command {
+    match chance.below(10) {
         0 => Command::QueryConfiguration,
         1 => Command::Configure(Configure {
             size: None,
             baud: None,
             auto_report: AutoReport::Genius,
             report_address: HOST,
-            auto_print: random.one_in(2),
+            auto_print: chance.one_in(2),
         }),
         2 => Command::LastBroadcast,
         3 => Command::QueryMode,
@@ -115,7 +100,7 @@ struct Outcome {
 }
 
 fn run(seed: u64) -> Outcome {
-    let mut random = Random(seed);
+    let mut chance = Chance::new(seed);
     let noise =
         Noise { seed, damaged_ppm: NOISE_PPM, lost_ppm: NOISE_PPM, unacknowledged_ppm: 10_000 };
     let mut world = World::with_noise(&[(UNIT, Model::Ser160)], noise);
@@ -140,8 +125,8 @@ fn run(seed: u64) -> Outcome {
     let scan = |world: &World| world.bus.borrow().traffic().scans - first_scan;
     while scan(&world) < SCANS {
         // One contact or two, now and then.
-        if scan(&world) < end_of_events && random.one_in(12) {
-            let changed = 1 << random.below(16) | 1 << random.below(16);
+        if scan(&world) < end_of_events && chance.one_in(12) {
+            let changed = 1 << chance.below(16) | 1 << chance.below(16);
             state ^= changed;
             let steps = Inputs(changed).numbers().map(|input| Step {
                 at_ms: 0,
@@ -165,22 +150,22 @@ fn run(seed: u64) -> Outcome {
         }
         let patient = asked_ms.is_some_and(|asked_ms| world.now_ms - asked_ms < PATIENCE_MS);
         if !patient && world.host.driver.can_transmit() {
-            let command = any_command(&mut random, &genius);
+            let command = any_command(&mut chance, &genius);
             world.send(Device(UNIT), &command);
             asked_ms = Some(world.now_ms);
         }
 
         // The host on the line: a tenth of its frames, and of the recorder's, are damaged.
-        if random.one_in(12) {
-            let command = any_command(&mut random, &serial);
+        if chance.one_in(12) {
+            let command = any_command(&mut chance, &serial);
             let mut frame: Vec<u8> = FrameEncoder::new(command.to_body()).collect();
-            if random.one_in(10) {
-                let at = usize::try_from(random.below(frame.len() as u64)).expect("small");
-                frame[at] ^= 1 << random.below(7);
+            if chance.one_in(10) {
+                let at = usize::try_from(chance.below(frame.len() as u64)).expect("small");
+                frame[at] ^= 1 << chance.below(7);
             }
             world.recorders[0].node.receive(&frame);
         }
-        let lost = random.one_in(10);
+        let lost = chance.one_in(10);
         for reply in world.recorders[0].serial_said().0 {
             if let Reply::Read(reply) = reply
                 && !lost

@@ -14,6 +14,8 @@ pub(crate) struct Board {
     pub(crate) limits: &'static Limits,
     pub(crate) package: &'static str,
     pub(crate) target: Target,
+    /// Features that other builds of the board have: each has to stand up to clippy, too.
+    pub(crate) features: &'static [&'static str],
     /// The chip as probe-rs calls it; none on a board that is emulated.
     pub(crate) chip: Option<&'static str>,
 }
@@ -23,6 +25,7 @@ pub(crate) const MPS2_AN385: Board = Board {
     limits: &image_check::MPS2_AN385,
     package: "ser-mps2-an385",
     target: cross::CORTEX_M3,
+    features: &[],
     chip: None,
 };
 
@@ -31,6 +34,7 @@ pub(crate) const STM32F407: Board = Board {
     limits: &image_check::STM32F407,
     package: "ser-stm32f407",
     target: cross::CORTEX_M4F,
+    features: &["serialiser"],
     chip: Some("STM32F407ZGTx"),
 };
 

@@ -1,5 +1,7 @@
 //! `lint`: format, clippy and documentation.
 
+use std::iter;
+
 use crate::boards::{BOARDS, Board};
 use crate::images::toolchains;
 use crate::places;
@@ -63,13 +65,15 @@ pub(crate) fn host(strict: bool) -> Result<()> {
 pub(crate) fn firmware(boards: &[(&Board, CrossToolchain)], strict: bool) -> Result<()> {
     for (board, toolchain) in boards {
         heading(&format!("Clippy on the firmware for {}", board.name()));
-        match toolchain.clippy() {
-            Some(mut clippy) => {
-                let package = ["--release", "--package", board.package];
-                steps::run(clippy.args(package).args(["--", "-D", "warnings"]))?;
+        for features in iter::once(&"").chain(board.features) {
+            match toolchain.clippy() {
+                Some(mut clippy) => {
+                    let package = ["--release", "--package", board.package, "--features", features];
+                    steps::run(clippy.args(package).args(["--", "-D", "warnings"]))?;
+                }
+                None if strict => return Err(Failure::new("this cross toolchain has no clippy")),
+                None => note("left out: this cross toolchain has no clippy"),
             }
-            None if strict => return Err(Failure::new("this cross toolchain has no clippy")),
-            None => note("left out: this cross toolchain has no clippy"),
         }
     }
     Ok(())

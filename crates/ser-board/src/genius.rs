@@ -33,7 +33,7 @@ impl<W: SharedRam, B: GeniBoard> Genius<W, B> {
         // No more than there is room for: a line that chatters must not keep the main loop.
         for _ in 0..PULSE_RING_LEN {
             let Some(tick_ms) = self.board.next_pulse() else { break };
-            self.port.interrupt(node, tick_ms);
+            node.genius_interrupt(&mut self.port, tick_ms);
         }
     }
 
@@ -41,7 +41,7 @@ impl<W: SharedRam, B: GeniBoard> Genius<W, B> {
     pub(crate) fn serve<S: Storage, R: Rtc>(&mut self, node: &mut Node<'_, S, R>) {
         // The pass may have taken long. A flag that is seen now has had its pulse.
         self.take_pulses(node);
-        self.port.poll(node);
+        node.genius_poll(&mut self.port);
         self.board.drive_reset(self.port.reset_held());
     }
 

@@ -451,11 +451,8 @@ mod tests {
 
     /// Memory as the very first power-up finds it.
     fn random() -> Memory {
-        let mut noise = 0xDEAD_BEEF_u32;
-        [(); WORDS].map(|()| {
-            noise = noise.wrapping_mul(0x9E37_79B9).wrapping_add(1);
-            noise
-        })
+        let mut noise = oorandom::Rand32::new(0xDEAD_BEEF);
+        [(); WORDS].map(|()| noise.rand_u32())
     }
 
     fn said(fault: Fault, text: &str, starts_ago: u32) -> Option<LastWords> {

@@ -12,7 +12,10 @@
 //! the worst: broken, then reset, then lost.
 
 use embedded_hal::digital::{OutputPin, PinState};
-use ser_node::Diagnostics;
+use geni_board::SharedRam;
+use ser_node::{Diagnostics, Node, Rtc, Storage};
+
+use crate::genius::{GeniBoard, Genius};
 
 /// How long a lamp is lit for one event, and dark before the next one lights it again, in
 /// milliseconds.
@@ -45,6 +48,28 @@ pub struct Condition {
     pub reset_by_fault: bool,
     /// Something that belonged into the log, or to a host, was lost since power-up.
     pub lost: bool,
+}
+
+impl Condition {
+    /// What a recorder's lamps are to tell. `line_bytes` have come and gone on RS-232; the board
+    /// knows whether anything is broken and how the run before this one ended.
+    pub fn of<S: Storage, R: Rtc, W: SharedRam, B: GeniBoard>(
+        node: &Node<'_, S, R>,
+        line_bytes: u32,
+        genius: Option<&Genius<W, B>>,
+        broken: bool,
+        reset_by_fault: bool,
+    ) -> Condition {
+        let reports = genius.map_or(0, |genius| genius.diagnostics().reports_sent);
+        Condition {
+            recording: node.is_recording(),
+            events: node.events(),
+            messages: line_bytes.wrapping_add(node.commands()).wrapping_add(reports),
+            broken,
+            reset_by_fault,
+            lost: has_lost(&node.diagnostics()),
+        }
+    }
 }
 
 /// Whether the counters tell of something that belonged to the user and is gone, or of stamps that

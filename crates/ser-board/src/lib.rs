@@ -6,9 +6,11 @@
 //!
 //! | module             | what it holds                                                                          |
 //! |--------------------|----------------------------------------------------------------------------------------|
+//! | [`start`]          | what every board's recorder is made of, once its chip is up                            |
 //! | [`budget`]         | ring lengths and interrupt priorities, each with its derivation                        |
 //! | [`ring`]           | a ring between an interrupt and the main loop that has no panicking path               |
 //! | [`serial_line`]    | the rings of the RS-232 line, and when the line is quiet enough for another rate       |
+//! | [`uart_line`]      | the main loop's end of the RS-232 line, over any UART                                  |
 //! | [`main_loop`]      | one pass of the main loop between the ports and the node                               |
 //! | [`genius`]         | the Genius port, with the lines of its GENI board                                      |
 //! | [`inputs`]         | the word of inputs: ports, wiring, and samples that could not be taken                 |
@@ -20,6 +22,7 @@
 //! | [`leds`]           | what the four lamps mean                                                               |
 //! | [`fault`]          | what a hard fault was, by what the processor shows of it                               |
 //! | [`last_words`]     | what outlives a reset: its cause, the panic's text, the number of boots                |
+//! | [`log_writer`]     | frames of the log, one writer at a time, without a critical section                    |
 //! | `report`           | tells the log which counters have moved (feature `defmt`)                             |
 //! | [`counter`]        | counts that one side keeps and another one reads                                       |
 #![cfg_attr(not(test), no_std)]
@@ -39,11 +42,14 @@ pub mod health;
 pub mod inputs;
 pub mod last_words;
 pub mod leds;
+pub mod log_writer;
 pub mod main_loop;
 #[cfg(feature = "defmt")]
 pub mod report;
 pub mod serial_line;
 pub mod serialiser;
+pub mod start;
 pub mod stm32_rtc;
+pub mod uart_line;
 
 pub use ser_node::ring;

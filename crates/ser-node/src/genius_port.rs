@@ -5,11 +5,14 @@
 //! directed one. The board is reset when it fails, and the bus is joined again; RS-232 and
 //! recording know nothing of it.
 //!
+//! The port turns datagrams into commands and replies into datagrams; what a command means, and who
+//! waits for which reply, is not known here. A [`Node`](crate::Node) carries from one to the other.
+//!
 //! - **Time of arrival** is the tick at which the board raised its Receive-Queue flag: that of the
-//!   pulse that was handed in ([`interrupt`](GeniusPort::interrupt)), or, without the line, of the
-//!   [`poll`](GeniusPort::poll) that saw the flag. However long the board then takes to hand the
-//!   datagram over, clock, mode and Last Broadcast go by it, and changes that come after it wait
-//!   for it ([`HELD_BACK_MS`](crate::HELD_BACK_MS)).
+//!   pulse that was handed in ([`genius_interrupt`](crate::Node::genius_interrupt)), or, without
+//!   the line, of the [`genius_poll`](crate::Node::genius_poll) that saw the flag. However long the
+//!   board then takes to hand the datagram over, clock, mode and Last Broadcast go by it, and
+//!   changes that come after it wait for it ([`HELD_BACK_MS`](crate::HELD_BACK_MS)).
 //! - **Replies** are sent once. A host that misses one asks again, as on RS-232; a repeated reply
 //!   might be taken for the answer to the next command.
 //! - **Auto reports** are repeated until their receiver has acknowledged one, with growing pauses,
@@ -21,132 +24,42 @@
 //!   values are the states of the inputs. There are no outputs, so these tables are empty.
 //! - **Requests for memory** are refused: a recorder has none.
 
+mod diagnostics;
+mod options;
 mod reporter;
 
 use geni_board::{
-    Completion, Configuration, Counters, Data, Destination, DeviceChange, Driver, Event, Failure,
-    Interrupts, MAX_DATA_LEN, Options, ReceivedDatagram, SharedRam, Start, Status, Transmission,
-    TransmitPriority, timing,
+    Completion, Data, Destination, DeviceChange, Driver, Event, MAX_DATA_LEN, ReceivedDatagram,
+    SharedRam, Status, Transmission, TransmitPriority,
 };
-use heapless::{Deque, Vec};
+use heapless::Vec;
 use ser_proto::genius::{
     FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, GlobalData, IoForces, SUBFUNCTION_SER,
-    Subfunction, max_entries,
+    Subfunction,
 };
-use ser_proto::{AutoReport, Command, Model, Reply};
+use ser_proto::{Command, Inputs, Model, ReadReply, Reply};
 
-use crate::clock::Rtc;
+use crate::arrival::{Arrival, Way};
 use crate::diagnostics::count;
-use crate::node::Node;
-use crate::recorder::Answer;
-use crate::settings::Storage;
 
 use reporter::Reporter;
 
-/// Replies that may wait while another one is on its way. The board itself holds no more than 15
-/// commands.
-const MAX_REPLIES: usize = 16;
+pub use diagnostics::GeniusDiagnostics;
+pub use options::GeniusOptions;
 
-/// Things the board has to say that are dealt with in one poll.
-const EVENTS_PER_POLL: usize = 4;
-
-/// No reference address is assigned.
-const NO_REFERENCE: u16 = 0xFFFF;
-
-/// How the port is set up.
+/// What the board had to say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct GeniusOptions {
-    /// The recorder's model: it decides how many bytes of global data there are.
-    pub model: Model,
-    /// State of the board when the port begins.
-    pub start: Start,
-    /// Whether [`GeniusPort::reset_held`] reaches the board. Without it, a failed board can only be
-    /// waited for.
-    pub reset_line: bool,
-    /// How long the board may go without a heartbeat.
-    pub heartbeat_timeout_ms: u32,
-    /// Reference address that the board tells devices that ask; it means nothing to the recorder.
-    pub reference: u16,
-}
-
-impl GeniusOptions {
-    /// A board that is reset at power-up and whenever it fails.
-    #[must_use]
-    pub const fn new(model: Model) -> GeniusOptions {
-        GeniusOptions {
-            model,
-            start: Start::Reset { hold_ms: timing::POWER_UP_RESET_MS },
-            reset_line: true,
-            heartbeat_timeout_ms: timing::HEARTBEAT_TIMEOUT_MS,
-            reference: NO_REFERENCE,
-        }
-    }
-
-    fn driver_options(self) -> Options {
-        let len = match self.model {
-            Model::Ser160 => 2,
-            Model::Ser320 => 4,
-        };
-        // Nobody looks at other devices' inputs, but with shorter buffers the board would not log
-        // all of them in.
-        let configuration =
-            Configuration::new(self.reference, len, 0, Configuration::DEFAULT.buffer_len());
-        Options {
-            start: self.start,
-            reset_line: self.reset_line,
-            heartbeat_timeout_ms: self.heartbeat_timeout_ms,
-            // A pulse of the line is a datagram, then. All else can wait until flags are looked at
-            // anyway.
-            interrupts: Interrupts::RECEIVE_QUEUE,
-            ..Options::new(configuration.unwrap_or(Configuration::DEFAULT))
-        }
-    }
-}
-
-impl Default for GeniusOptions {
-    /// For the 16-input model.
-    fn default() -> GeniusOptions {
-        GeniusOptions::new(Model::Ser160)
-    }
-}
-
-/// Counts since power-up; they stop at the largest value. What was wrong with commands is in
-/// [`Diagnostics`](crate::Diagnostics), whichever port they came from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct GeniusDiagnostics {
-    /// What the driver has met with at the board.
-    pub board: Counters,
-    /// How the board failed last.
-    pub last_failure: Option<Failure>,
-    /// Datagrams that are not for a recorder, or not as they should be.
-    pub datagrams_ignored: u32,
-    /// Commands that came by broadcast and were carried out.
-    pub broadcasts: u32,
-    /// Replies that the board could not send, or that went down with it before or after their
-    /// commands were carried out.
-    pub replies_lost: u32,
-    /// Commands that set the clock and were not carried out, because nobody saw them arrive.
-    pub clocks_refused: u32,
-    /// Auto reports that arrived.
-    pub reports_sent: u32,
-    /// Auto reports that did not arrive, or of which it is not known; each is sent again.
-    pub reports_failed: u32,
-}
-
-/// A reply that waits. Its content is looked up when it goes out, so that it is true then.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Waiting {
-    /// Device number of who asked.
-    to: u8,
-    what: What,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum What {
-    Answer(Answer),
-    Forces(ForceTable),
+pub(crate) enum FromBus {
+    /// A command.
+    Arrived(Arrival),
+    /// A device asks for a force table.
+    ForcesAsked { device: u8, table: ForceTable },
+    /// So many events from `first` on have reached their receiver.
+    Reported { first: u64, entries: usize },
+    /// The board has failed, and whoever asked knows nothing of us any more.
+    Failed,
+    /// Something that concerns the port alone.
+    DealtWith,
 }
 
 /// The datagram that the driver has.
@@ -156,15 +69,15 @@ enum OnItsWay {
     Report,
 }
 
-/// The Genius port of a [`Node`], over the shared RAM of its GENI board.
+/// The Genius port of a [`Node`](crate::Node), over the shared RAM of its GENI board.
 ///
 /// In every turn of its main loop a board hands in the pulses of the interrupt line
-/// ([`interrupt`](Self::interrupt)), calls [`Node::poll`], then [`poll`](Self::poll), and then
-/// drives the GENI board's reset line with [`reset_held`](Self::reset_held).
+/// ([`Node::genius_interrupt`](crate::Node::genius_interrupt)), calls
+/// [`Node::poll`](crate::Node::poll), then [`Node::genius_poll`](crate::Node::genius_poll), and
+/// then drives the GENI board's reset line with [`reset_held`](Self::reset_held).
 pub struct GeniusPort<W> {
     driver: Driver<W>,
     model: Model,
-    replies: Deque<Waiting, MAX_REPLIES>,
     on_its_way: Option<OnItsWay>,
     reporter: Reporter,
     /// Devices that are logged in, number 0 in bit 0.
@@ -173,13 +86,11 @@ pub struct GeniusPort<W> {
 }
 
 impl<W: SharedRam> GeniusPort<W> {
-    /// A port whose board is behind `window`. Nothing is read or written before the first
-    /// [`poll`](Self::poll).
+    /// A port whose board is behind `window`. Nothing is read or written before the port is polled.
     pub fn new(window: W, options: GeniusOptions) -> GeniusPort<W> {
         GeniusPort {
             driver: Driver::new(window, options.driver_options()),
             model: options.model,
-            replies: Deque::new(),
             on_its_way: None,
             reporter: Reporter::new(),
             others: 0,
@@ -187,41 +98,9 @@ impl<W: SharedRam> GeniusPort<W> {
         }
     }
 
-    /// Does what is due, a bounded amount of it: global data, commands that have arrived, one
-    /// datagram to be sent.
-    pub fn poll<S: Storage, R: Rtc>(&mut self, node: &mut Node<'_, S, R>) {
-        // Not that of `Node::poll`: what was done since may have taken long, and a flag is seen
-        // now.
-        let now_ms = node.tick_ms();
-        let global = GlobalData { model: self.model, state: node.inputs() }.to_bytes();
-        // As long as the model says, and that is what was configured.
-        let _ = self.driver.set_global_data(&global);
-        for _ in 0..EVENTS_PER_POLL {
-            let Some(event) = self.driver.poll(now_ms) else { break };
-            self.deal_with(event, node, now_ms);
-            // That may have taken long, as the storing of a configuration does. Pulses are handed
-            // in before flags are looked at again.
-            if node.tick_ms() != now_ms {
-                break;
-            }
-        }
-        node.hold_after(self.driver.oldest_arrival_ms());
-        if self.on_its_way.is_none() && self.driver.can_transmit() {
-            self.send_next(node, now_ms);
-        }
-    }
-
-    /// Whether the board's reset line is to be held low until the next [`poll`](Self::poll).
+    /// Whether the board's reset line is to be held low until the port is polled again.
     pub fn reset_held(&self) -> bool {
         self.driver.reset_held()
-    }
-
-    /// The board's interrupt line was pulsed at `tick_ms`: a datagram arrived then. Called before
-    /// [`Node::poll`], so that no change after it is recorded before it has been read. A board that
-    /// does not connect the line need not call this; the flags are looked at all the same.
-    pub fn interrupt<S: Storage, R: Rtc>(&mut self, node: &mut Node<'_, S, R>, tick_ms: u32) {
-        self.driver.interrupt(tick_ms);
-        node.hold_after(self.driver.oldest_arrival_ms());
     }
 
     /// The shared RAM.
@@ -245,27 +124,44 @@ impl<W: SharedRam> GeniusPort<W> {
         GeniusDiagnostics { board: self.driver.counters(), ..self.diagnostics }
     }
 
-    fn deal_with<S: Storage, R: Rtc>(
-        &mut self,
-        event: Event,
-        node: &mut Node<'_, S, R>,
-        now_ms: u32,
-    ) {
-        match event {
-            Event::Received(datagram) => self.receive(&datagram, node, now_ms),
-            Event::Sent(result) => self.sent(result.is_ok(), node, now_ms),
+    /// The board's interrupt line was pulsed at `tick_ms`.
+    pub(crate) fn interrupt(&mut self, tick_ms: u32) {
+        self.driver.interrupt(tick_ms);
+    }
+
+    /// When the oldest datagram arrived that waits to be read.
+    pub(crate) fn oldest_arrival_ms(&self) -> Option<u32> {
+        self.driver.oldest_arrival_ms()
+    }
+
+    /// Shows the state of all inputs in every bus scan.
+    pub(crate) fn show(&mut self, inputs: Inputs) {
+        let global = GlobalData { model: self.model, state: inputs }.to_bytes();
+        // As long as the model says, and that is what was configured.
+        let _ = self.driver.set_global_data(&global);
+    }
+
+    /// The next thing that the board has to say, if any.
+    pub(crate) fn poll(&mut self, now_ms: u32) -> Option<FromBus> {
+        Some(match self.driver.poll(now_ms)? {
+            Event::Received(datagram) => self.receive(&datagram, now_ms),
+            Event::Sent(result) => self.sent(result.is_ok(), now_ms),
             Event::Failed(failure) => {
                 self.diagnostics.last_failure = Some(failure);
-                // By the time the board is back, nobody waits for these any more.
-                count(&mut self.diagnostics.replies_lost, self.replies.len() as u64);
-                self.replies.clear();
                 self.others = 0;
+                FromBus::Failed
             }
-            Event::Ready(_) => self.reporter.hurry(),
-            Event::Device { number, change: DeviceChange::LoggedOut } => {
-                self.others &= !bit(number)
+            Event::Ready(_) => {
+                self.reporter.hurry();
+                FromBus::DealtWith
             }
-            Event::Device { number, .. } => self.others |= bit(number),
+            Event::Device { number, change } => {
+                match change {
+                    DeviceChange::LoggedOut => self.others &= !bit(number),
+                    _ => self.others |= bit(number),
+                }
+                FromBus::DealtWith
+            }
             // The driver remembers or has dealt with it, or it is not asked for.
             Event::Configured(_)
             | Event::StatusChanged(_)
@@ -273,74 +169,99 @@ impl<W: SharedRam> GeniusPort<W> {
             | Event::Request(_)
             | Event::Replied(_)
             | Event::TablesLocked
-            | Event::OutputsSent => {}
+            | Event::OutputsSent => FromBus::DealtWith,
+        })
+    }
+
+    /// Whether a datagram can be sent now.
+    pub(crate) fn can_send(&self) -> bool {
+        self.on_its_way.is_none() && self.driver.can_transmit()
+    }
+
+    /// Sends a reply to the device that asked.
+    pub(crate) fn reply(&mut self, to: u8, reply: &Reply) {
+        let sent = self.transmit_ser(to, reply);
+        self.reply_sent(sent);
+    }
+
+    /// Sends a force table to the device that asked.
+    pub(crate) fn reply_forces(&mut self, to: u8, table: ForceTable, inputs: Inputs) {
+        let data = forces(table, GlobalData { model: self.model, state: inputs });
+        let sent = self.transmit(to, FUNCTION_GENIUS, Subfunction::ReadIoForcesReply.code(), &data);
+        self.reply_sent(sent);
+    }
+
+    /// So many requests get no reply.
+    pub(crate) fn count_lost(&mut self, replies: usize) {
+        count(&mut self.diagnostics.replies_lost, replies as u64);
+    }
+
+    /// Whether a report may go now, or is to be waited with.
+    pub(crate) fn may_report(&self, now_ms: u32) -> bool {
+        self.reporter.may_send(now_ms)
+    }
+
+    /// Sends a report of events from `first` on.
+    pub(crate) fn report(&mut self, to: u8, first: u64, report: ReadReply) {
+        let entries = report.entries.len();
+        if self.transmit_ser(to, &Reply::Read(report)) {
+            self.reporter.sent(first, entries);
+            self.on_its_way = Some(OnItsWay::Report);
         }
     }
 
-    fn receive<S: Storage, R: Rtc>(
-        &mut self,
-        datagram: &ReceivedDatagram,
-        node: &mut Node<'_, S, R>,
-        now_ms: u32,
-    ) {
+    /// Nobody gets reports over the bus: the next one that is ever asked for need not wait.
+    pub(crate) fn forget_pause(&mut self) {
+        self.reporter.hurry();
+    }
+
+    fn receive(&mut self, datagram: &ReceivedDatagram, now_ms: u32) -> FromBus {
         const READ_IO_FORCES: u8 = Subfunction::ReadIoForces.code();
         match (datagram.function, datagram.subfunction) {
-            (FUNCTION_HORNER, SUBFUNCTION_SER) => self.receive_message(datagram, node, now_ms),
+            (FUNCTION_HORNER, SUBFUNCTION_SER) => self.receive_message(datagram, now_ms),
             (FUNCTION_GENIUS, READ_IO_FORCES) if !datagram.broadcast => {
                 let table = match *datagram.data {
                     [code] => ForceTable::from_code(code),
                     _ => None,
                 };
                 match table {
-                    Some(table) => self.reply(datagram.source, What::Forces(table)),
-                    None => count(&mut self.diagnostics.datagrams_ignored, 1),
+                    Some(table) => FromBus::ForcesAsked { device: datagram.source, table },
+                    None => self.ignore(),
                 }
             }
-            _ => count(&mut self.diagnostics.datagrams_ignored, 1),
+            _ => self.ignore(),
         }
     }
 
-    fn receive_message<S: Storage, R: Rtc>(
-        &mut self,
-        datagram: &ReceivedDatagram,
-        node: &mut Node<'_, S, R>,
-        now_ms: u32,
-    ) {
-        let message = Command::parse(&datagram.data);
+    fn ignore(&mut self) -> FromBus {
+        count(&mut self.diagnostics.datagrams_ignored, 1);
+        FromBus::DealtWith
+    }
+
+    fn receive_message(&mut self, datagram: &ReceivedDatagram, now_ms: u32) -> FromBus {
+        let command = Command::parse(&datagram.data);
         // The time that it brings was that of its arrival, and no other is known to be right.
-        if datagram.arrived_ms.is_none() && matches!(message, Ok(Command::SetClock(_))) {
+        if datagram.arrived_ms.is_none() && matches!(command, Ok(Command::SetClock(_))) {
             count(&mut self.diagnostics.clocks_refused, 1);
-            return;
+            return FromBus::DealtWith;
         }
-        if datagram.arrived_ms.is_none() && matches!(message, Ok(Command::SetMode { .. })) {
-            // Better late than never; but changes of that time have been judged by the mode of
-            // before.
-            count(&mut node.recorder.diagnostics.settings_late, 1);
-        }
-        let arrived_ms = datagram.arrived_ms.unwrap_or(now_ms);
-        if datagram.broadcast {
-            count(&mut self.diagnostics.broadcasts, message.is_ok().into());
-            node.genius_broadcast(message, arrived_ms);
-        } else if self.replies.is_full() {
-            count(&mut node.recorder.diagnostics.commands_overrun, 1);
-        } else if let Some(answer) = node.arrived(message, arrived_ms) {
-            self.reply(datagram.source, What::Answer(answer));
-        }
+        let way = if datagram.broadcast {
+            count(&mut self.diagnostics.broadcasts, command.is_ok().into());
+            Way::Broadcast
+        } else {
+            Way::Bus(datagram.source)
+        };
+        let tick_ms = datagram.arrived_ms.unwrap_or(now_ms);
+        FromBus::Arrived(Arrival { command, tick_ms, is_seen: datagram.arrived_ms.is_some(), way })
     }
 
-    fn reply(&mut self, to: u8, what: What) {
-        if self.replies.push_back(Waiting { to, what }).is_err() {
-            count(&mut self.diagnostics.replies_lost, 1);
-        }
-    }
-
-    fn sent<S: Storage, R: Rtc>(&mut self, arrived: bool, node: &mut Node<'_, S, R>, now_ms: u32) {
+    fn sent(&mut self, arrived: bool, now_ms: u32) -> FromBus {
         match self.on_its_way.take() {
             Some(OnItsWay::Reply) => count(&mut self.diagnostics.replies_lost, (!arrived).into()),
             Some(OnItsWay::Report) if arrived => {
                 count(&mut self.diagnostics.reports_sent, 1);
-                let turns_ms = self.turns_of_others_ms();
-                self.reporter.arrived(&mut node.recorder, now_ms, turns_ms);
+                let (first, entries) = self.reporter.arrived(now_ms, self.turns_of_others_ms());
+                return FromBus::Reported { first, entries };
             }
             Some(OnItsWay::Report) => {
                 count(&mut self.diagnostics.reports_failed, 1);
@@ -348,6 +269,7 @@ impl<W: SharedRam> GeniusPort<W> {
             }
             None => {}
         }
+        FromBus::DealtWith
     }
 
     /// How long it takes until each other device could have sent a datagram: a scan each, and what
@@ -357,34 +279,11 @@ impl<W: SharedRam> GeniusPort<W> {
         u32::from(scan_ms) * (self.others.count_ones() + 1)
     }
 
-    /// Replies go before reports: somebody waits for them.
-    fn send_next<S: Storage, R: Rtc>(&mut self, node: &mut Node<'_, S, R>, now_ms: u32) {
-        let max_entries = max_entries(node.recorder.model);
-        if let Some(Waiting { to, what }) = self.replies.pop_front() {
-            let sent = match what {
-                What::Answer(answer) => node
-                    .reply(answer, max_entries)
-                    .is_some_and(|reply| self.transmit_ser(to, &reply)),
-                What::Forces(table) => {
-                    let data =
-                        forces(table, GlobalData { model: self.model, state: node.inputs() });
-                    self.transmit(to, FUNCTION_GENIUS, Subfunction::ReadIoForcesReply.code(), &data)
-                }
-            };
-            if sent {
-                self.on_its_way = Some(OnItsWay::Reply);
-            } else {
-                count(&mut self.diagnostics.replies_lost, 1);
-            }
-            return;
-        }
-        let configuration = node.recorder.configuration;
-        if configuration.auto_report != AutoReport::Genius {
-            self.reporter.hurry();
-        } else if let Some(report) = self.reporter.next(&mut node.recorder, max_entries, now_ms)
-            && self.transmit_ser(configuration.report_address, &Reply::Read(report))
-        {
-            self.on_its_way = Some(OnItsWay::Report);
+    fn reply_sent(&mut self, sent: bool) {
+        if sent {
+            self.on_its_way = Some(OnItsWay::Reply);
+        } else {
+            self.count_lost(1);
         }
     }
 

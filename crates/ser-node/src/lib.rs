@@ -7,9 +7,12 @@
 //! 2. [`sequencer`]: the main loop puts changes in the order in which they began;
 //! 3. [`clock`]: ticks since power-up become date and time;
 //! 4. [`event_log`]: the ring of up to 2048 events;
-//! 5. [`node`]: serves the commands and decides what goes out;
-//! 6. [`serial_port`]: the bytes of the RS-232 line; [`genius_port`]: the datagrams of the Genius
+//! 5. `recorder`: owns all of that, serves the commands and says what is to go out;
+//! 6. `serial_port`: the bytes of the RS-232 line; [`genius_port`]: the datagrams of the Genius
 //!    bus, for boards that have one.
+//!
+//! A port knows no recorder: it makes an `arrival` of what came in, and bytes of what is to go out.
+//! [`Node`] carries from one to the other.
 //!
 //! Time and bytes are passed in; bytes come out. A board or the simulator calls [`Capture::sample`]
 //! every millisecond and [`Node::poll`] as often as it can. Nothing here blocks, allocates or
@@ -20,8 +23,10 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
 )]
 
+mod arrival;
 pub mod calendar;
 pub mod capture;
+mod changes;
 pub mod clock;
 pub mod debounce;
 pub mod diagnostics;
@@ -30,14 +35,18 @@ pub mod genius_port;
 mod history;
 pub mod liveness;
 pub mod node;
+mod owed;
 mod print_line;
+mod printer;
 mod recorder;
 pub mod ring;
 pub mod sequencer;
-pub mod serial_port;
+mod serial_port;
 pub mod settings;
 mod tick_counter;
 pub mod ticks;
+mod version;
+mod waiting;
 
 pub use capture::{Capture, CaptureChannel, CaptureReader};
 pub use clock::{NoRtc, Rtc};
@@ -46,7 +55,9 @@ pub use diagnostics::Diagnostics;
 pub use event_log::{Event, EventLog};
 pub use genius_port::{GeniusDiagnostics, GeniusOptions, GeniusPort};
 pub use liveness::Liveness;
-pub use node::{Node, NodeParts, VERSION};
+pub use node::Node;
+pub use recorder::NodeParts;
 pub use sequencer::HELD_BACK_MS;
 pub use settings::{CopyNumber, RECORD_LEN, Storage};
 pub use tick_counter::TickCounter;
+pub use version::VERSION;

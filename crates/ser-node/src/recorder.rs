@@ -1,77 +1,109 @@
 //! What the recorder knows and does, whichever port asks: log, clock, configuration, recording
-//! mode.
+//! mode, and the commands that wait to be answered.
+//!
+//! Commands are answered in the order in which they came. What nobody asked for (print jobs, auto
+//! report, auto print) goes out when no command is waiting, from the log itself.
 
 use chrono::NaiveDateTime;
+use ser_proto::genius::ForceTable;
 use ser_proto::{
-    Code, Command, Configuration, Configure, Entry, Inputs, LastBroadcast, MAX_ENTRIES, Mode,
-    Model, ParseError, ReadReply, Reply, TimeStamp,
+    AutoReport, Code, Command, Configuration, Configure, Entry, FrameError, Inputs, LastBroadcast,
+    MAX_ENTRIES, Mode, Model, ParseError, ReadReply, Reply, TimeStamp,
 };
 
+use crate::arrival::{Arrival, Way};
 use crate::calendar::date_time;
+use crate::capture::CaptureReader;
+use crate::changes::Changes;
 use crate::clock::{Clock, Rtc, to_time_stamp};
 use crate::diagnostics::{Diagnostics, count};
 use crate::event_log::{Event, EventLog};
 use crate::history::History;
-use crate::node::VERSION;
-use crate::sequencer::Change;
+use crate::owed::Owed;
+use crate::print_line::PrintLine;
+use crate::printer::Printer;
 use crate::settings::{Settings, Storage};
+use crate::ticks::Ticks;
+use crate::version::VERSION;
+use crate::waiting::{Pending, Request, Waiting};
 
-/// A command that has arrived and whose reply waits for its turn.
-///
-/// Where the moment of arrival matters, the command has been carried out; all others are carried
-/// out when their turn comes, so that a read is never answered from a log that a later command has
-/// erased already.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(crate) enum Answer {
-    /// Still to be carried out.
-    To(Command),
-    /// The clock was set on arrival.
-    ClockSet,
-    /// The mode was set, or asked for, on arrival.
-    Mode { recording: bool },
+/// What a recorder is made of.
+pub struct NodeParts<'a, S, R> {
+    /// Which recorder it is.
+    pub model: Model,
+    /// Memory of the event log: 2048 events for the full range of sizes.
+    pub log: &'a mut [Event],
+    /// The main loop's end of the capture channel.
+    pub capture: CaptureReader<'a>,
+    /// Where the configuration is kept.
+    pub storage: S,
+    /// The battery-backed clock, or [`NoRtc`](crate::NoRtc).
+    pub rtc: R,
 }
 
-/// The part of the node that all ports share.
+/// Everything but the ports.
 pub(crate) struct Recorder<'a, S, R> {
-    pub(crate) model: Model,
-    pub(crate) log: EventLog<'a>,
-    pub(crate) configuration: Configuration,
-    pub(crate) diagnostics: Diagnostics,
+    model: Model,
+    changes: Changes<'a>,
+    log: EventLog<'a>,
     clock: Clock,
     recording: History<bool>,
-    last_broadcast: Option<LastBroadcast>,
-    /// Sequence number of the next event to report, whichever port reports.
-    report_next: u64,
+    configuration: Configuration,
     settings: Settings<S>,
     rtc: R,
+    waiting: Waiting,
+    printer: Printer,
+    /// Events to report, whichever port reports.
+    to_report: Owed,
+    last_broadcast: Option<LastBroadcast>,
+    /// Commands that have arrived on any port, wrapping.
+    commands: u32,
+    diagnostics: Diagnostics,
 }
 
 impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
-    pub(crate) fn new(
-        model: Model,
-        log: &'a mut [Event],
-        storage: S,
-        mut rtc: R,
-        now_ms: u64,
-    ) -> Recorder<'a, S, R> {
+    /// Loads the configuration and reads the clock. Recording is on.
+    pub(crate) fn new(parts: NodeParts<'a, S, R>) -> Recorder<'a, S, R> {
+        let NodeParts { model, log, capture, storage, mut rtc } = parts;
+        let now_ms = Ticks::new().extend(capture.tick_ms());
         let (settings, mut configuration) = Settings::load(storage);
         let mut log = EventLog::new(log);
         log.resize(configuration.size);
         configuration.size = log.size();
-        let clock = Clock::new(now_ms, rtc.read());
         Recorder {
             model,
+            changes: Changes::new(capture, model.mask()),
             log,
-            configuration,
-            diagnostics: Diagnostics::default(),
-            clock,
+            clock: Clock::new(now_ms, rtc.read()),
             recording: History::new(true),
-            last_broadcast: None,
-            report_next: 0,
+            configuration,
             settings,
             rtc,
+            waiting: Waiting::new(),
+            printer: Printer::new(),
+            to_report: Owed::ALL,
+            last_broadcast: None,
+            commands: 0,
+            diagnostics: Diagnostics::default(),
         }
+    }
+
+    pub(crate) fn model(&self) -> Model {
+        self.model
+    }
+
+    pub(crate) fn configuration(&self) -> &Configuration {
+        &self.configuration
+    }
+
+    /// The tick of the latest sample.
+    pub(crate) fn tick_ms(&self) -> u32 {
+        self.changes.capture().tick_ms()
+    }
+
+    /// The inputs that are on now, whether or not events are recorded.
+    pub(crate) fn inputs(&self) -> Inputs {
+        Inputs(self.changes.capture().state())
     }
 
     /// Whether changes are recorded now.
@@ -79,57 +111,126 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         self.recording.latest()
     }
 
-    /// Puts a change into the log, if recording was on when it happened.
-    pub(crate) fn record(&mut self, change: Change) {
-        if self.recording.at_sample(change.tick_ms) {
-            let time_ms = self.clock.stamp_ms(change.tick_ms);
-            self.log.append(Event { time_ms, changed: change.changed, state: change.state });
+    /// Events recorded since power-up, erased ones included; wraps.
+    pub(crate) fn events(&self) -> u32 {
+        let [a, b, c, d, ..] = self.log.next_sequence().to_le_bytes();
+        u32::from_le_bytes([a, b, c, d])
+    }
+
+    /// Commands that have arrived, those included that were refused; wraps.
+    pub(crate) fn commands(&self) -> u32 {
+        self.commands
+    }
+
+    pub(crate) fn diagnostics(&self) -> Diagnostics {
+        let capture = self.changes.capture();
+        Diagnostics {
+            edges_lost: capture.edges_lost(),
+            samples_missed: capture.samples_missed(),
+            ..self.diagnostics
         }
     }
 
-    /// Takes a command that arrived at `tick_ms`, which may be a while before `now_ms`, and carries
-    /// it out if that moment matters.
-    pub(crate) fn arrived(&mut self, command: &Command, tick_ms: u64, now_ms: u64) -> Answer {
-        match *command {
-            Command::SetClock(time) => {
-                self.set_clock(time, tick_ms, now_ms);
-                Answer::ClockSet
+    /// A frame on the RS-232 line was given up.
+    pub(crate) fn count_frame_error(&mut self, error: FrameError) {
+        self.diagnostics.count_frame_error(error);
+    }
+
+    /// The UART lost or misread so many more bytes.
+    pub(crate) fn count_line_errors(&mut self, bytes: u32) {
+        count(&mut self.diagnostics.line_errors, bytes.into());
+    }
+
+    /// Records all changes up to the sample of `tick_ms`.
+    pub(crate) fn record_until(&mut self, tick_ms: u32) -> u64 {
+        let Recorder { changes, log, clock, recording, .. } = self;
+        let until_ms = changes.extend(tick_ms);
+        changes.take_until(until_ms, |change| {
+            if recording.at_sample(change.tick_ms) {
+                let time_ms = clock.stamp_ms(change.tick_ms);
+                log.append(Event { time_ms, changed: change.changed, state: change.state });
             }
-            Command::SetMode { recording } => {
-                self.recording.set(tick_ms, recording);
-                self.mode()
-            }
-            Command::QueryMode => self.mode(),
-            other => Answer::To(other),
+        });
+        until_ms
+    }
+
+    /// A datagram that arrived at this tick waits to be read: changes that come after it are
+    /// recorded when it has been, as it may set clock or mode.
+    pub(crate) fn hold_after(&mut self, arrived_ms: Option<u32>) {
+        self.changes.hold_after(arrived_ms);
+    }
+
+    /// Whether another command from this way finds room to wait for its turn.
+    pub(crate) fn has_room(&self, way: Way) -> bool {
+        self.waiting.has_room(way)
+    }
+
+    /// Takes a command. Clock and mode are set at once, by its tick; everything else is done when
+    /// the reply has its turn. What changed before is recorded first, by the clock and mode of that
+    /// time.
+    pub(crate) fn arrived(&mut self, arrival: &Arrival) {
+        let Arrival { command, tick_ms, is_seen, way } = *arrival;
+        if !is_seen && matches!(command, Ok(Command::SetMode { .. })) {
+            // Better late than never; but changes of that time have been judged by the mode of
+            // before.
+            count(&mut self.diagnostics.settings_late, 1);
+        }
+        // What came over the line and is no command is counted as that, room or no room.
+        let needs_room = command.is_ok() || way != Way::Line;
+        if needs_room && !self.waiting.has_room(way) {
+            count(&mut self.diagnostics.commands_overrun, 1);
+            return;
+        }
+        self.commands = self.commands.wrapping_add(1);
+        let tick_ms = self.record_until(tick_ms);
+        let pending = match command {
+            Ok(command) => Some(self.begin(&command, tick_ms)),
+            Err(error) => self.refuse(error),
+        };
+        if way == Way::Broadcast {
+            self.finish_broadcast(command.ok(), pending, tick_ms);
+        } else if let Some(pending) = pending
+            && !self.waiting.push(way, pending)
+        {
+            count(&mut self.diagnostics.commands_overrun, 1);
         }
     }
 
-    /// Counts a body that is no command; some are answered all the same, with what is in force.
-    pub(crate) fn refuse(&mut self, error: ParseError) -> Option<Answer> {
-        self.diagnostics.count_parse_error(error);
-        match error {
-            ParseError::BadValue { code, .. } => match Code::from_byte(code)? {
-                Code::Configure => Some(Answer::To(Command::QueryConfiguration)),
-                Code::Mode => Some(self.mode()),
-                _ => None,
-            },
-            _ => None,
+    /// A device on the bus asks for a force table. False when there is no room for its question.
+    pub(crate) fn forces_asked(&mut self, device: u8, table: ForceTable) -> bool {
+        self.waiting.push_forces(device, table)
+    }
+
+    /// The reply for the RS-232 line whose turn it is.
+    pub(crate) fn next_line_reply(&mut self) -> Option<Reply> {
+        while let Some(pending) = self.waiting.next_from_line() {
+            if let Some(reply) = self.reply(pending, MAX_ENTRIES) {
+                return Some(reply);
+            }
         }
+        None
+    }
+
+    /// The request from the bus whose turn it is, and the number of the device that asks.
+    pub(crate) fn next_bus_request(&mut self) -> Option<(u8, Request)> {
+        self.waiting.next_from_bus()
+    }
+
+    /// Forgets what waits for the bus; says how many requests it were.
+    pub(crate) fn forget_bus_requests(&mut self) -> usize {
+        self.waiting.forget_bus()
     }
 
     /// Carries out what is still to be done, and gives the reply, with at most `max_entries`
-    /// entries.
-    pub(crate) fn reply(&mut self, answer: Answer, max_entries: usize) -> Reply {
-        match answer {
-            Answer::ClockSet => Reply::ClockSet,
-            Answer::Mode { recording } => Reply::Mode(Mode { recording, version: VERSION }),
-            Answer::To(command) => match command {
+    /// entries; `None` when it is refused by silence.
+    pub(crate) fn reply(&mut self, pending: Pending, max_entries: usize) -> Option<Reply> {
+        Some(match pending {
+            Pending::ClockSet => Reply::ClockSet,
+            Pending::Mode { recording } => Reply::Mode(Mode { recording, version: VERSION }),
+            Pending::To(command) => match command {
                 Command::Configure(configure) => self.configure(&configure),
                 Command::Erase => self.erase(),
-                Command::Print { start, .. } => {
-                    self.count_refused(start == 0 || start > self.log.size());
-                    Reply::PrintAccepted
-                }
+                Command::Print { start, count } => return self.print(start, count),
                 Command::Read { start, count } => {
                     let count = usize::from(count);
                     self.count_refused(
@@ -143,7 +244,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
                 | Command::SetMode { .. }
                 | Command::SetClock(_) => Reply::Configuration(self.configuration),
             },
-        }
+        })
     }
 
     /// The entries from `start` on that exist, at most `count` and not around the end of the ring.
@@ -151,7 +252,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         let entries = (start..=self.log.len())
             .map_while(|number| self.log.entry(number))
             .take(count.min(MAX_ENTRIES))
-            .map(|event| self.entry(event))
+            .map(entry)
             .collect::<heapless::Vec<_, MAX_ENTRIES>>();
         ReadReply {
             start,
@@ -162,51 +263,105 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
+    /// The next line of a print job.
+    pub(crate) fn next_ordered_line(&mut self) -> Option<PrintLine> {
+        self.printer.next_ordered(&self.log)
+    }
+
+    /// The next auto report for the RS-232 line. There is nobody to acknowledge it.
+    pub(crate) fn next_line_report(&mut self) -> Option<Reply> {
+        if self.configuration.auto_report != AutoReport::Rs232 {
+            return None;
+        }
+        let (first, report) = self.report(MAX_ENTRIES)?;
+        self.reported(first, report.entries.len());
+        Some(Reply::Read(report))
+    }
+
+    /// The next line of auto print.
+    pub(crate) fn next_auto_line(&mut self) -> Option<PrintLine> {
+        let edges_lost = self.changes.capture().edges_lost();
+        if !self.configuration.auto_print {
+            self.printer.is_off(edges_lost);
+            return None;
+        }
+        self.printer.next_auto(&self.log, edges_lost, &mut self.diagnostics.events_unprinted)
+    }
+
     /// The oldest events that auto report owes to its receiver, and the sequence number of the
     /// first one.
     ///
     /// They stay owed until [`reported`](Self::reported); those that the ring has overwritten
     /// meanwhile are counted.
     pub(crate) fn report(&mut self, max_entries: usize) -> Option<(u64, ReadReply)> {
-        let overwritten = self.log.oldest_sequence().saturating_sub(self.report_next);
-        self.report_next += overwritten;
+        let overwritten = self.to_report.skip_overwritten(&self.log);
         count(&mut self.diagnostics.events_unreported, overwritten);
-        let start = self.log.entry_number(self.report_next)?;
+        let first = self.to_report.first();
+        let start = self.log.entry_number(first)?;
         // In a ring that has wrapped, the slots behind the newest event hold the oldest ones.
-        let owed =
-            usize::try_from(self.log.next_sequence() - self.report_next).unwrap_or(usize::MAX);
-        Some((self.report_next, self.read(start, owed.min(max_entries))))
+        let owed = usize::try_from(self.log.next_sequence() - first).unwrap_or(usize::MAX);
+        Some((first, self.read(start, owed.min(max_entries))))
     }
 
     /// So many events from `first` on have reached their receiver. Means nothing when others are
     /// owed by now.
     pub(crate) fn reported(&mut self, first: u64, entries: usize) {
-        if self.report_next == first {
-            self.report_next += entries as u64;
+        self.to_report.told(first, entries);
+    }
+
+    /// Carries a command out if the moment of its arrival matters.
+    fn begin(&mut self, command: &Command, tick_ms: u64) -> Pending {
+        match *command {
+            Command::SetClock(time) => {
+                self.count_late(tick_ms);
+                self.set_clock(time, tick_ms);
+                Pending::ClockSet
+            }
+            Command::SetMode { recording } => {
+                self.count_late(tick_ms);
+                self.recording.set(tick_ms, recording);
+                self.mode()
+            }
+            Command::QueryMode => self.mode(),
+            other => Pending::To(other),
         }
     }
 
-    /// A command came by broadcast and has been carried out.
-    ///
-    /// The time is that of reception by the clock as it is now: after a broadcast that set it, the
-    /// time that was set.
-    pub(crate) fn broadcast_received(&mut self, code: Code, tick_ms: u64) {
+    /// Counts a body that is no command; some are answered all the same, with what is in force.
+    fn refuse(&mut self, error: ParseError) -> Option<Pending> {
+        self.diagnostics.count_parse_error(error);
+        match error {
+            ParseError::BadValue { code, .. } => match Code::from_byte(code)? {
+                Code::Configure => Some(Pending::To(Command::QueryConfiguration)),
+                Code::Mode => Some(self.mode()),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// Carries out the rest of a command that was meant for all recorders. Reading and printing,
+    /// which are requests of one host to one recorder, have no effect.
+    fn finish_broadcast(
+        &mut self,
+        command: Option<Command>,
+        pending: Option<Pending>,
+        tick_ms: u64,
+    ) {
+        if let Some(pending @ Pending::To(Command::Configure(_) | Command::Erase)) = pending {
+            self.reply(pending, 0);
+        }
+        let Some(command) = command else { return };
+        // The time is that of reception by the clock as it is now: after a broadcast that set it,
+        // the time that was set.
         let time = to_time_stamp(self.clock.now_ms(tick_ms));
         self.last_broadcast = Some(LastBroadcast {
-            code: code.byte(),
+            code: command.code().byte(),
             hour: time.hour,
             minute: time.minute,
             second: time.second,
             millisecond: time.millisecond,
         });
-    }
-
-    fn entry(&self, event: &Event) -> Entry {
-        Entry {
-            changed: Inputs(event.changed),
-            state: Inputs(event.state),
-            time: to_time_stamp(event.time_ms),
-        }
     }
 
     fn configure(&mut self, configure: &Configure) -> Reply {
@@ -218,7 +373,10 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         self.log.resize(configuration.size);
         if configuration.auto_report != self.configuration.auto_report {
             // It begins with the next event when it is switched on, or over to the other port.
-            self.report_next = self.log.next_sequence();
+            self.to_report = Owed::none(&self.log);
+        }
+        if configuration.auto_print != self.configuration.auto_print {
+            self.printer.auto_print_changed(&self.log);
         }
         self.configuration = configuration;
         // Also when nothing changes: it may be in force and not stored, because storing failed.
@@ -231,24 +389,50 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
     fn erase(&mut self) -> Reply {
         self.log.erase();
         // Erased events are not owed to anybody.
-        self.report_next = self.log.next_sequence();
+        self.to_report = Owed::none(&self.log);
+        self.printer.erased(&self.log);
         Reply::Erased
     }
 
-    fn mode(&self) -> Answer {
-        Answer::Mode { recording: self.recording.latest() }
+    fn print(&mut self, start: u16, entries: u16) -> Option<Reply> {
+        if !self.printer.order(start, entries) {
+            count(&mut self.diagnostics.commands_overrun, 1);
+            return None;
+        }
+        self.count_refused(start == 0 || start > self.log.size());
+        Some(Reply::PrintAccepted)
+    }
+
+    fn mode(&self) -> Pending {
+        Pending::Mode { recording: self.recording.latest() }
+    }
+
+    /// Counts a setting that changes after its arrival did not find any more.
+    fn count_late(&mut self, tick_ms: u64) {
+        if self.changes.is_past(tick_ms) {
+            count(&mut self.diagnostics.settings_late, 1);
+        }
     }
 
     fn count_refused(&mut self, refused: bool) {
         count(&mut self.diagnostics.parameters_refused, u64::from(refused));
     }
 
-    fn set_clock(&mut self, time: TimeStamp, tick_ms: u64, now_ms: u64) {
+    fn set_clock(&mut self, time: TimeStamp, tick_ms: u64) {
         // The parser let no impossible date through.
         if let Ok(time) = NaiveDateTime::try_from(time) {
             self.clock.set(tick_ms, time);
             // The battery-backed clock starts from what it is given when it is given it.
+            let now_ms = self.changes.now_ms();
             self.rtc.write(date_time(self.clock.now_ms(now_ms)).unwrap_or(time));
         }
+    }
+}
+
+fn entry(event: &Event) -> Entry {
+    Entry {
+        changed: Inputs(event.changed),
+        state: Inputs(event.state),
+        time: to_time_stamp(event.time_ms),
     }
 }

@@ -15,12 +15,9 @@ use embedded_storage::nor_flash::{
     ErrorType, MultiwriteNorFlash, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase,
     check_read, check_write,
 };
-use ser_board::flash_log::{FlashHealth, FlashLog};
+use ser_board::flash_log::FlashHealth;
 
 use crate::external_bus;
-
-/// Both copies.
-pub(crate) type Configuration = FlashLog<'static, BenchFlash>;
 
 pub(crate) static HEALTH: FlashHealth = FlashHealth::new();
 

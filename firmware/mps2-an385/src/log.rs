@@ -1,8 +1,8 @@
 //! The log: defmt frames on UART 1.
 //!
 //! # Design
-//! Bytes are written by polling. No critical section guards the log, so that logging never delays
-//! the capture interrupt: whoever interrupts a record that is being written writes nothing.
+//! Bytes are written by polling, and no critical section guards the log: see
+//! `ser_board::log_writer`.
 //!
 //! # Tradeoffs
 //! Polling holds up the main loop by the length of a record (2 ms at most), which is why events are
@@ -13,12 +13,10 @@
 //! `ser-cli sim` writes the frames into a file; `cargo xtask log` turns them into text with the ELF
 //! file's help.
 
-use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicU32, Ordering};
-
 use crate::device::{self, base};
 use crate::mmio::Word;
 use crate::timer;
+use ser_board::log_writer::LogWriter;
 
 const BITS_PER_SECOND: u32 = 115_200;
 
@@ -48,30 +46,12 @@ defmt::timestamp!("{=u32:ms}", timer::tick_ms());
 #[defmt::global_logger]
 struct Logger;
 
-struct SharedEncoder(UnsafeCell<defmt::Encoder>);
+static LOG: LogWriter<defmt::Encoder> = LogWriter::new(defmt::Encoder::new());
 
-// SAFETY: touched only while `DEPTH` is 1, that is by the one whose `acquire` found 0. Contexts
-// nest: one that interrupts it has released the log again before it goes on.
-unsafe impl Sync for SharedEncoder {}
-
-static ENCODER: SharedEncoder = SharedEncoder(UnsafeCell::new(defmt::Encoder::new()));
-
-/// How many records are being written, one inside the other.
-static DEPTH: AtomicU32 = AtomicU32::new(0);
-
-fn with_encoder(step: impl FnOnce(&mut defmt::Encoder)) {
-    if DEPTH.load(Ordering::Relaxed) == 1 {
-        // SAFETY: see `SharedEncoder`.
-        step(unsafe { &mut *ENCODER.0.get() });
-    }
-}
-
-// SAFETY: `acquire` and `release` only count, which is safe from anywhere; see `SharedEncoder` for
-// the rest.
+// SAFETY: `acquire` and `release` may be called from anywhere: see `LogWriter`.
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
-        DEPTH.fetch_add(1, Ordering::Relaxed);
-        with_encoder(|encoder| encoder.start_frame(write_bytes));
+        LOG.acquire(write_bytes);
     }
 
     unsafe fn flush() {
@@ -79,12 +59,11 @@ unsafe impl defmt::Logger for Logger {
     }
 
     unsafe fn release() {
-        with_encoder(|encoder| encoder.end_frame(write_bytes));
-        DEPTH.fetch_sub(1, Ordering::Relaxed);
+        LOG.release(write_bytes);
     }
 
     unsafe fn write(bytes: &[u8]) {
-        with_encoder(|encoder| encoder.write(bytes, write_bytes));
+        LOG.write(bytes, write_bytes);
     }
 }
 

@@ -26,22 +26,19 @@ mod watchdog;
 
 #[rtic::app(device = crate::device, peripherals = false)]
 mod app {
-    use chrono::NaiveDate;
     use ser_board::budget;
-    use ser_board::clock_chip::ClockChip;
     use ser_board::health::Health;
     use ser_board::inputs::{Sample, Sampler};
     use ser_board::last_words::Boot;
-    use ser_board::leds::{self, Condition};
+    use ser_board::leds::Condition;
     use ser_board::main_loop;
     use ser_board::report::{self, Report};
+    use ser_board::start::{self, BoardNode, BoardParts, Memory};
     use ser_cortex_m::protection::{self, Region};
     use ser_cortex_m::stack;
-    use ser_node::{
-        Capture, CaptureChannel, Event, GeniusOptions, Liveness, Node, NodeParts, VERSION,
-    };
+    use ser_node::{Capture, GeniusOptions, Liveness, VERSION};
 
-    use crate::configuration::{self, BenchFlash, Configuration};
+    use crate::configuration::{self, BenchFlash};
     use crate::external_bus::{self, GeniBoard, Genius};
     use crate::inputs::{self, InputLatch};
     use crate::lamps::Lamps;
@@ -50,12 +47,6 @@ mod app {
     use crate::uart::{self, ReceiveInterrupt, Rings, SerialLine, TransmitInterrupt};
     use crate::watchdog::Watchdog;
     use crate::{fault, forced, log};
-
-    /// Events that the log holds: the largest size that can be configured.
-    const LOG_LEN: usize = 2048;
-
-    /// No clock can show an earlier day: there was no such recorder.
-    const NOT_BEFORE: NaiveDate = NaiveDate::from_ymd_opt(2026, 1, 1).unwrap();
 
     /// There is nothing below the stack, and nobody says so: QEMU swallows what is written there.
     const BELOW_STACK: Region = Region::nothing(0x1000_0000, 0x1000_0000);
@@ -67,8 +58,6 @@ mod app {
         assert!(budget::RECEIVE_PRIORITY == 2);
         assert!(budget::TRANSMIT_PRIORITY == 1);
     };
-
-    pub(crate) type BoardNode = Node<'static, Configuration, ClockChip<'static, BenchClock>>;
 
     static HEALTH: Health<'static> = Health {
         inputs: &inputs::HEALTH,
@@ -88,7 +77,7 @@ mod app {
         receive: ReceiveInterrupt,
         transmit: TransmitInterrupt,
         serial: SerialLine,
-        node: BoardNode,
+        node: BoardNode<'static, BenchFlash, BenchClock>,
         genius: Option<Genius>,
         lamps: Lamps,
         watchdog: Watchdog,
@@ -96,12 +85,11 @@ mod app {
     }
 
     #[init(local = [
-        channel: CaptureChannel = CaptureChannel::new(),
-        events: [Event; LOG_LEN] = [Event::EMPTY; LOG_LEN],
+        memory: Memory = Memory::new(),
         rings: Rings = Rings::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let init::LocalResources { channel, events, rings, .. } = cx.local;
+        let init::LocalResources { memory, rings, .. } = cx.local;
         log::start();
         // SAFETY: the program uses nothing in that region.
         unsafe { protection::enable(&cx.core.MPU, [BELOW_STACK]) };
@@ -111,18 +99,12 @@ mod app {
         let model = external_bus::model();
         log_start(&boot, count, model);
 
-        let (capture, reader) = channel.split(external_bus::debounce());
         // SAFETY: `init` runs once.
         let clock = unsafe { BenchClock::open() };
         // SAFETY: as above.
-        let memory = unsafe { BenchFlash::open() };
-        let node = Node::new(NodeParts {
-            model,
-            log: events,
-            capture: reader,
-            storage: Configuration::new(memory, &configuration::HEALTH),
-            rtc: ClockChip::new(clock, NOT_BEFORE, &rtc::HEALTH),
-        });
+        let flash = unsafe { BenchFlash::open() };
+        let parts = BoardParts { model, debounce: external_bus::debounce(), flash, clock };
+        let (capture, node) = start::start(memory, parts, &HEALTH);
         let (serial, receive, transmit) = uart::start(rings, node.baud());
         // SAFETY: as above.
         let genius = unsafe { GeniBoard::find() };
@@ -187,7 +169,11 @@ mod app {
         let mut report = Report::new(node.tick_ms(), &HEALTH);
         loop {
             let now_ms = main_loop::pass(node, serial, genius.as_mut());
-            lamps.show(now_ms, &condition(node, serial, genius.as_ref(), *was_fault));
+            let broken = HEALTH.is_broken();
+            lamps.show(
+                now_ms,
+                &Condition::of(node, serial.bytes(), genius.as_ref(), broken, *was_fault),
+            );
             if liveness.pass(now_ms) {
                 watchdog.feed(now_ms);
                 if fault::watchdog_fed() {
@@ -207,24 +193,6 @@ mod app {
             if !serial.has_received() {
                 cortex_m::asm::wfi();
             }
-        }
-    }
-
-    /// What the lamps are to tell.
-    fn condition(
-        node: &BoardNode,
-        serial: &SerialLine,
-        genius: Option<&Genius>,
-        was_fault: bool,
-    ) -> Condition {
-        let reports = genius.map_or(0, |genius| genius.diagnostics().reports_sent);
-        Condition {
-            recording: node.is_recording(),
-            events: node.events(),
-            messages: serial.bytes().wrapping_add(node.commands()).wrapping_add(reports),
-            broken: HEALTH.is_broken(),
-            reset_by_fault: was_fault,
-            lost: leds::has_lost(&node.diagnostics()),
         }
     }
 

@@ -17,11 +17,9 @@
 
 use cortex_m::peripheral::NVIC;
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
-use ser_board::main_loop::Line;
-use ser_board::ring::{Reader, Writer};
-use ser_board::serial_line::{
-    self, LineErrors, Quiet, ReceivedByte, Receiver, SerialEnds, SerialRings,
-};
+use ser_board::ring::Reader;
+use ser_board::serial_line::{Quiet, ReceivedByte, Receiver, SerialEnds, SerialRings};
+use ser_board::uart_line::{Uart, UartLine};
 use ser_proto::Baud;
 
 use crate::device::{self, Interrupt, base};
@@ -67,7 +65,7 @@ pub(crate) fn start(
         TRANSMIT_ENABLE | RECEIVE_ENABLE | TRANSMIT_INTERRUPT_ENABLE | RECEIVE_INTERRUPT_ENABLE,
     );
     (
-        SerialLine { received, errors, to_send, baud, quiet: Quiet::new(), bytes: 0 },
+        UartLine::new(Uart0 { baud, quiet: Quiet::new() }, received, errors, to_send),
         ReceiveInterrupt { receiver },
         TransmitInterrupt { transmitter },
     )
@@ -119,60 +117,33 @@ impl TransmitInterrupt {
 }
 
 /// The main loop's end.
-pub(crate) struct SerialLine {
-    received: Reader<'static, ReceivedByte, RECEIVE_RING_LEN>,
-    errors: LineErrors<'static>,
-    to_send: Writer<'static, u8, TRANSMIT_RING_LEN>,
+pub(crate) type SerialLine = UartLine<'static, Uart0, RECEIVE_RING_LEN, TRANSMIT_RING_LEN>;
+
+/// UART 0 as the main loop sees it.
+pub(crate) struct Uart0 {
     baud: Baud,
     quiet: Quiet,
-    bytes: u32,
 }
 
-impl SerialLine {
-    /// Whether bytes are waiting to be taken.
-    pub(crate) fn has_received(&self) -> bool {
-        !self.received.is_empty()
-    }
-
-    /// Bytes that have come and gone, wrapping.
-    pub(crate) fn bytes(&self) -> u32 {
-        self.bytes
-    }
-}
-
-impl Line for SerialLine {
-    const MAX_BYTES: usize = RECEIVE_RING_LEN;
-
-    fn receive(&mut self, now_ms: u32) -> Option<ReceivedByte> {
-        let received = serial_line::take_until(&mut self.received, now_ms);
-        if received.is_some() {
-            self.bytes = self.bytes.wrapping_add(1);
-        } else if !NVIC::is_enabled(Interrupt::UART0_RX) {
+impl Uart for Uart0 {
+    fn let_through(&mut self) {
+        if !NVIC::is_enabled(Interrupt::UART0_RX) {
             // SAFETY: the interrupt masked itself outside of any critical section, waiting for
             // this.
             unsafe { NVIC::unmask(Interrupt::UART0_RX) };
         }
-        received
     }
 
-    fn errors(&mut self) -> u32 {
-        self.errors.take()
-    }
-
-    fn can_send(&self) -> bool {
-        self.to_send.has_room()
-    }
-
-    fn send(&mut self, byte: u8) {
-        self.bytes = self.bytes.wrapping_add(1);
+    fn will_send(&mut self) {
         self.quiet.sent();
-        // There is room, the main loop has asked.
-        let _ = self.to_send.push(byte);
+    }
+
+    fn wake_transmitter(&mut self) {
         NVIC::pend(Interrupt::UART0_TX);
     }
 
-    fn is_quiet(&mut self, now_ms: u32) -> bool {
-        let idle = self.to_send.is_empty() && STATE.read() & TRANSMIT_FULL == 0;
+    fn is_quiet(&mut self, ring_empty: bool, now_ms: u32) -> bool {
+        let idle = ring_empty && STATE.read() & TRANSMIT_FULL == 0;
         self.quiet.look(idle, now_ms, self.baud)
     }
 

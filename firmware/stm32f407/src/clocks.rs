@@ -45,6 +45,9 @@ pub(crate) const HCLK_HZ: u32 =
     CRYSTAL_HZ / CRYSTAL_DIVIDER as u32 * MULTIPLIER as u32 / OUTPUT_DIVIDER;
 /// Clock of the serial line.
 pub(crate) const PCLK1_HZ: u32 = HCLK_HZ / PCLK1_DIVIDER;
+/// Clock of SPI1.
+#[cfg(feature = "serialiser")]
+pub(crate) const PCLK2_HZ: u32 = HCLK_HZ / 2;
 /// Clock of the timers: twice that of their bus, which is divided.
 pub(crate) const TIMER_HZ: u32 = 2 * PCLK1_HZ;
 

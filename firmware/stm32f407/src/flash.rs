@@ -18,7 +18,7 @@ use embedded_storage::nor_flash::{
     ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
     check_erase, check_read, check_write,
 };
-use ser_board::flash_log::{FlashHealth, FlashLog};
+use ser_board::flash_log::FlashHealth;
 use ser_node::Liveness;
 use stm32f4::stm32f407::FLASH;
 
@@ -74,9 +74,6 @@ impl NorFlashError for FlashError {
         }
     }
 }
-
-/// Both copies, one in each sector.
-pub(crate) type Configuration = FlashLog<'static, ConfigurationFlash>;
 
 /// Both sectors as one memory.
 pub(crate) struct ConfigurationFlash {

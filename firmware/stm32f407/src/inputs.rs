@@ -3,8 +3,12 @@
 use core::convert::Infallible;
 
 use ser_board::inputs::{InputPorts, Wiring, join};
+use ser_board::serialiser::SerialiserHealth;
 use ser_proto::Model;
 use stm32f4::stm32f407::{GPIOB, GPIOC, GPIOG};
+
+/// There is no chain of serialisers.
+pub(crate) const SERIALISERS: Option<&'static SerialiserHealth> = None;
 
 /// How contacts are wired for a model: an optocoupler pulls its pin low while current flows.
 pub(crate) const fn wiring(model: Model) -> Wiring {

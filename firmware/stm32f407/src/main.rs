@@ -23,6 +23,10 @@ mod clocks;
 mod fault;
 mod flash;
 mod geni_bus;
+#[cfg(not(feature = "serialiser"))]
+mod inputs;
+#[cfg(feature = "serialiser")]
+#[path = "serialisers.rs"]
 mod inputs;
 mod lamps;
 mod log;
@@ -38,22 +42,19 @@ mod watchdog;
 
 #[rtic::app(device = stm32f4::stm32f407, peripherals = true)]
 mod app {
-    use chrono::NaiveDate;
     use ser_board::budget;
-    use ser_board::clock_chip::ClockChip;
     use ser_board::health::Health;
     use ser_board::inputs::{InputHealth, Sample, Sampler};
     use ser_board::last_words::Boot;
-    use ser_board::leds::{self, Condition};
+    use ser_board::leds::Condition;
     use ser_board::main_loop;
     use ser_board::report::{self, Report};
+    use ser_board::start::{self, BoardNode, BoardParts, Memory};
     use ser_cortex_m::{last_words, stack};
-    use ser_node::{
-        Capture, CaptureChannel, Event, GeniusOptions, Liveness, Node, NodeParts, VERSION,
-    };
+    use ser_node::{Capture, GeniusOptions, Liveness, VERSION};
 
     use crate::clocks::{self, Source};
-    use crate::flash::{self, Configuration, ConfigurationFlash};
+    use crate::flash::{self, ConfigurationFlash};
     use crate::geni_bus::{GeniBoard, Genius, InterruptLine, Pulses};
     use crate::inputs::{self, InputPins};
     use crate::lamps::Lamps;
@@ -64,12 +65,6 @@ mod app {
     use crate::watchdog::Watchdog;
     use crate::{boot, log, pins, protection, reset};
 
-    /// Events that the log holds: the largest size that can be configured.
-    const LOG_LEN: usize = 2048;
-
-    /// No clock can show an earlier day: there was no such recorder.
-    const NOT_BEFORE: NaiveDate = NaiveDate::from_ymd_opt(2026, 1, 1).unwrap();
-
     // RTIC takes nothing but literals for priorities; `crates/ser-board/tests/priorities.rs` sees
     // that the tasks have these.
     const _: () = {
@@ -77,8 +72,6 @@ mod app {
         assert!(budget::RECEIVE_PRIORITY == 2);
         assert!(budget::EXTERNAL_BUS_PRIORITY == 1);
     };
-
-    pub(crate) type BoardNode = Node<'static, Configuration, ClockChip<'static, ChipClock>>;
 
     #[shared]
     struct Shared {}
@@ -91,7 +84,7 @@ mod app {
         serial_interrupt: SerialInterrupt,
         geni_line: InterruptLine,
         serial: SerialLine,
-        node: BoardNode,
+        node: BoardNode<'static, ConfigurationFlash, ChipClock>,
         genius: Option<Genius>,
         lamps: Lamps,
         watchdog: Watchdog,
@@ -108,20 +101,19 @@ mod app {
 
     static HEALTH: Health<'static> = Health {
         inputs: &INPUT_HEALTH,
-        serialisers: None,
+        serialisers: inputs::SERIALISERS,
         clock: &rtc::HEALTH,
         storage: &flash::HEALTH,
     };
 
     #[init(local = [
-        channel: CaptureChannel = CaptureChannel::new(),
-        events: [Event; LOG_LEN] = [Event::EMPTY; LOG_LEN],
+        memory: Memory = Memory::new(),
         rings: Rings = Rings::new(),
         pulses: Pulses = Pulses::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         boot::use_vectors_in_ram(&cx.core.SCB);
-        let init::LocalResources { channel, events, rings, pulses, .. } = cx.local;
+        let init::LocalResources { memory, rings, pulses, .. } = cx.local;
         let device = cx.device;
         let ports = pins::Ports {
             a: device.GPIOA,
@@ -144,18 +136,13 @@ mod app {
         defmt::info!("version {=u8}, {}, start {=u32}: {}", VERSION, model, boot.count, boot.cause);
         log_start(&boot, clock_source, reset::guards_brown_out(&device.FLASH));
 
-        let (capture, reader) = channel.split(straps.debounce());
-        let clock = ChipClock::start(&device.RCC, &device.PWR, device.RTC);
-        let node = Node::new(NodeParts {
+        let parts = BoardParts {
             model,
-            log: events,
-            capture: reader,
-            storage: Configuration::new(
-                ConfigurationFlash::new(device.FLASH, watchdog),
-                &flash::HEALTH,
-            ),
-            rtc: ClockChip::new(clock, NOT_BEFORE, &rtc::HEALTH),
-        });
+            debounce: straps.debounce(),
+            flash: ConfigurationFlash::new(device.FLASH, watchdog),
+            clock: ChipClock::start(&device.RCC, &device.PWR, device.RTC),
+        };
+        let (capture, node) = start::start(memory, parts, &HEALTH);
         let (serial, serial_interrupt) =
             uart::start(&device.RCC, device.USART2, rings, node.baud());
         let (pulsed, pulses) = pulses.split();
@@ -168,7 +155,10 @@ mod app {
         };
         let genius =
             genius.map(|(board, window)| Genius::new(board, window, GeniusOptions::new(model)));
+        #[cfg(not(feature = "serialiser"))]
         let contacts = InputPins { low: ports.b, middle: ports.c, high: ports.g };
+        #[cfg(feature = "serialiser")]
+        let contacts = InputPins::start(&device.RCC, device.SPI1, ports.a, model);
         let sampler = Sampler::new(contacts, inputs::wiring(model), &INPUT_HEALTH);
         let timer = Timer::start(&device.RCC, device.TIM2, device.TIM3);
         (
@@ -231,7 +221,11 @@ mod app {
         let mut report = Report::new(node.tick_ms(), &HEALTH);
         loop {
             let now_ms = main_loop::pass(node, serial, genius.as_mut());
-            lamps.show(now_ms, &condition(node, serial, genius.as_ref(), start));
+            let broken = start.clock_source != Source::Crystal || HEALTH.is_broken();
+            lamps.show(
+                now_ms,
+                &Condition::of(node, serial.bytes(), genius.as_ref(), broken, start.was_fault),
+            );
             if liveness.pass(now_ms) {
                 watchdog.feed();
             }
@@ -244,24 +238,6 @@ mod app {
             if !serial.has_received() {
                 cortex_m::asm::wfi();
             }
-        }
-    }
-
-    /// What the lamps are to tell.
-    fn condition(
-        node: &BoardNode,
-        serial: &SerialLine,
-        genius: Option<&Genius>,
-        start: &Start,
-    ) -> Condition {
-        let reports = genius.map_or(0, |genius| genius.diagnostics().reports_sent);
-        Condition {
-            recording: node.is_recording(),
-            events: node.events(),
-            messages: serial.bytes().wrapping_add(node.commands()).wrapping_add(reports),
-            broken: start.clock_source != Source::Crystal || HEALTH.is_broken(),
-            reset_by_fault: start.was_fault,
-            lost: leds::has_lost(&node.diagnostics()),
         }
     }
 }

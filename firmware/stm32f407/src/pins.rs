@@ -72,16 +72,27 @@ struct Assignment {
 
 /// Alternate function of the external bus.
 const FSMC: u8 = 12;
+/// Alternate function of SPI 1 and 2.
+#[cfg(feature = "serialiser")]
+const SPI: u8 = 5;
 /// Alternate function of serial ports 1–3.
 const USART: u8 = 7;
 
-const ASSIGNMENTS: [Assignment; 16] = [
+const ASSIGNMENTS: &[Assignment] = &[
     // Inputs 1–16.
+    #[cfg(not(feature = "serialiser"))]
     assign(Port::B, range(0, 15), Role::Input),
     // Inputs 17–24.
+    #[cfg(not(feature = "serialiser"))]
     assign(Port::C, range(0, 7), Role::Input),
     // Inputs 25–32.
+    #[cfg(not(feature = "serialiser"))]
     assign(Port::G, range(8, 15), Role::Input),
+    // Chip select, and clock, data in and data out of SPI1.
+    #[cfg(feature = "serialiser")]
+    assign(Port::A, pin(SERIALISER_SELECT), Role::Output),
+    #[cfg(feature = "serialiser")]
+    assign(Port::A, range(5, 7), Role::Alternate(SPI)),
     // Transmit and receive data of RS-232: USART2.
     assign(Port::A, pin(2), Role::Alternate(USART)),
     assign(Port::A, pin(3), Role::PulledAlternate(USART)),
@@ -107,6 +118,10 @@ const ASSIGNMENTS: [Assignment; 16] = [
     // Straps: see `straps`.
     assign(Port::E, range(0, 3), Role::PulledInput),
 ];
+
+/// Number of the serialisers' chip select on port A.
+#[cfg(feature = "serialiser")]
+pub(crate) const SERIALISER_SELECT: u8 = 4;
 
 /// Number of the GENI board's reset line on port G.
 pub(crate) const GENI_RESET: u8 = 4;

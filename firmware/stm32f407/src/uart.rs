@@ -11,11 +11,9 @@
 //! knows; both are counted as line errors.
 
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
-use ser_board::main_loop::Line;
-use ser_board::serial_line::{
-    self, LineErrors, ReceiveStatus, ReceivedByte, Receiver, SerialEnds, SerialRings,
-};
-use ser_node::ring::{Reader, Writer};
+use ser_board::ring::Reader;
+use ser_board::serial_line::{ReceiveStatus, Receiver, SerialEnds, SerialRings};
+use ser_board::uart_line::{Uart, UartLine};
 use ser_proto::Baud;
 use stm32f4::stm32f407::{RCC, USART2};
 
@@ -37,10 +35,10 @@ pub(crate) fn start(
     uart.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
     let SerialEnds { receiver, received, errors, to_send, transmitter } = rings.split();
     // SAFETY: the two ends share the registers. The interrupt alone touches the data register, the
-    // main loop alone the divider; for the one bit that both change see `SerialLine::send`.
+    // main loop alone the divider; for the one bit that both change see `Usart2::wake_transmitter`.
     let shared = unsafe { USART2::steal() };
     (
-        SerialLine { uart: shared, received, errors, to_send, bytes: 0 },
+        UartLine::new(Usart2(shared), received, errors, to_send),
         SerialInterrupt { uart, receiver, transmitter },
     )
 }
@@ -89,58 +87,29 @@ impl SerialInterrupt {
 }
 
 /// The main loop's end.
-pub(crate) struct SerialLine {
-    uart: USART2,
-    received: Reader<'static, ReceivedByte, RECEIVE_RING_LEN>,
-    errors: LineErrors<'static>,
-    to_send: Writer<'static, u8, TRANSMIT_RING_LEN>,
-    bytes: u32,
-}
+pub(crate) type SerialLine = UartLine<'static, Usart2, RECEIVE_RING_LEN, TRANSMIT_RING_LEN>;
 
-impl SerialLine {
-    /// Whether bytes are waiting to be taken.
-    pub(crate) fn has_received(&self) -> bool {
-        !self.received.is_empty()
-    }
+/// USART 2 as the main loop sees it.
+pub(crate) struct Usart2(USART2);
 
-    /// Bytes that have come and gone, wrapping.
-    pub(crate) fn bytes(&self) -> u32 {
-        self.bytes
-    }
-}
+impl Uart for Usart2 {
+    /// What finds no room is lost: nothing is held back.
+    fn let_through(&mut self) {}
 
-impl Line for SerialLine {
-    const MAX_BYTES: usize = RECEIVE_RING_LEN;
+    fn will_send(&mut self) {}
 
-    fn receive(&mut self, now_ms: u32) -> Option<ReceivedByte> {
-        let received = serial_line::take_until(&mut self.received, now_ms);
-        self.bytes = self.bytes.wrapping_add(u32::from(received.is_some()));
-        received
-    }
-
-    fn errors(&mut self) -> u32 {
-        self.errors.take()
-    }
-
-    fn can_send(&self) -> bool {
-        self.to_send.has_room()
-    }
-
-    fn send(&mut self, byte: u8) {
-        self.bytes = self.bytes.wrapping_add(1);
-        // There is room, the main loop has asked.
-        let _ = self.to_send.push(byte);
+    fn wake_transmitter(&mut self) {
         // The interrupt may clear this bit between reading and writing, because it has found the
         // ring empty just before. Then it is set here, where it belongs; nothing else in the
         // register ever changes.
-        self.uart.cr1().modify(|_, w| w.txeie().set_bit());
+        self.0.cr1().modify(|_, w| w.txeie().set_bit());
     }
 
-    fn is_quiet(&mut self, _now_ms: u32) -> bool {
-        self.to_send.is_empty() && self.uart.sr().read().tc().bit_is_set()
+    fn is_quiet(&mut self, ring_empty: bool, _now_ms: u32) -> bool {
+        ring_empty && self.0.sr().read().tc().bit_is_set()
     }
 
     fn set_baud(&mut self, baud: Baud) {
-        set_divider(&self.uart, baud);
+        set_divider(&self.0, baud);
     }
 }

@@ -10,6 +10,7 @@ use std::rc::Rc;
 use embedded_storage::nor_flash::{
     ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
+use oorandom::Rand64;
 
 /// Steps of an erase: cells lose their contents little by little.
 const ERASE_STEPS: usize = 8;
@@ -28,7 +29,7 @@ struct Cells {
     /// Steps until the power fails; `None` when it does not.
     power: Option<u64>,
     steps: u64,
-    noise: u64,
+    noise: Rand64,
 }
 
 /// The power has failed.
@@ -49,7 +50,7 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
             weak: vec![false; sectors],
             power: None,
             steps: 0,
-            noise: 0x9E37_79B9_7F4A_7C15,
+            noise: Rand64::new(0),
         })))
     }
 
@@ -76,7 +77,7 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         let mut cells = self.0.borrow_mut();
         cells.sow(seed);
         for at in 0..cells.bytes.len() {
-            cells.bytes[at] = cells.noise().to_le_bytes()[0];
+            cells.bytes[at] = cells.noise();
         }
     }
 
@@ -94,14 +95,12 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
 impl Cells {
     /// Makes what is left to chance depend on `seed`, and on nothing else.
     fn sow(&mut self, seed: u64) {
-        self.noise = (seed + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        self.noise = Rand64::new(seed.into());
     }
 
-    fn noise(&mut self) -> u64 {
-        self.noise ^= self.noise << 13;
-        self.noise ^= self.noise >> 7;
-        self.noise ^= self.noise << 17;
-        self.noise
+    fn noise(&mut self) -> u8 {
+        let [byte, ..] = self.noise.rand_u64().to_le_bytes();
+        byte
     }
 
     /// Whether there is power for another step.
@@ -132,7 +131,7 @@ impl Cells {
             return Ok(());
         }
         // Some of the bits that were to become 0 have.
-        self.bytes[at] = old & (new | self.noise().to_le_bytes()[0]);
+        self.bytes[at] = old & (new | self.noise());
         Err(PowerCut)
     }
 
@@ -143,11 +142,7 @@ impl Cells {
                 return Err(PowerCut);
             }
             for at in from..to {
-                let risen = if step == ERASE_STEPS {
-                    0xFF
-                } else {
-                    self.noise().to_le_bytes()[0] & self.noise().to_le_bytes()[0]
-                };
+                let risen = if step == ERASE_STEPS { 0xFF } else { self.noise() & self.noise() };
                 self.bytes[at] |= risen;
             }
         }

@@ -1,11 +1,5 @@
 //! Auto reports over Genius: which events are on their way, and when the next ones may go.
 
-use ser_proto::ReadReply;
-
-use crate::clock::Rtc;
-use crate::recorder::Recorder;
-use crate::settings::Storage;
-
 /// Pause after the first report that did not arrive; it doubles with each further one.
 const FIRST_PAUSE_MS: u32 = 20;
 
@@ -37,31 +31,22 @@ impl Reporter {
         Reporter { first: 0, entries: 0, pause: None, failures: 0 }
     }
 
-    /// The next report, unless it is to be waited with, or there is none.
-    pub(super) fn next<S: Storage, R: Rtc>(
-        &mut self,
-        recorder: &mut Recorder<'_, S, R>,
-        max_entries: usize,
-        now_ms: u32,
-    ) -> Option<ReadReply> {
-        if self.pause.is_some_and(|pause| now_ms.wrapping_sub(pause.since_ms) < pause.ms) {
-            return None;
-        }
-        let (first, report) = recorder.report(max_entries)?;
-        (self.first, self.entries) = (first, report.entries.len());
-        Some(report)
+    /// Whether the next report may go, or is to be waited with.
+    pub(super) fn may_send(&self, now_ms: u32) -> bool {
+        self.pause.is_none_or(|pause| now_ms.wrapping_sub(pause.since_ms) >= pause.ms)
     }
 
-    /// The report has arrived. The next one waits for `turns_ms`, so that others have their turns.
-    pub(super) fn arrived<S: Storage, R: Rtc>(
-        &mut self,
-        recorder: &mut Recorder<'_, S, R>,
-        now_ms: u32,
-        turns_ms: u32,
-    ) {
-        recorder.reported(self.first, self.entries);
+    /// A report of so many events from `first` on has been sent.
+    pub(super) fn sent(&mut self, first: u64, entries: usize) {
+        (self.first, self.entries) = (first, entries);
+    }
+
+    /// The report has arrived; gives its first event and how many it has. The next one waits for
+    /// `turns_ms`, so that others have their turns.
+    pub(super) fn arrived(&mut self, now_ms: u32, turns_ms: u32) -> (u64, usize) {
         self.failures = 0;
         self.pause = Some(Pause { since_ms: now_ms, ms: turns_ms });
+        (self.first, self.entries)
     }
 
     /// The report has not arrived, as far as one knows. Its events stay owed.

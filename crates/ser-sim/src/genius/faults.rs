@@ -1,7 +1,7 @@
 //! What goes wrong, at random or when told: always the same way for the same seed.
 
 use super::device_id::DeviceId;
-use super::split_mix::SplitMix64;
+use oorandom::Rand64;
 
 /// How often messages suffer, in millionths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,13 +77,13 @@ pub enum DeviceFault {
 #[derive(Debug)]
 pub(super) struct Accidents {
     noise: Noise,
-    numbers: SplitMix64,
+    numbers: Rand64,
     damage: u32,
 }
 
 impl Accidents {
     pub(super) fn new(noise: Noise) -> Accidents {
-        Accidents { noise, numbers: SplitMix64::new(noise.seed), damage: 0 }
+        Accidents { noise, numbers: Rand64::new(noise.seed.into()), damage: 0 }
     }
 
     pub(super) fn damage(&mut self, messages: u32) {
@@ -95,14 +95,19 @@ impl Accidents {
             self.damage -= 1;
             return true;
         }
-        self.numbers.happens(self.noise.damaged_ppm)
+        self.happens(self.noise.damaged_ppm)
     }
 
     pub(super) fn lost(&mut self) -> bool {
-        self.numbers.happens(self.noise.lost_ppm)
+        self.happens(self.noise.lost_ppm)
     }
 
     pub(super) fn unacknowledged(&mut self) -> bool {
-        self.numbers.happens(self.noise.unacknowledged_ppm)
+        self.happens(self.noise.unacknowledged_ppm)
+    }
+
+    /// True this many times in a million. Draws nothing when that is never.
+    fn happens(&mut self, per_million: u32) -> bool {
+        per_million > 0 && self.numbers.rand_range(0..1_000_000) < u64::from(per_million)
     }
 }

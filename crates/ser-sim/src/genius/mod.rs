@@ -32,7 +32,6 @@ mod identity;
 mod map;
 mod outbox;
 mod scan_time;
-mod split_mix;
 mod station;
 #[cfg(test)]
 mod tests;
@@ -51,5 +50,4 @@ pub use faults::{DeviceFault, Fault, Noise};
 pub use identity::{BlockKind, Identity};
 pub use map::RAM_LEN;
 pub use scan_time::{BusTiming, MIN_SCAN_NS};
-pub use split_mix::SplitMix64;
 pub use window::{BoardWindow, tick_ms};

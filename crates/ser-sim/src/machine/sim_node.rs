@@ -301,7 +301,7 @@ impl<'a> SimNode<'a> {
 
     /// Lets a Genius port of the node work in the present millisecond: once in each that passes.
     pub fn serve<W: SharedRam>(&mut self, port: &mut GeniusPort<W>) {
-        port.poll(&mut self.node);
+        self.node.genius_poll(port);
         self.pump();
     }
 
@@ -309,7 +309,7 @@ impl<'a> SimNode<'a> {
     /// passes on.
     pub fn interrupt<W: SharedRam>(&mut self, port: &mut GeniusPort<W>, at_ms: u64) {
         let tick = self.tick_at(at_ms);
-        port.interrupt(&mut self.node, tick);
+        self.node.genius_interrupt(port, tick);
     }
 
     /// Bytes arrive on the node's line in the present millisecond.

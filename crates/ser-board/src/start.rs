@@ -1,0 +1,68 @@
+//! What every board's recorder is made of, once its chip is up.
+
+use chrono::NaiveDate;
+use embedded_storage::nor_flash::MultiwriteNorFlash;
+use ser_node::{Capture, CaptureChannel, Debounce, Event, Node, NodeParts};
+use ser_proto::Model;
+
+use crate::clock_chip::{ClockChip, KeepsTime};
+use crate::flash_log::FlashLog;
+use crate::health::Health;
+
+/// Events that the log holds: the largest size that can be configured.
+pub const LOG_LEN: usize = 2048;
+
+/// No clock can show an earlier day: there was no such recorder.
+pub const NOT_BEFORE: NaiveDate = NaiveDate::from_ymd_opt(2026, 1, 1).unwrap();
+
+/// A node whose configuration is in flash memory `F` and whose clock is the chip `C`.
+pub type BoardNode<'a, F, C> = Node<'a, FlashLog<'a, F>, ClockChip<'a, C>>;
+
+/// What a recorder keeps in RAM; belongs into a static.
+pub struct Memory {
+    channel: CaptureChannel,
+    events: [Event; LOG_LEN],
+}
+
+impl Memory {
+    /// As it is when the power comes.
+    #[must_use]
+    pub const fn new() -> Memory {
+        Memory { channel: CaptureChannel::new(), events: [Event::EMPTY; LOG_LEN] }
+    }
+}
+
+impl Default for Memory {
+    fn default() -> Memory {
+        Memory::new()
+    }
+}
+
+/// What a board has that differs from board to board.
+pub struct BoardParts<F, C> {
+    /// Which recorder it is.
+    pub model: Model,
+    /// Debounce times of its inputs.
+    pub debounce: Debounce,
+    /// The flash memory of the configuration.
+    pub flash: F,
+    /// The battery-backed clock.
+    pub clock: C,
+}
+
+/// Powers a recorder up; gives the capture interrupt's end and the main loop's.
+pub fn start<'a, F: MultiwriteNorFlash, C: KeepsTime>(
+    memory: &'a mut Memory,
+    parts: BoardParts<F, C>,
+    health: &Health<'a>,
+) -> (Capture<'a>, BoardNode<'a, F, C>) {
+    let (capture, reader) = memory.channel.split(parts.debounce);
+    let node = Node::new(NodeParts {
+        model: parts.model,
+        log: &mut memory.events,
+        capture: reader,
+        storage: FlashLog::new(parts.flash, health.storage),
+        rtc: ClockChip::new(parts.clock, NOT_BEFORE, health.clock),
+    });
+    (capture, node)
+}

@@ -1,0 +1,26 @@
+//! A command as a port hands it to the recorder: what it says, when it arrived, and the way back.
+
+use ser_proto::{Command, ParseError};
+
+/// The way on which a command came, and on which its reply goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) enum Way {
+    /// The RS-232 line.
+    Line,
+    /// The Genius bus, from the device of this number.
+    Bus(u8),
+    /// The Genius bus, to all recorders. Nobody is answered.
+    Broadcast,
+}
+
+/// A command, or what was sent as one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) struct Arrival {
+    pub(crate) command: Result<Command, ParseError>,
+    /// The tick of arrival, or of reading where nobody saw it arrive.
+    pub(crate) tick_ms: u32,
+    pub(crate) is_seen: bool,
+    pub(crate) way: Way,
+}

@@ -1,0 +1,14 @@
+//! The firmware version as a recorder tells it.
+
+/// Firmware version as the `M` reply has it, in hundredths: 0.1.0 is 10, 1.2.3 is 123.
+pub const VERSION: u8 = 100 * digit(env!("CARGO_PKG_VERSION_MAJOR"))
+    + 10 * digit(env!("CARGO_PKG_VERSION_MINOR"))
+    + digit(env!("CARGO_PKG_VERSION_PATCH"));
+
+#[expect(clippy::panic, reason = "evaluated by the compiler only")]
+const fn digit(text: &str) -> u8 {
+    match text.as_bytes() {
+        [digit @ b'0'..=b'9'] => *digit - b'0',
+        _ => panic!("the version byte has room for one digit per part of the version"),
+    }
+}

@@ -1,0 +1,89 @@
+//! Requests that have arrived and whose replies wait for their turn, in the order in which they
+//! came.
+
+use heapless::Deque;
+use ser_proto::Command;
+use ser_proto::genius::ForceTable;
+
+use crate::arrival::Way;
+
+/// Requests that may wait on each way while a message is being sent. A GENI board itself holds no
+/// more than 15 commands.
+const MAX_WAITING: usize = 16;
+
+/// A command that has arrived and whose reply waits for its turn.
+///
+/// Where the moment of arrival matters, the command has been carried out. All others are carried
+/// out when their turn comes, so that a read is never answered from a log that a later command has
+/// erased already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) enum Pending {
+    /// Still to be carried out.
+    To(Command),
+    /// The clock was set on arrival.
+    ClockSet,
+    /// The mode was set, or asked for, on arrival.
+    Mode { recording: bool },
+}
+
+/// What a device on the bus asks for. The content is looked up when the reply goes out, so that it
+/// is true then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Request {
+    Command(Pending),
+    Forces(ForceTable),
+}
+
+/// Requests by the way on which they came.
+pub(crate) struct Waiting {
+    line: Deque<Pending, MAX_WAITING>,
+    /// With the number of the device that asks.
+    bus: Deque<(u8, Request), MAX_WAITING>,
+}
+
+impl Waiting {
+    pub(crate) const fn new() -> Waiting {
+        Waiting { line: Deque::new(), bus: Deque::new() }
+    }
+
+    /// Whether another request from this way finds room. A broadcast needs none.
+    pub(crate) fn has_room(&self, way: Way) -> bool {
+        match way {
+            Way::Line => !self.line.is_full(),
+            Way::Bus(_) => !self.bus.is_full(),
+            Way::Broadcast => true,
+        }
+    }
+
+    /// Puts a command in line; false when there is no room.
+    pub(crate) fn push(&mut self, way: Way, pending: Pending) -> bool {
+        match way {
+            Way::Line => self.line.push_back(pending).is_ok(),
+            Way::Bus(device) => self.bus.push_back((device, Request::Command(pending))).is_ok(),
+            Way::Broadcast => true,
+        }
+    }
+
+    /// Puts a device's question for a force table in line; false when there is no room.
+    pub(crate) fn push_forces(&mut self, device: u8, table: ForceTable) -> bool {
+        self.bus.push_back((device, Request::Forces(table))).is_ok()
+    }
+
+    /// The command from the line whose turn it is.
+    pub(crate) fn next_from_line(&mut self) -> Option<Pending> {
+        self.line.pop_front()
+    }
+
+    /// The request from the bus whose turn it is, and who asks.
+    pub(crate) fn next_from_bus(&mut self) -> Option<(u8, Request)> {
+        self.bus.pop_front()
+    }
+
+    /// Forgets what waits for the bus; says how much it was.
+    pub(crate) fn forget_bus(&mut self) -> usize {
+        let waiting = self.bus.len();
+        self.bus.clear();
+        waiting
+    }
+}
