@@ -86,10 +86,10 @@ impl Seen {
             (Decoded::Text(byte), _) => self.text.push(byte),
             (Decoded::Dropped(dropped), _) => self.messages.push(format!("{:?}", dropped.cause)),
             (Decoded::Frame(body), Sender::Host) => {
-                self.messages.push(in_words(Command::parse(body)))
+                self.messages.push(in_words(Command::parse(body)));
             }
             (Decoded::Frame(body), Sender::Unit) => {
-                self.messages.push(in_words(Reply::parse(body)))
+                self.messages.push(in_words(Reply::parse(body)));
             }
         }
     }

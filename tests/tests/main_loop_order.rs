@@ -87,7 +87,7 @@ impl Surroundings {
                     self.moved_ms = Some(now_ms);
                 }
                 Act::Broadcast(command) => {
-                    transmit(&mut self.host, Destination::Broadcast, &command)
+                    transmit(&mut self.host, Destination::Broadcast, &command);
                 }
                 Act::Say(command) => {
                     let bytes = FrameEncoder::new(command.to_body());

@@ -37,7 +37,7 @@ impl Masking {
         match (first, second & 0xF000) {
             // MRS Rd, special.
             (0xF3EF, 0x8000) => {
-                self.reads.push(Transfer { at, special, register: second >> 8 & 0xF })
+                self.reads.push(Transfer { at, special, register: second >> 8 & 0xF });
             }
             // MSR special, Rn.
             (0xF380..=0xF38F, 0x8000) => {

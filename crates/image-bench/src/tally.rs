@@ -160,14 +160,14 @@ impl<'p> Tally<'p> {
         match self.head {
             Head::Unknown if kind == Kind::Sleep => self.head = Head::Behind(address),
             Head::Behind(at) if self.program.behind(at) == address => {
-                self.head = Head::Behind(address)
+                self.head = Head::Behind(address);
             }
             Head::Behind(_) => {
                 self.head = Head::Known(address);
                 self.pass = Some(Pass::default());
             }
             Head::Known(head) if head == address => {
-                self.passes.extend(self.pass.replace(Pass::default()))
+                self.passes.extend(self.pass.replace(Pass::default()));
             }
             _ => {}
         }

@@ -195,7 +195,7 @@ impl Walker<'_> {
                 goes_on |= self.call(address, callee, &after);
             }
             Flow::JumpRegister(register) => {
-                self.jump_away(address, before.function_in(register), &after)
+                self.jump_away(address, before.function_in(register), &after);
             }
             Flow::JumpWord(word) => {
                 self.jump_away(address, self.image.word(word).map(|word| word & !1), &after);

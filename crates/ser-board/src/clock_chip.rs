@@ -123,7 +123,7 @@ impl<'a, C: KeepsTime> ClockChip<'a, C> {
             assert!(
                 C::RESOLUTION_MS >= 1 && C::RESOLUTION_MS <= 1000,
                 "see `KeepsTime::RESOLUTION_MS`"
-            )
+            );
         };
         ClockChip { chip, not_before, health }
     }

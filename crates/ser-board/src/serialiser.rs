@@ -127,7 +127,10 @@ impl<'a, SPI: SpiDevice, const PARTS: usize> Serialisers<'a, SPI, PARTS> {
     /// A chain behind `spi`. A length that is not 1–4 does not compile.
     pub const fn new(spi: SPI, health: &'a SerialiserHealth) -> Self {
         const {
-            assert!(PARTS >= 1 && PARTS * INPUTS_PER_PART <= 32, "a recorder has at most 32 inputs")
+            assert!(
+                PARTS >= 1 && PARTS * INPUTS_PER_PART <= 32,
+                "a recorder has at most 32 inputs"
+            );
         };
         Serialisers { spi, health }
     }

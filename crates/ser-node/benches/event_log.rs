@@ -54,10 +54,10 @@ fn append(criterion: &mut Criterion) {
     let added = event(1);
     group.bench_function("ser_node", |bencher| bencher.iter(|| log.append(black_box(added))));
     group.bench_function("heapless_history_buf", |bencher| {
-        bencher.iter(|| history.write(black_box(added)))
+        bencher.iter(|| history.write(black_box(added)));
     });
     group.bench_function("heapless_deque", |bencher| {
-        bencher.iter(|| push(&mut deque, black_box(added)))
+        bencher.iter(|| push(&mut deque, black_box(added)));
     });
     group.finish();
     black_box((log, history, deque));

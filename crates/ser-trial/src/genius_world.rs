@@ -84,7 +84,7 @@ impl Recorder {
         for byte in self.node.take_output() {
             match self.frames.push(byte) {
                 Some(Decoded::Frame(body)) => {
-                    replies.push(Reply::parse(body).expect("a recorder's reply"))
+                    replies.push(Reply::parse(body).expect("a recorder's reply"));
                 }
                 Some(Decoded::Text(byte)) => text.push(byte.into()),
                 Some(Decoded::Dropped(dropped)) => panic!("the recorder sent {dropped:?}"),

@@ -46,7 +46,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         0 => {}
         1 => warn("1 event has not been delivered by read --new or watch"),
         unread => {
-            warn(format_args!("{unread} events have not been delivered by read --new or watch"))
+            warn(format_args!("{unread} events have not been delivered by read --new or watch"));
         }
     }
     unit.erase()?;

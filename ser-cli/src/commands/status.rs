@@ -82,7 +82,7 @@ fn write(
     let next = u32::from(position.next_slot) + 1;
     match configuration {
         Some(Configuration { size, .. }) => {
-            field(out, "next entry", format_args!("{next} of {size}"))?
+            field(out, "next entry", format_args!("{next} of {size}"))?;
         }
         None => field(out, "next entry", next)?,
     }

@@ -238,7 +238,7 @@ impl Board {
                 self.first_access_ms = None;
             }
             State::SelfTest { since_ms } if now_ms.wrapping_sub(since_ms) >= 1_850 => {
-                self.end_self_test()
+                self.end_self_test();
             }
             State::Running if !self.misbehaviour.hangs => self.run(),
             State::SelfTest { .. } | State::Running | State::Stopped => {}
@@ -401,7 +401,7 @@ impl Board {
         let (request, state) = (self.ram[LOCKOUT_REQUEST], self.ram[LOCKOUT_STATE]);
         match offset {
             LOCKOUT_REQUEST if byte == 1 => {
-                assert_eq!((request, state), (0, 0), "request over a request")
+                assert_eq!((request, state), (0, 0), "request over a request");
             }
             LOCKOUT_REQUEST => assert_eq!((byte, request, state), (0, 1, 1), "request withdrawn"),
             COMMAND => {
@@ -409,17 +409,17 @@ impl Board {
                 assert!(self.ram[COMMAND] == 0 || self.ram[COMMAND] >= 4, "command over a command");
             }
             0x08C3..0x09C2 => {
-                assert!(self.ram[COMMAND] == 0 || self.ram[COMMAND] >= 4, "block is busy")
+                assert!(self.ram[COMMAND] == 0 || self.ram[COMMAND] >= 4, "block is busy");
             }
             OK | 0x08A2..0x08AA => assert_eq!(byte, 0),
             0x1F80..0x2000 if self.on_bus && self.configuration[2] > 1 => {
                 assert!(self.locked(), "global data changed without lockout");
             }
             0x2000.. if self.buffer_len() > 1 => {
-                assert!(self.locked(), "outputs changed without lockout")
+                assert!(self.locked(), "outputs changed without lockout");
             }
             0x2000.. => {
-                assert!(offset >= 0x2000 + 32 * self.buffer_len(), "write to the input table")
+                assert!(offset >= 0x2000 + 32 * self.buffer_len(), "write to the input table");
             }
             _ => {}
         }

@@ -120,7 +120,7 @@ fn a_restart_in_the_middle_of_a_command_is_not_taken_for_its_end() {
         let lost = world.step().expect("the datagram is reported");
         match completion {
             Completion::Reply { .. } => {
-                assert_eq!(lost, Event::Replied(Err(CommandError::BoardFailed)))
+                assert_eq!(lost, Event::Replied(Err(CommandError::BoardFailed)));
             }
             _ => assert_eq!(lost, Event::Sent(Err(CommandError::BoardFailed))),
         }

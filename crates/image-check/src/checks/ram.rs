@@ -34,7 +34,7 @@ pub(super) fn while_erasing(limits: &Limits, image: &Image, calls: &Calls<'_>) -
             let name = image.name_of(function);
             match calls.calls_of(function).find(|call| call.at >= RAM_BEGINS) {
                 Some(call) => {
-                    wrong.push(format!("{name} is in flash; {} calls it", image.name_of(call.at)))
+                    wrong.push(format!("{name} is in flash; {} calls it", image.name_of(call.at)));
                 }
                 None => wrong.push(format!("{name} is in flash")),
             }

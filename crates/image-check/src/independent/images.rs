@@ -56,7 +56,7 @@ fn hold(variable: &str) {
             Verdict::Agreed | Verdict::Accepted(_) => {}
             Verdict::Unknown if reads_special_register(placed) => {}
             Verdict::Unknown => {
-                wrong.push(format!("{:04x} {:04x}: unknown", placed.first, placed.second))
+                wrong.push(format!("{:04x} {:04x}: unknown", placed.first, placed.second));
             }
             Verdict::Differs(how) => wrong.push(how),
         }

@@ -301,7 +301,7 @@ impl BusLife {
                 }
                 Ok(command) if taken.broadcast => ledger.command_done(&command),
                 Ok(command) => {
-                    ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS)
+                    ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS);
                 }
             }
         }

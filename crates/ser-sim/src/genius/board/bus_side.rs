@@ -107,7 +107,7 @@ impl Device for Board {
             Message::Directed { data, .. } => self.live.copies.set_directed(data),
             Message::AssignController { .. } => self.live.controller = Some(from),
             Message::Datagram { to, datagram } => {
-                self.take_datagram(from, *to == BROADCAST, datagram)
+                self.take_datagram(from, *to == BROADCAST, datagram);
             }
         }
         true

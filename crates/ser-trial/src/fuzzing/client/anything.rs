@@ -227,7 +227,7 @@ impl Readers {
             Some(cursor) if delivered > 0 => assert_eq!(cursor.anchor, last),
             // An empty log is the only one in which a cursor can stand without an event.
             cursor => {
-                assert!(cursor == before || cursor.is_some_and(|cursor| cursor.anchor.is_none()))
+                assert!(cursor == before || cursor.is_some_and(|cursor| cursor.anchor.is_none()));
             }
         }
         let summary = self.reader.summary();

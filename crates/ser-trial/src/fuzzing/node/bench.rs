@@ -107,7 +107,7 @@ impl<'a, 'm> Bench<'a, 'm> {
             match said {
                 // Without a port nobody will ever ask for it.
                 Said::Owed(entry) => {
-                    self.genius.iter_mut().for_each(|genius| genius.owed.push_back(entry))
+                    self.genius.iter_mut().for_each(|genius| genius.owed.push_back(entry));
                 }
                 said => self.expected.push_back(said),
             }
@@ -145,7 +145,7 @@ impl<'a, 'm> Bench<'a, 'm> {
                     self.expected.extend(self.model.body(&body, self.tick_ms, MAX_ENTRIES));
                 }
                 Some(Decoded::Frame(_)) => {
-                    assert_eq!(self.host, Host::Slow, "a command found no room")
+                    assert_eq!(self.host, Host::Slow, "a command found no room");
                 }
                 Some(Decoded::Dropped(_)) => self.frames_dropped += 1,
                 Some(Decoded::Text(_)) | None => {}
