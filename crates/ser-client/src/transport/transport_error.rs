@@ -1,4 +1,4 @@
-//! How a line fails in the middle of a conversation.
+//! The ways in which a line fails in the middle of a conversation.
 
 use std::error::Error;
 use std::fmt;
@@ -6,16 +6,16 @@ use std::io::{self, ErrorKind};
 
 use super::genius_error::GeniusError;
 
-/// How a line failed in the middle of a conversation.
+/// The way in which a line failed in the middle of a conversation.
 #[derive(Debug)]
 pub enum TransportError {
     /// The serial device is gone.
     Unplugged,
     /// The other end of the connection went away.
     Closed,
-    /// It did so before it said anything.
+    /// The other end went away before it had sent anything.
     TurnedAway,
-    /// The GENI board, or the bus behind it.
+    /// The GENI board or the bus behind it failed.
     Genius(GeniusError),
     /// Anything else.
     Io(io::Error),
@@ -33,7 +33,8 @@ impl TransportError {
                 Some("is the program or the terminal server at the other end still running?")
             }
             TransportError::TurnedAway => Some(
-                "perhaps another client has the unit: most terminal servers serve one at a time",
+                "perhaps another client has the recorder: most terminal servers serve one at a \
+                 time",
             ),
             TransportError::Genius(error) => Some(error.hint()),
             TransportError::Io(_) => None,
