@@ -1,11 +1,11 @@
-//! What it costs to find a full read reply in a byte stream and to understand it, beside what one
-//! would use instead.
+//! The cost of finding a full read reply in a byte stream and parsing it, compared with
+//! alternatives.
 //!
-//! Two steps, each in a group with its rivals on the same work:
+//! Each of the two steps is a group with its alternatives on the same work:
 //! - `to_bytes`: from characters to bytes. `faster-hex` turns the same characters into the same
-//!   bytes; it is told where they begin and end, and looks neither for a frame nor at a checksum.
-//! - `to_events`: from characters to ten events. For `nmea` each event is a ZDA sentence, cut out
-//!   already, which holds time, date and a checksum, and has no room for the inputs.
+//!   bytes. It is told where they begin and end, looks for no frame and checks no checksum.
+//! - `to_events`: from characters to ten events. For `nmea` each event is a ZDA sentence that is
+//!   already cut out. A sentence holds time, date and checksum, but not the inputs.
 
 use std::fmt::Write;
 use std::hint::black_box;

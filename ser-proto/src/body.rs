@@ -21,8 +21,8 @@ impl Body {
         body
     }
 
-    /// Appends bytes. Every message type ends below [`MAX_BODY_LEN`] by construction; more is a bug
-    /// of ours.
+    /// Appends bytes. Every message type stays within [`MAX_BODY_LEN`] by construction, so bytes
+    /// that do not fit are a bug of this crate.
     pub(crate) fn put(&mut self, bytes: &[u8]) {
         let fits = self.0.extend_from_slice(bytes).is_ok();
         debug_assert!(fits, "a message is longer than MAX_BODY_LEN");

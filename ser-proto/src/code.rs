@@ -9,9 +9,9 @@ pub enum Code {
     Configure = 0x43,
     /// `E`: erase the event buffer.
     Erase = 0x45,
-    /// `L`: the last command that was received as a broadcast.
+    /// `L`: ask for the last command that was received as a broadcast.
     LastBroadcast = 0x4C,
-    /// `M`: recording mode and firmware version.
+    /// `M`: start or stop recording; the reply tells mode and firmware version.
     Mode = 0x4D,
     /// `P`: print entries as text on RS-232.
     Print = 0x50,
@@ -45,7 +45,7 @@ impl Code {
         self as u8
     }
 
-    /// What the command is called.
+    /// The command's name.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -12,17 +12,17 @@ use crate::{Body, Code, Configure, ParseError, TimeStamp};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
-    /// `C` alone: what configuration is in force? An extension of this project; original recorders
-    /// stay silent.
+    /// `C` alone: asks for the configuration in force. An extension of this project; original
+    /// recorders do not answer it.
     QueryConfiguration,
     /// `C`: change the configuration.
     Configure(Configure),
     /// `E`: erase the event buffer.
     Erase,
-    /// `L`: which broadcast came last?
+    /// `L`: asks for the last broadcast.
     LastBroadcast,
-    /// `M` alone: is the recorder recording? An extension of this project; original recorders stay
-    /// silent.
+    /// `M` alone: asks whether the recorder is recording. An extension of this project; original
+    /// recorders do not answer it.
     QueryMode,
     /// `M`: start or stop recording.
     SetMode {
@@ -33,22 +33,22 @@ pub enum Command {
     Print {
         /// Number of the first entry, from 1.
         start: u16,
-        /// How many.
+        /// How many entries.
         count: u16,
     },
     /// `R`: read entries. With count 0 the reply is the header alone.
     Read {
         /// Number of the first entry, from 1.
         start: u16,
-        /// How many, 1–10.
+        /// How many entries, 1–10.
         count: u8,
     },
-    /// `S`: set the clock. The time is the one at which the last byte of the message arrives.
+    /// `S`: set the clock. The time is that of the arrival of the message's last byte.
     SetClock(TimeStamp),
 }
 
 impl Command {
-    /// Understands a body that came from a host.
+    /// Parses a body that came from a host.
     ///
     /// # Errors
     /// See [`ParseError`]. Start and count of `R` and `P` are never refused here: a recorder
@@ -86,7 +86,7 @@ impl Command {
             Command::Configure(configure) => return configure.to_body(),
             // The version byte has no meaning in this direction; the manual's example sends one.
             Command::SetMode { recording } => body.put(&[u8::from(recording), 0]),
-            // The short form is the manual's; the long one reaches above entry 255.
+            // The manual has only the short form; the long form reaches entries above 255.
             Command::Print { start, count } => match (u8::try_from(start), u8::try_from(count)) {
                 (Ok(start), Ok(count)) => body.put(&[start, count]),
                 _ => {
@@ -119,7 +119,7 @@ impl Command {
 }
 
 fn parse_set_mode(params: &[u8]) -> Result<Command, ParseError> {
-    // The version byte means nothing from a host and may be missing.
+    // A host's version byte means nothing and may be missing.
     let params = match params {
         [mode, _version] => core::slice::from_ref(mode),
         other => other,
@@ -180,7 +180,8 @@ mod tests {
             (Code::SetClock, &[9]),
         ];
         for (code, lengths) in allowed {
-            // With values that are right and with values that no field can have.
+            // The lengths are tried with values that are right and with values that no field can
+            // have.
             for (length, filling) in (1..=255).flat_map(|length| [(length, 0), (length, 0xFF)]) {
                 let mut body = vec![filling; length];
                 body[0] = code.byte();

@@ -3,8 +3,8 @@
 //! ```text
 //! | 43 | size (2) | baud code | auto report | report address | auto print |    7 bytes, both directions
 //! ```
-//!
-//! In the command a size or baud code of 0 keeps what is in force; the reply holds what is in force
+//! In a command, size 0 or baud code 0 keeps the value in force. The reply always holds the values
+//! now in force.
 //! now.
 
 use nom::Parser;
@@ -72,7 +72,7 @@ impl Baud {
         }
     }
 
-    /// The rate of that many bits per second, if the recorder has it.
+    /// The rate of `bits_per_second`, if the recorder has it.
     #[must_use]
     pub fn from_bits_per_second(bits_per_second: u32) -> Option<Baud> {
         Baud::ALL.into_iter().find(|baud| baud.bits_per_second() == bits_per_second)
@@ -131,7 +131,7 @@ pub struct Configuration {
     pub auto_print: bool,
 }
 
-/// Before any configuration: 2048 entries, 9600 bit/s, nothing automatic.
+/// The configuration as delivered: 2048 entries, 9600 bit/s, nothing automatic.
 impl Default for Configuration {
     fn default() -> Self {
         Configuration {
@@ -148,15 +148,15 @@ impl Default for Configuration {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Configure {
-    /// Entries that the event buffer shall hold, 1–2048; `None` keeps the size.
+    /// Entries that the event buffer is to hold, 1–2048; `None` keeps the size.
     pub size: Option<u16>,
     /// Rate of the RS-232 port from the reply on; `None` keeps the rate.
     pub baud: Option<Baud>,
-    /// Where events shall be reported.
+    /// Where events are to be reported.
     pub auto_report: AutoReport,
-    /// Genius address that shall get the reports, 0–31.
+    /// Genius address that is to get the reports, 0–31.
     pub report_address: u8,
-    /// Whether every event shall be printed as a text line on RS-232.
+    /// Whether every event is to be printed as a text line on RS-232.
     pub auto_print: bool,
 }
 
@@ -210,7 +210,7 @@ impl Configure {
     }
 }
 
-/// The command that makes these settings the ones in force.
+/// The command that puts these settings in force.
 impl From<Configuration> for Configure {
     fn from(settings: Configuration) -> Configure {
         Configure {

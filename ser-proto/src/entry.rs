@@ -68,7 +68,7 @@ impl fmt::Display for Inputs {
 }
 
 /// One event: the inputs that changed in the same millisecond, and the state of all inputs right
-/// after.
+/// after the change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Entry {
@@ -76,7 +76,7 @@ pub struct Entry {
     pub changed: Inputs,
     /// The inputs that are on.
     pub state: Inputs,
-    /// When.
+    /// When they changed.
     pub time: TimeStamp,
 }
 

@@ -13,14 +13,14 @@ pub enum ParseError {
         /// The byte found.
         code: u8,
     },
-    /// The command is known but never has this many bytes in this direction.
+    /// The command is known, but no message of this command and direction has this length.
     WrongLength {
         /// The command byte.
         code: u8,
         /// Bytes in the body, the command byte included.
         length: usize,
     },
-    /// The length is right and a field holds a value that it cannot have.
+    /// The length is right, but a field holds a value that is not allowed.
     BadValue {
         /// The command byte.
         code: u8,

@@ -8,8 +8,7 @@ use nom::error::{ErrorKind, FromExternalError, ParseError as NomParseError};
 
 pub(crate) type Bytes<'a> = &'a [u8];
 
-/// What nom hands up: how many bytes were left where parsing stopped, and the value that was
-/// refused there.
+/// What nom passes up: how many bytes were left where parsing stopped, and the value refused there.
 #[derive(Debug)]
 pub(crate) struct Fault {
     remaining: usize,
@@ -32,12 +31,12 @@ impl FromExternalError<Bytes<'_>, u16> for Fault {
     }
 }
 
-/// Why bytes are not what their layout asks for.
+/// Why bytes do not fit their layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Refusal {
-    /// There are never so many.
+    /// The layout never has this many bytes.
     Length,
-    /// A field holds a value that it cannot have.
+    /// A field holds a value that is not allowed.
     Value {
         /// Where the field starts.
         offset: usize,
@@ -46,7 +45,7 @@ pub(crate) enum Refusal {
     },
 }
 
-/// Parses `bytes`, of which there must be `expected_len`.
+/// Parses `bytes`, which must be `expected_len` bytes.
 pub(crate) fn parse_exactly<'a, T>(
     bytes: Bytes<'a>,
     expected_len: usize,
@@ -55,7 +54,7 @@ pub(crate) fn parse_exactly<'a, T>(
     if bytes.len() != expected_len {
         return Err(Refusal::Length);
     }
-    // `finish()` would do, but it panics on `Incomplete`, which these parsers never return.
+    // `finish()` would be shorter, but it panics on `Incomplete`, which these parsers never return.
     match nom::combinator::all_consuming(parser).parse(bytes) {
         Ok((_, fields)) => Ok(fields),
         Err(nom::Err::Error(Fault { remaining, value: Some(value) })) => {
@@ -65,7 +64,7 @@ pub(crate) fn parse_exactly<'a, T>(
     }
 }
 
-/// A one-byte field that `accept` turns into its meaning, or refuses.
+/// A one-byte field; `accept` turns it into its meaning or refuses it.
 pub(crate) fn byte<'a, T>(
     accept: impl Fn(u8) -> Option<T>,
 ) -> impl Parser<Bytes<'a>, Output = T, Error = Fault> {
@@ -74,7 +73,7 @@ pub(crate) fn byte<'a, T>(
     })
 }
 
-/// A two-byte field, high byte first, that `accept` turns into its meaning, or refuses.
+/// A two-byte field, high byte first; `accept` turns it into its meaning or refuses it.
 pub(crate) fn word<'a, T>(
     accept: impl Fn(u16) -> Option<T>,
 ) -> impl Parser<Bytes<'a>, Output = T, Error = Fault> {

@@ -1,9 +1,8 @@
 //! Finds ESC frames in a stream of bytes.
 //!
-//! The decoder works one byte at a time and needs no time-out: an ESC always starts a new frame, so
-//! a frame that was cut off costs itself and nothing after it. What stands between frames is text
-//! and is handed on. Every frame that is dropped is reported with its cause and its place in the
-//! stream.
+//! The decoder works one byte at a time and needs no time-out. An ESC always starts a new frame, so
+//! a frame that was cut off costs itself and nothing after it. Bytes between frames are text and
+//! are passed on. Every dropped frame is reported with its cause and its place in the stream.
 
 use core::fmt;
 
@@ -19,17 +18,17 @@ pub enum Decoded<'a> {
     Text(u8),
     /// The body of a complete frame whose checksum holds.
     Frame(&'a [u8]),
-    /// A frame ended without becoming one.
+    /// A frame was dropped.
     Dropped(DroppedFrame),
 }
 
-/// A frame that came to nothing.
+/// A frame that was dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DroppedFrame {
     /// Offset of its ESC, from the first byte that the decoder was given.
     pub start: u64,
-    /// Offset of the byte at which it was given up.
+    /// Offset of the byte at which the decoder gave it up.
     pub at: u64,
     /// Why.
     pub cause: FrameError,
@@ -41,7 +40,7 @@ pub struct DroppedFrame {
 pub enum FrameError {
     /// Another ESC came before the frame was complete.
     Interrupted,
-    /// A character that is no hexadecimal digit; it goes with the frame.
+    /// A character is not a hexadecimal digit; it is dropped with the frame.
     NotHex {
         /// The character.
         byte: u8,
@@ -76,12 +75,12 @@ pub struct FrameDecoder<const N: usize> {
 #[derive(Clone, Copy, Debug)]
 enum State {
     Text,
-    /// Inside a frame: `high` is the first digit of the byte under way.
+    /// Inside a frame; `high` is the first digit of the byte being assembled.
     Frame {
         high: Option<u8>,
         length: Option<u8>,
     },
-    /// Inside a frame that has been reported as dropped: so many digits belong to it still.
+    /// Inside a frame that was already reported as dropped, with this many digits still to come.
     Skip {
         digits: usize,
     },
@@ -104,13 +103,14 @@ impl<const N: usize> FrameDecoder<N> {
         FrameDecoder { state: State::Text, body: Vec::new(), start: 0, position: 0 }
     }
 
-    /// Takes the next byte of the stream; says what it completed, if anything.
+    /// Takes the next byte of the stream; returns what it completed, if anything.
     pub fn push(&mut self, byte: u8) -> Option<Decoded<'_>> {
         self.step(byte).map(|completed| self.show(completed))
     }
 
-    /// Takes bytes from the front of `stream` up to and including the one that completes something;
-    /// the bytes after it stay. `None`: all were taken and nothing more was completed.
+    /// Takes bytes from the front of `stream`, up to and including the one that completes
+    /// something; the bytes after it stay. `None` means that all were taken and nothing was
+    /// completed.
     pub fn push_slice(&mut self, stream: &mut &[u8]) -> Option<Decoded<'_>> {
         while let Some((&byte, rest)) = stream.split_first() {
             *stream = rest;
@@ -164,7 +164,7 @@ impl<const N: usize> FrameDecoder<N> {
         }
     }
 
-    /// Ends the stream: reports a frame that is not complete. The decoder can be used on.
+    /// Ends the stream and reports a frame that is incomplete. The decoder can then be used again.
     pub fn finish(&mut self) -> Option<DroppedFrame> {
         let unfinished = matches!(self.state, State::Frame { .. });
         self.state = State::Text;
@@ -175,7 +175,7 @@ impl<const N: usize> FrameDecoder<N> {
         })
     }
 
-    /// Whether a frame has begun and is not complete yet.
+    /// Whether a frame has begun and is not yet complete.
     #[must_use]
     pub const fn inside_frame(&self) -> bool {
         !matches!(self.state, State::Text)
@@ -201,7 +201,7 @@ impl<const N: usize> FrameDecoder<N> {
                 Some(self.drop_frame(at, FrameError::TooLong { length: byte }))
             }
             None => None,
-            // The vector never refuses: a length above `N` does not get this far.
+            // The push cannot fail: a frame longer than `N` was dropped at its length.
             Some(length) if self.body.len() < usize::from(length) => self
                 .body
                 .push(byte)

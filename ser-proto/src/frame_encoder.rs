@@ -25,7 +25,7 @@ pub struct FrameEncoder {
 }
 
 impl FrameEncoder {
-    /// The frame of `body`, from its ESC.
+    /// The frame around `body`, starting with the ESC.
     #[must_use]
     pub const fn new(body: Body) -> FrameEncoder {
         FrameEncoder { body, position: 0 }

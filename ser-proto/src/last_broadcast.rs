@@ -13,7 +13,7 @@ use crate::fields::{Bytes, below, byte, word};
 use crate::params::parse_params;
 use crate::{Body, Code, ParseError};
 
-/// The command that was last received as a broadcast, and when.
+/// The command last received as a broadcast, and the time of its reception.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LastBroadcast {

@@ -1,10 +1,10 @@
-//! The language of the sequential event recorder (SER): what a host and a recorder say to each
-//! other.
+//! The language of the sequential event recorder (SER): the messages between a host and a recorder.
 //!
-//! A message is a *body*: a command byte and its parameters, the same on every medium. [`Command`]
-//! is a body on its way to the recorder, [`Reply`] one on its way back; both `parse` from bytes and
-//! turn `to_body`. On RS-232 a body travels in an ESC frame: [`FrameEncoder`] makes one,
-//! [`FrameDecoder`] finds them in a stream that may also hold text lines and noise.
+//! A message is a *body*: a command byte and its parameters, the same on every medium. A
+//! [`Command`] is a body on its way to the recorder, a [`Reply`] one on its way back. Both `parse`
+//! from bytes and turn back into them with `to_body`. On RS-232 a body travels in an ESC frame.
+//! [`FrameEncoder`] makes one; [`FrameDecoder`] finds them in a stream that may also hold text
+//! lines and noise.
 //!
 //! Nothing here performs I/O, reads a clock, allocates or panics, whatever the bytes are.
 //!

@@ -2,7 +2,7 @@
 
 use crate::READ_REPLY_HEADER_LEN;
 
-/// Which recorder: it decides how many inputs there are and how wide an entry is.
+/// The recorder's model, which decides the number of inputs and the width of an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Model {

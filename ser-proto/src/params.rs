@@ -5,7 +5,7 @@ use nom::Parser;
 use crate::fields::{Bytes, Fault, Refusal, parse_exactly};
 use crate::{Code, ParseError};
 
-/// Parses `params`, the bytes after the command byte, which must be `expected_len` bytes.
+/// Parses `params`, the bytes after the command byte, of which there must be `expected_len`.
 pub(crate) fn parse_params<'a, T>(
     code: Code,
     params: Bytes<'a>,

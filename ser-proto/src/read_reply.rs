@@ -19,18 +19,18 @@ pub const READ_REPLY_HEADER_LEN: usize = 8;
 
 /// Entries of the log, and where the log stands.
 ///
-/// Entry `n` is slot `n - 1` of the ring. With `total` and `next_slot` a host knows what it has not
-/// read yet, also after the ring or the 16-bit total has wrapped.
+/// Entry `n` is slot `n - 1` of the ring. From `total` and `next_slot` a host works out what it has
+/// not yet read, even after the ring or the 16-bit total has wrapped.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ReadReply {
-    /// Number of the first entry, 1–2048; what was asked for when there are no entries.
+    /// Number of the first entry, 1–2048; without entries, the number that was asked for.
     pub start: u16,
     /// Events since the last erase, modulo 65536.
     pub total: u16,
     /// The slot that the next event will get, 0–2047.
     pub next_slot: u16,
-    /// The model that the entry size shows; it is not known from a reply without entries.
+    /// The model, as the entry size shows it; `None` without entries.
     pub model: Option<Model>,
     /// The entries, in slot order.
     pub entries: Vec<Entry, MAX_ENTRIES>,
@@ -58,7 +58,8 @@ impl ReadReply {
 
     pub(crate) fn to_body(&self) -> Body {
         let mut body = Body::new(Code::Read);
-        // Without a model the entries have no width; a reply that holds some always has one.
+        // Without a model the width of an entry is unknown; a reply with entries always has a
+        // model.
         let entries = self.model.map_or(&[][..], |_| &self.entries[..]);
         body.put_u16(self.start);
         body.put(&[u8::try_from(entries.len()).unwrap_or(u8::MAX)]);
@@ -96,7 +97,7 @@ fn parse_entries(
     Ok(entries)
 }
 
-/// The parameters of an `R` command: start and count as they came, not checked against any log.
+/// The start and count of an `R` command as they came, not checked against any log.
 pub(crate) fn parse_request(params: Bytes<'_>) -> Result<(u16, u8), ParseError> {
     parse_params(Code::Read, params, 3, (be_u16, be_u8))
 }

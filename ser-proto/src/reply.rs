@@ -1,9 +1,9 @@
-//! What a recorder says to a host.
+//! What a recorder sends to a host.
 
 use crate::{Body, Code, Configuration, LastBroadcast, Mode, ParseError, ReadReply};
 
-/// A message from the recorder: the answer to a command, or a read reply that nobody asked for
-/// (auto report).
+/// A message from the recorder: the answer to a command, or an unsolicited read reply (auto
+/// report).
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reply {
@@ -15,7 +15,7 @@ pub enum Reply {
     LastBroadcast(Option<LastBroadcast>),
     /// `M`: recording mode and version.
     Mode(Mode),
-    /// `P`: the lines follow.
+    /// `P`: the text lines follow.
     PrintAccepted,
     /// `R`: entries of the log.
     Read(ReadReply),
@@ -24,7 +24,7 @@ pub enum Reply {
 }
 
 impl Reply {
-    /// Understands a body that came from a recorder.
+    /// Parses a body that came from a recorder.
     ///
     /// # Errors
     /// See [`ParseError`].
@@ -36,7 +36,7 @@ impl Reply {
             (Code::Erase, 0) => Ok(Reply::Erased),
             (Code::LastBroadcast, _) => LastBroadcast::parse(params).map(Reply::LastBroadcast),
             (Code::Mode, _) => Mode::parse(params).map(Reply::Mode),
-            // The manual's text has the single byte, its example echoes the command.
+            // The manual's text has the single byte; its example echoes the command.
             (Code::Print, 0 | 2 | 4) => Ok(Reply::PrintAccepted),
             (Code::Read, _) => ReadReply::parse(params).map(Reply::Read),
             (Code::SetClock, 0) => Ok(Reply::ClockSet),

@@ -4,8 +4,9 @@
 //! | year | month | day | hour | minute | second | millisecond (2) |
 //! ```
 //!
-//! A stamp from the wire may hold an impossible date (a recorder whose clock was never set): it is
-//! kept as it is, so that an entry is never lost over it, and [`TimeStamp::check`] tells.
+//! A stamp from the wire may hold an impossible date, for example from a recorder whose clock was
+//! never set. It is kept as it is because no entry may be lost over it; [`TimeStamp::check`] finds
+//! it.
 
 use core::fmt;
 
@@ -15,8 +16,8 @@ use nom::number::complete::{be_u8, be_u16};
 use crate::Body;
 use crate::fields::{Bytes, Fault};
 
-/// A date and time of day with a resolution of one millisecond, in whatever time zone the recorder
-/// was set to.
+/// A date and time of day with a resolution of one millisecond, in the time zone to which the
+/// recorder was set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TimeStamp {
@@ -36,7 +37,7 @@ pub struct TimeStamp {
     pub millisecond: u16,
 }
 
-/// The first field of a [`TimeStamp`] that no date or time can have.
+/// The first field of a [`TimeStamp`] that holds an impossible value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct InvalidTime {
@@ -59,11 +60,11 @@ impl TimeStamp {
         }
     }
 
-    /// Whether there is such a date and time; if not, which field is the first that is wrong.
+    /// Whether this date and time exist.
     ///
     /// # Errors
-    /// The first field, in wire order, that is out of range; the day also when the month is too
-    /// short for it.
+    /// The first field, in wire order, that is out of range. A day is also out of range when the
+    /// month is too short for it.
     pub fn check(&self) -> Result<(), InvalidTime> {
         let fields = [
             (self.year, 0, 99),
@@ -114,7 +115,7 @@ impl TimeStamp {
     }
 }
 
-/// As `2026-11-22T10:00:00.250`, also when there is no such date.
+/// As `2026-11-22T10:00:00.250`, even for an impossible date.
 impl fmt::Display for TimeStamp {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
@@ -155,7 +156,7 @@ mod chrono_conversions {
 
     use super::{InvalidTime, TimeStamp};
 
-    /// Fails when there is no such date or time.
+    /// Fails when the date or time does not exist.
     impl TryFrom<TimeStamp> for NaiveDateTime {
         type Error = InvalidTime;
 
@@ -174,7 +175,8 @@ mod chrono_conversions {
         }
     }
 
-    /// Truncates to the millisecond; fails outside 1970–2069, which two digits cannot say.
+    /// Truncates to the millisecond; fails outside 1970–2069, which a two-digit year cannot
+    /// express.
     impl TryFrom<NaiveDateTime> for TimeStamp {
         type Error = InvalidTime;
 
@@ -189,7 +191,7 @@ mod chrono_conversions {
                     });
                 }
             };
-            // chrono shows a leap second as 1000 ms and more.
+            // chrono represents a leap second as 1000 ms or more.
             let millisecond = (time.nanosecond() / 1_000_000).min(999);
             let narrow = |value: u32| u8::try_from(value).unwrap_or(u8::MAX);
             Ok(TimeStamp {

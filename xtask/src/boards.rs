@@ -1,4 +1,4 @@
-//! The boards: what is built for them.
+//! The boards that images are built for.
 
 use std::path::PathBuf;
 
@@ -10,13 +10,13 @@ use crate::setup::cross::{self, Target};
 /// A board.
 #[derive(Clone, Debug)]
 pub(crate) struct Board {
-    /// What its image has to keep to.
+    /// The limits of its image.
     pub(crate) limits: &'static Limits,
     pub(crate) package: &'static str,
     pub(crate) target: Target,
-    /// Features that other builds of the board have: each has to stand up to clippy, too.
+    /// Features of other builds for the board. Clippy checks each of them.
     pub(crate) features: &'static [&'static str],
-    /// The chip as probe-rs calls it; none on a board that is emulated.
+    /// The chip by its name in probe-rs; `None` for an emulated board.
     pub(crate) chip: Option<&'static str>,
 }
 
@@ -38,26 +38,26 @@ pub(crate) const STM32F407: Board = Board {
     chip: Some("STM32F407ZGTx"),
 };
 
-/// All of them.
+/// All boards.
 pub(crate) const BOARDS: [Board; 2] = [MPS2_AN385, STM32F407];
 
 impl Board {
-    /// What it is called.
+    /// The board's name.
     pub(crate) fn name(&self) -> &'static str {
         self.limits.board
     }
 
-    /// Where cargo puts the image.
+    /// The path at which cargo puts the image.
     pub(crate) fn image(&self) -> PathBuf {
         places::firmware_target().join(self.target).join("release").join(self.package)
     }
 
-    /// Where tests look for the image.
+    /// The variable in which tests find the path of the image.
     pub(crate) fn image_variable(&self) -> String {
         format!("SER_IMAGE_{}", self.as_identifier().to_uppercase())
     }
 
-    /// What the name of a test over its image ends with.
+    /// How the name of a test over its image ends.
     pub(crate) fn as_identifier(&self) -> String {
         self.name().replace('-', "_")
     }

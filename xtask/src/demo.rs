@@ -15,7 +15,7 @@ Examples:
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
-    /// Take the ARM image in QEMU for the recorder.
+    /// Use the ARM image in QEMU as the recorder.
     #[arg(long)]
     qemu: bool,
 

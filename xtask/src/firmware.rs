@@ -8,12 +8,12 @@ use crate::steps::Result;
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask firmware
-  cargo xtask firmware --board mps2-an385 --stack    and where the stack goes
+  cargo xtask firmware --board mps2-an385 --stack    also where the stack is used
   DEFMT_LOG=debug cargo xtask firmware               with more in the log
 
-What an image has to keep to, read off the image itself: its budgets of flash and variables; \
-a stack that holds the worst case, and an overflow that ends in a fault; no way to a panic; \
-nothing in flash that is wanted while the flash is being erased.";
+The checks read the image itself. It must stay within its budgets of flash and variables. Its \
+stack must hold the worst case, and an overflow must end in a fault. Nothing may panic. Nothing \
+that is needed while the flash is being erased may be in flash.";
 
 /// Build the images for the boards and check whether they may be flashed.
 #[derive(Debug, clap::Args)]
@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &Arguments, installing: Installing) -> Result<()> {
     };
     let (found, missing) = toolchains(&boards, installing);
     let checked = build_and_check(&found, arguments.stack);
-    // The other images have been built and checked all the same.
+    // The other images have been built and checked by now.
     match (checked, missing.into_iter().next()) {
         (Ok(_), Some(missing)) => Err(missing),
         (checked, _) => checked.map(drop),

@@ -11,7 +11,7 @@ use crate::steps::{self, Failure, Result, heading, unrelated, works};
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask flash --board stm32f407
-  cargo xtask flash --board stm32f407 --probe 0483:374b    where several probes are connected
+  cargo xtask flash --board stm32f407 --probe 0483:374b    if several probes are connected
   cargo xtask flash --board stm32f407 -- --speed 1000      with options of `probe-rs download`
 
 `probe-rs list` shows the probes that are connected. The board restarts with the new image.";
@@ -22,12 +22,11 @@ const PROBE_RS: &str = "probe-rs";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
-    /// Which board it is.
+    /// The board to flash.
     #[arg(long, value_parser = images::board)]
     board: &'static Board,
 
-    /// Which probe, as `probe-rs list` shows it; there is no need to say it where only one is
-    /// connected.
+    /// The probe, as `probe-rs list` shows it; only needed if several are connected.
     #[arg(long, value_name = "VID:PID[:SERIAL]")]
     probe: Option<String>,
 
@@ -72,9 +71,9 @@ fn emulated(board: &Board) -> Failure {
 
 fn missing() -> Failure {
     Failure::new(
-        "probe-rs is missing, which drives the debug probe; get it with\n  \
+        "probe-rs, which drives the debug probe, is missing; get it with\n  \
          cargo install probe-rs-tools --locked\n\
-         or as a program that is ready to run from \
+         or download it ready to run from \
          https://probe.rs/docs/getting-started/installation",
     )
 }

@@ -13,21 +13,21 @@ Examples:
   cargo xtask fuzz --list                      the names of the targets
   cargo xtask fuzz                             every target, a minute each
   cargo xtask fuzz --seconds 600 node          one target, ten minutes
-  cargo test -p ser-tests --test fuzz_seeds    what is known already: needs no fuzzer
+  cargo test -p ser-tests --test fuzz_seeds    the known inputs: needs no fuzzer
 
-Needs the nightly toolchain, cargo-fuzz and a C++ compiler. What was found on the way is kept in \
-tests/fuzz/corpus and used again the next time; see tests/fuzz/README.md.";
+Needs the nightly toolchain, cargo-fuzz and a C++ compiler. Inputs that reach new code \
+are kept in tests/fuzz/corpus for the next run; see tests/fuzz/README.md.";
 
 /// The longest search, in seconds: libFuzzer keeps it in an `int`.
 const MAX_SECONDS: i64 = i32::MAX as i64;
 
-/// The toolchain that knows how to instrument.
+/// The toolchain that can instrument programs.
 const TOOLCHAIN: &str = "nightly";
 
-/// One input may take so long, in seconds; the slowest take a tenth of one.
+/// Time limit for one input, in seconds; the slowest take a tenth of a second.
 const INPUT_SECONDS: u32 = 20;
 
-/// Memory that a target may take, in megabytes.
+/// Memory limit of a target, in megabytes.
 const MEMORY_MB: u32 = 1024;
 
 /// Look for input that breaks the protocol, the recorder or its host, one target after the other.
@@ -75,10 +75,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if broken.is_empty() {
         return Ok(());
     }
-    Err(Failure::new(format!("input was found that breaks a property.\n{}", broken.concat())))
+    Err(Failure::new(format!("some input breaks a property.\n{}", broken.concat())))
 }
 
-/// The targets that are meant: those that are named, or all there are.
+/// The targets that are named, or all of them.
 fn chosen(named: &[String], all: Vec<String>) -> Result<Vec<String>> {
     match named.iter().find(|target| !all.contains(target)) {
         Some(unknown) => {
@@ -93,7 +93,7 @@ fn folder() -> PathBuf {
     places::root().join("tests/fuzz")
 }
 
-/// The names of the programs.
+/// The names of all targets.
 fn targets() -> Result<Vec<String>> {
     let programs = folder().join("fuzz_targets");
     let files = fs::read_dir(&programs)
@@ -117,26 +117,26 @@ fn check_tools() -> Result<()> {
     }
     Err(Failure::new(format!(
         "the fuzzer cannot run yet. Install what is missing and try again:{missing}\n\
-         It also needs a C++ compiler, and Linux or macOS. What is known already is checked \
-         without all that:\n  \
+         It also needs a C++ compiler, and Linux or macOS. The known inputs are checked \
+         without any of these:\n  \
          cargo test -p ser-tests --test fuzz_seeds"
     )))
 }
 
-/// A program of the toolchain that instruments.
+/// A program of the instrumenting toolchain.
 fn nightly(program: &str) -> Command {
     let mut command = steps::unrelated(program);
     command.env("RUSTUP_TOOLCHAIN", TOOLCHAIN).current_dir(places::root());
     command
 }
 
-/// Writes the seeds to where the fuzzer looks for input to begin with.
+/// Writes the seeds into the corpus, where the fuzzer begins.
 fn plant_seeds(target: &str) -> Result<()> {
     let mut plant = helper("plant", target);
     steps::run(plant.arg(folder().join("corpus").join(target)))
 }
 
-/// The program that knows the targets without a fuzzer.
+/// The program that runs the targets without a fuzzer.
 fn helper(verb: &str, target: &str) -> Command {
     let mut cargo = steps::cargo();
     cargo.args(["run", "--quiet", "-p", "ser-trial", "--example", "fuzzing", "--", verb, target]);
@@ -145,8 +145,8 @@ fn helper(verb: &str, target: &str) -> Command {
 
 fn fuzzer(target: &str, seconds: u32) -> Command {
     let mut cargo = nightly("cargo");
-    // Nothing here is unsafe but the windows of boards, so what sanitizers look for cannot be
-    // found, and it is twice as fast.
+    // The only `unsafe` code is in the windows of boards. Sanitizers would find nothing else here,
+    // and without them the fuzzer is twice as fast.
     cargo.args(["fuzz", "run", "--fuzz-dir", "tests/fuzz", "--sanitizer", "none", "--target-dir"]);
     cargo.arg(target_folder()).args([target, "--"]);
     cargo.arg(format!("-max_total_time={seconds}")).arg(format!("-timeout={INPUT_SECONDS}"));
@@ -154,7 +154,7 @@ fn fuzzer(target: &str, seconds: u32) -> Command {
     cargo
 }
 
-/// Where the programs are built: apart from everything else, for they have another compiler.
+/// Where the targets are built. The folder is separate because the compiler is another one.
 fn target_folder() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {
         Some(target) => places::root().join(target).join("fuzz"),
@@ -162,13 +162,13 @@ fn target_folder() -> PathBuf {
     }
 }
 
-/// What has been found to break the target, this time or before.
+/// The inputs that broke the target, now or earlier.
 fn artifacts(target: &str) -> BTreeSet<PathBuf> {
     let files = fs::read_dir(folder().join("artifacts").join(target));
     files.into_iter().flatten().filter_map(|file| Some(file.ok()?.path())).collect()
 }
 
-/// How to go on from what was found.
+/// How to continue with the inputs that were found.
 fn describe(target: &str, found: &[PathBuf]) -> String {
     let mut text = format!("\n{target}:\n");
     for file in found {
@@ -181,8 +181,8 @@ fn describe(target: &str, found: &[PathBuf]) -> String {
              none {target} {file}\n"
         );
     }
-    text + "  Once it is understood, a test in the crate and a seed with a telling name keep it \
-     from coming back.\n"
+    text + "  Once the fault is understood, a test in the crate and a seed with a telling name \
+     keep it from coming back.\n"
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The images: built and checked.
+//! Builds and checks the images.
 
 use std::fmt::Display;
 use std::path::PathBuf;
@@ -17,8 +17,8 @@ pub(crate) fn board(name: &str) -> std::result::Result<&'static Board, String> {
     Board::named(name).ok_or_else(|| format!("the boards are {}", names.join(", ")))
 }
 
-/// Boards that can be built for, each with its toolchain; and why the others cannot, which has been
-/// said by then.
+/// The boards that can be built for, each with its toolchain, and the reasons why the others
+/// cannot. The reasons have already been reported.
 pub(crate) type Toolchains<'a> = (Vec<(&'a Board, CrossToolchain)>, Vec<Failure>);
 
 /// Finds a toolchain for each board.
@@ -37,7 +37,7 @@ pub(crate) fn toolchains<'a>(boards: &[&'a Board], installing: Installing) -> To
     (found, missing)
 }
 
-/// Builds the image for the emulator, which has to be there; gives its file.
+/// Builds the image for the emulator, which must be installed, and returns its path.
 pub(crate) fn build_emulated(installing: Installing) -> Result<PathBuf> {
     emulator::find(installing)?;
     let toolchain = cross::find_one(MPS2_AN385.target, installing)?;
@@ -45,13 +45,13 @@ pub(crate) fn build_emulated(installing: Installing) -> Result<PathBuf> {
     build(&toolchain, &MPS2_AN385)
 }
 
-/// Builds one image; gives its file.
+/// Builds one image and returns its path.
 fn build(toolchain: &CrossToolchain, board: &Board) -> Result<PathBuf> {
     steps::run(toolchain.cargo("build").args(["--release", "--package", board.package]))?;
     Ok(board.image())
 }
 
-/// Builds images and checks them. One that may not be flashed is a failure.
+/// Builds and checks images. An image that must not be flashed is a failure.
 pub(crate) fn build_and_check(
     boards: &[(&Board, CrossToolchain)],
     stack: bool,

@@ -13,9 +13,9 @@ use crate::steps::{self, Failure, Result, heading, note};
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask lint              installs what is missing of rustfmt, clippy and the cross toolchain
+  cargo xtask lint              installs rustfmt, clippy and the cross toolchain if missing
   cargo xtask lint --offline    installs nothing
-  cargo fmt --all               mends the format; in firmware/, too";
+  cargo fmt --all               fixes the format; also run it in firmware/";
 
 /// Check format, clippy and documentation of both workspaces; warnings are errors.
 #[derive(Debug, clap::Args)]
@@ -32,8 +32,7 @@ pub(crate) fn run(_arguments: &Arguments, installing: Installing) -> Result<()> 
     firmware(&found, demand.is_strict())
 }
 
-/// All that needs no cross toolchain. A missing component is a failure where nothing may be left
-/// out.
+/// The checks that need no cross toolchain. If `strict`, a missing component is a failure.
 pub(crate) fn host(strict: bool) -> Result<()> {
     if strict {
         components::find(Installing::Forbidden)?;
@@ -61,7 +60,7 @@ pub(crate) fn host(strict: bool) -> Result<()> {
     ]))
 }
 
-/// What is flashed. A toolchain without clippy is a failure where nothing may be left out.
+/// Checks the firmware. If `strict`, a toolchain without clippy is a failure.
 pub(crate) fn firmware(boards: &[(&Board, CrossToolchain)], strict: bool) -> Result<()> {
     for (board, toolchain) in boards {
         heading(&format!("Clippy on the firmware for {}", board.name()));

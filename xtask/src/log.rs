@@ -1,4 +1,4 @@
-//! `log`: what an image has logged, as text.
+//! `log`: shows the log of an image as text.
 
 use std::path::PathBuf;
 
@@ -6,16 +6,16 @@ const EXAMPLES: &str = "\
 Examples:
   cargo xtask qemu --pty /tmp/ser --log ser.log     leaves a log
   cargo xtask log ser.log                           as text
-  cargo xtask log --follow ser.log                  and what is still to come, until Ctrl-C";
+  cargo xtask log --follow ser.log                  and what follows, until Ctrl-C";
 
 /// Print the log that an image has left in a file.
 ///
-/// The log holds numbers instead of text; the texts are in the image. It has to be the very image
-/// that wrote the log.
+/// The log holds numbers instead of text, and the texts are in the image. So the image must be the
+/// one that wrote the log.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
-    /// What `ser-cli sim --log` has written.
+    /// The file that `ser-cli sim --log` wrote.
     file: PathBuf,
 
     /// The image that wrote it; by default the one that was built last.
@@ -27,7 +27,7 @@ pub(crate) struct Arguments {
     follow: bool,
 }
 
-/// This program without the decoder: run the one with it.
+/// Without the decoder, this program runs the one that has it.
 #[cfg(not(feature = "log"))]
 pub(crate) fn run(arguments: &Arguments) -> crate::steps::Result<()> {
     use crate::{places, steps};
@@ -94,7 +94,7 @@ mod decoding {
                         "(a record that this image cannot have written)".to_owned()
                     }
                 };
-                // Whoever sent the file may have written anything into it.
+                // The file may come from anywhere and hold anything.
                 steps::print(format_args!("{}\n", Harmless(line)))?;
             }
         }

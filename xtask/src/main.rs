@@ -1,9 +1,9 @@
-//! Everything about the project that is one command: `cargo xtask --help`.
+//! The tasks of the project, each as one command: `cargo xtask --help`.
 //!
-//! A verb is a file. What verbs share: [`setup`] finds or installs tools, [`steps`] runs them and
-//! says how to repeat what failed. [`boards`] says what there is to build, [`images`] builds it and
-//! has `image-check` say whether it may be flashed; [`plugin`] and [`ser_cli`] are built for
-//! several verbs.
+//! Each verb is a file. The verbs share these modules: [`setup`] finds or installs tools. [`steps`]
+//! runs them and tells how to repeat a failed step. [`boards`] lists what can be built. [`images`]
+//! builds it and has `image-check` check it. [`plugin`] and [`ser_cli`] are built for several
+//! verbs.
 
 mod boards;
 mod demo;
@@ -29,12 +29,11 @@ use clap::{Parser, Subcommand};
 
 use setup::demand::Installing;
 
-/// Everything about the project that is one command. Missing tools are installed where that can be
-/// done.
+/// The tasks of the project, each as one command. Missing tools are installed if possible.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", version, max_term_width = 100)]
 struct Arguments {
-    /// Install no tools; say what is missing.
+    /// Install no tools; only report what is missing.
     #[arg(long, global = true)]
     offline: bool,
 
@@ -86,8 +85,8 @@ mod tests {
 
     use super::Arguments;
 
-    /// Prose is for clap to break, which knows how wide the terminal is: a line that is broken by
-    /// hand at more than that is broken twice.
+    /// clap breaks prose at the width of the terminal. A line that was broken by hand at a greater
+    /// width would be broken twice.
     #[test]
     fn examples_fit_the_narrowest_width_that_help_is_printed_in() {
         const WIDTH: usize = 100;

@@ -1,4 +1,4 @@
-//! Where things are.
+//! The folders of the project.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ pub(crate) fn root() -> &'static Path {
     here.parent().unwrap_or(here)
 }
 
-/// The workspace of what is flashed.
+/// The workspace of the firmware.
 pub(crate) fn firmware() -> PathBuf {
     root().join("firmware")
 }
@@ -21,7 +21,7 @@ pub(crate) fn host_target() -> PathBuf {
     }
 }
 
-/// Where the firmware is built: apart from the host's crates, for it may have another compiler.
+/// Where the firmware is built. The folder is separate because the compiler may be another one.
 pub(crate) fn firmware_target() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {
         Some(target) => root().join(target).join("firmware"),

@@ -1,4 +1,4 @@
-//! The emulator's plugin, which tells of each instruction of the image.
+//! The emulator's plugin, which reports each instruction of the image.
 
 use std::path::PathBuf;
 
@@ -6,13 +6,13 @@ use crate::places;
 use crate::setup::emulator;
 use crate::steps::{self, Failure, Result, heading};
 
-/// What QEMU loads to tell of instructions.
+/// The package of the plugin.
 const PLUGIN: &str = "image-bench-plugin";
 
-/// From this version on QEMU has plugins name the second version of its interface.
+/// The first version of QEMU with the second version of its plugin interface.
 const SECOND_INTERFACE: u32 = 9;
 
-/// Builds the emulator's plugin for the emulator that there is; gives its file.
+/// Builds the plugin for the installed emulator and returns its path.
 pub(crate) fn build() -> Result<PathBuf> {
     if cfg!(not(target_os = "linux")) {
         return Err(Failure::new(

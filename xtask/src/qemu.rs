@@ -1,4 +1,4 @@
-//! `qemu`: the ARM image in the emulator, on a pseudo-terminal, a TCP port or a Genius bus.
+//! `qemu`: runs the ARM image in the emulator, on a pseudo-terminal, a TCP port or a Genius bus.
 
 use std::ffi::OsString;
 

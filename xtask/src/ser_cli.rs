@@ -1,4 +1,4 @@
-//! `ser-cli`, which several verbs run.
+//! `ser-cli`, which several verbs use.
 
 use std::process::Command;
 
@@ -13,7 +13,7 @@ pub(crate) fn build() -> Result<()> {
     Ok(())
 }
 
-/// `ser-cli` with this subcommand. File names among the options are meant from where the user is.
+/// `ser-cli` with this subcommand. File names in the options are relative to the user's folder.
 pub(crate) fn command(subcommand: &str) -> Command {
     let mut command = steps::cargo();
     if let Ok(here) = std::env::current_dir() {

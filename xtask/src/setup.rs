@@ -1,8 +1,8 @@
-//! Finds the tools that do not come with Rust, and installs what is missing where that can be done
-//! unasked.
+//! Finds the tools that do not come with Rust, and installs missing ones if that needs no question.
 //!
-//! [`demand`] says what a run wants: what may be installed, and whether anything may be left out.
-//! Each other file knows one kind of tool: whether it is there, and how to install it.
+//! [`demand`] says what a run requires: which tools may be installed, and whether anything may be
+//! left out. Each other file handles one kind of tool: whether it is installed, and how to install
+//! it.
 
 mod apt;
 pub(crate) mod components;
@@ -16,12 +16,11 @@ use crate::steps::{Result, note};
 use cross::Target;
 use demand::{Demand, Installing, Kind, Plan, Tool};
 
-/// Makes ready what tests, checks and images need: says first what is missing and what will be
-/// installed, installs it, and says what is left out for want of a tool. Only tools of these kinds
-/// count.
+/// Prepares the tools for tests, checks and images, of these `kinds` only. It lists the missing
+/// tools, installs those that it may, and reports what is left out without the others.
 ///
 /// # Errors
-/// Something is left out and the demand is strict.
+/// If something is left out although the demand is strict.
 pub(crate) fn make_ready(demand: Demand, targets: &[Target], kinds: &[Kind]) -> Result<()> {
     let missing = || {
         let mut missing = missing(targets);
@@ -37,7 +36,7 @@ pub(crate) fn make_ready(demand: Demand, targets: &[Target], kinds: &[Kind]) -> 
     Ok(())
 }
 
-/// The tools that are not there.
+/// The tools that are not installed.
 fn missing(targets: &[Target]) -> Vec<&'static Tool> {
     let mut missing = Vec::new();
     let mut look = |there: bool, tool| _ = (!there).then(|| missing.push(tool));
@@ -49,7 +48,7 @@ fn missing(targets: &[Target]) -> Vec<&'static Tool> {
     missing
 }
 
-/// Installs what can be. What cannot is missing afterwards, and the reason has been said.
+/// Installs what it can. What fails stays missing, and the reason has been reported.
 fn install(plan: &Plan, targets: &[Target]) {
     for tool in &plan.install {
         let installed = match tool.kind {

@@ -1,4 +1,4 @@
-//! `simulate`: the whole system in virtual time, left to chance.
+//! `simulate`: runs the whole system in virtual time, with random operations.
 
 use std::ffi::OsString;
 

@@ -1,4 +1,4 @@
-//! Runs other programs: headings with the time, and how to repeat what failed.
+//! Runs other programs: prints headings with the time, and tells how to repeat a failed step.
 
 use std::ffi::OsStr;
 use std::fmt;
@@ -10,12 +10,12 @@ use std::time::{Duration, Instant};
 
 use ser_console::Harmless;
 
-/// Why a verb ended early; says what to do.
+/// Why a verb ended early, with a hint at what to do.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// What is to be told.
+    /// The message for the user.
     Told(String),
-    /// Standard output takes nothing more.
+    /// Standard output cannot be written any more.
     Unwritten(io::Error),
 }
 
@@ -24,7 +24,7 @@ impl Failure {
         Failure::Told(text.into())
     }
 
-    /// Tells the user; gives the exit code.
+    /// Tells the user and returns the exit code.
     pub(crate) fn report(&self) -> ExitCode {
         if let Failure::Unwritten(error) = self {
             return ser_console::unwritten(error);
@@ -45,7 +45,7 @@ impl fmt::Display for Failure {
     }
 }
 
-/// On standard error. Nobody is left to be told when that is gone.
+/// Prints on standard error. When that is gone, nobody can be told.
 pub(crate) fn say(line: &dyn fmt::Display) {
     let _ = writeln!(io::stderr(), "{line}");
 }
@@ -57,7 +57,7 @@ pub(crate) fn print(text: impl fmt::Display) -> Result<()> {
 
 pub(crate) type Result<T> = std::result::Result<T, Failure>;
 
-/// The steps so far, each with its beginning.
+/// The steps so far, each with its start.
 static STEPS: Mutex<Vec<(String, Instant)>> = Mutex::new(Vec::new());
 
 /// Announces the next step, with the time since the first one.
@@ -71,11 +71,11 @@ pub(crate) fn heading(text: &str) {
 /// Prints how long each step took.
 pub(crate) fn print_durations() {
     let steps = STEPS.lock().unwrap_or_else(PoisonError::into_inner);
-    say(&"\n==> Minutes of each step");
+    say(&"\n==> Time of each step (minutes:seconds)");
     durations(&steps, Instant::now()).iter().for_each(|line| say(line));
 }
 
-/// A line for each step, and one for all together.
+/// A line for each step, and one for the sum.
 fn durations(steps: &[(String, Instant)], end: Instant) -> Vec<String> {
     let ends = steps.iter().skip(1).map(|&(_, began)| began).chain([end]);
     let line = |took, text: &str| format!("{:>8}  {text}", minutes(took));
@@ -92,12 +92,12 @@ fn minutes(time: Duration) -> String {
     format!("{}:{:02}", seconds / 60, seconds % 60)
 }
 
-/// A remark on what is not done, and why.
+/// Prints a note on what is not done, and why.
 pub(crate) fn note(text: &str) {
     say(&format_args!("    {}", Harmless(text)));
 }
 
-/// Variables that cargo and rustup set for xtask, and that mislead other toolchains.
+/// Variables that cargo and rustup set for xtask, which would mislead other toolchains.
 const OURS: [&str; 14] = [
     "CARGO",
     "CARGO_BIN_NAME",
@@ -115,7 +115,7 @@ const OURS: [&str; 14] = [
     "RUST_RECURSION_COUNT",
 ];
 
-/// A program that knows nothing of the cargo that runs xtask.
+/// A program that must know nothing of the cargo that runs xtask.
 pub(crate) fn unrelated(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     OURS.into_iter().for_each(|name| _ = command.env_remove(name));
@@ -138,7 +138,7 @@ pub(crate) fn cargo() -> Command {
     command
 }
 
-/// Runs a program to its end; it prints what it likes.
+/// Runs a program to its end, with its output shown.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
     let status = command.status().map_err(|error| {
         Failure::new(format!("cannot run {}: {error}", command.get_program().display()))
@@ -153,7 +153,7 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     }
 }
 
-/// Becomes the program: Ctrl-C and exit status are between it and whoever called us.
+/// Replaces this process by the program, so that Ctrl-C and the exit status are its own.
 pub(crate) fn become_program(command: &mut Command) -> Result<()> {
     #[cfg(unix)]
     {
@@ -165,18 +165,18 @@ pub(crate) fn become_program(command: &mut Command) -> Result<()> {
     run(command)
 }
 
-/// What a program prints, if it can be run and succeeds.
+/// The output of a program, if it can be run and succeeds.
 pub(crate) fn output(command: &mut Command) -> Option<String> {
     let output = command.output().ok().filter(|output| output.status.success())?;
     Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
-/// Whether a program can be run and succeeds, silently.
+/// Whether a program can be run and succeeds; its output is not shown.
 pub(crate) fn works(command: &mut Command) -> bool {
     output(command).is_some()
 }
 
-/// The command as one would type it.
+/// The command as a person would type it.
 fn repeat(command: &Command) -> String {
     let mut line = String::new();
     if let Some(directory) =
@@ -185,7 +185,8 @@ fn repeat(command: &Command) -> String {
         line += &format!("cd {} && ", quoted(directory.as_os_str()));
     }
     for (name, value) in command.get_envs() {
-        // Who types the command has no variables to remove, and no toolchain chosen by cargo.
+        // A person who types the command has no variables to remove, and no toolchain chosen by
+        // cargo.
         if let Some(value) = value.filter(|_| name != "RUSTUP_TOOLCHAIN") {
             line += &format!("{}={} ", name.display(), quoted(value));
         }

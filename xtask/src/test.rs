@@ -1,4 +1,4 @@
-//! `test`: all there is to check, with the tests last.
+//! `test`: runs all checks, with the tests last.
 
 use std::process::Command;
 
@@ -12,23 +12,22 @@ use crate::{images, lint, plugin};
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask test              installs cross toolchain and emulator where they are missing
-  cargo xtask test --all        installs the programs of others that single tests need, too
+  cargo xtask test              installs cross toolchain and emulator if missing
+  cargo xtask test --all        also installs external programs for single tests
   cargo xtask test --offline    installs nothing
   cargo xtask test --strict     as in CI: nothing is left out
-  cargo test                    only the tests that need no other program, nor minutes
+  cargo test                    only the fast tests that need no other program
 
-What is missing, and will be installed, is said first. What cannot be built or run here is left \
-out, and \
-that is said, too; with --strict, and where CI is \"true\", it is a failure.";
+Missing tools that will be installed are listed first. What cannot be built or run here is left \
+out, with a note. With --strict, or if the variable CI is \"true\", that is a failure.";
 
-/// Where the tests in the emulator look for the bound of its image's stack, in bytes.
+/// The variable in which the tests in the emulator find their image's stack bound, in bytes.
 const STACK_VARIABLE: &str = "SER_STACK_BOUND_MPS2_AN385";
 
-/// What the names of tests over the image of a board begin with.
+/// How the names of tests over the image of a board begin.
 const IMAGE_TEST: &str = "image_of_";
 
-/// Where those that count instructions look for the emulator's plugin.
+/// The variable in which the tests that count instructions find the emulator's plugin.
 const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";
 
 /// Check format, clippy, documentation and images; run all tests, including those in the emulator.
@@ -59,8 +58,8 @@ fn everything(demand: Demand) -> Result<()> {
     tests(demand, &checked)
 }
 
-/// Builds and runs the tests; those in the emulator where it is there and its image was built
-/// above.
+/// Builds and runs the tests. Those in the emulator run only if it is installed and its image was
+/// built.
 fn tests(demand: Demand, images: &[Checked]) -> Result<()> {
     heading("Building the tests");
     steps::run(steps::cargo().args(["test", "--workspace", "--no-run"]))?;
@@ -75,7 +74,7 @@ fn tests(demand: Demand, images: &[Checked]) -> Result<()> {
     };
     let plugin = match plugin::build() {
         Ok(plugin) => Some(plugin),
-        // Those that need it are built for Linux only.
+        // The tests that need the plugin are built for Linux only.
         Err(failure) if cfg!(not(target_os = "linux")) && !demand.is_strict() => {
             note(&format!("left out: {failure}"));
             None
@@ -94,14 +93,14 @@ fn tests(demand: Demand, images: &[Checked]) -> Result<()> {
     steps::run(&mut tests)
 }
 
-/// All tests but those whose programs are missing.
+/// All tests except those whose programs are missing.
 fn all_tests() -> Command {
     let mut tests = steps::cargo();
     tests.args(["test", "--workspace", "--", "--include-ignored"]).args(programs::skipped());
     tests
 }
 
-/// Says to tests where the images are, and leaves out those over an image that was not built.
+/// Tells tests the paths of the images, and leaves out tests over an image that was not built.
 fn on_images(tests: &mut Command, images: &[Checked]) {
     for board in &BOARDS {
         match images.iter().find(|image| image.board == board.name()) {
@@ -113,7 +112,7 @@ fn on_images(tests: &mut Command, images: &[Checked]) {
 
 /// The ignored tests that need no emulator.
 fn ignored_tests(images: &[Checked]) -> Result<()> {
-    heading("Tests with programs of others");
+    heading("Tests with external programs");
     let mut others = steps::cargo();
     others
         .args(["test", "--workspace", "--", "--ignored", programs::MODULE])
@@ -143,7 +142,7 @@ mod tests {
         Checked { board, file: PathBuf::from("elf"), outcomes, stack_bytes: None, stack_paths }
     }
 
-    /// The variables and the arguments of a run with these images.
+    /// The variables and the arguments that a run with these images gets.
     fn told(images: &[Checked]) -> (Vec<String>, Vec<String>) {
         let mut command = Command::new("cargo");
         on_images(&mut command, images);

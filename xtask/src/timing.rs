@@ -1,4 +1,4 @@
-//! `timing`: the instructions of the ARM image, counted in the emulator.
+//! `timing`: counts the instructions of the ARM image in the emulator.
 
 use crate::setup::demand::Installing;
 use crate::steps::{self, Result, heading};
@@ -10,15 +10,15 @@ Examples:
   cargo xtask timing --load-seconds 60    with a minute of load
 
 Seconds are of virtual time, which counts instructions: the numbers are the same in every run \
-and on every machine. Exit code 1 when something is over budget, the capture interrupt late, \
-or an event unaccounted for.";
+and on every machine. Exit code 1 if something is over budget, the capture interrupt is \
+late, or an event is unaccounted for.";
 
-/// Count the instructions of the ARM image in the emulator, hold them against the budgets, and
+/// Count the instructions of the ARM image in the emulator, compare them with the budgets, and
 /// account for every event of a load.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
-    /// How long all inputs change in every millisecond, in seconds.
+    /// Seconds of load, in which all inputs change in every millisecond.
     #[arg(
         long,
         value_name = "N",

@@ -1,4 +1,4 @@
-//! What `xtask` prints, on a full disk, for a reader that has gone, and with arguments that a
+//! What `xtask` prints on a full disk, for a reader that has gone, and with arguments that a
 //! terminal would obey.
 #![cfg(unix)]
 

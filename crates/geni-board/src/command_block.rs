@@ -1,4 +1,4 @@
-//! The command block (chapter 10): four commands, one at a time.
+//! The command block (chapter 10): four commands, carried out one at a time.
 
 use crate::datagram::{
     Completion, Data, MAX_DEVICE_NUMBER, ReceivedDatagram, Transmission, TransmitPriority,
@@ -6,15 +6,15 @@ use crate::datagram::{
 use crate::map;
 use crate::ram::SharedRam;
 
-/// Asks the board to set the status to 0 as soon as it has taken the command, and to say no more
-/// about it: "bit 8".
+/// Asks the board to set the status to 0 as soon as it has taken the command, and to report nothing
+/// more about it: "bit 8".
 const CLEAR_STATUS: u8 = 0x80;
 
 /// Status that the host writes to start a command.
 const INCOMING: u8 = 1;
 
-/// Marks a directed datagram. What else there may be in the byte means broadcast: 0 by the table, 2
-/// by the example structure.
+/// Marks a directed datagram. Any other value means broadcast: the table has 0, the example
+/// structure has 2.
 const DIRECTED: u8 = 1;
 
 /// The commands.
@@ -46,11 +46,11 @@ impl CommandCode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CommandStatus {
-    /// 0: no command, or one of which nothing was to be known.
+    /// 0: no command, or a command whose outcome was not asked for.
     Cleared,
     /// 1, 2: the board has not finished. Also 3, which is neither free nor complete.
     Pending,
-    /// 4.
+    /// 4: the command is complete.
     Complete,
     /// 8: the command makes no sense, or there is no datagram to read.
     SyntaxError,
@@ -61,7 +61,7 @@ pub enum CommandStatus {
 }
 
 impl CommandStatus {
-    /// From the byte in the command block.
+    /// The status that the byte in the command block stands for.
     #[must_use]
     pub const fn from_byte(byte: u8) -> CommandStatus {
         match byte {
@@ -85,26 +85,26 @@ impl CommandStatus {
     }
 }
 
-/// Starts a command whose options are in place. The status byte goes last: it is what interrupts
-/// the board.
+/// Starts a command whose options are in place. The status byte is written last because it
+/// interrupts the board.
 fn start<R: SharedRam>(ram: &mut R, command: u8) {
     ram.write(map::COMMAND_CODE, command);
     ram.write(map::COMMAND_STATUS, INCOMING);
 }
 
-/// Asks for the oldest datagram of the receive queue.
+/// Starts a Read Datagram, which fetches the oldest datagram of the receive queue.
 pub(crate) fn start_read<R: SharedRam>(ram: &mut R) {
     start(ram, CommandCode::Read.to_byte());
 }
 
-/// Asks the board to take the setup table.
+/// Starts a Configuration Change, which makes the board take the setup table.
 pub(crate) fn start_configure<R: SharedRam>(ram: &mut R) {
     start(ram, CommandCode::Configure.to_byte());
 }
 
-/// Sends a datagram.
+/// Starts sending a datagram.
 pub(crate) fn start_transmission<R: SharedRam>(ram: &mut R, transmission: &Transmission) {
-    // The capacity of the data is 134.
+    // The capacity of the data is 134, so the length fits a byte.
     let len = u8::try_from(transmission.data.len()).unwrap_or(0);
     let priority = match transmission.priority {
         TransmitPriority::Normal => 0,
@@ -132,7 +132,7 @@ pub(crate) fn start_transmission<R: SharedRam>(ram: &mut R, transmission: &Trans
     start(ram, command);
 }
 
-/// What a finished Read Datagram command has brought. `None` when it makes no sense.
+/// The datagram that a finished Read Datagram command has fetched; `None` when it makes no sense.
 pub(crate) fn read_datagram<R: SharedRam>(ram: &R) -> Option<ReceivedDatagram> {
     let source = ram.read(map::READ_SOURCE);
     if source > MAX_DEVICE_NUMBER {
@@ -148,10 +148,11 @@ pub(crate) fn read_datagram<R: SharedRam>(ram: &R) -> Option<ReceivedDatagram> {
     })
 }
 
-/// The reply that a finished Transmit Datagram with Reply command has brought. `None` when it makes
+/// The reply that a finished Transmit Datagram with Reply command has fetched; `None` when it makes
 /// no sense.
 ///
-/// The board may have cleared the block, so who replied to what is not read back.
+/// The board may have cleared the block, so the source and the codes of the reply are not read from
+/// it.
 pub(crate) fn read_reply<R: SharedRam>(
     ram: &R,
     source: u8,

@@ -1,4 +1,4 @@
-//! Datagrams on their way to and from the bus (chapter 10).
+//! Datagrams to and from the bus (chapter 10).
 
 use core::fmt;
 
@@ -6,10 +6,10 @@ use heapless::Vec;
 
 use crate::map;
 
-/// Most data bytes of a datagram: 128, and up to six that say where they belong.
+/// Most data bytes of a datagram: 128, plus up to six that tell where they belong.
 pub const MAX_DATA_LEN: usize = map::READ_BUFFER.len as usize;
 
-/// Highest device number.
+/// Highest bus address.
 pub const MAX_DEVICE_NUMBER: u8 = map::DEVICE_COUNT - 1;
 
 /// Highest function code that the board sends.
@@ -21,13 +21,13 @@ const BROADCAST: u8 = 255;
 /// Data bytes of a datagram.
 pub type Data = Vec<u8, MAX_DATA_LEN>;
 
-/// Who is to get a datagram.
+/// Where a datagram goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Destination {
-    /// One device, 0–31.
+    /// One device, by its bus address, 0–31.
     Device(u8),
-    /// All of them. The board receives its own broadcasts too; the driver drops them.
+    /// All devices. The board also receives its own broadcasts; the driver drops them.
     Broadcast,
 }
 
@@ -40,26 +40,26 @@ impl Destination {
     }
 }
 
-/// Which datagrams go first.
+/// How urgent a datagram is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TransmitPriority {
-    /// In a bus scan in which nobody else has sent one.
+    /// Sent in a bus scan in which no other device has sent one.
     #[default]
     Normal,
-    /// In the board's next turn. Lengthens that scan.
+    /// Sent on the board's next turn, which lengthens that scan.
     High,
 }
 
-/// What is to be known about a datagram that was sent.
+/// What the driver is to find out about a datagram that it sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Completion {
-    /// That the board has taken it. Whether it arrived stays unknown.
+    /// Whether the board has taken it. Whether it arrived stays unknown.
     Taken,
-    /// That it was acknowledged.
+    /// Whether it was acknowledged.
     Acknowledged,
-    /// The reply. The board does nothing else meanwhile, up to 10 s.
+    /// The reply. The board carries out no other command until the reply comes, up to 10 s.
     Reply {
         /// Subfunction code of the reply.
         subfunction: u8,
@@ -70,7 +70,7 @@ pub enum Completion {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transmission {
-    /// Who is to get it.
+    /// Where it goes.
     pub destination: Destination,
     /// Function code, up to 112.
     pub function: u8,
@@ -78,14 +78,14 @@ pub struct Transmission {
     pub subfunction: u8,
     /// How urgent it is.
     pub priority: TransmitPriority,
-    /// What is to be known.
+    /// What the driver is to find out about it.
     pub completion: Completion,
     /// The data.
     pub data: Data,
 }
 
 impl Transmission {
-    /// What the board would refuse is refused here.
+    /// Refuses what the board would refuse.
     pub(crate) fn check(&self) -> Result<(), TransmitError> {
         match (self.destination, self.completion) {
             (Destination::Device(number), _) if number > MAX_DEVICE_NUMBER => {
@@ -107,15 +107,15 @@ impl Transmission {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TransmitError {
-    /// The board is starting up, off the bus or failed.
+    /// The board is starting up, is off the bus or has failed.
     NotReady,
-    /// The last datagram has not been dealt with.
+    /// The last datagram is still in progress.
     Busy,
-    /// Device numbers are 0–31.
+    /// Bus addresses are 0–31.
     NoSuchDevice(u8),
     /// Function codes are 0–112.
     FunctionCode(u8),
-    /// Everybody would reply.
+    /// Every device would reply.
     ReplyToBroadcast,
 }
 
@@ -125,7 +125,7 @@ impl fmt::Display for TransmitError {
             TransmitError::NotReady => f.write_str("the GENI board is not ready"),
             TransmitError::Busy => f.write_str("the last datagram is still on its way"),
             TransmitError::NoSuchDevice(number) => {
-                write!(f, "device number {number} is above {MAX_DEVICE_NUMBER}")
+                write!(f, "bus address {number} is above {MAX_DEVICE_NUMBER}")
             }
             TransmitError::FunctionCode(code) => {
                 write!(f, "function code {code} is above {MAX_FUNCTION_CODE}")
@@ -141,18 +141,18 @@ impl core::error::Error for TransmitError {}
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ReceivedDatagram {
-    /// Device number of the sender, 0–31.
+    /// Bus address of the sender, 0–31.
     pub source: u8,
     /// Function code.
     pub function: u8,
     /// Subfunction code.
     pub subfunction: u8,
-    /// Whether it went to everybody.
+    /// Whether it was a broadcast.
     pub broadcast: bool,
     /// The tick at which it was seen to arrive, by the count of
-    /// [`Driver::poll`](crate::Driver::poll), however much later it was read. Where two arrived
-    /// between two polls, see there. `None` for a reply, and for a datagram whose arrival nobody
-    /// saw.
+    /// [`Driver::poll`](crate::Driver::poll); when it was read does not matter. `poll` also
+    /// explains the case of two arrivals between two polls. `None` for a reply, and for a datagram
+    /// whose arrival was not seen.
     pub arrived_ms: Option<u32>,
     /// The data.
     pub data: Data,

@@ -7,7 +7,7 @@ use crate::ram::SharedRam;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum BlockKind {
-    /// Not told.
+    /// The board does not tell.
     Unknown,
     /// Inputs only.
     Inputs,
@@ -23,34 +23,34 @@ pub enum BlockKind {
 pub struct Device {
     /// Model number.
     pub model: u8,
-    /// Whether it is kept from getting outputs.
+    /// Whether outputs to it are disabled.
     pub outputs_disabled: bool,
-    /// Reference address, whatever it means to the device.
+    /// Reference address; its meaning is up to the device.
     pub reference: u16,
-    /// Bytes of inputs or global data it sends in every scan. Not more than a buffer holds.
+    /// Bytes of inputs or global data that it sends in every scan; not more than a buffer holds.
     pub input_len: u8,
-    /// Bytes of outputs or directed control data it takes in every scan. Not more than a buffer
-    /// holds.
+    /// Bytes of outputs or directed control data that it receives in every scan; not more than a
+    /// buffer holds.
     pub output_len: u8,
     /// Direction of its data.
     pub kind: BlockKind,
 }
 
-/// What a record says.
+/// The content of a device table entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Record {
     Absent,
     Present(Device),
-    /// A device that is longer than the buffers: the board does not log these in.
+    /// A device with more data than the buffers hold; the board logs no such device in.
     Impossible,
 }
 
-/// Offset of a byte of a device's record.
+/// Offset of a byte in a device's entry.
 fn record_byte(device_number: u8, byte: u16) -> u16 {
     map::DEVICE_TABLE.at(u16::from(device_number) * map::DEVICE_LEN + byte)
 }
 
-/// The record of device 0–31.
+/// The entry of the device at bus address 0–31.
 pub(crate) fn read_record<R: SharedRam>(ram: &R, device_number: u8, buffer_len: u8) -> Record {
     if device_number >= map::DEVICE_COUNT {
         return Record::Absent;
@@ -79,7 +79,7 @@ pub(crate) fn read_record<R: SharedRam>(ram: &R, device_number: u8, buffer_len: 
     }
 }
 
-/// Lets device 0–31 have outputs, or keeps it from them.
+/// Enables or disables outputs to the device at bus address 0–31.
 pub(crate) fn write_outputs_disabled<R: SharedRam>(ram: &mut R, device_number: u8, disabled: bool) {
     if device_number < map::DEVICE_COUNT {
         ram.write(record_byte(device_number, map::DEVICE_OUTPUTS_DISABLED), disabled.into());

@@ -2,8 +2,8 @@
 
 /// Milliseconds from `since_ms` to `now_ms`.
 ///
-/// A count that seems to lie half the range ahead is a clock that went back a little, and no time
-/// has passed.
+/// A count that seems to lie half the range ahead comes from a clock that went back a little; no
+/// time has passed then.
 pub(crate) fn elapsed_ms(now_ms: u32, since_ms: u32) -> u32 {
     let elapsed = now_ms.wrapping_sub(since_ms);
     if elapsed > u32::MAX / 2 { 0 } else { elapsed }

@@ -1,4 +1,4 @@
-//! What the driver has to say.
+//! What the driver reports.
 
 use core::fmt;
 
@@ -12,29 +12,29 @@ use crate::status_table::Status;
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Event {
-    /// The board has dealt with the configuration.
+    /// The board has answered the configuration.
     Configured(ConfigurationOutcome),
-    /// The board is free to join the bus: datagrams are accepted, tables can be locked. Whether it
-    /// has joined is told next, by [`Event::StatusChanged`].
+    /// The board is free to join the bus: datagrams are accepted and tables can be locked.
+    /// [`Event::StatusChanged`] follows and tells whether it has joined.
     Ready(Identity),
-    /// The board has failed and will be reset, if it has a reset line, and started again. All
+    /// The board has failed. It will be reset, if it has a reset line, and started again. All
     /// devices are gone.
     Failed(Failure),
-    /// The board came onto the bus or left it, or a monitor or excessive errors came or went. Also
-    /// once after [`Event::Ready`].
+    /// The board joined or left the bus, or a monitor or excessive errors came or went. Also
+    /// reported once after [`Event::Ready`].
     StatusChanged(Status),
     /// A device came, went or changed.
     Device {
-        /// Its number, 0–31.
+        /// Its bus address, 0–31.
         number: u8,
         /// What it did.
         change: DeviceChange,
     },
     /// A datagram has arrived.
     Received(ReceivedDatagram),
-    /// The datagram that was to be sent has been, or not.
+    /// The datagram has been sent, or could not be.
     Sent(Result<(), CommandError>),
-    /// The reply to the datagram that was sent, or the lack of it.
+    /// The reply to the datagram that was sent, or the reason why there is none.
     Replied(Result<ReceivedDatagram, CommandError>),
     /// Another device asks for this host's memory: see
     /// [`Driver::answer_request`](crate::Driver::answer_request).
@@ -49,19 +49,19 @@ pub enum Event {
     OutputsSent,
 }
 
-/// What the board thinks of a configuration.
+/// The board's answer to a configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ConfigurationOutcome {
-    /// It is in force, and the board is off the bus for 1.5 s.
+    /// It is now in force, and the board is off the bus for 1.5 s.
     Changed,
     /// It was in force already.
     Unchanged,
-    /// It is not in force. This is.
+    /// It is not in force; the enclosed one is.
     Refused(Configuration),
 }
 
-/// Who the board is.
+/// The board's revision and settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Identity {
@@ -77,7 +77,7 @@ pub struct Identity {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Failure {
-    /// Its self-test did not end well in time, with these faults.
+    /// Its self-test did not end in time, or ended with these faults.
     SelfTest {
         /// Hardware status byte.
         faults: u8,
@@ -89,13 +89,13 @@ pub enum Failure {
         /// Hardware status byte.
         faults: u8,
     },
-    /// Its setup table is not what it was: it has restarted by itself.
+    /// Its setup table has changed: it has restarted by itself.
     Restarted,
-    /// It does not finish its commands.
+    /// It does not finish a command.
     CommandStuck,
     /// It does not answer lockout requests.
     LockoutStuck,
-    /// It does not say whether it takes the configuration.
+    /// It does not answer its configuration.
     Configuration,
 }
 
@@ -131,24 +131,24 @@ pub enum DeviceChange {
     LoggedOut,
 }
 
-/// Why a datagram was not sent, or had no reply.
+/// Why a datagram was not sent, or got no reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CommandError {
-    /// The board calls it wrong.
+    /// The board refused it as wrong.
     Refused,
-    /// No acknowledgement, no reply within 10 s, or the board had no memory: another attempt may
-    /// help.
+    /// No acknowledgement came, no reply came within 10 s, or the board had no memory. Another
+    /// attempt may help.
     Failed,
     /// The board cleared the command without carrying it out.
     Cleared,
-    /// A status that does not exist.
+    /// The command ended with an undefined status.
     UnknownStatus(u8),
     /// The reply has an impossible length.
     BadReply,
-    /// The board did not finish in time. The datagram may have been sent or may still be.
+    /// The board did not finish in time. The datagram may have been sent, or may yet be.
     TimedOut,
-    /// The board failed meanwhile. The datagram may have been sent.
+    /// The board failed before it had finished. The datagram may have been sent.
     BoardFailed,
 }
 

@@ -1,4 +1,4 @@
-//! Shared RAM that is part of a file.
+//! Shared RAM in a file.
 
 use std::cell::Cell;
 use std::fs::File;
@@ -7,7 +7,7 @@ use std::os::unix::fs::FileExt;
 
 use crate::ram::{RAM_LEN, SharedRam};
 
-/// A window of 16 KiB in a file that the other side has open, or mapped into memory, too.
+/// A window of 16 KiB in a file that the other side also has open or mapped into memory.
 #[derive(Debug)]
 pub struct FileRam {
     file: File,
@@ -20,13 +20,14 @@ impl FileRam {
     ///
     /// # Errors
     ///
-    /// When the file ends before the window does, or its length cannot be found.
+    /// When the file ends before the window does, or when its length cannot be found.
     pub fn new(file: File, base: u64) -> io::Result<FileRam> {
         check_length(&file, base)?;
         Ok(FileRam { file, base, error: Cell::new(None) })
     }
 
-    /// The last error of the file since this was asked. Bytes that could not be read were all ones.
+    /// The last error of the file since the previous call. A byte that could not be read was taken
+    /// as all ones.
     pub fn take_error(&self) -> Option<io::ErrorKind> {
         self.error.take()
     }
@@ -52,7 +53,7 @@ impl SharedRam for FileRam {
         self.write_bytes(offset, &[byte]);
     }
 
-    // One system call for a run of bytes.
+    // One system call reads a whole run of bytes.
     fn read_bytes(&self, offset: u16, bytes: &mut [u8]) {
         if !Self::in_window(offset, bytes.len()) {
             bytes.fill(0xFF);
@@ -71,7 +72,7 @@ impl SharedRam for FileRam {
     }
 }
 
-/// Whether there is room for a window from `base` on.
+/// Checks that a window fits the file from `base` on.
 pub(crate) fn check_length(file: &File, base: u64) -> io::Result<()> {
     match base.checked_add(RAM_LEN as u64) {
         Some(end) if end <= file.metadata()?.len() => Ok(()),

@@ -1,4 +1,5 @@
-//! The interrupt tables (chapter 6): what has happened, and what of it interrupts the host.
+//! The interrupt tables (chapter 6): which conditions have occurred, and which of them interrupt
+//! the host.
 
 use core::ops::BitOr;
 
@@ -19,7 +20,7 @@ impl Interrupts {
     pub const STATUS: Interrupts = Interrupts(1 << 1);
     /// A device logged in or out or changed its configuration.
     pub const DEVICE: Interrupts = Interrupts(1 << 2);
-    /// The board has had its turn on the bus: once per scan.
+    /// The board has had its turn on the bus, once per scan.
     pub const OUTPUTS_SENT: Interrupts = Interrupts(1 << 3);
     /// A command is complete.
     pub const COMMAND: Interrupts = Interrupts(1 << 4);
@@ -36,13 +37,13 @@ impl Interrupts {
         self.0 & other.0 == other.0
     }
 
-    /// The set without those in `other`.
+    /// The set without the members of `other`.
     #[must_use]
     pub const fn without(self, other: Interrupts) -> Interrupts {
         Interrupts(self.0 & !other.0)
     }
 
-    /// Takes the flags that are set, and clears them, the summary first: a flag that is set
+    /// Takes and clears the flags that are set. The summary is cleared first, so a flag that is set
     /// meanwhile sets it again.
     pub(crate) fn take<R: SharedRam>(ram: &mut R) -> Interrupts {
         ram.write(map::INTERRUPT_STATUS.at(map::INTERRUPT_SUMMARY), 0);
@@ -57,12 +58,12 @@ impl Interrupts {
         taken
     }
 
-    /// Whether any flag is set that may interrupt the host.
+    /// Whether a flag that may interrupt the host is set.
     pub(crate) fn any<R: SharedRam>(ram: &R) -> bool {
         ram.read(map::INTERRUPT_STATUS.at(map::INTERRUPT_SUMMARY)) & 1 != 0
     }
 
-    /// Lets these interrupt the host and no others.
+    /// Enables exactly these interrupts.
     pub(crate) fn enable<R: SharedRam>(self, ram: &mut R) {
         for index in 0..map::INTERRUPT_COUNT {
             let disabled = !self.contains(Interrupts(1 << index));

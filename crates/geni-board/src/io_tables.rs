@@ -10,15 +10,16 @@ use crate::ram::SharedRam;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TableError {
-    /// The board is starting up, off the bus or failed.
+    /// The board is starting up, is off the bus or has failed.
     NotReady,
-    /// More than one byte, and the board is not locked out: it might change or send half of them.
+    /// The data are more than one byte and the board is not locked out: it might change or send
+    /// half of them.
     NotLocked,
-    /// The device is not logged in, or there is no such device number.
+    /// No device is logged in at this bus address, or the address is above 31.
     NotPresent,
-    /// More or fewer bytes than belong there.
+    /// The number of bytes is wrong.
     WrongLength {
-        /// How many do.
+        /// The right number of bytes.
         expected: u8,
     },
 }
@@ -36,12 +37,12 @@ impl fmt::Display for TableError {
 
 impl core::error::Error for TableError {}
 
-/// Where the inputs of a device are.
+/// The buffer with the inputs of a device.
 pub(crate) fn input_buffer(device_number: u8, buffer_len: u8) -> Region {
     buffer(u16::from(device_number), buffer_len)
 }
 
-/// Where the outputs for a device are: the output table follows the input table at once.
+/// The buffer with the outputs for a device. The output table directly follows the input table.
 pub(crate) fn output_buffer(device_number: u8, buffer_len: u8) -> Region {
     buffer(u16::from(map::DEVICE_COUNT) + u16::from(device_number), buffer_len)
 }
@@ -62,8 +63,7 @@ pub(crate) fn present_device<R: SharedRam>(
     }
 }
 
-/// The tables while the board keeps its hands off them. See
-/// [`Driver::tables`](crate::Driver::tables).
+/// The tables while the board is locked out of them. See [`Driver::tables`](crate::Driver::tables).
 #[derive(Debug)]
 pub struct Tables<'a, R> {
     ram: &'a mut R,
@@ -76,12 +76,12 @@ impl<'a, R: SharedRam> Tables<'a, R> {
         Tables { ram, buffer_len, directed_len }
     }
 
-    /// Reads the inputs, or the global data, of a device into the beginning of `inputs` and says
-    /// how many bytes they are.
+    /// Reads the inputs or the global data of a device into the beginning of `inputs` and returns
+    /// the number of bytes.
     ///
     /// # Errors
     ///
-    /// When the device is not logged in, or has more inputs than fit.
+    /// When the device is not logged in, or has more inputs than fit into `inputs`.
     pub fn inputs(&self, device_number: u8, inputs: &mut [u8]) -> Result<usize, TableError> {
         let device = present_device(self.ram, device_number, self.buffer_len)?;
         let len = usize::from(device.input_len);
@@ -95,7 +95,7 @@ impl<'a, R: SharedRam> Tables<'a, R> {
     ///
     /// # Errors
     ///
-    /// When the device is not logged in, or takes another number of bytes.
+    /// When the device is not logged in, or has another number of output bytes.
     pub fn set_outputs(&mut self, device_number: u8, outputs: &[u8]) -> Result<(), TableError> {
         let device = present_device(self.ram, device_number, self.buffer_len)?;
         if outputs.len() != usize::from(device.output_len) {
@@ -105,12 +105,12 @@ impl<'a, R: SharedRam> Tables<'a, R> {
         Ok(())
     }
 
-    /// Reads the directed control data for this host into the beginning of `data` and says how many
-    /// bytes they are.
+    /// Reads the directed control data for this host into the beginning of `data` and returns the
+    /// number of bytes.
     ///
     /// # Errors
     ///
-    /// When more is configured than fits.
+    /// When more is configured than fits into `data`.
     pub fn directed_inputs(&self, data: &mut [u8]) -> Result<usize, TableError> {
         let len = usize::from(self.directed_len);
         let data =

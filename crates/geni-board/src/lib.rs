@@ -1,16 +1,16 @@
 //! A host's view of a GENI board, the daughterboard that connects a computer to a Genius bus.
 //!
-//! Host and board share 16 KiB of RAM and nothing else but a reset line and an interrupt line.
-//! Everything the bus has to say is found in that RAM, and everything the host wants is written
-//! there: settings, commands, datagrams, data that is repeated in every bus scan.
+//! Host and board share 16 KiB of RAM, a reset line and an interrupt line, and nothing else. The
+//! RAM holds everything that comes from the bus. The host writes its settings, commands, datagrams
+//! and cyclic data there.
 //!
-//! - [`SharedRam`] is how the RAM is reached: [`WindowRam`] is a window in the memory of a
+//! - [`SharedRam`] is the access to the RAM. [`WindowRam`] is a window in the memory of a
 //!   processor, [`ArrayRam`] an array for tests. With feature `std`, on Unix, `FileRam` is a file
 //!   and `MappedRam` memory behind one.
-//! - [`map`] says where each table is; one module per table says what is in it.
-//! - [`Driver`] does the talking. The host calls [`Driver::poll`] as often as it can with its
-//!   millisecond count, sets the reset line to [`Driver::reset_held`] afterwards, and deals with
-//!   the [`Event`] that comes back.
+//! - [`map`] says where each table is; each table's module says what is in it.
+//! - [`Driver`] talks to the board. The host calls [`Driver::poll`] with its millisecond count as
+//!   often as it can. After each call it sets the reset line to [`Driver::reset_held`] and handles
+//!   the [`Event`] that was returned.
 //!
 //! ```
 //! use geni_board::{ArrayRam, Configuration, Driver, Event, Options};
@@ -31,9 +31,9 @@
 //! ```
 //!
 //! The driver never waits, allocates or panics. One call of `poll` does a bounded amount of work
-//! and returns at most one event. The RAM belongs to somebody else: no number read from it is used
-//! before it has been checked, and whatever was wrong with it is found in [`Counters`]. A board
-//! that has failed is reset, again and again if need be.
+//! and returns at most one event. The board may write anything into the RAM, so every number is
+//! checked before it is used, and [`Counters`] counts what was wrong. A board that has failed is
+//! reset as often as necessary.
 //!
 //! Chapters and tables in the documentation are those of the GENI board user's manual GFK-0073
 //! ("the manual").

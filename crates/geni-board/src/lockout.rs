@@ -3,16 +3,16 @@
 use crate::map;
 use crate::ram::SharedRam;
 
-/// The two bytes together.
+/// The state of the two bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Lockout {
-    /// Neither is set.
+    /// Neither byte is set.
     Free,
-    /// Asked for, not yet granted. Must not be withdrawn.
+    /// Requested, but not yet granted. The request must not be withdrawn.
     Requested,
-    /// Both are set: the board keeps out.
+    /// Both bytes are set: the board keeps out.
     Locked,
-    /// Given back; the board has not noticed yet.
+    /// Given back, but the board has not noticed yet.
     Releasing,
 }
 
@@ -27,12 +27,12 @@ impl Lockout {
         }
     }
 
-    /// Asks for lockout: only from [`Lockout::Free`].
+    /// Requests lockout; allowed only from [`Lockout::Free`].
     pub(crate) fn request<R: SharedRam>(ram: &mut R) {
         ram.write(map::LOCKOUT_REQUEST, 1);
     }
 
-    /// Gives lockout back: only from [`Lockout::Locked`].
+    /// Gives lockout back; allowed only from [`Lockout::Locked`].
     pub(crate) fn release<R: SharedRam>(ram: &mut R) {
         ram.write(map::LOCKOUT_REQUEST, 0);
     }

@@ -1,8 +1,8 @@
-//! Where things are in the shared RAM (chapter 3, memory map).
+//! The layout of the shared RAM (chapter 3, memory map).
 //!
-//! [`Region`]s are the tables of the memory map in its order; below them the bytes inside each
-//! table, named after the tables of the chapters. Words have their low byte first. Where the manual
-//! says *bit 1* it means the least significant one.
+//! The [`Region`]s are the tables of the memory map, in its order. Below them are the bytes inside
+//! each table, named after the tables of the chapters. Words have their low byte first. The
+//! manual's *bit 1* is the least significant one.
 
 /// A run of bytes in the shared RAM.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,13 +18,13 @@ impl Region {
         Region { start, len }
     }
 
-    /// Offset of a byte counted from 0; the last one when there are not that many.
+    /// Offset of the byte at `index`, counted from 0; the last byte when `index` is too large.
     #[must_use]
     pub const fn at(self, index: u16) -> u16 {
         self.start + if index < self.len { index } else { self.len - 1 }
     }
 
-    /// Offset of the first byte behind the region.
+    /// Offset of the first byte after the region.
     #[must_use]
     pub const fn end(self) -> u16 {
         self.start + self.len
@@ -47,9 +47,9 @@ pub const REQUEST_TAIL: u16 = 0x0881;
 pub const SETUP_TABLE: Region = Region::new(0x0882, 16);
 /// Health of board and bus (chapter 5).
 pub const STATUS_TABLE: Region = Region::new(0x0892, 16);
-/// What has happened (chapter 6).
+/// Conditions that have occurred (chapter 6).
 pub const INTERRUPT_STATUS: Region = Region::new(0x08A2, 16);
-/// What shall not interrupt the host (chapter 6).
+/// Conditions that must not interrupt the host (chapter 6).
 pub const INTERRUPT_DISABLE: Region = Region::new(0x08B2, 16);
 /// Commands to the board. Writing its first byte interrupts the board (chapter 10).
 pub const COMMAND_BLOCK: Region = Region::new(0x08C2, 16);
@@ -61,10 +61,10 @@ pub const READ_BUFFER: Region = Region::new(0x09C2, 134);
 pub const LOCKOUT_REQUEST: u16 = 0x0A48;
 /// Written by the board only (chapter 9).
 pub const LOCKOUT_STATE: u16 = 0x0A49;
-/// Not for the host, neither to read nor to write. The memory map's 5045 bytes leave out the first
-/// one, which the example structure of chapter 3 gives a name and no meaning.
+/// The host neither reads nor writes this region. The memory map gives it 5045 bytes and leaves out
+/// the first one, which the example structure of chapter 3 names without a meaning.
 pub const RESERVED: Region = Region::new(0x0A4A, 5046);
-/// The devices on the bus: 32 records of 8 bytes (chapter 7).
+/// The devices on the bus: 32 entries of 8 bytes (chapter 7).
 pub const DEVICE_TABLE: Region = Region::new(0x1E00, 256);
 /// Directed control data for this host (chapter 12).
 pub const DIRECTED_INPUT: Region = Region::new(0x1F00, 128);
@@ -73,7 +73,7 @@ pub const BROADCAST_OUTPUT: Region = Region::new(0x1F80, 128);
 /// 32 input buffers, then 32 output buffers, all of the same configured length (chapter 8).
 pub const IO_TABLE: Region = Region::new(0x2000, 8192);
 
-/// Request queue buffers (chapter 13).
+/// Number of request queue buffers (chapter 13).
 pub const REQUEST_COUNT: u8 = 16;
 /// Bytes of a request queue buffer: header and data.
 pub const REQUEST_LEN: u16 = 136;
@@ -85,14 +85,14 @@ pub const REQUEST_STATUS: u16 = 1;
 pub const REQUEST_DATA_LEN: u16 = 2;
 /// In a request queue buffer: address in the host's memory, three bytes, low byte first.
 pub const REQUEST_ADDRESS: u16 = 3;
-/// In a request queue buffer: device number of the asker.
+/// In a request queue buffer: bus address of the requester.
 pub const REQUEST_SOURCE: u16 = 6;
 /// In a request queue buffer: auxiliary source address.
 pub const REQUEST_AUXILIARY_SOURCE: u16 = 7;
 /// In a request queue buffer: the data.
 pub const REQUEST_DATA: u16 = 8;
 
-/// DIP switches; not for the host to write (chapter 4).
+/// DIP switches; the host must not write them (chapter 4).
 pub const SETUP_DIP_SWITCHES: u16 = SETUP_TABLE.at(0);
 /// Reference address, a word.
 pub const SETUP_REFERENCE: u16 = SETUP_TABLE.at(1);
@@ -128,7 +128,7 @@ pub const INTERRUPT_COUNT: u16 = 7;
 pub const COMMAND_STATUS: u16 = COMMAND_BLOCK.at(0);
 /// The command.
 pub const COMMAND_CODE: u16 = COMMAND_BLOCK.at(1);
-/// First byte of what belongs to the command.
+/// First byte of the command's options.
 pub const COMMAND_OPTIONS: u16 = COMMAND_BLOCK.at(2);
 /// Read Datagram: device that sent the datagram.
 pub const READ_SOURCE: u16 = COMMAND_BLOCK.at(2);
@@ -159,26 +159,26 @@ pub const REPLY_TRANSMIT_LEN: u16 = COMMAND_BLOCK.at(7);
 /// Transmit Datagram with Reply: length of the reply, set by the board.
 pub const REPLY_LEN: u16 = COMMAND_BLOCK.at(8);
 
-/// Device records (chapter 7), and buffers in each of the I/O tables (chapter 8).
+/// Number of device table entries (chapter 7), and of buffers in each I/O table (chapter 8).
 pub const DEVICE_COUNT: u8 = 32;
-/// Bytes of a device record.
+/// Bytes of a device table entry.
 pub const DEVICE_LEN: u16 = 8;
-/// In a device record: model number.
+/// In a device table entry: model number.
 pub const DEVICE_MODEL: u16 = 0;
-/// In a device record: outputs disabled, the only byte that the host writes.
+/// In a device table entry: outputs disabled, the only byte that the host writes.
 pub const DEVICE_OUTPUTS_DISABLED: u16 = 1;
-/// In a device record: present.
+/// In a device table entry: present.
 pub const DEVICE_PRESENT: u16 = 2;
-/// In a device record: reference address, a word.
+/// In a device table entry: reference address, a word.
 pub const DEVICE_REFERENCE: u16 = 3;
-/// In a device record: broadcast control data (inputs, global data) length.
+/// In a device table entry: broadcast control data (inputs, global data) length.
 pub const DEVICE_BROADCAST_LEN: u16 = 5;
-/// In a device record: directed control data (outputs) length.
+/// In a device table entry: directed control data (outputs) length.
 pub const DEVICE_DIRECTED_LEN: u16 = 6;
-/// In a device record: what kind of block it is.
+/// In a device table entry: block configuration.
 pub const DEVICE_BLOCK: u16 = 7;
 
-/// Most that a length in the setup table, and a buffer in an I/O table, can be.
+/// Largest length in the setup table, and largest buffer in an I/O table.
 pub const MAX_TABLE_LEN: u8 = 128;
 
 #[cfg(test)]

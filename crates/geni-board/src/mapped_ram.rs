@@ -1,4 +1,5 @@
-//! Shared RAM that is memory behind a file: a device, or a board's range of bus addresses.
+//! Shared RAM that is memory behind a file: a device, or a board's address range on a computer's
+//! bus.
 #![expect(unsafe_code, reason = "a window in memory can only be reached through a pointer")]
 
 use std::fs::File;
@@ -11,24 +12,23 @@ use crate::file_ram::check_length;
 use crate::ram::{RAM_LEN, SharedRam};
 use crate::window_ram::WindowRam;
 
-/// A window of 16 KiB that is mapped into this process and reached byte by byte.
+/// A window of 16 KiB that is mapped into this process and accessed byte by byte.
 ///
-/// This is the way to a board in the computer itself, whose RAM cannot be read and written as a
-/// file can. A regular file must keep its length as long as it is mapped: an access to what is gone
-/// ends the process.
+/// It reaches a board inside the computer, whose RAM cannot be read and written like a file. A
+/// regular file must keep its length while it is mapped: an access beyond its end ends the process.
 #[derive(Debug)]
 pub struct MappedRam {
     window: WindowRam,
-    // The window is valid as long as this lives.
+    // Keeps the mapping alive, on which the window depends.
     _map: MmapRaw,
 }
 
 impl MappedRam {
-    /// Maps the window that begins `base` bytes into what `file` stands for.
+    /// Maps the window that begins `base` bytes into `file`.
     ///
     /// # Errors
     ///
-    /// When it cannot be mapped, or is a regular file that ends before the window does.
+    /// When the file cannot be mapped, or is a regular file that ends before the window does.
     pub fn new(file: &File, base: u64) -> io::Result<MappedRam> {
         if file.metadata()?.is_file() {
             check_length(file, base)?;
@@ -58,7 +58,7 @@ mod tests {
     use super::*;
     use crate::FileRam;
 
-    /// Begins within a page of memory, as a board's addresses may.
+    /// The window begins within a page of memory, as a board's may.
     const BASE: u64 = 0x1100;
 
     #[test]

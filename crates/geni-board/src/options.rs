@@ -4,28 +4,29 @@ use crate::interrupts::Interrupts;
 use crate::setup_table::Configuration;
 use crate::timing;
 
-/// State of the board when the driver begins.
+/// State of the board at the first poll.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Start {
     /// Unknown: it is reset for this long.
     Reset {
-        /// Milliseconds; [`timing::POWER_UP_RESET_MS`] when the supply may have come up just now.
+        /// Milliseconds; use [`timing::POWER_UP_RESET_MS`] when the supply may only just have come
+        /// up.
         hold_ms: u32,
     },
-    /// Its reset was released at the first call of `poll` or less than a moment before.
+    /// Its reset is released at the first call of `poll`, or was a moment before.
     Released,
     /// It has been running for seconds.
     Running,
 }
 
-/// What is done with requests for this host's memory.
+/// How requests for this host's memory are handled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Requests {
-    /// All are refused: there is no memory to be read or written.
+    /// All are refused: the host has no memory to be read or written.
     Refuse,
-    /// They become [`Event::Request`](crate::Event::Request) and wait for an answer.
+    /// Each becomes an [`Event::Request`](crate::Event::Request) and waits for an answer.
     Ask,
 }
 
@@ -37,22 +38,24 @@ pub struct Options {
     pub configuration: Configuration,
     /// State of the board.
     pub start: Start,
-    /// Whether the host drives the reset line. Without it a failed board can only be waited for.
+    /// Whether the host drives the reset line. Without it the driver can only wait for a failed
+    /// board.
     pub reset_line: bool,
-    /// How long the board may go without a heartbeat, [`timing::HEARTBEAT_TIMEOUT_MS`] or, for one
-    /// that runs in the time of a busy computer, more. Such a board may stand still at any moment,
-    /// so it gets at least this long for everything else, too: [`timing::TRANSMIT_TIMEOUT_MS`],
-    /// [`timing::REPLY_TIMEOUT_MS`], [`timing::COMMAND_STUCK_MS`] and [`timing::LOCKOUT_STUCK_MS`].
+    /// How long the board may go without a heartbeat: [`timing::HEARTBEAT_TIMEOUT_MS`], or more for
+    /// a board that runs in the time of a busy computer. Such a board may stall at any moment, so
+    /// this is also the minimum for [`timing::TRANSMIT_TIMEOUT_MS`], [`timing::REPLY_TIMEOUT_MS`],
+    /// [`timing::COMMAND_STUCK_MS`] and [`timing::LOCKOUT_STUCK_MS`].
     pub heartbeat_timeout_ms: u32,
-    /// What interrupts the host. Flags that do not are found within [`timing::FLAGS_PERIOD_MS`].
+    /// The conditions that interrupt the host. Flags of other conditions are found within
+    /// [`timing::FLAGS_PERIOD_MS`].
     pub interrupts: Interrupts,
-    /// What is done with requests for this host's memory.
+    /// How requests for this host's memory are handled.
     pub requests: Requests,
 }
 
 impl Options {
-    /// A board that is reset at power-up and whenever it fails, with all interrupts but the one in
-    /// every scan, and all requests for memory refused.
+    /// A board that is reset at power-up and whenever it fails. All interrupts are enabled except
+    /// the one in every scan, and all requests for memory are refused.
     #[must_use]
     pub const fn new(configuration: Configuration) -> Options {
         Options {
@@ -65,7 +68,7 @@ impl Options {
         }
     }
 
-    /// What everything that the board does may take, at least.
+    /// The minimum for every other time limit of the board.
     pub(crate) const fn patience_ms(&self) -> u32 {
         self.heartbeat_timeout_ms
     }

@@ -1,4 +1,4 @@
-//! How the shared RAM is reached.
+//! Access to the shared RAM.
 
 use core::iter;
 
@@ -7,12 +7,11 @@ pub const RAM_LEN: usize = 0x4000;
 
 /// The 16 KiB that host and board share, byte by byte.
 ///
-/// Offsets are those of [`map`](crate::map). What lies beyond reads as all ones and ignores writes.
-/// There are no errors: a RAM that cannot be reached reads as all ones too, and is found out by the
-/// heartbeat.
+/// Offsets are those of [`map`](crate::map). Offsets beyond the window read as all ones and ignore
+/// writes. Accesses return no errors: a RAM that cannot be reached also reads as all ones, and the
+/// missing heartbeat shows it.
 ///
-/// Both sides may change any byte at any time, so every call has to reach the RAM, in program
-/// order.
+/// Both sides may change any byte at any time, so every call must access the RAM, in program order.
 pub trait SharedRam {
     /// The byte at an offset.
     fn read(&self, offset: u16) -> u8;
@@ -36,8 +35,8 @@ pub trait SharedRam {
 
     /// A word, low byte first.
     ///
-    /// The board may change it between two reads. When the high byte has changed meanwhile, the low
-    /// byte is read again; a word that keeps changing faster than that does not exist on the board.
+    /// The board may change it between the two reads. When the high byte has changed meanwhile, the
+    /// low byte is read again. No word on the board changes faster than that.
     fn read_word(&self, offset: u16) -> u16 {
         let high_offset = offset.saturating_add(1);
         let high_before = self.read(high_offset);
@@ -53,7 +52,8 @@ pub trait SharedRam {
     }
 }
 
-/// Ascending offsets without end: the last one stands for all that lie beyond it.
+/// Ascending offsets from `offset`, without end. The highest one repeats; it stands for all offsets
+/// beyond it.
 fn from(offset: u16) -> impl Iterator<Item = u16> {
     (offset..=u16::MAX).chain(iter::repeat(u16::MAX))
 }
@@ -68,12 +68,12 @@ impl<R: SharedRam> SharedRam for &mut R {
     }
 }
 
-/// Shared RAM that nobody shares: an array, for tests.
+/// A RAM that is not shared: an array, for tests.
 #[derive(Clone, Debug)]
 pub struct ArrayRam([u8; RAM_LEN]);
 
 impl ArrayRam {
-    /// All bytes zero.
+    /// A RAM whose bytes are all zero.
     #[must_use]
     pub const fn new() -> ArrayRam {
         ArrayRam([0; RAM_LEN])
@@ -125,7 +125,7 @@ mod tests {
         assert_eq!(bytes, [0xFF; 4]);
     }
 
-    /// A word that the board counts up from 00FFh to 0100h after the first byte has been read.
+    /// A word that the board counts up from 00FFh to 0100h after its first byte has been read.
     struct Counting(core::cell::Cell<u8>);
 
     impl SharedRam for Counting {

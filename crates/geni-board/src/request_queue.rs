@@ -1,4 +1,4 @@
-//! The request queue (chapter 13): other devices asking for this host's memory.
+//! The request queue (chapter 13): requests of other devices for this host's memory.
 
 use core::fmt;
 
@@ -17,21 +17,21 @@ pub const READ_DEVICE: u8 = 0x1E;
 pub const WRITE_DEVICE: u8 = 0x20;
 
 /// Command of a request that changes single bits of memory (the subfunction code of the Write Point
-/// datagram). The manual names this datagram and prints no code: this one is from general knowledge
-/// of Genius, unchecked.
+/// datagram). The manual names this datagram without a code. This code is from general knowledge of
+/// Genius and unchecked.
 pub const WRITE_POINT: u8 = 0x0B;
 
-/// What a host says to a request.
+/// The host's answer to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequestStatus {
-    /// Done.
+    /// The request was carried out.
     Complete,
-    /// Not now: the board puts it at the end of the queue.
+    /// The host cannot answer now; the board puts the request at the end of the queue.
     Busy,
-    /// Makes no sense here.
+    /// The request makes no sense to the host.
     Syntax,
-    /// Damaged.
+    /// The request is damaged.
     Checksum,
 }
 
@@ -46,17 +46,17 @@ impl RequestStatus {
     }
 }
 
-/// Who asks for what.
+/// What is requested, and by which device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RequestHeader {
     /// [`READ_DEVICE`], [`WRITE_DEVICE`], [`WRITE_POINT`] or another subfunction code.
     pub command: u8,
-    /// Number of data bytes, as the asker gave it.
+    /// Number of data bytes, as the requester gave it.
     pub len: u8,
-    /// Where in the host's memory: 24 bits.
+    /// The address in the host's memory, 24 bits.
     pub address: u32,
-    /// Device number of the asker.
+    /// Bus address of the requester.
     pub source: u8,
     /// Auxiliary source address.
     pub auxiliary_source: u8,
@@ -66,9 +66,9 @@ pub struct RequestHeader {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MemoryRequest {
-    /// Who asks for what.
+    /// What is requested, and by which device.
     pub header: RequestHeader,
-    /// The data; of no meaning when memory is to be read.
+    /// The data; meaningless in a request that reads memory.
     pub data: Vec<u8, MAX_REQUEST_DATA_LEN>,
 }
 
@@ -76,22 +76,22 @@ pub struct MemoryRequest {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequestAnswer<'a> {
-    /// Here is what was asked for, exactly as many bytes.
+    /// The requested bytes, exactly as many as were asked for.
     Data(&'a [u8]),
-    /// Done, or the reason why not.
+    /// The outcome without data.
     Status(RequestStatus),
 }
 
-/// Why an answer was not taken.
+/// Why an answer was not accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AnswerError {
-    /// There is no request, or it was refused because no answer came in time, or the board has
+    /// No request waits. It may have been refused because no answer came in time, or the board has
     /// failed.
     NoRequest,
-    /// Another number of bytes was asked for.
+    /// The request asks for another number of bytes.
     WrongLength {
-        /// How many were.
+        /// The number of bytes that the request asks for.
         expected: u8,
     },
 }
@@ -113,12 +113,12 @@ pub(crate) fn request_buffer(index: u8) -> Region {
     Region { start, len: map::REQUEST_LEN }
 }
 
-/// An index into the queue, whatever the RAM says.
+/// An index within the queue, whatever value the RAM holds.
 fn wrapped(index: u8) -> u8 {
     index % map::REQUEST_COUNT
 }
 
-/// Both pointers of the queue.
+/// The two pointers of the queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Pointers {
     /// The buffer that the host reads next, 0–15.
@@ -128,8 +128,8 @@ pub(crate) struct Pointers {
 }
 
 impl Pointers {
-    /// `Err` when the board's pointer makes no sense. The host's own one is put right by the next
-    /// write.
+    /// `Err` when the board's pointer is out of range. The host's own pointer is corrected by the
+    /// next write.
     pub(crate) fn read<R: SharedRam>(ram: &R) -> Result<Pointers, u8> {
         let tail = ram.read(map::REQUEST_TAIL);
         if tail >= map::REQUEST_COUNT {
@@ -142,14 +142,15 @@ impl Pointers {
         self.head == self.tail
     }
 
-    /// The board does not let the tail reach the head: with one buffer left it drops what comes.
+    /// The board never lets the tail reach the head: when one buffer is left it drops further
+    /// requests.
     pub(crate) fn is_full(self) -> bool {
         wrapped(self.tail + 1) == self.head
     }
 }
 
-/// Sets the status of a request and gives its buffer back. The head goes last, in one write: it is
-/// what interrupts the board.
+/// Sets the status of a request and gives its buffer back. The head is written last, in one write,
+/// because it interrupts the board.
 pub(crate) fn finish<R: SharedRam>(ram: &mut R, index: u8, status: RequestStatus) {
     let index = wrapped(index);
     ram.write(request_buffer(index).at(map::REQUEST_STATUS), status.to_byte());
@@ -173,7 +174,7 @@ pub(crate) fn read_header<R: SharedRam>(ram: &R, index: u8) -> RequestHeader {
     }
 }
 
-/// `None` when the length makes no sense.
+/// A request with its data; `None` when its length is impossible.
 pub(crate) fn read_request<R: SharedRam>(ram: &R, index: u8) -> Option<MemoryRequest> {
     let header = read_header(ram, index);
     let mut data = Vec::new();
@@ -182,7 +183,7 @@ pub(crate) fn read_request<R: SharedRam>(ram: &R, index: u8) -> Option<MemoryReq
     Some(MemoryRequest { header, data })
 }
 
-/// Puts what was asked for into the buffer of the request.
+/// Puts the requested data into the buffer of the request.
 pub(crate) fn write_data<R: SharedRam>(ram: &mut R, index: u8, data: &[u8]) {
     for (byte, &value) in (map::REQUEST_DATA..map::REQUEST_LEN).zip(data) {
         ram.write(request_buffer(index).at(byte), value);

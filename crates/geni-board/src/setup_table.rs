@@ -1,4 +1,5 @@
-//! The setup table (chapter 4): what the board is told by its switches and by the host.
+//! The setup table (chapter 4): the settings that the board takes from its switches and from the
+//! host.
 
 use core::fmt;
 
@@ -27,12 +28,12 @@ pub struct BoardSwitches {
     pub device_number: u8,
     /// Bit rate of the bus.
     pub rate: RateSetting,
-    /// Whether devices are sent outputs as soon as they log in.
+    /// Whether devices get outputs as soon as they log in.
     pub outputs_enabled: bool,
 }
 
 impl BoardSwitches {
-    /// From the byte in the setup table; an open switch is 1.
+    /// The switches that the byte in the setup table stands for; an open switch is 1.
     #[must_use]
     pub const fn from_byte(byte: u8) -> BoardSwitches {
         // Bit 5 is switch 6 and bit 6 is switch 7.
@@ -50,7 +51,7 @@ impl BoardSwitches {
     }
 }
 
-/// What the host sets in the setup table.
+/// The settings that the host writes into the setup table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Configuration {
@@ -91,8 +92,8 @@ impl fmt::Display for InvalidConfiguration {
 impl core::error::Error for InvalidConfiguration {}
 
 impl Configuration {
-    /// What a board has after reset: no global data, no directed control data, buffers of 128
-    /// bytes.
+    /// The configuration of a board after reset: no global data, no directed control data, buffers
+    /// of 128 bytes.
     pub const DEFAULT: Configuration = Configuration {
         reference: 0xFFFF,
         broadcast_len: 0,
@@ -100,13 +101,14 @@ impl Configuration {
         buffer_len: map::MAX_TABLE_LEN,
     };
 
-    /// `reference` is handed on to devices that ask and means nothing to the board; `broadcast_len`
-    /// bytes of global data are sent, `directed_len` bytes of directed control data taken per scan;
-    /// devices with more than `buffer_len` bytes of inputs or outputs are not logged in.
+    /// The board passes `reference` on to devices that ask, and does not use it. In every scan it
+    /// sends `broadcast_len` bytes of global data and receives `directed_len` bytes of directed
+    /// control data. Devices with more than `buffer_len` bytes of inputs or outputs are not logged
+    /// in.
     ///
     /// # Errors
     ///
-    /// The first length that is out of range: 0–128, the buffers 1–128.
+    /// The first length that is out of range. Lengths are 0–128, for the buffers 1–128.
     pub const fn new(
         reference: u16,
         broadcast_len: u8,
@@ -137,7 +139,7 @@ impl Configuration {
         self.broadcast_len
     }
 
-    /// Bytes of directed control data that the board takes in every scan, 0–128.
+    /// Bytes of directed control data that the board receives in every scan, 0–128.
     #[must_use]
     pub const fn directed_len(self) -> u8 {
         self.directed_len
@@ -149,7 +151,7 @@ impl Configuration {
         self.buffer_len
     }
 
-    /// Whether the two differ in more than the buffer length: then the board stops sending while it
+    /// Whether the two differ in more than the buffer length. The board then stops sending while it
     /// changes.
     pub(crate) fn silences_the_bus(self, other: Configuration) -> bool {
         Configuration { buffer_len: other.buffer_len, ..self } != other

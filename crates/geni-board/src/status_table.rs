@@ -3,23 +3,23 @@
 use crate::map;
 use crate::ram::SharedRam;
 
-/// Either reading of "bit 1" of the active byte, which counts from 0 in some tables and from 1 in
-/// others; the other bits of the byte are not used.
+/// Both readings of "bit 1" of the active byte. Some tables count bits from 0 and others from 1;
+/// the byte's other bits are not used.
 const MONITOR: u8 = 0b0011;
 
-/// Either reading of "bit 3".
+/// Both readings of "bit 3" of the active byte.
 const EXCESSIVE_ERRORS: u8 = 0b1100;
 
 /// Scan time of a board that cannot get onto the bus.
 const OFF_BUS: u16 = 0xFFFF;
 
-/// What the status table shows.
+/// The content of the status table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Status {
     /// Software revision of the board.
     pub revision: u8,
-    /// Hardware faults, one bit each; with any of them set the board has stopped.
+    /// Hardware faults, one bit each. A board with any fault has stopped.
     pub faults: u8,
     /// Whether a hand-held monitor is plugged into the motherboard.
     pub monitor: bool,
@@ -32,7 +32,7 @@ pub struct Status {
 }
 
 impl Status {
-    /// Whether the board is taking part in the traffic.
+    /// Whether the board takes part in the bus traffic.
     #[must_use]
     pub const fn on_bus(&self) -> bool {
         self.scan_ms.is_some()
@@ -47,7 +47,7 @@ impl Status {
             monitor: active & MONITOR != 0,
             excessive_errors: active & EXCESSIVE_ERRORS != 0,
             bus_errors: ram.read_word(map::STATUS_BUS_ERRORS),
-            // Zero is what the table holds from reset to the first scan.
+            // The table holds zero from reset to the first scan.
             scan_ms: (scan_ms != OFF_BUS && scan_ms != 0).then_some(scan_ms),
         }
     }

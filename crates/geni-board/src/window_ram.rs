@@ -1,11 +1,11 @@
-//! Shared RAM that a processor sees in its address space.
+//! Shared RAM in the address space of a processor.
 #![expect(unsafe_code, reason = "a window in memory can only be reached through a pointer")]
 
 use core::ptr::NonNull;
 
 use crate::ram::{RAM_LEN, SharedRam};
 
-/// A window of 16 KiB, one byte per address, that the hardware maps onto the shared RAM.
+/// A window of 16 KiB, one byte per address, that the hardware maps to the shared RAM.
 #[derive(Debug)]
 pub struct WindowRam {
     base: NonNull<u8>,

@@ -1,24 +1,24 @@
-//! All functions that can be reached, and how deep the stack gets below each.
+//! All reachable functions, and how deep the stack gets below each.
 //!
 //! # Design
-//! A call counts with the depth at which it stands, so the deepest path is the sum of what is
-//! really in use at each call of it and not of whole frames.
+//! A call counts with the stack depth at which it is made. The deepest path is therefore the sum of
+//! what is in use at each call, not of whole frames.
 //!
 //! # Tradeoffs
-//! A call through a pointer is taken to lead to any function whose address the image holds
-//! somewhere: too many, and never too few. Recursion has no bound that could be found here, and
-//! fails.
+//! A call through a pointer is assumed to lead to any function whose address the image holds
+//! somewhere: these may be too many, but never too few. Recursion has no bound that could be found
+//! here, so it fails the check.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::image::{Image, VECTOR_TABLE};
 use crate::walk::{Call, Callee, Walk, walk};
 
-/// So many calls below each other are followed: ten times as many as a program for a board has.
-/// What is deeper is refused, before it needs more stack here than there is.
+/// How many nested calls are followed: ten times as many as a program for a board has. Deeper
+/// nesting is refused before it overflows the stack of this program.
 const DEEPEST: usize = 200;
 
-/// Functions that call each other.
+/// The functions of an image and their calls.
 pub(crate) struct Calls<'a> {
     image: &'a Image,
     walks: BTreeMap<u32, Walk>,
@@ -31,26 +31,26 @@ pub(crate) struct Calls<'a> {
 pub(crate) struct Deepest {
     /// Bytes of stack.
     pub(crate) bytes: u32,
-    /// The functions on the way, the first one included.
+    /// The functions on the path, the first one included.
     pub(crate) path: Vec<u32>,
-    /// Where the stack begins that the first function changes to; none when all is on the stack
+    /// The start of the stack to which the first function changes; `None` if it stays on the stack
     /// that it found.
     pub(crate) other_stack: Option<u32>,
 }
 
-/// Why no depth can be given.
+/// Why the depth is unbounded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Unbounded {
     /// The functions of a ring of calls.
     Recursion(Vec<u32>),
-    /// An instruction that could not be followed; what it does is in the walk of its function.
+    /// An instruction that could not be followed; the walk of its function says why.
     NotFollowed(u32),
-    /// A function below more calls than are followed.
+    /// A function that is nested too deeply to follow.
     TooDeep(u32),
 }
 
 impl<'a> Calls<'a> {
-    /// Walks all functions of an image. Calls of those in `without` are left out.
+    /// Walks all functions of an image. Calls of functions in `without` are left out.
     pub(crate) fn of(image: &'a Image, without: &BTreeSet<u32>) -> Calls<'a> {
         let mut calls = Calls { image, walks: BTreeMap::new(), pointed_to: BTreeSet::new() };
         let mut begun = BTreeSet::new();
@@ -63,24 +63,24 @@ impl<'a> Calls<'a> {
         calls
     }
 
-    /// Walks a function, unless that has been done; says whether it comes back. One that is too
-    /// deep has its turn later, and is taken to come back.
+    /// Walks a function unless that has been done, and returns whether it returns. A function that
+    /// is nested too deeply is walked later and assumed to return.
     fn returns(&mut self, function: u32, begun: &mut BTreeSet<u32>, depth: usize) -> bool {
         if depth < DEEPEST && begun.insert(function) {
             let walk =
                 walk(self.image, function, &mut |callee| self.returns(callee, begun, depth + 1));
             self.walks.insert(function, walk);
         }
-        // One whose walk is not over yet takes part in a recursion, which fails anyway.
+        // A function whose walk is unfinished is part of a recursion, which fails anyway.
         self.walks.get(&function).is_none_or(|walk| walk.returns)
     }
 
-    /// What is known of a function.
+    /// The walk of a function.
     pub(crate) fn walk(&self, function: u32) -> Option<&Walk> {
         self.walks.get(&function)
     }
 
-    /// All functions and what is known of them.
+    /// All functions with their walks.
     pub(crate) fn walks(&self) -> impl Iterator<Item = (u32, &Walk)> {
         self.walks.iter().map(|(&function, walk)| (function, walk))
     }
@@ -94,7 +94,7 @@ impl<'a> Calls<'a> {
         one.into_iter().chain(any.into_iter().flatten())
     }
 
-    /// The functions that can be reached from some, these included.
+    /// The functions that can be reached from `from`, including those.
     pub(crate) fn reachable(&self, from: impl IntoIterator<Item = u32>) -> BTreeSet<u32> {
         let mut reached = BTreeSet::new();
         let mut due: Vec<u32> = from.into_iter().collect();
@@ -107,7 +107,7 @@ impl<'a> Calls<'a> {
         reached
     }
 
-    /// The calls that lead to a function, each with the function that it stands in.
+    /// The calls of a function.
     pub(crate) fn calls_of(&self, function: u32) -> impl Iterator<Item = &Call> {
         let calls = self.walks.values().flat_map(|walk| &walk.calls);
         calls.filter(move |call| call.callee == Callee::Function(function))
@@ -116,7 +116,7 @@ impl<'a> Calls<'a> {
     /// The deepest path from a function.
     ///
     /// # Errors
-    /// There is a recursion on some path, or an instruction that could not be followed.
+    /// If there is a recursion on a path, or an instruction that could not be followed.
     pub(crate) fn deepest(&self, from: u32) -> Result<Deepest, Unbounded> {
         self.deepest_from(from, &mut BTreeMap::new(), &mut Vec::new())
     }
@@ -162,7 +162,7 @@ impl<'a> Calls<'a> {
         Ok(deepest)
     }
 
-    /// For people: why no depth can be given.
+    /// A text that says why the depth is unbounded.
     pub(crate) fn explain(&self, unbounded: &Unbounded) -> String {
         match unbounded {
             Unbounded::Recursion(ring) => {
@@ -171,7 +171,7 @@ impl<'a> Calls<'a> {
                 format!("recursion: {}", names.join(" → "))
             }
             Unbounded::TooDeep(at) => {
-                format!("{} is more calls deep than any program", self.image.name_of(*at))
+                format!("{} is nested deeper than any program", self.image.name_of(*at))
             }
             Unbounded::NotFollowed(at) => {
                 let troubles = self.walks.values().flat_map(|walk| &walk.troubles);
@@ -186,8 +186,8 @@ impl<'a> Calls<'a> {
     }
 }
 
-/// Functions whose address stands in data or is put into a register. What the vector table holds is
-/// for the processor.
+/// Functions whose address is in data or is put into a register. The vector table does not count,
+/// because only the processor uses it.
 fn pointers(image: &Image, walks: &BTreeMap<u32, Walk>) -> BTreeSet<u32> {
     let mut values: BTreeSet<u32> =
         walks.values().flat_map(|walk| walk.constants.iter().copied()).collect();

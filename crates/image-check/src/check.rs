@@ -1,4 +1,4 @@
-//! An image against everything that its board asks of it.
+//! Checks an image against everything that its board requires.
 
 use std::path::{Path, PathBuf};
 
@@ -8,26 +8,26 @@ use crate::image::{Image, ReadError};
 use crate::limits::Limits;
 use crate::stack_paths;
 
-/// An image that has been checked, and what came out of it.
+/// An image with the results of its checks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Checked {
     /// The board's name.
     pub board: &'static str,
     /// Where the image is.
     pub file: PathBuf,
-    /// Of each check; the same checks, in the same order, for each board.
+    /// The results; every board has the same checks in the same order.
     pub outcomes: Vec<Outcome>,
-    /// How deep its stack can get at most, in bytes. None where there is no bound: one of the
-    /// checks has failed then.
+    /// The most stack that it can use, in bytes. `None` if there is no bound; then one of the
+    /// checks has failed.
     pub stack_bytes: Option<u32>,
-    /// For people: the deepest paths through the program.
+    /// The deepest paths through the program, as text.
     pub stack_paths: String,
 }
 
 /// Reads an image and checks it.
 ///
 /// # Errors
-/// The file cannot be read, or is no ELF file.
+/// If the file cannot be read or is not an ELF file.
 pub fn check(limits: &Limits, file: &Path) -> Result<Checked, ReadError> {
     let image = Image::read(file)?;
     let calls = Calls::of(&image, &checks::forced(limits, &image));

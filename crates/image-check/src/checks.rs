@@ -1,7 +1,7 @@
-//! What an image has to keep to before it is flashed.
+//! What an image must comply with before it is flashed.
 //!
-//! Everything here is read off the image: nothing has to run, and nothing is taken on trust. What
-//! each board is held to stands in [`Limits`].
+//! Everything is read from the image; nothing has to run, and nothing is assumed. The requirements
+//! of each board are in [`Limits`].
 
 mod memory;
 mod outcome;
@@ -17,7 +17,7 @@ pub use outcome::Outcome;
 pub(crate) use panics::forced;
 pub(crate) use stack::{bound, shares, together};
 
-/// All checks of an image; the same number, in the same order, for each board.
+/// All checks of an image; every board has the same checks in the same order.
 pub(crate) fn all(limits: &Limits, image: &Image, calls: &Calls<'_>) -> Vec<Outcome> {
     vec![
         memory::flash(limits, image),

@@ -1,4 +1,4 @@
-//! An image as the linker has left it: its bytes, its functions, and what in it is code.
+//! An image as the linker has left it: its bytes, its functions, and which parts are code.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,13 +15,13 @@ use object::{
 
 use crate::names;
 
-/// A file with what a debugger wants to know, in bytes.
+/// The longest file, with debug information, in bytes.
 const MAX_FILE_LEN: u64 = 64 << 20;
 
-/// What it lays into memory: as much as the largest controllers of this family have.
+/// The most bytes that an image loads: the memory of the largest controllers of this family.
 const MAX_LOADED_LEN: u64 = 4 << 20;
 
-/// Places of the memory that it lays something into.
+/// The most regions of memory that an image loads.
 const MAX_PIECES: usize = 256;
 
 /// Why a file cannot be read as an image.
@@ -35,9 +35,9 @@ pub struct ReadError {
 enum Why {
     /// The file cannot be read.
     Unread(io::Error),
-    /// It is no ELF file, or a damaged one.
+    /// It is not an ELF file, or is damaged.
     NoElf(object::Error),
-    /// No board could hold it.
+    /// It is too large for any board.
     TooLarge,
 }
 
@@ -47,7 +47,7 @@ impl fmt::Display for ReadError {
         match &self.why {
             Why::Unread(error) => write!(f, "{file}: {error}"),
             Why::NoElf(error) => write!(f, "{file}: {error}"),
-            Why::TooLarge => write!(f, "{file}: no board could hold that"),
+            Why::TooLarge => write!(f, "{file}: too large for any board"),
         }
     }
 }
@@ -66,13 +66,13 @@ impl From<object::Error> for Why {
     }
 }
 
-/// What an image lays into one place of the memory.
+/// What an image loads into one region of memory.
 #[derive(Debug)]
 pub(crate) struct Piece {
     pub(crate) name: String,
     pub(crate) address: u32,
     pub(crate) size: u32,
-    /// Empty when the place is only reserved.
+    /// Empty when the region is only reserved.
     pub(crate) bytes: Vec<u8>,
     /// Whether it holds variables.
     pub(crate) writable: bool,
@@ -84,10 +84,10 @@ impl Piece {
     }
 }
 
-/// A function and where it ends.
+/// A function, from its address to its end.
 #[derive(Debug, Default)]
 pub(crate) struct Function {
-    /// Aliases included, as they are in the source.
+    /// The names as in the source, aliases included.
     pub(crate) names: Vec<String>,
     pub(crate) end: u32,
 }
@@ -103,9 +103,9 @@ impl Function {
 #[derive(Debug, Default)]
 pub(crate) struct Image {
     pub(crate) pieces: Vec<Piece>,
-    /// By address.
+    /// The functions, by address.
     pub(crate) functions: BTreeMap<u32, Function>,
-    /// Where code (true) and data (false) begin, inside the pieces that hold both.
+    /// Where code (true) and data (false) begin, in pieces that hold both.
     code_begins: BTreeMap<u32, bool>,
     /// Sizes of variables and constants, by address.
     objects: BTreeMap<u32, u32>,
@@ -154,7 +154,7 @@ impl Image {
         let Ok(name) = symbol.name() else { return };
         let address = narrow(symbol.address());
         let section = symbol.section_index().and_then(|index| file.section_by_index(index).ok());
-        // The texts of a log have symbols, too, and are nowhere in memory.
+        // The texts of a log have symbols, too, but are not in memory.
         let loaded = section.is_some_and(|section| is_loaded(&section));
         if loaded && symbol.kind() == SymbolKind::Text {
             self.add_function(name, address & !1, narrow(symbol.size()));
@@ -174,13 +174,14 @@ impl Image {
         function.end = function.end.max(address.saturating_add(size));
     }
 
-    /// A variable without a size may stand where another one begins.
+    /// A variable without a size may have the address of another one.
     fn add_object(&mut self, address: u32, size: u32) {
         let known = self.objects.entry(address).or_default();
         *known = size.max(*known);
     }
 
-    /// Symbols of hand-written functions may lack a size: these end where the next one begins.
+    /// Symbols of hand-written functions may lack a size; such a function ends where the next
+    /// begins.
     fn end_functions(&mut self) {
         let mut next = None;
         let pieces = &self.pieces;
@@ -194,7 +195,7 @@ impl Image {
         }
     }
 
-    /// Address that a symbol of the linker script stands for.
+    /// The address that a symbol of the linker script stands for.
     pub(crate) fn symbol(&self, name: &str) -> Option<u32> {
         self.symbols.get(name).copied()
     }
@@ -212,13 +213,13 @@ impl Image {
         self.functions.iter().find(has_name).map(|(&address, _)| address)
     }
 
-    /// The function at an address or around it, and where it begins.
+    /// The function that contains an address, and its start.
     pub(crate) fn function_around(&self, address: u32) -> Option<(u32, &Function)> {
         let (&begin, function) = self.functions.range(..=address).next_back()?;
         (begin == address || address < function.end).then_some((begin, function))
     }
 
-    /// For people: the same as text.
+    /// The function that contains an address, as text.
     pub(crate) fn name_of(&self, address: u32) -> String {
         match self.function_around(address) {
             Some((begin, function)) if begin == address => function.name().to_owned(),
@@ -235,12 +236,12 @@ impl Image {
         begins.next_back().is_some_and(|(_, code)| *code)
     }
 
-    /// Where the code goes on after the data at `address`.
+    /// Where code begins again after the data at `address`.
     pub(crate) fn code_after(&self, address: u32) -> Option<u32> {
         self.code_begins.range(address..).find(|(_, code)| **code).map(|(&address, _)| address)
     }
 
-    /// What stands at an address, if the image says.
+    /// The bytes at an address, if the image holds them.
     pub(crate) fn bytes<const N: usize>(&self, address: u32) -> Option<[u8; N]> {
         let piece = self.pieces.iter().find(|piece| piece.addresses().contains(&address))?;
         let offset = usize::try_from(address - piece.address).ok()?;
@@ -252,8 +253,8 @@ impl Image {
         self.bytes(address).map(u32::from_le_bytes)
     }
 
-    /// Stack pointer at reset, and what the processor calls: the reset routine first, then the
-    /// handlers.
+    /// The stack pointer at reset, and the routines that the processor calls: the reset routine
+    /// first, then the handlers.
     pub(crate) fn vectors(&self) -> Option<(u32, Vec<u32>)> {
         let table = self.pieces.iter().find(|piece| piece.name == VECTOR_TABLE)?;
         let mut words = table.bytes.as_chunks().0.iter().map(|&bytes| u32::from_le_bytes(bytes));
@@ -273,7 +274,7 @@ fn has_flag(section: &Section<'_, '_>, flag: object::elf::SectionFlags) -> bool 
     matches!(section.flags(), SectionFlags::Elf { sh_flags, .. } if sh_flags.contains(flag))
 }
 
-/// Addresses and sizes of a 32-bit processor.
+/// An address or size of a 32-bit processor.
 fn narrow(value: u64) -> u32 {
     u32::try_from(value).unwrap_or(u32::MAX)
 }
@@ -301,7 +302,7 @@ impl Image {
         image
     }
 
-    /// Nothing but these pieces.
+    /// An image of these pieces only.
     pub(crate) fn of_pieces(pieces: Vec<Piece>) -> Image {
         Image { pieces, ..Image::default() }
     }
@@ -315,7 +316,7 @@ impl Image {
         self
     }
 
-    /// What both hold.
+    /// An image with the contents of both.
     pub(crate) fn joined_with(mut self, other: Image) -> Image {
         self.pieces.extend(other.pieces);
         self.functions.extend(other.functions);
@@ -323,7 +324,7 @@ impl Image {
         self
     }
 
-    /// Says where the stack is.
+    /// Sets the place of the stack.
     pub(crate) fn with_stack(mut self, end: u32, start: u32) -> Image {
         self.symbols.extend([("_stack_end".to_owned(), end), ("_stack_start".to_owned(), start)]);
         self
@@ -335,7 +336,7 @@ impl Image {
         self
     }
 
-    /// Says that there is data from `begin` to `end`.
+    /// Marks the bytes from `begin` to `end` as data.
     pub(crate) fn with_data(mut self, begin: u32, end: u32) -> Image {
         self.code_begins.insert(begin, false);
         self.code_begins.insert(end, true);

@@ -1,8 +1,8 @@
-//! Our decoder of instructions against an independent one, `yaxpeax-arm`.
+//! Our instruction decoder against an independent one, `yaxpeax-arm`.
 //!
-//! Wherever both know an instruction, they have to agree on its length, where it goes, what it does
-//! to the stack pointer, and which constant it loads; and ours has to forget every register that
-//! the other one sees written. [`accepted`] lists what they may differ in, each with the reason.
+//! If both know an instruction, they must agree on its length, its flow, its effect on the stack
+//! pointer and the constant that it loads. Ours must also forget every register that the other one
+//! sees written. [`accepted`] lists the permitted differences, each with its reason.
 
 mod accepted;
 mod encodings;
@@ -16,30 +16,30 @@ use crate::thumb::{Instruction, decode};
 const SP: u16 = 13;
 const PC: u16 = 15;
 
-/// What became of an instruction.
+/// The outcome for an instruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Verdict {
     Agreed,
-    /// They know no such instruction.
+    /// The other decoder knows no such instruction.
     Unknown,
-    /// They differ, for this reason.
+    /// They differ, for this accepted reason.
     Accepted(&'static str),
-    /// They differ, as told.
+    /// They differ, as described.
     Differs(String),
 }
 
-/// What they can differ in.
+/// The respects in which they can differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Difference {
     Length,
     Flow,
     Stack,
     Constant,
-    /// A register changes that ours takes to keep its value.
+    /// A register changes, but ours assumes that it keeps its value.
     Changes,
 }
 
-/// Asks both about an instruction.
+/// Compares both decoders on an instruction.
 fn compare(address: u32, first: u16, second: u16) -> Verdict {
     let ours = decode(address, first, second);
     let Some(theirs) = Theirs::of(address, first, second) else { return Verdict::Unknown };
@@ -59,7 +59,7 @@ fn compare(address: u32, first: u16, second: u16) -> Verdict {
 
 fn differences(ours: &Instruction, theirs: &Theirs) -> Vec<Difference> {
     let written = theirs.moves.map_or(theirs.gives, |base| theirs.gives | 1 << base);
-    // What becomes of these two is compared as the stack and as the flow.
+    // The stack pointer and the program counter are compared as stack and flow.
     let apart = 1 << SP | 1 << PC;
     let all = [
         (Difference::Length, ours.length == theirs.length),

@@ -1,8 +1,8 @@
-//! Whether an image may be flashed.
+//! Checks whether an image may be flashed.
 //!
-//! Everything is read off the image as the linker has left it: nothing has to run, and nothing is
-//! taken on trust. [`check()`] holds an image against the [`Limits`] of its board, [`table()`]
-//! shows what came out of it, [`verdict()`] refuses what may not be flashed.
+//! Everything is read from the image as the linker has left it; nothing has to run, and nothing is
+//! assumed. [`check()`] compares an image with the [`Limits`] of its board, [`table()`] shows the
+//! results, and [`verdict()`] refuses what may not be flashed.
 //!
 //! ```text
 //! image        bytes, functions, and what of them is code

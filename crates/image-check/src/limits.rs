@@ -1,24 +1,25 @@
-//! What the image of each board has to keep to.
+//! What the image of each board must comply with.
 
 const KIB: u32 = 1024;
 
-/// What the image of a board has to keep to.
+/// What the image of a board must comply with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// The board's name.
     pub board: &'static str,
-    /// Bytes. Goals, below what the memory map has: an affordable controller with room for more.
+    /// Flash in bytes. The goal is below what the memory map has: an affordable controller with
+    /// room for more.
     pub flash_budget: u32,
     /// Bytes of variables, with an event log of full size.
     pub variables_budget: u32,
-    /// Where the memory with the stack begins. Below, the protection unit allows nothing: a stack
-    /// that gets there ends in a fault.
+    /// Where the memory with the stack begins. The protection unit allows no access below, so a
+    /// stack that gets there ends in a fault.
     pub stack_floor: u32,
-    /// Functions that go on while the flash is being erased, besides all interrupt handlers: they
-    /// and all that they call have to be in RAM. None where nothing is erased.
+    /// Functions that run on while the flash is being erased, in addition to all interrupt
+    /// handlers. They and everything that they call must be in RAM. Empty if nothing is erased.
     pub while_erasing: &'static [&'static str],
-    /// Functions that end the program on purpose, each with the reason: they may panic, and have no
-    /// bound for the stack.
+    /// Functions that end the program on purpose, each with the reason. They may panic and need no
+    /// stack bound.
     pub forced: &'static [(&'static str, &'static str)],
 }
 
@@ -45,7 +46,7 @@ pub const STM32F407: Limits = Limits {
     forced: &[],
 };
 
-/// Those of all boards.
+/// The limits of all boards.
 pub const ALL: [Limits; 2] = [MPS2_AN385, STM32F407];
 
 impl Limits {

@@ -1,4 +1,4 @@
-//! The program: whether an image may be flashed.
+//! The program that checks whether an image may be flashed.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -12,13 +12,13 @@ use ser_console::Harmless;
 const EXAMPLES: &str = "\
 Examples:
   image-check --board mps2-an385 ser-mps2-an385
-  image-check --board stm32f407 --stack ser-stm32f407    and where the stack goes
+  image-check --board stm32f407 --stack ser-stm32f407    also where the stack is used
 
-`cargo xtask firmware` builds the images, checks them and says where they are.
+`cargo xtask firmware` builds the images, checks them and prints their paths.
 
 Exit code 1 when the image may not be flashed or cannot be read.";
 
-/// Say whether an image may be flashed: its sizes, its stack, its ways to a panic, what is in RAM.
+/// Check whether an image may be flashed: its sizes, its stack, its panics, and what is in RAM.
 #[derive(Debug, Parser)]
 #[command(name = "image-check", version, after_help = EXAMPLES, max_term_width = 100)]
 struct Arguments {
@@ -52,7 +52,7 @@ fn run(arguments: &Arguments) -> ExitCode {
         Ok(image) => image,
         Err(error) => {
             return fail(format_args!(
-                "{error}\nhint: cargo xtask firmware builds images, and says where they are"
+                "{error}\nhint: cargo xtask firmware builds images, and prints their paths"
             ));
         }
     };
@@ -67,9 +67,9 @@ fn run(arguments: &Arguments) -> ExitCode {
     }
 }
 
-/// Tells why; gives the exit code.
+/// Prints the reason and returns the exit code.
 fn fail(why: impl Display) -> ExitCode {
-    // Nobody is left to be told when standard error is gone.
+    // When standard error is gone, nobody can be told.
     let _ = writeln!(io::stderr(), "image-check: {}", Harmless(why));
     ExitCode::FAILURE
 }

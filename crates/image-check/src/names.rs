@@ -1,28 +1,27 @@
 //! Names of functions, and which of them belong to a panic.
 //!
-//! The linker drops what nobody refers to. An image in which none of these functions is left cannot
-//! panic.
+//! The linker drops what is never referenced. An image without any of these functions cannot panic.
 
 /// A symbol's name as the source has it, without the hash.
 pub(crate) fn as_in_source(symbol: &str) -> String {
     format!("{:#}", rustc_demangle::demangle(symbol))
 }
 
-/// Crates of the standard library, which begin every panic, explicit ones included.
+/// Crates of the standard library, in which every panic begins, even an explicit one.
 const LIBRARIES: [&str; 3] = ["core", "alloc", "std"];
 
-/// What a panic ends in: the image's handler, or that of the log.
+/// Where a panic ends: the image's handler, or that of the log.
 const HANDLERS: [&str; 4] =
     ["rust_begin_unwind", "rust_panic", "_defmt_panic", "__defmt_default_panic"];
 
-/// Whether a function is there only to panic; takes the name as the source has it.
+/// Whether a function exists only to panic. `name` is as in the source.
 pub(crate) fn is_panic(name: &str) -> bool {
     let segments: Vec<&str> = name.trim_start_matches('<').split("::").collect();
     let (Some(first), Some(last)) = (segments.first(), segments.last()) else { return false };
     HANDLERS.contains(last) || LIBRARIES.contains(first) && segments.into_iter().any(panics)
 }
 
-/// Whether a module or a function of the library is there only to panic, by its name.
+/// Whether a module or function of the library exists only to panic, by its name.
 fn panics(segment: &str) -> bool {
     // The modules `panic` and `panic_info` hold a panic's description, which is harmless.
     let begins = segment.starts_with("panic_") && segment != "panic_info";

@@ -1,8 +1,8 @@
-//! What an image takes of the board's memories.
+//! How much of the board's memories an image takes.
 
 use crate::image::Image;
 
-/// Bytes of an image.
+/// Sizes of an image in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Sizes {
     /// Code, constants, and the first values of variables.

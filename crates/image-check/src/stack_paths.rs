@@ -1,4 +1,4 @@
-//! Where the stack goes: the deepest paths through an image.
+//! Where the stack is used: the deepest paths through an image.
 
 use std::fmt::Write as _;
 
@@ -32,7 +32,7 @@ pub(crate) fn shown(limits: &Limits, image: &Image, calls: &Calls<'_>) -> String
     text + &computed(image, calls)
 }
 
-/// Calls whose target only the running program knows.
+/// The calls whose target only the running program knows.
 fn computed(image: &Image, calls: &Calls<'_>) -> String {
     let computed = calls
         .walks()
@@ -45,7 +45,7 @@ fn computed(image: &Image, calls: &Calls<'_>) -> String {
     })
 }
 
-/// The name of a function, which may be anything.
+/// The name of a function, filtered because it may be anything.
 fn harmless(image: &Image, address: u32) -> String {
     Harmless(image.name_of(address)).line()
 }

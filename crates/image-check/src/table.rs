@@ -1,4 +1,4 @@
-//! The table of what the checks found: a row for each check, a column for each image.
+//! The table of check results: a row for each check, a column for each image.
 
 use anstyle::{AnsiColor, Style};
 use ser_console::Harmless;
@@ -10,7 +10,7 @@ const KEPT: Style = AnsiColor::Green.on_default();
 const BROKEN: Style = AnsiColor::Red.on_default().bold();
 const FAINT: Style = Style::new().dimmed();
 
-/// The table, what is wrong, and where the images are; with colours.
+/// The table, the faults and the places of the images, with colours.
 #[must_use]
 pub fn table(images: &[Checked]) -> String {
     lines(images).join("\n") + "\n"
@@ -31,7 +31,7 @@ fn lines(images: &[Checked]) -> Vec<String> {
             &cells.fold(format!("{:label$}", outcome.what), |line, cell| line + "  " + &cell),
         ));
     }
-    // Names of functions and files may be anything.
+    // Names of functions and files may hold anything.
     for Checked { board, outcomes, .. } in images {
         for outcome in outcomes.iter().filter(|outcome| !outcome.wrong.is_empty()) {
             lines.push(format!("\n{BROKEN}{board}, {}:{BROKEN:#}", outcome.what));

@@ -1,13 +1,13 @@
-//! Thumb-2 instructions, as far as calls, jumps and the stack pointer are concerned.
+//! Thumb-2 instructions, as far as they concern calls, jumps and the stack pointer.
 //!
 //! # Design
-//! Every instruction is told apart well enough to know its length, where it goes, what it does to
-//! the stack pointer, and which registers it may change. What it computes is of no interest, but
-//! for constants: a call through a register that holds one is a call like any other.
+//! Every instruction is decoded well enough to know its length, its flow, its effect on the stack
+//! pointer, and which registers it may change. What it computes does not matter, except for
+//! constants: a call through a register that holds a constant is a call like any other.
 //!
 //! # Tradeoffs
-//! Where telling exactly would take a longer table, an instruction is taken to change more
-//! registers than it does. Then a constant is forgotten, never made up.
+//! If exact decoding would take a longer table, an instruction is assumed to change more registers
+//! than it does. A constant is then forgotten, never invented.
 //!
 //! # Notes
 //! Encodings are those of the ARMv7-M architecture reference manual (DDI 0403E), sections A5.2 and
@@ -23,52 +23,52 @@ const PC: u16 = 15;
 /// Registers that a function may change: r0–r3, r12 and lr.
 const CHANGED_BY_CALLS: u16 = 1 << 0 | 1 << 1 | 1 << 2 | 1 << 3 | 1 << 12 | 1 << LR;
 
-/// Where an instruction goes.
+/// Where execution continues after an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Flow {
-    /// To the next one.
+    /// At the next one.
     Next,
-    /// To an address.
+    /// At an address.
     Jump(u32),
-    /// To an address, or to the next one.
+    /// At an address or at the next one.
     Branch(u32),
-    /// To a function at an address, and then to the next one.
+    /// In the function at an address, and then at the next one.
     Call(u32),
     /// The same, with the address in a register.
     CallRegister(u16),
-    /// To an address in a register.
+    /// At an address in a register.
     JumpRegister(u16),
-    /// To the address in a word.
+    /// At the address in a word.
     JumpWord(u32),
-    /// Into a table of distances that follows; its entries have this many bytes.
+    /// At an entry of the table of distances that follows; its entries have this many bytes.
     Table(u32),
-    /// Back to the caller.
+    /// In the caller.
     Return,
-    /// Nowhere: it is there to fault.
+    /// Nowhere: the instruction is there to fault.
     Stop,
-    /// To the next one; this many instructions from there are conditional.
+    /// At the next one; from there on this many instructions are conditional.
     IfThen(u8),
-    /// Somewhere that cannot be told.
+    /// At an unknown place.
     Unknown,
 }
 
 /// What an instruction does to the stack pointer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stack {
-    /// Makes the stack this many bytes deeper; negative: shallower.
+    /// Makes the stack this many bytes deeper, or shallower if negative.
     Deeper(i32),
-    /// Changes to another stack, to the address in a register.
+    /// Changes to another stack, at the address in a register.
     Change(u16),
-    /// Something that cannot be followed.
+    /// Has an effect that cannot be followed.
     Unknown,
 }
 
 /// A constant in a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Constant {
-    /// All of it.
+    /// The whole register.
     Whole(u32),
-    /// Its upper half; the lower one stays.
+    /// Its upper half; the lower half is unchanged.
     Upper(u16),
     /// The word at an address.
     WordAt(u32),
@@ -77,15 +77,15 @@ pub(crate) enum Constant {
 /// One instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Instruction {
-    /// Bytes.
+    /// Length in bytes.
     pub(crate) length: u32,
     pub(crate) flow: Flow,
     pub(crate) stack: Stack,
-    /// Register and what it holds afterwards.
+    /// The register and its new value.
     pub(crate) constant: Option<(u16, Constant)>,
     /// Registers whose value is no longer known, r0 in bit 0.
     pub(crate) changes: u16,
-    /// It needs the floating-point unit, and exceptions then save its registers.
+    /// Whether it needs the floating-point unit, whose registers exceptions then save.
     pub(crate) floating_point: bool,
 }
 
@@ -94,7 +94,7 @@ pub(crate) fn is_wide(first: u16) -> bool {
     first >> 11 > 0b11100
 }
 
-/// The instruction at `address`. `second` counts for wide instructions only.
+/// Decodes the instruction at `address`. `second` matters only for wide instructions.
 pub(crate) fn decode(address: u32, first: u16, second: u16) -> Instruction {
     if is_wide(first) { wide(address, first, second) } else { narrow(address, first) }
 }
@@ -195,7 +195,7 @@ fn wide(address: u32, first: u16, second: u16) -> Instruction {
     }
 }
 
-/// All registers that a wide instruction has room to name.
+/// All registers that the fields of a wide instruction can name.
 fn named(first: u16, second: u16) -> u16 {
     1 << (first & 0xF) | 1 << (second >> 12) | 1 << (second >> 8 & 0xF) | 1 << (second & 0xF)
 }
@@ -251,7 +251,7 @@ fn load_store_single(address: u32, first: u16, second: u16) -> Instruction {
             _ => plain.holding(register, Constant::WordAt(word)),
         };
     }
-    // With an 8-bit distance that is also added to the base.
+    // An 8-bit distance, which is also added to the base.
     let back = first & 1 << 7 == 0 && second & 0x0900 == 0x0900;
     let mut instruction = plain;
     if base == SP && back {
@@ -329,12 +329,12 @@ fn branch_or_control(address: u32, first: u16, second: u16) -> Instruction {
 /// Special registers, barriers, hints, `udf.w`.
 fn control(first: u16, second: u16) -> Instruction {
     const MSP: u16 = 8;
-    /// The other stack pointer, and which of them is in use.
+    /// The other stack pointer, and the selection between the two.
     const PSP_AND_CONTROL: [u16; 2] = [9, 20];
 
     let plain = Instruction::plain(4, 1 << (second >> 8 & 0xF));
     match first & 0xFFF0 {
-        // Writes to special registers; they name no register to be changed.
+        // Writes to special registers; they change no other register.
         0xF380 if second & 0xFF == MSP => {
             Instruction::plain(4, 0).stack(Stack::Change(first & 0xF))
         }
@@ -382,7 +382,7 @@ fn words(list: u16) -> i32 {
     list.count_ones().cast_signed() * 4
 }
 
-/// A base that went up leaves the stack shallower.
+/// A base that has moved up leaves the stack shallower.
 fn moved(up: bool, bytes: i32) -> Stack {
     Stack::Deeper(if up { -bytes } else { bytes })
 }
@@ -399,7 +399,7 @@ fn signed(value: u32, bits: u32) -> i32 {
 mod tests {
     use super::*;
 
-    // What an assembler made of the text beside it.
+    // The values are what an assembler made of the text beside them.
 
     fn flow_at(address: u32, first: u16, second: u16) -> Flow {
         decode(address, first, second).flow

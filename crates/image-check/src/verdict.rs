@@ -1,10 +1,10 @@
-//! Whether images may be flashed, after their checks.
+//! Whether images may be flashed, by the results of their checks.
 
 use std::fmt;
 
 use crate::check::Checked;
 
-/// Images that may not be flashed.
+/// Images that must not be flashed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refused {
     /// The board of each, and the checks that it has failed.
@@ -27,10 +27,10 @@ impl fmt::Display for Refused {
 
 impl std::error::Error for Refused {}
 
-/// Says whether all of these images may be flashed.
+/// Returns whether all of these images may be flashed.
 ///
 /// # Errors
-/// Some may not: those that have failed a check.
+/// If some have failed a check.
 pub fn verdict(images: &[Checked]) -> Result<(), Refused> {
     let failed = |image: &Checked| {
         let failed = image.outcomes.iter().filter(|outcome| !outcome.wrong.is_empty());

@@ -1,16 +1,16 @@
 //! One function, along all its paths: how deep the stack gets, and what is called at which depth.
 //!
 //! # Design
-//! Every instruction is visited with the depth of the stack before it and with what is known of
-//! registers. The depth has to be the same on whichever path an instruction is reached, as
-//! compilers see to it; a register is known where all paths agree on it.
+//! Every instruction is visited with the stack depth before it and with the known values of
+//! registers. The depth must be the same on every path to an instruction, as compilers ensure. A
+//! register is known if all paths agree on its value.
 //!
 //! # Tradeoffs
-//! Whatever cannot be followed is trouble, which fails the check, and never a guess.
+//! What cannot be followed is reported as trouble, which fails the check. Nothing is guessed.
 //!
 //! # Notes
-//! A call that does not come back ends its path. Whether it does is asked of whoever walks the
-//! function that is called.
+//! A call that does not return ends its path. The caller of the walk says whether a called function
+//! returns.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -18,18 +18,18 @@ use std::fmt;
 use crate::image::Image;
 use crate::thumb::{Constant, Flow, Instruction, Stack, decode, is_wide};
 
-/// Who is called.
+/// The target of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Callee {
     Function(u32),
-    /// Only the running program knows.
+    /// A target that only the running program knows.
     Computed,
 }
 
 /// A call, or a jump to another function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Call {
-    /// Where it stands.
+    /// The address of the call.
     pub(crate) at: u32,
     /// Bytes of stack in use.
     pub(crate) depth: u32,
@@ -45,11 +45,11 @@ pub(crate) enum Trouble {
     UnevenStack,
     /// A return with something left on the stack.
     UnevenReturn,
-    /// A jump whose target is unknown.
+    /// A jump to an unknown target.
     Jump,
     /// A table branch without its table.
     Table,
-    /// A way out of the function that leads to no function.
+    /// A path that leaves the function and leads to no other one.
     NoFunction,
 }
 
@@ -59,26 +59,26 @@ impl fmt::Display for Trouble {
             Trouble::StackPointer => "sets the stack pointer from a register",
             Trouble::UnevenStack => "has a depth of stack that depends on the path",
             Trouble::UnevenReturn => "returns with something left on the stack",
-            Trouble::Jump => "jumps somewhere that cannot be told",
-            Trouble::Table => "branches by a table that is not there",
-            Trouble::NoFunction => "runs out of the function into what is none",
+            Trouble::Jump => "jumps to an unknown target",
+            Trouble::Table => "branches by a table that is missing",
+            Trouble::NoFunction => "leaves the function but enters no other one",
         })
     }
 }
 
-/// What there is to know of one function.
+/// What is known of one function.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Walk {
-    /// Its own bytes of stack at most.
+    /// The most bytes of stack that it uses itself.
     pub(crate) depth: u32,
     pub(crate) calls: BTreeSet<Call>,
-    /// Whether it ever comes back.
+    /// Whether it can return.
     pub(crate) returns: bool,
     /// Constants that it puts into registers.
     pub(crate) constants: BTreeSet<u32>,
     /// Whether it uses the floating-point unit.
     pub(crate) floating_point: bool,
-    /// Where another stack begins, on which it and all that it calls run.
+    /// The start of another stack, on which it and everything that it calls run.
     pub(crate) other_stack: Option<u32>,
     pub(crate) troubles: Vec<(u32, Trouble)>,
 }
@@ -89,12 +89,12 @@ struct State {
     depth: i32,
     registers: [Option<u32>; 16],
     other_stack: Option<u32>,
-    /// Conditional instructions from here, inside of an if-then block.
+    /// How many instructions from here on are conditional, in an if-then block.
     conditional: u8,
 }
 
 impl State {
-    /// What a register holds, if that is known.
+    /// The value of a register, if it is known.
     fn register(&self, register: u16) -> Option<u32> {
         self.registers.get(usize::from(register)).copied().flatten()
     }
@@ -105,7 +105,7 @@ impl State {
     }
 }
 
-/// Follows the function at `entry`. `returns` says of another function whether it comes back.
+/// Follows the function at `entry`. `returns` says whether another function returns.
 pub(crate) fn walk(image: &Image, entry: u32, returns: &mut dyn FnMut(u32) -> bool) -> Walk {
     let end = image.functions.get(&entry).map_or(entry, |function| function.end);
     let (seen, due) = (BTreeMap::new(), BTreeSet::new());
@@ -127,11 +127,11 @@ struct Walker<'a> {
     entry: u32,
     end: u32,
     returns: &'a mut dyn FnMut(u32) -> bool,
-    /// State before each instruction that was reached.
+    /// The state before each instruction that was reached.
     seen: BTreeMap<u32, State>,
-    /// Those that have to be looked at, for the first time or again.
+    /// The instructions to visit, for the first time or again.
     due: BTreeSet<u32>,
-    /// Where the stack that it was called with is in use.
+    /// Where the original stack is in use.
     used_at: Option<u32>,
     walk: Walk,
 }
@@ -143,7 +143,7 @@ impl Walker<'_> {
         }
     }
 
-    /// There is a path to an instruction.
+    /// Notes a path to an instruction.
     fn reach(&mut self, address: u32, state: State) {
         let Some(known) = self.seen.get_mut(&address) else {
             self.seen.insert(address, state);
@@ -167,7 +167,7 @@ impl Walker<'_> {
         Some((address, self.seen.get(&address)?.clone()))
     }
 
-    /// One instruction.
+    /// Follows one instruction.
     fn step(&mut self, address: u32, before: &State) {
         let Some(instruction) = self.fetch(address) else {
             return self.trouble(address, Trouble::NoFunction);
@@ -179,7 +179,7 @@ impl Walker<'_> {
             self.used_at.get_or_insert(address);
         }
         let next = address.saturating_add(instruction.length);
-        // A conditional instruction may also not be carried out.
+        // A conditional instruction may also be skipped.
         let mut goes_on = before.conditional > 0;
         match instruction.flow {
             Flow::Next | Flow::IfThen(_) => goes_on = true,
@@ -207,7 +207,7 @@ impl Walker<'_> {
             Flow::Unknown => self.trouble(address, Trouble::Jump),
         }
         if goes_on {
-            // After a return that was not carried out, the stack is as it was.
+            // A return that was skipped leaves the stack unchanged.
             let moved = matches!(instruction.flow, Flow::Return);
             let depth = if moved { before.depth } else { after.depth };
             self.go_on(address, next, State { depth, ..after });
@@ -251,7 +251,7 @@ impl Walker<'_> {
         let conditional = state.conditional > 0;
         match instruction.stack {
             Stack::Deeper(0) => {}
-            // A conditional `pop {pc}` is fine: see where returns are followed.
+            // A conditional `pop {pc}` is allowed: `step` handles it where it follows returns.
             Stack::Deeper(_) if conditional && instruction.flow != Flow::Return => {
                 self.trouble(address, Trouble::UnevenStack);
             }
@@ -275,7 +275,7 @@ impl Walker<'_> {
         }
     }
 
-    /// On to the next instruction.
+    /// Continues at the next instruction.
     fn go_on(&mut self, address: u32, next: u32, state: State) {
         if next < self.end {
             self.reach(next, state);
@@ -292,7 +292,7 @@ impl Walker<'_> {
         }
     }
 
-    /// A call whose return is the caller's.
+    /// Follows a call whose return is that of the caller.
     fn jump_away(&mut self, address: u32, target: Option<u32>, state: &State) {
         match target {
             Some(target) if self.image.functions.contains_key(&target) => {
@@ -303,7 +303,7 @@ impl Walker<'_> {
                 self.walk.returns |= comes_back;
             }
             Some(_) => self.trouble(address, Trouble::NoFunction),
-            // As calls in tail position of whatever a pointer leads to are compiled.
+            // Calls in tail position through a pointer are compiled to this.
             None if state.depth == 0 => {
                 self.walk.returns |= self.call(address, Callee::Computed, state);
             }
@@ -311,7 +311,7 @@ impl Walker<'_> {
         }
     }
 
-    /// Notes a call; says whether it comes back.
+    /// Notes a call and returns whether it returns.
     fn call(&mut self, at: u32, callee: Callee, state: &State) -> bool {
         let depth = state.depth.max(0).cast_unsigned();
         if state.other_stack.is_none() {
@@ -330,7 +330,8 @@ impl Walker<'_> {
         }
     }
 
-    /// Distances in halfwords from the end of the instruction, where the table begins.
+    /// Follows a table branch. Distances are in halfwords from the end of the instruction, where
+    /// the table begins.
     fn jump_by_table(&mut self, address: u32, table: u32, entry_len: u32, state: &State) {
         let end = self.image.code_after(table).filter(|_| !self.image.is_code(table));
         let Some(end) = end.filter(|&end| end <= self.end) else {
@@ -343,7 +344,7 @@ impl Walker<'_> {
             };
             let Some(entry) = entry else { return self.trouble(address, Trouble::Table) };
             let target = table.saturating_add(entry * 2);
-            // A last byte may be there only to make the table's length even.
+            // A last byte may only pad the table to an even length.
             let filler = entry_len == 1 && end - at == 1 && !(end..self.end).contains(&target);
             if !filler {
                 self.jump(address, target, state);
@@ -456,7 +457,7 @@ mod tests {
         let walk = walk_first(&Image::of_functions(AT, &[("f", &code), ("g", &[BX_LR])]));
         assert_eq!(walk.calls, BTreeSet::from([call(0x108, 0, 0x10A)]));
         assert_eq!((walk.returns, walk.troubles), (true, vec![]));
-        // The same, but to where there is no function.
+        // The same, but the target is not a function.
         assert_eq!(walk_code(&code).troubles, [(0x108, Trouble::NoFunction)]);
 
         // push; ldr r3, [pc, #4]; blx r3; pop; the word 0801_0101h
@@ -505,7 +506,7 @@ mod tests {
         let code = [0xF240, 0x4100, 0xF2C2, 0x0100, 0xF381, 0x8808, PUSH_R4_LR, POP_R4_PC];
         let walk = walk_code(&code);
         assert_eq!((walk.other_stack, walk.depth, walk.troubles), (Some(0x2000_0400), 8, vec![]));
-        // The same after a push: what was pushed lies on the first stack.
+        // The same after a push: the pushed registers are on the first stack.
         let code = [&[PUSH_R4_LR], &code[..]].concat();
         assert_eq!(walk_code(&code).troubles, [(AT, Trouble::StackPointer)]);
         // msr msp, r1 with any value

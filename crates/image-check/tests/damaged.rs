@@ -1,4 +1,4 @@
-//! A file that is damaged, or made to do harm, is judged or refused like any other.
+//! A damaged or malicious file is judged or refused like any other.
 
 mod elf;
 
@@ -8,7 +8,8 @@ use std::io::{Seek, Write};
 use image_check::{Checked, MPS2_AN385, ReadError, check, verdict};
 use tempfile::NamedTempFile;
 
-/// A file with changing content. It is never emptied first, for then systems wait for the disk.
+/// A file with changing content. It is never truncated first, because some systems then wait for
+/// the disk.
 struct Image {
     file: NamedTempFile,
 }
@@ -26,7 +27,7 @@ impl Image {
         check(&MPS2_AN385, self.file.path())
     }
 
-    /// Whatever the bytes are, there is an answer.
+    /// Checks the bytes; there must be an answer, whatever they are.
     fn is_good(&mut self, bytes: &[u8]) -> bool {
         self.checked(bytes).is_ok_and(|image| verdict(&[image]).is_ok())
     }
@@ -74,10 +75,10 @@ fn a_file_that_no_board_could_hold_is_refused_before_it_is_read_to_its_end() {
     image.checked(&elf::image()).expect("an image");
     image.file.as_file().set_len(1 << 40).expect("a file with a hole");
     let error = check(&MPS2_AN385, image.file.path()).expect_err("too large").to_string();
-    assert!(error.contains("no board could hold that"), "{error}");
+    assert!(error.contains("too large for any board"), "{error}");
 }
 
-/// To follow them all would take more stack than there is, here and on the board.
+/// To follow all calls would take more stack than there is, here and on the board.
 #[test]
 fn calls_that_go_deeper_than_any_program_have_no_bound() {
     let image = Image::new().checked(&elf::image_of_calls(100_000)).expect("an image");
@@ -85,7 +86,7 @@ fn calls_that_go_deeper_than_any_program_have_no_bound() {
     let depth = image.outcomes.iter().find(|outcome| outcome.what == "stack at its deepest");
     let wrong = &depth.expect("a check of the stack").wrong;
     assert!(
-        wrong.iter().any(|wrong| wrong.contains("more calls deep than any program")),
+        wrong.iter().any(|wrong| wrong.contains("nested deeper than any program")),
         "{wrong:?}"
     );
 }

@@ -1,5 +1,5 @@
-//! What the program prints, on a full disk, for a reader that has gone, and with arguments that a
-//! terminal would obey; what it says about files that are no images.
+//! What the program prints on a full disk, for a reader that has gone, with arguments that a
+//! terminal would obey, and about files that are not images.
 #![cfg(unix)]
 
 #[allow(dead_code, reason = "another test needs the rest")]
@@ -94,6 +94,9 @@ fn an_image_that_may_be_flashed_is_shown_as_a_table_and_with_its_paths() {
 fn an_image_that_may_not_be_flashed_is_refused_with_its_reasons() {
     let (code, stdout, stderr) = printed(&elf::image(), &["--board", "stm32f407"]);
     assert_eq!(code, Some(1), "{stdout}");
-    assert!(stdout.contains("the stack ends at 0x20000000, and there is memory below"), "{stdout}");
+    assert!(
+        stdout.contains("the stack ends at 0x20000000, but there is memory below it"),
+        "{stdout}"
+    );
     assert!(stderr.contains("not to be flashed: stm32f407 (stack overflow, "), "{stderr}");
 }

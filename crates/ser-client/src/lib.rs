@@ -1,6 +1,6 @@
-//! A host's conversation with a sequential event recorder: commands and their answers, told apart
-//! from what the recorder says by itself, and a log that is read by cursor, so that every event
-//! arrives once and in order.
+//! A host's conversation with a sequential event recorder. It tells answers to commands from what
+//! the recorder sends by itself. It reads the log by cursor, so that every event arrives once and
+//! in order.
 //!
 //! Most programs want [`open`] and [`Unit`]: blocking calls over a serial port or TCP. Underneath,
 //! [`Session`] (requests and their answers) and [`LogReader`] (which entries to read next) know
@@ -11,9 +11,9 @@
 //!
 //! # The folders
 //!
-//! Each needs only those before it: `transport` knows this computer and its ports, `reading` the
-//! log, `session` the conversation, `genius` the bus, `unit` makes blocking calls of them, and
-//! `following` reads again and again.
+//! Each folder needs only those before it. `transport` knows this computer and its ports, `reading`
+//! the log, `session` the conversation, and `genius` the bus. `unit` makes blocking calls of them,
+//! and `following` reads again and again.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)

@@ -1,4 +1,4 @@
-//! Reading by cursor, against a recorder that is nothing but a list.
+//! Reading by cursor, against a recorder that is only a list.
 
 mod common;
 
@@ -9,24 +9,23 @@ use proptest::prelude::*;
 use ser_client::{Cursor, Delivery, Disturbed, LogReader, Lost, Summary};
 use ser_proto::Inputs;
 
-/// A host that keeps its cursor from reading to reading, and a judge that knows what really
-/// happened.
+/// A host that keeps its cursor from reading to reading, and checks what it gets against what
+/// really happened.
 struct Host {
     cursor: Option<Cursor>,
-    /// Serial number of the event that has to come next; not known before the first.
+    /// Serial number of the event that must come next; unknown before the first.
     expected: Option<u32>,
     /// The most events that happen between two replies.
     rate: u32,
-    /// Requests under way, at most.
+    /// The most requests under way.
     window: usize,
-    /// Which replies are lost, the first of them first, over and over; their requests are asked
-    /// again.
+    /// Which replies are lost, first one first, over and over; their requests are repeated.
     lost: Vec<bool>,
     /// Whether readings go on until they have caught up.
     keeps_up: bool,
 }
 
-/// What happens to the recorder behind the host's back.
+/// What happens to the recorder without the host's knowledge.
 #[derive(Clone, Copy, Debug)]
 enum Change {
     Nothing,
@@ -40,7 +39,7 @@ impl Host {
         Host { cursor: None, expected: None, rate: 0, window: 1, lost: Vec::new(), keeps_up: false }
     }
 
-    /// One reading, as `Unit::read_new` does it; `meanwhile` is called after each reply.
+    /// One reading as in `Unit::read_new`; `meanwhile` is called after each reply.
     fn read(
         &mut self,
         recorder: &mut Recorder,
@@ -69,7 +68,7 @@ impl Host {
         let mut requests = 0;
         let mut after_loss = false;
         let mut under_way = VecDeque::new();
-        // What is asked again is asked alone.
+        // A repeated request is the only one under way.
         let mut again = VecDeque::new();
         let mut lost = self.lost.iter().cycle();
         let mut last = self.cursor.map(|cursor| cursor.sequence);
@@ -104,7 +103,8 @@ impl Host {
                 check_sequence(delivery, &mut last, recorder);
                 if let Delivery::Event { entry_number, entry, model, .. } = delivery {
                     let given_up = serial(&entry).saturating_sub(oldest_serial(recorder));
-                    // It may have been overwritten between its reply and the one that proves it.
+                    // The event may have been overwritten between its reply and the one that proves
+                    // it.
                     if serial(&entry) >= oldest_serial(recorder) {
                         let held = recorder.read(entry_number, 1);
                         assert_eq!(
@@ -125,8 +125,8 @@ impl Host {
         }
     }
 
-    /// Checks what was told against what happened. `first_of_life` is the serial of the first event
-    /// after the latest erase.
+    /// Checks what was delivered against what happened. `first_of_life` is the serial number of the
+    /// first event after the latest erase.
     fn judge(&mut self, told: &[Told], first_of_life: u32) {
         for &told in told {
             match told {
@@ -150,8 +150,8 @@ impl Host {
     }
 }
 
-/// Sequences go on from the last one, a loss takes as many as were lost, and they are the
-/// recorder's own totals, except for a multiple of 65536.
+/// Checks that sequences continue from the last one, that a loss takes as many as were lost, and
+/// that they are the recorder's own totals, except for a multiple of 65536.
 fn check_sequence(delivery: Delivery, last: &mut Option<u64>, recorder: &Recorder) {
     match delivery {
         Delivery::Event { sequence, entry, .. } => {
@@ -243,7 +243,7 @@ fn a_sequence_goes_on_where_the_total_wraps_and_is_exact_from_the_beginning_of_a
         let mut recorder = Recorder::after(10, past);
         let mut host = Host::new();
         host.read(&mut recorder, |_| {});
-        // A log that has just become full may have become so often.
+        // A log that has just become full may have become full several times.
         let cursor = host.cursor.unwrap();
         assert_eq!(cursor.is_exact, exact, "{past} events");
         let unseen = recorder.count() - cursor.sequence;
@@ -286,7 +286,7 @@ fn a_change_that_no_entry_shows_is_told_where_it_happened() {
     assert_eq!(told[0], Delivery::Lost { after: Some(5), lost: Lost::Unrecorded { inputs } });
     assert_eq!(told.len(), 4);
     assert_eq!((reader.summary().unrecorded, reader.summary().lost), (1, 0));
-    // Where events were overwritten between two, they are no neighbours.
+    // Entries are not neighbours if events between them were overwritten.
     recorder.append_many(30);
     host.cursor = reader.cursor();
     assert_eq!(host.read(&mut recorder, |_| {}).0[0], Told::Overwritten(10));
@@ -329,13 +329,13 @@ fn a_resize_between_two_readings_loses_what_it_throws_away() {
     let mut host = Host::new();
     recorder.append_many(25);
     host.read(&mut recorder, |_| {});
-    // Smaller: of eight new events the newest four are left.
+    // Smaller: the newest four of eight new events are left.
     recorder.append_many(8);
     recorder.resize(4);
     let mut expected = vec![Told::Overwritten(4)];
     expected.extend(events(30..=33));
     assert_eq!(host.read(&mut recorder, |_| {}).0, expected);
-    // Larger: of six new events four were there at the resize, and another two came after it.
+    // Larger: four of six new events were there at the resize, and two more came after it.
     recorder.append_many(8);
     recorder.resize(100);
     recorder.append_many(2);
@@ -372,9 +372,9 @@ fn a_download_takes_few_requests_more_than_there_are_full_replies() {
         let mut requests = 0;
         let mut host = Host { window, ..Host::new() };
         host.read(&mut recorder, |_| requests += 1);
-        // Position, whether the log is full (before the first entries and after them), ten entries
-        // at a time, once around the end of the ring, and every tenth reply or so an entry to look
-        // at.
+        // The position, whether the log is full (before the first entries and after them), ten
+        // entries at a time once around the end of the ring, and one entry to look at in every
+        // tenth reply or so.
         assert!((3 + 205 + 1..=3 + 205 + 1 + 3).contains(&requests), "{requests}");
     }
 }
@@ -424,7 +424,7 @@ fn a_total_that_goes_back_by_any_number_is_never_a_loss_of_65536() {
     {
         let mut recorder = Recorder::new(4);
         recorder.append_many(8);
-        // The log was empty when it was read last: there is no anchor.
+        // The log was empty at the last reading, so there is no anchor.
         let mut reader =
             LogReader::new(Some(Cursor { sequence: 0, is_exact: true, anchor: None }), 4);
         let mut lost = 0;
@@ -439,7 +439,7 @@ fn a_total_that_goes_back_by_any_number_is_never_a_loss_of_65536() {
             if taken.is_err() {
                 break;
             }
-            // More than the ring holds, so that the reading is behind.
+            // More than the ring holds, so the reading is behind.
             recorder.append_many(9);
             if reply == at_reply {
                 recorder.erase();
@@ -475,8 +475,8 @@ fn what_was_read_ahead_of_a_log_that_is_gone_is_not_delivered() {
         });
         assert_eq!(taken, Ok(()));
         if reply == 2 {
-            // Full again, with a larger total: it looks as if events had come faster than they can
-            // be read.
+            // The ring is full again, with a larger total: events seem to have come faster than
+            // they can be read.
             recorder.erase();
             recorder.append_many(400);
         }
@@ -498,7 +498,7 @@ fn resizes_under_a_reading_that_is_behind_spoil_no_count() {
         host.judge(&told, 1);
         recorder.append_many(new_events);
         let mut replies = 0;
-        // Next slot is 0 before and after for some of these, so that no position tells of it.
+        // Next slot is 0 before and after for some of these, so no position shows it.
         let (told, _) = host.read(&mut recorder, |recorder| {
             replies += 1;
             for (_, size) in resizes.into_iter().filter(|(at, _)| *at == replies) {
@@ -528,8 +528,7 @@ fn a_log_that_was_empty_tells_what_a_resize_that_nobody_told_of_has_thrown_away(
         recorder.append_many(new_events / 2);
         recorder.resize(actual);
         recorder.append_many(new_events.div_ceil(2));
-        // The host goes by the size that it knows, and asks for it when that does not go together
-        // with the replies.
+        // The host uses the size that it knows, and asks for it when it contradicts the replies.
         let mut all = Vec::new();
         let mut reader = LogReader::new(host.cursor, 35);
         if host.read_with(&mut reader, &mut recorder, &mut |_| {}, &mut all).is_err() {
@@ -543,7 +542,7 @@ fn a_log_that_was_empty_tells_what_a_resize_that_nobody_told_of_has_thrown_away(
 
 #[test]
 fn a_log_that_was_empty_and_has_had_more_events_than_the_total_can_tell_is_read() {
-    // Where the size divides 65536, total and next slot show nothing of it.
+    // If the size divides 65536, total and next slot show nothing.
     for size in [7, 100, 1000] {
         for new_events in [65_536, 65_537, 65_541, 65_600, 66_500] {
             let mut host = Host {
@@ -569,7 +568,7 @@ fn a_reader_that_is_faster_than_events_come_catches_up_with_them() {
         let mut recorder = Recorder::after(size, 5000);
         let mut host = Host { rate: u32::try_from(rate).unwrap(), ..Host::new() };
         host.read(&mut recorder, |_| {});
-        // It is behind by three rings.
+        // The reading is three rings behind.
         recorder.append_many(3 * size);
         let mut lost = Vec::new();
         for _ in 0..30 {
@@ -611,7 +610,7 @@ fn a_resize_that_nobody_told_of_is_no_restart_where_the_position_is_known() {
         let request = reader.request().unwrap();
         let reply = recorder.read(request.start, request.count);
         let taken = reader.take(&reply, &mut |delivery| panic!("{delivery:?}"));
-        // Now and then the ring of three happens to stand where one of eight would.
+        // The ring of three sometimes stands where one of eight would.
         let agrees = u32::from(reply.next_slot) == (4 + u32::from(reply.total) - 12) % 8;
         assert_eq!(taken.is_err(), !agrees, "{reply:?}");
     }
@@ -646,7 +645,7 @@ fn a_size_that_is_too_large_is_noticed_before_anything_is_called_lost() {
             let reply = recorder.read(request.start, request.count);
             result = reader
                 .take(&reply, &mut |delivery| assert!(!matches!(delivery, Delivery::Lost { .. })));
-            // The ring goes on turning under the questions.
+            // The ring goes on turning during the questions.
             recorder.append();
         }
         assert_eq!(result, Err(Disturbed::WrongSize), "size {size}, with cursor {with_cursor}");
@@ -655,7 +654,7 @@ fn a_size_that_is_too_large_is_noticed_before_anything_is_called_lost() {
 
 #[test]
 fn replies_that_make_no_sense_end_the_reading() {
-    // Always the same reply, with a total and no entries.
+    // The reply is always the same, with a total and no entries.
     let recorder = Recorder::new(5);
     let mut reader =
         LogReader::new(Some(Cursor { sequence: 3, is_exact: true, anchor: None }), 100);
@@ -695,7 +694,7 @@ fn any_window() -> impl Strategy<Value = (usize, Vec<bool>)> {
     let lost =
         prop_oneof![Just(Vec::new()), prop::collection::vec(prop::bool::weighted(0.2), 1..20)];
     (1_usize..=4, lost).prop_map(|(window, mut lost)| {
-        // Sooner or later one comes through.
+        // Every reply gets through sooner or later.
         lost.push(false);
         (window, lost)
     })
@@ -709,7 +708,7 @@ fn any_change() -> impl Strategy<Value = Change> {
     ]
 }
 
-/// Lets something happen that a host is able to notice; see "what cannot be known" in the reader's
+/// Makes something happen that a host can notice; see "what cannot be known" in the reader's
 /// documentation. Returns how many events may follow before the next reply.
 fn change(recorder: &mut Recorder, change: Change) -> usize {
     match change {
@@ -719,8 +718,8 @@ fn change(recorder: &mut Recorder, change: Change) -> usize {
             recorder.erase();
             followers
         }
-        // A total that has wrapped and happens to be what the ring holds looks as if nothing had
-        // been thrown away.
+        // A total that has wrapped and equals what the ring holds looks as if nothing had been
+        // discarded.
         Change::Resize(size) if recorder.count() < 65_536 || size <= recorder.size => {
             recorder.resize(size);
             usize::MAX
@@ -732,8 +731,7 @@ fn change(recorder: &mut Recorder, change: Change) -> usize {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Nothing happens during the readings: what is lost is exactly what the recorder does not hold
-    /// any more.
+    /// Nothing happens during the readings: exactly what the recorder no longer holds is lost.
     #[test]
     fn each_event_once_and_every_loss_counted(
         size in any_size(),
@@ -778,8 +776,8 @@ proptest! {
         }
     }
 
-    /// Events happen during the readings, up to so many that the ring turns over: order and count
-    /// still hold.
+    /// Events happen during the readings, even so many that the ring turns. Order and count still
+    /// hold.
     #[test]
     fn events_during_the_reading_are_delivered_or_counted(
         size in any_size(),
@@ -800,7 +798,7 @@ proptest! {
             let mut replies = 0;
             let (told, _) = host.read(&mut recorder, |recorder| {
                 replies += 1;
-                // A reading that keeps up would go on for ever.
+                // A reading that keeps up would never end.
                 if replies < 300 {
                     recorder.append_many(rate * percents.next().unwrap() / 100);
                 }
@@ -810,7 +808,7 @@ proptest! {
                 prop_assert!(host.expected.unwrap() > due, "the reading ended before its time");
             }
         }
-        // In peace the rest comes, too.
+        // The rest comes when the events stop.
         let (told, _) = host.read(&mut recorder, |_| {});
         host.judge(&told, 1);
         let next_serial = recorder.history.last().map_or(1, |entry| serial(entry) + 1);
@@ -818,7 +816,7 @@ proptest! {
         prop_assert_eq!(host.read(&mut recorder, |_| {}).0, vec![]);
     }
 
-    /// Somebody erases or resizes the log in the middle of a reading.
+    /// Another host erases or resizes the log in the middle of a reading.
     #[test]
     fn changes_during_the_reading_are_noticed(
         size in any_size(),
@@ -855,7 +853,7 @@ proptest! {
     }
 
     /// The total has wrapped, and after an erase so many events follow at once that neither it nor
-    /// the next slot shows it. The entries do.
+    /// the next slot shows the erase. The entries show it.
     #[test]
     fn an_erase_that_no_header_shows_is_noticed(
         size in prop_oneof![Just(64_usize), Just(256), Just(2048)],

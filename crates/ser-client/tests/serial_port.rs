@@ -1,4 +1,4 @@
-//! A pseudo-terminal for a serial port: opening, rates, and what happens when it goes away.
+//! A pseudo-terminal as the serial port: opening, rates, and what happens when it goes away.
 #![cfg(target_os = "linux")]
 
 mod common;
@@ -17,7 +17,7 @@ use ser_client::{
 use ser_proto::{Baud, Command, Decoded, FrameDecoder, FrameEncoder, Reply};
 use serialport::{SerialPort, TTYPort};
 
-/// Far more than anything here takes, on the busiest machine.
+/// Far longer than anything here takes on the busiest machine.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The recorder's end of a pseudo-terminal, and the name of the client's end.
@@ -91,7 +91,7 @@ fn every_rate_of_the_recorder_can_be_opened_and_set() {
         unit.set_timeout(PATIENCE).unwrap();
         unit.read_exact(&mut heard).unwrap();
         assert_eq!(&heard, b"\x1B014D4D");
-        // Nothing is changed on the way: no echo, no CR to LF, no XON.
+        // The terminal must not change anything: no echo, no CR to LF, no XON.
         unit.write_all(b"\r\n\x11\x13\x03\x1B\xFF\x00").unwrap();
         assert_eq!(read_at_least(&mut transport, 8), b"\r\n\x11\x13\x03\x1B\xFF\x00");
     }
@@ -114,7 +114,7 @@ fn nothing_to_read_is_zero_after_the_timeout() {
 #[test]
 fn what_the_unit_printed_before_is_not_thrown_away() {
     let (mut unit, path) = pair();
-    // Somebody has to have the port open for the terminal to keep anything.
+    // The terminal keeps bytes only while a program has the port open.
     let transport = SerialTransport::open(&path, 9600).unwrap();
     unit.write_all(b"printed before\r\n").unwrap();
     let mut client = Unit::new(Box::new(transport), Options::default());

@@ -1,4 +1,4 @@
-//! Requests and their answers, with every byte and every moment written down.
+//! Requests and their answers, with every byte and every moment given.
 
 mod common;
 
@@ -19,7 +19,7 @@ fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)
 }
 
-/// Over a line that takes no time: an attempt lasts exactly the timeout.
+/// A line that takes no time: an attempt lasts exactly the timeout.
 fn session(retries: u32) -> Session {
     Session::new(Timing { timeout: TIMEOUT, retries, line_rate: LineRate::Instant })
 }
@@ -28,7 +28,7 @@ fn frame(reply: &Reply) -> Vec<u8> {
     FrameEncoder::new(reply.to_body()).collect()
 }
 
-/// What the session sends now.
+/// The bytes that the session sends now.
 fn sent(session: &mut Session, now: Duration) -> Option<Vec<u8>> {
     session.dispatch(now).map(|attempt| attempt.frame().to_vec())
 }
@@ -72,7 +72,7 @@ fn a_body_without_a_frame_is_a_message_like_any_other() {
     let mut session = session(0);
     session.request(Command::Read { start: 1, count: 10 }).unwrap();
     assert_eq!(session.dispatch(ms(0)).unwrap().command(), &Command::Read { start: 1, count: 10 });
-    // Over a Genius bus a recorder with 32 inputs brings seven entries where ten were asked for.
+    // Over a Genius bus a recorder with 32 inputs returns seven entries when ten were asked for.
     let (report, reply) = (read_reply(5, 2), read_reply(1, 7));
     session.process_body(ms(1), &Reply::Read(report.clone()).to_body());
     session.process_body(ms(1), b"R");
@@ -187,7 +187,7 @@ fn a_slow_line_is_given_the_time_it_needs() {
         Timing { timeout: TIMEOUT, retries: 0, line_rate: LineRate::BitsPerSecond(bits_per_second) }
             .attempt(&command)
     };
-    // A frame of 13 characters, and two of 341: the one that was just being sent, and the answer.
+    // A frame of 13 characters and two of 341: the one that was just being sent, and the answer.
     let read = Command::Read { start: 1, count: 10 };
     assert_eq!(at(300, read), TIMEOUT + Duration::from_nanos(695 * 10 * 1_000_000_000 / 300));
     assert_eq!(at(9600, read).as_millis(), 1723);
@@ -200,7 +200,7 @@ fn an_attempt_is_not_given_up_in_the_middle_of_a_frame() {
     session.request(Command::QueryMode).unwrap();
     sent(&mut session, ms(0)).unwrap();
     let bytes = frame(&RUNNING);
-    // One character every 900 ms, as no line has it, but a terminal server might.
+    // One character every 900 ms, which no line has, but a terminal server might.
     for (index, byte) in bytes.iter().enumerate() {
         let now = ms(900 * (1 + u64::try_from(index).unwrap()));
         assert_eq!(sent(&mut session, now), None);
@@ -248,7 +248,7 @@ fn noise_and_reports_and_lines_before_the_answer_do_not_matter() {
         }))
     );
     assert_eq!(session.take_unsolicited(), Some(Unsolicited::Report(report)));
-    // The remains of the two broken frames count against the line in which they were.
+    // The remains of the two broken frames count against the line that they are in.
     assert_eq!(
         session.take_unsolicited(),
         Some(Unsolicited::Line(TextLine { text: "second line".to_owned(), cut: false, noise: 2 }))
@@ -263,14 +263,14 @@ fn noise_and_reports_and_lines_before_the_answer_do_not_matter() {
 fn a_read_is_answered_by_what_it_asked_for_only() {
     let mut session = session(0);
     session.request(Command::Read { start: 4, count: 2 }).unwrap();
-    // Before the request is sent nothing can be the answer to it.
+    // Before the request is sent nothing can be its answer.
     session.process(ms(0), &frame(&Reply::Read(read_reply(4, 2))));
     sent(&mut session, ms(0)).unwrap();
     for other in [read_reply(5, 2), read_reply(4, 3), read_reply(3, 1)] {
         session.process(ms(1), &frame(&Reply::Read(other)));
         assert_eq!(session.take_answer(), None);
     }
-    // Fewer than asked for is an answer: the log ends.
+    // Fewer entries than asked for are an answer, because the log ends.
     session.process(ms(2), &frame(&Reply::Read(read_reply(4, 1))));
     assert_eq!(session.take_answer(), Some(Ok(Reply::Read(read_reply(4, 1)))));
     assert_eq!(session.counters().reports, 4);
@@ -324,7 +324,7 @@ fn the_second_answer_to_a_repeated_request_is_waited_for() {
     session.process(ms(1200), &frame(&RUNNING));
     assert_eq!(session.take_answer(), None);
     sent(&mut session, ms(1200)).unwrap();
-    // If it never comes, the wait ends when the attempt would have.
+    // If it never comes, the wait ends when the attempt would have ended.
     session.process(ms(1300), &frame(&RUNNING));
     session.take_answer().unwrap().unwrap();
     session.request(Command::QueryMode).unwrap();
@@ -337,7 +337,7 @@ fn what_came_instead_of_an_answer_is_the_diagnosis() {
         frame(&RUNNING).iter().map(|&byte| if byte == b'7' { b'6' } else { byte }).collect();
     let mut odd_length = b"\x1B024D014E".to_vec();
     odd_length.extend(frame(&Reply::ClockSet));
-    // 9600 baud seen at 19200: no byte has its shape.
+    // 9600 baud seen at 19200: no byte keeps its value.
     let garbage: Vec<u8> = (0..200_u8).map(|n| n.wrapping_mul(37) | 0x80).collect();
     let cases: [(&[u8], Diagnosis); 7] = [
         (b"", Diagnosis::Silent),
@@ -482,7 +482,7 @@ fn an_answer_that_was_lost_is_noticed_by_the_next_one() {
     assert_eq!(starts(&mut session, ms(0)), [1, 2]);
     answer(&mut session, ms(100), 2);
     assert_eq!(answered(&mut session), Some(2));
-    // At once, and alone.
+    // The request is repeated at once, and alone.
     assert!(!session.has_room());
     assert_eq!(starts(&mut session, ms(100)), [1]);
     assert_eq!(session.poll_at(), Some(ms(1100)));
@@ -516,7 +516,7 @@ fn after_a_timeout_both_are_asked_again_one_after_the_other() {
     assert_eq!(answered(&mut session), Some(1));
     answer(&mut session, ms(1150), 2);
     assert_eq!(answered(&mut session), Some(2));
-    // An answer to the repeated request may come, and must not pass for another one.
+    // An answer to the repeated request may come and must not pass for another one.
     session.request(read(1)).unwrap();
     assert_eq!(starts(&mut session, ms(1150)), []);
     answer(&mut session, ms(1200), 1);
@@ -530,7 +530,7 @@ fn after_a_timeout_both_are_asked_again_one_after_the_other() {
 #[test]
 fn a_unit_that_takes_no_request_while_it_answers_is_asked_one_at_a_time() {
     for retries in [0, 2] {
-        // Found out by the answer to the next request, or by a timeout.
+        // The loss shows in the answer to the next request, or in a timeout.
         for next in [true, false] {
             let mut session = session(retries);
             session.request(read(1)).unwrap();
@@ -565,13 +565,13 @@ fn a_unit_that_is_confused_by_a_second_request_is_asked_one_at_a_time() {
     session.request(read(1)).unwrap();
     session.request(read(2)).unwrap();
     starts(&mut session, ms(0));
-    // Neither is answered; that was no attempt.
+    // Neither is answered; that did not count as an attempt.
     assert_eq!(starts(&mut session, ms(1000)), [1]);
     assert!(session.is_one_at_a_time());
     answer(&mut session, ms(1100), 1);
     assert_eq!(answered(&mut session), Some(1));
     assert_eq!(starts(&mut session, ms(1100)), [2]);
-    // This one is.
+    // This one counts.
     assert_eq!(starts(&mut session, ms(2100)), []);
     session.take_answer().unwrap().unwrap_err();
 }
@@ -595,7 +595,7 @@ fn one_loss_in_five_is_too_many_for_two_at_once() {
         }
         now += 2000;
     }
-    // It was the line: the recorder has shown that it takes two.
+    // The line was at fault: the recorder has shown that it takes two.
     now += 2000;
     for answers in 1.. {
         session.request(read(1)).unwrap();
@@ -640,7 +640,7 @@ fn what_is_under_way_is_forgotten_together() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever arrives in whatever pieces, the session stays usable, and cutting does not change
+    /// Whatever arrives in whatever pieces, the session stays usable, and the pieces do not change
     /// the outcome.
     #[test]
     fn any_bytes_in_any_pieces(

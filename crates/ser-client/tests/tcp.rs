@@ -1,4 +1,4 @@
-//! A TCP connection to a unit: talking, and every way in which it does not come about.
+//! A TCP connection to a recorder: the conversation, and every way in which the connection fails.
 
 mod common;
 
@@ -92,7 +92,7 @@ fn a_peer_that_goes_away_in_the_middle_has_ended() {
 
 #[test]
 fn a_question_to_a_peer_that_has_hung_up_says_the_same_whichever_way_it_is_noticed() {
-    // With something unread, closing resets the connection.
+    // Closing with unread bytes resets the connection.
     for read in [false, true] {
         let (mut client, mut peer) =
             connect(Options { timeout: Duration::from_secs(20), retries: 0 });

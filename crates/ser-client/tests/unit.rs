@@ -64,7 +64,7 @@ fn settings_are_checked_against_what_is_in_force() {
         .unwrap();
     assert_eq!((in_force.size, in_force.auto_print, in_force.baud), (50, true, Baud::B19200));
     assert_eq!(bench.fake().recorder.size, 50);
-    // A recorder that finds a field out of range changes nothing and answers with what it has.
+    // A recorder that finds a field out of range changes nothing and answers with its settings.
     let result = bench.unit.configure(Configure { size: Some(2049), ..keep_everything() });
     assert!(
         matches!(result, Err(RequestError::Refused { in_force: old }) if old == in_force),
@@ -121,7 +121,7 @@ fn a_unit_at_another_rate_is_found_and_the_rate_is_left_as_it_was() {
         [Command::QueryMode],
         "the right rate is not asked for twice"
     );
-    // Nothing is sent where the rate is nothing that this side could change.
+    // Nothing is sent, because this side could not follow to the new rate.
     assert_eq!(Bench::new(100).unit.find_baud().unwrap(), None);
 }
 
@@ -235,7 +235,7 @@ fn a_log_is_read_over_a_line_that_loses_replies() {
     bench.fake().commands.clear();
     assert_eq!(read_new(&mut bench.unit, &mut cursor, 100).0, []);
     assert_eq!(bench.fake().commands.len(), 1);
-    // And what comes then is read from there.
+    // What comes then is read from there.
     bench.fake().recorder.append_many(2);
     assert_eq!(read_new(&mut bench.unit, &mut cursor, 100).0, [Told::Event(131), Told::Event(132)]);
 }
@@ -301,7 +301,7 @@ fn a_log_that_never_rests_ends_in_an_error() {
         recorder.erase();
         recorder.append_many(150);
     });
-    // Every total is the same, every entry another: each reading sees a log that began anew.
+    // Every total is the same but every entry different, so each reading sees a new log.
     let mut cursor = None;
     let (_, result) = read_new(&mut bench.unit, &mut cursor, 99);
     assert!(matches!(result, Err(RequestError::Disturbed(Disturbed::Changed))), "{result:?}");
@@ -368,7 +368,7 @@ fn reports_and_lines_during_requests_are_kept_in_order() {
     let report = bench.fake().recorder.read(1, 1);
     bench.fake().say(b"a line from before\r\n");
     bench.fake().reply(&Reply::Read(report.clone()));
-    // The report would be a fine answer, but it was there before the question.
+    // The report would be a valid answer, but it came before the question.
     assert_eq!(bench.unit.log_position().unwrap().total, 1);
     assert_eq!(bench.fake().commands.len(), 1);
     let mut next = || bench.unit.wait_event(Duration::ZERO).unwrap();

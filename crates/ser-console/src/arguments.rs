@@ -1,4 +1,4 @@
-//! Programs with arguments: what clap has to say, and standard output that is full or gone.
+//! Arguments of a program: clap's messages, and standard output that is full or gone.
 
 use std::error::Error as _;
 use std::fmt::Display;
@@ -9,18 +9,17 @@ use clap::error::{ContextKind, ContextValue};
 
 use crate::Harmless;
 
-/// Prints what clap says instead of the arguments: help, a version, or what is wrong. Gives the
-/// exit code.
+/// Prints clap's help, version or error instead of running the program, and returns the exit code.
 ///
-/// clap repeats arguments as they came. Nothing in them moves a terminal or passes for a line of
-/// the program's own; the program's colours stay.
+/// clap repeats arguments as they came. They are filtered, so that none of them moves a terminal or
+/// passes for a line of the program's own. The program's colours stay.
 #[must_use]
 pub fn explain(error: clap::Error) -> ExitCode {
     let to_stderr = error.use_stderr();
     let code = u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from);
     let text = rendered(error);
     if to_stderr {
-        // Nobody is left to be told when standard error is gone.
+        // When standard error is gone, nobody can be told.
         let _ = anstream::stderr().write_all(text.as_bytes());
     } else if let Err(error) = print(text) {
         return unwritten(&error);
@@ -31,7 +30,7 @@ pub fn explain(error: clap::Error) -> ExitCode {
 fn rendered(mut error: clap::Error) -> String {
     let repeated: Vec<_> =
         error.context().map(|(kind, value)| (kind, harmless(kind, value))).collect();
-    // clap would propose the words that it was given, as they came.
+    // clap would suggest the given words unfiltered.
     let is_hostile = repeated.iter().any(|(_, value)| value.is_some());
     for (kind, value) in repeated {
         if is_hostile && kind == ContextKind::Suggested {
@@ -44,17 +43,17 @@ fn rendered(mut error: clap::Error) -> String {
     if let Some(source) = error.source().map(ToString::to_string) {
         text = text.replace(&source, &Harmless(&source).to_string());
     }
-    // Nothing of others' is left by now. Should clap ever repeat more, the colours go, too: nobody
-    // could tell theirs from ours.
+    // Nothing from outside is left by now. If clap ever repeats more, the colours go, too, because
+    // they could then come from either side.
     let plain = anstream::adapter::strip_str(&text).to_string();
     if Harmless(&plain).lines() == plain { text } else { Harmless(text).lines() }
 }
 
-/// Of what an error repeats: its harmless form, where that is another one.
+/// The filtered form of a text that an error repeats, if that form is another one.
 fn harmless(kind: ContextKind, value: &ContextValue) -> Option<ContextValue> {
     let line = |word: &String| Harmless(word).line();
     match value {
-        // Usage is the program's own.
+        // The usage text is the program's own.
         _ if kind == ContextKind::Usage => None,
         ContextValue::String(word) if line(word) != *word => Some(ContextValue::String(line(word))),
         ContextValue::Strings(words) if words.iter().any(|word| line(word) != *word) => {
@@ -64,7 +63,7 @@ fn harmless(kind: ContextKind, value: &ContextValue) -> Option<ContextValue> {
     }
 }
 
-/// Prints a text on standard output, with colours only where they are wanted.
+/// Prints a text on standard output, with colours only if they are wanted.
 ///
 /// # Errors
 /// Those of writing it; see [`unwritten`].
@@ -74,8 +73,8 @@ pub fn print(text: impl Display) -> io::Result<()> {
     out.flush()
 }
 
-/// The exit code of a program whose standard output has failed. It is none of its business that
-/// nobody reads any more (`| head`); anything else it tells.
+/// The exit code of a program whose standard output has failed. A reader that is gone (`| head`) is
+/// not an error; any other cause is reported.
 #[must_use]
 pub fn unwritten(error: &io::Error) -> ExitCode {
     if error.kind() == ErrorKind::BrokenPipe {

@@ -1,9 +1,9 @@
-//! What programs say to people on a terminal, and how they notice that nobody listens any more.
+//! How programs write to a person's terminal, and notice that nobody reads any more.
 //!
-//! Names of files, what an adapter says of itself, the words of a command line: such text comes
-//! from outside and may hold anything, also what moves a terminal's cursor, changes its colours or
-//! turns its text around. It passes through [`Harmless`] before it is shown; a program that takes
-//! arguments passes clap's errors through [`explain`].
+//! File names, an adapter's description and the words of a command line come from outside and may
+//! hold anything, even what moves a terminal's cursor, changes its colours or reverses its text.
+//! Such text passes through [`Harmless`] before it is shown. A program that takes arguments passes
+//! clap's errors through [`explain`].
 
 #[cfg(feature = "arguments")]
 mod arguments;

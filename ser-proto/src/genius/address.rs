@@ -1,31 +1,31 @@
-//! Who is on the bus, and to whom a datagram goes.
+//! Addresses on the bus: who a device is, and where a datagram goes.
 
 use core::fmt;
 
 use crate::MAX_REPORT_ADDRESS;
 
-/// A device on the bus: its number is its address, 0–31.
+/// A device on the bus, known by its bus address, 0–31.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BusAddress(u8);
 
 impl BusAddress {
-    /// Number 0, by custom a hand-held monitor.
+    /// Address 0, by custom that of a hand-held monitor.
     pub(super) const FIRST: BusAddress = BusAddress(0);
 
-    /// The device with that number, 0–31.
+    /// The device with address `number`, 0–31.
     #[must_use]
     pub const fn new(number: u8) -> Option<BusAddress> {
         if number <= MAX_REPORT_ADDRESS { Some(BusAddress(number)) } else { None }
     }
 
-    /// Its number, 0–31.
+    /// The address as a number, 0–31.
     #[must_use]
     pub const fn number(self) -> u8 {
         self.0
     }
 
-    /// Every device that a bus can have, in the order in which they take turns.
+    /// Every device that a bus can have, in the order of their turns.
     pub fn all() -> impl Iterator<Item = BusAddress> {
         (0..=MAX_REPORT_ADDRESS).map(BusAddress)
     }
@@ -49,7 +49,7 @@ pub enum Address {
 }
 
 impl Address {
-    /// The address with that number: 0–31 or 255.
+    /// The destination with that number: 0–31 or 255.
     #[must_use]
     pub const fn from_number(number: u8) -> Option<Address> {
         match (number, BusAddress::new(number)) {

@@ -28,7 +28,7 @@ impl BusRate {
         BusRate::ALL.into_iter().find(|rate| rate.code() == code)
     }
 
-    /// The code, 0–3, as in a Read ID reply. DIP switches use another one.
+    /// The code, 0–3, as in a Read ID reply. The DIP switches use another code.
     #[must_use]
     pub const fn code(self) -> u8 {
         self as u8
@@ -44,7 +44,7 @@ impl BusRate {
         }
     }
 
-    /// What manuals call it.
+    /// The name that the manuals use.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -26,7 +26,7 @@ pub enum CommReq {
 }
 
 impl CommReq {
-    /// Understands the words of a block; word 6 says which one it is.
+    /// Parses the words of a block; word 6 says which one it is.
     ///
     /// # Errors
     /// See [`CommReqError`].
@@ -51,7 +51,7 @@ impl CommReq {
     }
 }
 
-/// As the block itself reads.
+/// As the block it holds.
 impl fmt::Display for CommReq {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

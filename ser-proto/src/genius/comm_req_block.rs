@@ -33,7 +33,7 @@ impl<'a> Block<'a> {
         Ok(status)
     }
 
-    /// The word at `index`, which `accept` turns into its meaning, or refuses.
+    /// The word at `index`; `accept` turns it into its meaning or refuses it.
     pub(super) fn word<T>(
         self,
         index: usize,
@@ -50,8 +50,8 @@ impl<'a> Block<'a> {
         Ok(PlcReference { memory, number })
     }
 
-    /// The words from `index` on, of which there must be `count`, or up to `most` when a PLC hands
-    /// over the words behind them too.
+    /// The words from `index` on. There must be `count`, or up to `most` when a PLC also hands over
+    /// the words after the block.
     pub(super) fn rest(
         self,
         index: usize,
@@ -84,7 +84,8 @@ pub(super) fn address(value: u16) -> Option<Address> {
     byte(value).and_then(Address::from_number)
 }
 
-/// Why words are not a `COMM_REQ` block that we know. Words count from 0, as in the manual.
+/// Why words are not a `COMM_REQ` block that this crate knows. Words count from 0, as in the
+/// manual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CommReqError {
@@ -93,7 +94,7 @@ pub enum CommReqError {
         /// The word that is not there.
         index: usize,
     },
-    /// A word holds a value that it cannot have.
+    /// A word holds a value that is not allowed.
     BadWord {
         /// Which word.
         index: usize,
@@ -102,7 +103,7 @@ pub enum CommReqError {
     },
     /// There are more words than the block has.
     TooManyWords {
-        /// How many there are.
+        /// How many words there are.
         words: usize,
     },
 }

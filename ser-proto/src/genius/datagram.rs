@@ -8,9 +8,9 @@ use super::{
     Address, BusAddress, FUNCTION_GENIUS, FUNCTION_HORNER, Priority, SUBFUNCTION_SER, Subfunction,
 };
 
-/// The most data bytes of a datagram: what the buffers of a GENI board hold (GENI manual, chapter
-/// 10, tables of the Transmit Datagram commands). Messages of the recorder have at most
-/// [`MAX_SER_DATA`](super::MAX_SER_DATA).
+/// The most data bytes of a datagram. It is the size of a GENI board's buffers (GENI manual,
+/// chapter 10, tables of the Transmit Datagram commands). Messages of the recorder have at most
+/// [`MAX_SER_DATA`](super::MAX_SER_DATA) bytes.
 pub const MAX_DATA: usize = 134;
 
 /// The data of a datagram.
@@ -22,15 +22,16 @@ pub type Data = Vec<u8, MAX_DATA>;
 pub struct Datagram {
     /// Who sent it.
     pub source: BusAddress,
-    /// To whom.
+    /// Where it goes.
     pub destination: Address,
     /// Which family of datagrams, e.g. [`FUNCTION_GENIUS`].
     pub function: u8,
     /// Which one of the family; its meaning depends on the function.
     pub subfunction: u8,
-    /// How urgent it was, or shall be. A receiver is not told: there it is [`Priority::Normal`].
+    /// How urgent it is. The bus does not tell a receiver; a received datagram has
+    /// [`Priority::Normal`].
     pub priority: Priority,
-    /// What it carries.
+    /// The data.
     pub data: Data,
 }
 
@@ -57,7 +58,7 @@ impl Datagram {
         })
     }
 
-    /// The function and subfunction codes in words, where we know them.
+    /// The function and subfunction codes in words, where they have a name here.
     fn subject(&self) -> Subject {
         Subject { function: self.function, subfunction: self.subfunction }
     }
@@ -104,7 +105,7 @@ impl fmt::Display for ByteCount {
     }
 }
 
-/// More than the [`MAX_DATA`] bytes that fit a datagram.
+/// The data are longer than the [`MAX_DATA`] bytes of a datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TooMuchData {

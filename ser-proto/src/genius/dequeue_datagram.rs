@@ -20,7 +20,8 @@ pub(super) const DEQUEUE: u16 = 13;
 /// Words of the block; it carries no data.
 const LEN: usize = 13;
 
-/// Word 0: the words from the command word on. It is the manual's rule for a datagram length of 0.
+/// Word 0: the number of words from the command word on. The manual's rule gives 7 for a datagram
+/// length of 0.
 const COMMAND_LENGTH: u16 = 7;
 const _: () = assert!(HEADER_LEN + COMMAND_LENGTH as usize == LEN);
 
@@ -28,11 +29,11 @@ const _: () = assert!(HEADER_LEN + COMMAND_LENGTH as usize == LEN);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DequeueDatagram {
-    /// Where the PLC shall put the outcome.
+    /// Where the PLC is to put the outcome.
     pub status: PlcReference,
-    /// How many words may be fetched, from 1.
+    /// How many words may be fetched, at least 1.
     pub max_words: u16,
-    /// Where the first of them goes.
+    /// Where the first fetched word goes.
     pub into: PlcReference,
     /// Function code of the datagram.
     pub function: u8,
@@ -69,7 +70,7 @@ impl DequeueDatagram {
         gather(start(COMMAND_LENGTH, self.status, DEQUEUE).into_iter().chain(fields))
     }
 
-    /// Understands the words of a block.
+    /// Parses the words of a block.
     ///
     /// # Errors
     /// See [`CommReqError`].

@@ -8,8 +8,8 @@
 //!                 | 1 0 76.8K, 1 1 153.6K standard   |
 //! ```
 //!
-//! An open switch is a 1. The switches of a GENI board mean the same; there a closed switch 8 holds
-//! back outputs.
+//! An open switch is a 1. The switches of a GENI board mean the same, except that its switch 8
+//! disables outputs when closed.
 
 use core::fmt;
 
@@ -30,7 +30,7 @@ impl DipSwitches {
     /// The address that switches 1–5 give.
     #[must_use]
     pub fn address(self) -> BusAddress {
-        // Five bits are always an address.
+        // Five bits always make a valid address.
         BusAddress::new(self.0 & 0x1F).unwrap_or(BusAddress::FIRST)
     }
 
@@ -45,10 +45,10 @@ impl DipSwitches {
         }
     }
 
-    /// What the switches of a recorder say.
+    /// The settings of a recorder with these switches.
     ///
     /// # Errors
-    /// [`Switch8Closed`]: a recorder has no outputs that the switch could hold back.
+    /// [`Switch8Closed`]: a recorder has no outputs that switch 8 could disable.
     pub fn settings(self) -> Result<BusSettings, Switch8Closed> {
         match self.is_open(8) {
             true => Ok(BusSettings { address: self.address(), rate: self.rate() }),
@@ -78,7 +78,7 @@ pub struct BusSettings {
 }
 
 impl BusSettings {
-    /// The switches that say so, with switch 8 open.
+    /// The switches for these settings, with switch 8 open.
     #[must_use]
     pub const fn switches(self) -> DipSwitches {
         let rate = match self.rate {

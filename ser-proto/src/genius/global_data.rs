@@ -38,10 +38,10 @@ impl GlobalData {
         }
     }
 
-    /// Understands the global data of a recorder; their length shows the model.
+    /// Parses the global data of a recorder; their length shows the model.
     ///
     /// # Errors
-    /// [`GlobalDataLength`] when there are neither 2 nor 4 bytes.
+    /// [`GlobalDataLength`] unless there are 2 or 4 bytes.
     pub fn parse(bytes: &[u8]) -> Result<GlobalData, GlobalDataLength> {
         let (ser160, ser320) = (le_u16.map(u32::from), le_u32);
         let state = |model, state| GlobalData { model, state: Inputs(state) };
@@ -64,7 +64,7 @@ impl fmt::Display for GlobalData {
     }
 }
 
-/// Global data of this many bytes are not a recorder's.
+/// Global data of a length that no recorder sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GlobalDataLength {

@@ -5,7 +5,7 @@
 //! reply:   | table | its contents … |    1 byte, and at most 128 of contents
 //! ```
 //!
-//! A table has a byte for every eight discrete points, then a word for every analog channel.
+//! A table has one byte for every eight discrete points, then one word for every analog channel.
 
 use core::fmt;
 
@@ -84,7 +84,7 @@ impl fmt::Display for ForceTable {
 pub struct IoForces {
     /// Which table.
     pub table: ForceTable,
-    /// What it contains; nothing when the device has no such points.
+    /// What it contains; empty when the device has no such points.
     pub contents: Vec<u8, MAX_FORCE_TABLE>,
 }
 

@@ -6,8 +6,8 @@
 //! Read Device reply, Write Device:   | length | address (3, low first) | contents … | 4 + length bytes
 //! ```
 //!
-//! This is the order in which a GENI board shows such datagrams in its request queue, and in which
-//! it sends them back (GENI manual, chapter 13). The order on the bus is not published; see
+//! A GENI board shows such datagrams in this order in its request queue, and sends them back in
+//! this order (GENI manual, chapter 13). The order on the bus is not published; see
 //! `docs/genius.md`.
 
 use core::fmt;
@@ -25,18 +25,18 @@ use crate::fields::{Bytes, Fault, byte};
 /// Bytes before the contents.
 const HEADER_LEN: usize = 4;
 
-/// The most bytes of memory that one datagram carries along with the header (GENI manual, chapter
-/// 13: a buffer of the request queue has so many for data).
+/// The most bytes of memory that one datagram carries after the header: the data size of a buffer
+/// in the request queue (GENI manual, chapter 13).
 pub const MAX_MEMORY_DATA: usize = 128;
 const _: () = assert!(HEADER_LEN + MAX_MEMORY_DATA <= MAX_DATA);
 
-/// A place in a host's memory: 24 bits whose meaning is the host's.
+/// An address in a host's memory: 24 bits whose meaning is up to the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MemoryAddress(u32);
 
 impl MemoryAddress {
-    /// The place with that address, below 2²⁴.
+    /// The place at `address`, below 2²⁴.
     #[must_use]
     pub const fn new(address: u32) -> Option<MemoryAddress> {
         if address < 1 << 24 { Some(MemoryAddress(address)) } else { None }
@@ -70,7 +70,7 @@ impl fmt::Display for MemoryAddress {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MemoryRange {
-    /// Where.
+    /// Where it starts.
     pub address: MemoryAddress,
     /// How many bytes, 0–[`MAX_MEMORY_DATA`].
     pub length: u8,
@@ -94,9 +94,9 @@ impl MemoryRange {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MemoryContents {
-    /// Where.
+    /// Where it starts.
     pub address: MemoryAddress,
-    /// What is there, or shall be.
+    /// The bytes that are there, or that are to be written.
     pub contents: Vec<u8, MAX_MEMORY_DATA>,
 }
 

@@ -1,4 +1,4 @@
-//! The bus's own datagrams (function code 20h) by their meaning.
+//! The bus's own datagrams (function code 20h), parsed.
 
 use core::fmt;
 
@@ -8,21 +8,21 @@ use super::{
     MemoryRange, MessageError, Priority, ReadIdReply, Subfunction, WritePoint,
 };
 
-/// A datagram of function code 20h. Those whose layout we do not know keep their bytes.
+/// A datagram of function code 20h. One whose layout is not known here keeps its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Message {
-    /// Who are you? A GENI board answers by itself.
+    /// Asks a device what it is. A GENI board answers by itself.
     ReadId,
-    /// The answer.
+    /// The answer to Read ID.
     ReadIdReply(ReadIdReply),
     /// Asks for one of the four force tables.
     ReadIoForces(ForceTable),
-    /// The answer.
+    /// The answer to Read I/O Forces.
     ReadIoForcesReply(IoForces),
     /// Asks for a piece of a host's memory.
     ReadDevice(MemoryRange),
-    /// The answer.
+    /// The answer to Read Device.
     ReadDeviceReply(MemoryContents),
     /// Changes a piece of a host's memory.
     WriteDevice(MemoryContents),
@@ -38,10 +38,10 @@ pub enum Message {
 }
 
 impl Message {
-    /// Understands a datagram.
+    /// Parses a datagram.
     ///
     /// # Errors
-    /// See [`MessageError`]. A subfunction that we do not know is not an error.
+    /// See [`MessageError`]. An unknown subfunction is not an error.
     pub fn parse(datagram: &Datagram) -> Result<Message, MessageError> {
         if datagram.function != FUNCTION_GENIUS {
             return Err(MessageError::WrongFunction { function: datagram.function });
@@ -49,10 +49,10 @@ impl Message {
         Message::from_data(datagram.subfunction, &datagram.data)
     }
 
-    /// Understands what a datagram of function code 20h carries.
+    /// Parses the data of a datagram of function code 20h.
     ///
     /// # Errors
-    /// See [`MessageError`]. A subfunction that we do not know is not an error.
+    /// See [`MessageError`]. An unknown subfunction is not an error.
     pub fn from_data(subfunction: u8, carried: &Data) -> Result<Message, MessageError> {
         let data = &carried[..];
         match Subfunction::from_code(subfunction) {
@@ -75,7 +75,7 @@ impl Message {
         }
     }
 
-    /// The message on its way.
+    /// The datagram that carries the message.
     #[must_use]
     pub fn to_datagram(
         &self,
@@ -109,7 +109,7 @@ impl Message {
         }
     }
 
-    /// What the datagram carries.
+    /// The data of the datagram.
     #[must_use]
     pub fn to_data(&self) -> Data {
         match self {
@@ -172,7 +172,7 @@ mod tests {
         }
     }
 
-    /// Any subfunction and data, most of them of a length that the subfunction can have.
+    /// Any subfunction and data, mostly of a length that the subfunction can have.
     fn code_and_data() -> impl Strategy<Value = (u8, Vec<u8>)> {
         let bytes = |lengths| prop::collection::vec(any::<u8>(), lengths);
         prop_oneof![
@@ -255,7 +255,7 @@ mod tests {
             (code, mut data) in code_and_data(),
             fitting: bool,
         ) {
-            // A length inside the data agrees by luck only.
+            // A random length inside the data would agree only by luck.
             if fitting && let [length, _, _, _, contents @ ..] = &mut data[..] {
                 *length = u8::try_from(contents.len()).unwrap();
             }
@@ -263,7 +263,7 @@ mod tests {
             if let Ok(message) = Message::parse(&before) {
                 let after = message.to_datagram(before.source, before.destination, before.priority);
                 prop_assert_eq!(Message::parse(&after), Ok(message));
-                // Half a byte of the Read ID reply means nothing.
+                // The lower half of the last byte of a Read ID reply means nothing.
                 if code != 0x01 {
                     prop_assert_eq!(after, before);
                 }

@@ -17,14 +17,14 @@ pub enum MessageError {
         /// The code found.
         function: u8,
     },
-    /// This datagram never has that many data bytes.
+    /// This datagram never has this many data bytes.
     WrongLength {
         /// Which datagram.
         subfunction: Subfunction,
         /// Data bytes found.
         length: usize,
     },
-    /// The length is right and a field holds a value that it cannot have.
+    /// The length is right, but a field holds a value that is not allowed.
     BadValue {
         /// Which datagram.
         subfunction: Subfunction,
@@ -35,7 +35,7 @@ pub enum MessageError {
     },
 }
 
-/// Parses the data of a datagram, of which there must be `expected_len` bytes.
+/// Parses the data of a datagram, which must be `expected_len` bytes.
 pub(super) fn parse_data<'a, T>(
     subfunction: Subfunction,
     data: Bytes<'a>,
@@ -44,7 +44,7 @@ pub(super) fn parse_data<'a, T>(
 ) -> Result<T, MessageError> {
     parse_exactly(data, expected_len, parser).map_err(|refusal| match refusal {
         Refusal::Length => MessageError::WrongLength { subfunction, length: data.len() },
-        // Fields that are checked have one byte here.
+        // Every field that is checked here is one byte wide.
         Refusal::Value { offset, value } => {
             let [_, value] = value.to_be_bytes();
             MessageError::BadValue { subfunction, offset, value }

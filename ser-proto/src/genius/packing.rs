@@ -2,8 +2,7 @@
 
 use heapless::Vec;
 
-/// The words that hold `bytes`. The high half of the last one is 0 when there is an odd number of
-/// bytes.
+/// The words that hold `bytes`. An odd number of bytes leaves 0 in the high half of the last word.
 pub fn words_of_bytes(bytes: &[u8]) -> impl Iterator<Item = u16> + '_ {
     bytes.chunks(2).map(|pair| match *pair {
         [low, high] => u16::from_le_bytes([low, high]),
@@ -17,8 +16,9 @@ pub fn bytes_of_words(words: &[u16], count: usize) -> impl Iterator<Item = u8> +
     words.iter().flat_map(|word| word.to_le_bytes()).take(count)
 }
 
-/// Items in a buffer of their own. Every caller stays below the capacity by construction; more is a
-/// bug of ours, and must not be a panic in a recorder, which `collect` would make it.
+/// Collects items into a fixed buffer. Every caller stays within the capacity by construction, so
+/// an item that does not fit is a bug of this crate. `collect` would panic then, which a recorder
+/// must not.
 pub(super) fn gather<T, const N: usize>(items: impl IntoIterator<Item = T>) -> Vec<T, N> {
     let mut gathered = Vec::new();
     for item in items {

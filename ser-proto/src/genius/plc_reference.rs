@@ -3,8 +3,8 @@
 use core::fmt;
 use core::num::NonZeroU16;
 
-/// A kind of PLC memory, by the code that `COMM_REQ` blocks use. PLCs have more of them than have
-/// names here.
+/// A kind of PLC memory, by the code that `COMM_REQ` blocks use. PLCs have more kinds than are
+/// named here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MemoryType(pub u16);
@@ -23,7 +23,7 @@ impl MemoryType {
     /// `%W`.
     pub const BULK: MemoryType = MemoryType(196);
 
-    /// What PLC programs call it, if it has a name here.
+    /// The name in PLC programs, if the kind is named here.
     #[must_use]
     pub const fn name(self) -> Option<&'static str> {
         match self {
@@ -58,13 +58,13 @@ impl PlcReference {
         }
     }
 
-    /// What a block holds for the number: one less.
+    /// The number as a block holds it: one less.
     #[must_use]
     pub const fn offset(self) -> u16 {
         self.number.get() - 1
     }
 
-    /// The number for what a block holds. The largest offset has none.
+    /// The number for an offset in a block. The largest offset has none.
     pub(super) fn number_at(offset: u16) -> Option<NonZeroU16> {
         offset.checked_add(1).and_then(NonZeroU16::new)
     }

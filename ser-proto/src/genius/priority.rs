@@ -6,10 +6,10 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Priority {
-    /// Only if nobody else has sent one in this bus scan. Code 0.
+    /// Only if no other device has sent one in this bus scan. Code 0.
     #[default]
     Normal,
-    /// On the sender's next turn in any case; the scan gets longer for everybody. Code 1.
+    /// On the sender's next turn in any case, which lengthens the scan for all devices. Code 1.
     High,
 }
 

@@ -17,31 +17,31 @@ use crate::fields::byte;
 /// Data bytes of the reply.
 const LEN: usize = 12;
 
-/// What a device says about itself when a bus controller logs it in.
+/// What a device tells about itself when a bus controller logs it in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ReadIdReply {
-    /// Bytes that it sends in every scan, or broadcasts as global data.
+    /// Bytes that it sends in every scan, as inputs or as global data.
     pub input_len: u8,
-    /// Bytes that it takes in every scan, or as directed control data.
+    /// Bytes that it receives in every scan, as outputs or as directed control data.
     pub output_len: u8,
     /// Bytes of its configuration.
     pub configuration_len: u8,
     /// Bytes of its diagnostics.
     pub diagnostic_len: u8,
-    /// What kind of device it is, and in which state.
+    /// The kind of device, and its state.
     pub status: DeviceStatus,
-    /// The reference address that it has been given.
+    /// The reference address assigned to it.
     pub reference_address: u16,
     /// Model or application number, depending on the kind of device.
     pub application: u8,
     /// Revision of its software.
     pub software_revision: u8,
-    /// The address of the bus controller that it is assigned to.
+    /// The address of the bus controller to which it is assigned.
     pub controller: u8,
     /// Model number.
     pub model: u8,
-    /// The rate that it works at.
+    /// The bus rate at which it works.
     pub rate: BusRate,
 }
 
@@ -117,8 +117,7 @@ impl fmt::Display for ReadIdReply {
 pub struct DeviceStatus(pub u8);
 
 impl DeviceStatus {
-    /// The bits of a device that goes in these directions, with nothing forced and no hand-held
-    /// monitor.
+    /// The status bits of a device with these directions, nothing forced and no hand-held monitor.
     #[must_use]
     pub const fn new(directions: Directions) -> DeviceStatus {
         DeviceStatus((directions as u8) << 1)
@@ -130,7 +129,7 @@ impl DeviceStatus {
         self.0 & 0x01 != 0
     }
 
-    /// Whether it has inputs, outputs or both, if it says so.
+    /// Whether the device has inputs, outputs or both; `None` if it does not say.
     #[must_use]
     pub const fn directions(self) -> Option<Directions> {
         match self.0 >> 1 & 0b11 {
@@ -148,7 +147,7 @@ impl DeviceStatus {
     }
 }
 
-/// Which way the data of a device go.
+/// The directions in which a device exchanges data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]

@@ -19,30 +19,30 @@ use super::{
 /// The command number.
 pub(super) const SEND: u16 = 14;
 
-/// Where the data start.
+/// The word at which the data start.
 const DATA_INDEX: usize = 12;
 
 /// A block that makes a PLC's bus controller send a datagram.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SendDatagram {
-    /// Where the PLC shall put the outcome.
+    /// Where the PLC is to put the outcome.
     pub status: PlcReference,
-    /// To whom.
+    /// Where the datagram goes.
     pub target: Address,
     /// Function code.
     pub function: u8,
     /// Subfunction code.
     pub subfunction: u8,
-    /// How urgent it is; the manual has 0, normal.
+    /// How urgent it is; the manual's table has 0, normal.
     pub priority: Priority,
-    /// What the datagram carries.
+    /// The data of the datagram.
     pub data: Data,
 }
 
 impl SendDatagram {
-    /// The block that sends `datagram`. Its source is the PLC's bus controller, whatever the
-    /// datagram says.
+    /// The block that sends `datagram`. The datagram's source is ignored: the PLC's bus controller
+    /// sends it.
     #[must_use]
     pub fn new(datagram: Datagram, status: PlcReference) -> SendDatagram {
         SendDatagram {
@@ -55,7 +55,7 @@ impl SendDatagram {
         }
     }
 
-    /// The datagram as a bus controller with that address sends it.
+    /// The datagram as the bus controller at address `source` sends it.
     #[must_use]
     pub fn to_datagram(&self, source: BusAddress) -> Datagram {
         Datagram {
@@ -70,8 +70,8 @@ impl SendDatagram {
 
     /// Word 0 by the manual's rule: (data length + 1) / 2 + 7.
     ///
-    /// That is one more than the words that follow word 5. A PLC reads one word more than the block
-    /// needs, and a bus controller sends the bytes that word 11 counts.
+    /// That is one more than the number of words after word 5. A PLC therefore reads one word more
+    /// than the block needs; a bus controller sends the bytes that word 11 counts.
     #[must_use]
     pub fn command_length(&self) -> u16 {
         self.words_from_command() + 1
@@ -96,10 +96,10 @@ impl SendDatagram {
         gather(start.into_iter().chain(fields).chain(words_of_bytes(&self.data)))
     }
 
-    /// Understands the words of a block.
+    /// Parses the words of a block.
     ///
-    /// Word 0 may also be the true count of the words from word 6 on, and the one word that the
-    /// manual's rule counts in excess may follow.
+    /// Word 0 may also be the true count of the words from word 6 on. The one extra word that the
+    /// manual's rule counts may follow the block.
     ///
     /// # Errors
     /// See [`CommReqError`].
@@ -260,7 +260,7 @@ mod tests {
             let mut words = block.to_words().to_vec();
             prop_assert_eq!(SendDatagram::parse(&words), Ok(block.clone()));
             for length in 0..words.len() {
-                // The command word is looked at first.
+                // The command word is checked first.
                 let missing = if length <= 6 { 6 } else { length };
                 let cut = SendDatagram::parse(&words[..length]);
                 prop_assert_eq!(cut, Err(CommReqError::Missing { index: missing }));

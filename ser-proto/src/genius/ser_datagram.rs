@@ -19,7 +19,7 @@ pub const SUBFUNCTION_SER: u8 = 0x50;
 /// Length"). Other datagrams may be longer: see [`MAX_DATA`](super::MAX_DATA).
 pub const MAX_SER_DATA: usize = 128;
 
-/// The most entries that one read reply brings over the bus: 10 with 16 inputs, 7 with 32.
+/// The most entries that one read reply carries over the bus: 10 with 16 inputs, 7 with 32.
 #[must_use]
 pub const fn max_entries(model: Model) -> usize {
     let fit = (MAX_SER_DATA - READ_REPLY_HEADER_LEN) / model.entry_len();
@@ -27,16 +27,16 @@ pub const fn max_entries(model: Model) -> usize {
 }
 
 impl Datagram {
-    /// A command on its way to a recorder, or to all of them: a broadcast is carried out and not
-    /// answered.
+    /// A command to one recorder or to all. A recorder carries out a broadcast and does not answer
+    /// it.
     #[must_use]
     pub fn from_command(source: BusAddress, destination: Address, command: &Command) -> Datagram {
-        // No command is longer than nine bytes, so nothing is ever cut off here.
+        // No command is longer than nine bytes, so nothing is ever lost here.
         let data = Data::from_slice(&command.to_body()).unwrap_or_default();
         ser_datagram(source, destination, data)
     }
 
-    /// A reply, or a report that nobody asked for.
+    /// A reply or an unsolicited report.
     ///
     /// # Errors
     /// [`SerDatagramError::TooLong`] for a read reply with more than [`max_entries`].
@@ -92,7 +92,7 @@ fn ser_datagram(source: BusAddress, destination: Address, data: Data) -> Datagra
     }
 }
 
-/// Why a datagram holds no message of a recorder, or a message fits no datagram.
+/// Why a datagram holds no message of a recorder, or why a message does not fit a datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SerDatagramError {
@@ -101,18 +101,17 @@ pub enum SerDatagramError {
         /// The code found.
         function: u8,
     },
-    /// The function is right and the subfunction code is not [`SUBFUNCTION_SER`].
+    /// The function code is right, but the subfunction code is not [`SUBFUNCTION_SER`].
     WrongSubfunction {
         /// The code found.
         subfunction: u8,
     },
-    /// The message has more than the [`MAX_SER_DATA`] bytes that a message of the recorder may
-    /// have.
+    /// The message is longer than the [`MAX_SER_DATA`] bytes allowed for one.
     TooLong {
         /// Bytes of the message.
         length: usize,
     },
-    /// The datagram is for, or from, a recorder, and its body is no message.
+    /// The datagram is to or from a recorder, but its body is not a message.
     Message(ParseError),
 }
 

@@ -1,76 +1,75 @@
 //! Function code 20h: the datagrams that every Genius device speaks, and their subfunction codes.
 //!
 //! The manuals at hand name most of these datagrams and print few of the codes. A code marked
-//! *unchecked* is from general knowledge of Genius: no page was there to check it against.
+//! *unchecked* is from general knowledge of Genius, not from a manual.
 
 use core::fmt;
 
 /// Function code of the bus's own datagrams.
 pub const FUNCTION_GENIUS: u8 = 0x20;
 
-/// The highest function code that a GENI board sends; it refuses those above (GENI manual, chapter
+/// The highest function code that a GENI board sends; it refuses higher ones (GENI manual, chapter
 /// 10).
 pub const HIGHEST_FUNCTION: u8 = 112;
 
-/// Which datagram of function code 20h. A code without a name stays what it is.
+/// A datagram of function code 20h. A code without a name here is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Subfunction {
-    /// 00h: who are you?
+    /// 00h: asks a device what it is.
     ReadId,
-    /// 01h: the answer.
+    /// 01h: the answer to Read ID.
     ReadIdReply,
-    /// 02h: how are you configured?
+    /// 02h: asks for a device's configuration.
     ReadConfiguration,
-    /// 03h: the answer.
+    /// 03h: the answer to Read Configuration.
     ReadConfigurationReply,
-    /// 04h: be configured so.
+    /// 04h: sets a device's configuration.
     WriteConfiguration,
     /// 05h: report faults to this device too.
     AssignMonitor,
-    /// 06h: what follows belongs together.
+    /// 06h: begins a sequence of datagrams that belong together.
     BeginPacketSequence,
-    /// 07h: and ends here.
+    /// 07h: ends such a sequence.
     EndPacketSequence,
-    /// 08h (unchecked): what is wrong with you?
+    /// 08h (unchecked): asks for a device's faults.
     ReadDiagnostics,
-    /// 09h (unchecked): the answer.
+    /// 09h (unchecked): the answer to Read Diagnostics.
     ReadDiagnosticsReply,
     /// 0Bh (unchecked): set and clear single bits of a host's memory.
     WritePoint,
-    /// 0Fh (unchecked): a block tells its controllers of a fault.
+    /// 0Fh (unchecked): a block reports a fault to its controllers.
     ReportFault,
-    /// 10h: check the outputs with a pulse.
+    /// 10h: checks the outputs with a pulse.
     PulseTest,
-    /// 12h (unchecked): forget the faults of one circuit.
+    /// 12h (unchecked): clears the faults of one circuit.
     ClearCircuitFault,
-    /// 13h: forget all faults.
+    /// 13h: clears all faults.
     ClearAllFaults,
-    /// 1Eh: what is in a host's memory?
+    /// 1Eh: reads a host's memory.
     ReadDevice,
-    /// 1Fh: the answer.
+    /// 1Fh: the answer to Read Device.
     ReadDeviceReply,
-    /// 20h: change a host's memory.
+    /// 20h: writes a host's memory.
     WriteDevice,
-    /// 22h (unchecked): a device tells its controllers that it was configured anew.
+    /// 22h (unchecked): a device tells its controllers that its configuration has changed.
     ConfigurationChange,
-    /// 2Ah: which references does a station use?
+    /// 2Ah: asks which references a station uses.
     ReadMap,
-    /// 2Bh: the answer.
+    /// 2Bh: the answer to Read Map.
     ReadMapReply,
-    /// 2Ch: use these references.
+    /// 2Ch: sets the references that a station uses.
     WriteMap,
-    /// 40h: which inputs or outputs are forced, and to what?
+    /// 40h: asks which inputs or outputs are forced, and to what.
     ReadIoForces,
-    /// 41h: the answer.
+    /// 41h: the answer to Read I/O Forces.
     ReadIoForcesReply,
-    /// Any other code. Codes that have a name never appear here when they come from
-    /// [`Subfunction::from_code`].
+    /// Any other code. [`Subfunction::from_code`] never returns this for a code that has a name.
     Unknown(u8),
 }
 
 impl Subfunction {
-    /// Those that have a name, in the order of their codes.
+    /// The subfunctions that have a name, in the order of their codes.
     pub const NAMED: [Subfunction; 24] = [
         Subfunction::ReadId,
         Subfunction::ReadIdReply,
@@ -139,7 +138,7 @@ impl Subfunction {
         }
     }
 
-    /// The subfunction of the reply, for a request that a device answers.
+    /// The subfunction of the reply, for a request that has one.
     #[must_use]
     pub const fn reply(self) -> Option<Subfunction> {
         match self {
@@ -153,13 +152,14 @@ impl Subfunction {
         }
     }
 
-    /// Whether it reads or writes a host's memory: a GENI board puts it into its request queue.
+    /// Whether it reads or writes a host's memory. A GENI board puts such datagrams into its
+    /// request queue.
     #[must_use]
     pub const fn is_memory_access(self) -> bool {
         matches!(self, Subfunction::ReadDevice | Subfunction::WriteDevice | Subfunction::WritePoint)
     }
 
-    /// What it is called; a code without a name is just called datagram.
+    /// Its name; a code without a name is just called datagram.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -209,7 +209,7 @@ mod tests {
         BusRate, FUNCTION_HORNER, ForceTable, MemoryType, Priority, SUBFUNCTION_SER,
     };
 
-    /// One place for every number that others have fixed.
+    /// Every number that the manuals fix is checked in this one place.
     #[test]
     fn every_code_is_the_one_of_its_table() {
         assert_eq!((FUNCTION_GENIUS, FUNCTION_HORNER, SUBFUNCTION_SER), (0x20, 0x40, 0x50));

@@ -4,8 +4,8 @@
 //! | length 4 | address (3, low first) | AND | OR | AND | OR |    8 bytes
 //! ```
 //!
-//! The head is that of the other memory accesses; the order of the masks is that of the PLC command
-//! that makes such datagrams. See `docs/genius.md` for how sure this is.
+//! The first fields are those of the other memory accesses. The masks are in the order of the PLC
+//! command that makes such datagrams. `docs/genius.md` says how sure this is.
 
 use nom::Parser;
 use nom::number::complete::be_u8;
@@ -20,8 +20,8 @@ const MASKS_LEN: u8 = 4;
 /// Length, address and masks.
 const LEN: usize = 8;
 
-/// Which bits of a byte change: a bit outside `and` is cleared, a bit in `or` is set, the others
-/// stay.
+/// Which bits of a byte change: a bit outside `and` is cleared, a bit in `or` is set, and the
+/// others stay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PointMask {
@@ -32,7 +32,7 @@ pub struct PointMask {
 }
 
 impl PointMask {
-    /// Leaves a byte as it is.
+    /// Leaves a byte unchanged.
     pub const KEEP: PointMask = PointMask { and: 0xFF, or: 0 };
 
     /// The byte after the change.

@@ -6,17 +6,17 @@ use std::process::Command;
 use crate::places;
 use crate::steps::{output, unrelated, works};
 
-/// Whether packages can be installed this way at all.
+/// Whether packages can be installed in this way.
 pub(crate) fn there() -> bool {
     cfg!(target_os = "linux") && works(unrelated("apt-get").arg("--version"))
 }
 
-/// Installs packages without asking. What apt prints goes to a file; if it fails, the reason comes
-/// back.
+/// Installs packages without asking. apt's output goes to a file. The error gives the reason of a
+/// failure.
 pub(crate) fn install(packages: &[&str]) -> Result<(), String> {
     let root = output(unrelated("id").arg("-u")).is_some_and(|id| id == "0");
     if !root && !works(unrelated("sudo").args(["-n", "true"])) {
-        return Err("installing packages takes root, or sudo without a password".to_owned());
+        return Err("installing packages needs root, or sudo without a password".to_owned());
     }
     let log =
         places::firmware_target().join(format!("apt-{}.log", packages.first().unwrap_or(&"")));
@@ -34,13 +34,13 @@ pub(crate) fn install(packages: &[&str]) -> Result<(), String> {
             sudo
         };
         command.args(["DEBIAN_FRONTEND=noninteractive", "apt-get", "--yes", "--quiet"]);
-        // Another apt may be at work, as on a machine that has just been started.
+        // Another apt may be running, for example on a machine that has just started.
         command.args(["--option", "DPkg::Lock::Timeout=120"]).args(arguments);
         log_to(&mut command, &log)
             .is_some_and(|command| command.status().is_ok_and(|status| status.success()))
     };
     let install = [&["install", "--no-install-recommends"], packages].concat();
-    // A fresh container has no package lists; most others have, and need no update.
+    // A fresh container has no package lists. Most other machines have them and need no update.
     if apt_get(&install) || apt_get(&["update"]) && apt_get(&install) {
         return Ok(());
     }

@@ -1,9 +1,9 @@
-//! rustfmt and clippy: a minimal Rust comes without them.
+//! rustfmt and clippy, which a minimal Rust installation lacks.
 
 use crate::setup::demand::{Installing, Kind, Size, Tool};
 use crate::steps::{self, Failure, Result, heading, works};
 
-/// Both. The size is that of Rust 1.95.
+/// Both components. The size is that of Rust 1.95.
 pub(crate) static TOOL: Tool = Tool {
     name: "rustfmt and clippy",
     serves: "the checks of format and code",
@@ -12,7 +12,7 @@ pub(crate) static TOOL: Tool = Tool {
     kind: Kind::Components,
 };
 
-/// One of them.
+/// One of the components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Component {
     Rustfmt,
@@ -28,7 +28,7 @@ pub(crate) fn has(component: Component) -> bool {
     works(steps::cargo().args([subcommand, "--version"]))
 }
 
-/// Whether both are there.
+/// Whether both are installed.
 pub(crate) fn there() -> bool {
     has(Component::Rustfmt) && has(Component::Clippy)
 }

@@ -1,8 +1,8 @@
 //! A Rust that builds for the boards.
 //!
-//! For each target, in this order: the toolchain in use, if it has the target's library; the same
-//! after `rustup target add`; Debian's own Rust, which comes with the library's source and builds
-//! that as well.
+//! For each target these are tried in order: the toolchain in use, if it has the target's library;
+//! the same after `rustup target add`; Debian's own Rust, which comes with the library's source and
+//! builds that as well.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -15,7 +15,7 @@ use crate::setup::components::{self, Component};
 use crate::setup::demand::{Installing, Kind, Size, Tool};
 use crate::steps::{self, Failure, Result, heading, note, output, unrelated, works};
 
-/// What a board's processor is called by Rust.
+/// Rust's name for a board's processor.
 pub(crate) type Target = &'static str;
 
 /// Cortex-M3.
@@ -23,14 +23,15 @@ pub(crate) const CORTEX_M3: Target = "thumbv7m-none-eabi";
 /// Cortex-M4 with a floating-point unit.
 pub(crate) const CORTEX_M4F: Target = "thumbv7em-none-eabihf";
 
-/// What `Cargo.toml` asks for.
+/// The oldest Rust that `Cargo.toml` allows.
 const OLDEST_RUST: (u32, u32) = (1, 88);
 
-/// The target's library is a few megabytes; a network that takes longer is as good as none.
+/// Time limit for a download. The target's library is a few megabytes, so a slower network is
+/// useless.
 const DOWNLOAD_WITHIN: Duration = Duration::from_secs(180);
 
-/// Debian's packages for Rust: what browsers are built with is the newest there is. Elsewhere the
-/// plain names may do.
+/// Debian's packages for Rust. Those for building browsers are the newest. The plain names may
+/// suffice on other systems.
 const DEBIAN_RUST: [[&str; 3]; 2] =
     [["rustc-web", "cargo-web", "rust-web-src"], ["rustc", "cargo", "rust-src"]];
 const DEBIAN_CLIPPY: [&str; 2] = ["rust-web-clippy", "rust-clippy"];
@@ -48,7 +49,7 @@ pub(crate) static TOOL: Tool = Tool {
     kind: Kind::CrossRust,
 };
 
-/// Clippy for that, which rustup's toolchains have.
+/// Clippy for the boards, which rustup's toolchains have.
 pub(crate) static CLIPPY: Tool = Tool {
     name: "clippy for the boards",
     serves: "the check of the firmware's code",
@@ -71,7 +72,7 @@ pub(crate) struct CrossToolchain {
 enum Rust {
     /// The toolchain in use.
     InUse,
-    /// Debian's Rust, with the linker that it is to use.
+    /// Debian's Rust, with the linker that it must use.
     Debian { linker: PathBuf },
 }
 
@@ -92,7 +93,7 @@ impl CrossToolchain {
     pub(crate) fn clippy(&self) -> Option<Command> {
         match &self.rust {
             Rust::InUse => components::has(Component::Clippy).then(|| self.cargo("clippy")),
-            // Through /usr/bin/cargo, rustup's clippy would be found first.
+            // With /usr/bin/cargo, rustup's clippy would be found first.
             Rust::Debian { linker } => {
                 let there = Path::new(DEBIAN_CARGO_CLIPPY).exists();
                 there.then(|| self.debian(DEBIAN_CARGO_CLIPPY, "clippy", linker))
@@ -109,8 +110,8 @@ impl CrossToolchain {
     fn debian(&self, program: &str, subcommand: &str, linker: &Path) -> Command {
         let mut cargo = unrelated(program);
         cargo.env("CARGO", DEBIAN_CARGO).env("RUSTC", DEBIAN_RUSTC);
-        // Building the library is not stable yet; the compiler and its source are of one version,
-        // so it works.
+        // Building the library is not a stable feature. It works here because compiler and source
+        // have the same version.
         cargo.env("RUSTC_BOOTSTRAP", "1");
         cargo.env(linker_variable(self.target), linker);
         cargo.args([subcommand, "-Zbuild-std=core"]);
@@ -118,7 +119,7 @@ impl CrossToolchain {
     }
 }
 
-/// Where cargo looks for the linker of a target.
+/// The variable in which cargo finds the linker of a target.
 fn linker_variable(target: Target) -> String {
     format!("CARGO_TARGET_{}_LINKER", target.to_uppercase().replace('-', "_"))
 }
@@ -128,8 +129,8 @@ pub(crate) fn there(targets: &[Target]) -> bool {
     find(targets, Installing::Forbidden).iter().all(Result::is_ok)
 }
 
-/// Whether each toolchain that is there has clippy. One that is missing counts as [`TOOL`] only: it
-/// may bring its clippy along.
+/// Whether each installed toolchain has clippy. A missing toolchain counts as [`TOOL`] only,
+/// because it may come with clippy.
 pub(crate) fn clippy_there(targets: &[Target]) -> bool {
     let found = find(targets, Installing::Forbidden);
     found.iter().flatten().all(|toolchain| toolchain.clippy().is_some())
@@ -170,8 +171,8 @@ fn missing(target: Target) -> Failure {
     ))
 }
 
-/// Adds targets to the toolchain in use, if rustup can get them. True when none is lacking any
-/// more.
+/// Adds targets to the toolchain in use, if rustup can get them. Returns whether all of them are
+/// there now.
 fn added(targets: &[Target]) -> bool {
     if !works(unrelated("rustup").arg("--version")) {
         return false;
@@ -185,7 +186,8 @@ fn added(targets: &[Target]) -> bool {
     lacking.is_empty()
 }
 
-/// Debian's Rust, which builds for all targets; gives the linker that it is to use.
+/// Finds or installs Debian's Rust, which builds for all targets, and returns the linker that it
+/// must use.
 fn found_or_installed_debian() -> Option<PathBuf> {
     if !apt::there() {
         return None;
@@ -200,7 +202,7 @@ fn found_or_installed_debian() -> Option<PathBuf> {
             Err(why) => note(&why),
         }
     }
-    // Nothing depends on it but how much is checked.
+    // Without clippy, only the check of the firmware's code is left out.
     if let Err(why) = install_clippy() {
         note(&why.to_string());
     }
@@ -232,7 +234,7 @@ fn has_library(target: Target) -> bool {
     })
 }
 
-/// `rustup target add`, silently, and not for long.
+/// Runs `rustup target add` silently and with a time limit.
 fn add_target(target: Target) -> bool {
     let mut rustup = steps::in_use("rustup");
     rustup.args(["target", "add", target]).env("RUSTUP_MAX_RETRIES", "0");
@@ -246,7 +248,7 @@ fn add_target(target: Target) -> bool {
             Err(_) => break,
         }
     }
-    // Whether or not it still runs: we do not wait for it.
+    // The process may still be running; xtask does not wait for it.
     let _ = child.kill();
     let _ = child.wait();
     false
@@ -265,7 +267,7 @@ fn debian_rust() -> Option<PathBuf> {
 
 /// The linker that comes with rustup's toolchain.
 fn rust_lld() -> Option<PathBuf> {
-    // <sysroot>/lib/rustlib/<host>/lib; the programs are beside.
+    // The path is <sysroot>/lib/rustlib/<host>/lib; the programs are in the folder beside it.
     let libraries =
         PathBuf::from(output(steps::in_use("rustc").args(["--print", "target-libdir"]))?);
     Some(libraries.parent()?.join("bin/rust-lld")).filter(|linker| linker.exists())
@@ -275,7 +277,7 @@ fn on_path(program: &str) -> bool {
     works(unrelated(program).arg("--version"))
 }
 
-/// Of `rustc 1.96.0 (ac68faa20 2026-05-25)`.
+/// The version in a text such as `rustc 1.96.0 (ac68faa20 2026-05-25)`.
 fn parse_version(text: &str) -> Option<(u32, u32)> {
     let mut numbers = text.split_whitespace().nth(1)?.split('.');
     Some((numbers.next()?.parse().ok()?, numbers.next()?.parse().ok()?))

@@ -1,60 +1,61 @@
 //! What a run demands of the machine: which missing tools may be installed, and whether anything
 //! may be left out.
 //!
-//! On a newcomer's machine the usual tools are installed and the rest is left out, and both are
-//! said. Where `CI` is `true`, or with `--strict`, everything is installed and nothing may be left
+//! On a newcomer's machine the usual tools are installed and the rest is left out; both are
+//! reported. With `--strict`, or if `CI` is `true`, everything is installed and nothing may be left
 //! out.
 
 use std::ffi::OsStr;
 
 use crate::steps::{Failure, Result};
 
-/// Something that does not come with Rust.
+/// A tool that does not come with Rust.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Tool {
-    /// What it is called; for a program, its name on the PATH.
+    /// Its name; for a program, the name on the PATH.
     pub(crate) name: &'static str,
-    /// What is left out without it.
+    /// What is left out without the tool.
     pub(crate) serves: &'static str,
-    /// What it takes, as measured.
+    /// The measured size of the installation.
     pub(crate) size: Size,
-    /// What is installed where that cannot be had.
+    /// What is installed if the tool is unavailable.
     pub(crate) instead: Option<(&'static str, Size)>,
     pub(crate) kind: Kind,
 }
 
-/// What there is to install, and how.
+/// The kinds of tools.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// rustfmt and clippy.
     Components,
-    /// What builds the images.
+    /// The toolchains that build the images.
     CrossRust,
-    /// What checks their code.
+    /// Clippy for the code of the images.
     CrossClippy,
     Emulator,
-    /// A program of others that single tests need.
+    /// An external program that single tests need.
     Program,
 }
 
 impl Kind {
-    /// All of them.
+    /// All kinds.
     pub(crate) const ALL: [Kind; 5] =
         [Kind::Components, Kind::CrossRust, Kind::CrossClippy, Kind::Emulator, Kind::Program];
 
     /// What the checks of the sources need.
     pub(crate) const OF_LINT: [Kind; 3] = [Kind::Components, Kind::CrossRust, Kind::CrossClippy];
 
-    /// Whether it is installed unasked: the project itself is built, checked and run with it.
+    /// Whether it is installed without asking, because the project itself is built, checked and run
+    /// with it.
     const fn is_usual(self) -> bool {
         !matches!(self, Kind::Program)
     }
 }
 
-/// What an installation takes, in megabytes rounded up.
+/// The size of an installation, in megabytes rounded up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Size {
-    /// Over the network, where that is known.
+    /// To download, if known.
     pub(crate) download_mb: Option<u32>,
     /// On disk.
     pub(crate) disk_mb: u32,
@@ -74,9 +75,9 @@ impl std::fmt::Display for Size {
 /// Whether missing tools may be installed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Installing {
-    /// They may, without asking.
+    /// They are installed without asking.
     Allowed,
-    /// Nothing is installed, nor looked for in the network.
+    /// Nothing is installed, and the network is not used.
     Forbidden,
 }
 
@@ -88,20 +89,20 @@ enum Scope {
     Everything,
 }
 
-/// What the command line says about it.
+/// The options for tools on the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::Args)]
 pub(crate) struct Options {
-    /// Leave nothing out: install everything that a check or a test needs, and fail where that does
-    /// not work. So it is where the variable CI is "true", too.
+    /// Leave nothing out: install everything that a check or a test needs, and fail if that does
+    /// not work. The same applies if the variable CI is "true".
     #[arg(long)]
     pub(crate) strict: bool,
 
-    /// Install also the programs of others that single tests need.
+    /// Also install the external programs that single tests need.
     #[arg(long)]
     pub(crate) all: bool,
 }
 
-/// What a run demands.
+/// The demand of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Demand {
     scope: Scope,
@@ -109,7 +110,7 @@ pub(crate) struct Demand {
 }
 
 impl Demand {
-    /// By the command line and by the environment's `CI`.
+    /// The demand by the command line and the environment's `CI`.
     pub(crate) fn new(options: Options, installing: Installing, ci: Option<&OsStr>) -> Demand {
         let strict = options.strict || ci.is_some_and(|ci| ci == "true" || ci == "1");
         let scope = match installing {
@@ -120,7 +121,7 @@ impl Demand {
         Demand { scope, strict }
     }
 
-    /// The same in this process's environment.
+    /// The demand in this process's environment.
     pub(crate) fn here(options: Options, installing: Installing) -> Demand {
         Demand::new(options, installing, std::env::var_os("CI").as_deref())
     }
@@ -130,7 +131,7 @@ impl Demand {
         self.strict
     }
 
-    /// What is to be installed of what is missing.
+    /// What is to be installed of the missing tools.
     pub(crate) fn plan(self, missing: &[&'static Tool]) -> Plan {
         let wanted = |tool: &&&Tool| match self.scope {
             Scope::Nothing => false,
@@ -140,17 +141,17 @@ impl Demand {
         Plan { install: missing.iter().filter(wanted).copied().collect() }
     }
 
-    /// Judges what is missing after everything has been tried.
+    /// Judges what is still missing after all attempts to install it.
     ///
     /// # Errors
-    /// Something is missing and the demand is strict.
+    /// If something is missing although the demand is strict.
     pub(crate) fn verdict(self, missing: &[&'static Tool]) -> Result<()> {
         if !self.strict || missing.is_empty() {
             return Ok(());
         }
         let lines = missing.iter().map(|tool| format!("\n  {}: {}", tool.name, tool.serves));
         let how = match self.scope {
-            Scope::Nothing => "without --offline it is tried to install them",
+            Scope::Nothing => "run again without --offline to try to install them",
             _ => "the lines above say why they could not be installed",
         };
         Err(Failure::new(format!(
@@ -160,34 +161,33 @@ impl Demand {
     }
 }
 
-/// What a run begins with.
+/// What a run installs first.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Plan {
     pub(crate) install: Vec<&'static Tool>,
 }
 
 impl Plan {
-    /// What is said before anything is installed.
+    /// The text before anything is installed.
     pub(crate) fn announcement(&self) -> Vec<String> {
         if self.install.is_empty() {
             return Vec::new();
         }
         let head = "these tools are missing and will be installed (--offline installs nothing):";
         let tools = self.install.iter().flat_map(|tool| {
-            let instead =
-                |(name, size)| format!("    or, where that cannot be had, {name}: {size}");
+            let instead = |(name, size)| format!("    or, if that is unavailable, {name}: {size}");
             let line = format!("  {}: {}; for {}", tool.name, tool.size, tool.serves);
             std::iter::once(line).chain(tool.instead.map(instead))
         });
         std::iter::once(head.to_owned()).chain(tools).collect()
     }
 
-    /// What is said of each tool that is missing for good.
+    /// A note for each tool that stays missing.
     pub(crate) fn remarks(missing: &[&'static Tool]) -> Vec<String> {
         let how = |tool: &Tool| if tool.kind.is_usual() { "" } else { "; --all installs it" };
         missing
             .iter()
-            .map(|tool| format!("left out for want of {}: {}{}", tool.name, tool.serves, how(tool)))
+            .map(|tool| format!("left out for lack of {}: {}{}", tool.name, tool.serves, how(tool)))
             .collect()
     }
 }
@@ -228,15 +228,15 @@ mod tests {
             [
                 "these tools are missing and will be installed (--offline installs nothing):",
                 "  emulator: 16 MB to download, 69 MB on disk; for the tests in the emulator",
-                "    or, where that cannot be had, another: 80 MB on disk"
+                "    or, if that is unavailable, another: 80 MB on disk"
             ]
         );
         assert!(demand.verdict(&BOTH).is_ok());
         assert_eq!(
             Plan::remarks(&BOTH),
             [
-                "left out for want of emulator: the tests in the emulator",
-                "left out for want of database: the test that imports a log; --all installs it"
+                "left out for lack of emulator: the tests in the emulator",
+                "left out for lack of database: the test that imports a log; --all installs it"
             ]
         );
     }

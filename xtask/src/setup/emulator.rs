@@ -6,7 +6,7 @@ use crate::steps::{Failure, Result, heading, note, output, unrelated, works};
 
 const PROGRAM: &str = "qemu-system-arm";
 
-/// The emulator. The size is that of Debian 12's package with what it depends on.
+/// The emulator. The size is that of Debian 12's package with its dependencies.
 pub(crate) static TOOL: Tool = Tool {
     name: PROGRAM,
     serves: "the tests in the emulator",
@@ -15,11 +15,11 @@ pub(crate) static TOOL: Tool = Tool {
     kind: Kind::Emulator,
 };
 
-/// Finds the emulator or installs it.
+/// Finds or installs the emulator.
 pub(crate) fn find(installing: Installing) -> Result<()> {
     if cfg!(not(unix)) {
         return Err(Failure::new(
-            "the emulator is driven through a pseudo-terminal and shared memory: it takes Linux \
+            "the emulator is driven through a pseudo-terminal and shared memory: it needs Linux \
              or macOS",
         ));
     }
@@ -48,12 +48,12 @@ pub(crate) fn find(installing: Installing) -> Result<()> {
     Err(Failure::new(format!("{PROGRAM} is missing; get it with\n  {how}")))
 }
 
-/// Whether the emulator is there and can be driven.
+/// Whether the emulator is installed and this system can drive it.
 pub(crate) fn there() -> bool {
     cfg!(unix) && works(unrelated(PROGRAM).arg("--version"))
 }
 
-/// The first part of its version.
+/// The major version of the emulator.
 pub(crate) fn major_version() -> Option<u32> {
     major(&output(unrelated(PROGRAM).arg("--version"))?)
 }

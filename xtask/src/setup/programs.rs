@@ -1,21 +1,21 @@
-//! Programs of others that single tests need: they read what this project writes, as users have
-//! them do.
+//! External programs that single tests need. They read what this project writes, as users' programs
+//! do.
 //!
-//! Such a test stands in a module `needs_NAME` and is ignored with the reason `needs NAME: cargo
-//! xtask test`, so that `cargo test` shows it as left out. `cargo xtask test` runs it where the
-//! program is there; a test that runs without its program fails.
+//! Such a test is in a module `needs_NAME` and ignored with the reason `needs NAME: cargo xtask
+//! test`, so `cargo test` shows it as left out. `cargo xtask test` runs it if the program is
+//! installed. A test that runs without its program fails.
 
 use crate::setup::apt;
 use crate::setup::demand::{Kind, Size, Tool};
 use crate::steps::{Failure, Result, heading, unrelated, works};
 
-/// A program, and Debian's package that brings it.
+/// A program, and the Debian package that contains it.
 struct Program {
     tool: Tool,
     package: &'static str,
 }
 
-/// All of them. Sizes are those of Debian 12.
+/// All programs. Sizes are those of Debian 12.
 static PROGRAMS: [Program; 1] = [Program {
     tool: Tool {
         name: "sqlite3",
@@ -27,7 +27,7 @@ static PROGRAMS: [Program; 1] = [Program {
     package: "sqlite3",
 }];
 
-/// Those that are not there.
+/// The programs that are not installed.
 pub(crate) fn missing() -> impl Iterator<Item = &'static Tool> {
     PROGRAMS.iter().map(|program| &program.tool).filter(|tool| !there(tool.name))
 }
@@ -35,11 +35,11 @@ pub(crate) fn missing() -> impl Iterator<Item = &'static Tool> {
 /// Installs a program.
 ///
 /// # Errors
-/// It cannot be had.
+/// If the program cannot be installed.
 pub(crate) fn install(name: &str) -> Result<()> {
     let program = PROGRAMS.iter().find(|program| program.tool.name == name);
     let Some(Program { tool, package }) = program else {
-        return Err(Failure::new(format!("nobody knows how to install {name}")));
+        return Err(Failure::new(format!("xtask does not know how to install {name}")));
     };
     if apt::there() {
         heading(&format!("Installing {name} ({})", tool.size));
@@ -54,7 +54,7 @@ pub(crate) fn install(name: &str) -> Result<()> {
     )))
 }
 
-/// What tells the test harness to leave out the tests whose programs are missing.
+/// Arguments for the test harness that leave out the tests whose programs are missing.
 pub(crate) fn skipped() -> Vec<String> {
     missing()
         .flat_map(|tool| ["--skip".to_owned(), format!("{}::", module_of(tool.name))])
@@ -65,10 +65,10 @@ fn there(name: &str) -> bool {
     works(unrelated(name).arg("--version"))
 }
 
-/// What the modules begin with in which such tests stand.
+/// How the names of modules with such tests begin.
 pub(crate) const MODULE: &str = "needs_";
 
-/// The module in which tests that need a program stand.
+/// The module with the tests that need a program.
 fn module_of(name: &str) -> String {
     format!("{MODULE}{}", name.replace('-', "_"))
 }
@@ -82,7 +82,7 @@ mod tests {
     use super::*;
     use crate::places;
 
-    /// All sources of tests.
+    /// Finds all sources of tests.
     fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
         for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
             let path = entry.path();
@@ -96,7 +96,7 @@ mod tests {
         }
     }
 
-    /// The programs that tests say they need, by module and by reason.
+    /// The programs that tests need, by module and by reason.
     fn needed() -> (BTreeSet<String>, BTreeSet<String>) {
         let mut files = Vec::new();
         sources(places::root(), &mut files);

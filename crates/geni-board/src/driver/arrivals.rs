@@ -1,22 +1,22 @@
-//! When datagrams arrived.
+//! Finds out when datagrams arrived.
 //!
-//! That is often long before they can be read: the command block carries out one command at a time,
-//! and a datagram that is being sent waits for its place in the scan.
+//! A datagram may have arrived long before it can be read. The command block carries out one
+//! command at a time, and a datagram that is being sent waits for its place in the scan.
 //!
 //! A host sees two signs of an arrival: the Receive-Queue flag, and the pulse of the interrupt
-//! line. A *notice* is the tick of such a sign. The board hands datagrams out in the order in which
-//! they came, so the oldest notice belongs to the datagram that is read next. There are four cases
-//! in which the two do not match:
+//! line. A *notice* is the tick of such a sign. The board hands datagrams out in the order of their
+//! arrival, so the oldest notice belongs to the datagram that is read next. The two do not match in
+//! four cases:
 //!
-//! - **Two datagrams, one flag.** Both came between two looks, so there is one notice less than
-//!   there are datagrams. A datagram that finds no notice gets the notice of the one before it. The
-//!   one that finds none need not be the second of the two: where notices of later datagrams are
-//!   there by then, each datagram takes the next one's, and the last of them finds none. With the
-//!   interrupt line each datagram has a pulse of its own, and this does not happen.
-//! - **A flag, and no datagram.** The board has dropped it. A board that says that its queue is
-//!   empty voids all notices that were there when it was asked.
-//! - **A datagram, and no flag.** It came before the board was looked at, or its flag was lost.
-//!   Nobody knows when it arrived, and it is handed out without a time. If a later datagram's
+//! - **Two datagrams, one flag.** Both came between two looks at the flag, so there is one notice
+//!   less than there are datagrams. A datagram without a notice gets the notice of the one before
+//!   it. That need not be the second of the two: if notices of later datagrams are waiting, each
+//!   datagram takes the next one's, and the last of them has none. With the interrupt line each
+//!   datagram has its own pulse, and this does not happen.
+//! - **A flag, but no datagram.** The board has dropped the datagram. When the board reports an
+//!   empty queue, all notices from before the question are void.
+//! - **A datagram, but no flag.** The datagram came before the first look at the board, or its flag
+//!   was lost. Its arrival is unknown, and it is handed out without a time. If a later datagram's
 //!   notice waits, it takes that one instead.
 //! - **The board has failed.** Its queue is gone, and so are the notices.
 
@@ -24,24 +24,24 @@ use heapless::Deque;
 
 use crate::elapsed::elapsed_ms;
 
-/// Notices that may wait: the board's queue holds 15 datagrams, and one more may be in the read
-/// buffer. Of more notices than these the oldest have no datagram any more.
+/// The most notices that wait. The board's queue holds 15 datagrams, and one more may be in the
+/// read buffer. Beyond that the oldest notices no longer have a datagram.
 const MAX_NOTICES: usize = 16;
 
 /// Notices of datagrams that have not been read.
 #[derive(Debug)]
 pub(super) struct Arrivals {
     notices: Deque<u32, MAX_NOTICES>,
-    /// How many of them were there when the latest Read Datagram was started.
+    /// How many of them existed when the latest Read Datagram was started.
     before_read: usize,
-    /// Pulses of the interrupt line since the board was last looked at.
+    /// Pulses of the interrupt line since the last look at the flag.
     pulses: Deque<u32, MAX_NOTICES>,
-    /// The flag was seen at this tick, and its pulse has not been handed in.
+    /// The tick at which the flag was seen, while its pulse has not been handed in.
     awaits_pulse: Option<u32>,
-    /// The flag was last seen set at this tick.
+    /// The tick at which the flag was last seen set.
     seen_ms: Option<u32>,
-    /// When the datagram arrived that was read last. It is kept for as long as there may be others
-    /// that came with it.
+    /// The arrival of the datagram that was read last. It is kept while there may be others that
+    /// came with it.
     latest: Option<u32>,
 }
 
@@ -57,29 +57,29 @@ impl Arrivals {
         }
     }
 
-    /// The line was pulsed at this tick, for a datagram and nothing else.
+    /// Hands in a pulse of the line at this tick, which was for a datagram and nothing else.
     pub(super) fn pulsed(&mut self, tick_ms: u32) {
-        // A flag that was seen a moment before its pulse was handed in has its notice already. The
-        // pulse knows the tick better.
+        // A flag seen just before its pulse was handed in already has its notice. The pulse has the
+        // more precise tick.
         if let Some(seen_ms) = self.awaits_pulse.take()
             && elapsed_ms(tick_ms, seen_ms) <= 1
         {
             self.notices.back_mut().into_iter().for_each(|notice| *notice = tick_ms);
             return;
         }
-        // The board takes no more datagrams than these between two looks.
+        // The board takes no more datagrams than this between two looks, so the push does not fail.
         let _ = self.pulses.push_back(tick_ms);
     }
 
-    /// The Receive-Queue flag was looked at, and cleared if it was set.
+    /// Takes note of a look at the Receive-Queue flag, which was cleared if it was set.
     pub(super) fn looked(&mut self, is_set: bool, now_ms: u32) {
-        // A pulse that has not been handed in by now does not belong to that flag any more.
+        // A pulse that has not been handed in by now does not belong to that flag.
         self.awaits_pulse = self.awaits_pulse.filter(|&seen_ms| elapsed_ms(now_ms, seen_ms) <= 1);
         if !is_set {
             while let Some(tick_ms) = self.pulses.pop_front() {
-                // The pulse came after the others were handed in, and right before the look that
-                // cleared its flag. Any other pulse without a flag means no datagram: there is one
-                // after a reset, for instance.
+                // The pulse came after the other pulses were handed in and right before the look
+                // that cleared its flag. Any other pulse without a flag means no datagram, for
+                // instance the one after a reset.
                 if self.seen_ms.is_some_and(|seen_ms| elapsed_ms(tick_ms, seen_ms) <= 1) {
                     self.notice(tick_ms);
                 }
@@ -104,19 +104,19 @@ impl Arrivals {
         let _ = self.notices.push_back(tick_ms);
     }
 
-    /// A Read Datagram is started.
+    /// Takes note that a Read Datagram is started.
     pub(super) fn read_started(&mut self) {
         self.before_read = self.notices.len();
     }
 
-    /// It has brought a datagram. Gives when that arrived, if anybody knows. The datagram may have
-    /// come while the command was carried out, so the flag must have been looked at since.
+    /// Takes note that it fetched a datagram, and returns its arrival if known. The datagram may
+    /// have come while the command was carried out, so the flag must have been looked at since.
     pub(super) fn read(&mut self) -> Option<u32> {
         self.latest = self.notices.pop_front().or(self.latest);
         self.latest
     }
 
-    /// It has found the queue empty.
+    /// Takes note that it found the queue empty.
     pub(super) fn found_empty(&mut self) {
         for _ in 0..self.before_read {
             self.notices.pop_front();
@@ -125,7 +125,7 @@ impl Arrivals {
         self.latest = None;
     }
 
-    /// When the oldest datagram that is known to wait arrived.
+    /// The arrival of the oldest datagram that is known to wait.
     pub(super) fn oldest(&self) -> Option<u32> {
         self.notices.front().or(self.pulses.front()).copied()
     }
@@ -135,7 +135,7 @@ impl Arrivals {
 mod tests {
     use super::*;
 
-    /// Looks that find the flag set.
+    /// Arrivals after looks that found the flag set at these ticks.
     fn seen(ticks_ms: impl IntoIterator<Item = u32>) -> Arrivals {
         let mut arrivals = Arrivals::new();
         ticks_ms.into_iter().for_each(|tick_ms| arrivals.looked(true, tick_ms));
@@ -163,7 +163,8 @@ mod tests {
     fn two_datagrams_that_share_a_flag_both_have_its_tick() {
         let mut arrivals = seen([10]);
         assert_eq!(read_all(&mut arrivals, 2), [Some(10), Some(10)]);
-        // The board says that there is no more. What is read after that was not seen to come.
+        // The board reports that its queue is empty. A datagram read after that was not seen to
+        // come.
         arrivals.read_started();
         arrivals.found_empty();
         assert_eq!(read_all(&mut arrivals, 1), [None]);
@@ -173,7 +174,7 @@ mod tests {
     fn a_flag_whose_datagram_is_gone_is_not_taken_for_the_next_one() {
         let mut arrivals = seen([10]);
         arrivals.read_started();
-        // Another one arrives meanwhile. The board answered before that.
+        // Another datagram arrives meanwhile. The board answered before that.
         arrivals.looked(true, 20);
         arrivals.found_empty();
         assert_eq!(read_all(&mut arrivals, 1), [Some(20)]);
@@ -185,7 +186,7 @@ mod tests {
         assert_eq!(read_all(&mut arrivals, 1), [Some(5)]);
         arrivals.read_started();
         (21..=40).for_each(|tick_ms| arrivals.looked(true, tick_ms));
-        // None of those that were there is left.
+        // None of the earlier notices is left.
         arrivals.found_empty();
         assert_eq!(read_all(&mut arrivals, 1), [Some(25)]);
     }
@@ -207,7 +208,7 @@ mod tests {
         arrivals.pulsed(103);
         arrivals.looked(true, 104);
         assert_eq!(read_all(&mut arrivals, 2), [Some(100), Some(103)]);
-        // One that comes much later is that of another datagram.
+        // A much later pulse belongs to another datagram.
         arrivals.looked(true, 200);
         arrivals.pulsed(203);
         arrivals.looked(true, 204);
@@ -241,7 +242,8 @@ mod tests {
     #[test]
     fn a_pulse_whose_flag_went_with_that_of_an_earlier_one_has_its_own_tick() {
         let mut arrivals = Arrivals::new();
-        // The first is handed in; the second falls right before the look that clears their flag.
+        // The first pulse is handed in. The second falls right before the look that clears their
+        // flag.
         arrivals.pulsed(236);
         arrivals.looked(true, 626);
         arrivals.pulsed(626);

@@ -1,4 +1,4 @@
-//! The board as a whole: from reset to the bus.
+//! The life of the board, from reset to the bus.
 
 use super::{Arrivals, Done, Driver};
 use crate::command_block::CommandStatus;
@@ -12,35 +12,35 @@ use crate::ram::SharedRam;
 use crate::setup_table::Configuration;
 use crate::timing;
 
-/// Attempts to configure that may end in a status that does not exist.
+/// How often a configuration may end in an undefined status.
 const MAX_FUTILE_CONFIGURATIONS: u8 = 3;
 
-/// Where a board is in its life.
+/// The phases of a board's life.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Phase {
     /// Before the first poll.
     Begin,
     /// The reset line is low.
     Reset { since_ms: u32, hold_ms: u32 },
-    /// The reset line goes up after this poll; time counts from the next one.
+    /// The reset line goes up after this poll, so time counts from the next one.
     Released,
-    /// Self-test: first no access at all, then the OK flag is waited for.
+    /// Self-test. The RAM is not accessed at first; then the driver waits for the OK flag.
     SelfTest { since_ms: u32 },
-    /// A board that should be running: once its OK flag has been cleared, it should come back.
+    /// A board that should be running. The driver clears its OK flag, which should come back.
     Attaching { since_ms: u32, cleared: bool },
-    /// The OK flag is there. `window_since_ms` says since when, where the board is not on the bus
-    /// yet.
+    /// The OK flag is set. `window_since_ms` is the tick since which it was, for a board that is
+    /// not yet on the bus.
     Configuring { window_since_ms: Option<u32>, futile: u8 },
-    /// The board stays off the bus for a while. When it is `silent`, its tables need no lock.
+    /// The board stays off the bus for a while. The tables of a `silent` board need no lock.
     Joining { since_ms: Option<u32>, silent: bool },
-    /// Traffic.
+    /// Normal traffic.
     Running,
-    /// Nothing can be done for a while.
+    /// The board is left alone for a while.
     Failed { since_ms: u32, pause_ms: u32 },
 }
 
-/// How long to leave a board alone after so many futile attempts: none, then a second, doubled each
-/// time.
+/// The pause before another attempt: none at first, then one second, doubled after each futile
+/// start.
 pub(super) fn pause_ms(futile_starts: u32) -> u32 {
     match futile_starts {
         0 => 0,
@@ -49,7 +49,7 @@ pub(super) fn pause_ms(futile_starts: u32) -> u32 {
 }
 
 impl<R: SharedRam> Driver<R> {
-    /// One step, whatever the phase is.
+    /// Takes one step, whatever the phase is.
     pub(super) fn step(&mut self, now_ms: u32) -> Result<Option<Event>, Failure> {
         match self.phase {
             Phase::Begin => {
@@ -128,13 +128,13 @@ impl<R: SharedRam> Driver<R> {
     ) -> Result<Option<Event>, Failure> {
         match self.ram.read(map::STATUS_OK) {
             1 if cleared => self.enter_configuring(now_ms, None),
-            // The flag may be a relic.
+            // The flag may be left over from an earlier run.
             0 | 1 if !cleared => {
                 self.ram.write(map::STATUS_OK, 0);
                 self.phase = Phase::Attaching { since_ms, cleared: true };
             }
-            // With any other value this is a board in its self-test, or none, and not ours to write
-            // to.
+            // Any other value means a board in its self-test, or no board. The driver must not
+            // write to it.
             _ if elapsed_ms(now_ms, since_ms) >= self.options.heartbeat_timeout_ms => {
                 return Err(Failure::NoHeartbeat);
             }
@@ -145,7 +145,7 @@ impl<R: SharedRam> Driver<R> {
 
     fn joining(&mut self, now_ms: u32, since_ms: Option<u32>, silent: bool) -> Option<Event> {
         if silent {
-            // What the board says first on the bus is not to be what its memory happened to hold.
+            // The board's first global data must not be whatever its memory happened to hold.
             self.global.write(&mut self.ram, self.in_force.broadcast_len());
         }
         let joined =
@@ -177,8 +177,8 @@ impl<R: SharedRam> Driver<R> {
         self.phase = Phase::Configuring { window_since_ms, futile: 0 };
     }
 
-    /// With some more patience while the board starts up or changes its configuration: it may have
-    /// no time for beats.
+    /// Allows `more_ms` more while the board starts up or changes its configuration, when it may
+    /// have no time for heartbeats.
     fn watch_heart(&mut self, now_ms: u32, more_ms: u32) -> Result<(), Failure> {
         let patience_ms = self.options.heartbeat_timeout_ms.saturating_add(more_ms);
         if self.heart.watch(&mut self.ram, now_ms, patience_ms)? {
@@ -187,9 +187,9 @@ impl<R: SharedRam> Driver<R> {
         Ok(())
     }
 
-    /// The command is sent even when the setup table already holds what is wanted: somebody may
-    /// have written it without making it known. It costs nothing, the board says that nothing has
-    /// changed.
+    /// The command is sent even when the setup table already holds what is wanted, because another
+    /// program may have written it without the command. It costs nothing: the board answers that
+    /// nothing has changed.
     fn configuring(
         &mut self,
         now_ms: u32,
@@ -217,7 +217,7 @@ impl<R: SharedRam> Driver<R> {
         let accepted = match status {
             CommandStatus::Complete => ConfigurationOutcome::Changed,
             CommandStatus::ProcessError => ConfigurationOutcome::Unchanged,
-            // The board has put back what is in force.
+            // The board has restored the configuration in force.
             CommandStatus::SyntaxError => ConfigurationOutcome::Refused(
                 Configuration::read(&self.ram).unwrap_or(self.in_force),
             ),
@@ -234,7 +234,7 @@ impl<R: SharedRam> Driver<R> {
         self.take_configuration(now_ms, window_since_ms, accepted).map(Some)
     }
 
-    /// The board has answered; what is in force is what its table says now.
+    /// Takes over the board's answer; its table now holds the configuration in force.
     fn take_configuration(
         &mut self,
         now_ms: u32,

@@ -1,4 +1,4 @@
-//! One command at a time (chapter 10): starts them, waits for them without waiting, gives them up.
+//! Starts commands one at a time (chapter 10), polls for their end and gives them up.
 
 use crate::command_block::{
     CommandStatus, read_datagram, read_reply, start_configure, start_read, start_transmission,
@@ -11,21 +11,22 @@ use crate::ram::SharedRam;
 use crate::setup_table::Configuration;
 use crate::timing;
 
-/// What a command came to.
+/// How a command ended.
 #[derive(Debug)]
 pub(super) enum Done {
-    /// A datagram came out of the receive queue; `None` when it is nothing to pass on.
+    /// A Read Datagram took a datagram out of the receive queue; `None` when it cannot be passed
+    /// on.
     Read(Option<ReceivedDatagram>),
     /// The receive queue was empty when the board looked.
     QueueEmpty,
-    /// Nothing is known about the receive queue.
+    /// A Read Datagram ended without news of the receive queue.
     NothingRead,
     Sent(Result<(), CommandError>),
     Replied(Result<ReceivedDatagram, CommandError>),
     Configured(CommandStatus),
 }
 
-/// What has to be remembered of a datagram once the board has it.
+/// What must be remembered of a datagram once the board has it.
 #[derive(Clone, Copy, Debug)]
 struct Sending {
     destination: u8,
@@ -56,8 +57,8 @@ enum State {
         sending: Sending,
         since_ms: u32,
     },
-    /// Something that nobody waits for is going on: our own command, `given_up`, or somebody
-    /// else's.
+    /// The block holds a command that nobody waits for: our own command, `given_up`, or another
+    /// program's.
     Occupied {
         since_ms: u32,
         given_up: bool,
@@ -68,15 +69,14 @@ enum State {
 #[derive(Debug)]
 pub(super) struct Commander {
     state: State,
-    /// How long the board may take for anything, at least.
+    /// The minimum for every time limit.
     patience_ms: u32,
     outbox: Option<Transmission>,
-    /// Something may have arrived since the last Read Datagram was started.
+    /// Whether something may have arrived since the last Read Datagram was started.
     read_due: bool,
-    /// The last Read Datagram found nothing, and nobody has asked for another one since it was
-    /// started.
+    /// Whether the last Read Datagram found nothing and no other was asked for since its start.
     queue_empty: bool,
-    /// Whether a datagram was read last: then it is the outbox's turn.
+    /// Whether the last command was a read; the outbox is next then.
     read_last: bool,
     configured: Configuration,
 }
@@ -94,7 +94,7 @@ impl Commander {
         }
     }
 
-    /// There may be datagrams to be read.
+    /// Asks for a read: there may be datagrams.
     pub(super) fn read_due(&mut self) {
         self.read_due = true;
         self.queue_empty = false;
@@ -129,13 +129,14 @@ impl Commander {
         self.configured
     }
 
-    /// The board has been started anew: nothing is going on.
+    /// Forgets all commands because the board has been started anew.
     pub(super) fn forget(&mut self) {
         self.state = State::Idle;
         self.queue_empty = false;
     }
 
-    /// The board has failed. Gives what was to be known about the datagram that went down with it.
+    /// Ends all commands because the board has failed. Returns the completion of the datagram that
+    /// was lost with it.
     pub(super) fn abandon(&mut self) -> Option<Completion> {
         let waiting = self.outbox.take().map(|transmission| transmission.completion);
         let sending = match self.state {
@@ -146,7 +147,7 @@ impl Commander {
         sending.or(waiting)
     }
 
-    /// Looks whether the command in progress is finished.
+    /// Checks whether the command in progress is finished.
     pub(super) fn poll<R: SharedRam>(
         &mut self,
         ram: &R,
@@ -162,7 +163,7 @@ impl Commander {
             return self.still_pending(now_ms, counters);
         }
         if let State::Reading { .. } | State::Sending { .. } = self.state {
-            // A board that has restarted shows a completed command, and default settings.
+            // A board that has restarted shows a completed command and default settings.
             if Configuration::read(ram) != Ok(in_force) {
                 return Err(Failure::Restarted);
             }
@@ -189,8 +190,8 @@ impl Commander {
     ) -> Result<Option<Done>, Failure> {
         match self.state {
             State::Idle => Ok(None),
-            // What a late Read Datagram brings is out of the queue for good, so it is never given
-            // up alone.
+            // A late Read Datagram has taken its datagram out of the queue for good, so it is never
+            // given up without giving up the board.
             State::Reading { since_ms }
             | State::Configuring { since_ms }
             | State::Occupied { since_ms, .. } => {
@@ -219,7 +220,7 @@ impl Commander {
     ) -> Done {
         match status {
             CommandStatus::Complete => {
-                // There may be more.
+                // There may be more datagrams.
                 self.read_due();
                 let received = read_datagram(ram);
                 if received.is_none() {
@@ -233,7 +234,7 @@ impl Commander {
                 self.queue_empty = !self.read_due;
                 Done::QueueEmpty
             }
-            // "Should not occur": leave it until the next flag or the next look around.
+            // "Should not occur". Reading resumes at the next flag or the next periodic check.
             CommandStatus::ProcessError => {
                 count(&mut counters.commands_failed);
                 Done::NothingRead
@@ -245,7 +246,7 @@ impl Commander {
         }
     }
 
-    /// Starts what waits, reading and sending by turns.
+    /// Starts the next command, alternating between reading and sending.
     pub(super) fn start_next<R: SharedRam>(
         &mut self,
         ram: &mut R,
@@ -281,7 +282,7 @@ impl Commander {
         }
     }
 
-    /// Writes the setup table and makes it known.
+    /// Writes the setup table and starts the command that makes the board take it.
     pub(super) fn start_configure<R: SharedRam>(
         &mut self,
         ram: &mut R,
@@ -297,7 +298,7 @@ impl Commander {
         }
     }
 
-    /// Whether the block is free. If not, somebody has left a command in it, which has to end
+    /// Whether the block is free. If not, another program has left a command in it, which must end
     /// first.
     fn take_block<R: SharedRam>(&mut self, ram: &R, now_ms: u32, counters: &mut Counters) -> bool {
         let free = CommandStatus::read(ram).is_free();
@@ -309,7 +310,7 @@ impl Commander {
     }
 }
 
-/// What became of a datagram.
+/// The outcome of sending a datagram.
 fn sent<R: SharedRam>(
     ram: &R,
     sending: Sending,
@@ -324,8 +325,8 @@ fn sent<R: SharedRam>(
             }
             Done::Replied(reply.ok_or(CommandError::BadReply))
         }
-        // By the table of status values an acknowledged datagram ends with 4, by the text above it
-        // with 0.
+        // An acknowledged datagram ends with 4 by the table of status values, and with 0 by the
+        // text above it.
         (
             CommandStatus::Complete | CommandStatus::Cleared,
             Completion::Taken | Completion::Acknowledged,

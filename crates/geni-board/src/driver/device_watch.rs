@@ -1,4 +1,4 @@
-//! Looks at the device table of a running board, a few records at a time.
+//! Watches the device table of a running board, a few entries at a time.
 
 use crate::counters::{Counters, count};
 use crate::device_table::{Device, Record, read_record};
@@ -7,14 +7,14 @@ use crate::map;
 use crate::ram::SharedRam;
 use crate::setup_table::BoardSwitches;
 
-/// Records in one poll.
+/// Entries checked in one poll.
 const RECORDS_PER_POLL: usize = 4;
 
-/// What was seen last.
+/// The devices as last seen.
 #[derive(Debug)]
 pub(super) struct DeviceWatch {
     known: [Option<Device>; map::DEVICE_COUNT as usize],
-    /// The next record, and how many are left to be looked at.
+    /// The next entry to check, and how many are left.
     next: u8,
     left: u8,
 }
@@ -38,7 +38,7 @@ impl DeviceWatch {
             self.left = self.left.checked_sub(1)?;
             let number = self.next;
             self.next = (number + 1) % map::DEVICE_COUNT;
-            // The board does not use its own record.
+            // The board does not use the entry of its own address.
             if number == BoardSwitches::read(ram).device_number {
                 continue;
             }
@@ -61,7 +61,7 @@ impl DeviceWatch {
     }
 }
 
-/// The outputs flag is the host's own doing and no news.
+/// A change of the outputs flag is not reported, because the host made it.
 fn change(known: Option<Device>, seen: Option<Device>) -> Option<DeviceChange> {
     match (known, seen) {
         (None, Some(device)) => Some(DeviceChange::LoggedIn(device)),

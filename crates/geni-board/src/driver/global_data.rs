@@ -1,4 +1,4 @@
-//! What this host sends to everybody in every bus scan (chapter 11).
+//! The global data that this host sends in every bus scan (chapter 11).
 
 use crate::map;
 use crate::ram::SharedRam;
@@ -16,7 +16,7 @@ impl GlobalData {
         GlobalData { bytes: [0; map::MAX_TABLE_LEN as usize], len: 0, due: false }
     }
 
-    /// New data, at most 128 bytes. The same again is no news.
+    /// Sets new data, at most 128 bytes. Unchanged data are not written again.
     pub(super) fn set(&mut self, data: &[u8]) {
         if self.bytes.get(..self.len) == Some(data) {
             return;
@@ -28,7 +28,7 @@ impl GlobalData {
         self.due = true;
     }
 
-    /// The board may have forgotten them.
+    /// Has the data written again, because the board may have lost them.
     pub(super) fn due(&mut self) {
         self.due = true;
     }
@@ -37,7 +37,7 @@ impl GlobalData {
         self.due && self.len > 0
     }
 
-    /// Writes them if they are due, but no more than the board sends.
+    /// Writes the data if they are due, but no more than the board sends.
     pub(super) fn write<R: SharedRam>(&mut self, ram: &mut R, broadcast_len: u8) {
         if !self.is_due() {
             return;

@@ -1,11 +1,11 @@
-//! The heartbeat (chapter 5, GENI OK Status): the board sets a flag, we clear it.
+//! The heartbeat (chapter 5, GENI OK Status): the board sets a flag, and the host clears it.
 
 use crate::elapsed::elapsed_ms;
 use crate::event::Failure;
 use crate::map;
 use crate::ram::SharedRam;
 
-/// When the flag was seen last.
+/// The tick at which the flag was last seen.
 #[derive(Debug)]
 pub(super) struct Heart {
     last_beat_ms: u32,
@@ -16,15 +16,15 @@ impl Heart {
         Heart { last_beat_ms: 0 }
     }
 
-    /// The board is alive now.
+    /// Counts the board as alive now.
     pub(super) fn begin(&mut self, now_ms: u32) {
         self.last_beat_ms = now_ms;
     }
 
-    /// Whether there was a beat since the last time.
+    /// Whether there was a beat since the last call.
     ///
-    /// The flag is looked at before the clock: a host that was away for long finds it set by a
-    /// healthy board.
+    /// The flag is checked before the clock, because a host that was away for long finds it set by
+    /// a healthy board.
     pub(super) fn watch<R: SharedRam>(
         &mut self,
         ram: &mut R,

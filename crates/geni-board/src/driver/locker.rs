@@ -1,4 +1,4 @@
-//! The lockout handshake (chapter 9), without waiting for it.
+//! The lockout handshake (chapter 9), without blocking.
 
 use crate::counters::{Counters, count};
 use crate::elapsed::elapsed_ms;
@@ -7,7 +7,7 @@ use crate::lockout::Lockout;
 use crate::ram::SharedRam;
 use crate::timing;
 
-/// Where the handshake is.
+/// The state of the handshake.
 #[derive(Clone, Copy, Debug)]
 enum State {
     Free,
@@ -20,7 +20,8 @@ enum State {
 #[derive(Debug)]
 pub(super) struct Locker {
     state: State,
-    /// Look at the bytes even when nothing is wanted: a host that died may have left them set.
+    /// Whether to check the bytes even when no lock is wanted: a host that died may have left them
+    /// set.
     due: bool,
     released_ms: Option<u32>,
     /// How long the board may take to answer, at least.
@@ -46,8 +47,8 @@ impl Locker {
 
     /// True when the board has just been locked out.
     ///
-    /// Between two lockouts there are at least `gap_ms`, so that a host that always wants the
-    /// tables leaves the board a bus scan to exchange them.
+    /// At least `gap_ms` pass between two lockouts. A host that always wants the tables thus leaves
+    /// the board a bus scan to exchange them.
     pub(super) fn poll<R: SharedRam>(
         &mut self,
         ram: &mut R,
@@ -95,8 +96,8 @@ impl Locker {
         Ok(false)
     }
 
-    /// A request must not be made over another one, and one that is not granted yet must not be
-    /// withdrawn: what somebody else has left behind is seen through to its end first.
+    /// A request must not be made over another one, and an ungranted one must not be withdrawn. So
+    /// what another program has left behind is first completed.
     fn begin<R: SharedRam>(
         &mut self,
         ram: &mut R,
@@ -123,7 +124,7 @@ impl Locker {
         };
     }
 
-    /// Gives the tables back to the board, if they are held.
+    /// Gives the tables back to the board, if they are locked.
     pub(super) fn end_hold<R: SharedRam>(
         &mut self,
         ram: &mut R,

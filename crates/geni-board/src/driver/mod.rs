@@ -1,6 +1,6 @@
-//! The driver: one board, from reset to traffic and back.
+//! The driver: takes one board from reset to traffic, and back there after a failure.
 //!
-//! Each file here looks after one thing and is asked in turn; none of them waits.
+//! Each file here handles one concern and is polled in turn; none of them waits.
 
 mod arrivals;
 mod board;
@@ -37,7 +37,8 @@ use locker::Locker;
 use request_server::RequestServer;
 use status_watch::StatusWatch;
 
-/// What a running board is asked for, in turn: whoever has an event goes to the end of the line.
+/// The tasks on a running board, in turn. A task that returns an event goes to the end of the
+/// queue.
 const TASKS: [Task; 6] =
     [Task::Flags, Task::Commands, Task::Requests, Task::Status, Task::Devices, Task::Tables];
 
@@ -56,41 +57,41 @@ enum Task {
 /// # What the host has to do
 ///
 /// - Call [`poll`](Driver::poll) in every turn of its main loop. The board tolerates slow hosts,
-///   but holds no more than 15 datagrams and 15 memory requests for them, and answers come as fast
-///   as this is called.
+///   but holds no more than 15 datagrams and 15 memory requests for them. Answers come only as fast
+///   as `poll` is called.
 /// - After each call, hold the reset line low if [`reset_held`](Driver::reset_held) says so, and
 ///   release it otherwise.
-/// - Call [`interrupt`](Driver::interrupt) with the tick of each pulse of the interrupt line, if it
-///   is connected at all.
+/// - Call [`interrupt`](Driver::interrupt) with the tick of each pulse of the interrupt line, if
+///   the line is connected.
 ///
 /// # When a datagram arrived
 ///
-/// Every poll looks at the board's flags, whatever command is in progress. A datagram is handed out
+/// Every poll checks the board's flags, whatever command is in progress. A datagram is handed out
 /// with the tick at which its flag was seen:
 /// [`ReceivedDatagram::arrived_ms`](crate::ReceivedDatagram::arrived_ms). That is later than the
 /// flag by no more than the time between two polls.
 ///
-/// Some hosts have to know the tick to the millisecond although their main loop may be away. They
-/// connect the interrupt line and let nothing but [`Interrupts::RECEIVE_QUEUE`] pull it. A datagram
-/// then has the tick of its pulse.
+/// Some hosts need the tick to the millisecond although their main loop may be away. They connect
+/// the interrupt line and enable only [`Interrupts::RECEIVE_QUEUE`]. A datagram then has the tick
+/// of its pulse.
 ///
-/// # What happens when
+/// # Sequence
 ///
-/// Reset, no access for 1.7 s, OK flag, configuration, 1.5 s off the bus, [`Event::Ready`]. Then
-/// traffic, until [`Event::Failed`], and all over again; the pauses between futile attempts grow up
-/// to a minute.
+/// The driver goes through reset, 1.7 s without access, the OK flag, configuration, 1.5 s off the
+/// bus, and [`Event::Ready`]. Traffic follows until [`Event::Failed`], and then the sequence starts
+/// again. The pauses between futile attempts grow up to a minute.
 ///
 /// # Heartbeat and commands
 ///
-/// The manual wants the OK flag seen before each command. As the flag is cleared to watch the
-/// heartbeat, it is the heartbeat that is checked instead: nothing is asked of a board whose
-/// heartbeat is overdue.
+/// The manual wants the OK flag checked before each command. The driver clears that flag to watch
+/// the heartbeat, so it checks the heartbeat instead: a board whose heartbeat is overdue gets no
+/// command.
 #[derive(Debug)]
 pub struct Driver<R> {
     ram: R,
     options: Options,
     phase: Phase,
-    /// Starts that came to nothing, in a row.
+    /// Number of failed starts in a row.
     futile_starts: u32,
     /// The configuration that the board has confirmed.
     in_force: Configuration,
@@ -104,10 +105,10 @@ pub struct Driver<R> {
     status: StatusWatch,
     global: GlobalData,
     tables_wanted: bool,
-    /// A datagram that the board took with it when it failed, still to be reported.
+    /// A datagram that was lost in the board's failure and must still be reported.
     lost: Option<Completion>,
     interrupted: bool,
-    /// The board has had its turn, which is still to be reported.
+    /// Whether a turn of the board must still be reported.
     outputs_sent: bool,
     flags_taken_ms: u32,
     safety_ms: u32,
@@ -116,8 +117,8 @@ pub struct Driver<R> {
 }
 
 impl<R: SharedRam> Driver<R> {
-    /// A driver for the board behind `ram`. Nothing is read or written before the first call of
-    /// [`poll`](Driver::poll).
+    /// A driver for the board that shares `ram`. Nothing is read or written before the first call
+    /// of [`poll`](Driver::poll).
     pub fn new(ram: R, options: Options) -> Driver<R> {
         Driver {
             ram,
@@ -145,9 +146,9 @@ impl<R: SharedRam> Driver<R> {
         }
     }
 
-    /// Does what is due, a bounded amount of it, and says what has happened, one thing at a time.
+    /// Does a bounded amount of the work that is due, and returns at most one event.
     ///
-    /// `now_ms` counts milliseconds, from anywhere, and may wrap.
+    /// `now_ms` counts milliseconds from any start and may wrap.
     pub fn poll(&mut self, now_ms: u32) -> Option<Event> {
         if let Some(completion) = self.lost.take() {
             return Some(match completion {
@@ -166,8 +167,7 @@ impl<R: SharedRam> Driver<R> {
         }
     }
 
-    /// Whether the reset line is to be held low from now to the next call of
-    /// [`poll`](Driver::poll).
+    /// Whether the reset line must be held low until the next call of [`poll`](Driver::poll).
     pub fn reset_held(&self) -> bool {
         match self.phase {
             Phase::Begin => {
@@ -178,9 +178,10 @@ impl<R: SharedRam> Driver<R> {
         }
     }
 
-    /// The interrupt line was pulsed at `tick_ms`, by the count of [`poll`](Driver::poll). The next
-    /// poll looks at the flags. Where only [`Interrupts::RECEIVE_QUEUE`] pulls the line, a datagram
-    /// arrived at that tick. Pulses have to be handed in in the order in which they came.
+    /// Takes note of a pulse of the interrupt line at `tick_ms`, by the count of
+    /// [`poll`](Driver::poll). The next poll checks the flags. If only
+    /// [`Interrupts::RECEIVE_QUEUE`] is enabled, a datagram arrived at that tick. Pulses must be
+    /// handed in in their order.
     pub fn interrupt(&mut self, tick_ms: u32) {
         self.interrupted = true;
         if self.options.interrupts == Interrupts::RECEIVE_QUEUE {
@@ -188,7 +189,7 @@ impl<R: SharedRam> Driver<R> {
         }
     }
 
-    /// When the oldest datagram that waits to be read arrived, as far as that is known.
+    /// The arrival of the oldest datagram that waits to be read, as far as it is known.
     pub fn oldest_arrival_ms(&self) -> Option<u32> {
         if self.is_ready() { self.arrivals.oldest() } else { None }
     }
@@ -203,21 +204,21 @@ impl<R: SharedRam> Driver<R> {
         self.in_force
     }
 
-    /// Changes the configuration, now or as soon as the board is ready for it. Ends in
-    /// [`Event::Configured`] and [`Event::Ready`]. When it is not the one in force, all devices are
-    /// logged out for 1.5 s.
+    /// Changes the configuration, now or as soon as the board is ready for it.
+    /// [`Event::Configured`] and [`Event::Ready`] follow. If it is not the one in force, all
+    /// devices are logged out for 1.5 s.
     pub fn configure(&mut self, configuration: Configuration) {
         self.options.configuration = configuration;
         self.configure_due = true;
     }
 
-    /// Sends a datagram. Ends in one [`Event::Sent`], or in one [`Event::Replied`] if a reply is
-    /// wanted, whatever happens.
+    /// Sends a datagram. Exactly one [`Event::Sent`] follows in any case, or one [`Event::Replied`]
+    /// if a reply is wanted.
     ///
     /// # Errors
     ///
-    /// When the board is not ready, when the last datagram has not been dealt with, or for
-    /// datagrams that the board would refuse.
+    /// When the board is not ready, when the last datagram is still in progress, or when the board
+    /// would refuse this one.
     pub fn transmit(&mut self, transmission: Transmission) -> Result<(), TransmitError> {
         transmission.check()?;
         if !self.is_ready() {
@@ -226,34 +227,34 @@ impl<R: SharedRam> Driver<R> {
         self.commander.put(transmission)
     }
 
-    /// Whether the last datagram has been dealt with and the board is ready.
+    /// Whether the last datagram is done and the board is ready.
     pub fn can_transmit(&self) -> bool {
         self.is_ready() && self.commander.can_transmit()
     }
 
-    /// Has the receive queue read until it is empty. It is read also without this, when the board
-    /// says that something has arrived; this is for a host that has to know where it stands: see
+    /// Has the receive queue read until it is empty. The driver does so by itself when the board
+    /// signals an arrival. This is for a host that must know that nothing is left: see
     /// [`receive_queue_is_empty`](Driver::receive_queue_is_empty).
     pub fn check_receive_queue(&mut self) {
         self.commander.read_due();
     }
 
-    /// Whether a Read Datagram that was started after the last
-    /// [`check_receive_queue`](Driver::check_receive_queue), and after the last sign of the board
-    /// that something has arrived, has found nothing: what was in the queue then has become
+    /// Whether a Read Datagram has found the queue empty that was started after the last
+    /// [`check_receive_queue`](Driver::check_receive_queue) and after the board's last sign of an
+    /// arrival. Everything that was in the queue then has become [`Event::Received`].
     /// [`Event::Received`].
     pub fn receive_queue_is_empty(&self) -> bool {
         self.is_ready() && self.commander.queue_is_empty()
     }
 
-    /// Sets what is sent to everybody in every bus scan, from the next scan on that allows it. It
-    /// survives a failure of the board.
+    /// Sets the global data for every bus scan, from the next scan on that allows it. They survive
+    /// a failure of the board.
     ///
-    /// May be called as often as one likes; at most one version per bus scan gets out.
+    /// It may be called as often as the host likes; at most one version per bus scan is sent.
     ///
     /// # Errors
     ///
-    /// When it is not exactly as long as the configuration says.
+    /// When the data are not exactly as long as configured.
     pub fn set_global_data(&mut self, data: &[u8]) -> Result<(), TableError> {
         let expected = self.options.configuration.broadcast_len();
         if data.len() != usize::from(expected) {
@@ -263,13 +264,14 @@ impl<R: SharedRam> Driver<R> {
         Ok(())
     }
 
-    /// Asks for the tables. Ends in [`Event::TablesLocked`], or is forgotten when the board fails.
+    /// Asks for the tables. [`Event::TablesLocked`] follows; if the board fails first, the request
+    /// is forgotten.
     pub fn request_tables(&mut self) {
         self.tables_wanted = true;
     }
 
     /// The input and output tables, from [`Event::TablesLocked`] to the next call of
-    /// [`poll`](Driver::poll). Meanwhile the board neither takes new inputs nor sends new outputs.
+    /// [`poll`](Driver::poll). Until then the board neither takes new inputs nor sends new outputs.
     ///
     /// # Errors
     ///
@@ -281,7 +283,7 @@ impl<R: SharedRam> Driver<R> {
         Ok(Tables::new(&mut self.ram, self.in_force.buffer_len(), self.in_force.directed_len()))
     }
 
-    /// The inputs of a device that has not more than one byte of them: these need no lock.
+    /// The inputs of a device with at most one byte of them. They need no lock.
     ///
     /// # Errors
     ///
@@ -294,7 +296,7 @@ impl<R: SharedRam> Driver<R> {
         Ok(self.ram.read(input_buffer(device_number, self.in_force.buffer_len()).start))
     }
 
-    /// Sets the outputs of a device that has not more than one byte of them: these need no lock.
+    /// Sets the outputs of a device with at most one byte of them. They need no lock.
     ///
     /// # Errors
     ///
@@ -308,11 +310,11 @@ impl<R: SharedRam> Driver<R> {
         Ok(())
     }
 
-    /// Lets a device have outputs, or keeps it from them.
+    /// Enables or disables outputs to a device.
     ///
     /// # Errors
     ///
-    /// When the board is not ready or there is no such device number. The device need not be logged
+    /// When the board is not ready, or the bus address is above 31. The device need not be logged
     /// in.
     pub fn enable_outputs(&mut self, device_number: u8, enabled: bool) -> Result<(), TableError> {
         if !self.is_ready() {
@@ -325,7 +327,7 @@ impl<R: SharedRam> Driver<R> {
         Ok(())
     }
 
-    /// A device that is logged in.
+    /// The device that is logged in at this bus address.
     ///
     /// # Errors
     ///
@@ -338,28 +340,27 @@ impl<R: SharedRam> Driver<R> {
     ///
     /// # Errors
     ///
-    /// When no request waits any more, or the data have another length than was asked for.
+    /// When no request waits any more, or when the request asks for another number of bytes.
     pub fn answer_request(&mut self, answer: RequestAnswer<'_>) -> Result<(), AnswerError> {
         self.requests.answer(&mut self.ram, answer)
     }
 
-    /// The status table as it was looked at last; `None` when it was not since the board was
-    /// started.
+    /// The status table as last seen; `None` if it was not seen since the board was started.
     pub fn status(&self) -> Option<Status> {
         self.status.last()
     }
 
-    /// Counters of everything that was lost, refused or out of order.
+    /// Counters of what was lost, refused or out of order.
     pub fn counters(&self) -> Counters {
         self.counters
     }
 
-    /// The RAM.
+    /// The shared RAM.
     pub fn ram(&self) -> &R {
         &self.ram
     }
 
-    /// The RAM, for whoever owns what is behind it.
+    /// The shared RAM, for the owner of what is behind it.
     pub fn ram_mut(&mut self) -> &mut R {
         &mut self.ram
     }
@@ -371,7 +372,7 @@ impl<R: SharedRam> Driver<R> {
         present_device(&self.ram, device_number, self.in_force.buffer_len())
     }
 
-    /// One step of a board that is on the bus.
+    /// Takes one step with a board that is on the bus.
     fn serve(&mut self, now_ms: u32) -> Result<Option<Event>, Failure> {
         if elapsed_ms(now_ms, self.safety_ms) >= timing::SAFETY_PERIOD_MS {
             self.look_at_everything(now_ms);
@@ -410,7 +411,7 @@ impl<R: SharedRam> Driver<R> {
         }
     }
 
-    /// A lost flag must not lose data, so now and then nobody waits for one.
+    /// Has everything checked from time to time without a flag, so a lost flag loses no data.
     fn look_at_everything(&mut self, now_ms: u32) {
         self.safety_ms = now_ms;
         self.commander.read_due();
@@ -420,7 +421,7 @@ impl<R: SharedRam> Driver<R> {
         self.locker.due();
     }
 
-    /// Looks at the board's flags, if one of them may be set.
+    /// Checks the board's flags, if one of them may be set.
     fn look(&mut self, now_ms: u32) {
         let due = self.interrupted
             || Interrupts::any(&self.ram)
@@ -445,7 +446,7 @@ impl<R: SharedRam> Driver<R> {
         if received {
             self.commander.read_due();
         }
-        // A finished command and a granted lockout are seen where they are waited for.
+        // The commander and the locker see a finished command and a granted lockout without flags.
         let outputs_sent = Interrupts::OUTPUTS_SENT;
         self.outputs_sent |=
             flags.contains(outputs_sent) && self.options.interrupts.contains(outputs_sent);
@@ -476,8 +477,8 @@ impl<R: SharedRam> Driver<R> {
     fn report(&mut self, done: Done, now_ms: u32) -> Option<Event> {
         match done {
             Done::Read(received) => {
-                // The datagram may have come after the latest look. Its flag is set by now, since
-                // the command has finished.
+                // The datagram may have come after the latest look at the flags. Its flag is set by
+                // now, because the command has finished.
                 self.look(now_ms);
                 let arrived_ms = self.arrivals.read();
                 let received = ReceivedDatagram { arrived_ms, ..received? };
@@ -501,7 +502,7 @@ impl<R: SharedRam> Driver<R> {
     fn exchange(&mut self, now_ms: u32) -> Result<Option<Event>, Failure> {
         let len = self.in_force.broadcast_len();
         if len <= 1 {
-            // A byte cannot be sent by halves.
+            // A single byte cannot be torn.
             self.global.write(&mut self.ram, len);
         }
         let wanted = self.tables_wanted || self.global.is_due();
@@ -551,7 +552,7 @@ impl<R: SharedRam> Driver<R> {
         self.configure_due = false;
         let mut pause_ms = board::pause_ms(self.futile_starts);
         if !self.options.reset_line {
-            // It may be restarting by itself, and must be left alone meanwhile.
+            // The board may be restarting by itself and must be left alone meanwhile.
             pause_ms = pause_ms.max(timing::START_UP_MS);
         }
         self.phase = Phase::Failed { since_ms: now_ms, pause_ms };

@@ -1,4 +1,4 @@
-//! Keeps the request queue moving (chapter 13): a full one loses requests without a word.
+//! Keeps the request queue moving (chapter 13), because a full queue loses requests silently.
 
 use crate::counters::{Counters, count};
 use crate::elapsed::elapsed_ms;
@@ -20,15 +20,15 @@ struct Waiting {
 }
 
 impl Waiting {
-    /// The head is ours: somewhere else, or in an empty queue, it means that the board has started
-    /// anew.
+    /// Only the driver moves the head. A head that is elsewhere, or an empty queue, means that the
+    /// board has started anew.
     fn is_still_there<R: SharedRam>(self, ram: &R) -> bool {
         Pointers::read(ram)
             .is_ok_and(|pointers| pointers.head == self.index && !pointers.is_empty())
     }
 }
 
-/// Takes requests one at a time.
+/// Handles requests one at a time.
 #[derive(Debug)]
 pub(super) struct RequestServer {
     due: bool,
@@ -112,7 +112,7 @@ impl RequestServer {
     }
 }
 
-/// There is nothing here that could be read or written.
+/// Refuses a request because the host has no such memory.
 fn refuse<R: SharedRam>(ram: &mut R, index: u8, counters: &mut Counters) -> Event {
     let header = read_header(ram, index);
     finish(ram, index, RequestStatus::Syntax);

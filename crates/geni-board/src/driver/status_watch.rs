@@ -1,4 +1,4 @@
-//! Looks at the status table and the setup table of a running board.
+//! Watches the status table and the setup table of a running board.
 
 use crate::counters::{Counters, count, count_by};
 use crate::event::{Event, Failure};
@@ -7,7 +7,7 @@ use crate::setup_table::Configuration;
 use crate::status_table::Status;
 use crate::timing;
 
-/// What was seen last.
+/// The tables as last seen.
 #[derive(Debug)]
 pub(super) struct StatusWatch {
     due: bool,
@@ -27,7 +27,7 @@ impl StatusWatch {
         self.last
     }
 
-    /// Duration of a bus scan, believable at any rate.
+    /// Duration of a bus scan in milliseconds, limited to a believable range.
     pub(super) fn scan_ms(&self) -> u32 {
         let scan_ms = self.last.and_then(|status| status.scan_ms).unwrap_or(timing::MIN_SCAN_MS);
         scan_ms.clamp(timing::MIN_SCAN_MS, timing::MAX_SCAN_MS).into()
@@ -51,7 +51,7 @@ impl StatusWatch {
             return Err(Failure::Restarted);
         }
         let before = self.last.replace(status);
-        // What a board has counted before it was looked at is history.
+        // Errors that the board counted before the first look are not ours to report.
         let errors = before.map_or(0, |before| status.bus_errors.wrapping_sub(before.bus_errors));
         count_by(&mut counters.bus_errors, errors.into());
         let was_on_bus = before.is_some_and(|before| before.on_bus());

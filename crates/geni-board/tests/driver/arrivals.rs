@@ -1,5 +1,5 @@
-//! When datagrams arrived: by the board's flags and by its interrupt line, however long the command
-//! block is busy.
+//! Arrival times of datagrams, by the board's flags and by its interrupt line, however long the
+//! command block is busy.
 
 use geni_board::{
     Completion, Configuration, Data, Destination, Event, Interrupts, Options, ReceivedDatagram,
@@ -8,7 +8,7 @@ use geni_board::{
 
 use crate::world::World;
 
-/// Keeps the block busy for so long.
+/// How long a command keeps the block busy.
 fn busy(world: &mut World, for_ms: u32) {
     world.board().misbehaviour.command_ms = Some(for_ms);
     let transmission = Transmission {
@@ -23,7 +23,7 @@ fn busy(world: &mut World, for_ms: u32) {
     world.run(2);
 }
 
-/// Datagrams by their first byte, with their arrivals.
+/// The first byte of each datagram, and its arrival.
 fn arrivals(events: &[Event]) -> Vec<(u8, Option<u32>)> {
     let received = |event: &Event| match event {
         Event::Received(ReceivedDatagram { data, arrived_ms, .. }) => Some((data[0], *arrived_ms)),
@@ -32,7 +32,7 @@ fn arrivals(events: &[Event]) -> Vec<(u8, Option<u32>)> {
     events.iter().filter_map(received).collect()
 }
 
-/// A board whose interrupt line tells of datagrams only.
+/// A board whose interrupt line signals datagrams only.
 fn with_line() -> World {
     World::ready_with(Options {
         start: Start::Running,
@@ -108,7 +108,7 @@ fn a_datagram_whose_flag_was_lost_has_arrived_nobody_knows_when() {
 #[test]
 fn a_datagram_that_makes_no_sense_leaves_the_next_one_its_flag() {
     let mut world = World::ready(Configuration::DEFAULT);
-    // There is no such device.
+    // No such device exists.
     world.board().receive(40, 1, &[1]);
     world.step();
     world.board().receive(30, 1, &[2]);

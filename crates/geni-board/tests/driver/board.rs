@@ -1,4 +1,4 @@
-//! A scripted board: it keeps the rules, and checks that the host does.
+//! A scripted board, which keeps the manual's rules and checks that the host does.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -13,20 +13,20 @@ pub(crate) const COMMAND: usize = 0x08C2;
 pub(crate) const LOCKOUT_REQUEST: usize = 0x0A48;
 pub(crate) const LOCKOUT_STATE: usize = 0x0A49;
 
-/// What the board does instead of what it should.
+/// How the board misbehaves.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Misbehaviour {
-    /// Faults found in the self-test.
+    /// The self-test finds faults.
     pub(crate) self_test_faults: u8,
-    /// Nothing at all happens any more.
+    /// The board is dead.
     pub(crate) hangs: bool,
-    /// The heartbeat stops, all else goes on.
+    /// The heartbeat stops; all else goes on.
     pub(crate) no_heartbeat: bool,
     /// Commands stay in progress.
     pub(crate) stalls: bool,
-    /// No configuration is good enough.
+    /// Every configuration is refused.
     pub(crate) refuses_configuration: bool,
-    /// The table of global data is cleared when the bus is joined.
+    /// The global data are cleared when the board joins the bus.
     pub(crate) forgets_global_data: bool,
     /// Commands take this long instead of 3 ms.
     pub(crate) command_ms: Option<u32>,
@@ -72,17 +72,17 @@ pub(crate) struct Board {
     pub(crate) reply: Option<Vec<u8>>,
     pub(crate) sent: Vec<Sent>,
     pub(crate) configurations: u32,
-    /// What the board sends as global data in each scan, sampled when it may.
+    /// The global data that the board sends in each scan, sampled when it may.
     pub(crate) on_bus: bool,
     pub(crate) lockouts: u32,
     pub(crate) resets: u32,
-    /// Host accesses since this was set to 0.
+    /// Host accesses since the counter was last set to 0.
     pub(crate) accesses: usize,
-    /// Where the host has written, in order, since this was emptied.
+    /// The offsets that the host has written since this was last emptied, in order.
     pub(crate) written: Vec<usize>,
     pub(crate) first_access_ms: Option<u32>,
     pub(crate) released_ms: u32,
-    /// Checks of what the host does can be left out for a RAM full of noise.
+    /// Whether to check the host's accesses; a RAM full of noise needs no checks.
     pub(crate) checks_handshakes: bool,
     state: State,
     now_ms: u32,
@@ -94,7 +94,7 @@ pub(crate) struct Board {
 
 const DEFAULTS: [u8; 5] = [0xFF, 0xFF, 0, 0, 128];
 
-/// What the host may write, and what it may not even read.
+/// Where the host may write, and where it may not even read.
 const HOST_WRITES: [Range<usize>; 12] = [
     0x0000..0x0881,
     0x0883..0x0888,
@@ -112,7 +112,7 @@ const HOST_WRITES: [Range<usize>; 12] = [
 const RESERVED: Range<usize> = 0x0A4A..0x1E00;
 
 impl Board {
-    /// A board without power: its RAM holds anything.
+    /// A board without power, whose RAM holds anything.
     pub(crate) fn new() -> Board {
         Board {
             ram: vec![0xA5; RAM_LEN],
@@ -139,7 +139,7 @@ impl Board {
         }
     }
 
-    /// A board that has been running for long.
+    /// A board that has been running for a long time.
     pub(crate) fn running(now_ms: u32) -> Board {
         let mut board = Board::new();
         board.state = State::Running;
@@ -165,7 +165,7 @@ impl Board {
         self.joins_ms = Some(now_ms.wrapping_add(1_500));
     }
 
-    /// Restarts by itself, in no time.
+    /// Restarts by itself within no time.
     pub(crate) fn restart(&mut self) {
         self.start_up(self.now_ms);
     }
@@ -206,7 +206,7 @@ impl Board {
         true
     }
 
-    /// Sets the record of a device, `[model, …, block configuration]`.
+    /// Sets the device table entry of a device, `[model, …, block configuration]`.
     pub(crate) fn device(&mut self, number: usize, record: [u8; 8]) {
         self.ram[0x1E00 + 8 * number..][..8].copy_from_slice(&record);
         self.flag(3);
@@ -220,7 +220,7 @@ impl Board {
         self.configuration[4].into()
     }
 
-    /// One millisecond.
+    /// Lets one millisecond pass.
     pub(crate) fn step(&mut self, now_ms: u32, reset_held: bool) {
         self.now_ms = now_ms;
         if reset_held {
@@ -430,7 +430,7 @@ impl Board {
 #[derive(Clone)]
 pub(crate) struct HostSide(pub Rc<RefCell<Board>>);
 
-/// 16 KiB tell nobody anything.
+/// Prints nothing: 16 KiB would help nobody.
 impl fmt::Debug for HostSide {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("HostSide")

@@ -55,7 +55,7 @@ fn every_status_has_its_meaning() {
         (Completion::Acknowledged, Some(8), Err(Refused)),
         (Completion::Acknowledged, Some(0x10), Err(Failed)),
         (Completion::Acknowledged, Some(10), Err(UnknownStatus(10))),
-        // With the status cleared at once nothing more is known.
+        // The status is cleared at once, so nothing more is known.
         (Completion::Taken, Some(8), Ok(())),
     ] {
         assert_eq!(outcome(completion, status), Event::Sent(expected), "{completion:?} {status:?}");
@@ -105,7 +105,7 @@ fn a_command_that_ends_late_is_not_taken_for_the_next_one() {
     assert_eq!(events, [Event::Sent(Err(CommandError::TimedOut))]);
     assert!((2_000..2_010).contains(&after_ms), "gave up after {after_ms} ms");
 
-    // The next one has to wait for the end of the first.
+    // The next command must wait for the end of the first.
     let mut next = transmission(Completion::Acknowledged);
     next.data = Data::from_slice(&[0x4C]).expect("short");
     world.driver.transmit(next).expect("accepted");
@@ -173,7 +173,7 @@ fn a_lost_flag_loses_no_datagram() {
 #[test]
 fn own_broadcasts_are_dropped_and_others_are_not() {
     let mut world = World::ready(Configuration::DEFAULT);
-    // The board has device number 7.
+    // The board has bus address 7.
     world.board().receive(7, 0, &[1]);
     world.board().receive(8, 0, &[2]);
     world.board().receive(8, 2, &[3]);
@@ -263,7 +263,7 @@ fn the_status_byte_is_written_last() {
         let board = world.board();
         let written: Vec<_> =
             board.written.iter().filter(|at| (0x08C2..0x09C2).contains(*at)).collect();
-        // Block and buffer, the status byte once and at the end.
+        // The block and the buffer are written first, the status byte once and last.
         assert!(written.len() >= 7 && written.contains(&&0x08D2), "{written:X?}");
         assert_eq!(
             written.iter().position(|at| **at == 0x08C2),
@@ -280,7 +280,7 @@ fn a_read_that_fails_against_the_manual_is_tried_again_later() {
     world.board().misbehaviour.command_status = Some(0x10);
     world.board().flag(6);
     assert!(world.run(50).is_empty());
-    // Not again and again: nothing says that there is something to read.
+    // The driver does not read again, because nothing signals a datagram.
     assert_eq!(world.driver.counters().commands_failed, failed + 1);
     world.board().misbehaviour.command_status = None;
     world.board().receive(30, 1, &[0x4D]);
@@ -291,7 +291,7 @@ fn a_read_that_fails_against_the_manual_is_tried_again_later() {
 fn the_host_is_told_when_the_receive_queue_is_empty() {
     let mut world = World::ready(Configuration::DEFAULT);
     assert!(world.driver.receive_queue_is_empty());
-    // The board does not say that something has come: the host asks.
+    // The board does not signal the datagram; the host asks.
     world.board().misbehaviour.no_flags = true;
     for number in 0..3 {
         world.board().receive(30, 1, &[number]);
@@ -313,7 +313,7 @@ fn what_arrives_while_the_queue_is_found_empty_is_read_at_once() {
     world.board().misbehaviour.command_ms = Some(50);
     world.driver.check_receive_queue();
     world.run(49);
-    // The board has looked and says so in a moment; its flag comes before that.
+    // The board has looked and is about to answer; its flag comes before the answer.
     world.board().receive(30, 1, &[7]);
     let (after_ms, _) = world.until(500, |event| matches!(event, Event::Received(_)));
     assert!(after_ms <= 110, "after {after_ms} ms");
@@ -333,7 +333,7 @@ fn a_board_in_the_time_of_a_busy_computer_gets_longer_for_everything() {
     assert_eq!(events, [Event::Sent(Ok(()))]);
     world.driver.transmit(transmission(Completion::Reply { subfunction: 0x51 })).expect("accepted");
     world.board().reply = Some(vec![1]);
-    // Before each of them the board may be looking into its receive queue.
+    // The board may be looking into its receive queue before each of them.
     world.until(60_000, |event| matches!(event, Event::Replied(Ok(_))));
     world.board().receive(30, 1, &[7]);
     world.until(60_000, |event| matches!(event, Event::Received(_)));

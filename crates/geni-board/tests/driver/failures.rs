@@ -1,4 +1,4 @@
-//! Heartbeat, faults and what becomes of work in progress.
+//! Heartbeat, faults, and the fate of work in progress.
 
 use geni_board::{
     CommandError, Completion, Configuration, Data, Destination, Event, Failure, Options, Start,
@@ -36,8 +36,8 @@ fn a_healthy_board_stays_healthy() {
     assert_eq!(world.driver.counters(), geni_board::Counters::default());
 }
 
-/// What an idle board costs on a slow external bus: the flag and the summary in every poll, and now
-/// and then the rest.
+/// The accesses that an idle board costs on a slow external bus: the flag and the summary in every
+/// poll, and the rest from time to time.
 #[test]
 fn idle_polls_are_cheap() {
     let mut world = World::ready(configuration(4, 0, 16));
@@ -66,7 +66,7 @@ fn a_board_without_heartbeat_is_reset_and_comes_back() {
     world.until(5_000, is_ready);
     world.run(20);
     assert_eq!(world.board().resets, 1);
-    // Configuration and global data are back without anybody asking.
+    // Configuration and global data are restored without a request.
     assert_eq!(world.driver.configuration(), configuration(2, 0, 16));
     assert_eq!(world.board().ram[0x1F80..0x1F82], [7, 8]);
 }

@@ -1,4 +1,4 @@
-//! A RAM full of noise: no panic, no endless poll, nothing written where the host has no business.
+//! A RAM full of noise: no panic, no endless poll, and no write outside the host's bytes.
 
 use geni_board::{
     Completion, Configuration, Data, Destination, Event, Options, RequestAnswer, Requests, Start,
@@ -9,11 +9,11 @@ use proptest::prelude::*;
 use crate::board::Board;
 use crate::world::{World, configuration};
 
-/// Most accesses in one poll. The longest: a lockout is granted (128 bytes of global data), flags
-/// are set, devices are looked at.
+/// Most accesses in one poll. The longest poll grants a lockout (128 bytes of global data), sees
+/// flags and checks devices.
 const MAX_ACCESSES: usize = 600;
 
-/// Something that changes between two polls.
+/// An event between two polls.
 #[derive(Clone, Debug)]
 enum Noise {
     /// One byte anywhere.
@@ -21,7 +21,7 @@ enum Noise {
         offset: u16,
         byte: u8,
     },
-    /// One byte where it hurts.
+    /// One byte in a sensitive place.
     Control {
         offset: u16,
         byte: u8,
@@ -42,7 +42,7 @@ enum Noise {
     Request {
         header: [u8; 8],
     },
-    /// The host wants something.
+    /// A request of the host.
     Transmit {
         completion: u8,
     },
@@ -100,7 +100,7 @@ fn transmission(completion: u8) -> Transmission {
     }
 }
 
-/// Uses whatever the driver offers.
+/// Calls whatever the driver offers.
 fn make_use_of(world: &mut World, event: &Event) {
     let mut bytes = [0; 256];
     if *event == Event::TablesLocked {
@@ -163,11 +163,11 @@ fn options(start: Start, requests: Requests, reset_line: bool) -> Options {
     Options { start, requests, reset_line, ..Options::new(configuration(128, 128, 128)) }
 }
 
-/// One poll that is watched.
+/// One poll, with its accesses checked.
 fn watched_step(world: &mut World) -> Option<Event> {
     world.now_ms = world.now_ms.wrapping_add(world.pace_ms);
     world.board().accesses = 0;
-    // The board does what it can with what the noise has left.
+    // The board works with whatever the noise has left.
     world.board.borrow_mut().step(world.now_ms, world.driver.reset_held());
     let event = world.driver.poll(world.now_ms);
     assert!(
@@ -197,12 +197,11 @@ proptest! {
         for (noise, polls) in script {
             apply(&mut world, &noise);
             for _ in 0..polls {
-                // The heart goes on beating more often than not, so that the noise gets far into
-                // the driver.
+                // The heart usually goes on beating, so that the noise gets far into the driver.
                 if world.now_ms.is_multiple_of(3) {
                     world.board().ram[0x0893] = 1;
                     if !responds {
-                        // What the noise has put there is all the answer there is.
+                        // The noise is the only answer there is.
                         world.board().ram[0x08C2] = 4;
                     }
                 }
@@ -213,8 +212,7 @@ proptest! {
         }
     }
 
-    /// With a board that does its work, noise in its tables is overcome: in the end there is
-    /// traffic.
+    /// A board that does its work overcomes noise in its tables: in the end there is traffic.
     #[test]
     fn a_board_that_calms_down_is_brought_back(
         script in prop::collection::vec(noise(), 1..60),
@@ -232,7 +230,7 @@ proptest! {
                 }
             }
         }
-        // Whatever is broken now is either put right or found out within half a minute.
+        // Whatever is broken now is repaired or detected within half a minute.
         world.run(30_000);
         let mut waited_ms = 0;
         while !world.driver.can_transmit() {

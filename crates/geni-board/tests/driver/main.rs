@@ -1,5 +1,5 @@
-//! The driver and a scripted board that does what the manual's procedures and example algorithms
-//! say, step by step.
+//! Tests the driver with a scripted board that follows the manual's procedures and example
+//! algorithms step by step.
 //!
 //! Offsets are written out here as the manual has them, so that a slip in the crate's map cannot
 //! hide.

@@ -81,7 +81,7 @@ fn a_configuration_that_is_in_force_already_costs_nothing() {
     let (_, events) = world.until(10_000, is_ready);
     assert_eq!(events[0], Event::Configured(ConfigurationOutcome::Unchanged));
     assert_eq!(world.board().configurations, 0);
-    // The window of 1.5 s after the OK flag is waited for all the same.
+    // The driver still waits for the 1.5 s after the OK flag.
     assert!(world.now_ms >= 2_000 + 1_700 + 1_500);
 }
 
@@ -111,7 +111,7 @@ fn a_flag_left_behind_by_a_dead_board_is_not_believed() {
     assert!((1_000..1_100).contains(&failed_ms), "noticed after {failed_ms} ms");
 }
 
-/// What a window holds that is none, or a board in its self-test.
+/// What a window holds when there is no board, or one in its self-test.
 fn silent_with(flag: u8) -> World {
     let options = Options {
         start: Start::Running,
@@ -131,7 +131,7 @@ fn nothing_is_written_to_what_cannot_be_a_running_board() {
         let (failed_ms, events) = world.until(10_000, is_failed);
         assert_eq!(events, [Event::Failed(Failure::NoHeartbeat)]);
         assert!((1_000..1_100).contains(&failed_ms), "noticed after {failed_ms} ms");
-        // And not later either, when it is tried again.
+        // The driver does not write later either, when it tries again.
         world.run(10_000);
         assert_eq!(world.board().written, [], "{flag:02X}");
     }
@@ -171,7 +171,7 @@ fn a_board_that_fails_its_self_test_is_reset_less_and_less_often() {
     assert!(gaps_ms[1..].is_sorted(), "{gaps_ms:?}");
     assert!(gaps_ms[1] < 3_000 && gaps_ms[11] > 60_000, "{gaps_ms:?}");
 
-    // It is never given up.
+    // The driver never gives up.
     world.board().misbehaviour.self_test_faults = 0;
     world.until(70_000, is_ready);
     let counters = world.driver.counters();
@@ -188,7 +188,7 @@ fn a_refused_configuration_tells_what_is_in_force() {
     assert!(events.contains(&refused), "{events:?}");
     assert_eq!(world.driver.configuration(), configuration(2, 0, 16));
     assert_eq!(world.driver.counters().configurations_refused, 1);
-    // Asked once is enough.
+    // One request is enough.
     assert!(!world.run(5_000).iter().any(|event| matches!(event, Event::Configured(_))));
 }
 

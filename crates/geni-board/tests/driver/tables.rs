@@ -1,5 +1,5 @@
-//! Chapters 8, 9, 11 and 12: what is exchanged in every scan, and lockout. The scripted board
-//! panics when the host touches tables without lockout, asks twice, or withdraws a request.
+//! Chapters 8, 9, 11 and 12: the data exchanged in every scan, and lockout. The scripted board
+//! panics when the host touches tables without lockout, asks twice or withdraws a request.
 
 use geni_board::{Configuration, Event, Failure, Options, Start, TableError};
 
@@ -10,7 +10,7 @@ fn is_locked(event: &Event) -> bool {
     matches!(event, Event::TablesLocked)
 }
 
-/// A device with so many inputs and outputs.
+/// A device with this many inputs and outputs.
 fn record(inputs: u8, outputs: u8) -> [u8; 8] {
     [64, 0, 1, 0x34, 0x12, inputs, outputs, 3]
 }
@@ -23,7 +23,7 @@ fn global_data_are_changed_under_lockout() {
     assert_eq!(world.board().ram[0x1F80..0x1F84], [1, 2, 3, 4]);
     assert_eq!(world.board().lockouts, 1);
     assert_eq!((world.peek(LOCKOUT_REQUEST), world.peek(LOCKOUT_STATE)), (0, 0));
-    // The same again is no news.
+    // Unchanged data are not written again.
     world.driver.set_global_data(&[1, 2, 3, 4]).expect("four bytes");
     world.run(10);
     assert_eq!(world.board().lockouts, 1);
@@ -125,11 +125,11 @@ fn a_request_that_is_not_granted_is_never_withdrawn() {
     world.driver.set_global_data(&[1, 2, 3, 4]).expect("four bytes");
     world.run(4_000);
     assert_eq!((world.peek(LOCKOUT_REQUEST), world.peek(LOCKOUT_STATE)), (1, 0));
-    // Granted late: all is well.
+    // The lockout is granted late, which is fine.
     world.board().misbehaviour.ignores_lockout = false;
     world.run(10);
     assert_eq!(world.board().ram[0x1F80..0x1F84], [1, 2, 3, 4]);
-    // Never granted: the board has failed.
+    // The lockout is never granted, so the board has failed.
     world.board().misbehaviour.ignores_lockout = true;
     world.driver.set_global_data(&[1, 2, 3, 5]).expect("four bytes");
     let (_, events) = world.until(6_000, |event| matches!(event, Event::Failed(_)));

@@ -31,7 +31,7 @@ fn devices_come_change_and_go() {
         [Event::Device { number: 12, change: DeviceChange::LoggedIn(device) }]
     );
     assert_eq!(world.driver.device(12), Ok(device));
-    // The outputs flag is our own doing.
+    // The host itself changed the outputs flag.
     world.board().device(12, [64, 0, 1, 0x34, 0x12, 8, 4, 3]);
     assert_eq!(world.run(20), []);
     world.board().device(12, [64, 0, 1, 0x34, 0x12, 6, 4, 3]);
@@ -60,7 +60,7 @@ fn all_devices_at_once_are_all_reported() {
         })
         .collect();
     numbers.sort_unstable();
-    // Number 7 is the board itself.
+    // Address 7 is the board's own.
     assert_eq!(numbers, (0..32).filter(|&number| number != 7).collect::<Vec<_>>());
 }
 
@@ -120,7 +120,7 @@ fn flags_are_cleared_after_service() {
 
 #[test]
 fn a_pulse_on_the_interrupt_line_makes_flags_count_at_once() {
-    // Nothing interrupts, so the summary stays clear.
+    // No interrupt is enabled, so the summary stays clear.
     let options = Options {
         start: Start::Running,
         interrupts: Interrupts::NONE,
@@ -128,12 +128,12 @@ fn a_pulse_on_the_interrupt_line_makes_flags_count_at_once() {
     };
     let mut world = World::ready_with(options);
     assert_eq!(world.peek(0x08B2) & 1, 1);
-    // Within the period without a pulse, ...
+    // Without a pulse the flag is found within the period.
     world.board().device(3, [1, 0, 1, 0, 0, 1, 1, 3]);
     assert_eq!(world.peek(0x08A2), 0);
     let (_, events) = world.until(40, |event| matches!(event, Event::Device { .. }));
     assert_eq!(events.len(), 1);
-    // ... and at once with one.
+    // With a pulse it is found at once.
     world.run(1);
     world.board().flag(3);
     world.driver.interrupt(world.now_ms);
@@ -151,7 +151,7 @@ fn a_host_that_wants_to_keep_time_with_the_bus_can() {
     let mut world = World::ready_with(options);
     world.board().flag(4);
     assert_eq!(world.run(2), [Event::OutputsSent]);
-    // Not otherwise.
+    // Other flags are not reported.
     let mut world = World::ready(Configuration::DEFAULT);
     world.board().flag(4);
     assert_eq!(world.run(50), []);

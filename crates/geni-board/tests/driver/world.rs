@@ -30,7 +30,7 @@ impl World {
         }
     }
 
-    /// A running board with this configuration, attached to.
+    /// A running board with this configuration, with the driver attached.
     pub(crate) fn ready(configuration: Configuration) -> World {
         World::ready_with(Options { start: Start::Running, ..Options::new(configuration) })
     }
@@ -46,12 +46,12 @@ impl World {
         self.board.borrow_mut()
     }
 
-    /// A byte as it is.
+    /// A byte of the RAM, unchecked.
     pub(crate) fn peek(&self, offset: usize) -> u8 {
         self.board().ram[offset]
     }
 
-    /// One turn of both sides.
+    /// Lets `pace_ms` milliseconds pass on the board, then polls the driver once.
     pub(crate) fn step(&mut self) -> Option<Event> {
         for _ in 0..self.pace_ms {
             self.now_ms = self.now_ms.wrapping_add(1);
@@ -60,12 +60,12 @@ impl World {
         self.driver.poll(self.now_ms)
     }
 
-    /// All events of the next so many milliseconds.
+    /// All events of the next `ms` milliseconds.
     pub(crate) fn run(&mut self, ms: u32) -> Vec<Event> {
         (0..ms.div_ceil(self.pace_ms)).filter_map(|_| self.step()).collect()
     }
 
-    /// Runs until an event that fits; the time and everything before it.
+    /// Runs until an event fits; returns the time and all events before it.
     pub(crate) fn until(
         &mut self,
         within_ms: u32,

@@ -7,27 +7,27 @@ use crate::sizes::Sizes;
 
 const KIB: u32 = 1024;
 
-/// Code, constants and first values.
+/// Checks the flash: code, constants and first values.
 pub(super) fn flash(limits: &Limits, image: &Image) -> Outcome {
     against("flash", Sizes::of(image).flash, limits.flash_budget)
 }
 
-/// All that can be written, but for the stack.
+/// Checks the variables: all writable memory except the stack.
 pub(super) fn variables(limits: &Limits, image: &Image) -> Outcome {
     against("variables", Sizes::of(image).variables, limits.variables_budget)
 }
 
-/// A use against a limit.
+/// The outcome of a size against its limit.
 pub(super) fn against(what: &'static str, bytes: u32, limit: u32) -> Outcome {
     let result = format!("{} of {} KiB ({} %)", kib(bytes), kib(limit), percent(bytes, limit));
     let wrong = match bytes.checked_sub(limit) {
-        Some(over) if over > 0 => vec![format!("{over} bytes more than there are")],
+        Some(over) if over > 0 => vec![format!("{over} bytes too many")],
         _ => vec![],
     };
     Outcome::new(what, result, wrong)
 }
 
-/// With one decimal, rounded up: what is used is never shown as less.
+/// In KiB with one decimal, rounded up, so that a size is never shown too small.
 fn kib(bytes: u32) -> String {
     let tenths = (u64::from(bytes) * 10).div_ceil(KIB.into());
     format!("{}.{}", tenths / 10, tenths % 10)
@@ -53,6 +53,6 @@ mod tests {
     fn a_byte_over_the_limit_is_one_too_many() {
         let over = against("flash", 48 * KIB + 1, 48 * KIB);
         assert_eq!(over.result, "48.1 of 48.0 KiB (101 %)");
-        assert_eq!(over.wrong, ["1 bytes more than there are"]);
+        assert_eq!(over.wrong, ["1 bytes too many"]);
     }
 }

@@ -1,13 +1,13 @@
-//! What comes out of a check.
+//! The result of a check.
 
-/// What came out of one check of one image.
+/// The result of one check of one image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcome {
     /// What is checked.
     pub what: &'static str,
-    /// In a few words; empty when the board is not asked.
+    /// The result in a few words; empty when the check does not apply to the board.
     pub result: String,
-    /// What is wrong, a line each; none when the image keeps to it.
+    /// The faults, one line each; empty when the image complies.
     pub wrong: Vec<String>,
 }
 

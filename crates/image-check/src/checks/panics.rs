@@ -1,4 +1,4 @@
-//! No way to a panic.
+//! Checks that nothing can panic.
 
 use std::collections::BTreeSet;
 
@@ -8,19 +8,19 @@ use crate::image::Image;
 use crate::limits::Limits;
 use crate::names::is_panic;
 
-/// The functions that end the program on purpose. Calls of theirs count for nothing.
+/// The functions that end the program on purpose. Calls from them do not count.
 pub(crate) fn forced(limits: &Limits, image: &Image) -> BTreeSet<u32> {
     limits.forced.iter().filter_map(|(name, _)| image.function(name)).collect()
 }
 
-/// The linker drops what nobody refers to: a function of the panic machinery that is still there
-/// can be reached.
+/// The linker drops what is never referenced, so a function of the panic machinery that is still
+/// there can be reached.
 pub(super) fn none(limits: &Limits, image: &Image, calls: &Calls<'_>) -> Outcome {
     let forced = forced(limits, image);
     let missing = limits.forced.iter().filter(|(name, _)| image.function(name).is_none());
     let mut wrong: Vec<_> =
-        missing.map(|(name, _)| format!("{name} is to panic and is not there")).collect();
-    // What matters is who brings a panic in; among themselves, panics call each other.
+        missing.map(|(name, _)| format!("{name} is to panic but is not in the image")).collect();
+    // Only the first cause of a panic matters; panics also call each other.
     let is_harmless = |at| {
         let Some((begin, function)) = image.function_around(at) else { return false };
         forced.contains(&begin) || function.names.iter().any(|name| is_panic(name))
@@ -29,7 +29,7 @@ pub(super) fn none(limits: &Limits, image: &Image, calls: &Calls<'_>) -> Outcome
         let Some(name) = function.names.iter().find(|name| is_panic(name)) else { continue };
         let mut callers = calls.calls_of(address).peekable();
         if callers.peek().is_none() {
-            wrong.push(format!("{name} is there, and nothing calls it directly"));
+            wrong.push(format!("{name} is there, but nothing calls it directly"));
         }
         let callers = callers.filter(|call| !is_harmless(call.at));
         let places: Vec<_> =
@@ -40,7 +40,7 @@ pub(super) fn none(limits: &Limits, image: &Image, calls: &Calls<'_>) -> Outcome
     }
     let result = match (wrong.len(), forced.len()) {
         (0, 0) => "none".to_owned(),
-        (0, _) => "none but on purpose".to_owned(),
+        (0, _) => "only on purpose".to_owned(),
         (count, _) => format!("{count} of them"),
     };
     Outcome::new("ways to panic", result, wrong)
@@ -80,18 +80,18 @@ mod tests {
     #[test]
     fn a_panic_that_nothing_seems_to_call_is_one_all_the_same() {
         let outcome = outcome(&BOARD, &[("main", &[0x4770]), ("rust_begin_unwind", &[0xDE00])]);
-        assert_eq!(outcome.wrong, ["rust_begin_unwind is there, and nothing calls it directly"]);
+        assert_eq!(outcome.wrong, ["rust_begin_unwind is there, but nothing calls it directly"]);
     }
 
     #[test]
     fn a_function_may_panic_on_purpose_and_no_other_one() {
         let board = Limits { forced: &[("force", "a test")], ..BOARD };
         let forced = outcome(&board, &[("force", &CALL_NEXT), (FMT, &[0xDE00])]);
-        assert_eq!((&*forced.result, forced.wrong), ("none but on purpose", vec![]));
+        assert_eq!((&*forced.result, forced.wrong), ("only on purpose", vec![]));
         let both = [("main", &CALL_AFTER_NEXT[..]), ("force", &CALL_NEXT), (FMT, &[0xDE00])];
         let both = outcome(&board, &both);
         assert_eq!(both.wrong, ["core::panicking::panic_fmt is called by main+0x2 (0x102)"]);
         let gone = outcome(&board, &[("main", &[0x4770])]);
-        assert_eq!(gone.wrong, ["force is to panic and is not there"]);
+        assert_eq!(gone.wrong, ["force is to panic but is not in the image"]);
     }
 }

@@ -1,4 +1,4 @@
-//! Nothing that has to go on while the flash is being erased leads there.
+//! Checks that nothing which runs while the flash is being erased leads into flash.
 
 use std::collections::BTreeSet;
 
@@ -7,11 +7,10 @@ use crate::checks::outcome::Outcome;
 use crate::image::{Image, Piece};
 use crate::limits::Limits;
 
-/// Below, processors of this family have their flash, and other memory that holds no code; RAM
-/// begins here.
+/// The start of RAM. Below it processors of this family have flash, and other memory without code.
 const RAM_BEGINS: u32 = 0x2000_0000;
 
-/// Whatever the handlers, and the functions that the board names, can reach has to be in RAM: what
+/// Everything that the handlers and the functions named by the board can reach must be in RAM: what
 /// they call, and the constants that they read.
 pub(super) fn while_erasing(limits: &Limits, image: &Image, calls: &Calls<'_>) -> Outcome {
     const WHAT: &str = "while flash is erased";
@@ -55,8 +54,8 @@ pub(super) fn while_erasing(limits: &Limits, image: &Image, calls: &Calls<'_>) -
     Outcome::new(WHAT, result, wrong)
 }
 
-/// Whether the image has something in flash at this address. What else is in flash is not the
-/// program's: the configuration, which is read while nothing is erased.
+/// Whether the image has something in flash at this address. Other contents of the flash are not
+/// the program's: the configuration, which is read only while nothing is erased.
 fn in_flash(image: &Image, address: u32) -> bool {
     let holds = |piece: &Piece| !piece.bytes.is_empty() && piece.addresses().contains(&address);
     address < RAM_BEGINS && image.pieces.iter().any(holds)

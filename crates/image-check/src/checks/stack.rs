@@ -1,13 +1,13 @@
-//! The stack: how deep it can get, and what happens if it did get deeper.
+//! The stack: how deep it can get, and what happens if it gets deeper.
 //!
 //! # Design
 //! The worst case is the deepest path of the main program, interrupted there by every handler at
-//! its deepest, each with the registers that the processor saves for it. A handler that changes to
-//! a stack of its own counts there.
+//! its deepest, each with the registers that the processor saves for it. For a handler with its own
+//! stack, only the saved registers count.
 //!
 //! # Tradeoffs
-//! Priorities are not asked: handlers of the same one cannot interrupt each other, and their sum is
-//! then too much. With one handler to a priority, it is exact.
+//! Priorities are ignored: handlers of the same priority cannot interrupt each other, so the sum is
+//! too large for them. With one handler per priority it is exact.
 
 use crate::calls::{Calls, Deepest};
 use crate::checks::memory::against;
@@ -18,10 +18,10 @@ use crate::limits::Limits;
 /// Registers that the processor saves when it takes an exception (DDI 0403E, B1.5.6): r0–r3, r12,
 /// lr, pc, xPSR, …
 const SAVED_BYTES: u32 = 8 * 4;
-/// … with those of the floating-point unit, for which room is made whether or not they are saved
-/// later …
+/// The same with the registers of the floating-point unit. Room for these is made whether or not
+/// they are saved later.
 const SAVED_FLOATING_POINT_BYTES: u32 = 26 * 4;
-/// … at an address that is a multiple of eight.
+/// The saved registers begin at an address that is a multiple of eight.
 const ALIGNMENT_BYTES: u32 = 4;
 
 /// Places in the vector table, from reset on.
@@ -29,10 +29,10 @@ const RESET: usize = 0;
 const NON_MASKABLE: usize = 1;
 const HARD_FAULT: usize = 2;
 
-/// What one part of the program has of the stack at most.
+/// The most stack that one part of the program uses.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Share {
-    /// Its place in the vector table, from reset on.
+    /// Its index in the vector table, from reset on.
     vector: usize,
     /// Bytes that the processor saves before it begins, on the stack that it finds.
     pub(crate) saved: u32,
@@ -40,7 +40,7 @@ pub(crate) struct Share {
 }
 
 impl Share {
-    /// Bytes of the stack that it finds.
+    /// Bytes that it uses of the stack that it finds.
     pub(crate) fn bytes(&self) -> u32 {
         let own = if self.deepest.other_stack.is_none() { self.deepest.bytes } else { 0 };
         self.saved.saturating_add(own)
@@ -66,7 +66,7 @@ pub(crate) fn shares(image: &Image, calls: &Calls<'_>) -> Result<Vec<Share>, Vec
         }
         let saved = if vector == RESET { 0 } else { saved };
         match calls.deepest(function) {
-            // Who else may interrupt it there is known of this one only.
+            // Only for the hard fault handler is it known what may interrupt it on its own stack.
             Ok(Deepest { other_stack: Some(_), .. }) if vector != HARD_FAULT => {
                 unbounded.push(format!("{} changes the stack", image.name_of(function)));
             }
@@ -87,12 +87,12 @@ pub(crate) fn bound(image: &Image, calls: &Calls<'_>) -> Result<u32, Vec<String>
     Ok(together(&shares(image, calls)?))
 }
 
-/// What all have of the stack.
+/// The sum of all shares.
 pub(crate) fn together(shares: &[Share]) -> u32 {
     shares.iter().map(Share::bytes).fold(0, u32::saturating_add)
 }
 
-/// The worst case against what the memory map sets aside.
+/// Checks the worst case against the stack in the memory map.
 pub(super) fn depth(image: &Image, calls: &Calls<'_>) -> Outcome {
     const WHAT: &str = "stack at its deepest";
     let (Some(start), Some(end)) = (image.symbol("_stack_start"), image.symbol("_stack_end"))
@@ -105,8 +105,8 @@ pub(super) fn depth(image: &Image, calls: &Calls<'_>) -> Outcome {
     }
 }
 
-/// The stack that the hard fault handler changes to, if it does. Only the non-maskable interrupt
-/// can interrupt it there.
+/// Checks the hard fault handler's own stack, if it has one. Only the non-maskable interrupt can
+/// interrupt the handler there.
 pub(super) fn fault_handler(image: &Image, calls: &Calls<'_>) -> Outcome {
     const WHAT: &str = "hard fault's own stack";
     let shares = shares(image, calls).unwrap_or_default();
@@ -125,12 +125,12 @@ pub(super) fn fault_handler(image: &Image, calls: &Calls<'_>) -> Outcome {
     }
 }
 
-/// A stack that gets too deep has to run into a fault and not into variables.
+/// Checks that a stack which gets too deep runs into a fault and not into variables.
 pub(super) fn overflow(limits: &Limits, image: &Image) -> Outcome {
     let mut wrong = Vec::new();
     let (start, end) = (image.symbol("_stack_start"), image.symbol("_stack_end"));
     if end != Some(limits.stack_floor) {
-        wrong.push(format!("the stack ends at {}, and there is memory below", shown(end)));
+        wrong.push(format!("the stack ends at {}, but there is memory below it", shown(end)));
     }
     if image.vectors().map(|(stack, _)| stack) != start {
         wrong.push(format!(
@@ -204,7 +204,7 @@ mod tests {
         let functions: [(&str, &[u16]); 2] =
             [("Reset", &[0xB0BF, 0xB03F, BX_LR]), ("Tick", &[BX_LR])];
         let image = image(&functions, &["Reset", "Tick"]);
-        assert_eq!(depth_of(&image).wrong, ["32 bytes more than there are"]);
+        assert_eq!(depth_of(&image).wrong, ["32 bytes too many"]);
     }
 
     #[test]
@@ -215,7 +215,7 @@ mod tests {
             [("Reset", &[BX_LR]), ("NonMaskableInt", &[PUSH, POP]), ("HardFault", &hard_fault)];
         let image = image(&functions, &["Reset", "NonMaskableInt", "HardFault"]);
         let calls = Calls::of(&image, &BTreeSet::new());
-        // Two handlers' registers, and the 8 bytes of one of them.
+        // The registers saved for two handlers, and 8 bytes of one of them.
         assert_eq!(depth_of(&image).result, "0.1 of 0.3 KiB (32 %)");
         assert_eq!(
             fault_handler(&image, &calls).wrong,
@@ -223,7 +223,7 @@ mod tests {
         );
         let image = image.with_object(0x2000_0380, 0x80);
         let calls = Calls::of(&image, &BTreeSet::new());
-        // 8 of its own, 44 of the other one.
+        // 8 bytes of its own, 44 of the other handler.
         assert_eq!(fault_handler(&image, &calls).result, "0.1 of 0.2 KiB (41 %)");
     }
 
@@ -236,7 +236,7 @@ mod tests {
         assert_eq!(
             overflow(&BOARD, &moved).wrong,
             [
-                "the stack ends at 0x10000100, and there is memory below",
+                "the stack ends at 0x10000100, but there is memory below it",
                 "the vector table does not begin with the stack's start, 0x10000200"
             ]
         );

@@ -1,5 +1,5 @@
-//! What the two decoders may differ in, each with the reason. Sections are those of the manual of
-//! ARMv7-M (DDI 0403E).
+//! The permitted differences of the two decoders, each with its reason. Sections are those of the
+//! ARMv7-M manual (DDI 0403E).
 
 use yaxpeax_arm::armv7::Opcode;
 
@@ -7,10 +7,10 @@ use super::theirs::Theirs;
 use super::{Difference, PC, SP};
 use crate::thumb::is_wide;
 
-/// The encoding, what they say of it, in what ours is different, and whether that is accepted.
+/// Whether a reason applies, by the encoding, the other decoder's result and the differences.
 type Applies = fn([u16; 2], &Theirs, &[Difference]) -> bool;
 
-/// All of them.
+/// All reasons.
 pub(super) const REASONS: [(&str, Applies); 8] = [
     (
         "eight bits are no address: the walk may forget them, as it does any other value",
@@ -31,7 +31,7 @@ pub(super) const REASONS: [(&str, Applies); 8] = [
         |[first, _], theirs, _| {
             match theirs.opcode {
                 Opcode::RFE(..) | Opcode::SRS(..) | Opcode::BXJ | Opcode::ERET => true,
-                // With the address in a register, both have it.
+                // With the address in a register, both processors have it.
                 Opcode::BLX => is_wide(first),
                 _ => false,
             }
@@ -69,7 +69,7 @@ pub(super) const REASONS: [(&str, Applies); 8] = [
     ),
 ];
 
-/// Why a difference is none; nothing if it is one.
+/// The reason that permits the differences, if there is one.
 pub(super) fn reason(
     encoding: [u16; 2],
     theirs: &Theirs,

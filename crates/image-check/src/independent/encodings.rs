@@ -10,10 +10,10 @@ const AT: u32 = 0x1002;
 /// The first halfword of wide instructions is at least this.
 const WIDE: u16 = 0xE800;
 
-/// So many second halfwords for each first one.
+/// How many second halfwords are tried with each first one.
 const SECONDS: u16 = 256;
 
-/// So many differences are shown.
+/// How many differences are shown.
 const SHOWN: usize = 10;
 
 #[derive(Debug, Default)]
@@ -53,8 +53,8 @@ fn narrow() -> impl Iterator<Item = (u16, u16)> {
     (0..WIDE).map(|first| (first, 0))
 }
 
-/// Two odd numbers as steps lead to all second halfwords in the end, and to others for each first
-/// one.
+/// Two odd numbers as steps eventually reach all second halfwords, and different ones for each
+/// first halfword.
 fn wide() -> impl Iterator<Item = (u16, u16)> {
     let seconds = |first: u16| {
         (0..SECONDS)
@@ -67,7 +67,7 @@ fn wide() -> impl Iterator<Item = (u16, u16)> {
 fn all_instructions_of_16_bits_are_read_as_others_read_them() {
     let tally = Tally::of(narrow());
     tally.assert_no_difference();
-    // What is left over is UNDEFINED.
+    // The rest is UNDEFINED.
     assert!(tally.agreed > u32::from(WIDE) / 100 * 90, "{tally:?}");
 }
 
@@ -75,7 +75,7 @@ fn all_instructions_of_16_bits_are_read_as_others_read_them() {
 fn instructions_of_32_bits_are_read_as_others_read_them() {
     let tally = Tally::of(wide());
     tally.assert_no_difference();
-    // Much is UNDEFINED, and a third of it is for coprocessors that nobody knows.
+    // Many are UNDEFINED, and a third are for coprocessors that neither decoder knows.
     let all = tally.agreed + tally.unknown + tally.accepted.values().sum::<u32>();
     assert_eq!(all, u32::from(u16::MAX - WIDE + 1) * u32::from(SECONDS));
     assert!(tally.agreed > all / 2, "{tally:?}");

@@ -1,4 +1,4 @@
-//! Every instruction of the images. `cargo xtask test` builds them and says where they are.
+//! Every instruction of the images. `cargo xtask test` builds them and tells the tests their paths.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -8,7 +8,7 @@ use crate::calls::Calls;
 use crate::image::Image;
 use crate::thumb::{Flow, Instruction, Stack, decode, is_wide};
 
-/// An instruction where it stands.
+/// An instruction and its address.
 struct Placed {
     at: u32,
     first: u16,
@@ -21,8 +21,8 @@ impl Placed {
     }
 }
 
-/// All functions of an image, one instruction after the other, whether or not anything leads there.
-/// What the linker fills gaps with is none of it.
+/// All functions of an image, instruction by instruction, whether or not they can be reached. The
+/// linker's fillers are left out.
 fn sweep(image: &Image) -> Vec<Placed> {
     let halfword = |at| image.bytes(at).map(u16::from_le_bytes);
     let is_code = |at| image.is_code(at) && image.function_around(at).is_some();
@@ -43,7 +43,7 @@ fn sweep(image: &Image) -> Vec<Placed> {
     all
 }
 
-/// Holds our decoder against the other one, and the walk against where instructions begin.
+/// Compares our decoder with the other one, and the walk with the starts of instructions.
 fn hold(variable: &str) {
     let file = std::env::var_os(variable);
     let file = file.unwrap_or_else(|| panic!("{variable} is not set: run `cargo xtask test`"));
@@ -66,8 +66,8 @@ fn hold(variable: &str) {
     assert_walk_keeps_to(&image, &all);
 }
 
-/// Whether it is one that they do not know, for ARMv7-M has other special registers (B5.1.1), and
-/// that ours reads as the manual says: one register changes (A7.7.82).
+/// Whether the other decoder does not know this instruction because ARMv7-M has other special
+/// registers (B5.1.1). Ours must read it as the manual does: one register changes (A7.7.82).
 fn reads_special_register(placed: &Placed) -> bool {
     let ours = placed.ours();
     let plain = (ours.length, ours.flow, ours.stack, ours.constant)
@@ -76,7 +76,7 @@ fn reads_special_register(placed: &Placed) -> bool {
     placed.first == 0xF3EF && placed.second & 0xF000 == 0x8000 && plain && ours.changes == changes
 }
 
-/// The sweep has met what the walk lives on.
+/// Checks that the sweep has met every kind of instruction that the walk depends on.
 fn assert_is_a_program(all: &[Placed]) {
     let count =
         |is: fn(&Instruction) -> bool| all.iter().filter(|placed| is(&placed.ours())).count();
@@ -96,7 +96,7 @@ fn assert_is_a_program(all: &[Placed]) {
     }
 }
 
-/// Wherever the walk finds a call, and wherever anything leads, there begins an instruction.
+/// Checks that an instruction begins wherever the walk finds a call, and at every target.
 fn assert_walk_keeps_to(image: &Image, all: &[Placed]) {
     let begins: BTreeSet<u32> = all.iter().map(|placed| placed.at).collect();
     let calls = Calls::of(image, &BTreeSet::new());

@@ -1,15 +1,15 @@
 //! What `yaxpeax-arm` says of an instruction, in the terms of our own decoder.
 //!
-//! That decoder knows the `ARMv7` of application processors, of which ARMv7-M is a part. Where it
-//! says the same in other words, it is put into ours here:
+//! That decoder knows the `ARMv7` of application processors, of which ARMv7-M is a part. These
+//! differences in its description are translated here:
 //!
 //! * It counts the distance of 16-bit conditional branches from the next instruction and all others
 //!   from two instructions on; the manual counts all from there (A7.7.12, A7.7.21).
 //! * It says of loads and stores with an index that is added afterwards that they do not write the
 //!   base back. They always do (A7.7.43: `wback = (P == 0 || W == 1)`).
-//! * It does not know the floating-point unit, which is coprocessors 10 and 11 (A6.1.1). What an
-//!   instruction for a coprocessor does to the processor's registers does not depend on which one
-//!   it is, so it is asked about another one.
+//! * It does not know the floating-point unit, which is coprocessors 10 and 11 (A6.1.1). The effect
+//!   of a coprocessor instruction on the processor's registers does not depend on the coprocessor.
+//!   So it is asked about another one.
 
 use yaxpeax_arch::{Decoder, U8Reader};
 use yaxpeax_arm::armv7::{ConditionCode, InstDecoder, Instruction, Opcode, Operand, Reg};
@@ -20,24 +20,25 @@ const SP: u16 = 13;
 const LR: u16 = 14;
 const PC: u16 = 15;
 
-/// What both decoders can say of an instruction.
+/// What both decoders can tell of an instruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Theirs {
-    /// For people.
+    /// The instruction as text.
     pub(super) text: String,
     pub(super) opcode: Opcode,
     pub(super) length: u32,
     pub(super) flow: Flow,
     pub(super) stack: Stack,
     pub(super) constant: Option<(u16, Constant)>,
-    /// Registers that it gives a value, r0 in bit 0.
+    /// Registers that it writes, r0 in bit 0.
     pub(super) gives: u16,
-    /// The register with an address that it writes back.
+    /// The base register that it writes back.
     pub(super) moves: Option<u16>,
 }
 
 impl Theirs {
-    /// The instruction at an address. None when they know no such instruction.
+    /// Decodes the instruction at an address; `None` when the other decoder knows no such
+    /// instruction.
     pub(super) fn of(address: u32, first: u16, second: u16) -> Option<Theirs> {
         let second =
             if is_floating_point(first, second) { second & !0x0F00 | 0x0100 } else { second };
@@ -56,7 +57,7 @@ impl Theirs {
     }
 }
 
-/// Whether it is one for coprocessor 10 or 11.
+/// Whether the instruction is for coprocessor 10 or 11.
 fn is_floating_point(first: u16, second: u16) -> bool {
     first & 0xEC00 == 0xEC00 && second & 0x0E00 == 0x0A00
 }
@@ -73,7 +74,7 @@ fn register(operand: Operand) -> Option<u16> {
     }
 }
 
-/// Base that an instruction for memory writes back, and by how many bytes it moves.
+/// The base register that a load or store writes back, and by how many bytes it moves.
 fn moved_base(instruction: &Instruction) -> Option<(u16, i32)> {
     let signed = |bytes: u16, up| if up { i32::from(bytes) } else { -i32::from(bytes) };
     let all = || instruction.operands.into_iter();
@@ -96,7 +97,7 @@ fn moved_base(instruction: &Instruction) -> Option<(u16, i32)> {
     })
 }
 
-/// Bytes of so many registers.
+/// Bytes of the registers in a list.
 fn words(list: u16) -> u16 {
     (0..16).filter(|register| list >> register & 1 == 1).map(|_| 4).sum()
 }
@@ -116,7 +117,7 @@ fn destinations(opcode: Opcode) -> usize {
         | Opcode::MCRR(..) => 0,
         Opcode::CMP | Opcode::CMN | Opcode::TST | Opcode::TEQ => 0,
         Opcode::BX | Opcode::BXJ | Opcode::BLX | Opcode::CBZ | Opcode::CBNZ => 0,
-        // What would be loaded into the program counter is a hint to the memory.
+        // A load into the program counter is a hint to the memory here.
         Opcode::NOP | Opcode::PLD | Opcode::PLI => 0,
         Opcode::LDRD
         | Opcode::LDREXD
@@ -209,7 +210,7 @@ fn flow(address: u32, instruction: &Instruction) -> Flow {
     }
 }
 
-/// Whether some operand is memory at this base.
+/// Whether an operand is memory at this base.
 fn has_base(operands: &[Operand; 4], wanted: u16) -> bool {
     operands.iter().any(|operand| match operand {
         Operand::RegDerefPreindexReg(base, ..)
@@ -221,7 +222,7 @@ fn has_base(operands: &[Operand; 4], wanted: u16) -> bool {
     })
 }
 
-/// Whether it goes where only the processor's state tells.
+/// Whether its target depends on the processor's state.
 fn is_elsewhere(opcode: Opcode) -> bool {
     matches!(
         opcode,
@@ -229,7 +230,7 @@ fn is_elsewhere(opcode: Opcode) -> bool {
     )
 }
 
-/// Where an instruction goes that writes the program counter.
+/// The flow of an instruction that writes the program counter.
 fn loaded(address: u32, instruction: &Instruction) -> Flow {
     let from_stack = match instruction.opcode {
         Opcode::POP => true,
@@ -244,7 +245,7 @@ fn loaded(address: u32, instruction: &Instruction) -> Flow {
     }
 }
 
-/// The address of the word that an instruction loads from beside the code.
+/// The address of the word beside the code that an instruction loads.
 fn literal(address: u32, instruction: &Instruction) -> Option<u32> {
     match (instruction.opcode, instruction.operands) {
         (Opcode::LDR, [_, Operand::RegDerefPreindexOffset(base, bytes, up, false), ..])

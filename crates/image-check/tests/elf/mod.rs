@@ -1,4 +1,4 @@
-//! A small image as the linker would leave it, in bytes.
+//! The bytes of a small image, as the linker would leave it.
 
 /// Where its functions are.
 const CODE: u32 = 0x100;
@@ -12,7 +12,7 @@ struct Section {
     flags: u32,
     address: u32,
     bytes: Vec<u8>,
-    /// Of the table of symbols only.
+    /// Only the table of symbols has this.
     link: u32,
     entry: u32,
 }
@@ -25,11 +25,11 @@ const WRITE: u32 = 1;
 const ALLOCATE: u32 = 2;
 const FUNCTION: u8 = 2;
 
-/// Text sections are numbered from one; this is that with the code.
+/// Sections are numbered from one; this is the one with the code.
 const IN_CODE: u16 = 2;
 const ABSOLUTE: u16 = 0xFFF1;
 
-/// Reset calls a function that pushes two registers, which branches by a table; and one that ends
+/// Reset calls a function that pushes two registers and branches by a table. Another function ends
 /// the program on purpose.
 fn code() -> Vec<u8> {
     let halfwords: [u16; 16] = [
@@ -65,7 +65,7 @@ fn length(bytes: &[u8]) -> u32 {
 /// Name, value, size, kind, section.
 type Symbol = (&'static str, u32, u32, u8, u16);
 
-/// Symbols and the strings that they are named by.
+/// The symbols and the strings with their names.
 fn symbols(names: &[Symbol]) -> (Vec<u8>, Vec<u8>) {
     let (mut symbols, mut strings) = (vec![0; 16], vec![0]);
     for &(name, value, size, kind, section) in names {
@@ -103,7 +103,7 @@ pub(crate) fn image() -> Vec<u8> {
     file(sections(code(), &NAMES))
 }
 
-/// An image with so many functions, each of which calls the next one and then returns.
+/// An image with `count` functions, each of which calls the next one and then returns.
 pub(crate) fn image_of_calls(count: u32) -> Vec<u8> {
     // push; bl to what comes after pop; pop
     let one: [u16; 4] = [0xB510, 0xF000, 0xF801, 0xBD10];

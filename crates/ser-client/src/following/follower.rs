@@ -1,10 +1,10 @@
 //! Following a log: reading after reading, each from where the last one ended.
 //!
-//! An auto report is a reason to read, and no more. It names its events by their place in the ring
-//! and the total, and both begin anew after an erase. So nothing in a report shows whether it goes
-//! on with the log that was read last. Earlier reports might have shown it, but they may be lost,
-//! or were never sent. A reading begins with the last event that was delivered. If no more than
-//! nine have happened since, it is one request.
+//! An auto report causes a reading, and nothing else. It names its events by their place in the
+//! ring and by the total, and both begin anew after an erase. A report thus does not show whether
+//! it belongs to the log that was read last. Earlier reports might have shown it, but they may be
+//! lost or were never sent. A reading begins with the last event that was delivered. It takes one
+//! request if no more than nine events have happened since.
 
 use crate::reading::cursor::Cursor;
 use crate::reading::delivery::Delivery;
@@ -18,16 +18,16 @@ use crate::unit::request_error::RequestError;
 /// How often a reading begins anew because the log was changed under it.
 const MAX_RESYNCS: u32 = 4;
 
-/// What a reply has brought.
+/// The content of one reply, as a reading hands it out.
 #[derive(Clone, Copy, Debug)]
 pub struct Step<'a> {
     /// Events and losses, in order.
     pub deliveries: &'a [Delivery],
-    /// Where the next reading has to begin once these are delivered.
+    /// Where the next reading must begin after these are delivered.
     pub cursor: Option<Cursor>,
     /// How many more events the log is known to hold.
     pub pending: u32,
-    /// How many entries the log holds, as far as is known by now.
+    /// How many entries the log holds, as far as is known.
     pub size: u16,
 }
 
@@ -41,7 +41,7 @@ pub struct LogFollower {
 }
 
 impl LogFollower {
-    /// Begins behind `cursor`, or with the oldest event. `size` is how many entries the log holds.
+    /// Begins after `cursor`, or with the oldest event. `size` is how many entries the log holds.
     #[must_use]
     pub fn new(cursor: Option<Cursor>, size: u16) -> LogFollower {
         LogFollower { size, cursor, position: None, keeps_up: false }
@@ -59,16 +59,16 @@ impl LogFollower {
         self.cursor
     }
 
-    /// The same, when the log was last seen at `position`: if nothing has happened since, the next
-    /// reading is shorter.
+    /// The same follower, with the position at which the log was last seen. If nothing has happened
+    /// since, the next reading is shorter.
     #[must_use]
     pub fn starting_near(mut self, position: Option<LogPosition>) -> LogFollower {
         self.position = position;
         self
     }
 
-    /// Whether a reading goes on for as long as there is enough for a full reply, instead of ending
-    /// when it has come past what had happened when it began.
+    /// Whether a reading continues as long as a full reply is available. Otherwise it ends when it
+    /// has passed what had happened when it began.
     pub fn set_keeps_up(&mut self, keeps_up: bool) {
         self.keeps_up = keeps_up;
     }
@@ -79,14 +79,14 @@ impl LogFollower {
         self.position
     }
 
-    /// Reads what is new and hands it to `take`, reply by reply; each event comes once and in
-    /// order, and what was lost is told. Auto reports that came before the first reply are
-    /// forgotten: the reading brings what they have to tell. When `take` fails, the reading ends
-    /// with its error, and the next one begins before what it was given.
+    /// Reads what is new and hands it to `take`, reply by reply. Each event comes once and in
+    /// order, and losses are reported. Auto reports from before the first reply are forgotten,
+    /// because the reading delivers their events. When `take` fails, the reading ends with its
+    /// error, and the next reading delivers the same again.
     ///
     /// # Errors
-    /// Those of `take`; no reply, a line that fails, or a log that is changed again and again while
-    /// it is read.
+    /// Those of `take`. Also if no reply comes, the line fails, or the log is changed again and
+    /// again while it is read.
     pub fn read_new<E: From<RequestError>>(
         &mut self,
         unit: &mut Unit,
@@ -101,13 +101,13 @@ impl LogFollower {
             unrecorded = unrecorded.saturating_add(summary.unrecorded);
             restarted |= summary.restarted;
             if self.keeps_up && summary.delivered > 0 {
-                // It may last for days.
+                // The reading may last for days.
                 resyncs = 0;
             }
             match end {
                 Ok(()) => return Ok(Summary { delivered, lost, unrecorded, restarted, ..summary }),
-                // Somebody erased or resized the log: what is still there is sorted out from the
-                // cursor.
+                // Another host erased or resized the log. The next reading finds out what is left,
+                // from the cursor.
                 Err(Disturbed::Changed | Disturbed::WrongSize) if resyncs < MAX_RESYNCS => {
                     resyncs += 1;
                     self.learn_size(unit)?;
@@ -133,14 +133,14 @@ impl LogFollower {
         while reader.is_waiting() {
             let reply = unit.next_reply()?;
             if first {
-                // What they tell is in the log that is read now, or was erased since.
+                // Their events are in the log that is being read, or were erased since.
                 unit.forget_earlier_reports();
                 first = false;
             }
             deliveries.clear();
             let taken = reader.take(&reply, &mut |delivery| deliveries.push(delivery));
             let (cursor, pending) = (reader.cursor(), reader.pending());
-            // Before anything is done with this: the line shall not have to wait for it.
+            // The next request is sent first, so that the line does not wait for `take`.
             let asked = if taken.is_ok() { unit.ask(&mut || reader.request()) } else { Ok(()) };
             take(&Step { deliveries: &deliveries, cursor, pending, size: self.size })?;
             self.cursor = cursor;
@@ -154,8 +154,7 @@ impl LogFollower {
         Ok((summary, Ok(())))
     }
 
-    /// Asks for the size again; original recorders do not tell, then it stays what it was said to
-    /// be.
+    /// Asks for the size again. Original recorders do not tell it; the given size then stays.
     fn learn_size(&mut self, unit: &mut Unit) -> Result<(), RequestError> {
         match unit.configuration() {
             Ok(configuration) => self.size = configuration.size,

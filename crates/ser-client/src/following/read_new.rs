@@ -8,12 +8,12 @@ use crate::unit::Unit;
 use crate::unit::request_error::RequestError;
 
 impl Unit {
-    /// Reads what has happened since `cursor` (everything, if there is none) from a log of `size`
-    /// entries, each event once and in order, and says what was lost; see
+    /// Reads what has happened since `cursor` from a log of `size` entries, or everything if there
+    /// is no cursor. Each event is delivered once and in order, and losses are reported; see
     /// [`reader`](crate::reader).
     ///
     /// `cursor` moves on with every reply, never past what was handed to `on`. After an error the
-    /// next call goes on where this one stopped.
+    /// next call continues where this one stopped.
     ///
     /// # Errors
     /// If no reply comes, the line fails, or the log is changed again and again while it is read.

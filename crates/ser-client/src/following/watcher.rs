@@ -1,11 +1,10 @@
 //! Following a log without end: when to read it, and whether the recorder is to report by itself.
 //!
-//! A report is the quickest way to hear of an event. But it takes the line: the same entries go
-//! over it twice, once in the report and once in the reading that it causes. If events come faster
-//! than the line carries them twice, the recorder is told not to report, and is read as fast as it
-//! goes. When it has been quiet for a while, it may report again. Each change of this setting is
-//! stored in the recorder. So a recorder that is busy again and again stays without reports for
-//! longer each time.
+//! A report is the quickest way to hear of an event. But it makes the same entries go over the line
+//! twice: once in the report and once in the reading that it causes. If events come faster than the
+//! line carries them twice, the recorder is told not to report and is read as fast as it goes.
+//! After a quiet time it may report again. Each change of this setting is stored in the recorder.
+//! So a recorder that is busy again and again stays without reports for longer each time.
 
 use std::time::Duration;
 
@@ -19,44 +18,43 @@ use crate::transport::line_rate::LineRate;
 use crate::unit::Unit;
 use crate::unit::request_error::RequestError;
 
-/// Readings that follow each other without a pause for so long are more than the line carries
-/// beside the reports.
+/// If readings follow each other without a pause for this long, the line cannot carry the reports
+/// as well.
 const BUSY_FOR: Duration = Duration::from_secs(3);
 
-/// A pause between two readings that is one.
+/// The shortest time between two readings that counts as a pause.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// A ring that is full of unread events to this part is in danger.
+/// A ring is in danger when more than this fraction of it is unread: one in so many entries.
 const DANGER: u32 = 4;
 
-/// Fewer unread events than this are a burst and no danger, except in a small ring.
+/// Fewer unread events than this are a burst and not a danger, except in a small ring.
 const BURST: u32 = 20;
 
-/// How often a busy recorder is read: a reply then holds many events, and none is old.
+/// How often a busy recorder is read. A reply then holds many events, and none is old.
 const BUSY_POLL: Duration = Duration::from_millis(200);
 
-/// Events in one reading that are as many as a reply holds: there may be more.
+/// As many events as a full reply holds: there may be more.
 const FULL_REPLY: u32 = 10;
 
-/// Events in one reading of a busy recorder that is busy no more.
+/// A busy recorder with fewer events than this in a reading counts as quiet.
 const QUIET: u32 = 3;
 
-/// How long a recorder has to be quiet before it reports again: the first time, and at most.
+/// How long a recorder must be quiet before it reports again: the first time, and at most.
 const CALM: [Duration; 2] = [Duration::from_secs(30), Duration::from_secs(3600)];
 
-/// Bytes that an event takes on the line at the least: 12 bytes in hexadecimal digits.
+/// Fewest bytes that an event takes on the line: 12 bytes in hexadecimal digits.
 const EVENT_LEN: usize = 24;
 
-/// The rate of a line that is not known, as behind a terminal server: the highest that recorders
-/// have.
+/// Stands for the unknown rate of a line, as with a terminal server: the highest rate of recorders.
 const HIGHEST_RATE: LineRate = LineRate::BitsPerSecond(19_200);
 
 /// How to make a recorder report to this host, and how to make it stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReportSwitch {
-    /// With auto report.
+    /// The setting with auto report.
     pub on: Configure,
-    /// Without.
+    /// The setting without.
     pub off: Configure,
     /// Whether it reports now.
     pub is_on: bool,
@@ -67,7 +65,7 @@ pub struct ReportSwitch {
 pub struct LogWatcher {
     follower: LogFollower,
     interval: Duration,
-    /// Whether the log may be read more often than that.
+    /// Whether the log may be read more often than every `interval`.
     may_shorten: bool,
     switch: Option<ReportSwitch>,
     has_switched: bool,
@@ -78,17 +76,17 @@ pub struct LogWatcher {
     read_until: Duration,
     /// Since when there has been no pause between readings.
     busy_since: Option<Duration>,
-    /// Whether so much is unread that events may be lost.
+    /// Whether so much is unread that events may soon be lost.
     endangered: bool,
-    /// Since when few events have come.
+    /// Since when the recorder has been quiet.
     quiet_since: Duration,
-    /// How long that has to be.
+    /// How long it must be quiet before it reports again.
     calm: Duration,
 }
 
 impl LogWatcher {
-    /// Reads a log every `interval`, from where `follower` stands, or more often where
-    /// `may_shorten` allows it and the ring would overflow in that time.
+    /// Reads a log every `interval`, from where `follower` stands. With `may_shorten` it reads more
+    /// often if the ring could overflow in that time.
     #[must_use]
     pub fn polling(follower: LogFollower, interval: Duration, may_shorten: bool) -> LogWatcher {
         LogWatcher {
@@ -117,8 +115,7 @@ impl LogWatcher {
         LogWatcher { switch: Some(switch), ..LogWatcher::polling(follower, interval, true) }
     }
 
-    /// Whether the recorder was told to report or not to, so that its setting may have to be put
-    /// back.
+    /// Whether the recorder's report setting was changed and may have to be restored.
     #[must_use]
     pub fn has_switched(&self) -> bool {
         self.has_switched
@@ -130,15 +127,14 @@ impl LogWatcher {
         self.follower.cursor()
     }
 
-    /// Has the log read in the next step, as after a failure.
+    /// Makes the next step read the log, for example after a failure.
     pub fn read_next(&mut self) {
         self.due = Duration::ZERO;
     }
 
-    /// Does what is due: reads, or tells the recorder to report or not to; otherwise waits for
-    /// that, or for a report, for `patience` at the longest. What a reading brings goes to `take`,
-    /// as with [`LogFollower::read_new`]; in a reading that events come too fast for that may go on
-    /// for ever.
+    /// Does what is due: reads, or switches the recorder's reports. Otherwise it waits for that or
+    /// for a report, at most for `patience`. What a reading brings goes to `take`, as with
+    /// [`LogFollower::read_new`]. If events come too fast, a reading may go on for ever.
     ///
     /// # Errors
     /// As for [`LogFollower::read_new`], and if the recorder refuses the setting.
@@ -156,10 +152,10 @@ impl LogWatcher {
             return self.read(unit, take);
         }
         match unit.wait_event(patience.min(self.due - now))? {
-            // Only a reading shows whether it is still the same log, and one takes the place of all
+            // Only a reading shows whether it is still the same log, and one reading covers all
             // reports.
             Some(Unsolicited::Report(_)) => self.due = unit.now(),
-            // What the recorder prints says nothing that the log does not.
+            // A printed line tells nothing that the log does not.
             Some(Unsolicited::Line(_)) | None => {}
         }
         Ok(())
@@ -169,7 +165,7 @@ impl LogWatcher {
         self.switch.is_some_and(|switch| switch.is_on)
     }
 
-    /// Whether it is time to tell the recorder to report, or not to.
+    /// The setting that is due for the recorder's reports, if any.
     fn switch_due(&self, now: Duration) -> Option<bool> {
         let ReportSwitch { is_on, .. } = self.switch.filter(|_| self.has_read)?;
         let is_busy =
@@ -183,7 +179,7 @@ impl LogWatcher {
 
     fn report(&mut self, unit: &mut Unit, on: bool) -> Result<(), RequestError> {
         let Some(switch) = &mut self.switch else { return Ok(()) };
-        // The recorder may have carried out what it did not answer.
+        // The recorder may have carried out the command even if it did not answer.
         self.has_switched = true;
         unit.configure(if on { switch.on } else { switch.off })?;
         switch.is_on = on;
@@ -213,7 +209,7 @@ impl LogWatcher {
         })?;
         let now = unit.now();
         let in_danger = unread > BURST.min(self.size() / 2) && unread > self.size() / DANGER;
-        // What was there before is no sign of anything.
+        // What the first reading found says nothing about the present pace.
         self.endangered = self.has_read && (in_danger || summary.lost > 0);
         self.has_read = true;
         self.read_until = now;

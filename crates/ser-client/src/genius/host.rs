@@ -1,7 +1,7 @@
-//! The host's side of a GENI board: who is on the bus, what they say, and what is said to them.
+//! The host's side of a GENI board: the devices on the bus, and the messages from and to them.
 //!
 //! [`GeniHost`] is a handle that can be cloned. Behind it, `Host` owns the driver of the board. The
-//! driver never waits, so `Host` looks at the board until what it waits for has happened, and sorts
+//! driver never waits, so `Host` polls the board until what it waits for has happened. It sorts
 //! what arrives meanwhile: messages into the inbox of their sender, log-ins into the list of
 //! devices.
 
@@ -29,44 +29,45 @@ use crate::transport::endpoint::GeniWindow;
 use crate::transport::genius_error::GeniusError;
 use crate::transport::open_error::OpenError;
 
-/// Nothing tells when a file has changed, so it is looked at this often.
+/// How often the window is checked, because nothing signals a change of a file.
 pub(super) const PACE: Duration = Duration::from_millis(1);
 
-/// What happens in one look is dealt with, up to so many events; more wait for the next.
+/// The most events that are handled in one look at the board; the others wait for the next look.
 const EVENTS_PER_LOOK: usize = 16;
 
-/// A set-clock datagram takes about so long: the host's board takes it over and sends it. The
-/// recorder's board raises its flag as soon as it is there. Measured with the models of both.
+/// How long a set-clock datagram itself takes: the host's board takes it over and sends it, and the
+/// recorder's board raises its flag at once. Measured with the models of both boards.
 const HANDOVER: Duration = Duration::from_millis(2);
 
-/// A board has its heartbeat five times a second. One that runs in the time of a busy computer gets
-/// longer.
+/// A board's heartbeat comes five times a second. A board that runs in the time of a busy computer
+/// is given longer.
 const HEARTBEAT_PATIENCE: Duration = Duration::from_secs(3);
 
-/// From the heartbeat to the bus, at least: the board starts up, or has just been configured.
+/// The least time from the heartbeat to the bus: the board starts up, or has just been configured.
 const BUS_PATIENCE: Duration = Duration::from_secs(5);
 
-/// A device that is on the bus is logged in within a few scans, which are not longer than 400 ms.
+/// A device on the bus is logged in within a few scans, of at most 400 ms each.
 const LOG_IN_PATIENCE: Duration = Duration::from_secs(2);
 
-/// When nobody has logged in or out for so many scans, everybody who is there is known.
+/// All devices are known when none has logged in or out for this many scans.
 const QUIET_SCANS: u32 = 10;
 
-/// The driver ends every datagram before that, unless it has to be more patient itself.
+/// The driver ends every datagram before that, unless its own patience is longer.
 const DATAGRAM_PATIENCE: Duration = Duration::from_secs(20);
 
 /// A device that is logged in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BusDevice {
-    /// Its number.
+    /// Its bus address.
     pub number: u8,
-    /// What the board knows of it.
+    /// The board's device table entry for it.
     pub device: Device,
     /// Its inputs or global data.
     pub inputs: Vec<u8>,
 }
 
-/// A host on a Genius bus. Clones are the same host; each can be in another [`Unit`](crate::Unit).
+/// A host on a Genius bus. Clones are the same host, and each can serve another
+/// [`Unit`](crate::Unit).
 #[derive(Clone)]
 pub struct GeniHost {
     shared: Arc<Mutex<Host>>,
@@ -74,17 +75,17 @@ pub struct GeniHost {
 }
 
 impl GeniHost {
-    /// Opens a window, and waits until the board in it is on the bus. `patience` is how long the
-    /// board may stand still; it gets at least three seconds. What recorders have sent while nobody
-    /// had the window open is thrown away.
+    /// Opens a window and waits until the board in it is on the bus. `patience` is how long the
+    /// board may stall, at least three seconds. Messages that recorders sent before the window was
+    /// opened are discarded.
     ///
     /// # Errors
-    /// When there is no such window, or the board does not come onto the bus.
+    /// When there is no such window, or when the board does not join the bus.
     pub fn open(window: impl Into<GeniWindow>, patience: Duration) -> Result<GeniHost, OpenError> {
         GeniHost::open_in(Arc::new(RealTime::new()), window, patience)
     }
 
-    /// The same until `stop` is set, if that comes first.
+    /// The same, but gives up when `stop` is set.
     ///
     /// # Errors
     /// As [`open`](Self::open), and [`GeniusError::Interrupted`].
@@ -96,7 +97,7 @@ impl GeniHost {
         GeniHost::open_in_unless(Arc::new(RealTime::new()), window, patience, stop)
     }
 
-    /// The same for a host in whose time board and bus live.
+    /// The same for a host that shares the clock of a simulated board and bus.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -108,7 +109,8 @@ impl GeniHost {
         GeniHost::open_in_unless(clock, window, patience, &Arc::default())
     }
 
-    /// The same for a host in whose time board and bus live.
+    /// The same, until `stop` is set, for a host that shares the clock of a simulated board and
+    /// bus.
     ///
     /// # Errors
     /// As [`open_unless`](Self::open_unless).
@@ -121,7 +123,7 @@ impl GeniHost {
         GeniHost::open_and(clock, window.into(), patience, stop, |_| Ok(()))
     }
 
-    /// The same, with something more to wait for.
+    /// The same, but also waits until the device `node` is logged in.
     pub(crate) fn open_with_node(
         window: GeniWindow,
         patience: Duration,
@@ -148,13 +150,13 @@ impl GeniHost {
         Ok(GeniHost { shared: Arc::new(Mutex::new(host)), clock })
     }
 
-    /// The host's own number.
+    /// The host's own bus address.
     #[must_use]
     pub fn number(&self) -> u8 {
         self.lock().number()
     }
 
-    /// Who the host's board is.
+    /// The revision and settings of the host's board.
     #[must_use]
     pub fn identity(&self) -> Option<Identity> {
         self.lock().identity
@@ -166,23 +168,21 @@ impl GeniHost {
         self.lock().scan_time()
     }
 
-    /// How board and bus are, by the board's own word; `None` before it has said anything.
+    /// The state of board and bus as the board reports it; `None` before its first report.
     #[must_use]
     pub fn status(&self) -> Option<Status> {
         self.lock().driver.status()
     }
 
-    /// Waits until a device is logged in, as long as that takes for one that is there.
-    ///
+    /// Waits until a device is logged in, as long as that takes for a device that is there.
     /// # Errors
-    /// When it is not there, or the board fails.
+    /// When the device is not there, or the board fails.
     pub fn find(&self, node: u8) -> Result<Device, GeniusError> {
         self.lock().find(node)
     }
 
-    /// All devices that are logged in, and what their inputs are in one and the same bus scan.
-    /// While devices come and go, as when the bus has just been started, this waits until that is
-    /// over, two seconds at most.
+    /// All devices that are logged in, with their inputs from the same bus scan. While devices come
+    /// and go, for example after a start of the bus, this waits for at most two seconds.
     ///
     /// # Errors
     /// When the board fails.
@@ -190,11 +190,11 @@ impl GeniHost {
         self.lock().devices()
     }
 
-    /// Says a command to all recorders. It is carried out and not answered; each of them remembers
-    /// its last broadcast.
+    /// Sends a command to all recorders. They carry it out, do not answer it, and remember it as
+    /// the last broadcast.
     ///
     /// # Errors
-    /// When it does not get out.
+    /// When the board cannot send it.
     pub fn broadcast(&self, command: &Command) -> Result<(), GeniusError> {
         self.lock().deliver(ser_message(Destination::Broadcast, command)?).map_err(|error| {
             match error {
@@ -212,16 +212,16 @@ impl GeniHost {
         self.lock().read_forces(node, table)
     }
 
-    /// How long a short datagram that is sent now takes to arrive, on the average. The host's next
-    /// turn is half a scan away. A busy bus takes longer, as all devices together send one datagram
+    /// How long a short datagram that is sent now takes to arrive, on average. The host's next turn
+    /// is half a scan away. A busy bus takes longer, because all devices together send one datagram
     /// per scan.
     #[must_use]
     pub fn delay(&self) -> Duration {
         PACE + self.scan_time().unwrap_or_default() / 2 + HANDOVER
     }
 
-    /// Datagrams that were no message of a recorder to this host, and messages that nobody took in
-    /// time. Among the latter are those that were there before this host.
+    /// Datagrams that were not a recorder's message to this host, and messages that were dropped
+    /// because nobody took them. The latter include those from before this host.
     #[must_use]
     pub fn lost(&self) -> (u64, u64) {
         self.lock().inboxes.lost()
@@ -239,15 +239,15 @@ impl GeniHost {
         matches!(self.lock().sent, Some(Err(_)))
     }
 
-    /// What a recorder has sent before now. The board holds some of it back until it is asked, so a
-    /// look will not do.
+    /// The messages that a recorder has sent before now. The board keeps datagrams until they are
+    /// read, so one look at it is not enough.
     pub(crate) fn take_waiting(&self, node: u8) -> Result<Vec<ReceivedDatagram>, GeniusError> {
         let mut host = self.lock();
         host.empty_receive_queue()?;
         Ok(std::iter::from_fn(|| host.inboxes.take(node)).collect())
     }
 
-    /// Waits for messages of a recorder.
+    /// Waits for messages from a recorder.
     pub(crate) fn receive(
         &self,
         node: u8,
@@ -262,7 +262,7 @@ impl GeniHost {
             if !received.is_empty() || self.clock.now() >= until {
                 return Ok(received);
             }
-            // Without the lock, so that other recorders can be asked meanwhile.
+            // The lock is not held here, so other recorders can be asked meanwhile.
             self.clock.wait(PACE);
         }
     }
@@ -283,9 +283,9 @@ impl fmt::Debug for GeniHost {
     }
 }
 
-/// A message in a datagram whose acknowledgement is waited for. The reply comes as a datagram of
-/// its own: a board that is told to wait for it does nothing else meanwhile, and would take an auto
-/// report for it.
+/// A message in a datagram with acknowledgement. The reply comes as a datagram of its own. A board
+/// that is told to wait for a reply does nothing else meanwhile, and would take an auto report for
+/// the reply.
 pub(super) fn ser_message(
     destination: Destination,
     command: &Command,
@@ -297,12 +297,12 @@ pub(super) fn ser_message(
         subfunction: SUBFUNCTION_SER,
         priority: TransmitPriority::Normal,
         completion: Completion::Acknowledged,
-        // No command is as long as that.
+        // No command is longer than a datagram's data.
         data: data.map_err(|_| GeniusError::BoardBusy)?,
     })
 }
 
-/// A datagram that has arrived, as the protocol knows it.
+/// A received datagram in the protocol's form.
 fn bus_datagram(received: &ReceivedDatagram, own_number: u8) -> Option<Datagram> {
     let source = ser_proto::genius::BusAddress::new(received.source)?;
     let own_number = ser_proto::genius::BusAddress::new(own_number)?;
@@ -320,12 +320,12 @@ const fn bit(number: u8) -> u32 {
     1 << (number & MAX_DEVICE_NUMBER)
 }
 
-/// The board, and what it has said.
+/// The board, and what has come from it.
 pub(super) struct Host {
     driver: Driver<Window>,
     clock: Arc<dyn Clock>,
     patience: Duration,
-    /// Set when nobody wants to wait any longer; looked at while the window is opened.
+    /// Set when the caller no longer wants to wait; checked while the window is opened.
     stop: Option<Arc<AtomicBool>>,
     identity: Option<Identity>,
     failure: Option<Failure>,
@@ -334,7 +334,7 @@ pub(super) struct Host {
     sent: Option<Result<(), geni_board::CommandError>>,
     replied: Option<Result<ReceivedDatagram, geni_board::CommandError>>,
     tables: Option<Vec<BusDevice>>,
-    /// Who is logged in by the driver's word, a bit for each.
+    /// The devices that the driver reports as logged in, one bit for each.
     known: u32,
     /// When that changed last.
     devices_changed: Duration,
@@ -342,10 +342,11 @@ pub(super) struct Host {
 
 impl Host {
     fn new(ram: Window, clock: Arc<dyn Clock>, patience: Duration) -> Host {
-        // A board that is starting up has anything in its tables; this flag has no such value then.
+        // The tables of a board that is starting up may hold anything, but then this flag has
+        // another value.
         let is_set_up = ram.read(map::STATUS_OK) <= 1;
-        // The board serves other programs as well, one after the other: it stays as it is
-        // configured.
+        // The board also serves other programs, one after the other, so its configuration stays
+        // unchanged.
         let configuration = Configuration::new(
             ram.read_word(map::SETUP_REFERENCE),
             ram.read(map::SETUP_BROADCAST_LEN),
@@ -397,8 +398,8 @@ impl Host {
         }
     }
 
-    /// The same for the first time. Auto reports may have come while no program ran, and the
-    /// recorder's log may have become another one since: they are neither news nor answers.
+    /// Starts the board for the first time. Auto reports may have come while no program ran, and
+    /// the recorder's log may have been erased since, so they are neither news nor answers.
     fn begin(&mut self) -> Result<(), GeniusError> {
         self.start()?;
         self.empty_receive_queue()?;
@@ -416,8 +417,8 @@ impl Host {
         }
     }
 
-    /// The driver takes the patience once for the datagram before, once for this one, and knows
-    /// within it.
+    /// The driver may need its patience once for the datagram before and once for this one, and
+    /// ends both within that time.
     fn datagram_patience(&self) -> Duration {
         DATAGRAM_PATIENCE.max(self.patience.saturating_mul(2))
     }
@@ -445,7 +446,7 @@ impl Host {
             self.driver.request_tables();
             self.wait(self.datagram_patience(), |host| host.tables.is_some())?;
             let devices = self.tables.take().ok_or(GeniusError::BoardBusy)?;
-            // Somebody may have come meanwhile, and others with him.
+            // A device may have logged in meanwhile, and others with it.
             if self.knows_everybody() || left.is_zero() {
                 return Ok(devices);
             }
@@ -480,7 +481,7 @@ impl Host {
         }
     }
 
-    /// Sends a datagram and waits until it is out.
+    /// Sends a datagram and waits until it is sent.
     pub(super) fn deliver(&mut self, transmission: Transmission) -> Result<(), GeniusError> {
         self.start()?;
         self.transmit(transmission)?;
@@ -488,7 +489,7 @@ impl Host {
         self.sent.take().ok_or(GeniusError::BoardBusy)?.map_err(GeniusError::Undelivered)
     }
 
-    /// Hands a datagram to the board as soon as that is done with the last one.
+    /// Hands a datagram to the board as soon as the last one is done.
     fn transmit(&mut self, transmission: Transmission) -> Result<(), GeniusError> {
         if !self.wait(self.datagram_patience(), |host| host.driver.can_transmit())? {
             return Err(GeniusError::BoardBusy);
@@ -500,7 +501,8 @@ impl Host {
         })
     }
 
-    /// Looks at the board until `done`, or until the time is over. A board that fails ends it.
+    /// Polls the board until `done`, or until the time is over. A failure of the board ends the
+    /// wait.
     fn wait(
         &mut self,
         timeout: Duration,
@@ -560,7 +562,7 @@ impl Host {
             Event::Sent(result) => self.sent = Some(result),
             Event::Replied(result) => self.replied = Some(result),
             Event::TablesLocked => self.tables = self.read_tables().ok(),
-            // The driver remembers these, or has dealt with them.
+            // The driver keeps these itself, or has already handled them.
             Event::Configured(_)
             | Event::StatusChanged(_)
             | Event::Request(_)
@@ -580,7 +582,7 @@ impl Host {
         let present: Vec<_> =
             numbers.filter_map(|number| Some((number, self.driver.device(number).ok()?))).collect();
         if present.iter().fold(0, |devices, (number, _)| devices | bit(*number)) != self.known {
-            // The driver is about to say who.
+            // The driver is about to report the device.
             self.devices_changed = self.clock.now();
         }
         let tables = self.driver.tables()?;

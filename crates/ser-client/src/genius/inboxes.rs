@@ -1,14 +1,14 @@
-//! Messages of recorders that have arrived, each in the box of its sender.
+//! Received messages of recorders, sorted by sender.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use geni_board::ReceivedDatagram;
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 
-/// Messages that wait in one box; the oldest go when there are more.
+/// Most messages in one inbox; beyond that the oldest are dropped.
 const CAPACITY: usize = 1024;
 
-/// A box for every sender.
+/// One inbox for every sender.
 #[derive(Debug, Default)]
 pub(super) struct Inboxes {
     boxes: BTreeMap<u8, VecDeque<ReceivedDatagram>>,
@@ -17,8 +17,8 @@ pub(super) struct Inboxes {
 }
 
 impl Inboxes {
-    /// Keeps a message that a recorder has sent to this host. What is said to all, or is no message
-    /// of a recorder, answers nobody here.
+    /// Keeps a recorder's message to this host. Broadcasts and other datagrams answer nobody here,
+    /// so they are only counted.
     pub(super) fn put(&mut self, received: ReceivedDatagram) {
         let of_recorder =
             (received.function, received.subfunction) == (FUNCTION_HORNER, SUBFUNCTION_SER);
@@ -34,12 +34,12 @@ impl Inboxes {
         inbox.push_back(received);
     }
 
-    /// The oldest message of a device.
+    /// Takes the oldest message of a device.
     pub(super) fn take(&mut self, node: u8) -> Option<ReceivedDatagram> {
         self.boxes.get_mut(&node)?.pop_front()
     }
 
-    /// The oldest message of a device whose data are of some kind; the others stay.
+    /// Takes the oldest message of a device whose data `fits` accepts; the others stay.
     pub(super) fn take_if(
         &mut self,
         node: u8,
@@ -50,14 +50,14 @@ impl Inboxes {
         inbox.remove(place)
     }
 
-    /// Empties all boxes.
+    /// Empties all inboxes.
     pub(super) fn throw_away(&mut self) {
         let thrown_away: usize = self.boxes.values().map(VecDeque::len).sum();
         self.boxes.clear();
         self.dropped += thrown_away as u64;
     }
 
-    /// Datagrams that were no message to this host, and messages that nobody took in time.
+    /// How many datagrams were not a message to this host, and how many messages were dropped.
     pub(super) const fn lost(&self) -> (u64, u64) {
         (self.ignored, self.dropped)
     }

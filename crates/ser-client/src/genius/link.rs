@@ -1,4 +1,4 @@
-//! A session's messages in datagrams: the link to one recorder on the bus.
+//! The link to one recorder on the bus: a session's messages in datagrams.
 
 use std::time::Duration;
 
@@ -10,14 +10,14 @@ use crate::session::link::Link;
 use crate::session::{Attempt, Session};
 use crate::transport::transport_error::TransportError;
 
-/// The way to one recorder on the bus.
+/// The link to one recorder on the bus.
 pub(crate) struct GeniusLink {
     pub(crate) host: GeniHost,
     pub(crate) node: u8,
 }
 
 impl GeniusLink {
-    /// Gives the session its messages, which are so many bytes.
+    /// Gives the session its messages and returns the number of bytes.
     fn hand_over(&self, received: &[ReceivedDatagram], session: &mut Session) -> usize {
         for datagram in received {
             session.process_body(self.now(), &datagram.data);
@@ -54,7 +54,7 @@ impl Link for GeniusLink {
         self.host.delay()
     }
 
-    /// The bus has a rate, and nobody here can change it.
+    /// The bus has a rate, but a host cannot change it.
     fn set_baud(&mut self, _bits_per_second: u32) -> Result<(), TransportError> {
         Ok(())
     }

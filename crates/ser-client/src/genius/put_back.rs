@@ -1,18 +1,18 @@
-//! A window that may not be one. A user may name the wrong file, or the wrong place in it. So the
-//! bytes that were there are remembered, and put back unless a board answers.
+//! A window that may not be one. A user may give the wrong file or the wrong place in it. So the
+//! original bytes are remembered and restored unless a board answers.
 
 use std::cell::RefCell;
 
 use geni_board::SharedRam;
 
-/// Shared RAM, with what to put back.
+/// Shared RAM, with the bytes to restore.
 pub(super) struct PutBack<R: SharedRam> {
     ram: R,
-    /// Nothing once a board has shown itself: then the window is one.
+    /// `None` once a board has answered, which proves that the file is a window.
     written: RefCell<Option<Vec<Written>>>,
 }
 
-/// A byte that we have written.
+/// A byte that this host has written.
 struct Written {
     offset: u16,
     before: u8,
@@ -29,7 +29,7 @@ impl<R: SharedRam> PutBack<R> {
         &self.ram
     }
 
-    /// Looks whether somebody else has changed what we have written: that is a board.
+    /// Checks whether another program has changed a written byte: that is a board.
     fn look(&self, offset: u16, bytes: &[u8]) {
         let mut written = self.written.borrow_mut();
         let is_changed = |ours: &Written| {
@@ -92,7 +92,7 @@ mod tests {
 
     use super::*;
 
-    /// A file that is no window, and one that is opened as if it were.
+    /// A file that is not a window, opened as if it were one.
     fn mistaken() -> (tempfile::NamedTempFile, PutBack<FileRam>) {
         let file = tempfile::NamedTempFile::new().unwrap();
         fs::write(file.path(), [0xA5; RAM_LEN]).unwrap();

@@ -1,10 +1,9 @@
-//! Which of the devices on a bus are recorders.
+//! Finds the recorders among the devices on a bus.
 //!
-//! A recorder is behind a GENI board, and so may other things be; what the bus tells of a device
-//! does not say which. So every device that sends as much as a recorder does, and takes nothing, is
-//! asked a question that only recorders answer: what they heard last by broadcast (`L`, which
-//! original recorders answer, too, and which changes nothing). What came out is remembered until
-//! the device logs in anew.
+//! A recorder is behind a GENI board, and so are other devices; the bus does not tell which is
+//! which. So every device that sends as much as a recorder and receives nothing is asked a question
+//! that only recorders answer: their last broadcast (`L`). Original recorders answer it, too, and
+//! it changes nothing. The result is remembered until the device logs in again.
 
 use std::time::Duration;
 
@@ -16,32 +15,33 @@ use super::host::{BusDevice, GeniHost, Host, PACE, ser_message};
 use crate::session::options::Options;
 use crate::transport::genius_error::GeniusError;
 
-/// The question that only recorders answer. [`Answers`](super::answers::Answers) knows the answer.
+/// The question that only recorders answer. [`Answers`](super::answers::Answers) recognises the
+/// answer.
 const QUESTION: Command = Command::LastBroadcast;
 
 /// How recorders are told from other devices with as many inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Recognition {
-    /// They are asked, all at the same time and each once for each log-in. A device that does not
-    /// answer in time is asked again, as often as the options say.
+    /// The devices are asked, all at the same time and each once after each log-in. A device that
+    /// does not answer in time is asked again, as often as the options say.
     Asking(Options),
-    /// By the model number that their GENI boards have. Nobody is asked.
+    /// By the model number of their GENI boards. No device is asked.
     ModelNumber(u8),
 }
 
 /// The recorders on a bus.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BusRecorders {
-    /// Their numbers and inputs, all of the same bus scan.
+    /// Their bus addresses and inputs, all from the same bus scan.
     pub recorders: Vec<(u8, GlobalData)>,
-    /// Numbers of devices that send as much as a recorder does, and did not answer. Such a device
+    /// Bus addresses of devices that send as much as a recorder but did not answer. Such a device
     /// is something else, or a recorder that hangs.
     pub silent: Vec<u8>,
 }
 
 impl BusDevice {
-    /// What its inputs would be if it were a recorder; `None` when it cannot be one: a recorder
-    /// sends 2 or 4 bytes in every scan, and takes nothing.
+    /// Its inputs as a recorder's; `None` when it cannot be a recorder, which sends 2 or 4 bytes in
+    /// every scan and receives nothing.
     #[must_use]
     pub fn candidate_inputs(&self) -> Option<GlobalData> {
         let sends_only = self.device.output_len == 0
@@ -52,8 +52,8 @@ impl BusDevice {
 
 impl GeniHost {
     /// The recorders that are logged in. While devices come and go this waits as
-    /// [`devices`](Self::devices) does; asking takes as long as the options say where somebody does
-    /// not answer.
+    /// [`devices`](Self::devices) does. If a device does not answer, asking takes as long as the
+    /// options allow.
     ///
     /// # Errors
     /// When the board fails.
@@ -62,7 +62,7 @@ impl GeniHost {
         if let Recognition::Asking(options) = how
             && self.ask(&devices, options)?
         {
-            // Asking takes its time; the inputs have to be those of now.
+            // Asking takes time, and the inputs must be the present ones.
             devices = self.devices()?;
         }
         let host = self.lock();
@@ -83,7 +83,8 @@ impl GeniHost {
         Ok(found)
     }
 
-    /// Asks those that have not been asked since they logged in; says whether there were any.
+    /// Asks the devices that have not been asked since they logged in. Returns whether there were
+    /// any.
     fn ask(&self, devices: &[BusDevice], options: Options) -> Result<bool, GeniusError> {
         let candidates = devices.iter().filter(|device| device.candidate_inputs().is_some());
         let mut unknown: Vec<u8> = candidates.map(|device| device.number).collect();
@@ -97,14 +98,15 @@ impl GeniHost {
             for &node in &unknown {
                 match self.lock().deliver(ser_message(Destination::Device(node), &QUESTION)?) {
                     Ok(()) => unheard.retain(|&other| other != node),
-                    // It is gone, or the bus has damaged the question: it stays unknown.
+                    // The device is gone, or the bus has damaged the question; the device stays
+                    // unknown.
                     Err(GeniusError::Undelivered(_) | GeniusError::NotOnBus { .. }) => {}
                     Err(error) => return Err(error),
                 }
             }
             self.wait_for_answers(&mut unknown, options.timeout)?;
         }
-        // Who has not even heard the question is asked again the next time.
+        // A device that did not receive the question is asked again the next time.
         let mut host = self.lock();
         for node in unknown.into_iter().filter(|node| !unheard.contains(node)) {
             host.answers.was_silent(node);
@@ -112,7 +114,7 @@ impl GeniHost {
         Ok(any)
     }
 
-    /// Waits until nobody is unknown any more, or until the time is over.
+    /// Waits until no device is unknown, or until the time is over.
     fn wait_for_answers(
         &self,
         unknown: &mut Vec<u8>,
@@ -124,14 +126,14 @@ impl GeniHost {
             if unknown.is_empty() || self.clock.now() >= until {
                 return Ok(());
             }
-            // Without the lock, so that recorders can be spoken to meanwhile.
+            // The lock is not held here, so recorders can be used meanwhile.
             self.clock.wait(PACE);
         }
     }
 }
 
 impl Host {
-    /// Looks at the board, and strikes those out that have answered.
+    /// Polls the board and removes the devices that have answered from `unknown`.
     fn collect_answers(&mut self, unknown: &mut Vec<u8>) -> Result<(), GeniusError> {
         self.look()?;
         unknown.iter().for_each(|&node| self.answers.collect(node, &mut self.inboxes));

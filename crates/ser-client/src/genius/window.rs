@@ -11,20 +11,19 @@ use super::put_back::PutBack;
 use crate::transport::endpoint::GeniWindow;
 use crate::transport::open_error::OpenError;
 
-/// The window, until a board answers there with what to put back.
+/// The window, with the bytes to restore until a board answers there.
 pub(super) type Window = PutBack<AnyRam>;
 
-/// Shared RAM, however it is reached.
+/// Shared RAM, by either kind of access.
 pub(super) enum AnyRam {
-    /// A program on the other side, through a file. Should the file get shorter, that is an error
-    /// and nothing worse.
+    /// A file shared with another program. If the file gets shorter, that is only an error.
     File(FileRam),
-    /// A board.
+    /// The memory of a board.
     Memory(MappedRam),
 }
 
 impl Window {
-    /// Opens the window and takes it for this program alone: two hosts would overwrite each other's
+    /// Opens the window for this program alone, because two hosts would overwrite each other's
     /// commands.
     pub(super) fn open(place: &GeniWindow) -> Result<Window, OpenError> {
         let path = || place.file.clone();
@@ -33,18 +32,19 @@ impl Window {
             ErrorKind::PermissionDenied => OpenError::WindowDenied { path: path() },
             _ => OpenError::Other { name: path(), error },
         };
-        // Before anything is opened: there are devices that take notice of that.
+        // The type is checked before anything is opened, because some devices react to being
+        // opened.
         let kind = fs::metadata(&place.file).map_err(other)?.file_type();
         let mut options = OpenOptions::new();
         options.read(true).write(true);
         if kind.is_char_device() {
-            // Some systems ask for that before they map bus addresses without a cache.
+            // Some systems require this flag for an uncached mapping of bus addresses.
             options.custom_flags(OFlags::SYNC.bits().cast_signed());
         } else if !kind.is_file() {
             return Err(OpenError::NotAWindow { path: path() });
         }
         let file = options.open(&place.file).map_err(other)?;
-        // By now it may be something else.
+        // The name may stand for another file by now.
         if file.metadata().map_err(other)?.file_type() != kind {
             return Err(OpenError::NotAWindow { path: path() });
         }
@@ -57,7 +57,7 @@ impl Window {
         ram.map(PutBack::new)
     }
 
-    /// The last error since this was asked.
+    /// The last error since the previous call.
     pub(super) fn take_error(&self) -> Option<ErrorKind> {
         match self.ram() {
             AnyRam::File(ram) => ram.take_error(),
@@ -66,8 +66,8 @@ impl Window {
     }
 }
 
-/// A file that has another size may be anything, and must not be written to unless the user says
-/// where.
+/// A file of another size may be anything. It must not be written to unless the user gives an
+/// offset.
 fn of_file(file: File, place: &GeniWindow) -> Result<AnyRam, OpenError> {
     let other = |error| OpenError::Other { name: place.file.clone(), error };
     let len = file.metadata().map_err(other)?.len();
@@ -76,7 +76,7 @@ fn of_file(file: File, place: &GeniWindow) -> Result<AnyRam, OpenError> {
         Some(offset) if offset.checked_add(RAM_LEN as u64).is_some_and(|end| end <= len) => offset,
         _ => return Err(OpenError::WindowSize { path: place.file.clone(), len }),
     };
-    // Some systems show the memory of a board as a file that can be mapped and not read.
+    // Some systems show the memory of a board as a file that can be mapped but not read.
     if file.read_exact_at(&mut [0], offset).is_err() {
         return of_memory(&file, place);
     }

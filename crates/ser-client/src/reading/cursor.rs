@@ -1,21 +1,21 @@
 //! What a host remembers of a log between two readings.
 //!
-//! A log lives from power-up or erase to the next. Within a life every event has a *sequence*: the
-//! recorder's total after it, 1 for the first. The recorder shows totals modulo 65536; a host that
-//! goes on from a [`Cursor`] unwraps them.
+//! A log lives from a power-up or erase to the next one. Within a life every event has a
+//! *sequence*: the recorder's total after it, 1 for the first event. The recorder shows totals
+//! modulo 65536. A host that continues from a [`Cursor`] unwraps them.
 
 use ser_proto::Entry;
 
-/// How far a host has read. Keep it, and the next reading starts right after.
+/// How far a host has read. The next reading starts right after it.
 ///
-/// `sequence` alone would do if logs were never erased; the anchor tells a log that went on from
-/// one that began anew.
+/// `sequence` alone would be enough if logs were never erased. The anchor tells a log that
+/// continued from one that began anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Cursor {
     /// The sequence of the last event that was delivered; 0 if the log was empty.
     pub sequence: u64,
-    /// Whether `sequence` counts from the beginning of the log. Otherwise the host has first seen
-    /// the log when it had gone round, and a multiple of 65536 may be missing.
+    /// Whether `sequence` counts from the beginning of the log. Otherwise the total may already
+    /// have wrapped when the host first saw the log, and a multiple of 65536 may be missing.
     pub is_exact: bool,
     /// The last event that was delivered; `None` if the log was empty.
     pub anchor: Option<Entry>,

@@ -9,15 +9,15 @@ pub enum Delivery {
     Event {
         /// The physical number of the entry, 1 … size.
         entry_number: u16,
-        /// The sequence of the event in the life of its log, from 1. `None` where entries are read
-        /// by their physical numbers, which do not tell.
+        /// The sequence of the event in the life of its log, from 1. `None` for entries that are
+        /// read by their physical numbers, which do not tell it.
         sequence: Option<u64>,
         /// What was recorded.
         entry: Entry,
         /// The model, as the entry size shows it.
         model: Model,
     },
-    /// Events that happened here and cannot be read any more, or never were recorded.
+    /// Events that happened here and can no longer be read, or were never recorded.
     Lost {
         /// The sequence of the last event before the loss; 0 if the loss is at the beginning of the
         /// log. `None` where entries are read by their physical numbers.
@@ -30,24 +30,24 @@ pub enum Delivery {
 /// Why events are missing from what was delivered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lost {
-    /// Exactly so many were overwritten by newer ones before they were read.
+    /// Exactly this many were overwritten by newer ones before they were read.
     Overwritten {
         /// How many.
         count: u32,
     },
-    /// So many were overwritten before the first reading of this log, or a multiple of 65536 more:
-    /// the recorder counts modulo 65536 and nobody watched.
+    /// This many were overwritten before the first reading of this log, or a multiple of 65536
+    /// more: the recorder counts modulo 65536, and no host was watching.
     OverwrittenAtLeast {
         /// How many.
         count: u32,
     },
-    /// The log is not the one that was read last: it was erased or lost its contents (power). How
-    /// many events went unread with the old one is not known; what follows is all that the new one
-    /// holds.
+    /// The log is not the one that was read last: it was erased, or its contents were lost with the
+    /// power. It is unknown how many unread events were lost with the old log. What follows is all
+    /// that the new log holds.
     LogRestarted,
-    /// These inputs changed between two neighbouring entries, and no entry says when: recording was
-    /// stopped, or the recorder could not take all changes. How many changes there were is not
-    /// known; inputs that changed back meanwhile leave no trace.
+    /// These inputs changed between two neighbouring entries, and no entry says when. Recording was
+    /// stopped, or the recorder could not take all changes. The number of changes is unknown.
+    /// Inputs that changed back meanwhile leave no trace.
     Unrecorded {
         /// The inputs.
         inputs: Inputs,
@@ -55,8 +55,8 @@ pub enum Lost {
 }
 
 impl Lost {
-    /// What is missing between an entry and the one right after it in the same log, if anything:
-    /// the state before, with what changed, has to be the state after.
+    /// What is missing between an entry and the next one in the same log, if anything. The earlier
+    /// state with the inputs that changed must give the later state.
     #[must_use]
     pub fn between(entry: &Entry, next: &Entry) -> Option<Lost> {
         let inputs = Inputs(entry.state.0 ^ next.changed.0 ^ next.state.0);

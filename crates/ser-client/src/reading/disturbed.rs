@@ -1,14 +1,14 @@
-//! Why a reading cannot go on.
+//! Why a reading cannot continue.
 
 use std::error::Error;
 use std::fmt;
 
-/// Why a reading cannot go on. The cursor stands behind the last event that was delivered: a new
-/// reading from there sorts most of these out.
+/// Why a reading cannot continue. The cursor stands after the last event that was delivered; a new
+/// reading from there resolves most of these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Disturbed {
     /// Total and next slot moved in a way that recording does not explain: the log was erased or
-    /// resized meanwhile.
+    /// resized during the reading.
     Changed,
     /// The ring does not have the size that was given.
     WrongSize,
@@ -33,7 +33,7 @@ impl fmt::Display for Disturbed {
         f.write_str(match self {
             Disturbed::Changed => "the log was erased or resized while it was being read",
             Disturbed::WrongSize => "the log does not have the size that was expected",
-            Disturbed::NoProgress => "the log tells of events and does not hand them out",
+            Disturbed::NoProgress => "the log shows events but does not hand them out",
         })
     }
 }

@@ -1,4 +1,4 @@
-//! Where a log stands.
+//! The position of a log.
 
 use ser_proto::ReadReply;
 

@@ -1,4 +1,4 @@
-//! Reading entries by their physical numbers, as they stand in the ring.
+//! Reading entries by their physical numbers, in the order of the ring.
 
 use ser_proto::{Entry, MAX_ENTRIES, MAX_SIZE, ReadReply};
 
@@ -7,13 +7,13 @@ use super::log_position::LogPosition;
 use super::read_request::ReadRequest;
 
 /// Reads a range of entries. Events that are recorded meanwhile may overwrite entries of the range
-/// between two replies; [`LogReader`](crate::LogReader) follows them, this only tells:
-/// [`is_mixed`](Self::is_mixed).
+/// between two replies. [`LogReader`](crate::LogReader) follows such events; this reader only
+/// reports them: [`is_mixed`](Self::is_mixed).
 #[derive(Debug)]
 pub struct RangeReader {
     start: u16,
     next: u16,
-    /// Behind the last entry.
+    /// The number after the last entry.
     end: u16,
     /// Where the log stood in the first reply.
     first: Option<LogPosition>,
@@ -24,8 +24,8 @@ pub struct RangeReader {
 }
 
 impl RangeReader {
-    /// Reads `count` entries from number `start` (from 1) of a ring of `size` entries. What is
-    /// outside of the ring is left out.
+    /// Reads `count` entries from number `start` (from 1) of a ring of `size` entries. Numbers
+    /// outside the ring are left out.
     #[must_use]
     pub fn new(start: u16, count: u16, size: u16) -> RangeReader {
         let size = size.clamp(1, MAX_SIZE);
@@ -34,7 +34,7 @@ impl RangeReader {
         RangeReader { start, next, end, first: None, position: None, before: None, delivered: 0 }
     }
 
-    /// The entries to ask for next; `None` when all have come, or those that exist.
+    /// The entries to ask for next; `None` when all existing entries have come.
     #[must_use]
     pub fn request(&self) -> Option<ReadRequest> {
         let count = usize::from(self.end.saturating_sub(self.next)).min(MAX_ENTRIES);
@@ -59,7 +59,7 @@ impl RangeReader {
             return;
         };
         for &entry in reply.entries.iter().take(request.count.into()) {
-            // The oldest entry of a full ring stands right behind the newest.
+            // In a full ring the oldest entry directly follows the newest.
             let before = self.before.filter(|_| !self.is_seam(self.next));
             if let Some(lost) = before.and_then(|before| Lost::between(&before, &entry)) {
                 on(Delivery::Lost { after: None, lost });
@@ -71,16 +71,16 @@ impl RangeReader {
         }
     }
 
-    /// Whether an entry is the first after the newest: the oldest of a full ring. It has nothing to
-    /// do with the entry that comes before it by number.
+    /// Whether an entry is the first after the newest: the oldest of a full ring. It is unrelated
+    /// to the entry before it by number.
     #[must_use]
     pub fn is_seam(&self, entry_number: u16) -> bool {
         self.position
             .is_some_and(|position| entry_number.checked_sub(1) == Some(position.next_slot))
     }
 
-    /// Whether the entry before `next` is still what it was, although the log has moved on between
-    /// two replies.
+    /// Whether the entry before `next` is still the same, although the log has moved on between two
+    /// replies.
     fn keeps_before(&self, earlier: LogPosition, now: LogPosition) -> bool {
         let Some(slot) = self.next.checked_sub(2) else { return true };
         earlier == now
@@ -93,8 +93,8 @@ impl RangeReader {
         self.position
     }
 
-    /// Whether events that were recorded during the reading may stand in place of entries that were
-    /// delivered.
+    /// Whether events that were recorded during the reading may have overwritten entries of the
+    /// range.
     #[must_use]
     pub fn is_mixed(&self) -> bool {
         let (Some(first), Some(last)) = (self.first, self.position) else { return false };
@@ -103,7 +103,7 @@ impl RangeReader {
         }
         // Slot `n - 1` holds entry `n`.
         let slots = self.start.saturating_sub(1)..self.next.saturating_sub(1);
-        // Where the ring turned, or the log was erased, every entry may have been written.
+        // If the ring turned or the log was erased, every entry may have been written.
         !went_straight(first, last) || (first.next_slot < slots.end && slots.start < last.next_slot)
     }
 
@@ -114,7 +114,7 @@ impl RangeReader {
     }
 }
 
-/// Whether events were appended, and nothing else happened, from one position to the other.
+/// Whether events were appended between the two positions, and nothing else happened.
 fn went_straight(first: LogPosition, last: LogPosition) -> bool {
     last.total.wrapping_sub(first.total) == last.next_slot.wrapping_sub(first.next_slot)
         && first.next_slot < last.next_slot
@@ -154,8 +154,8 @@ mod tests {
     #[test]
     fn a_change_without_an_entry_is_told_between_neighbours_only() {
         let mut reply = reply(11, 4, 215, 13);
-        // Input 2 is on all of a sudden in entry 12, and again in 14, which is the oldest of the
-        // ring.
+        // Input 2 changes without an entry before entry 12, and again before 14, which is the
+        // oldest of the ring.
         for (entry, state) in reply.entries.iter_mut().zip([0b01, 0b10, 0b11, 0b00]) {
             entry.changed = Inputs(0b01);
             entry.state = Inputs(state);
@@ -173,7 +173,7 @@ mod tests {
     fn a_change_without_an_entry_is_told_where_two_replies_meet_although_an_event_came_elsewhere() {
         let first = reply(1, 10, 20, 20);
         let mut second = reply(11, 10, 21, 21);
-        // Input 2 is on all of a sudden in entry 11.
+        // Input 2 changes without an entry before entry 11.
         second.entries[0].state = Inputs(0b11);
         let mut told = Vec::new();
         let mut reader = RangeReader::new(1, 20, 100);
@@ -183,7 +183,7 @@ mod tests {
         let input_2 = Lost::Unrecorded { inputs: Inputs(0b10) };
         assert_eq!(told[10], Delivery::Lost { after: None, lost: input_2 });
         assert!(!reader.is_mixed());
-        // What was written over the entry before is no neighbour.
+        // The entry that overwrote the one before is not a neighbour.
         let mut told = Vec::new();
         let mut reader = RangeReader::new(1, 20, 100);
         for reply in [&reply(1, 10, 109, 9), &ReadReply { total: 110, next_slot: 10, ..second }] {

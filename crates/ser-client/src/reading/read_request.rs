@@ -12,8 +12,8 @@ pub struct ReadRequest {
 }
 
 impl ReadRequest {
-    /// Asks where the log stands. One entry comes along, because no manual promises an answer to a
-    /// count of 0.
+    /// Asks for the position of the log. The request includes one entry, because no manual promises
+    /// an answer to a count of 0.
     pub const POSITION: ReadRequest = ReadRequest { start: 1, count: 1 };
 }
 

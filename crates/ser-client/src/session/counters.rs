@@ -1,9 +1,9 @@
-//! What a session has seen on the line. [`Diagnosis`](super::diagnosis::Diagnosis) makes a cause of
-//! it when an answer does not come.
+//! What a session has seen on the line. [`Diagnosis`](super::diagnosis::Diagnosis) derives the
+//! cause from it when an answer does not come.
 
 use ser_proto::FrameError;
 
-/// Counts since the session began. Two of them, subtracted, say what happened in between.
+/// Counts since the session began. The difference of two shows what happened in between.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Bytes of any kind.

@@ -1,7 +1,7 @@
 //! What the line looked like while an answer did not come, and what a person can do about it.
 //!
 //! The difference of two counts tells silence from a wrong rate, from noise, and from a recorder
-//! that talks of something else.
+//! that sends something else.
 
 use std::fmt;
 
@@ -12,34 +12,34 @@ use super::counters::Counters;
 /// Why there was no answer, as far as the bytes that did arrive can tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Diagnosis {
-    /// Not one byte arrived. A recorder that is asked at the wrong baud rate hears garbage and is
+    /// Not one byte arrived. A recorder that is asked at a wrong baud rate hears garbage and is
     /// silent, too.
     Silent,
     /// The recorder is on the Genius bus and did not answer.
     SilentOnBus {
-        /// Its number.
+        /// Its bus address.
         node: u8,
     },
-    /// The recorder is on the Genius bus, and what was sent to it last did not arrive.
+    /// The recorder is on the Genius bus, but the last datagram sent to it did not arrive.
     Unacknowledged {
-        /// Its number.
+        /// Its bus address.
         node: u8,
     },
-    /// Bytes arrived and none of them made sense: most likely the wrong baud rate.
+    /// Bytes arrived, but none of them made sense: most likely the baud rate is wrong.
     Garbage {
         /// How many bytes.
         bytes: u64,
     },
-    /// Frames arrived damaged and none whole: noise on the line.
+    /// Frames arrived damaged and none arrived whole: there is noise on the line.
     Damaged {
-        /// How many frames had a wrong checksum or broke off.
+        /// How many frames had a wrong checksum or were incomplete.
         frames: u64,
     },
-    /// The recorder did answer this command, with something that is no such message.
+    /// The recorder answered this command, but the answer is not such a message.
     NotUnderstood(ParseError),
-    /// The recorder talks, with frames or lines of text, but does not answer this command. An
-    /// original recorder is silent on the queries that this project added to the protocol, and on
-    /// every command it refuses.
+    /// The recorder sends frames or lines of text, but does not answer this command. An original
+    /// recorder does not answer the queries that this project added to the protocol, nor any
+    /// command that it refuses.
     Ignored {
         /// Frames with other contents.
         frames: u64,
@@ -49,8 +49,8 @@ pub enum Diagnosis {
 }
 
 impl Diagnosis {
-    /// Judges what was counted while the answer was awaited; `not_understood` is the last answer to
-    /// the command that made no sense, `unfinished` whether a frame had begun and never ended.
+    /// Judges what was counted while the answer was awaited. `not_understood` is the error of the
+    /// last answer to the command; `unfinished` says whether a frame had begun but not ended.
     pub(crate) fn of(
         seen: &Counters,
         not_understood: Option<ParseError>,
@@ -88,7 +88,7 @@ impl Diagnosis {
             }
             Diagnosis::Unacknowledged { .. } => {
                 "try again; if it persists, look for errors on the bus: cable, terminators, a \
-                 number given twice"
+                 bus address that is used twice"
             }
             Diagnosis::Garbage { .. } => "try another baud rate; recorders are delivered with 9600",
             Diagnosis::Damaged { .. } => {

@@ -1,4 +1,4 @@
-//! What lies between a session and its recorder: a line, or a Genius bus.
+//! The connection between a session and its recorder: a line, or a Genius bus.
 //!
 //! A [`Link`] carries the messages of a session and tells it the time. The one for serial ports and
 //! TCP is here; the one for a bus is in `genius`.
@@ -12,41 +12,41 @@ use crate::transport::Transport;
 use crate::transport::clock::Clock;
 use crate::transport::transport_error::TransportError;
 
-/// How much is taken from a line in one go, at most: a peer that never stops must not keep us from
-/// asking.
+/// How much is taken from a line in one go, at most. A peer that never stops sending must not keep
+/// the host from asking.
 const MAX_WAITING_BYTES: usize = 64 * 1024;
 
 /// Carries a session's messages.
 pub(crate) trait Link: Send {
-    /// Sends what the attempt is about.
+    /// Sends an attempt.
     fn send(&mut self, attempt: &Attempt<'_>) -> Result<(), TransportError>;
 
-    /// Waits up to `timeout` and gives the session what arrived, which is so many bytes.
+    /// Waits up to `timeout`, gives the session what arrived and returns the number of bytes.
     fn receive(
         &mut self,
         session: &mut Session,
         timeout: Duration,
     ) -> Result<usize, TransportError>;
 
-    /// Gives the session what has arrived before now, wherever it waits.
+    /// Gives the session everything that has already arrived.
     fn receive_waiting(&mut self, session: &mut Session) -> Result<(), TransportError>;
 
-    /// The time that a session on this link goes by.
+    /// The time of the sessions on this link.
     fn now(&self) -> Duration;
 
-    /// How long it takes from [`send`](Self::send) until the attempt's last byte arrives, about.
+    /// Roughly how long it takes from [`send`](Self::send) until the attempt's last byte arrives.
     fn delay(&self, attempt: &Attempt<'_>) -> Duration;
 
-    /// Changes the rate, where there is one.
+    /// Changes the rate, if the link has one.
     fn set_baud(&mut self, bits_per_second: u32) -> Result<(), TransportError>;
 
-    /// The rate, where there is one.
+    /// The rate, if the link has one.
     fn bits_per_second(&self) -> Option<u32>;
 
     /// What the lack of an answer means here.
     fn diagnose(&self, diagnosis: Diagnosis) -> Diagnosis;
 
-    /// The host's own number on the bus, where there is a bus.
+    /// The host's own bus address, if the link is a bus.
     fn bus_address(&self) -> Option<u8>;
 }
 

@@ -1,4 +1,4 @@
-//! Requests and the answer to each, told apart from what the recorder says by itself.
+//! Requests and their answers, told apart from what the recorder sends by itself.
 //!
 //! A session owns neither port nor clock. Give it a command with [`request`](Session::request);
 //! send what [`dispatch`](Session::dispatch) hands out; give it what arrives with
@@ -9,47 +9,47 @@
 //! # Which answer belongs to which request
 //!
 //! The protocol has no transaction numbers. A reply answers the request under way if its command
-//! byte is the same; a read reply must also begin at the entry that was asked for and hold no more
-//! entries than that. Every other read reply is an auto report ([`Unsolicited::Report`]), every
+//! byte is the same. A read reply must also begin at the entry that was asked for and hold no more
+//! entries than that. Every other read reply is an auto report ([`Unsolicited::Report`]). Every
 //! other reply is counted and forgotten.
 //!
 //! An auto report that is made after the question and begins at the same entry cannot be told from
-//! the answer. It need not be: it says how the log stands now, and whoever reads goes on behind an
-//! answer that is short. A report from before the question would be another matter, so
-//! [`Unit`](crate::Unit) takes what has arrived before it asks.
+//! the answer. That does no harm: it shows how the log stands now, and a reader continues after a
+//! short answer. A report from before the question would do harm, so [`Unit`](crate::Unit) takes
+//! what has arrived before it asks.
 //!
-//! A request that was repeated or given up may be answered after all, later. To a repeated read
-//! that does no harm: each reply says where the log stood when it was made. But a *new* request of
-//! the same kind could take the old answer for its own, and the next one the answer after that, and
-//! so on. Such a request is therefore held back until the missing answers have come, or one more
-//! timeout has passed.
+//! A request that was repeated or given up may still be answered later. For a repeated read that
+//! does no harm: each reply says where the log stood when it was made. But a *new* request of the
+//! same kind could take the old answer for its own, and the next request the answer after that.
+//! Such a request is therefore held back until the missing answers have come or one more timeout
+//! has passed.
 //!
 //! # Two reads at once
 //!
-//! Reads may be [requested](Session::has_room) while another one is under way, so that the recorder
-//! finds the next request when it is done with an answer, and the line is never silent. Everything
-//! else is one at a time.
+//! Reads may be [requested](Session::has_room) while another one is under way. The recorder then
+//! finds the next request as soon as it has answered, and the line is never silent. All other
+//! requests go one at a time.
 //!
-//! A recorder answers in the order in which it was asked, and a line keeps the order. So an answer
-//! that comes before that to an earlier request shows that the earlier request or its answer was
-//! lost, and it is sent again at once. Answers are [handed out](Session::take_answer) in the order
-//! in which they come. The time for an answer begins when the one before it is there. A request
-//! that is repeated is alone under way.
+//! A recorder answers requests in their order, and a line keeps that order. So if a later request
+//! is answered first, the earlier request or its answer was lost, and it is sent again at once.
+//! Answers are [handed out](Session::take_answer) in the order in which they come. The time for an
+//! answer begins when the one before it has come. A repeated request is the only one under way.
 //!
 //! A recorder need not take a request while it answers another one. When one of the first two goes
-//! unanswered, it is [one at a time](Session::is_one_at_a_time) for the rest of the session, and
-//! nothing of this counts as an attempt: to have tried it costs such a recorder one timeout at
-//! most. A recorder that has taken some is forgiven a loss, but not one in five; one that has taken
-//! eight without a loss is tried again after a hundred answers, because then it was the line.
+//! unanswered, requests go [one at a time](Session::is_one_at_a_time) for the rest of the session.
+//! The trial does not count as an attempt and costs such a recorder at most one timeout. A recorder
+//! that has taken some requests in this way may lose one, but not one in five. After eight without
+//! a loss it is known to take them: a later loss was then the line's, and it is tried again after a
+//! hundred answers.
 //!
 //! # What is repeated
 //!
-//! Queries, reads, start, stop and settings are sent again when no answer comes. Not so:
-//! - *Erase*: a repeated one could erase events that were recorded in between, unread;
+//! Queries, reads, start, stop and settings are sent again when no answer comes. These are not:
+//! - *Erase*: a repeat could erase events that were recorded in between and not yet read;
 //! - *Print*: everything would be printed twice;
 //! - *Configure* with a baud rate: the recorder may have changed the rate already, so the repeat
 //!   would be garbage;
-//! - *Set clock*, unless each attempt gets a time of its own: see [`Session::request_set_clock`].
+//! - *Set clock*, unless each attempt gets its own time: see [`Session::request_set_clock`].
 //!
 //! # The files
 //!
@@ -88,11 +88,11 @@ use unsolicited::{Unsolicited, UnsolicitedQueue};
 const MAX_READS: usize = 2;
 
 /// How much longer than its timeout an attempt may last because a frame is just arriving: the
-/// longest frame at the lowest rate. It matters where the rate of the line is not known, as behind
-/// a terminal server.
+/// longest frame at the lowest rate. It matters where the rate of the line is unknown, as with a
+/// terminal server.
 const LONGEST_FRAME: Duration = Duration::from_millis(11_400);
 
-/// A time that no recorder accepts, until the attempt gets its own.
+/// A time that no recorder accepts; it stands in until the attempt gets its own.
 const NO_TIME: TimeStamp =
     TimeStamp { year: 0, month: 0, day: 0, hour: 0, minute: 0, second: 0, millisecond: 0 };
 
@@ -123,7 +123,7 @@ impl Timing {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Busy;
 
-/// No answer came, however often the request was sent.
+/// No answer came to any attempt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NoReply {
     /// The command.
@@ -132,16 +132,16 @@ pub struct NoReply {
     pub attempts: u32,
     /// What the line looked like meanwhile.
     pub diagnosis: Diagnosis,
-    /// Whether the command changes something, and so may have done it.
+    /// Whether the command changes something and may have been carried out.
     pub may_have_been_done: bool,
 }
 
-/// The reply in a body, or which one it seemed to be.
+/// The reply in a body, or the error with the command byte if there is one.
 fn understand(body: &[u8]) -> Result<Reply, (Option<u8>, ParseError)> {
     Reply::parse(body).map_err(|error| (body.first().copied(), error))
 }
 
-/// A conversation over one line; see the [module documentation](self).
+/// A conversation with one recorder; see the [module documentation](self).
 #[derive(Debug)]
 pub struct Session {
     timing: Timing,
@@ -149,7 +149,7 @@ pub struct Session {
     lines: LineAssembler,
     counters: Counters,
     last_byte_at: Duration,
-    /// Those under way come first, in the order in which they were sent.
+    /// Those under way come first, in the order of sending.
     requests: VecDeque<Request>,
     /// When the attempt of the first request under way ends.
     deadline: Duration,
@@ -161,7 +161,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// A session that has not said anything yet.
+    /// A session that has not sent anything yet.
     #[must_use]
     pub fn new(timing: Timing) -> Session {
         Session {
@@ -180,14 +180,14 @@ impl Session {
         }
     }
 
-    /// The same session, with one request at a time under way, reads or not.
+    /// The same session, but with only one request under way at a time, even for reads.
     #[must_use]
     pub fn one_at_a_time(self) -> Session {
         Session { pace: Pace::ONE_AT_A_TIME, ..self }
     }
 
-    /// Whether one request at a time is under way, reads or not: because that was wanted, or
-    /// because the recorder does not take a request while it answers another one.
+    /// Whether only one request is under way at a time: because the caller wants it, or because the
+    /// recorder does not take a request while it answers another one.
     #[must_use]
     pub const fn is_one_at_a_time(&self) -> bool {
         self.pace.is_one_at_a_time()
@@ -196,17 +196,16 @@ impl Session {
     /// Begins a request. [`dispatch`](Self::dispatch) sends it.
     ///
     /// # Errors
-    /// When another one is under way and this one is no read for which [there is
-    /// room](Self::has_room), or an answer has not been taken.
+    /// When another request is under way, unless both are reads and there [is
+    /// room](Self::has_room), or when an answer has not been taken.
     pub fn request(&mut self, command: Command) -> Result<(), Busy> {
         self.begin(command, may_be_repeated(&command), false)
     }
 
-    /// Whether a read may be requested now: nothing else is under way, or only reads, fewer than
-    /// two.
+    /// Whether a read may be requested now. Nothing else may be under way but fewer than two reads.
     #[must_use]
     pub fn has_room(&self) -> bool {
-        // What is asked again is alone under way.
+        // A repeated request is the only one under way.
         let may_be_joined = |request: &Request| request.is_read() && request.failed == 0;
         let room = if self.is_one_at_a_time() { 1 } else { MAX_READS };
         self.answers.is_empty()
@@ -214,14 +213,14 @@ impl Session {
             && self.requests.iter().all(may_be_joined)
     }
 
-    /// Whether no answer is to come or to be taken.
+    /// Whether no answer is awaited or waiting to be taken.
     #[must_use]
     pub fn is_idle(&self) -> bool {
         self.answers.is_empty() && self.requests.is_empty()
     }
 
     /// Begins to set the clock. Unlike a [`Command::SetClock`] this is repeated, because each
-    /// [`Attempt`] wants a time of its own.
+    /// [`Attempt`] asks for its own time.
     ///
     /// # Errors
     /// As for [`request`](Self::request).
@@ -239,8 +238,8 @@ impl Session {
         Ok(())
     }
 
-    /// Does what is due: hands out a frame to send, or gives a request up. When it has handed one
-    /// out, another may be due.
+    /// Does what is due: returns an attempt to send, or gives a request up. After an attempt
+    /// another one may be due.
     pub fn dispatch(&mut self, now: Duration) -> Option<Attempt<'_>> {
         self.owed.expire(now);
         if self.attempt_ends_at().is_some_and(|end| end <= now) {
@@ -264,7 +263,7 @@ impl Session {
         Some(Attempt { request, frame: &mut self.frame, line_rate: self.timing.line_rate })
     }
 
-    /// When to call [`dispatch`](Self::dispatch) again, if nothing arrives before; a moment in the
+    /// When to call [`dispatch`](Self::dispatch) again if nothing arrives before; a time in the
     /// past means at once. `None` while there is no request.
     #[must_use]
     pub fn poll_at(&self) -> Option<Duration> {
@@ -272,7 +271,7 @@ impl Session {
         self.attempt_ends_at().into_iter().chain(next).min()
     }
 
-    /// When the attempt under way is given up, the first if there are two.
+    /// When the attempt under way ends; of two, the first.
     fn attempt_ends_at(&self) -> Option<Duration> {
         self.requests.front().filter(|request| request.under_way)?;
         if !self.decoder.inside_frame() {
@@ -285,7 +284,7 @@ impl Session {
     /// The request to be sent next, and when.
     fn next_to_send(&self) -> Option<(usize, Duration)> {
         let place = self.requests.iter().position(|request| !request.under_way)?;
-        // Two only where neither was asked in vain.
+        // Two requests go together only if neither has failed before.
         let together = self.requests.iter().take(place + 1);
         if place > 0 && (self.is_one_at_a_time() || { together }.any(|request| request.failed > 0))
         {
@@ -295,7 +294,7 @@ impl Session {
         Some((place, held_back.unwrap_or_default()))
     }
 
-    /// Takes bytes that have arrived, cut in any way.
+    /// Takes bytes that have arrived, in pieces of any size.
     pub fn process(&mut self, now: Duration, bytes: &[u8]) {
         for &byte in bytes {
             self.counters.bytes += 1;
@@ -308,7 +307,7 @@ impl Session {
                 }
                 Some(Decoded::Dropped(dropped)) => {
                     self.counters.dropped(dropped.cause);
-                    // What is left of the frame would pass for text.
+                    // The remains of the frame would pass for text.
                     self.lines.damaged();
                     continue;
                 }
@@ -375,7 +374,7 @@ impl Session {
             if place == 0 { self.deadline } else { end },
         );
         if reply == Reply::PrintAccepted {
-            // Nothing but their time tells earlier lines from those that were asked for.
+            // Only their time tells earlier lines from those that were asked for.
             self.unsolicited.drop_lines();
             self.lines.clear();
         }
@@ -384,8 +383,8 @@ impl Session {
         if place == 0 {
             self.pace.kept(request.behind);
         }
-        // Otherwise it is the late answer to an earlier attempt, and says nothing about what was
-        // sent since.
+        // Otherwise it is the late answer to an earlier attempt and says nothing about later
+        // requests.
         if request.under_way && place > 0 {
             self.passed_over(now, place);
         }
@@ -394,8 +393,7 @@ impl Session {
         }
     }
 
-    /// The answer to a later request came before those to the first `count`: they are not coming
-    /// any more.
+    /// A later request was answered before the first `count`, whose answers will not come any more.
     fn passed_over(&mut self, now: Duration, count: usize) {
         let free = self.pace.lost();
         for _ in 0..count {
@@ -428,7 +426,7 @@ impl Session {
         request.failed > if request.repeat { self.timing.retries } else { 0 }
     }
 
-    /// Gives up the request at a place, and with it the others.
+    /// Gives up the request at `place`, and all others with it.
     fn give_up(&mut self, now: Duration, place: usize) {
         let Some(request) = self.requests.get(place) else { return };
         let seen = self.counters.since(&request.before);
@@ -442,7 +440,7 @@ impl Session {
         self.answers.push_back(Err(no_reply));
     }
 
-    /// Forgets the requests under way, as after an error of the line.
+    /// Forgets the requests under way, for example after an error of the line.
     pub fn cancel(&mut self, now: Duration) {
         self.answers.clear();
         self.forget_requests(now);
@@ -455,8 +453,8 @@ impl Session {
         }
     }
 
-    /// The outcome of a request, once. Of two reads it says itself, by its start, to which it is
-    /// the answer. When one is given up, so is the other.
+    /// The outcome of a request, once. Of two reads, the start of the answer says which one it
+    /// belongs to. When one is given up, so is the other.
     pub fn take_answer(&mut self) -> Option<Result<Reply, NoReply>> {
         self.answers.pop_front()
     }
@@ -466,14 +464,13 @@ impl Session {
         self.unsolicited.pop()
     }
 
-    /// Forgets the reports that came before the last answer. Messages come in the order in which
-    /// the recorder sent them, so these tell of a log that has changed since: the answer knows
-    /// better.
+    /// Forgets the reports that came before the last answer. Messages come in the order of sending,
+    /// so these reports are older than the answer.
     pub fn forget_earlier_reports(&mut self) {
         self.unsolicited.drop_reports_before_mark();
     }
 
-    /// How many messages were dropped because nobody took them; 4096 are kept.
+    /// How many messages were dropped because nobody took them. The session keeps 4096.
     #[must_use]
     pub const fn unsolicited_dropped(&self) -> u64 {
         self.unsolicited.dropped()
@@ -497,7 +494,7 @@ impl Session {
         self.timing.retries = retries;
     }
 
-    /// Tells that the line has another rate now. What was under way at the old rate is forgotten.
+    /// Sets the rate of the line. Requests under way at the old rate are forgotten.
     pub fn set_line_rate(&mut self, line_rate: LineRate) {
         self.timing.line_rate = line_rate;
         if let Some(unfinished) = self.decoder.finish() {

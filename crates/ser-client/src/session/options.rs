@@ -1,20 +1,19 @@
-//! How patient a host is.
+//! How long a host waits for an answer, and how often it asks.
 
 use std::time::Duration;
 
-/// How patient to be.
+/// How long a host waits for an answer, and how often it asks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
     /// How long a recorder may take to answer, on top of the time that the bytes are on the line.
-    /// Behind a terminal server that time is not known, so a slow line there wants a longer
-    /// timeout.
+    /// With a terminal server that time is unknown, so a slow line there needs a longer timeout.
     pub timeout: Duration,
     /// How often a request is repeated when no answer comes. Requests that must not be carried out
-    /// twice never are.
+    /// twice are never repeated.
     pub retries: u32,
 }
 
-/// One second, and two repeats.
+/// One second and two repeats.
 impl Default for Options {
     fn default() -> Self {
         Options { timeout: Duration::from_secs(1), retries: 2 }

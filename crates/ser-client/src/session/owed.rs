@@ -1,4 +1,4 @@
-//! Answers that may still come although nobody waits for them any more.
+//! Late answers, which may still come although nobody waits for them.
 //!
 //! A new request of the same kind could take such an answer for its own. It is held back until the
 //! answer has come, or its time is over.
@@ -7,25 +7,25 @@ use std::time::Duration;
 
 use ser_proto::{Code, Command, Reply};
 
-/// Requests whose late answers are remembered; of more the oldest are forgotten.
+/// Requests whose late answers are remembered; beyond that the oldest are forgotten.
 const MAX_REQUESTS: usize = 16;
 
 /// Late answers to one request.
 #[derive(Debug)]
 struct Late {
     code: Code,
-    /// Where a read began.
+    /// The first entry that a read asked for.
     start: Option<u16>,
     replies: u32,
     until: Duration,
 }
 
-/// What may still come.
+/// The late answers that may still come.
 #[derive(Debug, Default)]
 pub(super) struct Owed(Vec<Late>);
 
 impl Owed {
-    /// So many answers to the command may come up to a moment.
+    /// Remembers that up to `replies` answers to the command may still come before `until`.
     pub(super) fn remember(&mut self, command: &Command, replies: u32, until: Duration) {
         if replies == 0 {
             return;
@@ -36,8 +36,7 @@ impl Owed {
         self.0.push(Late { code: command.code(), start: read_start(command), replies, until });
     }
 
-    /// Until when the command has to be held back: an answer that may still come would pass for the
-    /// one to it.
+    /// How long the command must be held back because a late answer could be taken for its own.
     pub(super) fn holds_back(&self, command: &Command) -> Option<Duration> {
         let (code, start) = (command.code(), read_start(command));
         self.0
@@ -47,7 +46,7 @@ impl Owed {
             .max()
     }
 
-    /// A reply has come that answers no request under way.
+    /// Takes note of a reply that answers no request under way.
     pub(super) fn came(&mut self, reply: &Reply) {
         let start = match reply {
             Reply::Read(reply) => Some(reply.start),
@@ -61,7 +60,7 @@ impl Owed {
         }
     }
 
-    /// Nothing comes as late as that.
+    /// Forgets answers whose time is over.
     pub(super) fn expire(&mut self, now: Duration) {
         self.0.retain(|late| now < late.until);
     }

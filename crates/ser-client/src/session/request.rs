@@ -1,4 +1,4 @@
-//! A request: what may be done with it, where it stands, and an attempt of it.
+//! A request, its state, and its attempts.
 
 use std::time::Duration;
 
@@ -11,18 +11,18 @@ use crate::transport::line_rate::LineRate;
 #[derive(Debug)]
 pub(super) struct Request {
     pub(super) command: Command,
-    /// Whether each attempt is given a time of its own.
+    /// Whether each attempt gets its own time.
     pub(super) wants_time: bool,
     pub(super) repeat: bool,
     /// How often it was sent.
     pub(super) sent: u32,
     /// How many attempts have failed.
     pub(super) failed: u32,
-    /// Whether an attempt is under way; otherwise one is to be made.
+    /// Whether an attempt is under way; otherwise one must be sent.
     pub(super) under_way: bool,
     /// Whether another request was under way when this one was sent.
     pub(super) behind: bool,
-    /// What the counters were at the first attempt.
+    /// The counters at the first attempt.
     pub(super) before: Counters,
     pub(super) not_understood: Option<ParseError>,
 }
@@ -62,14 +62,14 @@ impl Request {
         matches!(self.command, Command::Read { .. })
     }
 
-    /// The attempt under way has come to nothing.
+    /// Marks the attempt under way as failed.
     pub(super) fn ask_again(&mut self) {
         self.under_way = false;
         self.behind = false;
     }
 }
 
-/// A frame that wants to be sent now.
+/// An attempt that must be sent now.
 #[derive(Debug)]
 pub struct Attempt<'a> {
     pub(super) request: &'a mut Request,
@@ -90,14 +90,14 @@ impl Attempt<'_> {
         self.line_rate.time_for(self.frame.len())
     }
 
-    /// Whether the attempt has to be given a time: it sets the clock.
+    /// Whether the attempt needs a time because it sets the clock.
     #[must_use]
     pub fn wants_time(&self) -> bool {
         self.request.wants_time
     }
 
-    /// Gives the attempt its time, the one at which the last byte of the frame arrives: now and
-    /// [`duration`](Self::duration). Other attempts than those that want a time stay as they are.
+    /// Sets the time at which the frame's last byte arrives: the present plus
+    /// [`duration`](Self::duration). Attempts that need no time stay unchanged.
     pub fn set_time(&mut self, time: TimeStamp) {
         if self.request.wants_time {
             self.request.command = Command::SetClock(time);
@@ -105,7 +105,7 @@ impl Attempt<'_> {
         }
     }
 
-    /// The command to send, where that is done without a frame.
+    /// The command to send, for a connection without frames.
     #[must_use]
     pub fn command(&self) -> &Command {
         &self.request.command

@@ -1,5 +1,5 @@
-//! Lines of text between the frames: what a recorder prints. Lines are bounded, and bytes that have
-//! no place in text are counted and left out.
+//! Lines of text between the frames: what a recorder prints. Lines are bounded. Bytes that are not
+//! text are counted and left out.
 
 /// The most characters of a line that are kept.
 pub const MAX_LINE_LEN: usize = 320;
@@ -11,21 +11,21 @@ pub struct TextLine {
     pub text: String,
     /// Whether the line was longer than [`MAX_LINE_LEN`] and the rest is missing.
     pub cut: bool,
-    /// How many bytes of the line have no place in text, among them the remains of broken frames.
-    /// They are not in `text`; a line that has some is damaged.
+    /// How many bytes of the line are not text, including the remains of broken frames. They are
+    /// not in `text`; a line that has some is damaged.
     pub noise: u32,
 }
 
-/// Puts lines together from single bytes. A line ends with LF; a CR before it is dropped.
+/// Assembles lines from single bytes. A line ends with LF; a CR before it is dropped.
 #[derive(Clone, Debug, Default)]
 pub struct LineAssembler {
     line: TextLine,
-    /// A CR that belongs to the line end if LF follows, and is noise otherwise.
+    /// A CR, which belongs to the line end if LF follows and is noise otherwise.
     pending_cr: bool,
 }
 
 impl LineAssembler {
-    /// Takes the next byte; gives the line that it completes. Empty lines are dropped.
+    /// Takes the next byte and returns the line that it completes. Empty lines are dropped.
     pub fn push(&mut self, byte: u8) -> Option<TextLine> {
         if self.pending_cr && byte != b'\n' {
             self.damaged();
@@ -46,12 +46,12 @@ impl LineAssembler {
         None
     }
 
-    /// Notes that something was lost in the line under way.
+    /// Notes that something was lost in the current line.
     pub fn damaged(&mut self) {
         self.line.noise = self.line.noise.saturating_add(1);
     }
 
-    /// Forgets the line under way.
+    /// Forgets the current line.
     pub fn clear(&mut self) {
         *self = LineAssembler::default();
     }

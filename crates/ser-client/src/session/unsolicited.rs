@@ -1,7 +1,7 @@
-//! What a recorder says without being asked, in a queue of bounded length.
+//! What a recorder sends without being asked, in a queue of bounded length.
 //!
-//! The queue knows which messages came before the last answer: reports among them tell of a log
-//! that has changed since.
+//! The queue knows which messages came before the last answer. Reports among them are older than
+//! it.
 
 use std::collections::VecDeque;
 
@@ -12,19 +12,19 @@ use super::text_line::TextLine;
 /// A message that answers no request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Unsolicited {
-    /// A read reply that nobody asked for: an auto report. In rare cases it is the late answer to a
-    /// read that was given up, so take the place of its entries from their numbers and the header,
+    /// An unsolicited read reply: an auto report. In rare cases it is the late answer to a read
+    /// that was given up. So the place of its entries follows from their numbers and the header,
     /// not from the order of arrival.
     Report(ReadReply),
     /// A line of text: auto print, or an answer to a print command.
     Line(TextLine),
 }
 
-/// Messages that wait until somebody wants them; the oldest go when there are too many.
+/// Messages that wait to be taken; when there are too many the oldest are dropped.
 #[derive(Debug, Default)]
 pub(crate) struct UnsolicitedQueue {
     messages: VecDeque<Unsolicited>,
-    /// So many of them came before a moment that was marked.
+    /// How many of them came before the mark.
     before_mark: usize,
     dropped: u64,
 }
@@ -45,18 +45,18 @@ impl UnsolicitedQueue {
         self.messages.pop_front()
     }
 
-    /// Forgets lines, and keeps reports.
+    /// Forgets lines and keeps reports.
     pub(crate) fn drop_lines(&mut self) {
         self.messages.retain(|message| !matches!(message, Unsolicited::Line(_)));
         self.before_mark = self.before_mark.min(self.messages.len());
     }
 
-    /// Marks the moment: what is there now came before it.
+    /// Sets the mark after the messages that are now in the queue.
     pub(crate) fn mark(&mut self) {
         self.before_mark = self.messages.len();
     }
 
-    /// Forgets reports that came before the mark, and keeps lines.
+    /// Forgets reports from before the mark and keeps lines.
     pub(crate) fn drop_reports_before_mark(&mut self) {
         let later = self.messages.split_off(self.before_mark.min(self.messages.len()));
         self.messages.retain(|message| matches!(message, Unsolicited::Line(_)));

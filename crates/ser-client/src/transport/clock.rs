@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 /// How time passes for a host.
 ///
-/// Everything here but tests wants [`RealTime`]. A test that plays the other end lets its time pass
-/// in [`wait`](Clock::wait), or in what it does for a transport, and so need not wait for anything.
+/// Only tests want another clock than [`RealTime`]. A test that plays the other end lets its time
+/// pass in [`wait`](Clock::wait) or in its transport, and so never really waits.
 pub trait Clock: Send + Sync {
     /// The time since some moment in the past.
     fn now(&self) -> Duration;
@@ -22,7 +22,7 @@ pub struct RealTime {
 }
 
 impl RealTime {
-    /// Time zero is now.
+    /// A clock that reads zero now.
     #[must_use]
     pub fn new() -> RealTime {
         RealTime { epoch: Instant::now() }

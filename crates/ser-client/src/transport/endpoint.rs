@@ -1,4 +1,4 @@
-//! Where a recorder is reached, as a person writes it.
+//! The address of a recorder, as a person writes it.
 
 use std::error::Error;
 use std::fmt;
@@ -12,7 +12,7 @@ const GENI_PREFIX: &str = "geni:";
 const NODE: &str = "node";
 const OFFSET: &str = "offset";
 
-/// Where a recorder is reached: `tcp://HOST:PORT`, `geni:FILE?node=N&offset=X`, or the path or name
+/// The address of a recorder: `tcp://HOST:PORT`, `geni:FILE?node=N&offset=X`, or the path or name
 /// of a serial port.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -31,7 +31,7 @@ pub enum Endpoint {
     Geni {
         /// The window.
         window: GeniWindow,
-        /// The recorder's number on the bus, 0-31; `None` for the bus as a whole.
+        /// The recorder's bus address, 0–31; `None` for the bus as a whole.
         node: Option<u8>,
     },
 }
@@ -39,15 +39,14 @@ pub enum Endpoint {
 /// The window that a host shares with its GENI board: 16 KiB, in a file or in memory.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct GeniWindow {
-    /// A file that is the window, a device that gives access to memory, or a file that stands for
-    /// memory.
+    /// The file that is the window, or a device or file that gives access to memory.
     pub file: String,
-    /// Where in the memory the window begins, in bytes. `None` for a file that is the window and
-    /// nothing else; for a device it is the same as 0.
+    /// Where the window begins in the memory, in bytes. `None` for a file that holds the window and
+    /// nothing else; for a device `None` means 0.
     pub offset: Option<u64>,
 }
 
-/// A file that is the window, or a device with nothing before it.
+/// A file that is the window, or a device whose memory begins with it.
 impl From<&str> for GeniWindow {
     fn from(file: &str) -> GeniWindow {
         GeniWindow { file: file.to_owned(), offset: None }
@@ -62,22 +61,22 @@ impl Endpoint {
     }
 }
 
-/// Why a text is no endpoint.
+/// Why a text is not an endpoint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EndpointError {
-    /// There is nothing.
+    /// The text is empty.
     Empty,
     /// `tcp://` is not followed by `HOST:PORT` with a port of 1–65535.
     TcpAddress,
     /// `geni:` is not followed by a file.
     GeniFile,
-    /// What follows `node=` is no number of 0–31.
+    /// `node=` is not followed by a number of 0–31.
     GeniNode,
-    /// What follows `offset=` is no number of bytes.
+    /// `offset=` is not followed by a number of bytes.
     GeniOffset,
-    /// A node or an offset is given twice, or something else with them.
+    /// A node or an offset is given twice, or there is another key.
     GeniQuery,
-    /// Something like `udp://…`.
+    /// The scheme is unknown, as in `udp://…`.
     UnknownScheme,
 }
 
@@ -100,7 +99,7 @@ impl FromStr for Endpoint {
             };
         };
         let (host, port) = address.rsplit_once(':').ok_or(EndpointError::TcpAddress)?;
-        // `::1:5000` could mean anything, so an IPv6 address wants its brackets.
+        // `::1:5000` is ambiguous, so an IPv6 address needs its brackets.
         let host_is_clear = !host.is_empty() && (!host.contains(':') || host.ends_with(']'));
         match port.parse::<u16>() {
             Ok(1..) if host_is_clear => Ok(Endpoint::Tcp { address: address.to_owned() }),
@@ -111,11 +110,11 @@ impl FromStr for Endpoint {
 
 fn geni(window: &str) -> Result<Endpoint, EndpointError> {
     let (file, query) = match window.rsplit_once('?') {
-        // A file may be called anything.
+        // A file may have any name, even one with `?` in it.
         Some((file, query)) if [NODE, OFFSET].iter().any(|key| is_about(query, key)) => {
             (file, query)
         }
-        // Unless it is one that is there, and something misspelled after it.
+        // A misspelled key after the name of an existing file is an error, not part of the name.
         Some((file, query)) if is_assignment(query) && exists(file) && !exists(window) => {
             return Err(EndpointError::GeniQuery);
         }
@@ -146,7 +145,7 @@ fn is_about(query: &str, key: &str) -> bool {
     query.strip_prefix(key).is_some_and(|rest| rest.starts_with('='))
 }
 
-/// Whether this looks like `word=value`.
+/// Whether the text looks like `word=value`.
 fn is_assignment(text: &str) -> bool {
     text.split_once('=').is_some_and(|(word, _)| {
         !word.is_empty() && word.chars().all(|letter| letter.is_ascii_alphabetic())
@@ -161,7 +160,7 @@ fn node_number(text: &str) -> Option<u8> {
     text.parse().ok().and_then(BusAddress::new).map(BusAddress::number)
 }
 
-/// In decimal, or in hex after `0x`.
+/// A number of bytes, in decimal or in hex after `0x`.
 fn bytes(text: &str) -> Option<u64> {
     match text.strip_prefix("0x") {
         Some(hex) => u64::from_str_radix(hex, 16).ok(),

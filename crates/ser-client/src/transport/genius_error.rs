@@ -12,39 +12,39 @@ pub enum GeniusError {
     BoardSilent,
     /// The board has failed.
     BoardFailed(Failure),
-    /// The board is well and not on the bus.
+    /// The board works but is not on the bus.
     OffBus,
-    /// No device with this number is logged in.
+    /// No device with this bus address is logged in.
     NotOnBus {
-        /// The number.
+        /// The bus address.
         node: u8,
     },
-    /// The number is that of this host's own board.
+    /// The bus address is that of this host's own board.
     OwnNumber {
-        /// The number.
+        /// The bus address.
         node: u8,
     },
-    /// The board did not deal with a datagram in time.
+    /// The board did not handle a datagram in time.
     BoardBusy,
     /// A datagram to a device did not get through, or was not answered.
     Undelivered(CommandError),
-    /// A broadcast did not get out. Nobody acknowledges one: it is this host's own board that could
-    /// not send it.
+    /// A broadcast was not sent. No device acknowledges one, so it was this host's own board that
+    /// could not send it.
     BroadcastFailed(CommandError),
-    /// A device answers something that does not belong to the question.
+    /// A device's answer does not belong to the question.
     OddReply {
-        /// The device.
+        /// Its bus address.
         node: u8,
     },
     /// The window can no longer be read or written.
     Window(io::ErrorKind),
-    /// Whoever opened the window has had enough of waiting for the board.
+    /// The caller set `stop` while the board was being waited for.
     Interrupted,
 }
 
 impl GeniusError {
-    /// Whether this may pass while one waits: the driver starts its board again and again, and
-    /// devices come back.
+    /// Whether waiting may help: the driver starts its board again and again, and devices come
+    /// back.
     #[must_use]
     pub const fn may_pass(&self) -> bool {
         match self {
@@ -74,23 +74,25 @@ impl GeniusError {
             }
             GeniusError::OffBus => {
                 "check the bus cable and its terminators, the bus rate, and that no other device \
-                 has this number"
+                 has this bus address"
             }
-            GeniusError::NotOnBus { .. } => "check number and bus rate on the device's switches",
+            GeniusError::NotOnBus { .. } => {
+                "check bus address and bus rate on the device's switches"
+            }
             GeniusError::OwnNumber { .. } => {
-                "name the number of the recorder, not that of the host"
+                "give the bus address of the recorder, not that of the host"
             }
             GeniusError::BoardBusy => "try again; does another program use the same window?",
             GeniusError::Undelivered(_) => {
                 "try again; if it persists, look for errors on the bus: cable, terminators, a \
-                 number given twice"
+                 bus address that is used twice"
             }
             GeniusError::BroadcastFailed(_) => {
                 "try again in a minute: after a start on a large bus the board is busy with \
-                 itself for so long"
+                 itself for that long"
             }
             GeniusError::OddReply { .. } => "does this kind of device know the question?",
-            GeniusError::Window(_) => "is the file still there, and as long as it was?",
+            GeniusError::Window(_) => "is the file still there, and has it kept its length?",
             GeniusError::Interrupted => {
                 "nothing has been asked of a recorder; give the board some seconds"
             }
@@ -108,7 +110,7 @@ impl fmt::Display for GeniusError {
             GeniusError::OwnNumber { node } => {
                 write!(f, "{node} is the number of this host's own board")
             }
-            GeniusError::BoardBusy => f.write_str("the GENI board does not deal with the datagram"),
+            GeniusError::BoardBusy => f.write_str("the GENI board does not handle the datagram"),
             GeniusError::Undelivered(error) => error.fmt(f),
             GeniusError::BroadcastFailed(error) => {
                 write!(f, "the broadcast did not get out: {error}")
@@ -119,9 +121,7 @@ impl fmt::Display for GeniusError {
             GeniusError::Window(kind) => {
                 write!(f, "the window of the GENI board cannot be used: {kind}")
             }
-            GeniusError::Interrupted => {
-                f.write_str("interrupted while the GENI board was waited for")
-            }
+            GeniusError::Interrupted => f.write_str("interrupted while waiting for the GENI board"),
         }
     }
 }

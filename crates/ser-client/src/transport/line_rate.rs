@@ -1,4 +1,4 @@
-//! How long bytes are on their way.
+//! How long bytes take on the line.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ const BITS_PER_BYTE: u64 = 10;
 /// The speed of the line to the recorder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LineRate {
-    /// Bytes take no time worth mentioning, or nobody knows how long (TCP).
+    /// The time is negligible or unknown (TCP).
     #[default]
     Instant,
     /// A serial line.

@@ -1,7 +1,7 @@
 //! How bytes get to a recorder and back: over a serial port or TCP, both a [`Transport`].
 //!
-//! Here is everything that knows this computer: how a port is named, listed and opened, how time
-//! passes, and what can go wrong on the way. What the bytes mean is known in `session`.
+//! Everything that depends on this computer is here: how a port is named, listed and opened, how
+//! time passes, and what can go wrong. The meaning of the bytes is in `session`.
 
 pub(crate) mod clock;
 pub(crate) mod endpoint;
@@ -19,16 +19,16 @@ use std::time::Duration;
 
 /// A line to a recorder, blocking.
 pub trait Transport: Send {
-    /// Waits up to `timeout` for bytes and takes those that are there. 0 means that none came in
+    /// Waits up to `timeout` for bytes and takes those that have come. 0 means that none came in
     /// time.
     ///
     /// # Errors
-    /// A line that has ended is an error, never 0: `NotConnected` for a device that was unplugged,
-    /// `UnexpectedEof` or one of the connection kinds for a peer that went away;
-    /// `ConnectionRefused` if it has not said anything before.
+    /// A line that has ended is an error, never 0. The kind is `NotConnected` for a device that was
+    /// unplugged, and `UnexpectedEof` or a connection kind for a peer that went away. It is
+    /// `ConnectionRefused` for a peer that had not sent anything before.
     fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize>;
 
-    /// Sends all bytes; they may still be on the line when this returns.
+    /// Sends all bytes; they may still be on the line when the call returns.
     ///
     /// # Errors
     /// As for [`read`](Self::read).
@@ -44,8 +44,8 @@ pub trait Transport: Send {
     fn bits_per_second(&self) -> Option<u32>;
 }
 
-/// What a blocking read came to: none in time is no error here, and the end of the line, of which
-/// `read` makes no error, is one of kind `ended`.
+/// The outcome of a blocking read. A read without bytes in time is not an error here. The end of
+/// the line, which `read` reports as 0 bytes, is an error of kind `ended`.
 fn bytes_read(read: io::Result<usize>, wanted: usize, ended: ErrorKind) -> io::Result<usize> {
     match read {
         Ok(0) if wanted > 0 => Err(ended.into()),

@@ -18,8 +18,8 @@ pub fn open(endpoint: &Endpoint, baud: u32) -> Result<Box<dyn Transport>, OpenEr
     }
 }
 
-/// A window is opened by [`Unit::open`](crate::Unit::open) and [`GeniHost`](crate::GeniHost), where
-/// that can be.
+/// A window is not a line. [`Unit::open`](crate::Unit::open) and [`GeniHost`](crate::GeniHost) open
+/// windows, on systems that have them.
 fn no_line(file: &str, node: Option<u8>) -> OpenError {
     match node {
         Some(_) => OpenError::NotAWindow { path: file.to_owned() },

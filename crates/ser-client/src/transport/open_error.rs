@@ -27,7 +27,7 @@ pub enum OpenError {
         /// The port.
         path: String,
     },
-    /// There is something of this name, but it is no serial port.
+    /// Something has this name, but it is not a serial port.
     NotSerial {
         /// What was asked for.
         path: String,
@@ -39,7 +39,7 @@ pub enum OpenError {
         /// The rate in bits per second.
         baud: u32,
     },
-    /// The host is there and nothing listens at this port.
+    /// The host is there, but nothing listens at this port.
     Refused {
         /// `HOST:PORT`.
         address: String,
@@ -59,7 +59,7 @@ pub enum OpenError {
         /// What was asked for.
         path: String,
     },
-    /// There is something of this name, but it cannot be a GENI window.
+    /// Something has this name, but it cannot be a GENI window.
     NotAWindow {
         /// What was asked for.
         path: String,
@@ -88,12 +88,12 @@ pub enum OpenError {
         /// The file.
         path: String,
     },
-    /// A GENI window, and no word of which recorder on the bus is meant.
+    /// The endpoint is a GENI window without a recorder's bus address.
     NoNode {
         /// The file.
         path: String,
     },
-    /// The GENI board, or the bus behind it.
+    /// The GENI board or the bus behind it cannot be used.
     Genius {
         /// The window.
         path: String,
@@ -149,8 +149,8 @@ impl OpenError {
                 "name a device for memory, and check the offset of the window in it"
             }
             OpenError::WindowDenied { .. } => "ask for the right to read and write it",
-            // A file of this name is how a system shows the memory of a PCI device; others are
-            // written to at one's peril.
+            // Linux shows the memory of a PCI device under this file name. The hint must not lead
+            // anybody to write into another kind of file.
             OpenError::WindowSize { path, .. } if file_name(path).starts_with("resource") => {
                 "a GENI window has 16384 bytes: add where in this memory it begins, as in offset=0"
             }

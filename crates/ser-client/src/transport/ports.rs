@@ -11,25 +11,24 @@ pub struct PortInfo {
     /// Path or name.
     pub path: String,
     /// What it is, in a few words: maker and product of a USB adapter, `PCI`, `Bluetooth`; may be
-    /// empty. An adapter may call itself anything; what a terminal would obey is escaped.
+    /// empty. An adapter may give any text, so characters that a terminal would obey are escaped.
     pub description: String,
 }
 
 /// Lists the serial ports, sorted by path.
 ///
-/// On Linux the kernel's list of terminals is read. Not in it are pseudo-terminals (a simulated
-/// recorder) and links such as `/dev/serial/by-id/…`; both can be opened by their path all the
-/// same.
+/// On Linux the kernel's list of terminals is read. It lacks pseudo-terminals (a simulated
+/// recorder) and links such as `/dev/serial/by-id/…`. Both can still be opened by their path.
 #[must_use]
 pub fn ports() -> Vec<PortInfo> {
-    // serialport panics where the kernel's list is missing, as in some containers.
+    // serialport panics if the kernel's list is missing, as in some containers.
     if cfg!(target_os = "linux") && !std::path::Path::new("/sys/class/tty").is_dir() {
         return Vec::new();
     }
     listed(serialport::available_ports().unwrap_or_default())
 }
 
-/// The ports that a system names, in whatever order.
+/// The ports that the system lists, in any order.
 fn listed(found: Vec<SerialPortInfo>) -> Vec<PortInfo> {
     let named = |port: SerialPortInfo| PortInfo {
         path: port.port_name,

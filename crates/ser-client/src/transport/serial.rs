@@ -1,7 +1,8 @@
 //! A serial port: RS-232 itself, a USB adapter, or a pseudo-terminal.
 //!
-//! The port is opened for this program alone where the system can do that, with 8 data bits, no
-//! parity, one stop bit and no flow control. What arrived before is left in the buffer: it may be
+//! The port is opened exclusively where the system can do that, with 8 data bits, no parity, one
+//! stop bit and no flow control. Bytes that arrived earlier stay in the buffer, because they may be
+//! lines that the recorder printed.
 //! lines that the recorder printed.
 
 use std::io::{self, ErrorKind, Read, Write};
@@ -14,8 +15,7 @@ use super::open_error::OpenError;
 use super::ports::ports;
 use super::{Transport, bytes_read};
 
-/// Far longer than the kernel needs to take one frame at 300 baud, so only a stuck port runs into
-/// it.
+/// Far longer than the kernel needs to take one frame at 300 baud, so only a stuck port exceeds it.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// An open serial port.
@@ -30,7 +30,7 @@ impl SerialTransport {
     /// # Errors
     /// See [`OpenError`].
     pub fn open(path: &str, baud: u32) -> Result<SerialTransport, OpenError> {
-        // Some systems take rate 0 for a way to hang up.
+        // Some systems hang up when the rate is set to 0.
         if baud == 0 {
             return Err(OpenError::UnsupportedBaud { path: path.to_owned(), baud });
         }
@@ -72,7 +72,8 @@ fn exists(path: &str) -> bool {
 #[cfg(unix)]
 fn is_no_terminal(path: &str, error: &serialport::Error) -> bool {
     use std::os::unix::fs::FileTypeExt;
-    // The text of ENOTTY is all that serialport leaves of it: /dev/null is a character device, too.
+    // The text is all that serialport keeps of ENOTTY. The file type does not suffice, because
+    // /dev/null is a character device, too.
     let not_a_terminal =
         error.description.contains("typewriter") || error.description.contains("terminal");
     not_a_terminal || std::fs::metadata(path).is_ok_and(|found| !found.file_type().is_char_device())
@@ -83,7 +84,7 @@ fn is_no_terminal(path: &str, _: &serialport::Error) -> bool {
     Path::new(path).is_file()
 }
 
-/// Makes one error of the many in which a serial port that was unplugged shows.
+/// Gives the many errors of an unplugged serial port one kind.
 fn unplugged(error: io::Error) -> io::Error {
     match error.kind() {
         // The kernel's EIO, ENXIO and ENODEV have no kind of their own and arrive as `Other`.
@@ -98,7 +99,7 @@ fn unplugged(error: io::Error) -> io::Error {
 impl Transport for SerialTransport {
     fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
         self.port.set_timeout(timeout)?;
-        // A port that says that it has bytes, and has none, was hung up.
+        // A port that reports bytes but has none was hung up.
         let read = self.port.read(buf);
         bytes_read(read, buf.len(), ErrorKind::NotConnected).map_err(unplugged)
     }

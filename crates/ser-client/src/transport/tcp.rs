@@ -9,10 +9,10 @@ use ser_proto::ESC;
 use super::open_error::OpenError;
 use super::{Transport, bytes_read};
 
-/// For each address of the host.
+/// Applies to each address of the host.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// A peer that takes nothing for so long has gone.
+/// A peer that takes nothing for this long has gone.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// So much of what the other end says before the first frame is shown.
@@ -27,7 +27,8 @@ pub struct TcpTransport {
 }
 
 impl TcpTransport {
-    /// Connects to `HOST:PORT`; of several addresses the first that answers.
+    /// Connects to `HOST:PORT`. If the host has several addresses, the first one that answers is
+    /// used.
     ///
     /// # Errors
     /// See [`OpenError`].
@@ -85,7 +86,7 @@ impl TcpTransport {
 }
 
 fn prepare(stream: TcpStream) -> io::Result<TcpStream> {
-    // A request is one small write; waiting for more to send with it only delays the answer.
+    // A request is one small write. Waiting for more to send with it would only delay the answer.
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
     Ok(stream)
@@ -104,7 +105,7 @@ fn why_not_connected(address: &str, error: io::Error) -> OpenError {
 
 impl Transport for TcpTransport {
     fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
-        // A socket takes a timeout of zero for none at all, and may round a small one up to several
+        // A socket waits for ever with a timeout of zero, and may round a small one up to several
         // milliseconds.
         self.stream.set_nonblocking(timeout.is_zero())?;
         if !timeout.is_zero() {

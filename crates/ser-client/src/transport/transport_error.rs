@@ -1,4 +1,4 @@
-//! How a line fails in the middle of a conversation.
+//! The ways in which a line fails in the middle of a conversation.
 
 use std::error::Error;
 use std::fmt;
@@ -6,7 +6,7 @@ use std::io::{self, ErrorKind};
 
 use super::genius_error::GeniusError;
 
-/// How a line failed in the middle of a conversation.
+/// The way in which a line failed in the middle of a conversation.
 #[derive(Debug)]
 pub enum TransportError {
     /// The serial device is gone.
@@ -18,7 +18,7 @@ pub enum TransportError {
         /// The text that it sent instead, on one line; empty if it said nothing.
         said: String,
     },
-    /// The GENI board, or the bus behind it.
+    /// The GENI board or the bus behind it failed.
     Genius(GeniusError),
     /// Anything else.
     Io(io::Error),

@@ -1,7 +1,7 @@
 //! A recorder behind a line or on a bus: blocking calls, one per thing that it can do.
 //!
-//! A [`Unit`] drives a session over a link: it sends what is due, waits for what arrives, and makes
-//! an error of an answer that does not come. How it is opened is in `open`.
+//! A [`Unit`] drives a session over a link. It sends what is due, waits for what arrives, and
+//! returns an error when no answer comes. `open` has the ways to open one.
 
 mod open;
 pub(crate) mod request_error;
@@ -28,19 +28,19 @@ use crate::transport::clock::{Clock, RealTime};
 use crate::transport::line_rate::LineRate;
 use request_error::RequestError;
 
-/// A recorder changes its rate when the reply is out; what arrives in that moment it would not
-/// understand.
+/// A recorder changes its rate after the reply. It would not understand what arrives at that
+/// moment.
 const BAUD_SETTLING: Duration = Duration::from_millis(20);
 
-/// How long a recorder may take to answer when its rate is looked for, on top of the time that the
-/// bytes are on the line.
+/// How long a recorder may take to answer while its rate is being searched for, on top of the time
+/// that the bytes are on the line.
 const SEARCH_TIMEOUT: Duration = Duration::from_millis(250);
 
-/// A recorder at the other end of a line.
+/// A connection to a recorder, over a line or a bus.
 pub struct Unit {
     link: Box<dyn Link>,
     session: Session,
-    /// Where the log stood at the end of the last reading by cursor.
+    /// Where the log stood after the last reading by cursor.
     pub(crate) last_position: Option<LogPosition>,
 }
 
@@ -51,7 +51,7 @@ impl Unit {
         Unit::with_clock(transport, options, Arc::new(RealTime::new()))
     }
 
-    /// A recorder behind a transport whose time is not that of this computer.
+    /// A recorder behind a transport that does not run in this computer's time.
     #[must_use]
     pub fn with_clock(
         transport: Box<dyn Transport>,
@@ -64,15 +64,15 @@ impl Unit {
         Unit { link: Box::new(SerialLink::new(transport, clock)), session, last_position: None }
     }
 
-    /// This host's number on the Genius bus, if that is where the recorder is: auto reports can be
-    /// sent there.
+    /// This host's own bus address, if the recorder is on a Genius bus. Auto reports can be sent
+    /// there.
     #[must_use]
     pub fn bus_address(&self) -> Option<u8> {
         self.link.bus_address()
     }
 
     /// Sends a command and waits for the reply. A [`Command::SetClock`] is sent once, with the time
-    /// that it has: [`set_clock`](Self::set_clock) is more exact.
+    /// that it holds; [`set_clock`](Self::set_clock) is more exact.
     ///
     /// # Errors
     /// If no reply comes or the line fails.
@@ -116,12 +116,12 @@ impl Unit {
         }
     }
 
-    /// Changes the settings and returns those in force. A new baud rate is followed on this side as
-    /// soon as the reply is there; the command is then sent only once.
+    /// Changes the settings and returns those in force. The command for a new baud rate is sent
+    /// only once, and this side changes to the new rate as soon as the reply has come.
     ///
     /// # Errors
-    /// If no reply comes, the recorder refuses the settings, or the line fails or does not have the
-    /// new rate.
+    /// If no reply comes, the recorder refuses the settings, the line fails, or the port does not
+    /// have the new rate.
     pub fn configure(&mut self, configure: Configure) -> Result<Configuration, RequestError> {
         let Reply::Configuration(in_force) = self.request(&Command::Configure(configure))? else {
             return Err(unexpected(Code::Configure));
@@ -133,7 +133,7 @@ impl Unit {
             self.set_baud(rate)?;
             self.listen_for(BAUD_SETTLING)?;
         }
-        // What the command leaves open cannot disagree with what is in force.
+        // A field that the command leaves open always agrees with the settings in force.
         if configure.apply_to(&in_force) == in_force {
             Ok(in_force)
         } else {
@@ -141,12 +141,12 @@ impl Unit {
         }
     }
 
-    /// Sets the clock. `time_at` is asked for the time that it will be after a delay: the one at
-    /// which the last byte arrives at the recorder. It is asked again for each attempt. Returns the
-    /// time that was set last.
+    /// Sets the clock. `time_at` gets a delay and returns the time after it, at which the last byte
+    /// arrives at the recorder. It is called again for each attempt. Returns the time that was set
+    /// last.
     ///
     /// # Errors
-    /// If there is no such time, no reply comes or the line fails.
+    /// If `time_at` fails, no reply comes or the line fails.
     pub fn set_clock(
         &mut self,
         mut time_at: impl FnMut(Duration) -> TimeStamp,
@@ -163,7 +163,8 @@ impl Unit {
         sent.ok_or_else(|| unexpected(Code::SetClock))
     }
 
-    /// Erases the log. Sent once: if no reply comes, it may or may not have been done.
+    /// Erases the log. The command is sent once. Without a reply it may or may not have been
+    /// carried out.
     ///
     /// # Errors
     /// If no reply comes or the line fails.
@@ -182,8 +183,8 @@ impl Unit {
         }
     }
 
-    /// Has entries printed. The lines come through [`wait_event`](Self::wait_event); those that
-    /// came before the recorder's reply are dropped. Sent once.
+    /// Has entries printed. The lines come through [`wait_event`](Self::wait_event); lines from
+    /// before the recorder's reply are dropped. The command is sent once.
     ///
     /// # Errors
     /// If no reply comes or the line fails.
@@ -199,7 +200,7 @@ impl Unit {
         self.read(ReadRequest::POSITION).map(|reply| LogPosition::from(&reply))
     }
 
-    /// Reads entries by their physical numbers, those that exist; returns how many there were.
+    /// Reads the existing entries of a range of physical numbers and returns their count.
     ///
     /// # Errors
     /// If no reply comes or the line fails.
@@ -217,9 +218,9 @@ impl Unit {
         Ok(reader.delivered())
     }
 
-    /// Waits for the next message that answers no request: an auto report or a line of text. Those
-    /// that came during requests come first, except that a reading by cursor takes the place of all
-    /// reports before it. `None` when nothing comes in time.
+    /// Waits for the next message that answers no request: an auto report or a line of text.
+    /// Messages that came during requests are returned first. A reading by cursor drops all reports
+    /// from before it, because it delivers their events. `None` if nothing comes in time.
     ///
     /// # Errors
     /// If the line fails.
@@ -236,7 +237,7 @@ impl Unit {
         }
     }
 
-    /// Talks at another rate from now on, on this side only.
+    /// Changes the rate on this side only.
     ///
     /// # Errors
     /// If the port does not have this rate.
@@ -246,9 +247,9 @@ impl Unit {
         Ok(())
     }
 
-    /// Looks for a recorder that does not answer: asks once at every other rate. `None` if it
-    /// answers at none of them, or the line has no rate. Takes six seconds at most, unless the line
-    /// is noisy. Afterwards the rate is what it was.
+    /// Searches for the rate of a recorder that does not answer: asks once at every other rate.
+    /// `None` if it answers at none of them, or the line has no rate. The search takes at most six
+    /// seconds, unless the line is noisy. The rate is then what it was before.
     ///
     /// # Errors
     /// If the line fails.
@@ -266,7 +267,7 @@ impl Unit {
         &mut self,
         rates: impl Iterator<Item = Baud>,
     ) -> Result<Option<Baud>, RequestError> {
-        // Every recorder, also an original one, answers a read.
+        // Every recorder answers a read, even an original one.
         let question = Command::Read { start: 1, count: 1 };
         let bytes =
             encoded_len(question.to_body().len()) + encoded_len(Model::Ser320.read_reply_len(1));
@@ -276,8 +277,8 @@ impl Unit {
                 continue;
             }
             let line_rate = LineRate::BitsPerSecond(baud.bits_per_second());
-            // A session also waits for the longest message that the recorder may just be sending;
-            // at 300 baud that is too long for a guess.
+            // A session also waits for the longest message that the recorder may be sending; at 300
+            // baud that is too long for a guess.
             self.session.set_line_rate(LineRate::Instant);
             self.session.set_patience(SEARCH_TIMEOUT + line_rate.time_for(bytes), 0);
             match self.request(&question) {
@@ -289,8 +290,7 @@ impl Unit {
         Ok(None)
     }
 
-    /// Reckons with a line of this speed behind the transport, as behind a terminal server, which
-    /// does not tell.
+    /// Sets the speed of a line that the transport cannot tell, as with a terminal server.
     pub fn set_line_rate(&mut self, line_rate: LineRate) {
         self.session.set_line_rate(line_rate);
     }
@@ -320,15 +320,14 @@ impl Unit {
     }
 
     /// Whether reads go one at a time, because the recorder does not take a request while it
-    /// answers another one, or is on a Genius bus. Otherwise there are two under way, and the line
-    /// is never silent.
+    /// answers another one, or because it is on a Genius bus. Otherwise two are under way, and the
+    /// line is never silent.
     #[must_use]
     pub fn reads_one_at_a_time(&self) -> bool {
         self.session.is_one_at_a_time()
     }
 
-    /// Asks for what `next` gives, as far as there is room for more reads under way, and does not
-    /// wait.
+    /// Sends the requests that `next` returns while there is room for more reads, without waiting.
     pub(crate) fn ask(
         &mut self,
         next: &mut dyn FnMut() -> Option<ReadRequest>,
@@ -342,13 +341,13 @@ impl Unit {
         while self.session.has_room()
             && let Some(request) = next()
         {
-            // There is room.
+            // The loop condition ensures that there is room.
             let _ = self.session.request(request.into());
         }
         self.send_due(&mut |_| Err(unexpected(Code::Read)))
     }
 
-    /// The reply to one of the reads that were asked for.
+    /// The reply to one of the reads under way.
     pub(crate) fn next_reply(&mut self) -> Result<ReadReply, RequestError> {
         match self.converse(&mut |_| Err(unexpected(Code::Read)))? {
             Reply::Read(reply) => Ok(reply),
@@ -356,7 +355,7 @@ impl Unit {
         }
     }
 
-    /// Forgets what is under way.
+    /// Forgets the requests under way.
     pub(crate) fn cancel(&mut self) {
         self.session.cancel(self.now());
     }
@@ -368,8 +367,8 @@ impl Unit {
         }
     }
 
-    /// Takes what arrived before the request: it answers nothing that is asked from now on. A
-    /// request that an error of the line has cut short is forgotten.
+    /// Takes what arrived before the request, because it cannot answer a later one. A request that
+    /// an error of the line has cut short is forgotten.
     fn prepare(&mut self) -> Result<(), RequestError> {
         self.session.cancel(self.now());
         Ok(self.link.receive_waiting(&mut self.session)?)
@@ -400,7 +399,7 @@ impl Unit {
     ) -> Result<(), RequestError> {
         while let Some(mut attempt) = self.session.dispatch(self.link.now()) {
             if attempt.wants_time() {
-                // Without a time nothing is sent; the next request forgets this one.
+                // Without a time nothing is sent, and the next request replaces this one.
                 attempt.set_time(time_at(self.link.delay(&attempt))?);
             }
             self.link.send(&attempt)?;
@@ -423,7 +422,7 @@ impl Unit {
         Ok(self.link.receive(&mut self.session, timeout)?)
     }
 
-    /// The time by which this recorder is waited for; it begins at any moment.
+    /// The time by which the host waits for this recorder, from any start.
     #[must_use]
     pub fn now(&self) -> Duration {
         self.link.now()

@@ -1,4 +1,4 @@
-//! Opening the way to a recorder, whichever it is.
+//! Opening a connection to a recorder, by any kind of endpoint.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -16,7 +16,7 @@ use crate::transport::open::open;
 use crate::transport::open_error::OpenError;
 
 impl Unit {
-    /// Opens the way to a recorder. `baud` is the rate of a serial port in bits per second.
+    /// Opens the connection to a recorder. `baud` is the rate of a serial port in bits per second.
     ///
     /// # Errors
     /// See [`OpenError`].
@@ -24,7 +24,7 @@ impl Unit {
         Unit::open_unless(endpoint, baud, options, &Arc::default())
     }
 
-    /// The same until `stop` is set, where a board on a bus has to be waited for.
+    /// The same, but gives up when `stop` is set while it waits for a board on a bus.
     ///
     /// # Errors
     /// See [`OpenError`].
@@ -53,7 +53,7 @@ impl GeniHost {
     pub fn unit(&self, node: u8, options: Options) -> Unit {
         let Options { timeout, retries } = options;
         let timing = Timing { timeout, retries, line_rate: LineRate::Instant };
-        // A bus has many talkers, and no silence that could be filled.
+        // A bus has many talkers, so two requests at once would fill no silence.
         let session = Session::new(timing).one_at_a_time();
         let link = Box::new(GeniusLink { host: self.clone(), node });
         Unit { link, session, last_position: None }

@@ -21,23 +21,23 @@ pub enum RequestError {
         attempts: u32,
         /// What the line looked like.
         diagnosis: Diagnosis,
-        /// Whether the command, if it did arrive, has changed something: an erase may or may not
+        /// Whether the command may have changed something if it arrived: an erase may or may not
         /// have been done.
         may_have_been_done: bool,
     },
-    /// The recorder did not take the settings; these are in force.
+    /// The recorder did not take the settings.
     Refused {
         /// The configuration in force.
         in_force: Configuration,
     },
-    /// The answer belongs to the command and says something else than was asked for.
+    /// The answer belongs to the command but does not confirm what was asked for.
     UnexpectedReply {
         /// The command.
         command: Code,
     },
-    /// There is no such date or time, so it was not sent: a recorder refuses it by silence.
+    /// The date or time does not exist. It was not sent, because a recorder would just not answer.
     InvalidTime(InvalidTime),
-    /// The log changed under the reading in a way that could not be followed.
+    /// The log was changed during the reading in a way that could not be followed.
     Disturbed(Disturbed),
     /// The line failed.
     Transport(TransportError),

@@ -1,4 +1,4 @@
-//! A recorder's log as plainly as it can be written down, to compare the real reading against.
+//! A recorder's log in its plainest form, to compare the real reading against.
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
 pub(crate) mod unit;
@@ -14,9 +14,9 @@ pub(crate) struct Recorder {
     /// Ring slots in physical order; shorter than `size` until the ring is full.
     slots: Vec<Entry>,
     next_slot: usize,
-    /// Of the present life of the log, all events since it was erased.
+    /// All events in the present life of the log, since it was erased.
     pub(crate) history: Vec<Entry>,
-    /// What the total started from, to reach its wrap quickly.
+    /// The start of the total, to reach its wrap quickly.
     offset: u64,
     /// Makes every event different from all others.
     serial: u32,
@@ -43,7 +43,7 @@ impl Recorder {
         let mut recorder = Recorder::new(size);
         let kept = u64::try_from(size).unwrap() * 3;
         if events > kept {
-            // What nobody can read any more need not be remembered; only its number matters.
+            // Events that can no longer be read need not be remembered; only their number matters.
             recorder.offset = events - kept;
             recorder.next_slot = usize::try_from(recorder.offset).unwrap() % size;
             recorder.slots = vec![event(0); size];
@@ -65,7 +65,7 @@ impl Recorder {
         self.history.push(entry);
     }
 
-    /// Lets changes happen that are not recorded; gives the state after them.
+    /// Makes changes that are not recorded, and returns the state after them.
     pub(crate) fn skip(&mut self, changes: u32) -> u32 {
         self.serial += changes;
         event(self.serial).state.0
@@ -77,7 +77,7 @@ impl Recorder {
         }
     }
 
-    /// Erase command or power loss: to a host they are the same.
+    /// An erase or a loss of power; a host sees no difference.
     pub(crate) fn erase(&mut self) {
         self.slots.clear();
         self.history.clear();
@@ -98,18 +98,18 @@ impl Recorder {
         self.slots.len()
     }
 
-    /// The serial number of the very first event, if the list goes back to it.
+    /// The serial number of the very first event, if the list reaches back to it.
     pub(crate) fn first_serial_known(&self) -> Option<u32> {
         (self.offset == 0).then_some(1)
     }
 
-    /// The sequence of an event of the present life, if the list goes back to it.
+    /// The sequence of an event of the present life, if the list reaches back to it.
     pub(crate) fn sequence(&self, serial_number: u32) -> Option<u64> {
         let index = self.history.binary_search_by_key(&serial_number, serial).ok()?;
         Some(self.offset + u64::try_from(index).unwrap() + 1)
     }
 
-    /// Events since the erase, not modulo anything.
+    /// Events since the erase, without wrapping.
     pub(crate) fn count(&self) -> u64 {
         self.offset + u64::try_from(self.history.len()).unwrap()
     }
@@ -133,8 +133,8 @@ impl Recorder {
     }
 }
 
-/// Event number `serial`, different from every other one: the state is its Gray code, so that from
-/// each event to the next one input changes.
+/// Event number `serial`, different from every other one. The state is its Gray code, so one input
+/// changes from each event to the next.
 pub(crate) fn event(serial: u32) -> Entry {
     let time =
         TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 0 };
@@ -156,7 +156,7 @@ const fn gray(serial: u32) -> u32 {
     serial ^ serial >> 1
 }
 
-/// A delivery in a form that compares and prints well.
+/// A delivery in a form for comparing and printing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Told {
     Event(u32),

@@ -13,28 +13,28 @@ use ser_proto::{
 
 use super::Recorder;
 
-/// What happens to a recorder behind the client's back.
+/// What happens to a recorder without the client's knowledge.
 type Meanwhile = Box<dyn FnMut(&mut Recorder, &mut Configuration, usize) + Send>;
 
-/// Everything that a test can look at and change while the client talks.
+/// Everything that a test can see and change during the conversation.
 pub(crate) struct Fake {
     pub(crate) recorder: Recorder,
     pub(crate) configuration: Configuration,
-    /// The rate at which the recorder talks; the client's rate has to be the same.
+    /// The rate at which the recorder talks; the client must have the same rate.
     pub(crate) unit_rate: u32,
     pub(crate) line_rate: u32,
     /// Whether the client knows that the line has a rate, and waits accordingly.
     pub(crate) has_rate: bool,
     pub(crate) recording: bool,
-    /// How many replies are swallowed from now on.
+    /// How many of the next replies are lost.
     pub(crate) swallow: usize,
-    /// Original recorders do not know the queries.
+    /// Whether the recorder does not know the queries, as original recorders do not.
     pub(crate) original: bool,
-    /// Whether a command is not heard while an answer is on the line.
+    /// Whether a command is lost while an answer is on the line.
     pub(crate) deaf_when_talking: bool,
-    /// After so many more commands the line fails.
+    /// After how many more commands the line fails.
     pub(crate) breaks_in: Option<usize>,
-    /// The line fails with this.
+    /// The kind of error with which it fails.
     pub(crate) broken: Option<io::ErrorKind>,
     pub(crate) commands: Vec<Command>,
     /// Called after each command with its number.
@@ -170,8 +170,7 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    /// Over a line of which the client does not know the rate: what is not answered is given up
-    /// soon.
+    /// A line whose rate the client does not know. What is not answered is given up soon.
     pub(crate) fn new(size: u16) -> Bench {
         Bench::with(size, false)
     }

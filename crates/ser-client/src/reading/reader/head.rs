@@ -1,20 +1,20 @@
-//! The head of the log: where the header of the latest reply said that the next event will go, and
-//! which event is in which slot then.
+//! The head of the log: the place of the next event by the header of the latest reply, and the
+//! event in each slot.
 //!
-//! Events have a running index here, which does not wrap: the total that the recorder shows,
-//! unwrapped, and [`BASE`] added.
+//! Events have a running index here, which does not wrap: the unwrapped total of the recorder plus
+//! [`BASE`].
 
 use crate::reading::disturbed::Disturbed;
 use crate::reading::log_position::LogPosition;
 
-/// The index that total 0 gets, large enough that no difference of indices goes below zero.
+/// The index of total 0, large enough that no difference of indices is negative.
 pub(super) const BASE: u64 = 1 << 32;
 
-/// Sequences above this leave the arithmetic no room. No recorder will ever count so far.
+/// Sequences above this leave the arithmetic no room. No recorder will ever count that far.
 const MAX_SEQUENCE: u64 = 1 << 62;
 
-/// Events between two replies of a reading that are believed: half of what the total can tell. A
-/// recorder needs half a minute for so many, at its fastest.
+/// The most events between two replies of a reading that are believed: half the range of the total.
+/// A recorder needs half a minute for that many, at its fastest.
 const MAX_HAPPENED: u64 = 1 << 15;
 
 /// The place of the next event.
@@ -43,8 +43,8 @@ impl Head {
     pub(super) fn moved_to(self, position: LogPosition) -> Result<Head, Disturbed> {
         let slot = slot_in_ring(position, self.size)?;
         let happened = u64::from(position.total.wrapping_sub(low_16(self.total)));
-        // A total that went back looks as if almost 65536 events had happened. Where so many have
-        // indeed, a new reading from the cursor sorts it out as well.
+        // A total that went back looks as if almost 65536 events had happened. If that many have
+        // indeed happened, a new reading from the cursor resolves that, too.
         if happened > MAX_HAPPENED || slot != (self.slot + happened) % self.size {
             return Err(Disturbed::Changed);
         }
@@ -73,13 +73,13 @@ impl Head {
         self.total.saturating_sub(self.size)
     }
 
-    /// How the recorder shows it.
+    /// The position as the recorder shows it.
     pub(super) fn position(&self) -> LogPosition {
         LogPosition { total: low_16(self.total), next_slot: low_16(self.slot) }
     }
 }
 
-/// The index of the event after the one with this sequence, which may be anything.
+/// The index of the event after the one with this sequence, whatever its value.
 pub(super) fn index_after(sequence: u64) -> u64 {
     BASE + sequence.min(MAX_SEQUENCE)
 }
@@ -89,7 +89,8 @@ pub(super) const fn low_16(value: u64) -> u16 {
     value as u16
 }
 
-/// A slot outside of the ring: its size is not what was said, or it has just been made larger.
+/// Refuses a slot outside the ring: its size is not the given one, or the ring has just been made
+/// larger.
 fn slot_in_ring(position: LogPosition, size: u64) -> Result<u64, Disturbed> {
     let slot = u64::from(position.next_slot);
     if slot < size { Ok(slot) } else { Err(Disturbed::WrongSize) }

@@ -1,4 +1,4 @@
-//! The first request of a reading: where does the log stand, and is the anchor in its place?
+//! The first request of a reading, which finds the position of the log and the anchor's place.
 
 use ser_proto::MAX_SIZE;
 
@@ -12,7 +12,7 @@ use crate::reading::disturbed::Disturbed;
 use crate::reading::log_position::LogPosition;
 use crate::reading::read_request::ReadRequest;
 
-/// What a reading is given, and whether the first request is under way.
+/// What a reading is given, and whether its first request is under way.
 #[derive(Debug)]
 pub(super) struct Locating {
     size: u64,
@@ -29,7 +29,7 @@ impl Locating {
         Locating { size, cursor, near: None, asked: None, keeps_up: false }
     }
 
-    /// Takes the log to stand at a position, or a little further.
+    /// Assumes that the log stands at a position or a little after it.
     pub(super) fn start_near(&mut self, position: LogPosition) {
         let in_ring = u64::from(position.next_slot) < self.size;
         if in_ring && self.cursor.is_some_and(|cursor| cursor.anchor.is_some()) {
@@ -42,7 +42,7 @@ impl Locating {
         if self.asked.is_some() {
             return None;
         }
-        // Where the last entry that was delivered probably is.
+        // The probable slot of the last entry that was delivered.
         let last_slot = |near: LogPosition| (u64::from(near.next_slot) + self.size - 1) % self.size;
         let near = self.near.map(|near| entries(self.size, last_slot(near), 2));
         self.asked = Some(near.unwrap_or(ReadRequest::POSITION));
@@ -73,7 +73,7 @@ impl Locating {
         Ok(Progress::new(head, next, self.cursor, self.keeps_up))
     }
 
-    /// Takes the entries of the first reply, and finds what the reading stands on.
+    /// Takes the entries of the first reply and finds what the reading stands on.
     pub(super) fn begin(
         &self,
         progress: &mut Progress,
@@ -96,9 +96,8 @@ impl Locating {
     }
 }
 
-/// The log was empty when it was read last. So the total tells how many entries there are, if it
-/// has not counted once around. Total and next slot part, if the ring has gone round or was
-/// resized.
+/// The log was empty at the last reading. The total then gives the number of entries, unless it has
+/// wrapped. Total and next slot disagree if the ring has turned or was resized.
 fn begin_without_anchor(progress: &mut Progress, cursor: Cursor, is_empty: bool) {
     progress.footing = Footing::Total;
     let behind = progress.behind();

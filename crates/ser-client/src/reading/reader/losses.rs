@@ -1,7 +1,7 @@
 //! What is missing between the events that are delivered.
 //!
-//! A loss is delivered with the event after it. If the reading ends before, the cursor has not
-//! moved past the loss, and the next reading finds it again.
+//! A loss is delivered with the event after it. If the reading ends first, the cursor has not
+//! passed the loss, and the next reading finds it again.
 
 use ser_proto::Entry;
 
@@ -14,7 +14,7 @@ struct Pending {
     restarted: bool,
     /// The log is read for the first time, from its beginning or from its oldest entry.
     begun: bool,
-    /// Overwritten before the log was first seen.
+    /// How many events were overwritten before the log was first seen.
     at_least: u64,
     overwritten: u64,
 }
@@ -25,7 +25,7 @@ pub(super) struct Losses {
     pending: Pending,
     /// Events that are known to be lost.
     pub(super) lost: u32,
-    /// Places at which inputs had changed and nothing was recorded.
+    /// How many times inputs had changed without being recorded.
     pub(super) unrecorded: u32,
     /// Whether the log began anew.
     pub(super) restarted: bool,
@@ -36,19 +36,21 @@ impl Losses {
         self.pending != Pending::default()
     }
 
-    /// The log began anew. That is a loss only to a host that has read the one before.
+    /// Notes that the log began anew. That is a loss only to a host that has read the log before
+    /// it.
     pub(super) fn log_restarted(&mut self, was_read: bool) {
-        // What was counted for the log that is gone is worth nothing.
+        // What was counted for the old log is meaningless.
         self.pending = Pending { restarted: was_read, ..Pending::default() };
     }
 
-    /// The log is read for the first time. So many events were overwritten before, at least.
+    /// Notes that the log is read for the first time, and that at least this many events were
+    /// overwritten.
     pub(super) fn log_begun(&mut self, at_least: u64) {
         self.pending.begun = true;
         self.pending.at_least = at_least;
     }
 
-    /// So many events were overwritten before they were read.
+    /// Notes that this many events were overwritten before they were read.
     pub(super) fn overwritten(&mut self, count: u64) {
         self.pending.overwritten += count;
     }
@@ -71,8 +73,8 @@ impl Losses {
         }
     }
 
-    /// Delivers what changed without an entry between the event at the cursor and the next one, if
-    /// these are neighbours.
+    /// Delivers the inputs that changed without an entry between the event at the cursor and the
+    /// next one, if the two are neighbours.
     pub(super) fn deliver_unrecorded(
         &mut self,
         cursor: Option<Cursor>,

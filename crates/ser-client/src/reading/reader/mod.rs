@@ -4,10 +4,10 @@
 //! wrap of the 16-bit total, and with events arriving meanwhile. It counts exactly what the
 //! recorder overwrote before it could be read.
 //!
-//! The reader performs no I/O. Send what [`request`](LogReader::request) asks for, and hand in the
-//! replies with [`take`](LogReader::take), until there is no request any more and no reply is to
-//! come. One request at a time is enough. With two, the next reply can follow the last one without
-//! a gap.
+//! The reader performs no I/O. The caller sends what [`request`](LogReader::request) asks for and
+//! hands in the replies with [`take`](LogReader::take), until there is no request and no reply is
+//! awaited. One request at a time is enough. With two, the next reply can follow the last one
+//! without a gap.
 //!
 //! # How it works
 //!
@@ -33,8 +33,8 @@
 //! them. So the proof costs one entry in eighty. The same is done where the end of the ring leaves
 //! the anchor alone in its request.
 //!
-//! Reading ahead must not cost the oldest events their lives. It goes only so far that the anchor,
-//! which is overwritten next, is still there as long as events come no faster than they are read.
+//! Reading ahead must not cost the oldest events. It goes only so far that the anchor, which is
+//! overwritten next, is still there as long as events come no faster than they are read.
 //!
 //! If another entry or none is in the place of the anchor, the log was erased or lost its contents.
 //! Reading then begins anew with [`Lost::LogRestarted`](crate::Lost::LogRestarted).
@@ -73,7 +73,7 @@
 //!   the anchor must still be there, the log seems to have begun anew.
 //! - An erase or a loss of power looks like overwriting if it is followed by at least as many
 //!   events as the log holds before the next look at the anchor. The events are delivered. The
-//!   count of lost ones is that of the totals, whatever it is worth.
+//!   count of lost ones is taken from the totals, although it is then meaningless.
 //! - An event that is recorded after an erase passes for the anchor if it is in the same slot, with
 //!   the same inputs and, since the clock was set back, with the same time.
 //! - A log that was empty has no anchor. Events that came and were erased before the next reading
@@ -83,8 +83,8 @@
 //! - Events may come so fast that the oldest entries are overwritten while the request for them is
 //!   on its way, or while the ring is looked at once more. The reader then gives up some more of
 //!   the oldest, to get ahead of the recorder. They are counted as lost like the rest.
-//! - A resize of which nobody knows, before the first reading of a program, puts another entry in
-//!   the place of the anchor. It looks as if the log had begun anew.
+//! - A resize before the first reading of a program puts another entry in the place of the anchor.
+//!   If the program does not know of it, the log seems to have begun anew.
 //! - A resize in the middle of a reading shows when total and next slot part, when the anchor is in
 //!   another place, or when the ring no longer has the size that it had before the anchor was given
 //!   up. If several resizes follow each other within one reading and end where they began, all of
@@ -127,7 +127,7 @@ use locating::Locating;
 use outstanding::Purpose;
 use progress::{Batch, Progress};
 
-/// A reading needs a few replies now and then that bring no event. So many in a row mean that
+/// A reading sometimes needs a few replies that bring no event. This many in a row mean that
 /// something is wrong.
 const MAX_FRUITLESS: u32 = 32;
 
@@ -135,15 +135,15 @@ const MAX_FRUITLESS: u32 = 32;
 #[derive(Debug)]
 pub struct LogReader {
     locating: Locating,
-    /// Nothing before the first reply.
+    /// `None` before the first reply.
     progress: Option<Progress>,
     /// Replies in a row that have brought no event.
     fruitless: u32,
 }
 
 impl LogReader {
-    /// Reads what has happened since `cursor`, or everything, from a log of `size` entries (1–2048;
-    /// what is outside is taken for the nearest).
+    /// Reads what has happened since `cursor`, or everything, from a log of `size` entries. A size
+    /// outside 1–2048 is taken for the nearest one inside.
     #[must_use]
     pub fn new(cursor: Option<Cursor>, size: u16) -> LogReader {
         LogReader { locating: Locating::new(cursor, size), progress: None, fruitless: 0 }
@@ -160,8 +160,8 @@ impl LogReader {
         self
     }
 
-    /// Goes on for as long as there is enough for a full reply. So a reading does not have to find
-    /// its place again and again while events come fast.
+    /// Continues as long as there is enough for a full reply. The reading then need not find its
+    /// place again and again while events come fast.
     ///
     /// Without this, a reading ends when it has come past what had happened when it began.
     #[must_use]
@@ -173,8 +173,8 @@ impl LogReader {
         self
     }
 
-    /// The entries to ask for next, each time others: several requests may be under way. `None` if
-    /// there are none before a reply comes. The reading is done when none [is
+    /// The entries to ask for next. Each call returns others, because several requests may be under
+    /// way. `None` if there are none before a reply comes. The reading is done when no reply [is
     /// awaited](Self::is_waiting) either.
     pub fn request(&mut self) -> Option<ReadRequest> {
         match &mut self.progress {
@@ -195,10 +195,9 @@ impl LogReader {
         }
     }
 
-    /// Takes the reply to a [`request`](Self::request) and delivers what it brings, or what it
-    /// proves. Replies have to be taken in the order in which the recorder sent them, which may be
-    /// another one than that of the requests. A reply that begins with an entry that no request
-    /// begins with is ignored.
+    /// Takes the reply to a [`request`](Self::request) and delivers what it brings or proves.
+    /// Replies must be taken in the order in which the recorder sent them, which need not be that
+    /// of the requests. A reply is ignored if its first entry is not that of any request.
     ///
     /// # Errors
     /// See [`Disturbed`].
@@ -224,7 +223,7 @@ impl LogReader {
         self.judge(delivered_before)
     }
 
-    /// Ends a reading that goes on without bringing events.
+    /// Ends a reading that no longer brings events.
     fn judge(&mut self, delivered_before: u32) -> Result<(), Disturbed> {
         let Some(progress) = &mut self.progress else { return Ok(()) };
         progress.leave_anchor_if_overrun();
@@ -233,7 +232,7 @@ impl LogReader {
         if self.fruitless > MAX_FRUITLESS { Err(Disturbed::NoProgress) } else { Ok(()) }
     }
 
-    /// Where the next reading has to begin; it only ever moves past what was delivered.
+    /// Where the next reading must begin. It never moves past what was delivered.
     #[must_use]
     pub const fn cursor(&self) -> Option<Cursor> {
         match &self.progress {
@@ -249,7 +248,7 @@ impl LogReader {
         u32::try_from(self.progress.as_ref().map_or(0, held)).unwrap_or(u32::MAX)
     }
 
-    /// What the reading came to so far.
+    /// The result of the reading so far.
     #[must_use]
     pub fn summary(&self) -> Summary {
         let nothing = Summary {
@@ -263,7 +262,7 @@ impl LogReader {
     }
 }
 
-/// The entries of a reply, no more than were asked for.
+/// The entries of a reply, at most as many as were asked for.
 fn batch(reply: &ReadReply, request: ReadRequest) -> Batch<'_> {
     let asked_for = reply.entries.len().min(request.count.into());
     let entries = reply.entries.get(..asked_for).unwrap_or_default();

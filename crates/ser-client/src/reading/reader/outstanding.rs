@@ -8,15 +8,15 @@ use crate::reading::read_request::ReadRequest;
 /// What a request is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Purpose {
-    /// The last slots of the ring, or those behind the head: which of them hold an entry?
+    /// The last slots of the ring, or those after the head: which of them hold an entry?
     Probe,
     /// Events from the next one on, without an anchor.
     Plain,
     /// Events from this index on. They are kept until a reply has shown the anchor.
     Events(u64),
-    /// Whatever is in these slots by then, as events come faster than they can be read.
+    /// Whatever these slots hold by then, because events come faster than they can be read.
     Overrun,
-    /// Nothing any more: the log has begun anew.
+    /// Nothing any more, because the log has begun anew.
     Abandoned,
 }
 
@@ -42,8 +42,8 @@ impl Asked {
 pub(super) struct Outstanding(VecDeque<Asked>);
 
 impl Outstanding {
-    /// Adds a request, unless its reply could be taken for that to another one: the first entry is
-    /// all that tells replies apart.
+    /// Adds a request, unless its reply could be taken for that to another one: only the first
+    /// entry tells replies apart.
     pub(super) fn add(&mut self, asked: Asked) -> Option<ReadRequest> {
         if self.0.iter().any(|other| other.request.start == asked.request.start) {
             return None;
@@ -58,7 +58,7 @@ impl Outstanding {
         self.0.remove(place)
     }
 
-    /// Makes all requests mean nothing. Their replies are still to come.
+    /// Makes all requests meaningless. Their replies are still to come.
     pub(super) fn abandon(&mut self) {
         self.0.iter_mut().for_each(|asked| asked.purpose = Purpose::Abandoned);
     }

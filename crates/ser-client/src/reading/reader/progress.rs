@@ -29,7 +29,7 @@ pub(super) struct Progress {
     pub(super) head: Head,
     /// Index of the next event to deliver.
     pub(super) next: u64,
-    /// The reading is done when `next` is here.
+    /// The reading is done when `next` gets here.
     pub(super) target: u64,
     pub(super) footing: Footing,
     /// Whether the anchor has been seen in its place during this reading.
@@ -38,12 +38,12 @@ pub(super) struct Progress {
     pub(super) outstanding: Outstanding,
     /// What is known of the events from `next` on.
     pub(super) ahead: ReadAhead,
-    /// Replies that have brought events since the anchor was last seen in its place.
+    /// Replies with events since the anchor was last seen in its place.
     pub(super) unproven: u64,
-    /// The most entries that a reply brings.
+    /// The most entries that one reply holds.
     pub(super) most: u64,
     pub(super) overrun: Overrun,
-    /// Whether the reading goes on until it has caught up.
+    /// Whether the reading continues until it has caught up.
     pub(super) keeps_up: bool,
     pub(super) losses: Losses,
     pub(super) cursor: Option<Cursor>,
@@ -90,12 +90,12 @@ impl Progress {
         Ok(())
     }
 
-    /// Events that are not delivered yet, whether the ring still holds them or not.
+    /// How many events are not delivered yet, whether or not the ring still holds them.
     pub(super) fn behind(&self) -> u64 {
         self.head.total - self.next
     }
 
-    /// Whether everything is delivered that had happened when the reading began.
+    /// Whether everything that had happened when the reading began is delivered.
     pub(super) fn is_at_target(&self) -> bool {
         // A loss is delivered with the event after it.
         self.next >= self.target && !self.losses.is_pending()
@@ -114,13 +114,13 @@ impl Progress {
         self.next = index;
     }
 
-    /// Keeps entries that are events `first`, `first + 1` and so on, as far as these have happened
-    /// and the ring still held them.
+    /// Keeps entries as events `first`, `first + 1` and so on, if these have happened and the ring
+    /// still held them.
     pub(super) fn keep(&mut self, first: u64, request: ReadRequest, batch: Batch<'_>) {
         let Head { size, total, .. } = self.head;
         let len = batch.entries.len() as u64;
         if (1..u64::from(request.count)).contains(&len) && first + len < total {
-            // The log holds more, so a message takes no more here.
+            // The log holds more, so a reply takes no more entries than this.
             self.most = self.most.min(len);
         }
         for (index, &entry) in (first..total).zip(batch.entries) {
@@ -130,7 +130,7 @@ impl Progress {
         }
     }
 
-    /// Keeps the entry of an event, unless it is delivered or given up.
+    /// Keeps the entry of an event, unless it is already delivered or given up.
     pub(super) fn keep_event(&mut self, index: u64, entry: Entry, model: Model) {
         let offset = index.checked_sub(self.next).and_then(|offset| usize::try_from(offset).ok());
         if let Some(offset) = offset {
@@ -138,7 +138,7 @@ impl Progress {
         }
     }
 
-    /// Delivers what is known of event `next`, `next + 1` and so on.
+    /// Delivers event `next`, `next + 1` and so on, as far as they are known.
     pub(super) fn deliver(&mut self, on: &mut dyn FnMut(Delivery)) {
         self.unproven = 0;
         while let Some((entry, model)) = self.ahead.pop() {
@@ -150,19 +150,19 @@ impl Progress {
             on(Delivery::Event { entry_number, sequence: Some(sequence), entry, model });
             self.delivered = self.delivered.saturating_add(1);
             self.cursor = Some(Cursor { sequence, is_exact: self.is_exact, anchor: Some(entry) });
-            // Nobody looks for the anchor while the reading is overrun.
+            // The anchor is not looked for while the reading is overrun.
             self.footing =
                 if self.overrun.is_on() { Footing::RingSize } else { Footing::Anchor(entry) };
             self.checked = true;
         }
     }
 
-    /// Delivers everything that is known, and counts what is missing in between, as far as that is
-    /// overwritten or given up.
+    /// Delivers all known events. Missing events between them are counted if they are overwritten
+    /// or given up.
     pub(super) fn deliver_past_gaps(&mut self, on: &mut dyn FnMut(Delivery)) {
         let end = self.overrun.given_up.max(self.head.oldest());
         self.deliver(on);
-        // A loss is counted when the event after it is there.
+        // A loss is counted when the event after it is known.
         while let Some(known) = self.ahead.first_known().map(|offset| self.next + offset)
             && known <= end
         {

@@ -1,10 +1,11 @@
-//! Entries that were read before their turn, and wait until a reply has proven them.
+//! Entries that were read before their turn and wait until a reply proves them.
 
 use std::collections::VecDeque;
 
 use ser_proto::{Entry, Model};
 
-/// What is known of the events from the next one on. The reach of the requests bounds it.
+/// The known entries of the events from the next one on. The reach of the requests bounds their
+/// number.
 #[derive(Debug, Default)]
 pub(super) struct ReadAhead {
     /// In the order of the events, with holes; the last one is known.
@@ -12,7 +13,7 @@ pub(super) struct ReadAhead {
 }
 
 impl ReadAhead {
-    /// Keeps the entry of the event that comes `offset` after the first.
+    /// Keeps the entry of the event at `offset` after the first.
     pub(super) fn keep(&mut self, offset: usize, entry: Entry, model: Model) {
         if self.entries.len() <= offset {
             self.entries.resize(offset + 1, None);
@@ -22,20 +23,21 @@ impl ReadAhead {
         }
     }
 
-    /// Whether the entry of the event that comes `offset` after the first is known.
+    /// Whether the entry of the event at `offset` after the first is known.
     pub(super) fn knows(&self, offset: u64) -> bool {
         let offset = usize::try_from(offset).unwrap_or(usize::MAX);
         matches!(self.entries.get(offset), Some(Some(_)))
     }
 
-    /// Takes out the entry of the first event, if it is known. The next event is the first then.
+    /// Takes out the entry of the first event, if it is known. The next event then becomes the
+    /// first.
     pub(super) fn pop(&mut self) -> Option<(Entry, Model)> {
         let known = self.entries.front().copied().flatten()?;
         self.entries.pop_front();
         Some(known)
     }
 
-    /// How many events come before the first that is known.
+    /// How many events come before the first known one.
     pub(super) fn first_known(&self) -> Option<u64> {
         self.entries.iter().position(Option::is_some).map(|offset| offset as u64)
     }

@@ -1,4 +1,4 @@
-//! What a reply with events does: which events its entries are, and whether they may be delivered.
+//! Handling a reply with events: which events its entries are, and whether they may be delivered.
 
 use super::footing::Footing;
 use super::growth::Growth;
@@ -10,7 +10,7 @@ use crate::reading::read_request::ReadRequest;
 
 /// What a reply shows of the anchor.
 enum AnchorSeen {
-    /// Nothing: it is not asked for, it has been overwritten, or there is none.
+    /// Nothing, because the anchor was not asked for, has been overwritten, or does not exist.
     NotAskedFor,
     /// The reply ends before it.
     Missing,
@@ -39,7 +39,7 @@ impl Progress {
     }
 
     /// Takes events from index `first` on. If the anchor is among them and in its place, everything
-    /// that was read before its turn is of the same log, and is delivered.
+    /// that was read before its turn is from the same log and is delivered.
     pub(super) fn take_events(
         &mut self,
         first: u64,
@@ -49,12 +49,12 @@ impl Progress {
     ) -> Result<(), Disturbed> {
         let is_empty = batch.entries.is_empty();
         match self.look_for_anchor(first, request, batch) {
-            // There are events in these slots, if the ring is what it was.
+            // There are events in these slots if the ring is unchanged.
             AnchorSeen::NotAskedFor if is_empty => Err(Disturbed::Changed),
             // The log is shorter than it must be, or the reply is.
             AnchorSeen::Missing if is_empty => self.not_full(on),
-            // It was there a moment ago. Perhaps the ring was resized, and the slots mean something
-            // else now.
+            // The anchor was there a moment ago. The ring may have been resized, and the slots mean
+            // something else now.
             AnchorSeen::Replaced if self.checked => Err(Disturbed::Changed),
             AnchorSeen::Replaced => {
                 self.restart();
@@ -82,7 +82,7 @@ impl Progress {
     fn look_for_anchor(&self, first: u64, request: ReadRequest, batch: Batch<'_>) -> AnchorSeen {
         let Footing::Anchor(anchor) = self.footing else { return AnchorSeen::NotAskedFor };
         let place = (self.next - 1).checked_sub(first).filter(|&at| at < request.count.into());
-        // If it has been overwritten meanwhile, the ring is probed next.
+        // If the anchor has been overwritten meanwhile, the ring is probed next.
         let Some(place) = place.filter(|_| self.behind() < self.head.size) else {
             return AnchorSeen::NotAskedFor;
         };
@@ -117,8 +117,8 @@ impl Progress {
             self.overrun.widen_margin(self.head.happened);
             return Ok(());
         }
-        // The ring goes round during one request and is the same afterwards. Nothing but what the
-        // reply holds can be had.
+        // The ring turns during one request and is the same afterwards. Only the entries of the
+        // reply are available.
         let slot = u64::from(request.start) - 1;
         self.skip_to(self.next.max(self.head.latest_in(slot)));
         self.keep(self.next, request, batch);
@@ -126,8 +126,8 @@ impl Progress {
         Ok(())
     }
 
-    /// Delivers what has been read without an anchor. Where the ring has gone round, it has to show
-    /// its size once more before: somebody may have changed it.
+    /// Delivers what was read without an anchor. If the ring has turned, it must first show its
+    /// size once more, because another host may have changed it.
     fn deliver_or_hold(&mut self, on: &mut dyn FnMut(Delivery)) {
         if self.head.holds_all() {
             self.deliver(on);
@@ -137,7 +137,7 @@ impl Progress {
         }
     }
 
-    /// Keeps all entries of a reply that are new, whichever events have come to these slots by now.
+    /// Keeps all new entries of a reply, whichever events are in these slots by now.
     fn take_overrun(&mut self, request: ReadRequest, batch: Batch<'_>) {
         for (slot, &entry) in (u64::from(request.start) - 1..).zip(batch.entries) {
             self.keep_event(self.head.latest_in(slot), entry, batch.model);

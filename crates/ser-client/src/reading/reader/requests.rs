@@ -1,8 +1,8 @@
 //! What is asked next, while replies are still to come.
 //!
 //! With an anchor, events are read ahead of it up to `DEPTH` replies, and then the anchor itself is
-//! asked for. While events come faster than that, requests for events and probes of the ring take
-//! turns. Everything else is asked alone.
+//! asked for. If events come faster than that, requests for events and probes of the ring
+//! alternate. Everything else is asked for alone.
 
 use ser_proto::{MAX_ENTRIES, MAX_SIZE};
 
@@ -13,17 +13,17 @@ use super::outstanding::{Asked, Purpose};
 use super::progress::Progress;
 use crate::reading::read_request::ReadRequest;
 
-/// Replies for one look at the anchor, at most: it costs one entry in so many replies.
+/// The most replies for one look at the anchor, which thus costs one entry in this many replies.
 const DEPTH: u64 = 8;
 
-/// How far beyond the next event others are asked for.
+/// How far beyond the next event the requests go.
 const REACH: u64 = 2 * DEPTH * MAX_ENTRIES as u64;
 
-/// Where the reading will be when everything that was asked for has come.
+/// Where the reading will be when all requests are answered.
 struct Expected {
     /// Index of the next event to deliver.
     next: u64,
-    /// Replies that no later one has proven.
+    /// Replies that are not proven by a later one.
     unproven: u64,
 }
 
@@ -51,17 +51,16 @@ impl Progress {
         }
     }
 
-    /// Asks when no other reply is to come.
+    /// Makes a request if no other reply is awaited.
     fn alone(&self, purpose: Purpose, request: ReadRequest) -> Option<Asked> {
         self.outstanding.is_empty().then_some(Asked { request, purpose })
     }
 
-    /// Asks for events that come after the anchor. Those that do not fit the request for the anchor
-    /// itself come first, up to `DEPTH` replies in all. Then come the anchor and the events that do
-    /// fit.
+    /// Asks for events after the anchor. Events that do not fit the request for the anchor itself
+    /// come first, up to `DEPTH` replies in all. The anchor and the events that do fit come last.
     fn plan_events(&self) -> Option<Asked> {
         if !self.checked && !self.outstanding.is_empty() {
-            // It may be another log.
+            // The log may be another one.
             return None;
         }
         let expected = self.expected();
@@ -92,7 +91,7 @@ impl Progress {
         for (place, asked) in self.outstanding.iter().enumerate() {
             let Some(events) = asked.events() else { continue };
             if events.contains(&(expected.next - 1)) {
-                // It proves what comes before it.
+                // This request proves the events before it.
                 let next = self.unasked_from(expected.next, place + 1);
                 expected = Expected { next, unproven: 0 };
             } else {
@@ -102,25 +101,26 @@ impl Progress {
         expected
     }
 
-    /// How many events fit the request that begins with the anchor, when `next` is the event after
+    /// How many events fit the request that begins with the anchor, if `next` is the event after
     /// it.
     fn with_anchor(&self, next: u64) -> u64 {
         self.most.min(self.head.size - self.head.slot_of(next - 1)) - 1
     }
 
-    /// Replies for one look at the anchor. As long as events come no faster than they can be read,
-    /// the anchor must not be overwritten meanwhile.
+    /// How many replies there may be for one look at the anchor. The anchor must not be overwritten
+    /// in that time if events come no faster than they can be read.
     fn depth(&self, next: u64) -> u64 {
         let least = if self.with_anchor(next) == 0 { 2 } else { 1 };
-        // What is read ahead is lost with the anchor: the faster events come, the less is risked.
+        // What is read ahead is lost with the anchor, so the faster events come, the less is read
+        // ahead.
         let most = MAX_ENTRIES as u64;
         let pace = self.overrun.pace;
         let per_reply = if pace > most { 2 * pace } else { most };
         ((next - 1).saturating_sub(self.head.oldest()) / per_reply).clamp(least, DEPTH)
     }
 
-    /// Asks for events, and for a look at the size of the ring, in turn: each while the other one
-    /// is on the line.
+    /// Asks for events and for the size of the ring in turn, each while the other reply is on the
+    /// line.
     fn plan_overrun(&mut self) -> Option<Asked> {
         let is_probe = |asked: &Asked| asked.purpose == Purpose::Probe;
         let is_probing = self.outstanding.iter().any(is_probe);
@@ -139,7 +139,8 @@ impl Progress {
         Some(Asked { request, purpose: Purpose::Overrun })
     }
 
-    /// The first event from `index` on that is neither known nor asked for by the first `requests`.
+    /// The first event from `index` on that is neither known nor asked for by the first `requests`
+    /// requests.
     fn unasked_from(&self, index: u64, requests: usize) -> u64 {
         (index..).find(|&index| !self.is_known_or_asked(index, requests)).unwrap_or(index)
     }
@@ -150,12 +151,12 @@ impl Progress {
         is_known || self.outstanding.asks_for(index, requests)
     }
 
-    /// Asks for `count` events from `index` on, as far as one request goes.
+    /// Asks for `count` events from `index` on, as far as one request reaches.
     fn events(&self, index: u64, count: u64) -> ReadRequest {
         entries(self.head.size, self.head.slot_of(index), count.min(self.most))
     }
 
-    /// Asks for the last entry of the ring, and for one more that must not exist.
+    /// Asks for the last entry of the ring and for one more, which must not exist.
     fn probe(&self) -> ReadRequest {
         let Head { size, .. } = self.head;
         let count = if size < MAX_SIZE.into() { 2 } else { 1 };
@@ -163,7 +164,8 @@ impl Progress {
     }
 }
 
-/// Asks for `count` entries from `slot` on, as far as one request goes in a ring of `size` entries.
+/// Asks for `count` entries from `slot` on, as far as one request reaches in a ring of `size`
+/// entries.
 pub(super) fn entries(size: u64, slot: u64, count: u64) -> ReadRequest {
     let count = count.min(size - slot).clamp(1, MAX_ENTRIES as u64);
     ReadRequest { start: low_16(slot + 1), count: u8::try_from(count).unwrap_or(1) }

@@ -1,4 +1,4 @@
-//! What the ring tells of the log: whether it is full, and so whether it was erased or resized.
+//! What the ring shows of the log: whether it is full, and so whether it was erased or resized.
 //!
 //! A full ring holds the last `size` events, so its size says which event an entry is. A ring that
 //! is not full holds every event since the erase, unless it was made larger.
@@ -17,7 +17,7 @@ use ser_proto::MAX_ENTRIES;
 const TOTAL_WRAPS_AT: u64 = 1 << 16;
 
 impl Progress {
-    /// Takes the reply to a probe: `entries` of the slots that it asked for hold an entry.
+    /// Takes the reply to a probe: `entries` of the probed slots hold an entry.
     pub(super) fn probed(
         &mut self,
         request: ReadRequest,
@@ -58,13 +58,13 @@ impl Progress {
             }
             self.overrun.widen_margin(self.head.happened);
         } else if self.behind() < size {
-            // It was asked while the reading was overrun, which is over.
+            // The probe was made while the reading was overrun, which is over.
             return Ok(());
         } else if self.overrun.is_fast() && (self.checked || self.keeps_up) {
-            // A moment ago nothing was lost, and events go on coming faster than they are read.
+            // Nothing was lost a moment ago, and events still come faster than they are read.
             self.overrun.widen_margin(self.overrun.pace);
         }
-        // What was read ahead cannot be proven any more: it may be of a log that is gone.
+        // What was read ahead can no longer be proven, because it may be from a log that is gone.
         self.forget_read_ahead();
         self.skip_to(self.head.oldest() + self.overrun.margin.min(size / 2));
         self.footing = Footing::RingSize;
@@ -75,7 +75,7 @@ impl Progress {
     pub(super) fn not_full(&mut self, on: &mut dyn FnMut(Delivery)) -> Result<(), Disturbed> {
         let held = self.head.slot;
         let behind = self.behind();
-        // Nothing has been thrown away since the erase, so the anchor would be there.
+        // Nothing has been discarded since the erase, so the anchor would be there.
         let is_anchored = self.footing.is_anchor();
         if self.head.holds_all() && (is_anchored || behind > held) {
             self.restart();
@@ -96,19 +96,19 @@ impl Progress {
             self.deliver(on);
             return Ok(());
         }
-        // The ring is larger than before, and what did not fit the smaller one is gone.
+        // The ring is larger than before, and what did not fit the smaller ring is gone.
         self.skip_to(self.next.max(self.head.total - held));
         Ok(())
     }
 
-    /// Begins a log of which nothing is known but that it holds `held` entries.
+    /// Begins a log of which only the number of entries is known.
     fn count(&mut self, held: u64, on: &mut dyn FnMut(Delivery)) -> Result<(), Disturbed> {
         let shown = u64::from(low_16(self.head.total));
         if held == 0 && shown != 0 {
             return Err(Disturbed::WrongSize);
         }
-        // Only the total is known of a log that is seen for the first time. Where it is less than
-        // what the log holds, it has wrapped.
+        // Only the total is known of a log that is seen for the first time. If it is less than the
+        // number of entries, it has wrapped.
         let total = BASE + if shown < held { shown + TOTAL_WRAPS_AT } else { shown };
         self.head.total = total;
         self.next = total - held;
@@ -124,7 +124,8 @@ impl Progress {
         Ok(())
     }
 
-    /// The log is not the one that was read last. It is read from its beginning.
+    /// Begins anew, because the log is not the one that was read last. It is read from its
+    /// beginning.
     pub(super) fn restart(&mut self) {
         self.losses.log_restarted(self.cursor.is_some());
         self.footing = Footing::Unknown;
