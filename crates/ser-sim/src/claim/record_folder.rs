@@ -44,7 +44,7 @@ fn open_own(path: &Path) -> Result<File, FolderFault> {
     let folder = match openat(CWD, path, flags, Mode::empty()) {
         Ok(folder) => File::from(folder),
         Err(Errno::NOTDIR | Errno::LOOP) => return Err(FolderFault::NoFolder),
-        // Made by somebody else, for himself: the place itself has let us look for it.
+        // Somebody else made it for himself alone: the place itself has let us look for it.
         Err(Errno::ACCESS) => return Err(FolderFault::NotYours),
         Err(errno) => return Err(other(errno)),
     };

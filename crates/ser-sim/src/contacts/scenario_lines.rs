@@ -1,7 +1,7 @@
 //! The lines of contact scenarios, taken from bytes as they come.
 //!
 //! A file holds one scenario. A stream holds any number: an empty line ends one, and the next
-//! starts its milliseconds afresh.
+//! counts its milliseconds from zero again.
 
 use std::collections::BTreeMap;
 use std::mem;
@@ -11,7 +11,7 @@ use ser_proto::Model;
 use crate::contacts::scenario_error::{ScenarioError, ScenarioFault};
 use crate::contacts::step::Step;
 
-/// No step comes near this; a longer line is some other file.
+/// No step comes near this length. A longer line is from some other kind of file.
 const MAX_LINE_LEN: usize = 1024;
 
 const HEADER: [&str; 3] = ["ms", "input", "state"];
@@ -39,7 +39,7 @@ pub(crate) struct ScenarioLines {
     name: String,
     model: Model,
     scenarios: Scenarios,
-    /// The nodes on the bus, if there is one.
+    /// The nodes on the bus. Empty when there is no bus.
     nodes: Vec<(u8, Model)>,
     /// Whether the header has a column for the node.
     names_nodes: bool,
@@ -375,7 +375,7 @@ mod tests {
         assert_eq!(error.reason, ScenarioFault::LineTooLong);
     }
 
-    /// Steps for ever.
+    /// A source of steps without end.
     struct Endless(u32);
 
     impl std::io::Read for Endless {

@@ -1,14 +1,14 @@
 //! A serial line over TCP, for one client at a time.
 //!
-//! A second client is closed at once, so that it notices; a client that goes makes room for the
-//! next. A slow client slows down what the node sends and nothing else.
+//! A second client is closed at once, so that it notices. A client that leaves makes room for the
+//! next. A slow client slows down what the recorder sends and nothing else.
 //!
 //! # Design
-//! Nobody keeps the place for ever. A client whose computer is gone, or the way to it, does not
-//! answer the probes of TCP and is given up within two minutes. One that is there and says nothing
-//! may be listening, as long as it likes; but when another one comes, and it has not said anything
-//! for ten minutes, it gives way. A second client is told nothing: whatever it was, it would be
-//! taken for a word of the recorder's.
+//! Nobody keeps the place for ever. A client whose computer is gone, or cannot be reached any more,
+//! does not answer the probes of TCP and is given up within two minutes. A client that is there and
+//! says nothing may be listening, and may do so as long as it likes. If it has been silent for ten
+//! minutes and another client comes, it gives way. A second client is told nothing, because it
+//! would take any text for the recorder's words.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::mem;
@@ -20,11 +20,10 @@ use std::time::{Duration, Instant};
 use super::Line;
 use crate::error::SimError;
 
-/// How long a client that has said its last word may wait for answers.
+/// How long a client that has closed its sending side may wait for answers.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
-/// How soon a client that is silent is asked by TCP whether it is there, and how often if it does
-/// not answer.
+/// How soon TCP asks a silent client whether it is there, and how often if it does not answer.
 #[cfg(unix)]
 const PROBE_AFTER: Duration = Duration::from_secs(60);
 #[cfg(unix)]
@@ -37,8 +36,8 @@ pub(crate) struct TcpLine {
     address: SocketAddr,
     gives_way_after: Option<Duration>,
     client: Option<Client>,
-    /// A connection that came while there was a client. Whether that client is gone shows when it
-    /// is read next.
+    /// A connection that came while there was a client. The next read shows whether that client is
+    /// gone.
     candidate: Option<(TcpStream, SocketAddr)>,
     client_changed: bool,
     notices: Vec<String>,
@@ -47,11 +46,12 @@ pub(crate) struct TcpLine {
 struct Client {
     stream: TcpStream,
     address: SocketAddr,
-    /// When it has sent something, or connected.
+    /// When the client last sent something, or connected.
     heard: Instant,
-    /// Whether it was told that others want its place: once is enough.
+    /// Whether the user was told that others want its place. Once is enough.
     has_turned_away: bool,
-    /// When it closed its sending side: `nc` does so at the end of its input and still listens.
+    /// When the client closed its sending side. `nc` does so at the end of its input and still
+    /// listens.
     last_word: Option<Instant>,
 }
 
@@ -132,9 +132,9 @@ impl TcpLine {
 
 fn prepare(stream: &TcpStream) -> io::Result<()> {
     stream.set_nonblocking(true)?;
-    // Answers are short and a host waits for each.
+    // Answers are short, and a host waits for each.
     stream.set_nodelay(true)?;
-    // Without, it is only noticed later that a client is gone.
+    // Without probes it is only noticed later that a client is gone.
     #[cfg(unix)]
     let _ = probe(stream);
     Ok(())
@@ -148,7 +148,7 @@ fn probe(stream: &TcpStream) -> rustix::io::Result<()> {
     sockopt::set_tcp_keepidle(stream, PROBE_AFTER)?;
     sockopt::set_tcp_keepintvl(stream, PROBE_EVERY)?;
     sockopt::set_tcp_keepcnt(stream, PROBES)?;
-    // Where something sent to it is not acknowledged, there are no probes.
+    // Linux sends no probes while something sent to the client is not acknowledged.
     #[cfg(target_os = "linux")]
     {
         let given_up = PROBE_AFTER + PROBE_EVERY * PROBES;
@@ -165,9 +165,9 @@ impl Line for TcpLine {
         if let Some(received) = self.read_client(buffer) {
             return Ok(received);
         }
-        // A candidate that cannot be set up has gone again.
+        // A candidate that cannot be set up has left again.
         let _ = self.decide();
-        // So has one that cannot be accepted.
+        // The same is true of one that cannot be accepted.
         self.candidate = self.listener.accept().ok();
         Ok(0)
     }
