@@ -6,7 +6,7 @@ use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Words go out in portions of so many bytes.
+/// How many bytes go out at once.
 const PORTION: usize = 1 << 16;
 
 /// The bench's byte that asks for every instruction.
