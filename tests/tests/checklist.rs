@@ -8,10 +8,10 @@ use ser_tests::pages::{self, Row};
 /// Who can keep a rule.
 const KEEPERS: [&str; 5] = ["board", "bus", "driver", "port", "host"];
 
-/// What a rule without a test begins its last cell with; the reason follows.
+/// What the last cell of a rule without a test begins with. The reason follows.
 const NOT_MODELLED: &str = "not modelled: ";
 
-/// The parts of the page that must be there, by what their rules' numbers begin with.
+/// The chapters that the page must have, by the beginnings of their rules' numbers.
 const CHAPTERS: [&str; 15] =
     ["2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13", "B", "F", "S"];
 
@@ -50,7 +50,7 @@ fn wrong_with_rule(
     wrong
 }
 
-/// Everything that is wrong with the page; `source_of` gives the text of a file.
+/// Everything that is wrong with the page. `source_of` returns the text of a file.
 fn mistakes(page: &str, source_of: impl Fn(&str) -> Option<String>) -> Vec<String> {
     let prefixes = pages::prefixes(page);
     let mut seen = BTreeSet::new();
@@ -76,7 +76,7 @@ fn every_rule_has_a_test_that_exists_or_a_reason() {
     assert!(mistakes.is_empty(), "docs/geni-rules.md:\n{}", mistakes.join("\n"));
 }
 
-/// A page with one good rule in each of these chapters, and more rows.
+/// A page with one good rule in each of these chapters, and additional rows.
 fn page_of(chapters: &[&str], rows: &str) -> String {
     let good =
         |chapter| format!("| {chapter}.1 | It is so. | Heading | board | `a/b.rs::good` |\n");

@@ -27,7 +27,7 @@ fn wrong_with_promise(row: &Row<'_>) -> Vec<String> {
     wrong
 }
 
-/// Everything that is wrong with the page; `source_of` gives the text of a file.
+/// Everything that is wrong with the page. `source_of` returns the text of a file.
 fn mistakes(page: &str, source_of: impl Fn(&str) -> Option<String>) -> Vec<String> {
     let prefixes = pages::prefixes(page);
     let (promises, tests) = (pages::rows(page, "no."), pages::rows(page, "promise"));
