@@ -105,11 +105,11 @@ fn wrong_with(
     source_of: &impl Fn(&str) -> Option<String>,
 ) -> Option<String> {
     let Some((file, name)) = code(test).and_then(|test| test.split_once("::")) else {
-        return Some(format!("\"{test}\" is no test, `file::name`"));
+        return Some(format!("\"{test}\" is not a test, `file::name`"));
     };
     let Some((prefix, folder)) = prefixes.iter().find(|(prefix, _)| file.starts_with(**prefix))
     else {
-        return Some(format!("{file} begins with no prefix of the page's first table"));
+        return Some(format!("{file} does not begin with a prefix of the page's first table"));
     };
     let path = format!("{folder}{}", &file[prefix.len()..]);
     match source_of(&path) {

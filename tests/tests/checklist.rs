@@ -34,7 +34,7 @@ fn wrong_with_rule(
     };
     let mut wrong = Vec::new();
     if !is_number(rule.first) {
-        wrong.push("this is no number of a rule".to_string());
+        wrong.push("this is not the number of a rule".to_string());
     }
     if text.is_empty() || section.is_empty() {
         wrong.push("the rule or its section is missing".to_string());
@@ -114,9 +114,12 @@ fn each_mistake_is_named_with_its_rule() {
         ),
         (
             "| 14.1 | Which? | Heading | board | `a/b.rs::good` |",
-            "rule 14.1: this is no number of a rule",
+            "rule 14.1: this is not the number of a rule",
         ),
-        ("| | Which? | Heading | board | `a/b.rs::good` |", "rule : this is no number of a rule"),
+        (
+            "| | Which? | Heading | board | `a/b.rs::good` |",
+            "rule : this is not the number of a rule",
+        ),
         (
             "| 3.2 | No bar. | Heading | board | `a/b.rs::goo` ",
             "rule 3.2: crate/a/b.rs has no test goo",
@@ -137,11 +140,11 @@ fn each_mistake_is_named_with_its_rule() {
         ),
         (
             "| 3.2 | How? | Heading | board | by hand |",
-            "rule 3.2: \"by hand\" is no test, `file::name`",
+            "rule 3.2: \"by hand\" is not a test, `file::name`",
         ),
         (
             "| 3.2 | Where? | Heading | board | `x/b.rs::good` |",
-            "rule 3.2: x/b.rs begins with no prefix of the page's first table",
+            "rule 3.2: x/b.rs does not begin with a prefix of the page's first table",
         ),
         (
             "| 3.2 | Gone. | Heading | board | `a/c.rs::good` |",

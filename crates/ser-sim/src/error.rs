@@ -88,7 +88,7 @@ impl NoRecords {
             let path = path.display();
             match fault {
                 FolderFault::NotYours => Some(format!("remove {path}, which is not yours")),
-                FolderFault::NoFolder => Some(format!("remove {path}, which is no folder")),
+                FolderFault::NoFolder => Some(format!("remove {path}, which is not a folder")),
                 FolderFault::OpenToOthers => Some(format!("keep others out: chmod 700 {path}")),
                 FolderFault::Other(_) => None,
             }
@@ -105,7 +105,7 @@ impl fmt::Display for NoRecords {
             match fault {
                 FolderFault::NotYours => f.write_str("belongs to another user")?,
                 FolderFault::OpenToOthers => f.write_str("is open to others")?,
-                FolderFault::NoFolder => f.write_str("is no folder")?,
+                FolderFault::NoFolder => f.write_str("is not a folder")?,
                 FolderFault::Other(error) => write!(f, "cannot be used: {error}")?,
             }
         }
@@ -131,7 +131,7 @@ impl fmt::Display for SimError {
             }
             SimError::NoRecords(no_records) => no_records.fmt(f),
             SimError::LinkInUse(path) | SimError::WindowInUse(path) => {
-                write!(f, "another simulator has {}", path.display())
+                write!(f, "another simulator uses {}", path.display())
             }
             SimError::LinkTaken(path) => {
                 write!(
@@ -161,7 +161,7 @@ impl fmt::Display for SimError {
                 )?;
                 write_printed(f, printed)
             }
-            SimError::Unsupported(what) => write!(f, "{what} cannot be had on this system"),
+            SimError::Unsupported(what) => write!(f, "{what} is not available on this system"),
             SimError::Ended => write!(f, "the simulator has ended"),
             SimError::StillPlaying => write!(f, "the contacts have not finished moving"),
         }

@@ -38,9 +38,9 @@ impl Link {
                 }
                 Some(("stop", address)) => {
                     let address = u64::from_str_radix(address, 16);
-                    stops.push(address.map_err(|_| format!("{option} names no address"))?);
+                    stops.push(address.map_err(|_| format!("{option} does not name an address"))?);
                 }
-                _ => return Err(format!("{option} is no option")),
+                _ => return Err(format!("{option} is not an option")),
             }
         }
         let socket = socket.ok_or("the option socket=PATH is missing")?;

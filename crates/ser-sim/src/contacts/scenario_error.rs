@@ -100,21 +100,21 @@ impl fmt::Display for ScenarioFault {
             ScenarioFault::NoBus => {
                 write!(f, "only a Genius bus has nodes: leave the fourth column out")
             }
-            ScenarioFault::NotANode(text) => write!(f, "{text:?} is no node number"),
+            ScenarioFault::NotANode(text) => write!(f, "{text:?} is not a node number"),
             ScenarioFault::NoSuchNode { node } => write!(f, "there is no node {node} on the bus"),
             ScenarioFault::NotATime(text) => {
                 write!(
                     f,
-                    "{text:?} is no time: whole milliseconds from 0 to {} are needed",
+                    "{text:?} is not a time: whole milliseconds from 0 to {} are needed",
                     u32::MAX
                 )
             }
-            ScenarioFault::NotAnInput(text) => write!(f, "{text:?} is no input number"),
+            ScenarioFault::NotAnInput(text) => write!(f, "{text:?} is not an input number"),
             ScenarioFault::NoSuchInput { input, inputs } => {
                 write!(f, "there is no input {input}: this model has inputs 1 to {inputs}")
             }
             ScenarioFault::NotAState(text) => {
-                write!(f, "{text:?} is no state: 1 (closed) or 0 (open) is needed")
+                write!(f, "{text:?} is not a state: 1 (closed) or 0 (open) is needed")
             }
             ScenarioFault::TimeDecreases { at_ms, previous_ms } => {
                 write!(f, "{at_ms} ms comes after {previous_ms} ms: times must not decrease")

@@ -73,7 +73,11 @@ impl Display for Told<'_> {
                     .fmt(f)
             }
             None => {
-                write!(f, "{time}, which is no date  changed {:08x}  on {:08x}", changed.0, state.0)
+                write!(
+                    f,
+                    "{time}, which is not a date  changed {:08x}  on {:08x}",
+                    changed.0, state.0
+                )
             }
         }
     }
@@ -159,7 +163,7 @@ mod tests {
         assert_eq!(Told(&entry).to_string(), text);
         let time = TimeStamp { month: 13, ..entry.time };
         let never = Entry { time, state: Inputs(2), ..entry };
-        let text = "2026-13-22T10:00:00.250, which is no date  changed 00200001  on 00000002";
+        let text = "2026-13-22T10:00:00.250, which is not a date  changed 00200001  on 00000002";
         assert_eq!(Told(&never).to_string(), text);
     }
 

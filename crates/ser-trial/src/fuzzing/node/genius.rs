@@ -60,7 +60,7 @@ impl Genius {
         let header = (sent.destination, sent.function, sent.subfunction);
         assert_eq!(header, (address, FUNCTION_HORNER, SUBFUNCTION_SER));
         let Ok(Reply::Read(report)) = Reply::parse(&sent.data) else {
-            panic!("{sent:?} is no report")
+            panic!("{sent:?} is not a report")
         };
         assert!(!report.entries.is_empty(), "an empty report");
         for entry in report.entries {

@@ -78,7 +78,7 @@ impl Bench<'_, '_> {
             Said::Reply(reply) => {
                 reply_to(source, FUNCTION_HORNER, SUBFUNCTION_SER, reply.to_body().to_vec())
             }
-            other => panic!("{other:?} is no reply"),
+            other => panic!("{other:?} is not a reply"),
         });
         // Printouts go to the serial line.
         self.expected.extend(said);
