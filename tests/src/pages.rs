@@ -6,13 +6,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Tests that are ignored for a reason that ends like this run in `cargo xtask test`.
+/// How the reason ends for which tests are ignored that `cargo xtask test` runs.
 const RUN_BY_XTASK: &str = ": cargo xtask test\"]";
 
 /// Macros that make a test of each name between their braces.
 const MAKE_TESTS: [&str; 1] = ["targets! {"];
 
-/// Macros that make two tests of each function that is named between their braces.
+/// Macros that make two tests of each function named between their braces.
 const MAKE_TESTS_OF_FUNCTIONS: [&str; 1] = ["with_both_kinds! {"];
 
 /// The text of a file of the project.
@@ -31,7 +31,7 @@ pub struct Row<'a> {
     pub cells: Vec<&'a str>,
 }
 
-/// The cells of a row; the bar at its end may be missing, as in any Markdown.
+/// The cells of a row. The bar at its end may be missing, as in any Markdown.
 fn cells(line: &str) -> Option<Vec<&str>> {
     let row = line.trim().strip_prefix('|')?;
     Some(row.strip_suffix('|').unwrap_or(row).split('|').map(str::trim).collect())
@@ -55,7 +55,7 @@ pub fn rows<'a>(page: &'a str, heading: &str) -> Vec<Row<'a>> {
     rows
 }
 
-/// What the names of files begin with, and the folders that this stands for.
+/// The prefixes of file names, and the folders that they stand for.
 #[must_use]
 pub fn prefixes(page: &str) -> BTreeMap<&str, &str> {
     let rows = page.lines().filter_map(cells);
@@ -68,7 +68,7 @@ fn code(cell: &str) -> Option<&str> {
     cell.strip_prefix('`')?.strip_suffix('`')
 }
 
-/// Whether a source file has a test of this name that is run.
+/// Whether a source file has a test of this name, and the test is run.
 fn has_test(source: &str, name: &str) -> bool {
     let head = format!("fn {name}(");
     let lines: Vec<&str> = source.lines().map(str::trim).collect();
@@ -98,18 +98,18 @@ fn is_listed(source: &str, opening: &str, name: &str) -> bool {
     calls.any(|names| names.split([',', ' ']).any(|listed| listed == name))
 }
 
-/// What is wrong with the name of a test, if anything is.
+/// What is wrong with the name of a test; `None` if nothing is.
 fn wrong_with(
     test: &str,
     prefixes: &BTreeMap<&str, &str>,
     source_of: &impl Fn(&str) -> Option<String>,
 ) -> Option<String> {
     let Some((file, name)) = code(test).and_then(|test| test.split_once("::")) else {
-        return Some(format!("\"{test}\" is no test, `file::name`"));
+        return Some(format!("\"{test}\" is not a test, `file::name`"));
     };
     let Some((prefix, folder)) = prefixes.iter().find(|(prefix, _)| file.starts_with(**prefix))
     else {
-        return Some(format!("{file} begins with no prefix of the page's first table"));
+        return Some(format!("{file} does not begin with a prefix of the page's first table"));
     };
     let path = format!("{folder}{}", &file[prefix.len()..]);
     match source_of(&path) {
@@ -119,7 +119,7 @@ fn wrong_with(
     }
 }
 
-/// What is wrong with a list of tests that commas separate.
+/// What is wrong with a list of tests separated by commas.
 #[must_use]
 pub fn wrong_with_tests(
     tests: &str,

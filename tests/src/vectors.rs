@@ -14,13 +14,13 @@ pub enum Sender {
 /// One example.
 #[derive(Clone, Debug)]
 pub struct Vector {
-    /// Line of the file, for messages.
+    /// The line of the file, for messages.
     pub line: usize,
     /// Who sends it.
     pub sender: Sender,
     /// Whether it is refused, in whole or in part.
     pub refused: bool,
-    /// Whether our encoder produces these very bytes.
+    /// Whether our encoder produces exactly these bytes.
     pub canonical: bool,
     /// The frame as it travels.
     pub wire: Vec<u8>,
@@ -31,7 +31,7 @@ pub struct Vector {
 /// All examples of the file.
 ///
 /// # Panics
-/// When the file is not as its head says.
+/// When the file differs from the format that its head describes.
 #[must_use]
 pub fn all() -> Vec<Vector> {
     include_str!("../vectors/rs232.txt")
@@ -80,7 +80,7 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// Takes down one result of the decoder.
+    /// Adds one result of the decoder.
     pub fn note(&mut self, decoded: Decoded<'_>, sender: Sender) {
         match (decoded, sender) {
             (Decoded::Text(byte), _) => self.text.push(byte),

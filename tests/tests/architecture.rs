@@ -1,5 +1,5 @@
 //! The table of crates in `docs/architecture.md` stays true: it names every crate of the workspace,
-//! and of each the crates that it uses.
+//! and for each the crates that it uses.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
@@ -9,7 +9,7 @@ use serde_json::Value;
 
 type Uses = BTreeMap<String, BTreeSet<String>>;
 
-/// What cargo says: each crate of the workspace with those that it is built with.
+/// What cargo says: each crate of the workspace, and the crates that it is built with.
 fn uses_by_cargo() -> Uses {
     let arguments = ["metadata", "--no-deps", "--offline", "--locked", "--format-version", "1"];
     let output = Command::new(env!("CARGO")).args(arguments).output().expect("cargo runs");

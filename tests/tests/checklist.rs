@@ -8,10 +8,10 @@ use ser_tests::pages::{self, Row};
 /// Who can keep a rule.
 const KEEPERS: [&str; 5] = ["board", "bus", "driver", "port", "host"];
 
-/// What a rule without a test begins its last cell with; the reason follows.
+/// What the last cell of a rule without a test begins with. The reason follows.
 const NOT_MODELLED: &str = "not modelled: ";
 
-/// The parts of the page that must be there, by what their rules' numbers begin with.
+/// The chapters that the page must have, by the beginnings of their rules' numbers.
 const CHAPTERS: [&str; 15] =
     ["2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13", "B", "F", "S"];
 
@@ -34,7 +34,7 @@ fn wrong_with_rule(
     };
     let mut wrong = Vec::new();
     if !is_number(rule.first) {
-        wrong.push("this is no number of a rule".to_string());
+        wrong.push("this is not the number of a rule".to_string());
     }
     if text.is_empty() || section.is_empty() {
         wrong.push("the rule or its section is missing".to_string());
@@ -50,7 +50,7 @@ fn wrong_with_rule(
     wrong
 }
 
-/// Everything that is wrong with the page; `source_of` gives the text of a file.
+/// Everything that is wrong with the page. `source_of` returns the text of a file.
 fn mistakes(page: &str, source_of: impl Fn(&str) -> Option<String>) -> Vec<String> {
     let prefixes = pages::prefixes(page);
     let mut seen = BTreeSet::new();
@@ -76,7 +76,7 @@ fn every_rule_has_a_test_that_exists_or_a_reason() {
     assert!(mistakes.is_empty(), "docs/geni-rules.md:\n{}", mistakes.join("\n"));
 }
 
-/// A page with one good rule in each of these chapters, and more rows.
+/// A page with one good rule in each of these chapters, and additional rows.
 fn page_of(chapters: &[&str], rows: &str) -> String {
     let good =
         |chapter| format!("| {chapter}.1 | It is so. | Heading | board | `a/b.rs::good` |\n");
@@ -114,9 +114,12 @@ fn each_mistake_is_named_with_its_rule() {
         ),
         (
             "| 14.1 | Which? | Heading | board | `a/b.rs::good` |",
-            "rule 14.1: this is no number of a rule",
+            "rule 14.1: this is not the number of a rule",
         ),
-        ("| | Which? | Heading | board | `a/b.rs::good` |", "rule : this is no number of a rule"),
+        (
+            "| | Which? | Heading | board | `a/b.rs::good` |",
+            "rule : this is not the number of a rule",
+        ),
         (
             "| 3.2 | No bar. | Heading | board | `a/b.rs::goo` ",
             "rule 3.2: crate/a/b.rs has no test goo",
@@ -137,11 +140,11 @@ fn each_mistake_is_named_with_its_rule() {
         ),
         (
             "| 3.2 | How? | Heading | board | by hand |",
-            "rule 3.2: \"by hand\" is no test, `file::name`",
+            "rule 3.2: \"by hand\" is not a test, `file::name`",
         ),
         (
             "| 3.2 | Where? | Heading | board | `x/b.rs::good` |",
-            "rule 3.2: x/b.rs begins with no prefix of the page's first table",
+            "rule 3.2: x/b.rs does not begin with a prefix of the page's first table",
         ),
         (
             "| 3.2 | Gone. | Heading | board | `a/c.rs::good` |",

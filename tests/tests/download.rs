@@ -1,5 +1,5 @@
-//! A full log is read at nearly the rate of the line, in virtual time. The table: `cargo bench
-//! --bench download`.
+//! A full log is read at nearly the rate of the line, in virtual time. `cargo bench --bench
+//! download` prints the table.
 
 use ser_client::LogPosition;
 use ser_proto::{Baud, Model};

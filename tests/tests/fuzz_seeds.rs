@@ -1,5 +1,5 @@
-//! Everything that fuzzing checks, for the seeds that are kept. The fuzzer itself is `cargo xtask
-//! fuzz`.
+//! Everything that fuzzing checks, run on the seeds that are kept. The fuzzer itself is `cargo
+//! xtask fuzz`.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -26,7 +26,7 @@ fn replay(name: &str) {
     let seeds = seeds::of(name).unwrap_or_else(|error| panic!("{error}"));
     assert!(!seeds.is_empty(), "{name} has no seeds");
     for seed in seeds {
-        // Shown when it fails.
+        // Printed only when the test fails.
         println!("{name}/{}", seed.name);
         (target.run)(&seed.bytes);
     }

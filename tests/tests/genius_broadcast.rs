@@ -1,5 +1,4 @@
-//! Many recorders on one bus: one broadcast sets all clocks, and everybody's inputs are seen in
-//! every scan.
+//! Many recorders on one bus: one broadcast sets all clocks, and all inputs are seen in every scan.
 
 use geni_board::CommandError;
 use geni_board::Destination::Broadcast;
@@ -9,8 +8,9 @@ use ser_trial::genius_world::World;
 const NOON: TimeStamp =
     TimeStamp { year: 26, month: 11, day: 22, hour: 12, minute: 0, second: 0, millisecond: 0 };
 
-/// A broadcast reaches all boards at once, but every recorder fetches it from its board by itself:
-/// the board says so and carries out Read Datagram, and the recorder looks once per millisecond.
+/// How far clocks may differ. A broadcast reaches all boards at once, but every recorder fetches it
+/// from its board by itself: the board says so and carries out Read Datagram, and the recorder
+/// looks once per millisecond.
 const CLOCKS_AGREE_WITHIN_MS: u32 = 1;
 
 fn milliseconds(time: TimeStamp) -> u32 {
@@ -18,7 +18,7 @@ fn milliseconds(time: TimeStamp) -> u32 {
         + u32::from(time.millisecond)
 }
 
-/// The same edge is seen in so many phases of the bus scan.
+/// How many phases of the bus scan the same edge is seen in.
 const EDGES: u16 = 12;
 
 #[test]
@@ -39,8 +39,8 @@ fn one_broadcast_sets_the_clocks_of_30_recorders() {
         }
         world.run(1_000);
     };
-    // The host's turn ends; all boards have the datagram. The bus adds no more than the wait for
-    // the host's turn.
+    // The host's turn has ended and all boards have the datagram. The bus adds no more than the
+    // wait for the host's turn.
     let out_ms = world.now_ms;
     let scan_ns = world.bus.borrow().scan_time_ns().expect("a running bus");
     assert!(out_ms - sent_ms <= 3 * scan_ns.div_ceil(1_000_000));
@@ -53,7 +53,8 @@ fn one_broadcast_sets_the_clocks_of_30_recorders() {
         assert_eq!((last.code, last.hour, last.minute), (Code::SetClock.byte(), 12, 0));
         assert_eq!((last.second, last.millisecond), (0, 0));
     }
-    // The same edge at all of them, again and again: no time between two is a multiple of a scan.
+    // The same edge occurs at all of them repeatedly. No time between two edges is a multiple of a
+    // scan.
     let mut edges_ms = Vec::new();
     for edge in 0..EDGES {
         world.run(7 + 5 * u64::from(edge));
@@ -73,8 +74,8 @@ fn one_broadcast_sets_the_clocks_of_30_recorders() {
         let (earliest, latest) =
             (stamps.iter().min().expect("30"), stamps.iter().max().expect("30"));
         assert!(latest - earliest <= CLOCKS_AGREE_WITHIN_MS, "{stamps:?}");
-        // The clocks are behind a clock that was set when the datagram had left, by what the boards
-        // take.
+        // The clocks are behind a clock set when the datagram had left. The difference is the time
+        // that the boards take.
         let elapsed = u32::try_from(edge_ms - out_ms).expect("short");
         let behind = elapsed + milliseconds(NOON) - earliest;
         assert!(behind <= 5, "{behind} ms");
@@ -99,7 +100,7 @@ fn inputs_are_seen_in_every_scan_also_while_recording_is_stopped() {
         let bit = 1_u32 << (input - 1);
         state = if on { state | bit } else { state & !bit };
         state = if round % 2 == 0 { state | 0x8000 } else { state & !0x8000 };
-        // The next lockout, the next turn, and the host's own exchange of tables.
+        // This covers the next lockout, the next turn, and the host's own exchange of tables.
         world.run(40);
         for (number, model) in units {
             let len = if model == Model::Ser160 { 2 } else { 4 };

@@ -1,4 +1,4 @@
-//! One broadcast sets the clocks of recorders that report all the time: their boards are busy
+//! One broadcast sets the clocks of recorders that report all the time. Their boards are busy
 //! sending when it comes, and hand it over late.
 
 use chrono::NaiveDateTime;
@@ -10,20 +10,20 @@ use ser_sim::{Scenario, Step};
 use ser_trial::genius_world::{Recorder, World};
 use ser_trial::simulation::chance::Chance;
 
-/// Recorders look at their boards in the same moment here; those of real ones can lie up to 1 ms
-/// apart.
+/// How far clocks may differ. Recorders here look at their boards at the same moment; real ones can
+/// be up to 1 ms apart.
 const CLOCKS_AGREE_WITHIN_MS: i64 = 1;
 
-/// Toggles all the time, so that every recorder has a report to send whenever it may.
+/// An input that toggles all the time, so that every recorder has a report to send whenever it may.
 const BUSY: u8 = 1;
 
-/// Moves at all recorders at once; its stamps are compared.
+/// An input that moves at all recorders at once. Its stamps are compared.
 const COMMON: u8 = 2;
 
 /// Milliseconds between two changes of the busy input.
 const PERIOD_MS: u64 = 3;
 
-/// No recorder waits longer for its place in the scan.
+/// The longest that a recorder waits for its place in the scan.
 const CARRIED_OUT_WITHIN_MS: u64 = 10_000;
 
 /// Recorders that report all the time.
@@ -47,7 +47,7 @@ impl Plant {
         plant
     }
 
-    /// Lets a millisecond pass. The common contact moves at all recorders, if it shall.
+    /// Lets a millisecond pass. The common contact moves at all recorders if `moves` says so.
     fn step(&mut self, moves: bool) {
         let Plant { world, common_on, moved_ms, .. } = self;
         let next_ms = world.now_ms + 1;
@@ -81,8 +81,8 @@ impl Plant {
         self.world.recorders.iter().map(|recorder| recorder.port.diagnostics().broadcasts).collect()
     }
 
-    /// Sends one broadcast; the common contact moves so long after the first recorder has carried
-    /// it out. Gives how long the last one took after the first.
+    /// Sends one broadcast. The common contact moves this long after the first recorder has carried
+    /// it out. Returns how long after the first the last one did so.
     fn broadcast(&mut self, command: &Command, move_after_ms: u64) -> u64 {
         let before = self.carried_out();
         while !self.world.host.driver.can_transmit() {
@@ -105,7 +105,7 @@ impl Plant {
             if let (Some(first_ms), Some(last_ms)) = (first_ms, last_ms)
                 && self.world.now_ms > first_ms + move_after_ms
             {
-                // What waited for the broadcast is recorded now.
+                // What waited for the broadcast is now recorded.
                 self.step(false);
                 return last_ms - first_ms;
             }
@@ -117,8 +117,8 @@ impl Plant {
         );
     }
 
-    /// When each recorder's board received the broadcast that was carried out last, and the
-    /// recorder looked at it: in every millisecond, and there is no interrupt line here.
+    /// When each recorder looked at the broadcast that it carried out last, after its board had
+    /// received it. Recorders look in every millisecond, and there is no interrupt line here.
     fn seen_ms(&mut self) -> Vec<u64> {
         self.world
             .recorders
@@ -135,7 +135,7 @@ impl Plant {
         self.seen_ms().into_iter().map(|seen_ms| milliseconds(time) + since(seen_ms)).collect()
     }
 
-    /// What the recorders stamp the latest event of this kind with.
+    /// The recorders' stamps of their latest event of this kind.
     fn stamps_ms(&self, is: impl Fn(Inputs) -> bool) -> Vec<i64> {
         let stamp = |log: Vec<Entry>| {
             let entry = log.into_iter().rfind(|entry| is(entry.changed)).expect("it is recorded");
@@ -151,8 +151,8 @@ impl Plant {
         TimeStamp { year: 26, month: 11, day, hour, minute, second, millisecond }
     }
 
-    /// The boards of all recorders were busy sending when broadcasts came, and these were handed
-    /// over late.
+    /// Checks that the boards of all recorders were busy sending when broadcasts came, and handed
+    /// these over late.
     fn assert_was_busy(&self, rounds: u32, longest_ms: u64) {
         let sent =
             self.world.recorders.iter().map(|recorder| recorder.port.diagnostics().reports_sent);
@@ -165,7 +165,7 @@ impl Plant {
     }
 }
 
-/// How far they lie apart.
+/// How far stamps are apart.
 fn spread(stamps: &[i64]) -> i64 {
     stamps.iter().max().expect("some") - stamps.iter().min().expect("some")
 }
@@ -187,10 +187,10 @@ fn last_broadcasts(plant: &mut Plant) -> Vec<LastBroadcast> {
     plant.world.recorders.iter_mut().map(ask).collect()
 }
 
-/// Sets all clocks again and again, at any phase of the scan, each time to another time. A contact
-/// of all recorders moves up to `soon_ms` later, while the others have not carried it out, and
-/// another time when all have. Where one of them takes longer than changes wait for it, only the
-/// latter counts.
+/// Sets all clocks repeatedly, at any phase of the scan, each time to another time. A contact of
+/// all recorders moves up to `soon_ms` later, while the others have not yet carried out the
+/// broadcast, and again when all have. Where one recorder takes longer than changes wait for it,
+/// only the second move counts.
 fn clocks_agree(recorders: u8, rounds: u32, soon_ms: Option<u64>) {
     let mut plant = Plant::new(recorders);
     let (mut widest_ms, mut longest_ms, mut beyond) = (0, 0, 0);
@@ -211,7 +211,7 @@ fn clocks_agree(recorders: u8, rounds: u32, soon_ms: Option<u64>) {
             );
         }
         beyond += u32::from(took_ms > HELD_BACK_MS);
-        // Who has recorded changes too early knows it.
+        // A recorder that has recorded changes too early knows it.
         let late =
             plant.world.recorders.iter().map(|recorder| recorder.node.diagnostics().settings_late);
         assert_eq!(late.sum::<u32>() > 0, beyond > 0, "round {round}, {took_ms} ms");
@@ -231,7 +231,7 @@ fn clocks_agree(recorders: u8, rounds: u32, soon_ms: Option<u64>) {
          broadcast out up to {longest_ms} ms after the first, and in {beyond} rounds later than \
          changes wait for it"
     );
-    // In nearly all rounds changes soon after a broadcast waited for it.
+    // In nearly all rounds, changes soon after a broadcast waited for it.
     assert!(soon_ms.is_none() || beyond <= rounds / 100, "{beyond}");
     plant.assert_was_busy(rounds, longest_ms);
 }
@@ -246,15 +246,15 @@ fn one_broadcast_sets_12_recorders_that_report_all_the_time() {
     clocks_agree(12, 1_000, Some(60));
 }
 
-/// The last of so many carries a broadcast out when changes of before have long been recorded: see
-/// `ser_node::HELD_BACK_MS`. What counts is that all agree afterwards.
+/// The last of so many recorders carries out a broadcast when earlier changes have long been
+/// recorded: see `ser_node::HELD_BACK_MS`. What counts is that all agree afterwards.
 #[test]
 fn one_broadcast_sets_30_recorders_that_report_all_the_time() {
     clocks_agree(30, 1_000, None);
 }
 
-/// All inputs of the plant change again and again; what is recorded last before recording stops,
-/// and first after it starts, is the same everywhere.
+/// All inputs of the plant change repeatedly. What is recorded last before recording stops, and
+/// first after it starts, is the same everywhere.
 #[test]
 fn one_broadcast_stops_and_starts_recorders_that_report_all_the_time_in_the_same_millisecond() {
     const ROUNDS: u32 = 300;
@@ -289,25 +289,26 @@ fn one_broadcast_stops_and_starts_recorders_that_report_all_the_time_in_the_same
     plant.assert_was_busy(ROUNDS, longest_ms);
 }
 
-/// The main loop of a recorder is away when a broadcast comes, as while a flash sector is erased.
+/// The main loop of a recorder is held up when a broadcast comes, as while a flash sector is
+/// erased.
 struct Away {
     /// When the board received the broadcast.
     arrived_ms: i64,
-    /// When the main loop looks at the board for the first time after that.
+    /// When the main loop first looks at the board after that.
     looks_ms: i64,
-    /// What the clock shows then, by the stamp of a contact that moves after the main loop is back.
+    /// What the clock then shows, by the stamp of a contact that moves after the main loop is back.
     shows_ms: i64,
-    /// Stamps of contacts that moved while the main loop was away, against what the clock shows
-    /// then.
+    /// Stamps of contacts that moved while the main loop was held up, relative to what the clock
+    /// shows then.
     stamps_off_ms: Vec<i64>,
 }
 
-/// Lets the main loop be away for so long, with or without the interrupt line.
+/// Holds up the main loop for a while, with or without the interrupt line.
 fn away(has_line: bool) -> Away {
     const AWAY_MS: u64 = 300;
     const MOVES: u8 = 8;
     let mut world = World::started(&[(1, Model::Ser160)]);
-    // Those of before have been dealt with.
+    // Earlier interrupts have been dealt with.
     let _ = world.recorders[0].port.window().take_interrupts();
     world.send(Broadcast, &Command::SetClock(TEN_O_CLOCK));
     // Contacts move all the time.
@@ -360,7 +361,7 @@ const TEN_O_CLOCK: TimeStamp =
 fn a_main_loop_that_is_away_knows_by_the_interrupt_line_when_a_broadcast_came() {
     let away = away(true);
     assert_eq!(away.shows_ms, milliseconds(TEN_O_CLOCK));
-    // What moved after it has waited for it.
+    // What moved after the broadcast has waited for it.
     assert!(away.stamps_off_ms.len() >= 7, "{:?}", away.stamps_off_ms);
     assert!(away.stamps_off_ms.iter().all(|&off_ms| off_ms == 0), "{:?}", away.stamps_off_ms);
 }

@@ -1,4 +1,4 @@
-//! Every command of a host over Genius, and what is no command.
+//! Every command of a host over Genius, and everything that is not a command.
 
 use std::rc::Rc;
 
@@ -20,7 +20,7 @@ fn started(model: Model) -> World {
     World::started(&[(UNIT, model)])
 }
 
-/// So many events on input 1, a millisecond apart.
+/// Makes `count` events on input 1, a millisecond apart.
 fn events(world: &mut World, count: u32) {
     for event in 0..count {
         world.recorders[0].contact(1, event % 2 == 0);
@@ -35,7 +35,7 @@ fn read(world: &mut World, start: u16, count: u8) -> ser_proto::ReadReply {
     }
 }
 
-/// So many entries of the log.
+/// Reads `count` entries of the log.
 fn log(world: &mut World, start: u16, count: u16) -> Vec<Entry> {
     let mut entries = Vec::new();
     for at in start..start + count {
@@ -152,7 +152,7 @@ fn a_broadcast_is_carried_out_and_not_answered() {
         assert_eq!((last.code, last.hour), (command.code().byte(), 12), "{command:?}");
         assert_eq!(read(&mut world, 1, 0).total, total, "{command:?}");
     }
-    // What is no command was not a broadcast.
+    // What was not a command was not a broadcast.
     world.transmit(Broadcast, 0x40, 0x50, &[0x53, 26, 2, 30, 0, 0, 0, 0, 0]);
     world.transmit(Broadcast, 0x40, 0x50, &[0x99]);
     world.run(50);
@@ -233,7 +233,7 @@ fn datagrams_of_any_content_and_length_are_counted_and_ignored() {
         }
     }
     let after = world.recorders[0].node.diagnostics();
-    // One broadcast of all these is a command: the one that is nothing but the erase byte.
+    // Only one of these broadcasts is a command: the one that consists of the erase byte alone.
     assert_eq!(world.recorders[0].port.diagnostics().broadcasts, 1);
     assert_eq!(after.frames_empty - before.frames_empty, 2);
     assert_eq!(after.commands_unknown - before.commands_unknown, 4);
@@ -258,9 +258,9 @@ fn auto_reports_go_to_the_configured_address_once_each() {
         let Ok(Reply::Read(report)) = Reply::parse(&data) else { panic!() };
         entries.extend(report.entries);
     }
-    // Those from before are not reported.
+    // Events from before are not reported.
     assert_eq!(entries, log(&mut world, 5, 26));
-    // Recorded while nobody is there to hear: reported when somebody is.
+    // Events that are recorded while nobody is there are reported when somebody is.
     let fault =
         ser_sim::genius::Fault::Disconnect { device: world.host.board.id(), for_us: 5_000_000 };
     world.bus.borrow_mut().inject(fault);
@@ -288,8 +288,8 @@ fn recorders_that_report_without_end_leave_everybody_a_turn() {
     for number in numbers {
         world.ask(number, &Command::Configure(configure));
     }
-    // More events than all reports together can bring, for a minute. The host has the last turn in
-    // every scan.
+    // For a minute there are more events than all reports together can bring. The host has the last
+    // turn in every scan.
     let mut answered = [0; 3];
     let mut asked_at_ms = 0;
     let end_ms = world.now_ms + 60_000;
@@ -335,7 +335,7 @@ fn second_host(world: &mut World, number: u8) -> Driver<BoardWindow> {
     host
 }
 
-/// What a host has received, if something has happened.
+/// What a host has received, if anything.
 fn look(host: &mut Driver<BoardWindow>, world: &World) -> Option<ReceivedDatagram> {
     let event = host.poll(u32::try_from(world.now_ms).expect("less than 49 days"));
     let held = host.reset_held();
@@ -400,8 +400,8 @@ fn what_one_port_configures_or_erases_holds_for_the_other() {
         .collect();
     assert_eq!(starts, [5, 6]);
 
-    // Back to Genius, to somebody who is not there: what is erased over RS-232 is owed to nobody
-    // any more.
+    // Reports go back to Genius, to a host that is not there. After an erase over RS-232 nothing is
+    // owed to it any more.
     let configure =
         Configure { auto_report: AutoReport::Genius, report_address: 30, ..unchanged() };
     let Reply::Configuration(_) = world.recorders[0].serial_ask(&Command::Configure(configure))
@@ -420,7 +420,7 @@ fn what_one_port_configures_or_erases_holds_for_the_other() {
     let Ok(Reply::Read(report)) = Reply::parse(&data) else { panic!() };
     assert_eq!((report.start, report.total), (1, report.entries.len().try_into().expect("two")));
 
-    // Erased over Genius: nothing left to print.
+    // After an erase over Genius nothing is left to print.
     world.ask(UNIT, &Command::Configure(Configure { auto_print: true, ..unchanged() }));
     world.ask(UNIT, &Command::Erase);
     events(&mut world, 2);

@@ -9,7 +9,7 @@ use ser_trial::genius_world::World;
 
 const UNIT: u8 = 5;
 
-/// Longest time for a board to be found out, reset, tested, configured and back on the bus.
+/// The longest time until a failed board is noticed, reset, tested, configured and back on the bus.
 const RECOVERY_MS: u64 = 8_000;
 
 fn started() -> World {
@@ -21,8 +21,8 @@ fn inject(world: &mut World, fault: DeviceFault) {
     world.bus.borrow_mut().inject(Fault::Inside { device, fault });
 }
 
-/// Toggles input 1 and asks over RS-232 for what was recorded, for so long; says how many events
-/// there were.
+/// Toggles input 1 for this long and asks over RS-232 for what was recorded. Returns how many
+/// events there were.
 fn live_on(world: &mut World, ms: u64) -> u16 {
     let mut events = 0;
     for _ in 0..ms / 100 {
@@ -36,7 +36,7 @@ fn live_on(world: &mut World, ms: u64) -> u16 {
     events
 }
 
-/// Everything is as before, over Genius too.
+/// Checks that everything is as before, also over Genius.
 fn assert_recovered(world: &mut World, events: u16) {
     assert!(world.recorders[0].port.is_ready());
     let Reply::Read(reply) = world.ask(UNIT, &Command::Read { start: 1, count: 0 }) else {
@@ -70,7 +70,7 @@ fn a_board_that_fails_its_self_test_at_start_is_tried_again() {
 
 #[test]
 fn a_board_that_restarts_in_the_middle_of_a_command_is_configured_anew() {
-    // Each time a little later in the exchange of command and reply.
+    // Each failure comes a little later in the exchange of command and reply.
     for delay_ms in [0, 1, 2, 3, 4, 5, 6, 8, 10] {
         let mut world = started();
         world.send(Device(UNIT), &Command::QueryMode);
@@ -114,7 +114,7 @@ fn reports_outlive_a_board() {
             report.start..report.start + u16::try_from(report.entries.len()).expect("at most ten"),
         );
     }
-    // One may come twice, when it was acknowledged to a board that then had nobody to tell.
+    // A report may come twice if it was acknowledged to a board that could no longer tell anybody.
     reported.dedup();
     assert_eq!(reported, (1..=events).collect::<Vec<_>>());
     assert_recovered(&mut world, events);
@@ -134,7 +134,7 @@ fn requests_for_memory_are_refused_and_never_fill_the_queue() {
 }
 
 /// Sends datagrams (destination, function, subfunction, data) while nobody polls the recorder's
-/// port: its board keeps them.
+/// port. Its board keeps them.
 fn send_while_away(world: &mut World, datagrams: &[(u8, u8, u8, &[u8])]) {
     const MS_PER_DATAGRAM: u64 = 20;
     let bus = std::rc::Rc::clone(&world.bus);

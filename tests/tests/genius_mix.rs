@@ -1,5 +1,5 @@
-//! Commands of all kinds on both ports at once, with a tenth of all messages lost or damaged:
-//! whoever reads the log gets every event once.
+//! Commands of all kinds on both ports at once, with a tenth of all messages lost or damaged. Every
+//! reader of the log gets every event once.
 
 use geni_board::Destination::Device;
 use ser_proto::{
@@ -14,22 +14,23 @@ const UNIT: u8 = 5;
 const SIZE: u16 = 512;
 const SCANS: u64 = 12_000;
 
-/// Messages on the bus that nobody can read, and that one receiver cannot: a tenth together.
+/// The rate of messages on the bus that nobody can read, and of those that one receiver cannot: a
+/// tenth together.
 const NOISE_PPM: u32 = 50_000;
 
-/// A host gives a reply up after this time and asks again.
+/// How long a host waits for a reply before it asks again.
 const PATIENCE_MS: u64 = 250;
 
 /// A host's place in the log: how many events it has, and what they were.
 #[derive(Default)]
 struct Reader {
     events: Vec<(u32, u32)>,
-    /// Deliveries that had all been there before.
+    /// How many deliveries contained nothing new.
     repeated: u32,
 }
 
 impl Reader {
-    /// Takes what is new in a read reply, and nothing else: total and next slot say which events
+    /// Takes what is new in a read reply, and nothing else. Total and next slot say which events
     /// they are.
     fn take(&mut self, reply: &ReadReply) {
         let total = u64::from(reply.total);
@@ -40,7 +41,7 @@ impl Reader {
         let known = self.events.len() as u64;
         assert!(first <= known, "events {known} to {first} are missing");
         let skipped = usize::try_from(known - first).expect("small");
-        // Behind the newest event the ring goes on with the oldest one.
+        // After the newest event the ring goes on with the oldest one.
         let upto = reply.entries.len().min(usize::try_from(back).expect("small"));
         let new = reply.entries.get(skipped..upto).unwrap_or_default();
         self.repeated += u32::from(new.is_empty() && upto > 0);
@@ -81,7 +82,7 @@ fn any_command(chance: &mut Chance, reader: &Reader) -> Command {
     }
 }
 
-/// Shows the first difference and not thousands of events.
+/// Compares events, and shows only the first difference instead of thousands of events.
 fn assert_same(read: &[(u32, u32)], expected: &[(u32, u32)]) {
     let differs = read.iter().zip(expected).position(|(read, expected)| read != expected);
     assert_eq!(differs.map(|at| (at, read[at], expected[at])), None);
@@ -138,9 +139,9 @@ fn run(seed: u64) -> Outcome {
         }
         world.step();
 
-        // The host on the bus: one question at a time.
+        // The host on the bus has one question at a time.
         while let Some((_, data)) = world.take_message(UNIT) {
-            // A report looks like the answer to a question, and is as good as one.
+            // A report looks like the answer to a question, and serves as one.
             if let Reply::Read(reply) = Reply::parse(&data).expect("boards discard what is damaged")
                 && !reply.entries.is_empty()
             {

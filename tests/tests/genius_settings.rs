@@ -1,5 +1,5 @@
 //! A bus and a line together set a recorder's clock and mode as fast as they can, while debounce
-//! holds changes back: what was in force when a contact moved decides about the change.
+//! holds changes back. What was in force when a contact moved decides about the change.
 
 use geni_board::{Completion, Data, Destination, Transmission, TransmitPriority};
 use ser_node::Debounce;
@@ -9,17 +9,18 @@ use ser_trial::genius_world::World;
 
 const UNIT: u8 = 5;
 
-/// The longest there is: for so long settings have to be remembered.
+/// The longest debounce time. Settings have to be remembered for that long.
 const DEBOUNCE_MS: u8 = 255;
 
-/// A clock setting takes longer than that on the line, at its highest rate.
+/// The time between clock settings on the line. It is shorter than a setting takes at the line's
+/// highest rate, so a real line sets the clock less often.
 const LINE_PERIOD_MS: u64 = 5;
 
 /// Each input moves once, one after the other.
 const MOVES: u8 = 32;
 const MOVE_PERIOD_MS: u64 = 8;
 
-/// What is set, when.
+/// What is set, and when.
 #[derive(Clone, Copy, Debug)]
 struct Set {
     at_ms: u64,
@@ -45,7 +46,7 @@ fn numbered(hour: u8, number: u64) -> Command {
 struct Plant {
     world: World,
     sent: Vec<Command>,
-    /// Datagrams that the recorder had read before.
+    /// How many datagrams the recorder had already read.
     read_before: u64,
     set: Vec<Set>,
 }
@@ -58,7 +59,7 @@ impl Plant {
         Plant { world, sent: Vec::new(), read_before, set: Vec::new() }
     }
 
-    /// The datagram that the recorder's board handed over last: which one, and when it came.
+    /// The number of the datagram that the recorder's board handed over last, and when it came.
     fn read(world: &World) -> Option<(u64, u64)> {
         let bus = world.bus.borrow();
         bus.get(world.recorders[0].board).latest_read().map(|read| (read.number, read.arrived_us))
@@ -69,7 +70,7 @@ impl Plant {
         if world.host.driver.can_transmit() {
             let command = numbered(1, sent.len() as u64);
             let data = Data::from_slice(&command.to_body()).expect("short");
-            // As fast as a bus can: in every turn of the host.
+            // The host sends in every turn, which is as fast as a bus can.
             let transmission = Transmission {
                 destination: Destination::Broadcast,
                 function: FUNCTION_HORNER,
@@ -82,7 +83,7 @@ impl Plant {
             sent.push(command);
         }
         world.step();
-        // They are read in the order in which they were sent; one at most in a millisecond.
+        // They are read in the order in which they were sent, at most one in a millisecond.
         if let Some((number, arrived_us)) = Plant::read(world)
             && let Some(index) = number.checked_sub(*read_before + 1)
         {
@@ -91,8 +92,8 @@ impl Plant {
                 .iter()
                 .filter(|set| matches!(set.command, Command::SetClock(time) if time.hour == 1));
             if already.count() == index {
-                // Without an interrupt line it counts from the next look, which is in every
-                // millisecond.
+                // Without an interrupt line the datagram counts from the next look, and there is
+                // one in every millisecond.
                 set.push(Set { at_ms: arrived_us.div_ceil(1000), command: sent[index] });
             }
         }
@@ -104,8 +105,8 @@ impl Plant {
         }
     }
 
-    /// Clocks that may be in force in a millisecond: that of the latest setting before it, or one
-    /// of several.
+    /// The clocks that may be in force in a millisecond: that of the latest setting before it, or
+    /// one of several.
     fn in_force(&self, at_ms: u64) -> Vec<(u64, TimeStamp)> {
         let latest = self.set.iter().map(|set| set.at_ms).filter(|&set_ms| set_ms < at_ms).max();
         let of = |set: &Set| match set.command {

@@ -1,4 +1,4 @@
-//! The examples of `vectors/genius.txt`: what they mean, and that we produce them.
+//! The examples of `vectors/genius.txt`: what they mean, and that we produce the same.
 
 use ser_proto::genius::{
     BusAddress, CommReq, Datagram, DipSwitches, GlobalData, Message, PlcReference, Priority,

@@ -1,4 +1,4 @@
-//! Every command over a host's GENI window, with the real client, against the native node and
+//! Every command over a host's GENI window, with the real client, against the native recorder and
 //! against the ARM image.
 #![cfg(unix)]
 
@@ -120,7 +120,7 @@ fn one_datagram(kind: Kind, model: Model, entries: usize, len: usize) {
 fn broadcasts_are_carried_out_and_remembered(kind: Kind) {
     let (recorder, host, mut unit) = start(kind, Model::Ser160);
     let heard = |unit: &mut Unit, code: Code| {
-        // A broadcast is not answered: that it has been heard is seen here.
+        // A broadcast is not answered. The effect shows that it was heard.
         let deadline = Instant::now() + PATIENCE;
         loop {
             let last = unit.last_broadcast().expect("a reply");

@@ -19,7 +19,7 @@ fn wrong_with_promise(row: &Row<'_>) -> Vec<String> {
             && place.bytes().all(|byte| byte.is_ascii_digit())
     });
     if !is_number {
-        wrong.push("this is no number of a promise".to_string());
+        wrong.push("this is not the number of a promise".to_string());
     }
     if promise.is_empty() {
         wrong.push("nothing is promised".to_string());
@@ -27,7 +27,7 @@ fn wrong_with_promise(row: &Row<'_>) -> Vec<String> {
     wrong
 }
 
-/// Everything that is wrong with the page; `source_of` gives the text of a file.
+/// Everything that is wrong with the page. `source_of` returns the text of a file.
 fn mistakes(page: &str, source_of: impl Fn(&str) -> Option<String>) -> Vec<String> {
     let prefixes = pages::prefixes(page);
     let (promises, tests) = (pages::rows(page, "no."), pages::rows(page, "promise"));
@@ -87,9 +87,13 @@ fn each_mistake_is_named_with_its_promise() {
         (so, "", &["O.1 has no test"]),
         ("", shown, &["O.1 is tested and not promised"]),
         (so, "| O.1 | `a/b.rs::gone` |", &["O.1: crate/a/b.rs has no test gone"]),
-        (so, "| O.1 | |", &["O.1: \"\" is no test, `file::name`"]),
+        (so, "| O.1 | |", &["O.1: \"\" is not a test, `file::name`"]),
         ("| O.1 | |", shown, &["O.1: nothing is promised"]),
-        ("| X.1 | So. |", "| X.1 | `a/b.rs::good` |", &["X.1: this is no number of a promise"]),
+        (
+            "| X.1 | So. |",
+            "| X.1 | `a/b.rs::good` |",
+            &["X.1: this is not the number of a promise"],
+        ),
         ("| O.1 | So. |\n| O.1 | So. |", shown, &["O.1 is promised twice"]),
     ] {
         assert_eq!(mistakes(&page(promises, tests), source_of), wrong, "{promises} {tests}");

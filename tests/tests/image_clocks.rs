@@ -1,5 +1,5 @@
 //! One broadcast sets the clocks of the ARM image and of two recorders in this process, all on one
-//! bus and reporting all the time. In virtual time: the same in every run and on every machine.
+//! bus and reporting all the time. Time is virtual, so every run is the same on every machine.
 #![cfg(target_os = "linux")]
 
 use image_bench::bench::{Bench, Parts, Setup};
@@ -16,24 +16,24 @@ const ROUNDS: u8 = 20;
 
 const CLOCKS_AGREE_WITHIN_MS: i64 = 1;
 
-/// The GENI boards have started by then, and the host knows the recorders.
+/// By when the GENI boards have started and the host knows the recorders.
 const START_LIMIT_MS: u64 = 30_000;
 
-/// All three have carried a broadcast out by then.
+/// By when all three have carried out a broadcast.
 const CARRIED_OUT_MS: u64 = 250;
 
-/// A reply has come over the line by then.
+/// By when a reply has come over the line.
 const REPLY_LIMIT_MS: u64 = 2_000;
 
-/// Toggles all the time, so that every recorder has a report to send whenever it may.
+/// An input that toggles all the time, so that every recorder has a report to send whenever it may.
 const BUSY: u8 = 1;
 const PERIOD_MS: u64 = 5;
 
-/// Moves at all recorders in the same sample; its stamps are compared.
+/// An input that moves at all recorders in the same sample. Its stamps are compared.
 const COMMON: u8 = 2;
 
-/// Each recorder sends a report in some 60 ms. So many at least come while a broadcast is carried
-/// out.
+/// How many reports of each recorder come at least while a broadcast is carried out. A recorder
+/// sends one in some 60 ms.
 const REPORTS_PER_ROUND: u32 = 2;
 
 struct Plant<'p> {
@@ -118,7 +118,7 @@ impl<'p> Plant<'p> {
         others.iter_mut().for_each(|other| other.send_command(&Command::Erase));
     }
 
-    /// What the recorders stamp the latest move of the common contact with, the image first.
+    /// The recorders' stamps of the latest move of the common contact, the image's first.
     fn stamps_ms(&mut self) -> Vec<i64> {
         let Reply::Read(head) = self.ask(&Command::Read { start: 1, count: 1 }) else {
             panic!("no log")
@@ -159,7 +159,7 @@ fn one_broadcast_sets_the_image_and_two_recorders_that_report_all_the_time() {
     let mut all = Vec::new();
     for round in 0..ROUNDS {
         plant.erase_logs();
-        // At another phase of the scan each time, while everybody is about to report.
+        // Each round is at another phase of the scan, while everybody is about to report.
         plant.run(60 + 7 * u64::from(round), true);
         while !plant.genius().is_ready() {
             plant.run(1, true);
@@ -192,7 +192,7 @@ fn one_broadcast_sets_the_image_and_two_recorders_that_report_all_the_time() {
         let stamps = plant.stamps_ms();
         let spread = stamps.iter().max().expect("three") - stamps.iter().min().expect("three");
         assert!(spread <= CLOCKS_AGREE_WITHIN_MS, "round {round}, set to {time}: {stamps:?}");
-        // None of them has an interrupt line, so each goes by its next look at its board.
+        // None of them has an interrupt line, so each uses its next look at its board.
         for (stamp, arrived_ms) in stamps.iter().zip(arrived_ms) {
             let off_ms =
                 (stamp - milliseconds(time)) - i64::try_from(moved_ms - arrived_ms).expect("short");

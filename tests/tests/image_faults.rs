@@ -1,9 +1,9 @@
-//! What the ARM image does when something goes wrong for good: it starts anew, records again, and
-//! says what it was.
+//! What the ARM image does after a fatal fault: it starts anew, records again, and says what the
+//! fault was.
 //!
-//! The faults are brought about in the very image that is to be flashed: a word of the emulated
-//! board's external bus tells it to. Events are lost with the memory that they were in; the
-//! configuration and the time are not.
+//! The faults are brought about in the very image that is to be flashed, by a word of the emulated
+//! board's external bus. Events are lost with the memory that held them; the configuration and the
+//! time are not.
 #![cfg(unix)]
 
 mod image_records;
@@ -28,8 +28,8 @@ const WANTED: Configuration = Configuration {
     auto_print: false,
 };
 
-/// By how much a main loop may come late to set the clock or to read it, on a computer that does
-/// other things as well.
+/// How late a main loop may come to set the clock or to read it, on a computer that does other
+/// things as well.
 const CLOCK_TOLERANCE: Duration = Duration::from_millis(500);
 
 fn read_all(unit: &mut Unit) -> Vec<Entry> {
@@ -51,7 +51,7 @@ fn milliseconds(time: Duration) -> i64 {
     i64::try_from(time.as_millis()).expect("minutes")
 }
 
-/// A clock that was set to ten o'clock, and when by this computer's.
+/// A clock that was set to ten o'clock, and when by this computer's clock.
 struct SetClock {
     not_before: Instant,
     not_after: Instant,
@@ -64,8 +64,8 @@ impl SetClock {
         SetClock { not_before, not_after: Instant::now() }
     }
 
-    /// Checks the time of an entry that was recorded between two moments, but for what the bench
-    /// kept the clock from.
+    /// Checks the time of an entry that was recorded between two moments, with allowance for the
+    /// time that the bench kept the clock from running.
     fn assert_is_right(&self, entry: &Entry, from: Instant, to: Instant, stood_still: Duration) {
         let shown_ms = stamp_ms(entry) - stamp_ms(&Entry { time: TEN_O_CLOCK, ..*entry });
         let tolerance_ms = milliseconds(CLOCK_TOLERANCE + stood_still);
@@ -93,19 +93,19 @@ impl InUse {
         assert_eq!(unit.configure(WANTED.into()).expect("configured"), WANTED);
         recorder.play(&[(0, 1, true), (5, 32, true), (9, 1, false)]);
         assert_eq!(read_all(&mut unit).len(), 3);
-        // A clock that did not go on while the recorder was away would be far out.
+        // A clock that stood still while the recorder was away would be far off.
         let long_enough_ms = 4 * u32::try_from(CLOCK_TOLERANCE.as_millis()).expect("seconds");
         assert!(recorder.board().wait(PATIENCE, |board| board.tick_ms() - set_ms > long_enough_ms));
         InUse { recorder, unit, clock }
     }
 
-    /// Checks that it goes on with what it was told, right from the start; its line is the one that
-    /// it had.
+    /// Checks that it goes on as it was told, right from the start, on the same line as before.
     fn assert_goes_on(&mut self) {
         let InUse { recorder, unit, clock } = self;
         let board = recorder.board();
         let boot_time = board.boot_time();
-        // Printed and not asserted: the emulator's clock goes on while this computer stands still.
+        // The time is printed and not asserted, because the emulator's clock goes on while this
+        // computer stands still.
         println!("recording {boot_time:?} after reset");
         let played_before = recorder.played().len();
         let from = Instant::now();
@@ -123,7 +123,7 @@ impl InUse {
     }
 }
 
-/// Forces a fault upon a recorder in use, and sees it come back.
+/// Forces a fault upon a recorder in use, and checks that it comes back.
 fn survives(fault: ForcedFault, cause: ResetCause, words: impl Fn(&str) -> bool) {
     let folder = tempfile::tempdir().expect("a folder");
     let log = folder.path().join("log");
@@ -161,7 +161,7 @@ fn a_panic_is_over_in_a_moment_and_its_text_is_kept() {
 #[test]
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn a_stack_that_runs_out_is_a_fault_and_harms_nothing_else() {
-    // The processor finds no room for the registers that would tell where.
+    // The processor finds no room for the registers that would tell where it happened.
     survives(ForcedFault::StackOverflow, ResetCause::StackOverflow, |words| {
         words.starts_with("status ")
     });
@@ -234,7 +234,7 @@ fn a_power_cycle_leaves_configuration_and_time() {
     in_use.assert_goes_on();
 }
 
-/// The emulated memory's sectors hold 15 records each; every one of these changes is written.
+/// The emulated memory's sectors hold 15 records each, and every one of these changes is written.
 #[test]
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn a_configuration_outlives_power_cycles_around_the_erasing_of_its_sectors() {
@@ -278,7 +278,7 @@ fn a_clock_that_was_never_set_begins_in_2000() {
     assert_eq!((entry.time.year, entry.time.month, entry.time.day), (0, 1, 1));
 }
 
-/// Whatever moved before is lost with the log, and whatever moved after is not.
+/// Moves before the restart are lost with the log. Moves after it are not.
 #[test]
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn contacts_that_move_all_the_time_are_recorded_again_from_the_first_sample_on() {

@@ -1,5 +1,4 @@
-//! What the ARM image writes to its log: nothing that was dropped, refused or lost goes
-//! unmentioned.
+//! What the ARM image writes to its log. Everything that was dropped, refused or lost is mentioned.
 #![cfg(unix)]
 
 mod image_records;

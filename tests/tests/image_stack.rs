@@ -1,5 +1,5 @@
-//! How much of its stack the ARM image needs when everything happens at once, and that it records
-//! all the while.
+//! How much of its stack the ARM image needs when everything happens at once, and that it keeps
+//! recording.
 #![cfg(unix)]
 
 use std::thread;
@@ -10,11 +10,11 @@ use ser_sim::Played;
 use ser_sim::testing::{Kind, PATIENCE};
 use ser_trial::recorder::{NODE, PATIENT, Recorder};
 
-/// As the image's memory map has it.
+/// The length of the stack in the image's memory map.
 const STACK_LEN: u32 = 8 * 1024;
 
-/// Where the bound is that the checks of the image have found by walking through it, in bytes: set
-/// by `cargo xtask test`.
+/// The variable with the bound that the checks of the image have found by walking through it, in
+/// bytes. `cargo xtask test` sets it.
 const BOUND_VARIABLE: &str = "SER_STACK_BOUND_MPS2_AN385";
 
 /// How deep the stack of the image can get, by its instructions.
@@ -25,7 +25,7 @@ fn bound() -> u32 {
     bound.parse().expect("a number of bytes")
 }
 
-/// Every so often the image looks at its stack.
+/// How often the image looks at its stack.
 const LOOK_EVERY_MS: u32 = 1000;
 
 /// How long contacts move, in milliseconds, while hosts ask for everything.
@@ -34,7 +34,7 @@ const MOVING_MS: u64 = 4000;
 /// Events that the log holds: fewer than there are moves in that time.
 const SIZE: u16 = 2048;
 
-/// All 32 contacts, once a millisecond, one after the other and all together in turns.
+/// Moves all 32 contacts, once a millisecond, alternately one after the other and all together.
 fn everything_moves(milliseconds: u64) -> Vec<(u64, u8, bool)> {
     (0..milliseconds)
         .flat_map(|ms| {
@@ -110,7 +110,7 @@ fn a_quarter_of_the_stack_is_never_in_use_nor_more_than_the_bound_found_in_the_i
     recorder.play(&everything_moves(300));
     let played = recorder.played();
     let closed = played.last().map_or(0, |moved| moved.state.0);
-    // As many as may wait, of lines enough to last to the end.
+    // As many printouts as may wait, with enough lines to last to the end.
     for _ in 0..4 {
         on_bus.print(1, SIZE).expect("accepted");
     }
@@ -119,7 +119,7 @@ fn a_quarter_of_the_stack_is_never_in_use_nor_more_than_the_bound_found_in_the_i
     let all_moves = played.len() + changes(closed, &moves);
     recorder.start_playing(&moves);
 
-    // To the last move: all that the log holds in the end was recorded meanwhile.
+    // Asking goes on to the last move, so all that the log holds in the end was recorded meanwhile.
     let is_moving = || recorder.played().len() < all_moves;
     thread::scope(|scope| {
         scope.spawn(|| {
@@ -152,6 +152,6 @@ fn a_quarter_of_the_stack_is_never_in_use_nor_more_than_the_bound_found_in_the_i
     assert_eq!(board.boots(), 1);
     recorder.assert_lawful();
 
-    // A recorder that does nothing needs little stack.
+    // The log is checked too, because a recorder that does nothing needs little stack.
     assert_log_is(&read_new(&mut recorder.unit(), &mut None), &recorder.played());
 }

@@ -19,14 +19,15 @@ use ser_sim::testing::image;
 /// Where the emulator's plugin is: set by `cargo xtask test`, which builds it.
 const PLUGIN_VARIABLE: &str = "SER_QEMU_PLUGIN";
 
-/// So long nothing happens before.
+/// How long nothing happens before the load.
 const REST_MS: u64 = 100;
 
-/// So long all inputs change in every millisecond: more events than the log holds. `cargo xtask
-/// timing --load-seconds 60` goes on for a minute, which takes more than one of real time.
+/// How long all inputs change in every millisecond, which makes more events than the log holds.
+/// `cargo xtask timing --load-seconds 60` goes on for a minute, which takes more than one of real
+/// time.
 const LOAD_MS: u64 = 3_000;
 
-/// Bytes that a direction of the line may have been behind with when the load began.
+/// How many bytes a direction of the line may have been behind when the load began.
 const LINE_SLACK: u64 = 4;
 
 fn parts() -> Parts {
@@ -52,8 +53,7 @@ fn the_capture_interrupt_keeps_to_its_budget() {
             cases.push((format!("{change:?}, debounce of {debounce_ms} ms"), instructions));
         }
     }
-    // With a longer debounce time the watchdog ends the main loop that hangs before the queue is
-    // full.
+    // With a longer debounce time the watchdog ends the hanging main loop before the queue is full.
     for debounce_ms in [0, SHORTEST_DEBOUNCE_MS] {
         let instructions = costs::capture_beyond_queue(&parts, &program, debounce_ms).unwrap();
         cases.push((format!("queue full, debounce of {debounce_ms} ms"), instructions));
@@ -64,7 +64,7 @@ fn the_capture_interrupt_keeps_to_its_budget() {
     let beyond: Vec<_> =
         cases.iter().filter(|(_, instructions)| *instructions > CAPTURE_INSTRUCTIONS).collect();
     assert!(beyond.is_empty(), "more than {CAPTURE_INSTRUCTIONS} instructions: {beyond:?}");
-    // Each case is one of its own: changes, debounce and a full queue cost something.
+    // Each case differs from the others: changes, debounce and a full queue all cost something.
     let cost =
         |case: &str| cases.iter().find(|(name, _)| name == case).map_or(0, |(_, cost)| *cost);
     let [idle, all] = ["None", "All"].map(|change| cost(&format!("{change}, debounce of 0 ms")));
@@ -85,7 +85,8 @@ fn a_load_on_both_ports_delays_no_sample_and_loses_no_event() {
     load.rest_ms(REST_MS).unwrap();
     load.run_ms(LOAD_MS).unwrap();
     load.bench.tell(false);
-    // Against the same expiry of the timer: a delay that load brings to all of them shows, too.
+    // Both are measured by the same expiry of the timer, so a delay that load brings to all
+    // interrupts shows as well.
     let [quiet, busy] = load.lateness();
     let longest = runs_of(&load.bench.tally, Handler::Capture).map(|run| run.instructions).max();
     assert_eq!((quiet.count() as u64, quiet.max()), (REST_MS, 0));
@@ -99,7 +100,7 @@ fn a_load_on_both_ports_delays_no_sample_and_loses_no_event() {
     let [(_, line, _), (_, bus, _)] = account.hosts;
     assert!(line.delivered > 0 && line.overwritten > 0, "{account:?}");
     assert!(bus.delivered > 0 && bus.overwritten > 0, "{account:?}");
-    // The line was full both ways, and no more than full.
+    // The line was full both ways, and not more than full.
     let full = u64::from(RATE) * LOAD_MS / 1000;
     let Carried { to, from } = account.carried;
     assert!((full * 95 / 100..=full + LINE_SLACK).contains(&to), "{account:?}");
@@ -120,8 +121,8 @@ fn two_runs_count_the_same() {
     assert_eq!(costs, run());
 }
 
-/// The measurement measures: where interrupts are masked, here by another instruction in the place
-/// of the sleep, the interrupt is seen to be late.
+/// Checks the measurement itself: where interrupts are masked, here by an instruction in place of
+/// the sleep, the interrupt is seen to be late.
 #[test]
 #[ignore = "needs the emulator and the image: cargo xtask test"]
 fn an_interrupt_that_is_masked_is_seen_to_be_late() {
@@ -156,7 +157,7 @@ fn an_interrupt_that_is_masked_is_seen_to_be_late() {
             .unwrap();
         assert!(sleeps.contains(&stop));
         tally.executed(stop);
-        // Masked during every second pass.
+        // Interrupts are masked during every second pass.
         lockstep.patch(stop, if pass.is_multiple_of(2) { MASK } else { UNMASK }).unwrap();
     }
     let began = costs::beginnings(&tally);

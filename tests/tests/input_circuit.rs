@@ -1,5 +1,5 @@
-//! The circuit in front of each input, as `docs/hardware.md` draws it, reckoned for its worst case:
-//! the page's figures are the ones that come out, and its levels are valid ones.
+//! The circuit in front of each input, as `docs/hardware.md` draws it, calculated for its worst
+//! case. The page's figures must be the results, and its levels must be valid ones.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ const FILTER: (f64, &str) = (4.7e-9, "4.7 nF");
 const RESISTOR: [f64; 2] = [0.99, 1.01];
 const CAPACITOR: [f64; 2] = [0.9, 1.1];
 
-// Of data sheets: the controller's (I/O static characteristics) and the optocoupler's.
+// From data sheets: the controller's (I/O static characteristics) and the optocoupler's.
 const SUPPLY: [f64; 2] = [3.3 * 0.95, 3.3 * 1.05];
 const LOW_OF_SUPPLY: f64 = 0.3;
 const HIGH_OF_SUPPLY: f64 = 0.7;
@@ -23,7 +23,7 @@ const LED: [f64; 2] = [1.0, 1.3];
 const LED_TYPICAL: f64 = 1.15;
 const SATURATED: [f64; 2] = [0.1, 0.4];
 const TRANSFER_MIN: f64 = 0.3;
-/// What the LED has to have for that.
+/// The LED current at which that ratio holds.
 const TRANSFER_AT: f64 = 1e-3;
 const DARK_CURRENT: f64 = 50e-6;
 const ON_MAX_US: f64 = 20.0;
@@ -33,8 +33,8 @@ fn led_current(field: f64, led: f64, [series, shunt]: [f64; 2]) -> f64 {
     (field - led) / (SERIES_FIELD.0 * series) - led / (SHUNT.0 * shunt)
 }
 
-/// Shortest and longest time, in microseconds, that the pin takes to change its level: through a
-/// threshold that may lie anywhere between the two that are guaranteed.
+/// The shortest and the longest time, in microseconds, that the pin takes to change its level. The
+/// threshold may be anywhere between the two guaranteed ones.
 fn filter_us(closes: bool) -> [f64; 2] {
     let mut times = Vec::new();
     for (capacitor, resistor) in pairs(CAPACITOR, RESISTOR) {
@@ -58,7 +58,7 @@ fn pairs(a: [f64; 2], b: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
     a.into_iter().flat_map(move |a| b.map(|b| (a, b)))
 }
 
-/// The page with its lines in one.
+/// The page with all its lines joined.
 fn page() -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/hardware.md");
     fs::read_to_string(path)
@@ -76,7 +76,7 @@ fn assert_says(page: &str, figures: &[String]) {
 #[test]
 fn the_parts_are_those_of_the_page() {
     let parts = [SERIES_FIELD.1, SHUNT.1, PULL_UP.1, SERIES_PIN.1, FILTER.1];
-    // In the list of parts and in the drawing.
+    // Each part is named in the list of parts and in the drawing.
     for part in parts {
         assert!(page().matches(part).count() >= 2, "{part}");
     }
@@ -91,7 +91,7 @@ fn a_closed_contact_is_a_valid_low_with_the_weakest_parts() {
     assert!(led > TRANSFER_AT, "{led} A: less than what the transfer is given for");
     let sinks = TRANSFER_MIN * led;
     let has_to_sink = (SUPPLY[1] - SATURATED[1]) / (PULL_UP.0 * RESISTOR[0]) + PIN_LEAKAGE;
-    // For what the optocoupler loses over the years.
+    // The reserve covers what the optocoupler loses over the years.
     let reserve = sinks / has_to_sink - 1.0;
     assert!(reserve > 0.5, "{sinks} A of {has_to_sink} A");
     let at_24 = TRANSFER_MIN * led_current(24.0, LED[1], [RESISTOR[1], RESISTOR[0]]);
@@ -133,7 +133,8 @@ fn an_open_contact_is_a_valid_high_with_the_leakiest_parts() {
         &page(),
         &[format!("{:.2} V at least | {wanted:.2} V at least", at_pin(SUPPLY[0]))],
     );
-    // Less than the LED takes at all; what little it takes is less than the dark current.
+    // The LED gets less than it needs to conduct. The little current that it takes is less than the
+    // dark current.
     let at_led =
         4.2 * SHUNT.0 * RESISTOR[1] / (SHUNT.0 * RESISTOR[1] + SERIES_FIELD.0 * RESISTOR[0]);
     assert!(at_led < 0.8, "{at_led} V");
@@ -177,7 +178,7 @@ fn delays_and_what_the_test_sheet_makes_of_them_are_those_of_the_circuit() {
     let constant = |source: f64| source * FILTER.0 * 1e6;
     let (while_on, while_off) = (constant(SERIES_PIN.0), constant(SERIES_PIN.0 + PULL_UP.0));
     let ([closes, closes_max], [opens, opens_max]) = (filter_us(true), filter_us(false));
-    // In milliseconds from here on.
+    // Times are in milliseconds from here on.
     let late = |filter_us: f64, optocoupler_us: f64| (filter_us + optocoupler_us) / 1e3;
     let (on, on_max) = (late(closes, 0.0), late(closes_max, ON_MAX_US));
     let (off, off_max) = (late(opens, 0.0), late(opens_max, OFF_MAX_US));

@@ -1,6 +1,6 @@
 //! A board's main loop with both ports, in the middle of which time passes: interrupts take
-//! samples, bytes and pulses while it is busy. A clock that comes by broadcast counts from the tick
-//! of the pulse, for every change after it.
+//! samples, bytes and pulses while it is busy. A clock set by broadcast counts from the tick of the
+//! pulse, for every change after it.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -24,14 +24,14 @@ use ser_sim::genius::{Board, BoardOptions, BoardWindow, Bus, BusTiming, Handle};
 const UNIT: u8 = 5;
 const HOST: u8 = 31;
 
-/// Reset line at power-up, as short as the boards allow.
+/// The reset line at power-up, held as shortly as the boards allow.
 const RESET: Start = Start::Reset { hold_ms: 20 };
 
-/// Everybody is on the bus by then.
+/// By when everybody is on the bus.
 const START_LIMIT_MS: u32 = 30_000;
 
-/// The broadcast is given to the host's board so long after time begins to pass, and the contact
-/// moves when it has arrived and been ready to be read for a while.
+/// How long after time begins to pass the broadcast is given to the host's board. The contact moves
+/// when the broadcast has arrived and been ready to be read for a while.
 const BROADCAST_AFTER_MS: u32 = 20;
 const MOVE_AFTER_MS: u32 = 80;
 const AWAY_MS: u32 = 120;
@@ -39,7 +39,7 @@ const AWAY_MS: u32 = 120;
 const TEN_O_CLOCK: TimeStamp =
     TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 0 };
 
-/// Something else than the configuration in force: it has to be stored.
+/// A configuration that differs from the one in force, so it has to be stored.
 const CONFIGURE: Command = Command::Configure(Configure {
     size: Some(1_000),
     baud: None,
@@ -72,7 +72,7 @@ struct Surroundings {
 }
 
 impl Surroundings {
-    /// A millisecond: it begins with its sample, and all that comes after that has its tick.
+    /// A millisecond. It begins with its sample, and everything after that has its tick.
     fn pass_ms(&mut self) {
         self.now_ms += 1;
         let now_ms = self.now_ms;
@@ -106,7 +106,7 @@ impl Surroundings {
         self.host.ram_mut().drive_reset(held);
     }
 
-    /// A broadcast, then a change, both so soon that the main loop is still away.
+    /// Plans a broadcast and then a change, both so soon that the main loop is still held up.
     fn plan(&mut self, besides: impl IntoIterator<Item = (u32, Act)>) {
         let acts = [
             (BROADCAST_AFTER_MS, Act::Broadcast(Command::SetClock(TEN_O_CLOCK))),
@@ -133,11 +133,11 @@ fn transmit(host: &mut Driver<BoardWindow>, destination: Destination, command: &
 
 type Shared = Rc<RefCell<Surroundings>>;
 
-/// Memory that takes its time, as flash does whose sector is erased.
+/// Memory that takes its time, like flash while a sector is erased.
 struct SlowStorage {
     around: Shared,
     copies: [[u8; RECORD_LEN]; 2],
-    /// What happens during the next writing.
+    /// Whether something happens during the next writing.
     meanwhile: Rc<RefCell<bool>>,
 }
 
@@ -164,7 +164,7 @@ impl Storage for SlowStorage {
 struct Lines {
     around: Shared,
     window: BoardWindow,
-    /// Time passes when the main loop asks for line errors: it has read its tick by then.
+    /// Whether time passes when the main loop asks for line errors. It has read its tick by then.
     is_away: bool,
 }
 
@@ -219,7 +219,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// Everybody is on the bus.
+    /// A bench on which everybody is on the bus.
     fn start() -> Bench {
         let bus = Rc::new(RefCell::new(Bus::new(BusTiming::default())));
         let connect = |number| bus.borrow_mut().connect(Board::new(BoardOptions::at(number)));
@@ -229,7 +229,7 @@ impl Bench {
             window(host),
             Options { start: RESET, ..Options::new(Configuration::DEFAULT) },
         );
-        // Memory of the test process goes when it does.
+        // This memory is given back when the test process ends.
         let (capture, reader) = Box::leak(Box::new(CaptureChannel::new())).split(Debounce::OFF);
         let around = Rc::new(RefCell::new(Surroundings {
             now_ms: 0,
@@ -270,13 +270,13 @@ impl Bench {
         self.genius.is_ready() && host.device(UNIT).is_ok() && host.can_transmit()
     }
 
-    /// A millisecond, and a turn of the main loop.
+    /// A millisecond, and a pass of the main loop.
     fn turn(&mut self) {
         self.around.borrow_mut().pass_ms();
         main_loop::pass(&mut self.node, &mut self.line, Some(&mut self.genius));
     }
 
-    /// Checks that the change has the time that was set, by the board's own word for when it came.
+    /// Checks that the change has the time that was set, counted from when the board says it came.
     fn assert_stamped_by_the_broadcast(&mut self) {
         (0..200).for_each(|_| self.turn());
         let around = self.around.borrow();

@@ -1,13 +1,13 @@
 //! Programs touch no file that they have not made, and do not panic when nobody reads what they
-//! print: every call in the source that could is here, with the reason why it does not. A new one
-//! has to be judged, and a line added.
+//! print. Every call in the source that could do so is listed here, with the reason why it does
+//! not. A new call has to be judged, and a line added.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What makes room for itself, writes, follows links, replaces or removes; what panics on a closed
-/// pipe.
+/// Calls that create, write, follow links, replace or remove files, and calls that panic on a
+/// closed pipe.
 const CALLS: [&str; 26] = [
     "File::create(",
     "File::create_buffered(",
@@ -31,10 +31,10 @@ const CALLS: [&str; 26] = [
     "remove_dir(",
     "map_raw(",
     "map_mut(",
-    // The other program opens what it is told by name.
+    // Another program opens what it is told by name.
     "Process::new(",
     ".persist(",
-    // And what ends with it: `eprintln!`.
+    // This also finds what ends with it, such as `eprintln!`.
     "println!(",
     "print!(",
 ];
@@ -192,7 +192,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// The source of programs and libraries, without that of tests.
+/// Finds the sources of programs and libraries, without those of tests.
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in
         fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path())
@@ -207,8 +207,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Where the tests at the end of a source begin. A module of tests that is in another file ends
-/// nothing.
+/// Where the tests at the end of a source begin. A module of tests in another file does not count.
 fn end_of_code(source: &str) -> usize {
     let is_body = |at: usize| {
         let mut lines = source[at..].lines().skip(1);
@@ -222,12 +221,12 @@ fn end_of_code(source: &str) -> usize {
     marks.into_iter().find(|&at| is_of_tests(at) && is_body(at)).unwrap_or(source.len())
 }
 
-/// How often each call stands in a source, comments and its tests at the end apart.
+/// How often each call occurs in a source, without comments and without the tests at its end.
 fn calls(source: &str) -> BTreeMap<&'static str, usize> {
     let code = &source[..end_of_code(source)];
     let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
     let code: String = lines.flat_map(|line| [line, "\n"]).collect();
-    // `is_symlink` only looks.
+    // `is_symlink` only looks, so a call may not follow an underscore.
     let is_call = |&(at, _): &(usize, &str)| !code[..at].ends_with('_');
     let counts = CALLS.map(|call| (call, code.match_indices(call).filter(is_call).count()));
     counts.into_iter().filter(|(_, count)| *count > 0).collect()

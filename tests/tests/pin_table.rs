@@ -1,5 +1,4 @@
-//! The pins of `docs/hardware.md` are those of `firmware/stm32f407/src/pins.rs`, neither more nor
-//! less.
+//! The pins of `docs/hardware.md` are exactly those of `firmware/stm32f407/src/pins.rs`.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,7 +8,7 @@ use std::path::Path;
 /// Port and number.
 type Pin = (char, u8);
 
-/// Pins that the program has nothing to do with: the main crystal's.
+/// Pins that the program does not touch: the main crystal's.
 const BY_HARDWARE: [Pin; 2] = [('H', 0), ('H', 1)];
 
 fn read(path: &str) -> String {

@@ -1,5 +1,5 @@
-//! Every command over a pseudo-terminal, with the real client, against the native node and against
-//! the ARM image.
+//! Every command over a pseudo-terminal, with the real client, against the native recorder and
+//! against the ARM image.
 #![cfg(unix)]
 
 use std::time::Duration;
@@ -232,7 +232,7 @@ fn a_full_ser320_log_is_read_while_events_keep_arriving(kind: Kind) {
     full_log_while_events_keep_arriving(kind, Model::Ser320);
 }
 
-/// 2048 events fill the log; while it is read, 400 more come. Everything is delivered or counted.
+/// 2048 events fill the log. While it is read, 400 more come. Everything is delivered or counted.
 fn full_log_while_events_keep_arriving(kind: Kind, model: Model) {
     let recorder = Recorder::start(kind, model);
     let mut unit = recorder.unit();
@@ -268,7 +268,7 @@ fn full_log_while_events_keep_arriving(kind: Kind, model: Model) {
     recorder.wait_played();
     let played = recorder.played();
     assert_eq!(played.len(), 2448);
-    // What was delivered after the last loss are the newest events, without a gap.
+    // The events delivered after the last loss are the newest ones, without a gap.
     assert_entries_are(&entries, &played[played.len() - entries.len()..]);
     assert_eq!(delivered + lost, 2448, "each event is delivered once or counted as lost");
 }
@@ -283,7 +283,7 @@ fn an_overrun_log_says_exactly_how_many_are_lost(kind: Kind) {
     let mut log = Vec::new();
     unit.read_new(&mut cursor, size, &mut |delivery| log.push(delivery)).expect("the log is read");
     assert_eq!(log.len(), 20);
-    // Two and a half times its size more.
+    // Two and a half times as many events as the log holds follow.
     recorder.play(&toggling(250, 1));
     log.clear();
     let summary = unit

@@ -1,5 +1,5 @@
-//! Some virtual time of the whole system, left to chance: every event is read once, or reported as
-//! lost.
+//! Some virtual time of the whole system with random operations: every event is read once, or
+//! reported as lost.
 //!
 //! `cargo xtask simulate` goes on for as long as one likes.
 
@@ -9,7 +9,7 @@ use ser_trial::simulation::{Options, Report, run, run_flat_out};
 const HOUR_MS: u64 = 3_600_000;
 const MINUTE_MS: u64 = 60_000;
 
-/// No life is on a bus.
+/// The setting with which no life is on a bus.
 const NO_BUS: u64 = 0;
 
 fn lived(seed: u64, duration_ms: u64, bus_one_in: u64) -> Report {
@@ -20,7 +20,7 @@ fn lived(seed: u64, duration_ms: u64, bus_one_in: u64) -> Report {
     report
 }
 
-/// Checks that nothing is left over: each edge and each event is in one of the columns.
+/// Checks that each edge and each event is in one of the columns.
 fn assert_accounted(report: &Report) {
     for edges in &report.edges {
         let in_columns = edges.recorded
@@ -74,7 +74,7 @@ fn days_without_a_bus() {
     assert!(edges().any(|edges| edges.filtered > 0) && edges().any(|edges| edges.stopped > 0));
 }
 
-/// With the days and the minutes on a bus a hundred different beginnings.
+/// Together with the days and the minutes on a bus, these are a hundred different beginnings.
 #[test]
 fn many_beginnings_without_a_bus() {
     for seed in 201..=284 {
@@ -132,8 +132,8 @@ fn all_inputs_toggle_for(duration_ms: u64) {
         report.tallies.iter().all(|(_, tally)| tally.delivered > 0 && tally.overwritten > 0),
         "{report}"
     );
-    // The line carries nine replies a second, of which every other one is short, beside some three
-    // printed lines; the bus some twenty datagrams to each host.
+    // The line carries nine replies a second, every other one of them short, beside some three
+    // printed lines. The bus carries some twenty datagrams to each host.
     let at_least = |count: u64, per_second: u64| count > per_second * duration_ms / 1000;
     assert!(at_least(report.line.answered, 5) && at_least(report.line.lines, 2), "{report}");
     assert!(report.bus.iter().all(|talk| at_least(talk.answered, 10)), "{report}");

@@ -1,4 +1,4 @@
-//! The manual's examples through the frame decoder and the message types, whole, in pieces and
+//! The manual's examples, decoded by the frame decoder and the message types: whole, in pieces and
 //! after noise.
 
 use proptest::prelude::*;

@@ -1,6 +1,6 @@
-//! `watch` while events come faster and faster, in virtual time: nothing is lost that the line
-//! carries, and beyond that most of what it carries is delivered. Every event is delivered once and
-//! in order, or counted as lost: the run itself sees to that.
+//! `watch` while events come faster and faster, in virtual time. Nothing is lost that the line
+//! carries. Beyond that, most of what the line carries is delivered. Every event is delivered once
+//! and in order, or counted as lost; the run itself checks that.
 
 use ser_trial::watching::{Load, Watched, Way, line_carries};
 
@@ -16,7 +16,7 @@ fn watch(way: Way, size: u16, per_second: u32) -> Watched {
 
 #[test]
 fn nothing_is_lost_that_the_line_carries() {
-    // A ring of 64 entries turns over in less than a second then, and bears less.
+    // At higher rates a ring of 64 entries turns over in less than a second, and withstands less.
     for (size, rates) in
         [(64, &[20, 40, 60][..]), (128, &[40, 70]), (256, &[40, 60, 70]), (2048, &[40, 70])]
     {
@@ -33,8 +33,8 @@ fn nothing_is_lost_that_the_line_carries() {
 
 #[test]
 fn a_watcher_with_reports_is_never_far_behind() {
-    // With reports and readings on the line at once, it falls further behind with every second from
-    // 35 events/s on.
+    // With reports and readings on the line at once, a watcher falls further behind with every
+    // second from 35 events/s on.
     for per_second in [10, 20, 30, 40, 50, 60] {
         let watched = watch(Way::Reports, 1024, per_second);
         let behind = watched.events - watched.in_time;

@@ -1,8 +1,8 @@
-//! The emulated board on a bench: contacts, a serial line at full rate, perhaps a Genius bus, all
-//! in step with the board's own milliseconds.
+//! The emulated board on a bench: contacts, a serial line at full rate and, if wanted, a Genius
+//! bus, all in step with the board's own milliseconds.
 //!
 //! The bench acts while the capture interrupt is about to take its sample. What it changes then is
-//! in that very sample.
+//! already in that sample.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ use super::genius::Genius;
 use super::program::{Handler, Kind, Program};
 use super::tally::Tally;
 
-/// NOP: the processor goes on where it would sleep.
+/// NOP. With it the processor goes on where it would sleep.
 const NOP: u16 = 0xBF00;
 
 /// Bytes per second on the line, which are thousandths of a byte per millisecond.
@@ -26,12 +26,13 @@ const BYTE: u32 = 1000;
 /// What the battery-backed clock shows first: 2026-11-22 10:00.
 pub const FIRST_MS: u64 = 1_795_341_600_000;
 
-/// What one direction of the line could have carried by now and did not.
+/// What one direction of the line could have carried by now but did not.
 #[derive(Clone, Copy, Debug, Default)]
 struct Credit(u32);
 
 impl Credit {
-    /// A millisecond passes. A line that waits for an interrupt catches up with that and no more.
+    /// A millisecond passes. A line that waits for an interrupt catches up for that long and no
+    /// more.
     fn pass_ms(&mut self) {
         self.0 = (self.0 + RATE).min(4 * BYTE);
     }
@@ -46,13 +47,13 @@ impl Credit {
         self.0 -= BYTE;
     }
 
-    /// There is nothing to carry: an idle line saves nothing up.
+    /// There is nothing to carry. An idle line saves nothing up.
     fn idle(&mut self) {
         self.0 = self.0.min(BYTE);
     }
 }
 
-/// Files that it takes.
+/// The files that the bench needs.
 #[derive(Clone, Debug)]
 pub struct Parts {
     /// The image, an ELF file.
@@ -72,14 +73,14 @@ pub struct Setup {
 
 /// The bench.
 pub struct Bench<'p> {
-    /// What was executed while it was [told of](Bench::tell).
+    /// What was executed while the bench was [told](Bench::tell) of it.
     pub tally: Tally<'p>,
     /// The bus, if there is one.
     pub genius: Option<Genius>,
     program: &'p Program,
     board: Lockstep,
     telling: bool,
-    /// The instruction that the board is held at.
+    /// The instruction at which the board is held.
     at: u32,
     now_ms: u64,
     inputs: u32,
@@ -142,10 +143,10 @@ impl<'p> Bench<'p> {
         })
     }
 
-    /// Has every instruction counted from now on, or none.
+    /// Counts every instruction from now on, or none.
     pub fn tell(&mut self, telling: bool) {
         if telling && !self.telling {
-            // The one that the board is held at has not been counted.
+            // The instruction at which the board is held has not been counted.
             self.tally.executed(self.at);
         }
         self.telling = telling;
@@ -157,7 +158,7 @@ impl<'p> Bench<'p> {
         self.now_ms
     }
 
-    /// Lets a millisecond pass, and stands before the next sample.
+    /// Lets a millisecond pass, and holds the board before the next sample.
     ///
     /// # Errors
     /// When the board misses a sample, starts anew, or the emulator ends.
@@ -220,7 +221,7 @@ impl<'p> Bench<'p> {
         Ok(())
     }
 
-    /// Takes a byte from the board; its transmitter is busy until then.
+    /// Takes a byte from the board. Its transmitter is busy until then.
     fn take(&mut self) -> Result<(), SimError> {
         if !self.credit_from.is_due() {
             return Ok(());
@@ -243,12 +244,12 @@ impl<'p> Bench<'p> {
         self.board.set_inputs(self.inputs);
     }
 
-    /// Lets the main loop go no further; the watchdog looks on for two seconds.
+    /// Stops the main loop. The watchdog tolerates that for two seconds.
     pub fn hang_main_loop(&self) {
         self.board.force(ForcedFault::MainLoopHangs);
     }
 
-    /// Puts bytes on the line, behind those that wait.
+    /// Puts bytes on the line, after those that wait.
     pub fn send(&mut self, bytes: &[u8]) {
         self.to_board.extend(bytes);
     }

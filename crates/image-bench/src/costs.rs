@@ -1,4 +1,4 @@
-//! What single things cost: a run of the capture interrupt, a command.
+//! The cost of single things: a run of the capture interrupt, a command.
 
 use std::collections::BTreeMap;
 
@@ -10,29 +10,29 @@ use super::genius::Genius;
 use super::program::{Handler, Program};
 use super::tally::{Masked, Pass, Run, Tally};
 
-/// Everything has started by then and taken its baseline, in milliseconds.
+/// When everything has started and taken its baseline, in milliseconds.
 const STARTED_MS: u64 = 20;
 
-/// The longest debounce time there is, in milliseconds: all bits of all counters are in use.
+/// The longest possible debounce time, in milliseconds. With it all bits of all counters are in
+/// use.
 pub const LONGEST_DEBOUNCE_MS: u8 = 255;
 
-/// The shortest debounce time, with which the queue is full before the watchdog looks at the main
-/// loop.
+/// The shortest debounce time. With it the queue is full before the watchdog acts on the main loop.
 pub const SHORTEST_DEBOUNCE_MS: u8 = 1;
 
-/// Changes that the main loop may still take after it was told to hang.
+/// How many changes the main loop may still take after it was told to hang.
 const QUEUED_LATER: usize = 10;
 
-/// A GENI board and everybody on its bus are at rest, so long after the host knows the recorder.
+/// How long after the host knows the recorder a GENI board and everybody on its bus are at rest.
 const SETTLED_MS: u64 = 1_500;
 
-/// Nothing takes longer, in milliseconds of virtual time.
+/// The limit of every wait, in milliseconds of virtual time.
 const LIMIT_MS: u64 = 30_000;
 
-/// Nobody says anything for so long when everything is said, in milliseconds.
+/// How long the line is silent when everything is said, in milliseconds.
 const SILENT_MS: u64 = 10;
 
-/// So long an idle board is looked at, in milliseconds.
+/// How long an idle board is measured, in milliseconds.
 const IDLE_MS: u64 = 50;
 
 /// Events in the log that is read.
@@ -54,7 +54,7 @@ pub enum Change {
 }
 
 impl Change {
-    /// All of them.
+    /// All cases.
     pub const ALL: [Change; 3] = [Change::None, Change::One, Change::All];
 
     fn mask(self) -> u32 {
@@ -71,8 +71,8 @@ pub fn runs_of<'a>(tally: &'a Tally<'_>, handler: Handler) -> impl Iterator<Item
     tally.runs.iter().filter(move |run| run.handler == handler)
 }
 
-/// The longest run of the capture interrupt in which a change is accepted; the longest of all, if
-/// nothing changes.
+/// The longest run of the capture interrupt in which a change is accepted. If nothing changes, the
+/// longest run of all.
 ///
 /// # Errors
 /// When the board does not do what it must.
@@ -85,7 +85,7 @@ pub fn capture(
     let mut bench = Bench::start(parts, program, Setup { debounce_ms, genius: false })?;
     pass(&mut bench, STARTED_MS)?;
     bench.tell(true);
-    // There and back.
+    // The contacts move there and back.
     for _ in 0..2 {
         bench.toggle(change.mask());
         pass(&mut bench, u64::from(debounce_ms) + 5)?;
@@ -93,7 +93,7 @@ pub fn capture(
     Ok(runs_of(&bench.tally, Handler::Capture).map(|run| run.instructions).max().unwrap_or(0))
 }
 
-/// The longest run of the capture interrupt when all inputs change and its queue is full, because
+/// The longest run of the capture interrupt when all inputs change and its queue is full because
 /// the main loop hangs.
 ///
 /// # Errors
@@ -106,7 +106,8 @@ pub fn capture_beyond_queue(
     let mut bench = Bench::start(parts, program, Setup { debounce_ms, genius: false })?;
     pass(&mut bench, STARTED_MS)?;
     bench.hang_main_loop();
-    // One behind the other, as fast as debounce accepts them; the first ones may still be taken.
+    // The changes follow each other as fast as debounce accepts them. The first ones may still be
+    // taken.
     for _ in 0..QUEUE_LEN + QUEUED_LATER {
         bench.toggle(u32::MAX);
         pass(&mut bench, u64::from(debounce_ms) + 1)?;
@@ -138,7 +139,7 @@ fn pass(bench: &mut Bench<'_>, ms: u64) -> Result<(), String> {
     (0..ms).try_for_each(|_| bench.pass_ms())
 }
 
-/// The way that a command takes.
+/// How a command reaches the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
     /// RS-232.
@@ -151,8 +152,8 @@ pub enum Way {
 /// does meanwhile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
-    /// Instructions of the main loop. A pass that costs less than an idle one counts for nothing:
-    /// with a full ring in front of the transmitter it does not look for what could be sent.
+    /// Instructions of the main loop. A pass that costs less than an idle one counts as zero: with
+    /// a full ring in front of the transmitter the loop does not look for what could be sent.
     pub main_loop: u64,
     /// Instructions of the serial interrupts.
     pub handlers: u64,
@@ -162,9 +163,9 @@ pub struct Cost {
 
 /// What idle passes of the main loop cost.
 struct Idle {
-    /// Most of them.
+    /// What most of them cost.
     usual: u64,
-    /// What all others cost more, in sixteenths per millisecond.
+    /// What all others cost in addition, in sixteenths per millisecond.
     more_per_ms: u64,
 }
 
@@ -229,7 +230,7 @@ impl<'p> Commands<'p> {
         self.idle.usual
     }
 
-    /// Has a command served, and counts.
+    /// Has a command served, and counts its cost.
     ///
     /// # Errors
     /// When it is not answered.
@@ -246,7 +247,8 @@ impl<'p> Commands<'p> {
             (Way::Bus, Some(genius)) => genius.take_received().first().map(drop),
             _ => holds_frame(decoder, &bench.take_sent()).then_some(()),
         })?;
-        // What the reply leaves to be done is done by then, printed lines included.
+        // When the line is silent, the work that the reply leaves is done as well, printed lines
+        // included.
         let mut silent_ms = 0;
         until(&mut self.bench, "the line falls silent", |bench| {
             silent_ms = if bench.take_sent().is_empty() { silent_ms + 1 } else { 0 };

@@ -1,5 +1,5 @@
-//! A Genius bus in virtual time with the emulated board's GENI, a host's, and those of recorders in
-//! this process.
+//! A Genius bus in virtual time with the GENI boards of the emulated board, of a host, and of
+//! recorders in this process.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -17,10 +17,10 @@ use ser_sim::{Ram, Scenario, SimNode, SimNodeOptions, Step};
 
 use ser_trial::genius_world::HOST;
 
-/// Device number of the image.
+/// Bus address of the image.
 const RECORDER: u8 = 5;
 
-/// Reset line at power-up, as short as the board allows.
+/// The reset line at power-up, held as shortly as the board allows.
 const RESET: Start = Start::Reset { hold_ms: 20 };
 
 /// A recorder in this process, with its port.
@@ -56,7 +56,7 @@ pub struct Genius {
 }
 
 impl Genius {
-    /// Both boards have power, and nobody has looked at them.
+    /// A bus on which both boards have power, and nobody has looked at them.
     #[must_use]
     pub fn new() -> Genius {
         let bus = Rc::new(RefCell::new(Bus::new(BusTiming::default())));
@@ -68,19 +68,20 @@ impl Genius {
         Genius { bus, recorder, others: Vec::new(), host, received: Vec::new() }
     }
 
-    /// Connects another recorder, of 32 inputs and in this process, at the beginning.
+    /// Connects another recorder, with 32 inputs and in this process. To be called at the
+    /// beginning.
     pub fn connect(&mut self, number: u8) {
         let board = self.bus.borrow_mut().connect(Board::powered(BoardOptions::at(number)));
         let window = BoardWindow::new(Rc::clone(&self.bus), board);
-        // Memory of the test process goes when it does.
+        // This memory is given back when the test process ends.
         let node =
             SimNode::new(SimNodeOptions::new(Model::Ser320), Box::leak(Box::new(Ram::new())));
         let options = GeniusOptions { start: RESET, ..GeniusOptions::new(Model::Ser320) };
         self.others.push(BuiltIn { number, node, port: GeniusPort::new(window, options) });
     }
 
-    /// The recorder is held at this millisecond: lets the boards and the host live up to it, and
-    /// the other recorders up to the one before, whose sample it has taken.
+    /// Lets the boards and the host live up to `now_ms`, at which the image is held. The other
+    /// recorders live up to the millisecond before, whose sample they have taken.
     pub fn advance(&mut self, now_ms: u64, lockstep: &mut Lockstep) {
         for BuiltIn { node, port, .. } in &mut self.others {
             node.advance_to(now_ms - 1);
@@ -114,7 +115,7 @@ impl Genius {
         known(RECORDER) && others && self.host.can_transmit()
     }
 
-    /// Sends the recorder a command. [`is_ready`](Genius::is_ready) has said yes.
+    /// Sends the recorder a command. [`is_ready`](Genius::is_ready) must have returned true.
     ///
     /// # Errors
     /// When the host's board does not take it.
@@ -122,7 +123,7 @@ impl Genius {
         self.send_to(Destination::Device(RECORDER), command)
     }
 
-    /// The same to all recorders.
+    /// Sends a command to all recorders.
     ///
     /// # Errors
     /// When the host's board does not take it.
@@ -145,11 +146,11 @@ impl Genius {
             .map_err(|error| format!("the host's board refuses: {error:?}"))
     }
 
-    /// When each recorder's board received the datagram that it handed over last: the tick of that
-    /// moment, the image's first.
+    /// The ticks at which the recorders' boards received the datagram that they handed over last,
+    /// the image's first.
     ///
     /// # Panics
-    /// When there was none since its reset.
+    /// When there was none since a board's reset.
     #[must_use]
     pub fn read_arrived_ms(&mut self) -> Vec<u64> {
         let image = self.bus.borrow().get(self.recorder).latest_read();

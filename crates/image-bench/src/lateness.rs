@@ -2,38 +2,40 @@
 //! of its handler.
 //!
 //! The timer expires every millisecond, which is a fixed number of instructions. The earliest
-//! interrupt of a board's life comes at once, and shows [when that is](expiry); the others are late
-//! by what they come later within their millisecond. Interrupts of a time in which all of them are
-//! late need those of another time to be measured by.
+//! interrupt of a board's life comes at once and shows [when the timer expires](expiry). Any other
+//! interrupt is late by as much as it comes later within its millisecond. In a time in which all
+//! interrupts are late, they must be measured by those of another time.
 
 use std::fmt;
 
-/// Bounds of the histogram's rows, in instructions: up to and with each.
+/// Upper bounds of the histogram's rows, in instructions, inclusive.
 const ROWS: [u64; 7] = [0, 10, 30, 100, 300, 1_000, 3_000];
 
-/// Widest bar.
+/// The length of the longest bar.
 const BAR: u64 = 40;
 
 /// Instructions from expiry to handler, of many interrupts.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Lateness {
-    /// In rising order.
+    /// In ascending order.
     sorted: Vec<u64>,
 }
 
-/// When the timer expires, within its period, by the earliest of these beginnings of the handler.
+/// When the timer expires within its period, judging by the earliest of these beginnings of the
+/// handler.
 #[must_use]
 pub fn expiry(began: &[u64], period: u64) -> u64 {
     let Some(&first) = began.first() else { return 0 };
-    // Within half a period of the first; that one may have been late itself.
+    // Compared within half a period of the first beginning, because that one may have been late
+    // itself.
     let half = period / 2;
     let earliest = began.iter().map(|&began| (began - first + half) % period).min().unwrap_or(half);
     (first + period - half + earliest) % period
 }
 
 impl Lateness {
-    /// From the count of instructions at each beginning of the handler, when the timer expires
-    /// within its period, and the period.
+    /// From the count of instructions at each beginning of the handler, from when the timer expires
+    /// within its period, and from the period.
     #[must_use]
     pub fn of(began: &[u64], expiry: u64, period: u64) -> Lateness {
         let mut sorted: Vec<u64> =
@@ -48,7 +50,7 @@ impl Lateness {
         self.sorted.len()
     }
 
-    /// The lateness that so many of a thousand do not exceed; the smallest for 0.
+    /// The lateness that this many of a thousand do not exceed. For 0, the smallest lateness.
     #[must_use]
     pub fn per_mille(&self, per_mille: usize) -> u64 {
         let rank = (self.sorted.len() * per_mille).div_ceil(1000).max(1);
@@ -61,7 +63,7 @@ impl Lateness {
         self.per_mille(1000)
     }
 
-    /// Rows of a histogram: bounds and how many are within.
+    /// The rows of a histogram: bounds, and how many interrupts are within.
     fn rows(&self) -> impl Iterator<Item = (u64, u64, u64)> {
         let ends = ROWS.into_iter().chain([u64::MAX]);
         let begins = [0].into_iter().chain(ROWS.into_iter().map(|end| end + 1));
@@ -74,7 +76,7 @@ impl Lateness {
 }
 
 impl fmt::Display for Lateness {
-    /// A histogram, without the rows behind the last one that counts.
+    /// A histogram, without the empty rows after the last one that counts.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let most = self.rows().map(|(_, _, count)| count).max().unwrap_or(0).max(1);
         let max = self.max();
@@ -101,7 +103,7 @@ mod tests {
         let began = [1_007, 2_000, 3_400, 4_001];
         assert_eq!(expiry(&began, 1_000), 0);
         assert_eq!(Lateness::of(&began, 0, 1_000).sorted, [0, 1, 7, 400]);
-        // Where the period begins within their spread, too.
+        // The result is the same where the period begins within the spread of the beginnings.
         let began = began.map(|began| began + 998);
         assert_eq!(expiry(&began, 1_000), 998);
         assert_eq!(Lateness::of(&began, 998, 1_000).sorted, [0, 1, 7, 400]);

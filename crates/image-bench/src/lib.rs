@@ -1,5 +1,5 @@
-//! What the ARM image costs and what it bears, in instructions and in virtual time: the same
-//! numbers in every run and on every machine.
+//! What the ARM image costs and what load it withstands, in instructions and in virtual time. The
+//! numbers are the same in every run and on every machine.
 
 #[cfg(target_os = "linux")]
 pub mod bench;

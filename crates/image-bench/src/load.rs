@@ -23,16 +23,16 @@ use ser_trial::simulation::ledger::Ledger;
 /// 2000-01-01 00:00, what a clock that has never been set shows at tick 0.
 const NEVER_SET_MS: i64 = 946_684_800_000;
 
-/// Bytes that are never missing on the line: more than it takes in a millisecond.
+/// How many bytes always wait on the line: more than it carries in a millisecond.
 const LINE_AHEAD: usize = 4;
 
-/// A byte of noise: one that stands outside every frame.
+/// A byte of noise, which stands outside every frame.
 const NOISE: u8 = 0x55;
 
-/// The GENI boards have started by then.
+/// When the GENI boards have started.
 const START_LIMIT_MS: u64 = 30_000;
 
-/// Hosts have read everything so long after the last change.
+/// How long after the last change hosts have read everything.
 const CATCH_UP_MS: u64 = 60_000;
 
 /// The total counts modulo this.
@@ -48,13 +48,13 @@ pub struct Load<'p> {
     outgoing: VecDeque<Command>,
     /// Samples in which contacts have moved.
     changes: u64,
-    /// Events that the recorder has counted, by what it said last.
+    /// The events that the recorder has counted, by its latest word.
     total: Option<u16>,
     /// When capture interrupts began while nothing happened.
     quiet: Vec<u64>,
-    /// While contacts moved.
+    /// What the line carried while contacts moved.
     carried: Carried,
-    /// Who has read everything since then may rest.
+    /// A host that has read everything since then may rest.
     still_since_ms: u64,
 }
 
@@ -63,9 +63,10 @@ pub struct Load<'p> {
 pub struct Account {
     /// Samples that saw a change.
     pub changes: u64,
-    /// Events that the recorder says it has counted, modulo 65536; `None` when it never said.
+    /// The total that the recorder gave last, modulo 65536; `None` when it never gave one.
     pub total: Option<u16>,
-    /// The host on RS-232, and the one on the bus: what they were told, and what they talked about.
+    /// The host on RS-232, and the one on the bus, each with what it was told and the counts of its
+    /// conversation.
     pub hosts: [(&'static str, Told, Talk); 2],
     /// What went over RS-232 while contacts moved.
     pub carried: Carried,
@@ -100,7 +101,7 @@ impl<'p> Load<'p> {
         let mut ledger = Ledger::new(Model::Ser320.mask());
         ledger.power_up(0, NEVER_SET_MS, MAX_SIZE, Debounce::OFF);
         let mut line = Conversation::new("RS-232", LineRate::BitsPerSecond(MAX_BITS_PER_SECOND));
-        // The recorder reports every event to the host on the bus, besides.
+        // The recorder also reports every event to the host on the bus.
         line.begin(Order::Ask(Command::Configure(REPORT)), bench.now_ms());
         Ok(Load {
             bench,
@@ -116,8 +117,8 @@ impl<'p> Load<'p> {
         })
     }
 
-    /// Nothing changes and nobody says anything for so many milliseconds; only what comes behind
-    /// them counts as load.
+    /// Lets this many milliseconds pass in which nothing changes and nobody says anything. Only
+    /// what comes after them counts as load.
     ///
     /// # Errors
     /// When the board does not do what it must.
@@ -129,7 +130,8 @@ impl<'p> Load<'p> {
         Ok(())
     }
 
-    /// How late the capture interrupts were, at rest and later, all against the earliest of them.
+    /// How late the capture interrupts were, at rest and later, both measured by the earliest of
+    /// them.
     #[must_use]
     pub fn lateness(&self) -> [Lateness; 2] {
         let busy = beginnings(&self.bench.tally);
@@ -137,10 +139,11 @@ impl<'p> Load<'p> {
         [&self.quiet, &busy].map(|began| Lateness::of(began, expiry, INSTRUCTIONS_PER_MS))
     }
 
-    /// All inputs change in every one of so many milliseconds, and both hosts read all the time.
+    /// Changes all inputs in every one of this many milliseconds, while both hosts read all the
+    /// time.
     ///
     /// # Errors
-    /// When the board or a host's books are not as they must be.
+    /// When the board or a host's account is not as it must be.
     pub fn run_ms(&mut self, ms: u64) -> Result<(), String> {
         let before = self.bench.carried();
         for _ in 0..ms {
@@ -172,9 +175,9 @@ impl<'p> Load<'p> {
         if let Some(outgoing) = next(&mut self.line, now_ms, self.still_since_ms, &self.ledger)? {
             self.bench.send(&outgoing.frame);
         }
-        // The line never rests. Where the board has nothing to answer, it is asked for the mode
-        // besides; more questions would have answers for which the way back has no room, so it is
-        // noise that fills the rest.
+        // The line never rests. Where the board has nothing to answer, it is also asked for the
+        // mode. The way back has no room for the answers to more questions, so noise fills the
+        // rest.
         if self.bench.waiting() < LINE_AHEAD && self.bench.is_silent() {
             self.bench.send_command(&Command::QueryMode);
         }
@@ -203,7 +206,7 @@ impl<'p> Load<'p> {
         Ok(())
     }
 
-    /// Contacts stay as they are, and the hosts read the rest.
+    /// Leaves contacts as they are, and lets the hosts read the rest.
     ///
     /// # Errors
     /// When something is missing in the end.
@@ -238,7 +241,7 @@ impl<'p> Load<'p> {
     }
 }
 
-/// What a host says next: it reads, and when it has come to the end, it reads on.
+/// What a host says next. It reads, and when it has come to the end, it reads on.
 fn next(
     host: &mut Conversation,
     now_ms: u64,

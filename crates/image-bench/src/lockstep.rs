@@ -1,26 +1,26 @@
-//! The ARM image in QEMU in virtual time: it runs from stop to stop, and the world moves while it
+//! The ARM image in QEMU in virtual time. It runs from stop to stop, and the world moves while it
 //! is held.
 //!
 //! # Design
-//! QEMU counts instructions for time (`-icount`), and a plugin of it (`image-bench-plugin`) holds
-//! the processor before chosen instructions. Between two stops nothing reaches the board from
-//! outside. What happens is then the same in every run and on every machine, and every instruction
-//! can be looked at.
+//! QEMU derives time from the count of instructions (`-icount`), and its plugin
+//! `image-bench-plugin` holds the processor before chosen instructions. Between two stops nothing
+//! reaches the board from outside. What happens is then the same in every run and on every machine,
+//! and every instruction can be looked at.
 //!
 //! Inputs, clock and GENI board are in the memory that both sides map. Bytes for the board's UART
-//! go through QEMU's standard input; the UART's state, read by way of QEMU's test interface
-//! (`-qtest`), tells that they have arrived. QEMU keeps no line rate, but it does keep a byte that
-//! its standard output does not take, and that is a pipe for one byte: the transmitter is busy for
-//! as long as the bench leaves it so.
+//! go through QEMU's standard input. The UART's state, read through QEMU's test interface
+//! (`-qtest`), tells that they have arrived. QEMU has no line rate, but it does keep a byte that
+//! its standard output does not take. That output is a pipe for one byte, so the transmitter is
+//! busy for as long as the bench leaves the byte there.
 //!
 //! # Tradeoffs
-//! One instruction lasts 2⁵ ns: 31.25 million in a second, less than any chip that one would flash.
-//! At 2⁰ ns the processor would be so fast that no load is one. Numbers of instructions do not
-//! depend on it.
+//! One instruction lasts 2⁵ ns, which is 31.25 million in a second, less than any chip that one
+//! would flash. At 2⁰ ns the processor would be so fast that nothing would be a load. Numbers of
+//! instructions do not depend on it.
 //!
 //! # Notes
 //! An idle processor makes QEMU 7.2 jump two timer periods ahead instead of one. The bench
-//! therefore has to see that the processor never sleeps, with a `nop` in place of each `wfi`: see
+//! therefore has to prevent the processor from sleeping, with a `nop` in place of each `wfi`: see
 //! [`Lockstep::patch`].
 
 mod line_out;
@@ -53,19 +53,19 @@ use line_out::LineOut;
 use probe::Probe;
 use tracer::Tracer;
 
-/// How long QEMU may take for anything: machines stall for seconds.
+/// How long QEMU may take for anything, because machines stall for seconds.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// How soon it is looked again.
+/// How often the bench looks again while it waits.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
 
-/// An instruction lasts two to the power of this, in nanoseconds.
+/// The exponent of an instruction's duration: two to the power of this, in nanoseconds.
 const INSTRUCTION_SHIFT: u32 = 5;
 
 /// Instructions that the processor executes in a millisecond.
 pub const INSTRUCTIONS_PER_MS: u64 = 1_000_000 >> INSTRUCTION_SHIFT;
 
-/// Nothing more than the straps and the input latch differ between boards.
+/// How a board is set up. Boards otherwise differ in nothing.
 #[derive(Clone, Debug)]
 pub struct LockstepOptions {
     /// The image and the emulator.
@@ -74,7 +74,7 @@ pub struct LockstepOptions {
     pub plugin: PathBuf,
     /// Which recorder the board is strapped to be.
     pub model: Model,
-    /// Debounce time of all inputs that it is strapped for; 0 is off.
+    /// Debounce time of all inputs that the board is strapped for; 0 is off.
     pub debounce_ms: u8,
     /// Whether it has a GENI board.
     pub geni: bool,
@@ -85,19 +85,19 @@ pub struct LockstepOptions {
 /// An emulated board that is held at a stop.
 pub struct Lockstep {
     bus: ExternalBus,
-    /// The GENI board's reset line as it was last seen.
+    /// The last seen state of the GENI board's reset line.
     geni_reset: u32,
     tracer: Tracer,
     probe: Probe,
     input: ChildStdin,
     output: LineOut,
     qemu: Qemu,
-    /// Holds memory, sockets, and what QEMU prints. Goes last.
+    /// Holds memory, sockets, and what QEMU prints. Dropped last.
     directory: TempDir,
 }
 
 impl Lockstep {
-    /// Switches a board on; it is held at the very first instruction. All contacts are open.
+    /// Switches on a board, and holds it at the very first instruction. All contacts are open.
     ///
     /// # Errors
     /// When the emulator or the plugin cannot be started.
@@ -127,7 +127,7 @@ impl Lockstep {
             LineOut::new().map_err(SimError::io("make a pipe for the emulator"))?;
         process.stdin(Stdio::piped()).stdout(qemus).stderr(printed);
         let mut qemu = spawn(&mut process, &program)?;
-        // They have our copies of its files, and of its end of the pipe.
+        // QEMU now has our copies of its files, and of its end of the pipe.
         drop((handed_over, process));
         let input = qemu.0.stdin.take().ok_or(SimError::Ended)?;
         let mut accept = |listener| accept(listener, &mut qemu, directory.path());
@@ -139,8 +139,8 @@ impl Lockstep {
         Ok(lockstep)
     }
 
-    /// Lets the board run to the next stop; gives its address. `executed` is told of every
-    /// instruction from the one it is held at up to, and without, that stop.
+    /// Lets the board run to the next stop, and returns its address. `executed` is told of every
+    /// instruction, from the one at which the board is held up to that stop, which is not included.
     ///
     /// # Errors
     /// When the emulator has ended or hangs.
@@ -151,7 +151,7 @@ impl Lockstep {
             .map_err(|error| self.explain(error))
     }
 
-    /// The same, and nobody is told of instructions, which is faster.
+    /// Lets the board run to the next stop without telling of instructions, which is faster.
     ///
     /// # Errors
     /// When the emulator has ended or hangs.
@@ -162,7 +162,7 @@ impl Lockstep {
             .map_err(|error| self.explain(error))
     }
 
-    /// Puts another instruction in the place of one that has not been executed yet.
+    /// Replaces an instruction that has not been executed yet by another one.
     ///
     /// # Errors
     /// When the emulator has ended or hangs.
@@ -175,7 +175,7 @@ impl Lockstep {
         self.bus.set_inputs(inputs);
     }
 
-    /// Turns the battery-backed clock on.
+    /// Advances the battery-backed clock to `count_ms`.
     pub fn set_clock(&self, count_ms: u64) {
         self.bus.set_clock(count_ms);
     }
@@ -216,8 +216,8 @@ impl Lockstep {
         Ok(true)
     }
 
-    /// Lets the byte in the transmitter's shift register out, if there is one; the next one takes
-    /// its place, if there is one. The transmitter is busy until then.
+    /// Takes the byte out of the transmitter's shift register, if there is one. The next byte, if
+    /// there is one, takes its place. The transmitter is busy until then.
     ///
     /// # Errors
     /// When the emulator has ended or hangs.
@@ -235,7 +235,7 @@ impl Lockstep {
         Ok(byte)
     }
 
-    /// Waits for QEMU to have moved a byte.
+    /// Waits until QEMU has moved a byte.
     fn until(&mut self, mut moved: impl FnMut(&mut Probe) -> io::Result<bool>) -> io::Result<()> {
         let deadline = Instant::now() + PATIENCE;
         while !moved(&mut self.probe)? {
@@ -264,7 +264,7 @@ impl Lockstep {
         board.publish(|offset, byte| self.bus.write_geni(offset, byte));
     }
 
-    /// Why the emulator does not talk to us.
+    /// Finds out why the emulator does not talk to us.
     fn explain(&mut self, error: io::Error) -> SimError {
         explain(error, &mut self.qemu, self.directory.path())
     }
@@ -273,7 +273,7 @@ impl Lockstep {
 /// File for what QEMU prints.
 const PRINTED: &str = "qemu.txt";
 
-/// Options that make QEMU's time virtual and let us in.
+/// Options that make QEMU's time virtual and let the bench in.
 fn extra(options: &LockstepOptions, plugin_at: &Path, probe_at: &Path) -> Vec<OsString> {
     let mut plugin = OsString::from("file=");
     plugin.push(doubled_commas(&options.plugin));
@@ -305,7 +305,7 @@ fn doubled_commas(path: &Path) -> OsString {
     )
 }
 
-/// Waits for the emulator to call.
+/// Waits for the emulator to connect.
 fn accept(
     listener: &UnixListener,
     qemu: &mut Qemu,
@@ -358,7 +358,7 @@ mod tests {
     fn an_emulator_that_knows_no_such_options_says_so() {
         let image = tempfile::NamedTempFile::new().unwrap();
         let mut emulator = EmulatorOptions::new(image.path());
-        // The shell knows no option -M.
+        // The shell does not know the option -M.
         emulator.program = Some("/bin/sh".into());
         let options = LockstepOptions {
             emulator,

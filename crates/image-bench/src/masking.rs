@@ -1,8 +1,8 @@
 //! Instructions that write the registers that mask interrupts.
 //!
 //! `CPSID` and `CPSIE` say in their own bits what they do. What `MSR` writes is in a register,
-//! which a trace of addresses does not show. An image may therefore only give back with it what was
-//! in force before: anything else could mask capture unseen.
+//! which a trace of addresses does not show. An image may therefore use `MSR` only to restore what
+//! was in force before. Anything else could mask capture without the trace showing it.
 
 use std::ops::Range;
 
@@ -17,17 +17,17 @@ struct Transfer {
     register: u16,
 }
 
-/// The transfers of an image.
+/// The transfers in an image.
 #[derive(Debug, Default)]
 pub(super) struct Masking {
     reads: Vec<Transfer>,
-    /// Those that do not write a 0, which masks nothing.
+    /// Transfers that do not write a 0, which would mask nothing.
     writes: Vec<Transfer>,
 }
 
 impl Masking {
-    /// Notes an instruction if it is one of them; `before` is the first half of the one in front of
-    /// it.
+    /// Notes an instruction if it is such a transfer. `before` is the first half of the instruction
+    /// in front of it.
     pub(super) fn note(&mut self, at: u32, before: u16, first: u16, second: Option<u16>) {
         let Some(second) = second else { return };
         let special = second & 0xFF;
@@ -51,11 +51,11 @@ impl Masking {
         }
     }
 
-    /// The first instruction that may mask more than before; `function_around` gives the bounds of
+    /// The first instruction that may mask more than before. `function_around` gives the bounds of
     /// functions.
     ///
-    /// One that writes the register into which its function has read the same masking register
-    /// gives back.
+    /// An instruction only restores if it writes a register into which its function has read the
+    /// same masking register.
     pub(super) fn unseen(&self, function_around: impl Fn(u32) -> Range<u32>) -> Option<u32> {
         let gives_back = |write: &&Transfer| {
             let function = function_around(write.at);
@@ -75,7 +75,7 @@ mod tests {
 
     const READ_BASEPRI_TO_R10: [u16; 2] = [0xF3EF, 0x8A11];
 
-    /// The first instruction that masks unseen, of wide ones that stand one behind the other.
+    /// The first instruction that masks unseen, in a row of wide instructions.
     fn unseen(code: &[[u16; 2]]) -> Option<u32> {
         let mut masking = Masking::default();
         let mut before = 0;
@@ -89,15 +89,15 @@ mod tests {
     #[test]
     fn what_gives_back_what_was_in_force_masks_nothing() {
         assert_eq!(unseen(&[READ_BASEPRI_TO_R10, [0xF38A, 0x8811]]), None);
-        // Another register, another special one, the wrong order, and nothing read at all;
-        // BASEPRI_MAX reads as BASEPRI.
+        // The cases: another register, another special register, the wrong order, and nothing read
+        // at all. BASEPRI_MAX reads as BASEPRI.
         assert_eq!(unseen(&[READ_BASEPRI_TO_R10, [0xF38B, 0x8811]]), Some(0x104));
         assert_eq!(unseen(&[READ_BASEPRI_TO_R10, [0xF38A, 0x8810]]), Some(0x104));
         assert_eq!(unseen(&[[0xF38A, 0x8811], READ_BASEPRI_TO_R10]), Some(0x100));
         for special in MASKING {
             assert_eq!(unseen(&[[0xF380, 0x8800 | special]]), Some(0x100));
         }
-        // MSP is none of them.
+        // MSP does not mask.
         assert_eq!(unseen(&[[0xF381, 0x8808]]), None);
     }
 

@@ -10,7 +10,7 @@ use object::{File, Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind}
 
 use super::masking::Masking;
 
-/// Entry of the vector table, in words, with the first instruction after a reset.
+/// The entry of the vector table, in words, that has the first instruction after a reset.
 const RESET_VECTOR: usize = 1;
 /// The first of the chip's own interrupts.
 const FIRST_INTERRUPT: usize = 16;
@@ -31,7 +31,7 @@ pub enum Handler {
 }
 
 impl Handler {
-    /// All of them.
+    /// All handlers.
     pub const ALL: [Handler; 3] = [Handler::Capture, Handler::Receive, Handler::Transmit];
 }
 
@@ -58,9 +58,9 @@ pub enum Kind {
 /// The program of an image.
 #[derive(Debug, Default)]
 pub struct Program {
-    /// By half the address.
+    /// Indexed by half the address.
     kinds: Vec<Kind>,
-    /// The same: whether it has four bytes.
+    /// Whether the instruction has four bytes. Indexed in the same way.
     wide: Vec<bool>,
     functions: BTreeMap<u32, (u32, String)>,
     masking: Masking,
@@ -90,7 +90,7 @@ impl Program {
                 let name = format!("{:#}", rustc_demangle::demangle(name));
                 program.functions.insert(address & !1, (end, name));
             } else if name.starts_with("$t") || name.starts_with("$d") {
-                // Where code and data begin.
+                // Mapping symbols mark where code and data begin.
                 marks.insert(address, name.starts_with("$t"));
             }
         }
@@ -133,7 +133,7 @@ impl Program {
         Ok(())
     }
 
-    /// Adds instructions that stand one behind the other.
+    /// Adds a row of instructions.
     fn add_code(&mut self, begin: u32, code: &[u8]) {
         let (halfwords, _) = code.as_chunks::<2>();
         let mut halfwords = halfwords.iter().map(|&bytes| u16::from_le_bytes(bytes));
@@ -165,7 +165,7 @@ impl Program {
         self.kinds.get(index_of(address / 2)).copied().unwrap_or_default()
     }
 
-    /// Where the instruction behind the one at an address is.
+    /// The address of the instruction after the one at an address.
     #[must_use]
     pub fn behind(&self, address: u32) -> u32 {
         let wide = self.wide.get(index_of(address / 2)).copied().unwrap_or_default();
@@ -199,7 +199,7 @@ impl Program {
         self.all(Kind::Return).filter(move |address| function.contains(address))
     }
 
-    /// From where to where the function around an address goes.
+    /// The bounds of the function around an address.
     #[must_use]
     pub fn function_around(&self, address: u32) -> Range<u32> {
         let function = self.functions.range(..=address).next_back();
@@ -226,7 +226,7 @@ fn kind(first: u16, second: Option<u16>) -> Kind {
         (0xF000..=0xF7FF, Some(second)) if second & 0xD000 == 0xD000 => Kind::Call,
         // CPSID I, F, or both.
         (0xB671..=0xB673, None) => Kind::Mask,
-        // CPSIE; MSR PRIMASK, Rn, which gives back what was in force: `Masking` sees to that.
+        // CPSIE; MSR PRIMASK, Rn. `Masking` makes sure that the latter restores what was in force.
         (0xB661..=0xB663, None) | (0xF380..=0xF38F, Some(0x8810)) => Kind::Unmask,
         // WFI.
         (0xBF30, None) => Kind::Sleep,

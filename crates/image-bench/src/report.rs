@@ -1,4 +1,4 @@
-//! All of it as a table, held against the budgets.
+//! All results as a table, compared with the budgets.
 
 use std::fmt;
 
@@ -15,14 +15,14 @@ use super::program::{Handler, Program};
 use super::tally::Masked;
 use ser_trial::digits::grouped;
 
-/// Instructions of the main loop that the rings in front of it cover: a pass must not take longer.
+/// How many instructions of the main loop the rings in front of it cover. No pass may take longer.
 pub const PASS_BUDGET: u64 = MAIN_LOOP_STALL_MS as u64 * INSTRUCTIONS_PER_MS;
 
-/// Instructions that the capture interrupt may be late, and for which interrupts may be masked
-/// under load.
+/// How many instructions the capture interrupt may be late, and for how many interrupts may be
+/// masked under load.
 const LATENESS_BUDGET: u64 = 0;
 
-/// So long the interrupt is looked at with nothing else going on, in milliseconds.
+/// How long the interrupt is measured with nothing else going on, in milliseconds.
 const QUIET_MS: u64 = 5_000;
 
 /// How busy the ports are when lateness is measured.
@@ -37,10 +37,10 @@ pub struct Report {
     pub commands: Vec<(&'static str, [Cost; 2])>,
     /// A pass with nothing to do, without and with a GENI board.
     pub idle_passes: [u64; 2],
-    /// While the image starts, and under load, with the function that masks.
+    /// While the image starts, and under load, each with the function that masks.
     pub masked: [(Masked, String); 2],
-    /// With both ports quiet, and with both busy, on one board: against the same expiry of the
-    /// timer.
+    /// With both ports quiet, and with both busy, on one board and measured by the same expiry of
+    /// the timer.
     pub lateness: [Lateness; 2],
     /// Under load.
     pub load: Loaded,
@@ -71,7 +71,7 @@ impl Capture {
     }
 }
 
-/// What a load came to.
+/// The results of a load.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Loaded {
     /// How long all inputs changed in every millisecond.
@@ -81,14 +81,14 @@ pub struct Loaded {
     /// The longest pass of the main loop.
     pub pass: u64,
     /// Instructions of all interrupt handlers, and of the main loop in passes that did more than
-    /// look whether there is something to do, in thousandths of all.
+    /// look for something to do, in thousandths of all.
     pub busy_per_mille: [u64; 2],
     /// What became of the events.
     pub account: Account,
 }
 
 impl Report {
-    /// Measures everything; `load_ms` is how long the load lasts. `next` is told what is measured
+    /// Measures everything. `load_ms` is how long the load lasts. `next` is told what is measured
     /// next.
     ///
     /// # Errors
@@ -131,7 +131,7 @@ impl Report {
         passes.chain([(self.load.pass, None)]).max_by_key(|&(pass, _)| pass).unwrap_or_default()
     }
 
-    /// What is not as it must be.
+    /// Everything that is not as it must be.
     #[must_use]
     pub fn wrong(&self) -> Vec<String> {
         let mut wrong = Vec::new();

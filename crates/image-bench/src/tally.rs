@@ -1,14 +1,14 @@
-//! Counts instructions, one after the other as they are executed: per run of a handler, per pass of
-//! the main loop, and while interrupts are masked.
+//! Counts instructions as they are executed: per run of a handler, per pass of the main loop, and
+//! while interrupts are masked.
 //!
 //! # Design
 //! A handler begins with its first instruction, which nobody calls, and ends with a return that
-//! belongs to no call inside of it. What a handler of higher priority does in between counts for
-//! that one alone. A pass of the main loop goes from the place that it jumps to behind its sleep to
+//! belongs to no call inside of it. Instructions of a handler of higher priority count for that
+//! handler alone. A pass of the main loop goes from the place to which it jumps after its sleep to
 //! the same place again.
 //!
 //! # Notes
-//! Entry and exit of an exception take a dozen cycles each and are no instructions.
+//! Entry and exit of an exception take a dozen cycles each and are not instructions.
 
 use super::program::{Handler, Kind, Program};
 
@@ -26,7 +26,7 @@ pub struct Pass {
 /// One run of a handler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
-    /// Which.
+    /// Which handler.
     pub handler: Handler,
     /// The count of all instructions when it began.
     pub began: u64,
@@ -65,25 +65,25 @@ pub struct Tally<'p> {
     pub runs: Vec<Run>,
     /// Passes of the main loop that have ended.
     pub passes: Vec<Pass>,
-    /// The longest time that interrupts were masked.
+    /// The longest stretch in which interrupts were masked.
     pub longest_masked: Masked,
-    /// How often they were.
+    /// How often interrupts were masked.
     pub times_masked: u64,
 }
 
 /// Where the main loop begins.
 #[derive(Clone, Copy)]
 enum Head {
-    /// It has not slept yet.
+    /// The main loop has not slept yet.
     Unknown,
-    /// It has, by the instruction at this address; it goes on to where that, or the branch behind
-    /// it, leads.
+    /// The main loop has slept, by the instruction at this address. It goes on to where that
+    /// instruction, or the branch after it, leads.
     Behind(u32),
     Known(u32),
 }
 
 impl<'p> Tally<'p> {
-    /// Counts of nothing.
+    /// A tally that has counted nothing.
     #[must_use]
     pub fn new(program: &'p Program) -> Tally<'p> {
         Tally {
@@ -102,13 +102,13 @@ impl<'p> Tally<'p> {
         }
     }
 
-    /// Instructions so far.
+    /// How many instructions were executed so far.
     #[must_use]
     pub fn total(&self) -> u64 {
         self.total
     }
 
-    /// Forgets what has ended, not what is under way.
+    /// Forgets the runs and passes that have ended, but not those under way.
     pub fn begin_anew(&mut self) {
         self.runs.clear();
         self.passes.clear();
@@ -134,8 +134,7 @@ impl<'p> Tally<'p> {
         self.latest = Some(address);
     }
 
-    /// Whether the latest instruction did not lead elsewhere: a return whose condition did not
-    /// hold.
+    /// Whether the latest instruction did not branch, as a return whose condition did not hold.
     fn is_next(&self, address: u32) -> bool {
         self.latest.is_some_and(|latest| self.program.behind(latest) == address)
     }
@@ -250,7 +249,7 @@ mod tests {
     fn a_handler_of_higher_priority_and_one_right_behind_another_count_apart() {
         let program = program();
         let mut tally = Tally::new(&program);
-        // Receive is interrupted by capture; then capture, and receive right behind it.
+        // Receive is interrupted by capture. Then capture runs, and receive right after it.
         let nested = [&[0x220][..], &CAPTURE, &[0x222]].concat();
         for address in [&LOOP[..], &nested, &CAPTURE, &[0x220, 0x222], &LOOP, &[0x100]].concat() {
             tally.executed(address);

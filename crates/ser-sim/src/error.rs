@@ -1,4 +1,4 @@
-//! What can go wrong around a simulated node.
+//! What can go wrong around a simulated recorder.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -20,38 +20,38 @@ pub enum SimError {
     },
     /// No host of this name is known; `HOST:PORT`.
     NoSuchHost(String),
-    /// The place of the link is taken by something that is not ours to replace.
+    /// Something that is not ours to replace stands where the link is to go.
     LinkTaken(PathBuf),
     /// Another simulator has the link.
     LinkInUse(PathBuf),
-    /// The file that is to be the GENI window is something else already.
+    /// The file that is to be the GENI window already exists and is something else.
     WindowTaken(PathBuf),
     /// Another simulator has the GENI window.
     WindowInUse(PathBuf),
     /// There is no place to note that a link or a window is in use.
     NoRecords(NoRecords),
-    /// There is something already under the name of the log.
+    /// Something already exists under the name of the log.
     LogTaken(PathBuf),
     /// The emulator is not installed.
     EmulatorMissing {
-        /// The program looked for.
+        /// The program that was looked for.
         program: PathBuf,
     },
     /// The emulator ended by itself.
     EmulatorEnded {
-        /// How, as in `exit status: 1`.
+        /// How it ended, as in `exit status: 1`.
         how: String,
         /// What it printed on standard error.
         printed: String,
     },
-    /// The image runs and does not answer.
+    /// The image runs but does not answer.
     NoAnswer {
         /// How long it had.
         waited: Duration,
         /// What the emulator printed on standard error.
         printed: String,
     },
-    /// This operating system has no such thing.
+    /// This operating system does not have it.
     Unsupported(&'static str),
     /// The simulator has ended; [`Simulator::stop`](crate::Simulator::stop) says why.
     Ended,
@@ -59,7 +59,7 @@ pub enum SimError {
     StillPlaying,
 }
 
-/// The user's directory for notes of who has which link or window can be had nowhere.
+/// No place was found for the user's directory of notes on who has which link or window.
 #[derive(Debug)]
 pub struct NoRecords {
     /// The link or window.
@@ -82,13 +82,13 @@ pub enum FolderFault {
 }
 
 impl NoRecords {
-    /// What a person can do about it, a line each. None where only the reasons tell.
+    /// What a person can do about it, one hint a line. There are none where only the reasons help.
     pub fn hints(&self) -> impl Iterator<Item = String> {
         self.tried.iter().filter_map(|(path, fault)| {
             let path = path.display();
             match fault {
                 FolderFault::NotYours => Some(format!("remove {path}, which is not yours")),
-                FolderFault::NoFolder => Some(format!("remove {path}, which is no folder")),
+                FolderFault::NoFolder => Some(format!("remove {path}, which is not a folder")),
                 FolderFault::OpenToOthers => Some(format!("keep others out: chmod 700 {path}")),
                 FolderFault::Other(_) => None,
             }
@@ -105,7 +105,7 @@ impl fmt::Display for NoRecords {
             match fault {
                 FolderFault::NotYours => f.write_str("belongs to another user")?,
                 FolderFault::OpenToOthers => f.write_str("is open to others")?,
-                FolderFault::NoFolder => f.write_str("is no folder")?,
+                FolderFault::NoFolder => f.write_str("is not a folder")?,
                 FolderFault::Other(error) => write!(f, "cannot be used: {error}")?,
             }
         }
@@ -114,7 +114,7 @@ impl fmt::Display for NoRecords {
 }
 
 impl SimError {
-    /// Says what was being tried, as in `listen on 127.0.0.1:4000`.
+    /// Makes an error that says what was being tried, as in `listen on 127.0.0.1:4000`.
     pub fn io(doing: impl Into<String>) -> impl FnOnce(io::Error) -> SimError {
         let doing = doing.into();
         |source| SimError::Io { doing, source }
@@ -131,7 +131,7 @@ impl fmt::Display for SimError {
             }
             SimError::NoRecords(no_records) => no_records.fmt(f),
             SimError::LinkInUse(path) | SimError::WindowInUse(path) => {
-                write!(f, "another simulator has {}", path.display())
+                write!(f, "another simulator uses {}", path.display())
             }
             SimError::LinkTaken(path) => {
                 write!(
@@ -161,7 +161,7 @@ impl fmt::Display for SimError {
                 )?;
                 write_printed(f, printed)
             }
-            SimError::Unsupported(what) => write!(f, "{what} cannot be had on this system"),
+            SimError::Unsupported(what) => write!(f, "{what} is not available on this system"),
             SimError::Ended => write!(f, "the simulator has ended"),
             SimError::StillPlaying => write!(f, "the contacts have not finished moving"),
         }

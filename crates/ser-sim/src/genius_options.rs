@@ -6,17 +6,17 @@ use ser_proto::Model;
 
 use crate::genius::{BusTiming, Noise};
 
-/// Device numbers are 0 to 31, and one of them is the host's.
+/// The most recorders on a bus. Bus addresses are 0 to 31, and one of them is the host's.
 pub const MAX_NODES: usize = 31;
 
 /// A Genius bus with recorders, and a host that is another program.
 #[derive(Clone, Debug)]
 pub struct GeniusOptions {
-    /// The file that becomes the host's GENI window; it goes with the simulator.
+    /// The file that becomes the host's GENI window. It is removed when the simulator ends.
     pub window: PathBuf,
-    /// Numbers and models of the recorders.
+    /// Bus addresses and models of the recorders.
     pub nodes: Vec<(u8, Model)>,
-    /// The host's number.
+    /// The host's bus address.
     pub host_number: u8,
     /// How fast the bus is.
     pub rate: BusTiming,
@@ -25,7 +25,7 @@ pub struct GeniusOptions {
 }
 
 impl GeniusOptions {
-    /// A bus at the usual rate on which nothing goes wrong, with the host at the highest number
+    /// A bus at the usual rate on which nothing goes wrong. The host has the highest bus address
     /// that is free.
     #[must_use]
     pub fn new(window: impl Into<PathBuf>, nodes: Vec<(u8, Model)>) -> GeniusOptions {

@@ -1,15 +1,15 @@
-//! The world around a recorder: contacts that move, a serial line, and the node itself in virtual
-//! time or as the ARM image in an emulator.
+//! The world around a recorder: contacts that move, a serial line, and the recorder itself, either
+//! in virtual time or as the ARM image in an emulator.
 //!
 //! - [`Scenario`] says which contact moves at which millisecond; [`Contacts`] says where it comes
 //!   from.
-//! - [`SimNode`] is a node that knows no time but the one it is told: for tests that must give the
-//!   same result on every machine.
-//! - [`Simulator`] is a node that keeps pace with real time and answers on a pseudo-terminal or a
-//!   TCP port: what a host program can be tried against.
-//! - [`qemu`] is the ARM image in an emulator: what a bench needs that drives it by itself.
-//! - [`genius`] is the other way to a node: a GENI board, the Genius bus it sits on, and other
-//!   devices there.
+//! - [`SimNode`] is a recorder that knows no time but the one it is told. It is for tests that must
+//!   give the same result on every machine.
+//! - [`Simulator`] is a recorder that keeps pace with real time and answers on a pseudo-terminal or
+//!   a TCP port. Host programs are tried against it.
+//! - [`qemu`] is the ARM image in an emulator, for a bench that drives it directly.
+//! - [`genius`] is the other way to reach a recorder: a GENI board, the Genius bus it sits on, and
+//!   the other devices there.
 
 #[cfg(unix)]
 mod claim;

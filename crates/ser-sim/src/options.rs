@@ -1,4 +1,4 @@
-//! What is simulated, and how: the node and what plays it, its port, its contacts, and its bus.
+//! What is simulated, and how: the recorder and what plays it, its port, its contacts, and its bus.
 
 use std::fmt;
 use std::fs::File;
@@ -27,15 +27,15 @@ pub struct SimOptions {
     pub contacts: Contacts,
     /// Debounce time of all inputs; 0 is off.
     pub debounce_ms: u8,
-    /// What plays the node.
+    /// What plays the recorder.
     pub backend: Backend,
-    /// The Genius bus, if the node is on one. Then `model` is of no account, and the bus's first
-    /// node is the one that is played by `backend` and has the port; the others are built in.
+    /// The Genius bus, if the recorder is on one. `model` is then ignored. The bus's first recorder
+    /// is played by `backend` and has the port; the others are built in.
     pub genius: Option<GeniusOptions>,
-    /// Called with a sentence for the user when something is not as it should be but goes on.
+    /// Called with a sentence for the user when something is wrong but the simulator goes on.
     pub notice: Option<Notice>,
-    /// Whether [`Simulator::played`](crate::Simulator::played) is wanted. It takes memory with
-    /// every move, as long as the simulator runs.
+    /// Whether to keep what [`Simulator::played`](crate::Simulator::played) returns. The memory it
+    /// takes grows with every move, as long as the simulator runs.
     pub keep_played: bool,
 }
 
@@ -49,7 +49,7 @@ impl fmt::Debug for Notice {
 }
 
 impl SimOptions {
-    /// A native node on `port` with still contacts.
+    /// A native recorder on `port` with still contacts.
     #[must_use]
     pub fn new(model: Model, port: Port) -> SimOptions {
         SimOptions {
@@ -65,14 +65,14 @@ impl SimOptions {
     }
 }
 
-/// What plays the node.
+/// What plays the recorder.
 #[derive(Clone, Debug)]
 pub enum Backend {
     /// The recorder itself, in this process.
     Native {
         /// How fast its bytes leave it.
         line_rate: LineRate,
-        /// Its memory and clock; keep a clone and the next simulator has the same node.
+        /// Its memory and clock. Keep a clone to give the next simulator the same recorder.
         non_volatile: NonVolatile,
     },
     /// The ARM image, in QEMU.
@@ -91,11 +91,11 @@ pub struct EmulatorOptions {
     /// The image, an ELF file for `mps2-an385`.
     pub image: PathBuf,
     /// File behind the board's external memory. It holds the stored configuration and the time, so
-    /// a node that is given the same file again remembers them. `None` makes a temporary one.
+    /// a recorder that is given the same file again remembers them. `None` makes a temporary one.
     pub memory: Option<PathBuf>,
     /// File for what the image logs on its second serial port. `None` drops it.
     pub log: Option<PathBuf>,
-    /// The emulator; `qemu-system-arm` when `None`.
+    /// The emulator; `None` is `qemu-system-arm`.
     pub program: Option<PathBuf>,
 }
 
@@ -106,18 +106,18 @@ impl EmulatorOptions {
         EmulatorOptions { image: image.into(), memory: None, log: None, program: None }
     }
 
-    /// Looks whether the image is a file that can be read: the emulator's own words for one that is
-    /// not are less clear.
+    /// Checks that the image is a file that can be read, because the emulator's own message for one
+    /// that is not is less clear.
     ///
     /// # Errors
-    /// When it is none.
+    /// When it is not.
     pub fn check_image(&self) -> Result<(), SimError> {
         let opened = open_regular(&self.image).map(drop);
         opened.map_err(SimError::io(format!("open the image {}", self.image.display())))
     }
 }
 
-/// Opens a file to read it, and nothing that would have to be waited for, as a pipe.
+/// Opens a regular file to read it, and refuses anything that could block, such as a pipe.
 fn open_regular(path: &Path) -> io::Result<File> {
     let mut options = File::options();
     #[cfg(unix)]

@@ -1,5 +1,5 @@
-//! The loop that serves a simulated node: it carries bytes between the machine and its line, and
-//! moves contacts.
+//! The loop that serves a simulated recorder. It carries bytes between the machine and its line,
+//! and moves contacts.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,20 +16,20 @@ use crate::line::{Line, garble, rates_agree};
 use crate::machine::Machine;
 use crate::options::Notice;
 
-/// Contacts of the emulated board move when this computer has time; less than this is not worth a
-/// word.
+/// How late contacts of the emulated board must move before the user is told. They move when this
+/// computer has time.
 const NOTICEABLE_MS: u64 = 3;
 
-/// While so many steps wait for their time, the stream that brings them has to wait, too: it may
-/// bring them faster than time passes, and without end. At 32 steps a millisecond, which is every
-/// contact, they last two seconds.
+/// How many steps may wait for their time before the stream that brings them has to wait, too. A
+/// stream may bring steps faster than time passes, and without end. At 32 steps a millisecond,
+/// which is every contact, they last two seconds.
 const MAX_WAITING_STEPS: usize = 65_536;
 
 /// What the owner of a simulator wants from it.
 pub(crate) enum Request {
-    /// Play this; the answer is the millisecond in which it begins.
+    /// Play this. The answer is the millisecond in which it begins.
     Play(Scenario, Sender<u64>),
-    /// Switch the node off and on; the answer comes when it answers again.
+    /// Switch the recorder off and on. The answer comes when the recorder answers again.
     PowerCycle(Sender<()>),
 }
 
@@ -60,7 +60,7 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    /// Waits until `done` or the time is over; gives the status then.
+    /// Waits until `done` or until the time is over. Returns the status at that moment.
     pub(crate) fn wait(
         &self,
         timeout: Duration,
@@ -85,7 +85,7 @@ pub(crate) struct Service {
     pub(crate) requests: Receiver<Request>,
     pub(crate) stream: Option<Receiver<Arrived>>,
     pub(crate) notice: Option<Notice>,
-    /// Whether somebody wants to know what has moved, which has no end.
+    /// Whether to keep what has moved, which grows without end.
     pub(crate) keeps_played: bool,
     pub(crate) shared: Arc<Shared>,
 }
@@ -139,7 +139,7 @@ impl Service {
                 Request::Play(scenario, reply) => {
                     let start_ms = machine.play(&scenario);
                     self.report(machine);
-                    // Whoever asked may have gone away.
+                    // The owner who asked may have gone away.
                     let _ = reply.send(start_ms);
                 }
                 Request::PowerCycle(reply) => return Some(Outcome::PowerCycle(reply)),
@@ -148,7 +148,7 @@ impl Service {
         None
     }
 
-    /// Lets the owner see how far the contacts are, and what is wrong.
+    /// Tells the owner how far the contacts are, and what is wrong.
     pub(crate) fn report(&self, machine: &mut dyn Machine) {
         machine.take_complaints().iter().for_each(|complaint| self.notify(complaint));
         let mut played = machine.take_played();
@@ -168,7 +168,7 @@ impl Service {
         }
     }
 
-    /// Carries bytes both ways, as many as go without waiting.
+    /// Carries as many bytes both ways as go without waiting.
     fn carry(&mut self, machine: &mut dyn Machine, buffer: &mut [u8]) -> io::Result<()> {
         let room = self.wire.room().min(buffer.len());
         if room > 0 {
@@ -215,13 +215,13 @@ impl Service {
         }
     }
 
-    /// How long nothing can happen, but for bytes that come and go.
+    /// How long nothing can happen, apart from bytes that come and go.
     fn patience(&self, machine: &dyn Machine) -> Duration {
         let on_the_wire = self.wire.next_arrival_in(Instant::now());
         on_the_wire.map_or(machine.patience(), |arrival| arrival.min(machine.patience()))
     }
 
-    /// Waits for bytes or for our patience to end.
+    /// Waits until bytes come or the time is over.
     #[cfg(unix)]
     fn wait(&self, machine: &mut dyn Machine) -> Result<(), SimError> {
         use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -230,7 +230,7 @@ impl Service {
         let sending = !machine.output().is_empty();
         let host = self.line.descriptors();
         let board = machine.descriptors();
-        // A host that sends faster than the wire takes it is no reason to wake up.
+        // A host that sends faster than the wire takes bytes is no reason to wake up.
         let listened_to = if self.wire.room() > 0 { &host[..] } else { &[] };
         let mut waiting: Vec<PollFd<'_>> =
             listened_to.iter().chain(&board).map(|fd| PollFd::new(fd, PollFlags::IN)).collect();
@@ -244,7 +244,7 @@ impl Service {
         }
     }
 
-    /// Waits as long as the machine can be left alone, without an eye on the line.
+    /// Waits as long as the machine can be left alone, without watching the line.
     #[cfg(not(unix))]
     #[expect(clippy::unnecessary_wraps, reason = "waiting can fail elsewhere")]
     fn wait(&self, machine: &mut dyn Machine) -> Result<(), SimError> {
@@ -320,8 +320,8 @@ mod tests {
         FrameEncoder::new(command.to_body()).collect()
     }
 
-    /// A node, and a function that sends bytes to it at a rate and gives what comes back at that
-    /// rate.
+    /// Runs a node, and passes a function that sends bytes to it at a rate and returns what comes
+    /// back at that rate.
     fn with_node(talk: impl FnOnce(&mut dyn FnMut(u32, &[u8]) -> Vec<u8>, &Mutex<Desk>)) {
         let desk = Arc::new(Mutex::new(Desk { takes: usize::MAX, ..Desk::default() }));
         let mut service = Service {

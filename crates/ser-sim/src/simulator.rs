@@ -1,4 +1,4 @@
-//! A simulated node that keeps pace with real time and answers on a serial line.
+//! A simulated recorder that keeps pace with real time and answers on a serial line.
 
 use std::fmt;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ use crate::service::{Outcome, Request, Service, Shared};
 /// How soon [`run`] and [`Simulator::wait`] notice that they are to stop.
 const STOP_CHECK: Duration = Duration::from_millis(20);
 
-/// A node that runs, until this is dropped.
+/// A recorder that runs until this is dropped.
 pub struct Simulator {
     port: String,
     #[cfg(unix)]
@@ -42,7 +42,7 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// Switches a node on and returns as soon as it answers on its port.
+    /// Switches a recorder on and returns as soon as it answers on its port.
     ///
     /// # Errors
     /// When the port cannot be opened, the emulator cannot be started or the image does not answer.
@@ -107,7 +107,7 @@ impl Simulator {
                     #[cfg(not(unix))]
                     Backend::Emulator(_) => Err(SimError::Unsupported("the emulated board")),
                 };
-                // The link goes before anybody is told that it is over.
+                // The link is removed before anybody is told that the simulator has ended.
                 drop(service);
                 shared.update(|status| status.ended = true);
                 result
@@ -137,27 +137,27 @@ impl Simulator {
         }
     }
 
-    /// How a host reaches the node: the path of a pseudo-terminal, or `tcp://ADDRESS:PORT`.
+    /// How a host reaches the recorder: the path of a pseudo-terminal, or `tcp://ADDRESS:PORT`.
     #[must_use]
     pub fn port(&self) -> &str {
         self.port.lines().next().unwrap_or_default()
     }
 
-    /// How a host reaches the nodes: the port of the first, if it has one, and then each of them on
-    /// the bus.
+    /// How a host reaches the recorders: the port of the first, if it has one, and then each of
+    /// them on the bus.
     pub fn ports(&self) -> impl Iterator<Item = &str> {
         self.port.lines()
     }
 
-    /// The emulated board, if that plays the node (the first one, on a bus).
+    /// The emulated board, if it plays the recorder (the first one, on a bus).
     #[cfg(unix)]
     #[must_use]
     pub fn board(&self) -> Option<&EmulatedBoard> {
         self.board.as_ref()
     }
 
-    /// Plays a scenario from the next millisecond on, or after those before it. Says in which
-    /// millisecond since the simulator's start it begins.
+    /// Plays a scenario from the next millisecond on, or after those before it. Returns the
+    /// millisecond in which it begins, counted from the simulator's start.
     ///
     /// # Errors
     /// When the simulator has ended.
@@ -165,7 +165,7 @@ impl Simulator {
         self.ask(|reply| Request::Play(scenario, reply))
     }
 
-    /// Waits until all contacts have moved and the node has sampled them.
+    /// Waits until all contacts have moved and the recorder has sampled them.
     ///
     /// # Errors
     /// When that takes longer than `timeout`, or the simulator has ended.
@@ -180,18 +180,18 @@ impl Simulator {
         }
     }
 
-    /// Every move of contacts so far that changed anything; none without
+    /// Every contact move so far that changed anything. Empty without
     /// [`keep_played`](SimOptions::keep_played).
     #[must_use]
     pub fn played(&self) -> Vec<Played> {
         self.shared.status().played.clone()
     }
 
-    /// Switches the node off and on again, contacts and line staying as they are; returns when it
-    /// answers.
+    /// Switches the recorder off and on again, while contacts and line stay as they are. Returns
+    /// when the recorder answers.
     ///
     /// # Errors
-    /// When the simulator has ended, or the node does not come up again.
+    /// When the simulator has ended, or the recorder does not come up again.
     pub fn power_cycle(&self) -> Result<(), SimError> {
         self.ask(Request::PowerCycle)
     }
@@ -207,7 +207,7 @@ impl Simulator {
         self.stop()
     }
 
-    /// Ends the simulator: the line is gone when this returns.
+    /// Ends the simulator. The line is gone when this returns.
     ///
     /// # Errors
     /// What ended it before, if something did.
@@ -224,7 +224,7 @@ impl Simulator {
     fn join(&mut self) -> Result<(), SimError> {
         self.shared.stop.store(true, Ordering::Relaxed);
         let Some(thread) = self.thread.take() else { return Ok(()) };
-        // A panic has printed its message; there is nothing to add.
+        // A panic has already printed its message.
         thread.join().unwrap_or(Err(SimError::Ended))
     }
 }
@@ -241,11 +241,11 @@ impl fmt::Debug for Simulator {
     }
 }
 
-/// Simulates a node until `stop` is set. `ready` is told, when the node answers, how a host reaches
-/// it; with several ways, one a line.
+/// Simulates a recorder until `stop` is set. When the recorder answers, `ready` is told how a host
+/// reaches it, one way a line.
 ///
 /// # Errors
-/// As [`Simulator::start`] and [`Simulator::wait`]. Being stopped is none, at no time.
+/// As [`Simulator::start`] and [`Simulator::wait`]. Being stopped is never an error.
 pub fn run(
     options: SimOptions,
     stop: &AtomicBool,
@@ -261,7 +261,7 @@ pub fn run(
     }
 }
 
-/// What is done once, when the node answers for the first time.
+/// What is done once, when the recorder answers for the first time.
 struct Start {
     model: Model,
     /// The nodes on the bus, if there is one.
@@ -272,7 +272,7 @@ struct Start {
     ready: Sender<Ready>,
 }
 
-/// What the owner of a simulator gets when the node answers.
+/// What the owner of a simulator gets when the recorder answers.
 struct Ready {
     /// All ways to reach the nodes, one a line.
     port: String,

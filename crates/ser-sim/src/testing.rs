@@ -1,4 +1,4 @@
-//! What tests of several crates share: which of the two recorders plays the node, and how long
+//! What tests of several crates share: which of the two recorders they run against, and how long
 //! anything may take.
 
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::options::{Backend, EmulatorOptions};
 
-/// How long anything may take: tests run on machines that stall for seconds.
+/// How long anything may take, because tests run on machines that stall for seconds.
 pub const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Where the ARM image is: set by `cargo xtask test`, which builds it.
@@ -15,7 +15,7 @@ pub const IMAGE_VARIABLE: &str = "SER_IMAGE_MPS2_AN385";
 /// The ARM image.
 ///
 /// # Panics
-/// When nobody says where it is.
+/// When the environment variable that names it is not set.
 #[must_use]
 pub fn image() -> PathBuf {
     std::env::var_os(IMAGE_VARIABLE)
@@ -23,7 +23,7 @@ pub fn image() -> PathBuf {
         .into()
 }
 
-/// What plays the node.
+/// What plays the recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The recorder in this process.
@@ -33,10 +33,10 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The simulator's back end for it.
+    /// The simulator's back end of this kind.
     ///
     /// # Panics
-    /// When the image is wanted and nobody says where it is.
+    /// When the image is wanted and the environment variable that names it is not set.
     #[must_use]
     pub fn backend(self) -> Backend {
         match self {

@@ -1,4 +1,4 @@
-//! Contacts from files and streams, played by a node that keeps pace with real time.
+//! Contacts from files and streams, played by a recorder that keeps pace with real time.
 #![cfg(unix)]
 
 mod common;
@@ -27,7 +27,8 @@ fn piped() -> (Simulator, io::PipeWriter) {
     (Simulator::start(options(contacts)).unwrap(), writer)
 }
 
-/// Millisecond of the scenario, and the input numbers that were closed then.
+/// The millisecond of each move in the scenario, and the input numbers that were closed from then
+/// on.
 fn summary(played: &[Played]) -> Vec<(u64, String)> {
     played.iter().map(|played| (played.at_ms, played.state.to_string())).collect()
 }
@@ -49,15 +50,16 @@ fn scenarios_from_a_stream_play_one_after_the_other() {
     assert_eq!(played[0].start_ms, played[1].start_ms);
     assert!(played[2].start_ms > played[1].start_ms + 7);
 
-    // A third one, once the others are over; the header may come again, and the end of the stream
-    // ends it.
+    // A third scenario, once the others are over. The header may come again. The end of the stream
+    // also ends the scenario.
     stream.write_all(b"ms,input,state\n0,2,0\n").unwrap();
     drop(stream);
     simulator.wait_played(LONG).unwrap();
     assert_eq!(summary(&simulator.played()[3..]), owned(&[(0, "")]));
 }
 
-/// A scenario without end, and how much of it was taken. Input 1 toggles in every millisecond.
+/// A scenario without end that counts how much of it was taken. Input 1 toggles in every
+/// millisecond.
 struct Endless {
     lines: Arc<AtomicU64>,
     rest: Vec<u8>,
@@ -91,7 +93,7 @@ fn a_stream_that_is_faster_than_time_has_to_wait() {
     let simulator =
         Simulator::start(SimOptions { notice: Some(notice), ..options(contacts) }).unwrap();
     let played = wait_for("a thousand moves", || {
-        // What waits for its time, and some reads of 64 KiB.
+        // This covers the steps that wait for their time, and some reads of 64 KiB.
         assert!(lines.load(Ordering::Relaxed) < 300_000);
         Some(simulator.played()).filter(|played| played.len() >= 1000)
     });

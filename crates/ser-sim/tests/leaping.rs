@@ -1,5 +1,5 @@
-//! A node that passes over quiet stretches is the same as one that lives through every millisecond
-//! of them.
+//! A recorder that passes over quiet stretches behaves like one that lives through every
+//! millisecond of them.
 
 use chrono::NaiveDate;
 use proptest::prelude::*;
@@ -7,16 +7,16 @@ use ser_node::{Debounce, Diagnostics};
 use ser_proto::{AutoReport, Baud, Command, Configure, FrameEncoder, Model, TimeStamp};
 use ser_sim::{LineRate, NonVolatile, Ram, Scenario, SimNode, SimNodeOptions, SimRtc, Step};
 
-/// Something that happens to a node, and how much time passes then.
+/// Something that happens to a recorder before some time passes.
 #[derive(Clone, Debug)]
 enum Deed {
-    /// Contacts move, each after so many milliseconds.
+    /// Contacts move, each after this many milliseconds.
     Contacts(Vec<(u64, u8, bool)>),
     /// Bytes arrive: a frame, or its beginning.
     Say(Command, bool),
     /// Somebody takes what the node has said.
     Listen,
-    /// The main loop is held up for so long.
+    /// The main loop is held up for this many milliseconds.
     HoldUp(u64),
     GrowOlder(u64),
 }
@@ -59,15 +59,15 @@ fn deed() -> impl Strategy<Value = Deed> {
     ]
 }
 
-/// Milliseconds from one deed to the next: often few, so that deeds meet, and now and then a
-/// minute.
+/// Milliseconds from one deed to the next. Often they are few, so that deeds overlap, and sometimes
+/// a minute.
 fn pause() -> impl Strategy<Value = u64> {
     prop_oneof![3 => 0..20_u64, 3 => 0..2_000_u64, 1 => 0..60_000_u64]
 }
 
 type Advance = fn(&mut SimNode<'_>, u64);
 
-/// All that can be seen of a node from outside, at every deed and at the end.
+/// All that can be seen of a recorder from outside, at every deed and at the end.
 fn life(
     options: &SimNodeOptions,
     deeds: &[(u64, Deed)],
@@ -78,7 +78,7 @@ fn life(
     let non_volatile = NonVolatile { rtc: SimRtc::held_at(rtc), ..NonVolatile::new() };
     let mut node = SimNode::new(SimNodeOptions { non_volatile, ..options.clone() }, &mut ram);
     let mut seen = Vec::new();
-    // In the end everything that is still on its way comes out.
+    // At the end everything that is still on its way comes out.
     let ending = (0..15).map(|_| (60_000, Deed::Listen));
     for (pause_ms, deed) in deeds.iter().cloned().chain(ending) {
         let until_ms = node.now_ms() + pause_ms;
@@ -105,7 +105,8 @@ fn life(
     seen
 }
 
-// As functions: the methods themselves are not general enough over the node's lifetime.
+// These are functions, because the methods themselves are not general enough over the node's
+// lifetime.
 fn live_through(node: &mut SimNode<'_>, ms: u64) {
     node.advance_to(ms);
 }

@@ -1,4 +1,4 @@
-//! A simulated node on TCP: one client at a time, slow ones and half-closed ones included.
+//! A simulated recorder on TCP: one client at a time, slow and half-closed ones included.
 #![cfg(unix)]
 
 mod common;
@@ -40,7 +40,7 @@ fn a_second_client_is_closed_and_the_first_goes_on() {
     assert!(ask(&mut first, &Command::QueryMode).is_some());
 }
 
-/// A simulator whose silent clients give way after that time, and what it says to its user.
+/// A simulator whose silent clients give way after that time, and what it tells its user.
 fn start_with_patience(gives_way_after: Option<Duration>) -> (Simulator, Receiver<String>) {
     let (notices, heard) = channel();
     let mut options = options("");

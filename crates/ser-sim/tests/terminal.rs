@@ -1,5 +1,5 @@
-//! A simulated node on a pseudo-terminal: the life of its link, hosts that come and go, rates that
-//! do not agree.
+//! A simulated recorder on a pseudo-terminal: the life of its link, hosts that come and go, rates
+//! that do not agree.
 #![cfg(unix)]
 
 mod common;
@@ -93,7 +93,7 @@ fn whatever_stands_under_the_name_is_refused_unharmed() {
     assert!(error.to_string().contains("exists already"), "{error}");
     assert_eq!(fs::read_to_string(&link).unwrap(), "a report");
 
-    // Links of others, whether they lead to a terminal, to a file or nowhere.
+    // Links of others, to a terminal, to a file or to nothing.
     for (name, target) in [
         ("of another program", Path::new("/dev/pts/4000000")),
         ("to a disk that is not there", Path::new("/nonexistent/disk")),
@@ -167,7 +167,7 @@ fn hosts_come_and_go_and_nothing_waits_for_them_meanwhile() {
     let simulator = Simulator::start(on(&place.link())).unwrap();
     let mut host = Terminal::open(place.link(), 9600);
     host.ask(&configure(Baud::B9600, AutoReport::Rs232));
-    // The reports of what happens without a host go nowhere.
+    // Reports of what happens without a host go nowhere.
     drop(host);
     let tap = Scenario::from_steps((0..50).map(|index| Step {
         at_ms: index,
@@ -238,7 +238,8 @@ fn a_host_that_was_killed_while_it_had_the_terminal_to_itself_does_not_lock_out_
     let _simulator = Simulator::start(on(&place.link())).unwrap();
     let host = Terminal::open(place.link(), 9600);
     rustix::termios::ioctl_tiocexcl(&host.0).unwrap();
-    // Closed without giving it back, as the kernel does for a process that is killed.
+    // The terminal is closed without being given back, as the kernel does for a process that is
+    // killed.
     drop(host);
     let mut host = wait_for("a terminal that can be opened", || {
         let opened = fs::OpenOptions::new().read(true).write(true).open(place.link());

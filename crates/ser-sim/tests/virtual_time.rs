@@ -1,4 +1,4 @@
-//! Contacts land on exactly the millisecond that their scenario gives, however time is handed out.
+//! Contacts move in exactly the millisecond that their scenario gives, however time is handed out.
 
 use chrono::{NaiveDate, NaiveDateTime, TimeDelta};
 use proptest::prelude::*;
@@ -107,7 +107,7 @@ fn a_log_shows_what_reading_it_brings() {
         auto_print: false,
     };
     ask(&mut node, &Command::Configure(small));
-    // Not full, full to the last entry, and wrapped.
+    // The log is not full, full to the last entry, or wrapped.
     for total in 1..=60 {
         node.play(&Scenario::from_steps([step(0, 1, total % 2 == 1)]));
         node.advance_to(u64::from(total) * 10);
@@ -150,7 +150,7 @@ fn contacts_at_power_up_are_the_baseline_and_a_power_cycle_forgets_the_log_and_k
     assert_eq!(log.len(), 1);
     // Input 2 was closed all the time.
     assert_eq!((log[0].changed, log[0].state), (Inputs(0b01), Inputs(0b10)));
-    // The clock that is held shows the same time at every power-up.
+    // The clock is held, so it shows the same time at every power-up.
     assert_eq!(NaiveDateTime::try_from(log[0].time).unwrap(), stamp(21));
 }
 

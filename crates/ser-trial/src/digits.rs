@@ -1,6 +1,6 @@
 //! Numbers for people.
 
-/// Digits in groups of three.
+/// A number with its digits in groups of three.
 #[must_use]
 pub fn grouped(count: u64) -> String {
     let digits = count.to_string();

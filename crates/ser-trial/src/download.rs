@@ -1,8 +1,9 @@
 //! How long it takes to read a full log over RS-232, beside the least that it could take.
 //!
 //! The client's own session and log reader talk to the recorder over a line that has its rate in
-//! both directions, in virtual time: the same on every computer. Everything counts, from the first
-//! bit of the first request to the moment in which the last event is delivered.
+//! both directions. Time is virtual, so the result is the same on every computer. Everything
+//! counts, from the first bit of the first request to the moment in which the last event is
+//! delivered.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -13,7 +14,7 @@ use ser_proto::{
 };
 use ser_sim::{Ram, Scenario, SimNode, SimNodeOptions, Step};
 
-/// Events before the download: the ring is full and begins somewhere in its middle.
+/// Events before the download. The ring is then full and begins somewhere in its middle.
 const EVENTS: u16 = 3000;
 
 const NS_PER_MS: u64 = 1_000_000;
@@ -30,7 +31,7 @@ pub struct Download {
     pub summary: Summary,
     /// Bytes of the fewest reply frames that hold the log.
     pub least_bytes: usize,
-    /// How long these alone are on the line.
+    /// How long these frames alone take on the line.
     pub least: Duration,
     /// How long it took.
     pub took: Duration,
@@ -62,7 +63,7 @@ impl Download {
         }
     }
 
-    /// How much of the time was needed by the replies alone.
+    /// What share of the time the replies alone needed, in per cent.
     #[must_use]
     pub fn percent(&self) -> f64 {
         100.0 * self.least.as_secs_f64() / self.took.as_secs_f64()

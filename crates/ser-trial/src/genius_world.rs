@@ -20,10 +20,10 @@ use ser_sim::genius::{
 };
 use ser_sim::{NonVolatile, Ram, Scenario, SimNode, SimNodeOptions, SimRtc, Step};
 
-/// Device number of the host.
+/// Bus address of the host.
 pub const HOST: u8 = 31;
 
-/// A recorder sends every event to the host, as it happens.
+/// The settings with which a recorder sends every event to the host as it happens.
 pub const REPORT: Configure = Configure {
     size: None,
     baud: None,
@@ -32,22 +32,22 @@ pub const REPORT: Configure = Configure {
     auto_print: false,
 };
 
-/// Reset line at power-up, as short as the boards allow.
+/// The reset line at power-up, held as shortly as the boards allow.
 const RESET: Start = Start::Reset { hold_ms: 20 };
 
-/// Time in which whatever is waited for happens. Thirty boards that all want to know who all others
-/// are, one datagram per scan, take more than a minute.
+/// The time in which everything waited for happens. Thirty boards that ask each other who they are,
+/// with one datagram per scan, take more than a minute.
 const LIMIT_MS: u64 = 300_000;
 
-/// A host finds out that its board has started anew within a few looks at it.
+/// How soon a host finds out that its board has started anew: within a few looks at it.
 const FOUND_OUT_US: u64 = 5_000;
 
-/// Time that everybody has after everybody is on the bus.
+/// How long everybody is given once all are on the bus.
 const SETTLING_MS: u64 = 500;
 
 /// A recorder with its board.
 pub struct Recorder {
-    /// Device number.
+    /// Bus address.
     pub number: u8,
     /// The recorder.
     pub node: SimNode<'static>,
@@ -68,7 +68,7 @@ impl Recorder {
         self.port.window().look(Board::latest_read).expect("a datagram").arrived_us
     }
 
-    /// Opens or closes contacts in the next millisecond.
+    /// Opens or closes a contact in the next millisecond.
     pub fn contact(&mut self, input: u8, on: bool) {
         self.node.play(&Scenario::from_steps([Step { at_ms: 0, input, on }]));
     }
@@ -114,11 +114,11 @@ pub struct Host {
     pub board: Handle<Board>,
     /// Datagrams that have arrived, and when.
     pub inbox: VecDeque<(u64, ReceivedDatagram)>,
-    /// How the datagrams ended that were to be sent.
+    /// How the datagrams ended that the host wanted to send.
     pub sent: VecDeque<Result<(), CommandError>>,
 }
 
-/// All of it.
+/// Recorders and a host on their bus.
 pub struct World {
     /// The bus.
     pub bus: Rc<RefCell<Bus>>,
@@ -131,20 +131,20 @@ pub struct World {
 }
 
 impl World {
-    /// Recorders with these device numbers and a host, all powered at time zero, on a bus that is
-    /// as it should be.
+    /// Recorders with these bus addresses and a host, all powered at time zero, on a bus without
+    /// noise.
     #[must_use]
     pub fn new(recorders: &[(u8, Model)]) -> World {
         World::with_noise(recorders, Noise::default())
     }
 
-    /// The same on a noisy bus.
+    /// Recorders and a host on a noisy bus.
     #[must_use]
     pub fn with_noise(recorders: &[(u8, Model)], noise: Noise) -> World {
         World::of(recorders, noise, Debounce::OFF, BoardOptions::default().model)
     }
 
-    /// The same with boards of this model number.
+    /// Recorders and a host on a noisy bus, with boards of this model number.
     #[must_use]
     pub fn with_boards(recorders: &[(u8, Model)], noise: Noise, board_model: u8) -> World {
         World::of(recorders, noise, Debounce::OFF, board_model)
@@ -161,7 +161,7 @@ impl World {
             .iter()
             .map(|&(number, model)| {
                 let (board, window) = connect(number);
-                // Every clock shows another time, until somebody sets them.
+                // Every clock shows a different time, until somebody sets them.
                 let time =
                     NaiveDateTime::default() + chrono::TimeDelta::days(365 * i64::from(number));
                 let non_volatile = NonVolatile {
@@ -170,7 +170,7 @@ impl World {
                 };
                 let options =
                     SimNodeOptions { debounce, non_volatile, ..SimNodeOptions::new(model) };
-                // Memory of the test process goes when it does.
+                // This memory is given back when the test process ends.
                 let node = SimNode::new(options, Box::leak(Box::new(Ram::new())));
                 let options = GeniusOptions { start: RESET, ..GeniusOptions::new(model) };
                 let port = GeniusPort::new(window, options);
@@ -184,16 +184,16 @@ impl World {
         World { bus, recorders, host, now_ms: 0 }
     }
 
-    /// The same, when everybody is on the bus.
+    /// Recorders and a host, once everybody is on the bus.
     ///
     /// # Panics
-    /// When somebody is not within five minutes.
+    /// When somebody is not on the bus within five minutes.
     #[must_use]
     pub fn started(recorders: &[(u8, Model)]) -> World {
         World::new(recorders).when_started()
     }
 
-    /// The same with debounce.
+    /// Recorders with debounce and a host, once everybody is on the bus.
     ///
     /// # Panics
     /// When somebody is not on the bus within five minutes.
@@ -211,13 +211,13 @@ impl World {
             };
             world.recorders.iter().all(known).then_some(())
         });
-        // Boards that have asked each other who they are go on to assign themselves as controllers.
+        // Boards that have asked each other who they are then assign themselves as controllers.
         world.run(SETTLING_MS);
         world.host.inbox.clear();
         world
     }
 
-    /// All recorders [report](REPORT) from now on.
+    /// Makes all recorders [report](REPORT) from now on.
     pub fn report_to_host(&mut self) {
         for recorder in &mut self.recorders {
             recorder.serial_ask(&Command::Configure(REPORT));
@@ -236,7 +236,7 @@ impl World {
         self.host.driver.ram_mut().drive_reset(held);
     }
 
-    /// Lets a millisecond pass in which the host is left alone: it may be another one.
+    /// Lets a millisecond pass without the driver of this host. The host may be another program.
     pub fn step_without_host(&mut self) {
         self.now_ms += 1;
         self.bus.borrow_mut().advance_to(self.now_ms * 1000);
@@ -255,10 +255,10 @@ impl World {
         }
     }
 
-    /// Lets time pass until there is what is looked for.
+    /// Lets time pass until `look` finds something.
     ///
     /// # Panics
-    /// When there is not within five minutes.
+    /// When it finds nothing within five minutes.
     pub fn until<T>(&mut self, what: &str, mut look: impl FnMut(&mut World) -> Option<T>) -> T {
         for _ in 0..LIMIT_MS {
             if let Some(found) = look(self) {
@@ -269,7 +269,7 @@ impl World {
         panic!("{what}: not within {LIMIT_MS} ms");
     }
 
-    /// Gives the host's board a datagram, as soon as it takes one.
+    /// Gives the host's board a datagram as soon as the board takes one.
     pub fn transmit(
         &mut self,
         destination: Destination,
@@ -315,7 +315,7 @@ impl World {
         Reply::parse(&self.ask_bytes(number, command)).expect("a reply")
     }
 
-    /// The same, with the reply as it came.
+    /// Asks a recorder over Genius, and returns the bytes of the reply.
     ///
     /// # Panics
     /// When there is no reply.
@@ -324,7 +324,7 @@ impl World {
         self.until("a reply", |world| world.take_message(number)).1
     }
 
-    /// The global data of a recorder as the host's board has them in its input table.
+    /// A recorder's global data, as the host's board has it in its input table.
     #[must_use]
     pub fn global(&self, number: u8, len: usize) -> Vec<u8> {
         let bus = self.bus.borrow();
@@ -332,11 +332,11 @@ impl World {
         bus.get(self.host.board).ram()[table..table + len].to_vec()
     }
 
-    /// No host did what the manual forbids, except that a recorder's board which has started anew
-    /// by itself was looked at once before it may be: nobody tells the host.
+    /// Checks that no host did what the manual forbids, with one exception. A recorder whose board
+    /// has started anew by itself may look at it once too early, because nobody tells it.
     ///
     /// # Panics
-    /// When one did more.
+    /// When a host did more.
     pub fn assert_lawful_but_for_a_reset(&self) {
         let bus = self.bus.borrow();
         for recorder in &self.recorders {
@@ -351,7 +351,7 @@ impl World {
         assert_eq!(bus.get(self.host.board).violations(), [], "host");
     }
 
-    /// No host did what the manual forbids.
+    /// Checks that no host did what the manual forbids.
     ///
     /// # Panics
     /// When one did.

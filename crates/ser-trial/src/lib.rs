@@ -1,8 +1,8 @@
 //! The whole system on trial, without hardware.
 //!
-//! [`simulation`] lets recorders, lines, buses and hosts live through random operations and faults
-//! in virtual time and accounts for every event. [`fuzzing`] says what must hold whatever bytes
-//! arrive. The other modules are what such trials and the end-to-end tests play on: a recorder
+//! [`simulation`] runs recorders, lines, buses and hosts through random operations and faults in
+//! virtual time, and accounts for every event. [`fuzzing`] says what must hold whatever bytes
+//! arrive. The other modules are what such trials and the end-to-end tests build on: a recorder
 //! behind a pseudo-terminal, recorders on a bus, a host that reads or watches a log.
 
 pub mod digits;

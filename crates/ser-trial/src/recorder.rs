@@ -15,23 +15,23 @@ use ser_sim::{
 };
 use tempfile::TempDir;
 
-/// The recorder's number, where it is on a bus.
+/// The recorder's bus address, where it is on a bus.
 pub const NODE: u8 = 5;
 
-/// For a client on a machine that stalls.
+/// Client options for a machine that stalls.
 pub const PATIENT: Options = Options { timeout: Duration::from_secs(20), retries: 5 };
 
 /// A recorder that is switched on.
 pub struct Recorder {
     simulator: Simulator,
-    /// What the simulator finds not to be as it should be.
+    /// The problems that the simulator has told of.
     notices: Arc<Mutex<Vec<String>>>,
     /// Holds the host's window, if it is on a bus.
     _folder: Option<TempDir>,
 }
 
 impl Recorder {
-    /// Switches a recorder on; all contacts are open.
+    /// Switches on a recorder with all contacts open.
     ///
     /// # Panics
     /// When it does not answer, or the image is not there.
@@ -40,7 +40,7 @@ impl Recorder {
         Recorder::start_with(SimOptions { backend: kind.backend(), ..options(model) }, None)
     }
 
-    /// Switches a recorder on that is on a Genius bus with a host; all contacts are open.
+    /// Switches on a recorder that is on a Genius bus with a host, with all contacts open.
     ///
     /// # Panics
     /// When it does not answer, or the image is not there.
@@ -49,7 +49,7 @@ impl Recorder {
         Recorder::start_on_noisy_bus(kind, model, Noise::default())
     }
 
-    /// The same on a bus on which messages are damaged and lost.
+    /// Switches on a recorder on a bus on which messages are damaged and lost.
     ///
     /// # Panics
     /// When it does not answer, or the image is not there.
@@ -117,7 +117,7 @@ impl Recorder {
     /// The emulated board.
     ///
     /// # Panics
-    /// When it is the recorder in this process.
+    /// When the recorder runs in this process.
     #[must_use]
     pub fn board(&self) -> &EmulatedBoard {
         self.simulator.board().expect("an emulated recorder")
@@ -211,7 +211,7 @@ fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Waits for what the recorder says unasked until `enough` has been seen.
+/// Takes what the recorder says unasked until `enough` has seen enough.
 ///
 /// # Panics
 /// When that takes too long.
@@ -237,8 +237,8 @@ pub fn stamp_ms(entry: &Entry) -> i64 {
     time.and_utc().timestamp_millis()
 }
 
-/// Checks that entries are the moves that were played: the same inputs in the same order, stamps
-/// exactly as far apart as the samples that can have seen them.
+/// Checks that entries are the moves that were played: the same inputs in the same order, and
+/// stamps exactly as far apart as the samples that can have seen them.
 ///
 /// # Panics
 /// When they are not.

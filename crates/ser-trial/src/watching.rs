@@ -1,5 +1,5 @@
-//! How many events `watch` delivers while they come faster and faster: the client's own watcher
-//! against the recorder over a line that has its rate in both directions, in virtual time.
+//! How many events `watch` delivers while they come faster and faster. The client's own watcher
+//! talks to the recorder over a line that has its rate in both directions, in virtual time.
 
 use std::collections::VecDeque;
 use std::io;
@@ -29,9 +29,9 @@ const LONG_ENOUGH_MS: u64 = 600_000;
 /// How a log is watched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
-    /// As `watch` does it: with reports, as long as the line carries them.
+    /// With reports as long as the line carries them, as `watch` does it.
     Reports,
-    /// As `watch --poll`.
+    /// By polling, as `watch --poll` does it.
     Polling,
 }
 
@@ -44,7 +44,7 @@ pub struct Load {
     pub size: u16,
     /// Events a second, at most 1000.
     pub per_second: u32,
-    /// For so many seconds.
+    /// For how many seconds.
     pub seconds: u32,
 }
 
@@ -57,11 +57,12 @@ pub struct Watched {
     pub in_time: u64,
     /// Delivered in all.
     pub delivered: u64,
-    /// Told to be lost.
+    /// Reported as lost.
     pub lost: u64,
 }
 
-/// Events a second that a line at 19200 bit/s carries, in replies of ten entries and nothing else.
+/// How many events a second a line at 19200 bit/s carries, in replies of ten entries and nothing
+/// else.
 #[must_use]
 pub fn line_carries() -> f64 {
     let bytes = encoded_len(Model::Ser160.read_reply_len(MAX_ENTRIES));
@@ -86,7 +87,8 @@ impl Load {
         let mut watcher = self.watcher(found);
         let mut watched =
             Watched { events: (self.per_second * self.seconds).into(), ..Watched::default() };
-        // What happens before the first reading is not what is watched.
+        // Events before the first reading are not part of the trial, so the watcher is set up
+        // first.
         while !self.is_set_up(&watcher) {
             watcher
                 .step::<RequestError>(&mut unit, HEARTBEAT, &mut |_| Ok(()))
@@ -151,13 +153,13 @@ impl Watched {
 /// The recorder, and the bytes on their way to it.
 struct Recorder {
     node: SimNode<'static>,
-    /// With the time at which their stop bits end.
+    /// Each byte with the time at which its stop bit ends.
     on_the_way: VecDeque<(u64, u8)>,
     free_ns: u64,
 }
 
 impl Recorder {
-    /// Lets the events begin; gives the time of the last.
+    /// Lets the events begin. Returns the time of the last.
     fn begin(&mut self, load: Load) -> u64 {
         let now_ms = self.node.now_ms();
         let at_ms = |event: u32| u64::from(event) * 1000 / u64::from(load.per_second);
@@ -190,7 +192,7 @@ struct Line(World);
 
 impl World {
     fn new() -> World {
-        // The node lives as long as its host, which nothing bounds.
+        // The node lives as long as its host, which has no fixed lifetime.
         let ram = Box::leak(Box::new(Ram::new()));
         let options = SimNodeOptions {
             line_rate: ser_sim::LineRate::Real,

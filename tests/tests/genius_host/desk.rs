@@ -1,4 +1,4 @@
-//! A host's desk: the file that is its window, and behind it boards, bus and recorders, whose time
+//! A host's desk: the file that is its window, and behind it boards, bus and recorders. Their time
 //! passes while the host waits for something.
 
 use std::fs::{File, OpenOptions};
@@ -17,10 +17,10 @@ use ser_sim::genius::{Noise, RAM_LEN};
 use ser_trial::genius_world::{Recorder, World};
 use tempfile::TempDir;
 
-/// Everybody is on the bus long before that.
+/// A time long before which everybody is on the bus.
 const START_LIMIT_MS: u64 = 60_000;
 
-/// Boards go on to assign themselves to each other when all are logged in.
+/// How long boards still assign themselves to each other after all are logged in.
 const SETTLING_MS: u64 = 500;
 
 type Order = Box<dyn FnOnce(&mut Bench) + Send>;
@@ -28,14 +28,14 @@ type Order = Box<dyn FnOnce(&mut Bench) + Send>;
 /// A time in which nothing moves.
 #[derive(Clone, Copy)]
 pub(crate) struct Stall {
-    /// From now to its beginning.
+    /// How long until it begins.
     pub(crate) in_ms: u64,
     /// How long it lasts.
     pub(crate) for_ms: u64,
 }
 
 impl Stall {
-    /// Whether this millisecond is one of them.
+    /// Whether this millisecond is part of the stall.
     fn step(&mut self) -> bool {
         if self.in_ms > 0 {
             self.in_ms -= 1;
@@ -51,19 +51,19 @@ impl Stall {
 pub(crate) struct Bench {
     pub(crate) world: World,
     window: File,
-    /// The host's board can be held in reset; the host at the window does not have that line.
+    /// Whether the host's board is held in reset. The host at the window does not have that line.
     pub(crate) in_reset: bool,
-    /// A recorder that does nothing, while its board does.
+    /// A recorder that does nothing while its board goes on.
     pub(crate) paused: Option<Recorder>,
-    /// Soon, nothing behind the window moves for a while, as on a computer that is busy with other
-    /// things.
+    /// A stall to come, in which nothing behind the window moves, as on a computer that is busy
+    /// with other things.
     pub(crate) stall: Option<Stall>,
-    /// So long it has not moved in all.
+    /// How long nothing has moved in all.
     stalled_ms: u64,
 }
 
 impl Bench {
-    /// Lets a millisecond pass in which each side sees what the other has written before.
+    /// Lets a millisecond pass in which each side sees what the other wrote before.
     fn step(&mut self) {
         if self.stall.as_mut().is_some_and(Stall::step) {
             self.stalled_ms += 1;
@@ -71,7 +71,7 @@ impl Bench {
         }
         let board = self.world.host.board;
         let mut image = [0; RAM_LEN];
-        // A file that is not whole any more tells nobody anything.
+        // A file that is no longer complete tells nobody anything.
         let whole = self.window.read_exact_at(&mut image, 0).is_ok();
         if whole {
             self.world.bus.borrow_mut().get_mut(board).sync_from_host(&image);
@@ -103,13 +103,13 @@ impl Bench {
     }
 
     fn is_logged_in(&self, number: u8) -> bool {
-        // The third byte of a device's entry in the device table.
+        // The third byte of a device table entry.
         let offset = 0x1E02 + 8 * u16::from(number);
         let ready = self.world.recorders.iter().all(|recorder| recorder.port.is_ready());
         ready && self.world.host.driver.ram().read(offset) == 1
     }
 
-    /// The time of a bus scan, in milliseconds and not less.
+    /// The time of a bus scan, rounded up to milliseconds.
     pub(crate) fn scan_ms(&self) -> u64 {
         self.world.bus.borrow().scan_time_ns().expect("a running bus").div_ceil(1_000_000)
     }
@@ -127,12 +127,12 @@ impl Desk {
         Desk::with_noise(recorders, Noise::default())
     }
 
-    /// The same on a noisy bus.
+    /// Recorders and the host's board on a noisy bus.
     pub(crate) fn with_noise(recorders: &[(u8, Model)], noise: Noise) -> Desk {
         Desk::of_world(recorders, move |recorders| World::with_noise(recorders, noise))
     }
 
-    /// The same with GENI boards of this model number.
+    /// Recorders and the host with GENI boards of this model number.
     pub(crate) fn with_boards(recorders: &[(u8, Model)], board_model: u8) -> Desk {
         Desk::of_world(recorders, move |recorders| {
             World::with_boards(recorders, Noise::default(), board_model)
@@ -156,7 +156,7 @@ impl Desk {
             received.into_iter().for_each(|order| order(&mut bench));
         });
         let clock = Arc::new(BenchTime { now_ms: AtomicU64::new(0), orders: Mutex::new(orders) });
-        // Until the bus is up.
+        // This returns when the bus is up.
         clock.wait(Duration::ZERO);
         Desk { folder, clock }
     }
@@ -169,12 +169,12 @@ impl Desk {
         GeniWindow::from(self.path("host").to_str().expect("text"))
     }
 
-    /// A host at any window, in the time of this desk.
+    /// A host at any window, in this desk's time.
     pub(crate) fn open(&self, window: GeniWindow) -> Result<GeniHost, OpenError> {
         self.open_patiently(window, Duration::from_secs(1))
     }
 
-    /// The same with more patience, or less.
+    /// A host with more patience, or less.
     pub(crate) fn open_patiently(
         &self,
         window: GeniWindow,
@@ -183,7 +183,7 @@ impl Desk {
         GeniHost::open_in(Arc::clone(&self.clock) as Arc<dyn Clock>, window, patience)
     }
 
-    /// The same for somebody who may have had enough.
+    /// A host for a user who may give up.
     pub(crate) fn open_unless(
         &self,
         window: GeniWindow,
@@ -205,7 +205,7 @@ impl Desk {
         self.clock.with(order)
     }
 
-    /// Moves the first contact of a recorder, by its index; says in which millisecond.
+    /// Moves the first contact of a recorder, given by index. Returns in which millisecond.
     pub(crate) fn contact(&self, recorder: usize, closed: bool) -> u64 {
         self.with(move |bench| {
             bench.world.recorders[recorder].contact(1, closed);
@@ -224,7 +224,7 @@ impl Desk {
     }
 }
 
-/// The usual patience of a client; its time is the desk's.
+/// A client with the usual patience, in the desk's time.
 pub(crate) fn unit(host: &GeniHost, number: u8) -> Unit {
     host.unit(number, Options::default())
 }

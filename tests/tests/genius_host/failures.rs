@@ -1,4 +1,4 @@
-//! What a host is told when board, bus or recorder fail, and that it goes on where it was when they
+//! What a host is told when board, bus or recorder fail, and how it goes on where it was when they
 //! are back.
 
 use std::time::Duration;
@@ -17,14 +17,14 @@ const NODE: u8 = 5;
 const EVENTS: u16 = 40;
 const SIZE: u16 = 2048;
 
-/// From a board that is reset to one that is back on the bus with everybody logged in.
+/// How long a reset board takes until it is back on the bus with everybody logged in.
 const RECOVERY_MS: u64 = 10_000;
 
 fn desk() -> Desk {
     Desk::new(&[(NODE, Model::Ser160), (9, Model::Ser320)])
 }
 
-/// Something happens to a device, so long from now.
+/// Makes something happen to a device, this long from now.
 fn inject(
     desk: &Desk,
     in_ms: u64,
@@ -68,7 +68,7 @@ fn a_board_that_is_not_on_the_bus_says_so() {
     let host = desk.host();
     assert_eq!(host.devices().expect("all is well").len(), 2);
 
-    // Its cable is pulled again, under a host that is at work.
+    // Its cable is pulled again, while a host is at work.
     inject(&desk, 0, host_board, |device| Fault::Disconnect { device, for_us: 30_000_000 });
     desk.run(5_000);
     assert_eq!(host.devices().err(), Some(GeniusError::OffBus));
@@ -95,7 +95,7 @@ fn numbers_without_a_recorder_are_told_apart() {
     }
 }
 
-/// A reading of a log, until something happens to the recorder.
+/// A reading of a log, during which something happens to the recorder.
 struct Reading {
     desk: Desk,
     host: GeniHost,
@@ -116,7 +116,7 @@ impl Reading {
         Reading { desk, host, unit, cursor: None, entries: 0 }
     }
 
-    /// Reads on; calls `halfway` once, after the first entries. Every entry comes once and in
+    /// Reads on. Calls `halfway` once, after the first entries. Every entry comes once and in
     /// order.
     fn read(&mut self, halfway: impl FnOnce(&Desk)) -> Result<(), RequestError> {
         let Reading { desk, unit, cursor, entries, .. } = self;
@@ -132,7 +132,7 @@ impl Reading {
         .map(drop)
     }
 
-    /// The rest comes when all is well again.
+    /// Reads the rest when all is well again.
     fn finish(mut self) {
         assert!((1..EVENTS).contains(&self.entries), "{} entries", self.entries);
         self.desk.run(RECOVERY_MS);
@@ -183,7 +183,7 @@ fn a_board_that_fails_in_the_middle_of_a_command_is_the_reason_given() {
     let mut unit = unit(&host, NODE);
     for fault in [DeviceFault::Hang, DeviceFault::FailSelfTest(4), DeviceFault::Reset] {
         let mut failed = 0;
-        // Each time a little later in the exchange of command and reply.
+        // Each fault comes a little later in the exchange of command and reply.
         for in_ms in [0, 1, 2, 3, 5, 8, 13] {
             inject(&desk, in_ms, host_board, move |device| Fault::Inside { device, fault });
             let result = unit.mode();
@@ -195,7 +195,7 @@ fn a_board_that_fails_in_the_middle_of_a_command_is_the_reason_given() {
                 ) => {
                     failed += 1;
                 }
-                // The answer was there before, or the board was back before the patience was over.
+                // The answer was there before, or the board came back before the patience was over.
                 (_, Ok(_)) => {}
                 (_, Err(error)) => panic!("{fault:?} after {in_ms} ms: {error}"),
             }
@@ -204,7 +204,7 @@ fn a_board_that_fails_in_the_middle_of_a_command_is_the_reason_given() {
             desk.run(20);
             desk.with(|bench| bench.in_reset = false);
             desk.run(RECOVERY_MS);
-            // What was found out meanwhile, once.
+            // This takes the error that was found meanwhile, which is reported once.
             let _ = unit.mode();
             unit.mode().unwrap_or_else(|error| panic!("{fault:?} after {in_ms} ms: {error}"));
         }
@@ -221,7 +221,8 @@ fn a_board_may_stand_still_for_as_long_as_the_host_is_patient() {
     let host =
         desk.open_patiently(desk.window(), patience).unwrap_or_else(|error| panic!("{error}"));
     let mut unit = host.unit(NODE, patient);
-    // In every part of an exchange: a look into the queue, a datagram, its reply; and of a lockout.
+    // The stall hits every part of an exchange (a look into the queue, a datagram, its reply) and
+    // of a lockout.
     for after_ms in [0, 1, 2, 3, 5, 8, 13] {
         stall(&desk, after_ms, STALL_MS);
         unit.mode().unwrap_or_else(|error| panic!("after {after_ms} ms: {error}"));
@@ -237,7 +238,7 @@ fn a_board_may_stand_still_for_as_long_as_the_host_is_patient() {
     assert_eq!(of_genius(host.unit(NODE, patient).mode()), GeniusError::BoardSilent);
 }
 
-/// All that is behind the window stands still, so long from now.
+/// Makes everything behind the window stand still, this long from now.
 fn stall(desk: &Desk, in_ms: u64, for_ms: u64) {
     desk.with(move |bench| bench.stall = Some(Stall { in_ms, for_ms }));
 }

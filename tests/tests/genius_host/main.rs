@@ -1,5 +1,5 @@
 //! A host at its window, in virtual time: how exact it is, how fresh what it sees is, and what it
-//! says when board, bus, recorder or window fail. Nothing here waits for anything.
+//! says when board, bus, recorder or window fail. Nothing here waits in real time.
 #![cfg(target_os = "linux")]
 
 mod desk;

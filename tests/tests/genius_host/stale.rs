@@ -1,4 +1,4 @@
-//! Auto reports that waited, in the board or in the host, while nobody looked: they are neither
+//! Auto reports that waited in the board or in the host while nobody looked. They are neither
 //! answers nor news.
 
 use ser_client::{Cursor, Delivery, GeniHost, LogFollower, RequestError, Unsolicited};
@@ -9,14 +9,14 @@ use crate::desk::{Desk, unit};
 const NODE: u8 = 5;
 const SIZE: u16 = 2048;
 
-/// Which inputs an event says are on.
+/// The inputs that events say are on.
 type Seen = Vec<Inputs>;
 
 fn desk() -> Desk {
     Desk::new(&[(NODE, Model::Ser160)])
 }
 
-/// The recorder sends its reports to the host's board.
+/// Makes the recorder send its reports to the host's board.
 fn report_to(host: &GeniHost) {
     let report = Configure {
         auto_report: AutoReport::Genius,
@@ -30,12 +30,12 @@ fn report_to(host: &GeniHost) {
 fn events(desk: &Desk, inputs: impl IntoIterator<Item = u8>) {
     for input in inputs {
         desk.with(move |bench| bench.world.recorders[0].contact(input, true));
-        // Each is an event of its own, and reported before the next.
+        // Each closing is an event of its own, and reported before the next.
         desk.run(50);
     }
 }
 
-/// Somebody erases the log over RS-232, and all contacts open unseen.
+/// Erases the log over RS-232, and opens all contacts unseen.
 fn erase(desk: &Desk) {
     desk.with(|bench| {
         let recorder = &mut bench.world.recorders[0];
@@ -137,7 +137,7 @@ fn a_host_that_has_not_looked_for_long_is_told_no_old_stories() {
 fn a_queue_that_ran_over_says_nothing_either() {
     let desk = desk();
     report_to(&desk.host());
-    // The board keeps fifteen.
+    // The board keeps fifteen datagrams.
     events(&desk, (1..=10).chain(1..=10));
     erase(&desk);
     events(&desk, 1..=16);
@@ -156,7 +156,7 @@ fn reports_that_come_while_something_else_is_asked_are_not_lost() {
     let mut cursor: Option<Cursor> = None;
     unit.read_new(&mut cursor, SIZE, &mut drop).expect("a log");
     events(&desk, [2, 3]);
-    // The reports wait in the board; the question is answered by its answer, and they are there
+    // The reports wait in the board. The question gets its own answer, and the reports are there
     // afterwards.
     assert_eq!(unit.last_broadcast().expect("a reply"), None);
     let mut seen = Vec::new();

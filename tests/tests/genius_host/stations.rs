@@ -14,11 +14,11 @@ use crate::desk::Desk;
 const RECORDER: u8 = 5;
 const ONE: [(u8, Model); 1] = [(RECORDER, Model::Ser160)];
 
-/// A host that asks as patiently as `ser-cli` does.
+/// A host's options with the patience of `ser-cli`.
 const OPTIONS: Options = Options { timeout: Duration::from_secs(1), retries: 2 };
 const ASKING: Recognition = Recognition::Asking(OPTIONS);
 
-/// The questions themselves take a few bus scans each.
+/// How long the questions themselves take: a few bus scans each.
 const QUESTIONS_MS: u64 = 500;
 
 /// Connects blocks with as many inputs as recorders have, and lets them log in.
@@ -37,8 +37,8 @@ fn connect_blocks(desk: &Desk) {
     desk.run(1_000);
 }
 
-/// The numbers of the recorders, those of candidates that said nothing, and how long it took to
-/// find out.
+/// The bus addresses of the recorders, those of candidates that said nothing, and how long it took
+/// to find out.
 fn recorders(desk: &Desk, host: &GeniHost, how: Recognition) -> (Vec<u8>, Vec<u8>, u64) {
     let before_ms = desk.now_ms();
     let found = host.recorders(how).expect("the board is well");
@@ -64,10 +64,10 @@ fn a_block_with_as_many_inputs_does_not_answer_and_is_no_recorder() {
     let host = desk.host();
     let (numbers, silent, took_ms) = recorders(&desk, &host, ASKING);
     assert_eq!((numbers, silent), (vec![RECORDER], vec![7, 8]));
-    // All were asked at the same time, three times, and nobody is waited for longer than that.
+    // All were asked at the same time, three times. Nobody was waited for longer than that.
     assert!((3_000..3_000 + QUESTIONS_MS).contains(&took_ms), "{took_ms} ms");
 
-    // What came out is remembered.
+    // The result is remembered.
     let (numbers, silent, took_ms) = recorders(&desk, &host, ASKING);
     assert_eq!((numbers, silent), (vec![RECORDER], vec![7, 8]));
     assert!(took_ms < QUESTIONS_MS, "{took_ms} ms");
@@ -79,10 +79,10 @@ fn an_answer_is_remembered_until_the_device_logs_in_anew() {
     let host = desk.host();
     assert_eq!(recorders(&desk, &host, ASKING).0, [RECORDER]);
     let board = desk.with(|bench| bench.world.recorders[0].board.id());
-    // Its board goes on, and whoever has answered once is not asked again ...
+    // The recorder's board goes on, and a recorder that has answered once is not asked again ...
     desk.with(|bench| bench.paused = Some(bench.world.recorders.remove(0)));
     assert_eq!(recorders(&desk, &host, ASKING).0, [RECORDER]);
-    // ... before it was away: it may be another device by then.
+    // ... until its board was away, because it may be another device by then.
     let log_in_anew = || {
         desk.with(move |bench| {
             let mut bus = bench.world.bus.borrow_mut();
@@ -109,7 +109,7 @@ fn by_model_number_nobody_is_asked() {
     let desk = Desk::with_boards(&ONE, 90);
     connect_blocks(&desk);
     let host = desk.host();
-    // A recorder that could not answer is one all the same.
+    // A device that could not answer is still a recorder.
     desk.with(|bench| bench.paused = Some(bench.world.recorders.remove(0)));
     let (numbers, silent, took_ms) = recorders(&desk, &host, Recognition::ModelNumber(90));
     assert_eq!((numbers, silent), (vec![RECORDER], vec![]));

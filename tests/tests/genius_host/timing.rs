@@ -1,4 +1,5 @@
-//! How exact a clock is that was set over the bus, and how fresh what a host sees of the inputs.
+//! How exact a clock is after it was set over the bus, and how fresh the inputs are that a host
+//! sees.
 
 use ser_client::GeniHost;
 use ser_proto::genius::GlobalData;
@@ -6,10 +7,10 @@ use ser_proto::{Command, Inputs, Model, Reply, TimeStamp};
 
 use crate::desk::{Desk, unit};
 
-/// Often enough to meet every phase of a scan.
+/// Enough rounds to meet every phase of a scan.
 const ROUNDS: u16 = 60;
 
-/// So many recorders of the larger model.
+/// `count` recorders of the larger model.
 fn crowd(count: u8) -> Vec<(u8, Model)> {
     (1..=count).map(|number| (number, Model::Ser320)).collect()
 }
@@ -26,10 +27,11 @@ fn a_host_sees_a_contact_within_four_scans() {
     for units in [crowd(3), crowd(12)] {
         let desk = Desk::new(&units);
         let host = desk.host();
-        // Once everybody is known nobody is waited for.
+        // Once everybody is known, nobody is waited for.
         host.devices().expect("the board is well");
         let mut longest_ms = 0;
-        // At every phase of the scan, at the first and at the last recorder in it.
+        // The contact moves at every phase of the scan, at the first and at the last recorder in
+        // it.
         for round in 0..u64::from(ROUNDS) {
             for index in [0, units.len() - 1] {
                 desk.run(round % 19);
@@ -56,7 +58,8 @@ fn a_clock_that_was_set_over_a_quiet_bus_is_off_by_little_more_than_half_a_scan(
         let scan_ms = desk.with(|bench| bench.scan_ms());
         let mut off_ms = Vec::new();
         for round in 0..u64::from(ROUNDS) {
-            // At every phase of the scan, and never in one that has had its datagram.
+            // The clock is set at every phase of the scan, never in a scan that has had its
+            // datagram.
             desk.run(3 * scan_ms + round % (scan_ms + 1));
             unit.set_clock(|ahead| {
                 at(desk.now_ms() + u64::try_from(ahead.as_millis()).expect("short"))
@@ -105,12 +108,13 @@ fn a_broadcast_sets_all_clocks_alike_at_every_phase_of_the_scan() {
     }
 }
 
-/// How far a clock may be off: the datagram waits for the host's turn, and nobody knows how long.
+/// How far a clock may be off, because nobody knows how long the datagram waits for the host's
+/// turn.
 fn half_and_some(scan_ms: u64) -> i64 {
     i64::try_from(scan_ms / 2).expect("short") + 3
 }
 
-/// When a recorder says that an entry was.
+/// The time that a recorder gives for an entry.
 fn stamp_ms(host: &GeniHost, number: u8, entry: u16) -> i64 {
     let reply =
         unit(host, number).request(&Command::Read { start: entry, count: 1 }).expect("a reply");

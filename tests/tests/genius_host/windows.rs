@@ -62,11 +62,11 @@ fn a_window_without_a_board_behind_it_is_silent() {
         }
         assert!(desk.now_ms() - began_ms <= 3_010, "{} ms", desk.now_ms() - began_ms);
     }
-    // One that was named by mistake is what it was.
+    // A file that was named by mistake is unchanged.
     assert!(fs::read(&photo).expect("read").iter().all(|&byte| byte == 0xA5));
 }
 
-/// A file of somebody's that looks like the window of a board that has stopped.
+/// A file of the user's that looks like the window of a board that has stopped.
 fn like_a_window(path: &Path, offset: usize) -> Vec<u8> {
     let mut bytes = vec![0xA5; offset + RAM_LEN + 7];
     bytes[offset + 0x0893] = 1;

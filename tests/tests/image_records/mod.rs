@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use defmt_decoder::{DecodeError, Table};
 use ser_sim::testing::{PATIENCE, image};
 
-/// Waits until the log holds all of the expected records, among others.
+/// Waits until the log holds all of the expected records, possibly among others.
 ///
 /// # Panics
 /// When that takes too long.
@@ -34,7 +34,7 @@ fn records(log: &[u8], image: &[u8]) -> Vec<String> {
     loop {
         match decoder.decode() {
             Ok(frame) => records.push(frame.display_message().to_string()),
-            // A reset cuts the record short that is being written.
+            // A reset cuts short the record that is being written.
             Err(DecodeError::Malformed) => {}
             Err(DecodeError::UnexpectedEof) => return records,
         }

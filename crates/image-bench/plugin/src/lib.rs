@@ -1,29 +1,29 @@
-//! A plugin for QEMU: tells a bench which instructions the emulated processor executes, and holds
-//! it where the bench wants.
+//! A plugin for QEMU. It tells a bench which instructions the emulated processor executes, and
+//! holds the processor where the bench wants.
 //!
 //! # Design
-//! The bench listens on a local socket; the plugin is told the socket and the addresses to stop at,
-//! and nothing else about the image. Everything that takes thought is the bench's.
+//! The bench listens on a local socket. The plugin is told the socket and the addresses to stop at,
+//! and nothing else about the image. All decisions are the bench's.
 //!
 //! | option        | what                                         |
 //! |---------------|----------------------------------------------|
 //! | `socket=PATH` | where the bench listens                      |
 //! | `stop=HEX`    | an address to stop at; as often as one likes |
 //!
-//! To the bench go addresses of instructions, as 32-bit little-endian words: each one executed,
-//! while the bench wants that, and each stop. A Thumb instruction's address is even, so an odd word
-//! is a stop: the processor stands before the instruction at the word less one, until the bench
-//! answers with a byte: `t` to be told of every instruction from there on, anything else not to be.
+//! The plugin sends the bench addresses of instructions as 32-bit little-endian words: each
+//! instruction executed, while the bench wants that, and each stop. The address of a Thumb
+//! instruction is even, so an odd word is a stop. The processor then stands before the instruction
+//! at the word less one, until the bench answers with a byte: `t` to be told of every instruction
+//! from there on, anything else not to be.
 //!
 //! # Tradeoffs
-//! A breakpoint of QEMU's debugger stub would stop the processor too, but it also stops the virtual
-//! clock, and that not at the same moment in each run. A plugin that takes its time is outside of
-//! time.
+//! A breakpoint of QEMU's debugger stub would stop the processor too. But it also stops the virtual
+//! clock, and not at the same moment in each run. A plugin that takes its time is outside of time.
 //!
 //! # Notes
-//! The interface is the one of QEMU's `qemu-plugin.h`; of what is used here nothing has changed
-//! since QEMU 5. The version of the interface that a plugin has to name did: 1 before QEMU 9, then
-//! 2. `SER_QEMU_PLUGIN_API` chooses at build time.
+//! The interface is that of QEMU's `qemu-plugin.h`. What is used here has not changed since QEMU 5.
+//! The version of the interface that a plugin has to name did change: 1 before QEMU 9, then 2.
+//! `SER_QEMU_PLUGIN_API` chooses at build time.
 #![cfg(target_os = "linux")]
 #![expect(unsafe_code, reason = "QEMU's interface is one of C")]
 
@@ -43,10 +43,10 @@ pub static qemu_plugin_version: c_int = match option_env!("SER_QEMU_PLUGIN_API")
     _ => 1,
 };
 
-/// The bench; there is one processor, so nobody ever waits for it.
+/// The bench. There is only one processor, so nobody ever waits for it.
 static LINK: OnceLock<Link> = OnceLock::new();
 
-/// What QEMU calls when it loads the plugin. Gives 0 if all is well.
+/// QEMU calls this when it loads the plugin. Returns 0 if all is well.
 ///
 /// # Safety
 /// QEMU calls it once, with `argc` texts in `argv`.

@@ -6,7 +6,7 @@ use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Words go out in portions of so many bytes.
+/// How many bytes go out at once.
 const PORTION: usize = 1 << 16;
 
 /// The bench's byte that asks for every instruction.
@@ -38,9 +38,9 @@ impl Link {
                 }
                 Some(("stop", address)) => {
                     let address = u64::from_str_radix(address, 16);
-                    stops.push(address.map_err(|_| format!("{option} names no address"))?);
+                    stops.push(address.map_err(|_| format!("{option} does not name an address"))?);
                 }
-                _ => return Err(format!("{option} is no option")),
+                _ => return Err(format!("{option} is not an option")),
             }
         }
         let socket = socket.ok_or("the option socket=PATH is missing")?;

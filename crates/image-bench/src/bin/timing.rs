@@ -10,7 +10,7 @@ fn main() -> ExitCode {
 #[cfg(not(target_os = "linux"))]
 fn main() -> ExitCode {
     use std::io::Write;
-    // Nobody is left to be told when standard error is gone.
+    // When standard error is gone, nobody is left to be told.
     let _ = std::io::stderr().write_all(
         b"the emulator is driven through local sockets and shared memory: it takes Linux\n",
     );
@@ -76,7 +76,7 @@ mod measured {
         }
     }
 
-    /// On standard error. Nobody is left to be told when that is gone.
+    /// Prints on standard error. When that is gone, nobody is left to be told.
     fn tell(what: fmt::Arguments<'_>) {
         let _ = writeln!(io::stderr(), "{what}");
     }

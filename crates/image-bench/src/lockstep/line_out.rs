@@ -1,8 +1,8 @@
 //! The line behind the board's transmitter: QEMU's standard output as a pipe that holds one byte.
 //!
-//! The byte in the pipe is the one in the shift register. While it is there the UART keeps the next
-//! one in its data register and is busy, as on a chip. QEMU moves that one on when the pipe is
-//! empty, which is only while the processor is held.
+//! The byte in the pipe is the one in the shift register. While it is there, the UART keeps the
+//! next byte in its data register and is busy, as on a chip. QEMU moves that byte on when the pipe
+//! is empty, which is only while the processor is held.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -20,7 +20,7 @@ pub(super) struct LineOut {
 impl LineOut {
     /// An idle line, and QEMU's end of it.
     pub(super) fn new() -> io::Result<(LineOut, OwnedFd)> {
-        // Every write is a packet with a page of the pipe for itself, and there is one page.
+        // Every write is a packet that takes a page of the pipe, and there is only one page.
         let flags = PipeFlags::DIRECT | PipeFlags::NONBLOCK | PipeFlags::CLOEXEC;
         let (ours, qemus) = pipe_with(flags)?;
         fcntl_setpipe_size(&qemus, 1)?;

@@ -1,10 +1,10 @@
-//! QEMU's test interface: memory and registers as a probe would read and write them. (QEMU,
-//! "`QTest` Device Emulation Testing Framework", protocol.)
+//! QEMU's test interface: memory and registers, read and written as a probe would. (QEMU, "`QTest`
+//! Device Emulation Testing Framework", protocol.)
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 
-/// UART0's state register, and its bits for a byte that waits for the shift register, and for one
+/// UART0's state register, and its bits for a byte that waits for the shift register and for one
 /// that waits to be taken.
 const UART_STATE: u32 = 0x4000_4004;
 const TRANSMIT_FULL: u64 = 1 << 0;

@@ -3,10 +3,10 @@
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::unix::net::UnixStream;
 
-/// Words are taken in portions of so many bytes.
+/// How many bytes are taken at once.
 const PORTION: usize = 1 << 16;
 
-/// Where the plugin says what is executed.
+/// The stream in which the plugin says what is executed.
 pub(super) struct Tracer<S = UnixStream> {
     stream: BufReader<S>,
 }
@@ -16,12 +16,12 @@ impl<S: Read + Write> Tracer<S> {
         Tracer { stream: BufReader::with_capacity(PORTION, stream) }
     }
 
-    /// Lets the processor go on; `tell` says whether the plugin is to tell of each instruction.
+    /// Lets the processor go on. `tell` says whether the plugin is to tell of each instruction.
     pub(super) fn go(&mut self, tell: bool) -> io::Result<()> {
         self.stream.get_mut().write_all(if tell { b"t" } else { b"-" })
     }
 
-    /// Takes words up to a stop; gives its address.
+    /// Takes words up to a stop, and returns its address.
     pub(super) fn read(&mut self, executed: &mut impl FnMut(u32)) -> io::Result<u32> {
         loop {
             let (words, _) = self.stream.fill_buf()?.as_chunks::<4>();
@@ -47,7 +47,7 @@ impl<S: Read + Write> Tracer<S> {
         }
     }
 
-    /// Takes a word of which less than all is there, or nothing.
+    /// Takes a word that is not yet complete, or of which nothing is there.
     fn read_split(&mut self, executed: &mut impl FnMut(u32)) -> io::Result<Option<u32>> {
         let mut word = [0; 4];
         self.stream.read_exact(&mut word)?;
@@ -64,7 +64,7 @@ impl<S: Read + Write> Tracer<S> {
 mod tests {
     use super::*;
 
-    /// Gives bytes in portions, as a socket does.
+    /// A source that gives bytes in portions, as a socket does.
     struct Portions(Vec<Vec<u8>>);
 
     impl Read for Portions {

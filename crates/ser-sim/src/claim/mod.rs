@@ -1,19 +1,18 @@
 //! A name in the file system that one simulator has for itself, and what it has put there.
 //!
 //! # Design
-//! What stands under a name does not tell who made it, nor whether that simulator still runs. Both
-//! are in a file of our own: its lock says that the simulator runs, and its content says what it
-//! has made. The file is in a directory of the user's that nobody else can write to, and never
-//! beside the name: there it could be anything of anybody's.
+//! What stands under a name does not tell who made it, nor whether that simulator still runs. A
+//! record of our own tells both: its lock says that the simulator runs, and its content says what
+//! it has made. The record is in a directory of the user's that nobody else can write to. It is
+//! never beside the name, where it could be anything of anybody's.
 //!
-//! The directory does not depend on the environment, as `$XDG_RUNTIME_DIR` does: one who starts a
-//! simulator from a terminal and one who does so from a timer must meet. It outlives a restart of
-//! the computer, as the name does.
+//! The directory does not depend on the environment, as `$XDG_RUNTIME_DIR` does, because a
+//! simulator started from a terminal and one started from a timer must meet. It outlives a restart
+//! of the computer, as the name does.
 //!
 //! # Notes
-//! Other users have directories of their own. Between two users it is the making of the thing
-//! itself that decides, which fails where something is, and neither replaces what the other has
-//! made.
+//! Other users have directories of their own. Between two users, making the thing itself decides:
+//! it fails where something is already there, and neither replaces what the other has made.
 
 mod record_folder;
 
@@ -29,8 +28,8 @@ use rustix::fs::{AtFlags, Mode, OFlags, openat, unlinkat};
 
 use crate::error::{NoRecords, SimError};
 
-/// How often a record may go between its opening and its locking: each time a simulator ends at
-/// that moment.
+/// How often a lock is tried. A try is lost each time another simulator removes the record between
+/// its opening and its locking.
 const MAX_TRIES: u32 = 100;
 
 /// No record is longer.
@@ -54,8 +53,8 @@ impl Claim {
         let doing = || format!("note that {} is in use", name.display());
         let folder = record_folder::open()
             .map_err(|tried| SimError::NoRecords(NoRecords { name: name.to_owned(), tried }))?;
-        // Programs that tidy up leave a locked folder alone; without the lock it works all the
-        // same.
+        // Programs that tidy up leave a locked folder alone. Without the lock everything still
+        // works.
         let _ = folder.try_lock_shared();
         match lock_record(&folder, &file_name).map_err(SimError::io(doing()))? {
             Some(record) => Ok(Claim { name: name.to_owned(), record, file_name, folder }),
@@ -63,8 +62,8 @@ impl Claim {
         }
     }
 
-    /// Whether something stands under the name, and if so, whether a simulator has made it: this
-    /// one, or one that did not end as it should.
+    /// Whether something stands under the name, and if so, whether a simulator made it: this one,
+    /// or one that did not end as it should.
     pub(crate) fn holder(&self) -> io::Result<Holder> {
         match fs::symlink_metadata(&self.name) {
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(Holder::Nobody),
@@ -76,17 +75,19 @@ impl Claim {
         }
     }
 
-    /// Notes that what stands under the name is ours from now on: we have just made it.
+    /// Notes that what stands under the name is ours from now on. To be called when we have just
+    /// made it.
     ///
     /// # Errors
-    /// When that cannot be noted. Then it is removed again, as nobody else would.
+    /// When that cannot be noted. Then the thing itself is removed again, because nobody else
+    /// would.
     pub(crate) fn remember(&self) -> io::Result<()> {
         self.record_what_is_there().inspect_err(|_| drop(fs::remove_file(&self.name)))
     }
 
     fn record_what_is_there(&self) -> io::Result<()> {
         let Identity { device, inode, born_ns } = Identity::of(&fs::symlink_metadata(&self.name)?);
-        // Cut short by a crash it is no record, and what is there stays.
+        // A record cut short by a crash does not parse, and what is under the name stays.
         let text = format!("{device} {inode} {born_ns}\n");
         self.record.set_len(0)?;
         self.record.write_all_at(text.as_bytes(), 0)
@@ -111,7 +112,8 @@ impl Drop for Claim {
     fn drop(&mut self) {
         // It may be gone, or somebody may have put something else there.
         let _ = self.remove();
-        // Still locked: whoever waits for it sees that it has gone, and makes a new one.
+        // The record is still locked. Another simulator that waits for the lock sees that it is
+        // gone, and makes a new one.
         let _ = unlinkat(&self.folder, &self.file_name, AtFlags::empty());
     }
 }
@@ -127,13 +129,13 @@ pub(crate) enum Holder {
     Foreign,
 }
 
-/// A file or link, told apart from another one that has come into its place.
+/// What tells a file or link apart from another one that has come into its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Identity {
     device: u64,
     inode: u64,
-    /// When it was made, in nanoseconds since 1970: file systems use inodes again. 0 where that is
-    /// not kept.
+    /// When it was made, in nanoseconds since 1970, because file systems reuse inodes. 0 where the
+    /// file system does not keep it.
     born_ns: u128,
 }
 
@@ -174,7 +176,7 @@ fn lock_record(folder: &File, name: &str) -> io::Result<Option<File>> {
             Err(TryLockError::WouldBlock) => return Ok(None),
             Err(TryLockError::Error(error)) => return Err(error),
         }
-        // Whoever had it may have taken it away between our opening and our locking.
+        // The simulator that had it may have removed it between our opening and our locking.
         let again = openat(
             folder,
             name,

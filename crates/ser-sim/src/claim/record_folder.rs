@@ -44,7 +44,7 @@ fn open_own(path: &Path) -> Result<File, FolderFault> {
     let folder = match openat(CWD, path, flags, Mode::empty()) {
         Ok(folder) => File::from(folder),
         Err(Errno::NOTDIR | Errno::LOOP) => return Err(FolderFault::NoFolder),
-        // Made by somebody else, for himself: the place itself has let us look for it.
+        // Somebody else made it for himself alone: the place itself has let us look for it.
         Err(Errno::ACCESS) => return Err(FolderFault::NotYours),
         Err(errno) => return Err(other(errno)),
     };
@@ -108,11 +108,11 @@ mod tests {
             [first, second].map(|place| place.join(&name).display().to_string());
         let no_records = NoRecords { name: "/tmp/ser".into(), tried };
         let hints: Vec<_> = no_records.hints().collect();
-        assert_eq!(hints, [format!("remove {wanted}, which is no folder")]);
+        assert_eq!(hints, [format!("remove {wanted}, which is not a folder")]);
         let told = SimError::NoRecords(no_records).to_string();
         let reason = "No such file or directory (os error 2)";
         let expected = format!(
-            "cannot note that /tmp/ser is in use: {wanted} is no folder; {fallback} cannot be \
+            "cannot note that /tmp/ser is in use: {wanted} is not a folder; {fallback} cannot be \
              used: {reason}"
         );
         assert_eq!(told, expected);

@@ -1,4 +1,4 @@
-//! Contacts that move: where their moves come from, and the player that makes them in time.
+//! Contacts that move: where their moves come from, and the player that makes them on time.
 
 mod breaker_trip;
 pub(crate) mod player;

@@ -1,4 +1,4 @@
-//! Which contacts move when: scenarios laid out on one time line, one after the other.
+//! Which contacts move when: scenarios laid out one after the other on one time line.
 
 use std::collections::VecDeque;
 
@@ -11,25 +11,25 @@ use crate::contacts::step::Step;
 /// How long a stream's scenario waits for its further lines when they did not come together with
 /// the first.
 ///
-/// Lines that a script writes one by one reach us one by one; without the wait all but the first
+/// Lines that a script writes one by one reach us one by one. Without the wait, all but the first
 /// would be late.
 pub const STREAM_LEAD_MS: u64 = 100;
 
-/// Contacts that moved together, and when the node can have seen it.
+/// Contacts that moved together, and when the recorder can have seen it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Played {
     /// When their scenario began, in milliseconds from power-up of the simulator.
     pub start_ms: u64,
-    /// When they were to move, from that beginning.
+    /// When they were to move, in milliseconds from that beginning.
     pub at_ms: u64,
     /// The contacts that moved.
     pub changed: Inputs,
     /// The contacts that were closed from then on.
     pub state: Inputs,
-    /// The latest sample that cannot have seen it, or the very sample that did: never later than
-    /// the stamp's tick.
+    /// The latest sample that cannot have seen the move, or the very sample that did. It is never
+    /// later than the stamp's tick.
     pub tick_before: u32,
-    /// The first sample known to have seen it: never earlier than the stamp's tick.
+    /// The first sample known to have seen the move. It is never earlier than the stamp's tick.
     pub tick_after: u32,
 }
 
@@ -63,7 +63,7 @@ pub(crate) struct Player {
     waiting: VecDeque<Waiting>,
     /// The first millisecond in which no scenario laid out so far moves anything.
     free_from_ms: u64,
-    /// The beginning of the stream's scenario, while that is not complete.
+    /// When the stream's scenario began, while that scenario is not complete.
     stream_start_ms: Option<u64>,
 }
 
@@ -85,8 +85,8 @@ impl Player {
         self.state
     }
 
-    /// Lays out a scenario from the next millisecond on, or after the ones before it. Says when it
-    /// begins.
+    /// Lays out a scenario from the next millisecond on, or after the scenarios before it. Returns
+    /// when it begins.
     pub(crate) fn play(&mut self, now_ms: u64, scenario: &Scenario) -> u64 {
         let start_ms = self.free_from_ms.max(now_ms + 1);
         for &step in scenario.steps() {
@@ -95,7 +95,7 @@ impl Player {
         start_ms
     }
 
-    /// Lays out what arrived together on a stream. Says by how much the latest step was late, if
+    /// Lays out what arrived together on a stream. Returns by how much the latest step was late, if
     /// one was.
     pub(crate) fn stream(&mut self, now_ms: u64, items: &[Item]) -> Option<u64> {
         let mut late_ms = None;
@@ -123,7 +123,7 @@ impl Player {
         self.free_from_ms
     }
 
-    /// Begins the next scenario not before this millisecond.
+    /// Lets the next scenario begin no earlier than this millisecond.
     pub(crate) fn reserve_until(&mut self, ms: u64) {
         self.free_from_ms = self.free_from_ms.max(ms);
     }
@@ -141,7 +141,7 @@ impl Player {
         due_ms
     }
 
-    /// What moves at `now_ms`, to be asked once for every opportunity to move contacts.
+    /// What moves at `now_ms`. To be asked once for every opportunity to move contacts.
     ///
     /// Contacts that are late move at the next opportunity, but never together with those of
     /// another millisecond.

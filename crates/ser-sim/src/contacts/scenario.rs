@@ -1,9 +1,9 @@
 //! A contact scenario: which field contact opens or closes at which millisecond.
 //!
 //! In a file it is CSV under the header `ms,input,state`: milliseconds from the start, input number
-//! from 1, and 1 for a contact that closes or 0 for one that opens. A file that is wrong anywhere
-//! is refused whole, with the line and the reason, because a typing error here would falsify the
-//! test that plays it.
+//! from 1, and 1 for a contact that closes or 0 for one that opens. A file with any error is
+//! refused as a whole, with the line and the reason, because a typing error would falsify the test
+//! that plays the file.
 
 use std::io::{ErrorKind, Read};
 
@@ -17,7 +17,7 @@ use crate::contacts::step::Step;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Scenario {
     steps: Vec<Step>,
-    /// The node of each step; empty when no nodes are named.
+    /// The node of each step. Empty when no nodes are named.
     nodes: Vec<u8>,
     names: Vec<(u8, &'static str)>,
 }
@@ -38,9 +38,9 @@ impl Scenario {
 
     /// Reads CSV. `name` is what errors call the file.
     ///
-    /// Line ends may be LF or CR LF, a byte order mark and spaces around fields are ignored, and so
-    /// are lines that start with `#` and empty lines at the end. Times may repeat but not decrease,
-    /// and an input may not be named twice in the same millisecond.
+    /// Line ends may be LF or CR LF. A byte order mark, spaces around fields, lines that start with
+    /// `#` and empty lines at the end are ignored. Times may repeat but not decrease, and an input
+    /// may not be named twice in the same millisecond.
     ///
     /// # Errors
     /// The first line that is wrong, or the failure to read.
@@ -52,8 +52,8 @@ impl Scenario {
         Scenario::read(ScenarioLines::new(name, model, Scenarios::One), reader)
     }
 
-    /// The same for several nodes on a bus, the first of which is meant where none is named: under
-    /// the header `ms,input,state,node` each line names one.
+    /// Reads CSV for several nodes on a bus. Each line names one under the header
+    /// `ms,input,state,node`. In a file without that column, the first node is meant.
     ///
     /// # Errors
     /// As for [`from_csv`](Self::from_csv).
@@ -96,7 +96,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// The steps of one node; those that name no node belong to the first one.
+    /// The steps of one node. Steps that name no node belong to the first one.
     #[must_use]
     pub fn for_node(&self, node: u8, is_first: bool) -> Scenario {
         let belongs = |index: usize| self.nodes.get(index).map_or(is_first, |&of| of == node);

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// The most steps that a file may hold: a mistyped path shall not fill the memory.
+/// The most steps that a file may hold. The limit keeps a mistyped path from filling the memory.
 pub const MAX_STEPS: usize = 1_000_000;
 
 /// Where a scenario is wrong and why.
@@ -21,22 +21,22 @@ pub struct ScenarioError {
 pub enum ScenarioFault {
     /// The first line is something else.
     NoHeader,
-    /// There are more or fewer than three fields.
+    /// The line has more or fewer than three fields.
     Columns(usize),
-    /// There are more or fewer than four fields where nodes are named.
+    /// The line has more or fewer than four fields where nodes are named.
     ColumnsOnBus(usize),
     /// Nodes are named and there is no bus.
     NoBus,
-    /// The node is no number.
+    /// The node is not a number.
     NotANode(String),
     /// There is no such node on the bus.
     NoSuchNode {
         /// The number given.
         node: u64,
     },
-    /// The time is no whole number of milliseconds, or is too large.
+    /// The time is not a whole number of milliseconds, or is too large.
     NotATime(String),
-    /// The input is no number.
+    /// The input is not a number.
     NotAnInput(String),
     /// The model has no such input.
     NoSuchInput {
@@ -54,14 +54,14 @@ pub enum ScenarioFault {
         /// The time of the line above.
         previous_ms: u64,
     },
-    /// The input has been given a state in this millisecond before.
+    /// The input already has a state in this millisecond.
     Twice {
         /// The input.
         input: u8,
         /// The millisecond.
         at_ms: u64,
     },
-    /// An empty line stands before the end: a file holds one scenario.
+    /// An empty line stands before the end, although a file holds only one scenario.
     EmptyLine,
     /// The line has more bytes than any step needs.
     LineTooLong,
@@ -100,21 +100,21 @@ impl fmt::Display for ScenarioFault {
             ScenarioFault::NoBus => {
                 write!(f, "only a Genius bus has nodes: leave the fourth column out")
             }
-            ScenarioFault::NotANode(text) => write!(f, "{text:?} is no node number"),
+            ScenarioFault::NotANode(text) => write!(f, "{text:?} is not a node number"),
             ScenarioFault::NoSuchNode { node } => write!(f, "there is no node {node} on the bus"),
             ScenarioFault::NotATime(text) => {
                 write!(
                     f,
-                    "{text:?} is no time: whole milliseconds from 0 to {} are needed",
+                    "{text:?} is not a time: whole milliseconds from 0 to {} are needed",
                     u32::MAX
                 )
             }
-            ScenarioFault::NotAnInput(text) => write!(f, "{text:?} is no input number"),
+            ScenarioFault::NotAnInput(text) => write!(f, "{text:?} is not an input number"),
             ScenarioFault::NoSuchInput { input, inputs } => {
                 write!(f, "there is no input {input}: this model has inputs 1 to {inputs}")
             }
             ScenarioFault::NotAState(text) => {
-                write!(f, "{text:?} is no state: 1 (closed) or 0 (open) is needed")
+                write!(f, "{text:?} is not a state: 1 (closed) or 0 (open) is needed")
             }
             ScenarioFault::TimeDecreases { at_ms, previous_ms } => {
                 write!(f, "{at_ms} ms comes after {previous_ms} ms: times must not decrease")

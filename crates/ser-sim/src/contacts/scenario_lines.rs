@@ -1,7 +1,7 @@
 //! The lines of contact scenarios, taken from bytes as they come.
 //!
 //! A file holds one scenario. A stream holds any number: an empty line ends one, and the next
-//! starts its milliseconds afresh.
+//! counts its milliseconds from zero again.
 
 use std::collections::BTreeMap;
 use std::mem;
@@ -11,7 +11,7 @@ use ser_proto::Model;
 use crate::contacts::scenario_error::{ScenarioError, ScenarioFault};
 use crate::contacts::step::Step;
 
-/// No step comes near this; a longer line is some other file.
+/// No step comes near this length. A longer line is from some other kind of file.
 const MAX_LINE_LEN: usize = 1024;
 
 const HEADER: [&str; 3] = ["ms", "input", "state"];
@@ -39,7 +39,7 @@ pub(crate) struct ScenarioLines {
     name: String,
     model: Model,
     scenarios: Scenarios,
-    /// The nodes on the bus, if there is one.
+    /// The nodes on the bus. Empty when there is no bus.
     nodes: Vec<(u8, Model)>,
     /// Whether the header has a column for the node.
     names_nodes: bool,
@@ -288,7 +288,7 @@ mod tests {
                 "ms,input,state,node\n0,1,1\n",
                 "line 2: 3 fields where four are needed (ms,input,state,node)",
             ),
-            ("ms,input,state,node\n0,1,1,x\n", "line 2: \"x\" is no node number"),
+            ("ms,input,state,node\n0,1,1,x\n", "line 2: \"x\" is not a node number"),
             ("ms,input,state,node\n0,1,1,6\n", "line 2: there is no node 6 on the bus"),
             (
                 "ms,input,state,node\n0,17,1,5\n",
@@ -322,13 +322,13 @@ mod tests {
             ),
             (
                 "ms,input,state\n1.5,1,1\n",
-                "\"1.5\" is no time: whole milliseconds from 0 to 4294967295 are",
+                "\"1.5\" is not a time: whole milliseconds from 0 to 4294967295 are",
             ),
-            ("ms,input,state\n-1,1,1\n", "line 2: \"-1\" is no time"),
-            ("ms,input,state\n+1,1,1\n", "line 2: \"+1\" is no time"),
-            ("ms,input,state\n,1,1\n", "line 2: \"\" is no time"),
-            ("ms,input,state\n4294967296,1,1\n", "line 2: \"4294967296\" is no time"),
-            ("ms,input,state\n0,a,1\n", "line 2: \"a\" is no input number"),
+            ("ms,input,state\n-1,1,1\n", "line 2: \"-1\" is not a time"),
+            ("ms,input,state\n+1,1,1\n", "line 2: \"+1\" is not a time"),
+            ("ms,input,state\n,1,1\n", "line 2: \"\" is not a time"),
+            ("ms,input,state\n4294967296,1,1\n", "line 2: \"4294967296\" is not a time"),
+            ("ms,input,state\n0,a,1\n", "line 2: \"a\" is not an input number"),
             (
                 "ms,input,state\n0,0,1\n",
                 "line 2: there is no input 0: this model has inputs 1 to 16",
@@ -340,9 +340,9 @@ mod tests {
             ("ms,input,state\n0,257,1\n", "line 2: there is no input 257"),
             (
                 "ms,input,state\n0,1,2\n",
-                "line 2: \"2\" is no state: 1 (closed) or 0 (open) is needed",
+                "line 2: \"2\" is not a state: 1 (closed) or 0 (open) is needed",
             ),
-            ("ms,input,state\n0,1,on\n", "line 2: \"on\" is no state"),
+            ("ms,input,state\n0,1,on\n", "line 2: \"on\" is not a state"),
             (
                 "ms,input,state\n9,1,1\n8,2,1\n",
                 "line 3: 8 ms comes after 9 ms: times must not decrease",
@@ -375,7 +375,7 @@ mod tests {
         assert_eq!(error.reason, ScenarioFault::LineTooLong);
     }
 
-    /// Steps for ever.
+    /// A source of steps without end.
     struct Endless(u32);
 
     impl std::io::Read for Endless {
@@ -412,7 +412,7 @@ mod tests {
     fn a_header_inside_a_scenario_is_refused() {
         assert!(
             refusal("ms,input,state\n0,1,1\nms,input,state\n")
-                .contains("line 3: \"ms\" is no time")
+                .contains("line 3: \"ms\" is not a time")
         );
     }
 

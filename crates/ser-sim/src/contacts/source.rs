@@ -14,21 +14,21 @@ use crate::contacts::scenario_error::{ScenarioError, ScenarioFault};
 use crate::contacts::scenario_lines::{Item, ScenarioLines, Scenarios};
 use crate::error::SimError;
 
-/// What moves the contacts of a simulated node from its start on.
+/// What moves the contacts of a simulated recorder from its start on.
 #[derive(Default)]
 pub enum Contacts {
     /// Nothing; scenarios may be played later.
     #[default]
     None,
-    /// A scenario, as soon as the node answers.
+    /// A scenario, played as soon as the recorder answers.
     Scenario(Scenario),
-    /// Scenarios that arrive while the node runs, with an empty line after each. Milliseconds count
-    /// from the arrival of the scenario's first line, or from the end of the scenario before if
-    /// that is later.
+    /// Scenarios that arrive while the recorder runs, with an empty line after each. Milliseconds
+    /// count from the arrival of the scenario's first line, or from the end of the scenario before
+    /// if that is later.
     Stream {
         /// What errors call the source.
         name: String,
-        /// The source. Reading may block; a thread of its own waits for it.
+        /// The source. Reading may block, because a thread of its own does it.
         source: Box<dyn Read + Send>,
     },
 }
@@ -38,8 +38,8 @@ impl Contacts {
     /// one scenario.
     ///
     /// # Errors
-    /// When the file cannot be opened or is wrong. What is wrong on standard input shows as it
-    /// arrives.
+    /// When the file cannot be opened or is wrong. An error on standard input shows only when the
+    /// line arrives.
     pub fn from_path(path: &Path, model: Model) -> Result<Contacts, SimError> {
         if path == Path::new("-") {
             return Ok(Contacts::Stream {
@@ -54,7 +54,7 @@ impl Contacts {
 }
 
 impl Contacts {
-    /// The same for several nodes on a bus, which may be named in a fourth column.
+    /// Contacts from a path for several nodes on a bus, which may be named in a fourth column.
     ///
     /// # Errors
     /// As for [`from_path`](Self::from_path).
@@ -81,15 +81,15 @@ impl fmt::Debug for Contacts {
     }
 }
 
-/// What one read from a stream brought: lines that were written together stay together, so they all
-/// keep their milliseconds however long it takes until they are looked at.
+/// What one read from a stream brought. Lines that were written together stay together, so they
+/// keep their milliseconds however late they are looked at.
 pub(crate) type Arrived = Result<Vec<Item>, ScenarioError>;
 
 /// How many reads from a stream may wait to be taken.
 const MAX_ARRIVED: usize = 4;
 
-/// Reads a stream in a thread of its own, as fast as what it brings is taken. The channel closes at
-/// the end of the stream and after an error.
+/// Reads a stream in a thread of its own, as fast as its lines are taken. The channel closes at the
+/// end of the stream and after an error.
 pub(crate) fn read_stream(
     name: &str,
     source: Box<dyn Read + Send>,
@@ -98,7 +98,7 @@ pub(crate) fn read_stream(
 ) -> Receiver<Arrived> {
     let (sender, receiver) = sync_channel(MAX_ARRIVED);
     let lines = ScenarioLines::new(name, model, Scenarios::Many).on_bus(nodes);
-    // Nobody waits for this thread: a read from a terminal cannot be cut short.
+    // Nobody waits for this thread, because a read from a terminal cannot be cut short.
     thread::spawn(move || forward(lines, source, &sender));
     receiver
 }

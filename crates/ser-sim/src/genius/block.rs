@@ -36,7 +36,7 @@ impl Circuits {
     }
 }
 
-/// A block of discrete circuits. It takes no datagram above 16 bytes.
+/// A block of discrete circuits. It takes no datagram of more than 16 bytes.
 pub struct DiscreteBlock {
     station: Station,
     circuits: Circuits,
@@ -61,14 +61,14 @@ impl DiscreteBlock {
         outputs.resize(len(matches!(kind, BlockKind::Outputs | BlockKind::Combination)), 0);
     }
 
-    /// What the field side of the inputs is; circuit 1 is bit 0.
+    /// Sets what the field side of the inputs is. Circuit 1 is bit 0.
     pub fn set_inputs(&mut self, inputs: u32) {
         let len = self.station.inputs.len();
         self.station.inputs.copy_from_slice(&inputs.to_le_bytes()[..len]);
     }
 
-    /// What the block puts out; circuit 1 is bit 0. All off when no controller has sent outputs for
-    /// three scans.
+    /// What the block puts out. Circuit 1 is bit 0. All outputs are off when no controller has sent
+    /// outputs for three scans.
     #[must_use]
     pub fn outputs(&self) -> u32 {
         self.station.outputs.iter().rev().fold(0, |outputs, &byte| outputs << 8 | u32::from(byte))
@@ -79,7 +79,7 @@ impl DiscreteBlock {
         self.station.controllers()
     }
 
-    /// Configures its circuits anew, as one would from a hand-held monitor.
+    /// Reconfigures its circuits, as one would from a hand-held monitor.
     pub fn configure(&mut self, kind: BlockKind, reference: u16) {
         self.station.kind = kind;
         self.station.reference = reference;

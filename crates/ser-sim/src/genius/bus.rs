@@ -9,7 +9,7 @@ use super::device_id::DeviceId;
 use super::faults::{Accidents, Fault, Noise};
 use super::scan_time::{BusTiming, MIN_SCAN_NS};
 
-/// Device numbers are 0 to 31.
+/// How many bus addresses there are: 0 to 31.
 pub const ADDRESSES: u8 = 32;
 
 /// A device on a bus whose type is known.
@@ -53,9 +53,9 @@ pub struct Traffic {
 
 /// A bus and what is connected to it.
 ///
-/// A *bus scan* here is the token's way from the lowest device number round to the lowest again; in
-/// it there is room for one datagram of normal priority. Devices with low numbers thus have the
-/// first chance.
+/// A *bus scan* here is the token's way from the lowest bus address round to the lowest again. A
+/// scan has room for one datagram of normal priority, so devices with low addresses have the first
+/// chance.
 pub struct Bus {
     rate: BusTiming,
     now_us: u64,
@@ -78,9 +78,9 @@ struct Connected {
 enum Token {
     /// Nobody is on the bus.
     Idle,
-    /// The turn of this device number, or of the next one in use, begins.
+    /// The turn of this bus address, or of the next one in use, begins.
     Next { address: u8, at_ns: u64 },
-    /// A turn is being taken, by several devices when their numbers are the same.
+    /// A turn is being taken, by several devices when their bus addresses are the same.
     Taken { address: u8, talkers: Vec<usize>, messages: Vec<Message>, until_ns: u64 },
 }
 
@@ -124,17 +124,17 @@ impl Bus {
     /// A device.
     ///
     /// # Panics
-    /// When the handle is another bus's.
+    /// When the handle is from another bus.
     #[must_use]
     pub fn get<T: Device>(&self, handle: Handle<T>) -> &T {
         let device: &dyn Any = &*self.connected[handle.id.0].device;
         device.downcast_ref().expect("the handle came from this bus")
     }
 
-    /// A device, to do something to it: what follows from that happens when time passes.
+    /// A device, to do something to it. The consequences come when time passes.
     ///
     /// # Panics
-    /// When the handle is another bus's.
+    /// When the handle is from another bus.
     pub fn get_mut<T: Device>(&mut self, handle: Handle<T>) -> &mut T {
         let device: &mut dyn Any = &mut *self.connected[handle.id.0].device;
         device.downcast_mut().expect("the handle came from this bus")
@@ -220,7 +220,7 @@ impl Bus {
         self.advance_to(self.now_us.saturating_add(us));
     }
 
-    /// Lets time pass, event by event, until the condition holds; says whether it did within
+    /// Lets time pass, event by event, until the condition holds. Returns whether it did within
     /// `limit_us`.
     pub fn advance_until(
         &mut self,
@@ -240,7 +240,7 @@ impl Bus {
         }
     }
 
-    /// Everything that is due at `now_us`.
+    /// Does everything that is due at `now_us`.
     fn pass(&mut self, now_us: u64) {
         self.now_us = now_us;
         while let Some(entry) = self.scheduled.first_entry().filter(|entry| *entry.key() <= now_us)
@@ -345,8 +345,8 @@ impl Bus {
             }
             return;
         };
-        // Who was cut off, or stopped, in the middle of its turn has said nothing that anyone can
-        // read.
+        // A device that was cut off, or stopped, in the middle of its turn has said nothing that
+        // anyone can read.
         let address = self.address_of(talker);
         let arrived: Vec<bool> = messages
             .iter()
@@ -359,7 +359,7 @@ impl Bus {
         self.connected[talker].device.end_turn(now_us, messages, &arrived);
     }
 
-    /// Lets everyone but the talker hear a message, which is damaged when it comes from no address.
+    /// Lets everyone except the talker hear a message. A message from no address is damaged.
     fn deliver(&mut self, talker: usize, from: Option<u8>, message: &Message) -> bool {
         let mut acknowledged = message.to().is_none();
         for index in 0..self.connected.len() {
@@ -392,7 +392,7 @@ impl Bus {
             .min()
     }
 
-    /// The number on which a device takes turns; none when it cannot be heard.
+    /// The bus address on which a device takes turns; `None` when it cannot be heard.
     fn address_of(&self, index: usize) -> Option<u8> {
         let connected = &self.connected[index];
         let heard =

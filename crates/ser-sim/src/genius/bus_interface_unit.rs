@@ -1,5 +1,5 @@
-//! A bus interface unit (BIU): a station of modules behind one device number, some of whose points
-//! may be forced.
+//! A bus interface unit (BIU): a station of modules behind one bus address. Some of its points may
+//! be forced.
 
 use super::datagram::{Datagram, subfunction};
 use super::device::{Device, Message};
@@ -27,7 +27,7 @@ impl StationData {
         self.discrete_bytes + 2 * self.channels
     }
 
-    /// Whether there is none.
+    /// Whether there is no data.
     #[must_use]
     pub fn is_empty(self) -> bool {
         self.len() == 0
@@ -54,7 +54,7 @@ impl Forces {
         Forces { enabled: vec![0; len], values: vec![0; len] }
     }
 
-    /// What the points are when these are their natural values.
+    /// The values of the points, given their natural values.
     fn applied_to(&self, natural: &[u8]) -> Vec<u8> {
         let masks = self.enabled.iter().zip(&self.values);
         natural
@@ -75,7 +75,7 @@ pub struct BusInterfaceUnit {
 }
 
 impl BusInterfaceUnit {
-    /// A unit with nothing forced; at most 128 bytes each way.
+    /// A unit with nothing forced. It has at most 128 bytes each way.
     ///
     /// # Panics
     /// When there is more data than that.
@@ -103,7 +103,7 @@ impl BusInterfaceUnit {
         BusInterfaceUnit { station, inputs, outputs, input_forces, output_forces }
     }
 
-    /// Plugs in other modules: nothing is forced any more, and the controllers are told.
+    /// Plugs in other modules. Nothing is forced any more, and the controllers are told.
     ///
     /// # Panics
     /// When there is more data than 128 bytes each way.
@@ -115,7 +115,7 @@ impl BusInterfaceUnit {
         *self = unit;
     }
 
-    /// What the field side of the inputs is, from the first byte on.
+    /// Sets what the field side of the inputs is, from the first byte on.
     pub fn set_inputs(&mut self, inputs: &[u8]) {
         let len = inputs.len().min(self.station.inputs.len());
         self.station.inputs[..len].copy_from_slice(&inputs[..len]);
@@ -127,8 +127,8 @@ impl BusInterfaceUnit {
         self.output_forces.applied_to(&self.station.outputs)
     }
 
-    /// Forces a discrete point, numbered from 0, or lets it go. A point that does not exist is left
-    /// alone.
+    /// Forces a discrete point, numbered from 0, or lets it go. A point that does not exist is
+    /// ignored.
     pub fn force_point(&mut self, side: Side, point: usize, force: Option<bool>) {
         let (data, forces) = self.side(side);
         if point < 8 * data.discrete_bytes {
@@ -139,7 +139,7 @@ impl BusInterfaceUnit {
     }
 
     /// Forces an analog channel, numbered from 0, or lets it go. A channel that does not exist is
-    /// left alone.
+    /// ignored.
     pub fn force_channel(&mut self, side: Side, channel: usize, force: Option<u16>) {
         let (data, forces) = self.side(side);
         if channel < data.channels {
@@ -166,7 +166,7 @@ fn set_bit(byte: &mut u8, bit: u8, on: bool) {
     *byte = if on { *byte | bit } else { *byte & !bit };
 }
 
-/// The answer to a Read I/O Forces: the table that was asked for, after its number.
+/// The answer to a Read I/O Forces: the number of the requested table, then the table.
 fn read_forces(inputs: &Forces, outputs: &Forces, datagram: &Datagram) -> Option<Datagram> {
     if !datagram.is(subfunction::READ_IO_FORCES) {
         return None;

@@ -1,4 +1,4 @@
-//! Datagrams and the few of them that boards and blocks deal with themselves.
+//! Datagrams, and the few of them that boards and blocks handle themselves.
 
 use ser_proto::genius::{FUNCTION_GENIUS, HIGHEST_FUNCTION};
 
@@ -6,9 +6,9 @@ use ser_proto::genius::{FUNCTION_GENIUS, HIGHEST_FUNCTION};
 pub const STANDARD: u8 = FUNCTION_GENIUS;
 /// A GENI refuses to send function codes above this one.
 pub const MAX_FUNCTION: u8 = HIGHEST_FUNCTION;
-/// The most data a datagram carries; 128 bytes and, for memory accesses, a header.
+/// The most data a datagram carries: 128 bytes and, for memory accesses, a header.
 pub const MAX_DATAGRAM_LEN: usize = 134;
-/// The device number that means all of them.
+/// The bus address that means all devices.
 pub const BROADCAST: u8 = 255;
 
 /// Subfunction codes of standard datagrams.
@@ -27,7 +27,7 @@ pub mod subfunction {
     pub const READ_DEVICE_REPLY: u8 = Subfunction::ReadDeviceReply.code();
     /// Writes a host's memory.
     pub const WRITE_DEVICE: u8 = Subfunction::WriteDevice.code();
-    /// A device was configured anew.
+    /// Says that a device was reconfigured.
     pub const CONFIGURATION_CHANGE: u8 = Subfunction::ConfigurationChange.code();
     /// Which points of a bus interface unit are forced?
     pub const READ_IO_FORCES: u8 = Subfunction::ReadIoForces.code();
@@ -60,10 +60,10 @@ impl Datagram {
     }
 }
 
-/// Whether a datagram waits until the scan's turn for one is free.
+/// Whether a datagram waits until the scan's one place for a datagram is free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MessagePriority {
-    /// One in each scan, from all devices together.
+    /// One in each scan, shared by all devices.
     Normal,
     /// On the sender's own turn, whatever else was sent in the scan.
     High,

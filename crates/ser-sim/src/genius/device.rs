@@ -1,4 +1,4 @@
-//! What the bus asks of whatever is connected to it.
+//! What the bus asks of the devices that are connected to it.
 
 use std::any::Any;
 
@@ -10,7 +10,7 @@ use super::scan_time::BusTiming;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Message {
     /// Inputs of a block, or global data of a controller, to everyone. Every turn ends with it,
-    /// even if it is empty: it passes the token, and shows that the device is there.
+    /// even if it is empty: it passes the token and shows that the device is there.
     Control(Vec<u8>),
     /// Outputs for a block, or directed control data for a controller.
     Directed {
@@ -19,7 +19,7 @@ pub enum Message {
         /// The outputs.
         data: Vec<u8>,
     },
-    /// The receiver shall report faults to the sender from now on.
+    /// Tells the receiver to report faults to the sender from now on.
     AssignController {
         /// The device.
         to: u8,
@@ -66,7 +66,7 @@ impl Message {
 
 /// A device on the bus, driven by [`Bus`](super::Bus).
 pub trait Device: Any + Send {
-    /// The device number on which it takes turns; `None` while it is silent.
+    /// The bus address on which it takes turns; `None` while it is silent.
     fn address(&self) -> Option<u8>;
 
     /// The speed it is set to.
@@ -77,18 +77,18 @@ pub trait Device: Any + Send {
         self.advance_to(now_us);
     }
 
-    /// When it next has something to do of its own accord.
+    /// When it next has something to do by itself.
     fn next_due_us(&self) -> Option<u64>;
 
-    /// Lets time pass; does what was due meanwhile, and what is due now.
+    /// Lets time pass. Does what was due meanwhile, and what is due now.
     fn advance_to(&mut self, now_us: u64);
 
-    /// Its turn: what it says, ending with [`Message::Control`]. `background_free` says whether
-    /// nobody has sent a datagram in this scan.
+    /// Takes its turn: returns what it says, ending with [`Message::Control`]. `background_free`
+    /// says that nobody has sent a datagram in this scan yet.
     fn take_turn(&mut self, now_us: u64, background_free: bool) -> Vec<Message>;
 
-    /// The turn is over; `arrived` says for each message whether its receiver acknowledged it, and
-    /// is true for those to all.
+    /// The turn is over. `arrived` says for each message whether its receiver acknowledged it. It
+    /// is true for messages to all.
     fn end_turn(&mut self, now_us: u64, messages: &[Message], arrived: &[bool]);
 
     /// Another device took its turn at the same time.
@@ -96,12 +96,12 @@ pub trait Device: Any + Send {
         self.count_bus_error(now_us);
     }
 
-    /// A message on the bus, to anyone. Says whether it is acknowledged.
+    /// Hears a message on the bus, to anyone. Returns whether it acknowledges the message.
     fn receive(&mut self, now_us: u64, from: u8, message: &Message) -> bool;
 
     /// A message came damaged, or not at all.
     fn count_bus_error(&mut self, _now_us: u64) {}
 
-    /// Something goes wrong with it. What cannot happen to a device does not.
+    /// Something goes wrong with it. A fault that cannot happen to this kind of device is ignored.
     fn suffer(&mut self, _now_us: u64, _fault: DeviceFault) {}
 }

@@ -1,4 +1,4 @@
-//! What goes wrong, at random or when told: always the same way for the same seed.
+//! What goes wrong, at random or when told. The same seed always gives the same accidents.
 
 use super::device_id::DeviceId;
 use oorandom::Rand64;
@@ -10,9 +10,9 @@ pub struct Noise {
     pub seed: u64,
     /// Messages that nobody can read: a bus error to everyone.
     pub damaged_ppm: u32,
-    /// Messages that one receiver, each for itself, cannot read: a bus error to that one.
+    /// Messages that a receiver cannot read, drawn for each receiver separately: a bus error to it.
     pub lost_ppm: u32,
-    /// Messages that arrive while the sender does not hear of it.
+    /// Messages that arrive although the sender gets no acknowledgement.
     pub unacknowledged_ppm: u32,
 }
 
@@ -50,7 +50,7 @@ pub enum Fault {
 /// Something that goes wrong inside a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DeviceFault {
-    /// A self-test during operation finds these faults (bits of the hardware status byte); the
+    /// A self-test during operation finds these faults (bits of the hardware status byte). The
     /// board stops.
     FailSelfTest(u8),
     /// The self-test at the next reset, and only that one, finds these faults.
@@ -59,7 +59,7 @@ pub enum DeviceFault {
     Hang,
     /// The processor starts from the beginning.
     Reset,
-    /// Everything the host asks for takes this much longer from now on.
+    /// From now on everything that the host asks for takes this much longer.
     AnswerLate {
         /// How much longer.
         by_us: u64,
@@ -69,7 +69,7 @@ pub enum DeviceFault {
         /// How many of them.
         datagrams: u32,
     },
-    /// Someone turned the switches for the device number.
+    /// Someone turned the switches for the bus address.
     ChangeAddress(u8),
 }
 

@@ -35,7 +35,7 @@ pub struct Identity {
     pub input_len: u8,
     /// Bytes it expects to be sent in each scan.
     pub output_len: u8,
-    /// Which way its circuits work.
+    /// The direction of its circuits.
     pub kind: BlockKind,
     /// Whether a circuit is forced.
     pub forced: bool,
@@ -78,7 +78,7 @@ impl Identity {
         ]
     }
 
-    /// Understands a reply; `None` when it is too short.
+    /// Reads a reply; `None` when it is too short.
     #[must_use]
     pub fn parse(data: &[u8]) -> Option<Identity> {
         let data: &[u8; IDENTITY_LEN] = data.first_chunk()?;

@@ -5,7 +5,7 @@ pub const RAM_LEN: usize = 0x4000;
 
 /// Buffers of the request queue.
 pub(super) const REQUESTS: usize = 16;
-/// A request's header and its 128 bytes of data; 16 of these fill the queue's 2176 bytes exactly.
+/// A request's header and its 128 bytes of data. Exactly 16 of these fill the queue's 2176 bytes.
 pub(super) const REQUEST_LEN: usize = 136;
 
 pub(super) const REQUEST_QUEUE: usize = 0x0000;
@@ -48,7 +48,7 @@ pub(super) const RESERVED: usize = 0x0A4A;
 
 pub(super) const DEVICES: usize = 0x1E00;
 pub(super) const DEVICE_LEN: usize = 8;
-// Within a device's entry:
+// Offsets within a device table entry:
 pub(super) const DEVICE_MODEL: usize = 0;
 pub(super) const DEVICE_OUTPUTS: usize = 1;
 pub(super) const DEVICE_PRESENT: usize = 2;
@@ -64,7 +64,7 @@ pub(super) const IO_TABLES: usize = 0x2000;
 /// The most bytes a device sends or takes as control data.
 pub(super) const MAX_CONTROL_LEN: usize = 128;
 
-/// The entry of a device in the device configuration table.
+/// The entry of a device in the device table.
 pub(super) fn device(address: u8) -> usize {
     DEVICES + DEVICE_LEN * usize::from(address)
 }

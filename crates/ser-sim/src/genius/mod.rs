@@ -2,9 +2,9 @@
 //! time.
 //!
 //! A [`Bus`] knows no time but the one it is told with [`Bus::advance_to`], and says with
-//! [`Bus::next_due_us`] when something happens next. What is connected to it implements [`Device`]:
-//! [`Board`]s, [`DiscreteBlock`]s and [`BusInterfaceUnit`]s. A host works with its board through
-//! the shared RAM alone:
+//! [`Bus::next_due_us`] when something happens next. The things connected to it implement
+//! [`Device`]: [`Board`]s, [`DiscreteBlock`]s and [`BusInterfaceUnit`]s. A host works with its
+//! board through the shared RAM alone:
 //!
 //! ```
 //! use ser_sim::genius::{Board, BoardOptions, Bus, BusTiming};
@@ -16,9 +16,9 @@
 //! assert_eq!(bus.get_mut(board).host_read(0x0893), 1);
 //! ```
 //!
-//! The manual meant throughout is that of the GENI board, GFK-0073. Nothing in here shares code
-//! with the driver for the board, so that a misreading on one side shows on the other;
-//! [`BoardWindow`] lets the driver reach the board's shared RAM.
+//! "The manual" means the GENI board's manual, GFK-0073, throughout. Nothing in here shares code
+//! with the driver for the board, so a misreading on one side shows on the other. [`BoardWindow`]
+//! lets the driver reach the board's shared RAM.
 
 mod block;
 mod board;

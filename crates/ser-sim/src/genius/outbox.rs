@@ -5,11 +5,11 @@ use std::collections::VecDeque;
 use super::datagram::MessagePriority;
 use super::device::Message;
 
-/// What a device has to say besides its control data. `T` tells the owner why it said it.
+/// What a device has to say besides its control data. `T` tells the owner why the message was sent.
 #[derive(Clone, Debug)]
 pub(super) struct Outbox<T> {
     waiting: VecDeque<(MessagePriority, Message, T)>,
-    /// The one that is being sent in the present turn.
+    /// The reason for the message that goes out in the present turn.
     sending: Option<T>,
 }
 
@@ -28,8 +28,8 @@ impl<T> Outbox<T> {
         self.waiting.len()
     }
 
-    /// The message for this turn: at most one, and one of normal priority only when the scan has
-    /// had none.
+    /// The message for this turn: at most one. One of normal priority is sent only when the scan
+    /// has had none yet.
     pub(super) fn take(&mut self, background_free: bool) -> Option<Message> {
         let high =
             self.waiting.iter().position(|(priority, ..)| *priority == MessagePriority::High);
@@ -39,7 +39,7 @@ impl<T> Outbox<T> {
         Some(message)
     }
 
-    /// Why the message of this turn was sent, when there was one.
+    /// Why the message of this turn was sent, if there was one.
     pub(super) fn sent(&mut self) -> Option<T> {
         self.sending.take()
     }

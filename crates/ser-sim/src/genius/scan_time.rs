@@ -17,15 +17,15 @@ pub enum BusTiming {
     K38,
 }
 
-/// No scan is shorter: bus controllers wait for the rest of it.
+/// The shortest scan. Bus controllers wait for the rest of it.
 pub const MIN_SCAN_NS: u64 = 3_000_000;
 
-/// Control characters, addresses and check characters around a datagram's data. Not published; it
-/// only matters for how long a scan with a datagram takes.
+/// Control characters, addresses and check characters around a datagram's data. The number is not
+/// published. It only matters for how long a scan with a datagram takes.
 const DATAGRAM_CHARACTERS: u64 = 9;
 
 impl BusTiming {
-    /// All of them.
+    /// All four speeds.
     pub const ALL: [BusTiming; 4] =
         [BusTiming::K153Extended, BusTiming::K153Standard, BusTiming::K76, BusTiming::K38];
 
@@ -40,7 +40,7 @@ impl BusTiming {
         }
     }
 
-    /// The same two bits, in place.
+    /// The two DIP switch bits of this rate, in place.
     #[must_use]
     pub fn dip_switches(self) -> u8 {
         match self {
@@ -83,7 +83,7 @@ impl BusTiming {
         }
     }
 
-    /// How long everyone waits for a device number that is not in use.
+    /// How long everyone waits for a bus address that is not in use.
     #[must_use]
     pub fn skip_ns(self) -> u64 {
         match self {

@@ -9,7 +9,7 @@ use super::identity::{BlockKind, Identity};
 use super::outbox::Outbox;
 use super::scan_time::BusTiming;
 
-/// Without outputs for so many scans a device falls back to its default outputs.
+/// After this many scans without outputs a device falls back to its default outputs.
 const SILENT_SCANS: u8 = 3;
 
 pub(super) struct Station {
@@ -68,7 +68,7 @@ impl Station {
         self.controllers.clone_from(&other.controllers);
     }
 
-    /// Its turn, with these inputs.
+    /// Takes its turn, with these inputs.
     pub(super) fn take_turn(&mut self, background_free: bool, inputs: Vec<u8>) -> Vec<Message> {
         self.silent_scans = self.silent_scans.saturating_add(1);
         if self.silent_scans > SILENT_SCANS {
@@ -82,7 +82,7 @@ impl Station {
         self.outbox.sent();
     }
 
-    /// A message; `answer` knows the datagrams that only this kind of device answers.
+    /// Hears a message. `answer` knows the datagrams that only this kind of device answers.
     pub(super) fn receive(
         &mut self,
         from: u8,
@@ -120,10 +120,10 @@ impl Station {
         true
     }
 
-    /// Tells its controllers that it was configured anew.
+    /// Tells its controllers that it was reconfigured.
     ///
-    /// The content of that datagram is not published; the device says what it would say to a Read
-    /// ID.
+    /// The content of that datagram is not published. Here the device says what it would say to a
+    /// Read ID.
     pub(super) fn report_configuration(&mut self, forced: bool) {
         let identity = self.identity(forced).to_bytes();
         for to in self.controllers.clone() {

@@ -1,5 +1,5 @@
-//! The model against the manual's chapters, one file each: every test is a host that does what the
-//! chapter says and looks at the shared RAM for what the chapter promises.
+//! The model against the manual's chapters, one file each. Every test is a host that does what the
+//! chapter says, and checks in the shared RAM what the chapter promises.
 
 mod bus;
 mod ch03_log_in;

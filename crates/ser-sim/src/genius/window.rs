@@ -1,4 +1,4 @@
-//! The shared RAM of a board on a bus, as the driver for the board wants to see it.
+//! The shared RAM of a board on a bus, in the form that the driver for the board expects.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -11,8 +11,8 @@ use super::bus::{Bus, Handle};
 
 /// The tick, in milliseconds, that an interrupt reads in this microsecond.
 ///
-/// It is that of the latest sample, as in the firmware, and not of the next: a sample is taken at
-/// the beginning of its millisecond, so all samples with a later tick were taken later.
+/// As in the firmware, it is the tick of the latest sample, and not of the next. A sample is taken
+/// at the beginning of its millisecond, so all samples with a later tick were taken later.
 #[must_use]
 pub const fn tick_ms(at_us: u64) -> u64 {
     at_us / 1000
@@ -32,7 +32,7 @@ impl BoardWindow {
         BoardWindow { bus, board }
     }
 
-    /// The board itself, to look at it without being its host.
+    /// Looks at the board itself, without being its host.
     pub fn look<T>(&self, look: impl FnOnce(&Board) -> T) -> T {
         look(self.bus.borrow().get(self.board))
     }

@@ -21,10 +21,10 @@ use crate::machine::sim_node::SimNode;
 /// How soon the host's board sees what the host has written.
 const PATIENCE: Duration = Duration::from_millis(1);
 
-/// After that a host may as well see for itself who is on the bus.
+/// How long the bus may take to come up. After that a host can see for itself who is on the bus.
 const LOG_IN_PATIENCE: Duration = Duration::from_secs(60);
 
-/// How often it is looked whether all are logged in.
+/// How often the bus checks whether all recorders are logged in.
 const LOOK_EVERY_MS: u32 = 50;
 
 /// The bus while its recorders are under power. The first of them has the serial line.
@@ -35,12 +35,12 @@ pub(crate) struct BusMachine<'a> {
     pub(super) window: &'a mut HostWindow,
     pub(super) pace: &'a mut Pace,
     pub(super) now_ms: &'a mut u64,
-    /// Where the stream's scenario begins, while that is not complete.
+    /// Where the stream's scenario begins, while that scenario is not complete.
     pub(super) stream_start_ms: Option<u64>,
 }
 
 impl<'a> BusMachine<'a> {
-    /// Returns when the host's board has logged all recorders in, or should have. False when it was
+    /// Returns when the host's board has logged in all recorders, or should have. False when it was
     /// cut short.
     pub(crate) fn come_up(&mut self, stop: &AtomicBool) -> Result<bool, SimError> {
         let cut_short = if self.built_in_nodes().count() == self.recorders.len() {
@@ -57,8 +57,8 @@ impl<'a> BusMachine<'a> {
         Ok(true)
     }
 
-    /// Lets time run ahead of real time, so that nobody has to wait for self-tests, and for boards
-    /// that ask each other who they are. True when it was cut short.
+    /// Lets time run ahead of real time, to skip the self-tests and the boards' first questions to
+    /// each other. True when it was cut short.
     fn run_ahead(&mut self, stop: &AtomicBool) -> bool {
         let until = Instant::now() + LOG_IN_PATIENCE;
         while !self.all_logged_in() && Instant::now() < until {
@@ -70,7 +70,8 @@ impl<'a> BusMachine<'a> {
         false
     }
 
-    /// An emulated processor has no time but the real one. True when it was cut short.
+    /// Waits for the image, because an emulated processor runs in real time only. True when it was
+    /// cut short.
     fn wait_for_image(&mut self, stop: &AtomicBool) -> Result<bool, SimError> {
         self.keep_pace(Pace::from(Instant::now(), *self.now_ms));
         let mut log_in_by = None;
@@ -101,8 +102,8 @@ impl<'a> BusMachine<'a> {
         }
     }
 
-    /// What ran ahead are also the recorders' clocks: they are set, as one would do it on their
-    /// serial lines.
+    /// Sets the recorders' clocks, which ran ahead as well, as one would do it on their serial
+    /// lines.
     fn set_clocks(&mut self) {
         let Ok(now) = TimeStamp::try_from(Local::now().naive_local()) else { return };
         let command: Vec<u8> = FrameEncoder::new(Command::SetClock(now).to_body()).collect();
@@ -134,7 +135,7 @@ impl<'a> BusMachine<'a> {
         self.recorders.iter_mut().for_each(Recorder::bus_advanced);
     }
 
-    /// Where scenarios of all recorders begin together.
+    /// The millisecond at which scenarios of all recorders begin together.
     fn align(&mut self) -> u64 {
         let free = self.recorders.iter_mut().map(|recorder| recorder.player_mut().free_from_ms());
         let free_from_ms = free.max().unwrap_or(0);

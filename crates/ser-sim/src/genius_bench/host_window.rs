@@ -9,7 +9,7 @@ use crate::claim::{Claim, Holder};
 use crate::error::SimError;
 use crate::genius::{Board, RAM_LEN};
 
-/// Bytes that a host writes last come first: they are read one by one before the rest.
+/// The bytes that a host writes last stand first, so these are read one by one before the rest.
 const READ_FIRST: usize = 3;
 
 /// The shared RAM as a file.
@@ -17,7 +17,7 @@ pub(super) struct HostWindow {
     path: PathBuf,
     file: File,
     image: Box<[u8; RAM_LEN]>,
-    /// Keeps other simulators from taking the window; the file goes with it.
+    /// Keeps other simulators from taking the window. The file is removed with it.
     _claim: Claim,
 }
 
@@ -31,7 +31,7 @@ impl HostWindow {
             Holder::Simulator => claim.remove().map_err(doing())?,
             Holder::Foreign => return Err(SimError::WindowTaken(path.to_owned())),
         }
-        // Fails where something has come meanwhile, and follows no link.
+        // Fails where something has been put there meanwhile, and follows no link.
         let file = File::options().read(true).write(true).create_new(true).open(path);
         let file = match file {
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
@@ -79,7 +79,7 @@ impl HostWindow {
     }
 }
 
-/// After an error the image stays what it was, so that the board is told nothing.
+/// Reads one part of the file. After an error `part` is unchanged, so the board is told nothing.
 fn read_part(file: &File, part: &mut [u8], offset: u64, result: &mut io::Result<()>) {
     if result.is_ok() {
         *result = file.read_exact_at(part, offset);

@@ -26,7 +26,7 @@ pub(crate) struct GeniusBench {
     bus: Bus,
     host: Handle<Board>,
     window: HostWindow,
-    /// What plays the first recorder, if it is not the built-in node.
+    /// The image that plays the first recorder, if the built-in node does not.
     image: Option<Emulator>,
     stations: Vec<Station>,
     pace: Pace,
@@ -38,13 +38,13 @@ struct Station {
     number: u8,
     board: SharedBoard,
     options: SimNodeOptions,
-    /// The built-in node, unless the image is here.
+    /// The built-in node while it has no power; `None` for the image.
     off: Option<PoweredOff>,
 }
 
 impl GeniusBench {
     /// Connects everything. The first recorder is the image, or else the built-in node as `options`
-    /// say; the others differ from that by their model, and have memory of their own.
+    /// say. The others differ from it in their model, and each has memory of its own.
     pub(crate) fn new(
         options: &SimNodeOptions,
         image: Option<Emulator>,
@@ -69,7 +69,7 @@ impl GeniusBench {
         Ok(GeniusBench { bus, host, window, image, stations, pace: Pace::new(), now_ms: 0 })
     }
 
-    /// Memory for every recorder.
+    /// Memory for each recorder.
     pub(crate) fn rams(&self) -> Vec<Ram> {
         self.stations.iter().map(|_| Ram::new()).collect()
     }

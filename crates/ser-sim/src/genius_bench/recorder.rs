@@ -2,8 +2,8 @@
 //! board.
 //!
 //! The built-in node lives in virtual time and reaches its board directly. The image lives in real
-//! time; its board's shared RAM is in the emulated board's external memory, and is compared with
-//! the board's once per millisecond.
+//! time. It reaches its board's shared RAM through the emulated board's external memory, which is
+//! compared with the simulated board's RAM once per millisecond.
 
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ enum Body<'a> {
 struct BuiltIn<'a> {
     native: Native<'a>,
     port: GeniusPort<BoardRam>,
-    /// Whether the port holds the board's reset line.
+    /// Whether the port holds the GENI board's reset line.
     in_reset: bool,
     /// Where the node goes when its power is cut.
     off: &'a mut Option<PoweredOff>,
@@ -49,7 +49,7 @@ struct Image<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// The built-in node, which goes to `off` when its power is cut.
+    /// The built-in node. It moves to `off` when its power is cut.
     pub(super) fn new(
         number: u8,
         board: SharedBoard,
@@ -62,7 +62,7 @@ impl<'a> Recorder<'a> {
         Recorder { number, board, body }
     }
 
-    /// The ARM image, which has been switched on.
+    /// The ARM image, which is already switched on.
     pub(super) fn with_image(
         number: u8,
         board: SharedBoard,
@@ -74,12 +74,12 @@ impl<'a> Recorder<'a> {
         Recorder { number, board, body }
     }
 
-    /// Its device number.
+    /// Its bus address.
     pub(super) fn number(&self) -> u8 {
         self.number
     }
 
-    /// The built-in node: its time can run ahead of real time.
+    /// The built-in node, whose time can run ahead of real time.
     pub(super) fn built_in_node(&mut self) -> Option<&mut SimNode<'a>> {
         match &mut self.body {
             Body::BuiltIn(built_in) => Some(&mut built_in.native.node),
@@ -95,7 +95,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// The same, to be changed.
+    /// Its contacts and its serial line, mutably.
     pub(super) fn unit_mut(&mut self) -> &mut dyn Machine {
         match &mut self.body {
             Body::BuiltIn(built_in) => &mut built_in.native,
@@ -111,7 +111,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Counts time as the bus does, from now on.
+    /// Counts time as the bus does from now on.
     pub(super) fn keep_pace(&mut self, pace: Pace) {
         match &mut self.body {
             Body::BuiltIn(built_in) => built_in.native.pace = pace,
@@ -119,7 +119,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Whether it answers by now; to be asked again and again.
+    /// Whether it answers by now. To be asked repeatedly.
     pub(super) fn is_up(&mut self) -> Result<bool, SimError> {
         match &mut self.body {
             Body::BuiltIn(_) => Ok(true),
@@ -127,14 +127,14 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Waits a moment for what lives in real time.
+    /// Waits a moment if the recorder lives in real time.
     pub(super) fn pause(&self) {
         if let Body::Image(image) = &self.body {
             image.emulator.pause();
         }
     }
 
-    /// Does what has to be done now and then, however little time has passed.
+    /// Does what has to be done regularly, however little time has passed.
     pub(super) fn look_after(&mut self) -> Result<(), SimError> {
         match &mut self.body {
             Body::BuiltIn(_) => Ok(()),
@@ -142,7 +142,8 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Lets the recorder live up to millisecond `ms`, and the board know what it has done.
+    /// Lets the recorder live up to millisecond `ms`, and tells its board what the recorder has
+    /// done.
     pub(super) fn advance_to(&mut self, ms: u64) {
         match &mut self.body {
             Body::BuiltIn(built_in) => built_in.advance_to(ms, &self.board),
@@ -150,14 +151,14 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// The board has lived up to the present: lets the recorder know what it has done.
+    /// Tells the recorder what its board has done. The board has lived up to the present.
     pub(super) fn bus_advanced(&mut self) {
         if let Body::Image(image) = &self.body {
             self.board.lock().publish(|offset, byte| image.memory.write_geni(offset, byte));
         }
     }
 
-    /// Rules that it broke at its board, since this was last asked.
+    /// The rules of its board that the recorder broke since this was last asked.
     pub(super) fn take_violations(&mut self) -> Vec<Violation> {
         let violations = self.board.lock().take_new_violations();
         match self.body {
@@ -166,7 +167,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Cuts the power of both; the board starts anew with its recorder.
+    /// Cuts the power of both. The board starts anew with its recorder.
     pub(super) fn power_off(self) {
         restart(&self.board);
         match self.body {
@@ -178,7 +179,7 @@ impl<'a> Recorder<'a> {
 
 impl BuiltIn<'_> {
     fn advance_to(&mut self, ms: u64, board: &SharedBoard) {
-        // Before the node records what came after them.
+        // This comes before the node records what happened after the interrupts.
         for at_us in board.lock().take_interrupts() {
             self.native.node.interrupt(&mut self.port, tick_ms(at_us));
         }
@@ -198,7 +199,7 @@ impl Image<'_> {
         let reset = self.memory.geni_reset();
         if reset != self.reset {
             self.reset = reset;
-            // However short it was, it is never missed.
+            // A pulse is never missed, however short it was.
             restart(board);
             if reset & 1 != 0 {
                 board.lock().hold_reset();
@@ -214,8 +215,8 @@ fn restart(board: &SharedBoard) {
     board.release_reset();
 }
 
-/// Without what only seems wrong: when a host in another process lets the reset line go is seen
-/// late here, so that it may seem to begin too early.
+/// Leaves out violations that may only seem so. We see late when a host in another process lets the
+/// reset line go, so the host may seem to begin too early.
 pub(super) fn as_seen_from_afar(mut violations: Vec<Violation>) -> Vec<Violation> {
     violations.retain(|violation| violation.kind != ViolationKind::TooEarly);
     violations

@@ -1,4 +1,4 @@
-//! The far end of the node's serial line, where a host plugs in.
+//! The far end of the recorder's serial line, where a host plugs in.
 
 mod open;
 pub(crate) mod port;
@@ -22,30 +22,31 @@ pub(crate) trait Line: Send {
     /// What a host has sent; 0 when there is nothing at present.
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
 
-    /// Takes bytes for the host and says how many. Without a host they are all taken, and lost, as
-    /// on a wire.
+    /// Takes bytes for the host and returns how many. Without a host all bytes are taken and lost,
+    /// as on a wire.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
 
-    /// The rate that the host's end is set to, if there is a host and its end has such a setting.
+    /// The rate to which the host's end is set. `None` without a host, or if its end has no such
+    /// setting.
     fn host_bits_per_second(&self) -> Option<u32>;
 
-    /// Whether another host has come since this was last asked: what was meant for the one before
-    /// is not for it.
+    /// Whether another host has come since this was last asked. Bytes meant for the previous host
+    /// are not for the new one.
     fn take_host_change(&mut self) -> bool;
 
     /// Makes the line known, now that the node answers.
     fn publish(&mut self) -> Result<(), SimError>;
 
-    /// What to give to a host to reach this line.
+    /// The name by which a host reaches this line.
     fn name(&self) -> String;
 
-    /// Sentences for the user about hosts that come and go, since this was last asked.
+    /// Sentences for the user about hosts that came and went since this was last asked.
     fn take_notices(&mut self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Descriptors that become readable when [`read`](Self::read) has something to do; the one of a
-    /// host comes first.
+    /// Descriptors that become readable when [`read`](Self::read) has something to do. The host's
+    /// own descriptor comes first.
     #[cfg(unix)]
     fn descriptors(&self) -> Vec<BorrowedFd<'_>>;
 }
@@ -55,11 +56,11 @@ pub(crate) fn rates_agree(host: Option<u32>, node: Baud) -> bool {
     host.is_none_or(|bits_per_second| bits_per_second == node.bits_per_second())
 }
 
-/// What bytes look like to a receiver at another rate: nothing that could be part of a frame or a
-/// text.
+/// Makes bytes what a receiver at another rate would see: nothing that could be part of a frame or
+/// a text.
 ///
-/// Real garbage depends on both rates and on the gaps between bytes. What matters here is that it
-/// is the same every time and never passes for sense: every byte has its highest bit set.
+/// Real garbage depends on both rates and on the gaps between bytes. What matters here is that the
+/// result is always the same and never passes for sense, so every byte has its highest bit set.
 pub(crate) fn garble(bytes: &mut [u8]) {
     for byte in bytes {
         *byte = (byte.rotate_left(3) ^ 0x5A) | 0x80;

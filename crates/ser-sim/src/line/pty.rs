@@ -1,12 +1,12 @@
 //! A serial line over a pseudo-terminal, found under a symbolic link.
 //!
 //! # Notes
-//! The node holds the master end. The slave end is open only while a host has it open, so the
-//! kernel tells us when there is no host: bytes then go nowhere, as on a wire, and do not wait for
-//! the next host to be confused by.
+//! We hold the master end. The slave end is open only while a host has it open, so the kernel tells
+//! us when there is no host. Bytes then go nowhere, as on a wire, instead of waiting to confuse the
+//! next host.
 //!
-//! A host usually takes the terminal for itself (`TIOCEXCL`), and one that is killed never gives it
-//! back: nobody but root could open the terminal again. The link is then moved to a fresh
+//! A host usually takes the terminal for itself (`TIOCEXCL`), and a host that is killed never gives
+//! it back: nobody but root could open the terminal again. The link is then moved to a fresh
 //! pseudo-terminal.
 
 use std::ffi::OsStr;
@@ -31,15 +31,15 @@ use super::Line;
 use crate::claim::{Claim, Holder};
 use crate::error::SimError;
 
-/// The rate of a port that nobody has set: what a factory-fresh node uses.
+/// The rate of a port that nobody has set. A factory-fresh recorder uses it, too.
 const INITIAL_BITS_PER_SECOND: u32 = 9600;
 
-/// How often the terminal is made ready while no host is there: one may have come and gone between
-/// two looks.
+/// How often the terminal is made ready while no host is there. A host may have come and gone
+/// between two looks.
 const FREE_EVERY: Duration = Duration::from_millis(100);
 
 pub(crate) struct PtyLine {
-    /// Goes first, so that the link never leads to somebody else's terminal.
+    /// Dropped first, so that the link never leads to somebody else's terminal.
     place: Place,
     pair: Pair,
     link: PathBuf,
@@ -54,17 +54,18 @@ pub(crate) struct PtyLine {
     notices: Vec<String>,
 }
 
-/// What the link is in.
+/// Where the link is.
 enum Place {
-    /// A place that others use, too. The link goes with the claim.
+    /// A place that others use, too. The link is removed with the claim.
     Shared(Claim),
-    /// A directory that has nothing else, made because no place was given, and goes with the link.
+    /// A directory made for the link alone, because no place was given. It is removed with the
+    /// link.
     Own(#[expect(dead_code, reason = "held until the end")] TempDir),
 }
 
 impl Place {
-    /// Whether what stands there is a link that we, or a simulator before us, have made; nothing is
-    /// no link.
+    /// Whether what stands there is a link made by us or by a simulator before us. An empty place
+    /// is not a link.
     fn holds_ours(&self) -> io::Result<bool> {
         match self {
             Place::Shared(claim) => Ok(claim.holder()? == Holder::Simulator),
@@ -90,8 +91,8 @@ struct Pair {
 impl Pair {
     fn new() -> io::Result<Pair> {
         let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY;
-        // In one step where there is one: a child that inherits the master would keep the terminal
-        // alive.
+        // Close-on-exec is set in the same step where the system can: a child that inherits the
+        // master would keep the terminal alive.
         #[cfg(target_os = "linux")]
         let flags = flags | OpenptFlags::CLOEXEC;
         let master = openpt(flags)?;
@@ -101,8 +102,8 @@ impl Pair {
         rfs::fcntl_setfl(&master, rfs::fcntl_getfl(&master)? | OFlags::NONBLOCK)?;
         let slave = PathBuf::from(OsStr::from_bytes(ptsname(&master, Vec::new())?.as_bytes()));
         let pair = Pair { master: File::from(master), slave };
-        // Raw from the start: otherwise the terminal echoes what the node says before a host has
-        // set it up.
+        // The terminal is raw from the start. Otherwise it would echo what the recorder says before
+        // a host has set it up.
         let slave = pair.open_slave()?;
         let mut settings: Termios = termios::tcgetattr(&slave)?;
         settings.make_raw();
@@ -154,17 +155,18 @@ impl PtyLine {
         })
     }
 
-    /// Nobody has the terminal open: makes it ready for the next host.
+    /// Makes the terminal ready for the next host. Nobody has it open now.
     fn free(&mut self) {
         self.host_present = false;
         self.freed = Instant::now();
         match self.pair.open_slave() {
             Ok(slave) => {
-                // The next host shall find it free, and none of what the last one did not read.
+                // The next host finds the terminal free, without the bytes that the last one did
+                // not read.
                 let _ = termios::ioctl_tiocnxcl(&slave);
                 let _ = termios::tcflush(&slave, QueueSelector::IFlush);
             }
-            // Taken and nobody there to have it: see the notes above.
+            // A host took it for itself and is gone, see the notes above.
             Err(Errno::BUSY) if !self.pair.has_host() => {
                 let moved = self.move_to_fresh_terminal();
                 self.tell(moved);
@@ -173,8 +175,8 @@ impl PtyLine {
         }
     }
 
-    /// Where that fails, and where somebody has put something else in the place of the link, all
-    /// stays as it is until the next time.
+    /// Moves the link to a fresh terminal. When that fails, or when somebody has put something else
+    /// in the place of the link, all stays as it is until the next time.
     fn move_to_fresh_terminal(&mut self) -> io::Result<()> {
         if self.published && !self.lost && !self.place.holds_ours()? {
             return Ok(());
@@ -229,7 +231,7 @@ impl Line for PtyLine {
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        // Nothing said before a host was noticed is an answer to it.
+        // Bytes sent before a host was noticed are not an answer to it.
         if !self.host_present || !self.pair.has_host() {
             return Ok(bytes.len());
         }
@@ -275,7 +277,7 @@ impl Line for PtyLine {
     }
 
     fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
-        // Without a host the master reports that over and over and would keep us from waiting at
+        // Without a host the master reports that over and over, which would keep us from waiting at
         // all.
         if self.host_present { vec![self.pair.master.as_fd()] } else { Vec::new() }
     }
@@ -297,8 +299,8 @@ impl PtyLine {
     }
 }
 
-/// Claims the place of the link and clears it of a link that a simulator has left behind; anything
-/// else is refused.
+/// Claims the place of the link and removes a link that an earlier simulator has left there.
+/// Anything else is refused.
 fn claim(link: &Path) -> Result<Claim, SimError> {
     let claim = Claim::on(link, SimError::LinkInUse)?;
     let looking = || SimError::io(format!("look at {}", link.display()));
@@ -309,8 +311,8 @@ fn claim(link: &Path) -> Result<Claim, SimError> {
     }
 }
 
-/// Puts a link to `target` in the place of the one that is there, with no moment without any. Until
-/// then it has a name that nobody can foresee, so nobody can be in its way.
+/// Replaces the link by one to `target`, with no moment without a link. The new link first has a
+/// name that nobody can foresee, so nobody can be in its way.
 fn replace_link(target: &Path, link: &Path) -> io::Result<()> {
     let folder =
         link.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -374,7 +376,7 @@ mod tests {
         let link = folder.path().join("ser");
         let mut line = PtyLine::open(Some(&link)).unwrap();
         line.publish().unwrap();
-        // As it is when the record could not be written.
+        // As after a record that could not be written.
         fs::remove_file(&link).unwrap();
         line.lost = true;
         fs::write(&link, "theirs").unwrap();

@@ -21,11 +21,10 @@ use std::time::{Duration, Instant};
 use super::Line;
 use crate::error::SimError;
 
-/// How long a client that has said its last word may wait for answers.
+/// How long a client that has closed its sending side may wait for answers.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
-/// How soon a client that is silent is asked by TCP whether it is there, and how often if it does
-/// not answer.
+/// How soon TCP asks a silent client whether it is there, and how often if it does not answer.
 #[cfg(unix)]
 const PROBE_AFTER: Duration = Duration::from_secs(60);
 #[cfg(unix)]
@@ -38,8 +37,8 @@ pub(crate) struct TcpLine {
     address: SocketAddr,
     gives_way_after: Option<Duration>,
     client: Option<Client>,
-    /// A connection that came while there was a client. Whether that client is gone shows when it
-    /// is read next.
+    /// A connection that came while there was a client. The next read shows whether that client is
+    /// gone.
     candidate: Option<(TcpStream, SocketAddr)>,
     client_changed: bool,
     notices: Vec<String>,
@@ -48,11 +47,12 @@ pub(crate) struct TcpLine {
 struct Client {
     stream: TcpStream,
     address: SocketAddr,
-    /// When it has sent something, or connected.
+    /// When the client last sent something, or connected.
     heard: Instant,
-    /// Whether it was told that others want its place: once is enough.
+    /// Whether the user was told that others want its place. Once is enough.
     has_turned_away: bool,
-    /// When it closed its sending side: `nc` does so at the end of its input and still listens.
+    /// When the client closed its sending side. `nc` does so at the end of its input and still
+    /// listens.
     last_word: Option<Instant>,
 }
 
@@ -147,9 +147,9 @@ fn turn_away(mut stream: TcpStream, holder: SocketAddr) {
 
 fn prepare(stream: &TcpStream) -> io::Result<()> {
     stream.set_nonblocking(true)?;
-    // Answers are short and a host waits for each.
+    // Answers are short, and a host waits for each.
     stream.set_nodelay(true)?;
-    // Without, it is only noticed later that a client is gone.
+    // Without probes it is only noticed later that a client is gone.
     #[cfg(unix)]
     let _ = probe(stream);
     Ok(())
@@ -163,7 +163,7 @@ fn probe(stream: &TcpStream) -> rustix::io::Result<()> {
     sockopt::set_tcp_keepidle(stream, PROBE_AFTER)?;
     sockopt::set_tcp_keepintvl(stream, PROBE_EVERY)?;
     sockopt::set_tcp_keepcnt(stream, PROBES)?;
-    // Where something sent to it is not acknowledged, there are no probes.
+    // Linux sends no probes while something sent to the client is not acknowledged.
     #[cfg(target_os = "linux")]
     {
         let given_up = PROBE_AFTER + PROBE_EVERY * PROBES;
@@ -180,9 +180,9 @@ impl Line for TcpLine {
         if let Some(received) = self.read_client(buffer) {
             return Ok(received);
         }
-        // A candidate that cannot be set up has gone again.
+        // A candidate that cannot be set up has left again.
         let _ = self.decide();
-        // So has one that cannot be accepted.
+        // The same is true of one that cannot be accepted.
         self.candidate = self.listener.accept().ok();
         Ok(0)
     }

@@ -1,7 +1,7 @@
-//! The wire from the host to the node: bytes take their time on it.
+//! The wire from the host to the recorder. Bytes take their time on it.
 //!
 //! A client that sets the clock sends the time at which the last byte will arrive. On a
-//! pseudo-terminal bytes would arrive at once, and the clock would be ahead by the length of the
+//! pseudo-terminal bytes would arrive at once, and the clock would be ahead by the duration of the
 //! message.
 
 use std::collections::VecDeque;
@@ -22,7 +22,7 @@ pub(crate) struct Wire {
 }
 
 impl Wire {
-    /// A wire that takes as long as its rate says, where it has one.
+    /// A wire that takes as long as the rate of its bytes says, where they have one.
     pub(crate) fn new() -> Wire {
         Wire { takes_time: true, bytes: VecDeque::new(), free_from: None }
     }
@@ -43,7 +43,8 @@ impl Wire {
         self.bytes.len()
     }
 
-    /// The host sends, at a rate or, where there is none, at once.
+    /// Puts bytes on the wire. They take their time at the given rate; without a rate they arrive
+    /// at once.
     pub(crate) fn send(&mut self, now: Instant, bytes: &[u8], bits_per_second: Option<u32>) {
         let byte_time = match bits_per_second {
             Some(rate) if self.takes_time && rate > 0 => {
@@ -69,7 +70,7 @@ impl Wire {
         Some(byte)
     }
 
-    /// How long the next byte is still on its way.
+    /// How long until the next byte arrives.
     pub(crate) fn next_arrival_in(&self, now: Instant) -> Option<Duration> {
         self.bytes.front().map(|(arrival, _)| arrival.saturating_duration_since(now))
     }

@@ -14,8 +14,8 @@ use crate::machine::Machine;
 use crate::machine::pace::Pace;
 use crate::machine::sim_node::SimNode;
 
-/// How soon a node that is left alone notices that time has passed. Stamps do not depend on it,
-/// only how soon an event is reported.
+/// How soon a recorder that is left alone notices that time has passed. Stamps do not depend on it,
+/// only the delay until an event is reported.
 const PATIENCE: Duration = Duration::from_millis(2);
 
 /// A node and the pace of its time.

@@ -1,6 +1,6 @@
-//! What a node keeps while its power is off: stored configuration and battery-backed clock.
+//! What a recorder keeps while its power is off: stored configuration and battery-backed clock.
 //!
-//! Both are handles: clones share the same memory, so it outlives the node that uses it.
+//! Both are handles. Clones share the same memory, so it outlives the recorder that uses it.
 
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use chrono::{Local, NaiveDateTime, TimeDelta};
 use ser_node::{CopyNumber, RECORD_LEN, Rtc, Storage};
 
-/// Memory and clock of one node.
+/// Memory and clock of one recorder.
 #[derive(Clone, Debug)]
 pub struct NonVolatile {
     /// Where the configuration is kept.
@@ -18,7 +18,8 @@ pub struct NonVolatile {
 }
 
 impl NonVolatile {
-    /// A node fresh from the factory, whose clock shows the local time of this computer.
+    /// The memory of a recorder fresh from the factory, whose clock shows this computer's local
+    /// time.
     #[must_use]
     pub fn new() -> NonVolatile {
         NonVolatile { storage: MemoryStorage::default(), rtc: SimRtc::host() }
@@ -31,7 +32,7 @@ impl Default for NonVolatile {
     }
 }
 
-/// Configuration memory; as erased flash when new.
+/// Configuration memory. When new, it is as erased flash.
 #[derive(Clone, Debug)]
 pub struct MemoryStorage(Arc<Mutex<[[u8; RECORD_LEN]; 2]>>);
 
@@ -61,7 +62,7 @@ pub struct SimRtc(Arc<Mutex<Time>>);
 
 #[derive(Clone, Copy, Debug)]
 enum Time {
-    /// Runs with this computer's local time, so much ahead of it.
+    /// Runs with this computer's local time, this much ahead of it.
     Host {
         ahead: TimeDelta,
     },
@@ -77,14 +78,14 @@ impl SimRtc {
         SimRtc::new(Time::Host { ahead: TimeDelta::zero() })
     }
 
-    /// A clock that shows `time` at every power-up, or the time to which it was last set: tests
+    /// A clock that shows `time` at every power-up, or the time to which it was last set. Tests
     /// that use it give the same result every time.
     #[must_use]
     pub fn held_at(time: NaiveDateTime) -> SimRtc {
         SimRtc::new(Time::Held(time))
     }
 
-    /// No clock: a node powers up in 2000.
+    /// No clock. A recorder without one powers up in 2000.
     #[must_use]
     pub fn absent() -> SimRtc {
         SimRtc::new(Time::Unknown)
@@ -114,7 +115,7 @@ impl Rtc for SimRtc {
     }
 }
 
-/// Nothing here can be left half changed by a thread that panicked.
+/// Locks even a poisoned mutex: a thread that panicked cannot have left anything half changed here.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

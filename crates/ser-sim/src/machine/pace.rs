@@ -6,22 +6,22 @@ use std::time::Instant;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pace {
     began: Instant,
-    /// The millisecond that it was then.
+    /// The millisecond at that moment.
     ahead_ms: u64,
 }
 
 impl Pace {
-    /// Millisecond 0 is now.
+    /// A count in which millisecond 0 is now.
     pub(crate) fn new() -> Pace {
         Pace::from(Instant::now(), 0)
     }
 
-    /// Millisecond `ahead_ms` was at `began`.
+    /// A count in which millisecond `ahead_ms` was at `began`.
     pub(crate) fn from(began: Instant, ahead_ms: u64) -> Pace {
         Pace { began, ahead_ms }
     }
 
-    /// The millisecond that a node should have reached.
+    /// The millisecond that a recorder should have reached.
     pub(crate) fn now_ms(&self) -> u64 {
         self.ahead_ms
             .saturating_add(u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX))

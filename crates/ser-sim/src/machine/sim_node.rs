@@ -1,10 +1,10 @@
-//! A node in virtual time: the recorder itself, its contacts and both ends of its line.
+//! A recorder in virtual time: the recorder itself, its contacts and both ends of its line.
 //!
-//! Time passes only when [`SimNode::advance_to`] says so, and then every millisecond of it, in
-//! order: contacts due in that millisecond move, all inputs are sampled, the node's main loop runs.
-//! However the caller is delayed, a contact lands on exactly the millisecond that its scenario
-//! gives. [`SimNode::leap_to`] comes to the same and passes over stretches in which nothing can
-//! happen, so that a quiet month takes no longer than a busy second.
+//! Time passes only when [`SimNode::advance_to`] says so. Every millisecond then passes in order:
+//! contacts due in that millisecond move, all inputs are sampled, the recorder's main loop runs.
+//! However the caller is delayed, a contact moves in exactly the millisecond that its scenario
+//! gives. [`SimNode::leap_to`] has the same result but passes over stretches in which nothing can
+//! happen, so a quiet month takes no longer than a busy second.
 
 use std::collections::VecDeque;
 
@@ -19,20 +19,21 @@ use crate::contacts::scenario::Scenario;
 use crate::contacts::scenario_lines::Item;
 use crate::machine::non_volatile::{MemoryStorage, NonVolatile, SimRtc};
 
-/// Bytes that may wait for the other end of the line before the node is asked for no more.
+/// How many bytes may wait for the other end of the line. At that limit the node is asked for no
+/// more.
 const OUTPUT_LIMIT: usize = 4096;
 
 const NANOSECONDS_PER_MS: u64 = 1_000_000;
 
-/// Start bit, eight data bits, stop bit: what a byte takes on the line, in nanoseconds at one bit
+/// What a byte (start bit, eight data bits, stop bit) takes on the line, in nanoseconds at one bit
 /// per second.
 const BYTE_AT_1_BAUD_NS: u64 = 10 * 1_000_000_000;
 
-/// The longest stretch that is passed over at once: a node tells two ticks apart that are less than
-/// 24.8 days apart.
+/// The longest stretch that is passed over at once. A recorder can compare two ticks only if they
+/// are less than 24.8 days apart.
 const LONGEST_LEAP_MS: u64 = 1 << 30;
 
-/// How fast the node's bytes leave it.
+/// How fast the recorder's bytes leave it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LineRate {
     /// At once.
@@ -42,14 +43,14 @@ pub enum LineRate {
     Real,
 }
 
-/// How a node is built.
+/// How a recorder is built.
 #[derive(Clone, Debug)]
 pub struct SimNodeOptions {
     /// Which recorder it is.
     pub model: Model,
     /// Debounce times.
     pub debounce: Debounce,
-    /// How fast the node's bytes leave it.
+    /// How fast the recorder's bytes leave it.
     pub line_rate: LineRate,
     /// Configuration memory and clock.
     pub non_volatile: NonVolatile,
@@ -68,7 +69,7 @@ impl SimNodeOptions {
     }
 }
 
-/// The memory that a node loses with its power.
+/// The memory that a recorder loses with its power.
 pub struct Ram {
     channel: CaptureChannel,
     log: Vec<Event>,
@@ -88,7 +89,7 @@ impl Default for Ram {
     }
 }
 
-/// A node without power, and its surroundings, in which time stands still.
+/// A recorder without power, and its surroundings, in which time stands still.
 pub struct PoweredOff {
     options: SimNodeOptions,
     player: Player,
@@ -96,16 +97,16 @@ pub struct PoweredOff {
 }
 
 impl PoweredOff {
-    /// A node that has never been switched on, all contacts open, at millisecond 0.
+    /// A recorder that has never been switched on, all contacts open, at millisecond 0.
     #[must_use]
     pub fn new(options: SimNodeOptions) -> PoweredOff {
         PoweredOff { options, player: Player::default(), now_ms: 0 }
     }
 
-    /// Switches the node on. It samples its inputs in the present millisecond already.
+    /// Switches the recorder on. It already samples its inputs in the present millisecond.
     pub fn power_up(self, ram: &mut Ram) -> SimNode<'_> {
         let PoweredOff { options, player, now_ms } = self;
-        // What memory holds after a power cut is anybody's guess; a node must not rely on it.
+        // Memory may hold anything after a power cut, and a recorder must not rely on it.
         *ram = Ram::new();
         let (mut capture, reader) = ram.channel.split(options.debounce);
         capture.sample(0, player.state());
@@ -135,7 +136,7 @@ impl PoweredOff {
     }
 }
 
-/// A node under power.
+/// A recorder under power.
 pub struct SimNode<'a> {
     node: Node<'a, MemoryStorage, SimRtc>,
     capture: Capture<'a>,
@@ -145,7 +146,7 @@ pub struct SimNode<'a> {
     power_up_ms: u64,
     /// When a contact moved last.
     moved_ms: u64,
-    /// Milliseconds that were passed over: the node counts them as samples that it missed.
+    /// Milliseconds that were passed over. The node counts them as samples that it missed.
     leapt_ms: u64,
     options: SimNodeOptions,
     /// The rate at which the line runs.
@@ -157,12 +158,12 @@ pub struct SimNode<'a> {
 }
 
 impl<'a> SimNode<'a> {
-    /// A node that is switched on for the first time.
+    /// A recorder that is switched on for the first time.
     pub fn new(options: SimNodeOptions, ram: &'a mut Ram) -> SimNode<'a> {
         PoweredOff::new(options).power_up(ram)
     }
 
-    /// Cuts the power. Contacts stay as they are and scenarios go on when time does.
+    /// Cuts the power. Contacts stay as they are, and scenarios go on when time does.
     #[must_use]
     pub fn power_off(self) -> PoweredOff {
         PoweredOff { options: self.options, player: self.player, now_ms: self.now_ms }
@@ -174,7 +175,7 @@ impl<'a> SimNode<'a> {
         self.now_ms
     }
 
-    /// The node's tick in millisecond `at_ms`: what a stamp is made of.
+    /// The recorder's tick in millisecond `at_ms`, from which stamps are made.
     #[must_use]
     pub fn tick_at(&self, at_ms: u64) -> u32 {
         #[expect(clippy::cast_possible_truncation, reason = "the tick wraps")]
@@ -182,8 +183,8 @@ impl<'a> SimNode<'a> {
         tick
     }
 
-    /// Plays a scenario from the next millisecond on, or after those before it. Says in which
-    /// millisecond it begins.
+    /// Plays a scenario from the next millisecond on, or after those before it. Returns the
+    /// millisecond in which it begins.
     pub fn play(&mut self, scenario: &Scenario) -> u64 {
         self.player.play(self.now_ms, scenario)
     }
@@ -217,7 +218,7 @@ impl<'a> SimNode<'a> {
         self.player.next_due_ms()
     }
 
-    /// Lets every millisecond up to and including `ms` pass. The past is left alone.
+    /// Lets every millisecond up to and including `ms` pass. An `ms` in the past changes nothing.
     pub fn advance_to(&mut self, ms: u64) {
         while self.now_ms < ms {
             self.pass_ms();
@@ -226,12 +227,12 @@ impl<'a> SimNode<'a> {
         }
     }
 
-    /// The same, much faster where nothing happens. For a node whose Genius port is not served
-    /// meanwhile.
+    /// Does the same as [`advance_to`](Self::advance_to), much faster where nothing happens. The
+    /// recorder's Genius port must not need service meanwhile.
     ///
-    /// A node whose inputs stay as they are, whose line is silent and which has nothing to say has
-    /// nothing to do either: it has no other reason to act. The samples that are passed over are
-    /// such as the node itself takes to have been the same when it missed them.
+    /// A recorder has nothing to do while its inputs stay as they are, its line is silent and it
+    /// has nothing to say; it has no other reason to act. For samples that it missed, the recorder
+    /// assumes that nothing changed. Here that is true of the samples that are passed over.
     pub fn leap_to(&mut self, ms: u64) {
         while self.now_ms < ms {
             let next_move_ms = self.player.next_due_ms().unwrap_or(u64::MAX);
@@ -244,8 +245,8 @@ impl<'a> SimNode<'a> {
         }
     }
 
-    /// Lets time pass while the node's main loop is held up, and only its interrupts run: changes
-    /// queue up. It runs again in the last of these milliseconds.
+    /// Lets time pass while the recorder's main loop is held up and only its interrupts run, so
+    /// changes queue up. The main loop runs again in the last of these milliseconds.
     pub fn hold_up_to(&mut self, ms: u64) {
         while self.now_ms < ms {
             self.pass_ms();
@@ -254,8 +255,8 @@ impl<'a> SimNode<'a> {
         self.pump();
     }
 
-    /// Makes the node as old as if it had been on for that much longer, with nothing happening: its
-    /// tick goes on, around its 32 bits if need be, and so does its clock.
+    /// Ages the recorder as if it had been on for that much longer with nothing happening. Its tick
+    /// and its clock go on; the tick wraps at 32 bits.
     pub fn grow_older(&mut self, by_ms: u64) {
         let mut left_ms = by_ms;
         while left_ms > 0 {
@@ -280,7 +281,8 @@ impl<'a> SimNode<'a> {
     /// Whether nothing is on its way through debounce or onto the line.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
-        // Held back twice at most: until a change is accepted, and until no earlier one can come.
+        // Debounce holds an edge back twice at most: until the change is accepted, and until no
+        // earlier one can come.
         let longest_ms = u64::from(self.options.debounce.longest_ms());
         let settled = self.now_ms - self.moved_ms >= 2 * longest_ms;
         settled && self.on_the_line.is_none()
@@ -299,20 +301,20 @@ impl<'a> SimNode<'a> {
         self.node.poll(tick);
     }
 
-    /// Lets a Genius port of the node work in the present millisecond: once in each that passes.
+    /// Lets a Genius port of the recorder work. To be called once in each millisecond that passes.
     pub fn serve<W: SharedRam>(&mut self, port: &mut GeniusPort<W>) {
         self.node.genius_poll(port);
         self.pump();
     }
 
-    /// The GENI board has pulled its interrupt line in millisecond `at_ms`. To be said before time
-    /// passes on.
+    /// The GENI board has pulled its interrupt line in millisecond `at_ms`. To be called before
+    /// time passes on.
     pub fn interrupt<W: SharedRam>(&mut self, port: &mut GeniusPort<W>, at_ms: u64) {
         let tick = self.tick_at(at_ms);
         self.node.genius_interrupt(port, tick);
     }
 
-    /// Bytes arrive on the node's line in the present millisecond.
+    /// Bytes arrive on the recorder's line in the present millisecond.
     pub fn receive(&mut self, bytes: &[u8]) {
         let tick = self.tick_at(self.now_ms);
         for &byte in bytes {
@@ -321,24 +323,24 @@ impl<'a> SimNode<'a> {
         }
     }
 
-    /// The node's UART meets a byte that it cannot read.
+    /// The recorder's UART meets a byte that it cannot read.
     pub fn line_error(&mut self) {
         self.node.serial_line_errors(1);
     }
 
-    /// Bytes that the node has sent and nobody has taken.
+    /// Bytes that the recorder has sent and nobody has taken.
     #[must_use]
     pub fn output(&mut self) -> &[u8] {
         self.output.make_contiguous()
     }
 
-    /// The first `count` bytes of [`output`](Self::output) have been taken.
+    /// Says that the first `count` bytes of [`output`](Self::output) have been taken.
     pub fn taken(&mut self, count: usize) {
         self.output.drain(..count.min(self.output.len()));
         self.pump();
     }
 
-    /// Takes everything that the node has to say in the present millisecond.
+    /// Takes everything that the recorder has to say in the present millisecond.
     pub fn take_output(&mut self) -> Vec<u8> {
         let mut bytes = Vec::new();
         self.pump();
@@ -349,24 +351,24 @@ impl<'a> SimNode<'a> {
         bytes
     }
 
-    /// The rate at which the node's line runs.
+    /// The rate at which the recorder's line runs.
     #[must_use]
     pub fn baud(&self) -> Baud {
         self.baud
     }
 
-    /// What the node dropped, refused or lost since power-up. Milliseconds that were passed over
-    /// are not missed.
+    /// What the recorder dropped, refused or lost since power-up. Milliseconds that were passed
+    /// over do not count as missed.
     #[must_use]
     pub fn diagnostics(&self) -> Diagnostics {
         let seen = self.node.diagnostics();
-        // The node's own count stops at its largest value, after 49 days that were passed over;
-        // then it says nothing.
+        // The node's own count stops at its largest value, reached when 49 days were passed over.
+        // From then on it says nothing.
         let leapt_ms = u32::try_from(self.leapt_ms).unwrap_or(u32::MAX);
         Diagnostics { samples_missed: seen.samples_missed.saturating_sub(leapt_ms), ..seen }
     }
 
-    /// The log as it is now: the total since the last erase, modulo 65536, and its entries from the
+    /// The log as it is now: the total since the last erase, modulo 65536, and the entries from the
     /// oldest to the newest. Nothing goes over the line for it.
     #[must_use]
     pub fn log(&self) -> (u16, Vec<Entry>) {
@@ -376,13 +378,13 @@ impl<'a> SimNode<'a> {
             entries.extend(self.node.read(start, COUNT).entries);
         }
         let head = self.node.read(1, 0);
-        // In a ring that has wrapped, the oldest entry is in the slot that comes next.
+        // In a ring that has wrapped, the oldest entry is in the slot to be written next.
         let oldest = usize::from(head.next_slot).min(entries.len());
         entries.rotate_left(oldest);
         (head.total, entries)
     }
 
-    /// Whether another command finds room to wait for its turn.
+    /// Whether there is room for another command to wait for its turn.
     #[must_use]
     pub fn has_room(&self) -> bool {
         self.node.serial_has_room()

@@ -12,15 +12,14 @@ use ser_board::leds::Lamps;
 
 use crate::qemu::external_bus::ExternalBus;
 
-/// How often the board is looked at by whoever waits for it.
+/// How often the board is checked while somebody waits for it.
 const LOOK_EVERY: Duration = Duration::from_millis(2);
 
-/// A fault that the image brings upon itself when it is told to, so that one can see what it does
-/// about it.
+/// A fault that the image brings upon itself when told to, to show how it copes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum ForcedFault {
-    /// It reads where there is nothing.
+    /// It reads an address where there is nothing.
     HardFault = 1,
     /// Its main loop goes no further.
     MainLoopHangs = 2,
@@ -28,12 +27,12 @@ pub enum ForcedFault {
     Panic = 3,
     /// It calls itself until the stack has run out.
     StackOverflow = 4,
-    /// Its capture interrupt comes no more.
+    /// Its capture interrupt stops coming.
     CaptureStops = 5,
-    /// A store of its main program gets below the stack, in which the processor finds room to save
-    /// registers.
+    /// Its main program stores something below the stack, and the processor still finds room there
+    /// to save registers.
     StackOverflowByStore = 6,
-    /// It resets, and says nothing about it.
+    /// It resets without a word about it.
     SilentReset = 7,
 }
 
@@ -59,7 +58,7 @@ impl EmulatedBoard {
         self.bus.boots()
     }
 
-    /// Waits until something can be seen at the board. False when it takes longer than `timeout`.
+    /// Waits until `seen` is true of the board. False when it takes longer than `timeout`.
     #[must_use]
     pub fn wait(&self, timeout: Duration, mut seen: impl FnMut(&EmulatedBoard) -> bool) -> bool {
         let deadline = Instant::now() + timeout;
@@ -79,20 +78,20 @@ impl EmulatedBoard {
         self.wait(timeout, |board| board.boots() != boots && board.bus.is_sampled())
     }
 
-    /// Why the image started the last time; `None` when it gives a number that means nothing.
+    /// Why the image last started; `None` when its number has no meaning.
     #[must_use]
     pub fn reset_cause(&self) -> Option<ResetCause> {
         self.bus.reset_cause().try_into().ok().and_then(ResetCause::from_code)
     }
 
-    /// What its latest fault had to say; empty when it said nothing, or there was none.
+    /// What its latest fault said. Empty when it said nothing, or there was no fault.
     #[must_use]
     pub fn last_words(&self) -> String {
         String::from_utf8_lossy(&self.bus.last_words()).into_owned()
     }
 
     /// How many starts ago its latest fault was: 1 when its last start was the first one after it.
-    /// None when there was none since it had no power.
+    /// `None` when there was no fault since it had no power.
     #[must_use]
     pub fn fault_starts_ago(&self) -> Option<NonZeroU32> {
         NonZeroU32::new(self.bus.last_words_age())
@@ -117,15 +116,15 @@ impl EmulatedBoard {
         Duration::from_micros(self.bus.boot_time_us().into())
     }
 
-    /// The most bytes of its stack in use since its last start; it looks once a second.
+    /// The most bytes of its stack in use since its last start. The board checks once a second.
     #[must_use]
     pub fn stack_bytes(&self) -> u32 {
         self.bus.stack_bytes()
     }
 
-    /// The longest time for which its battery-backed clock has stood still, because this computer
-    /// had no time for it. It goes on where it should be then; whoever set or read it meanwhile is
-    /// late by as much.
+    /// The longest time for which the battery-backed clock has stood still because this computer
+    /// was busy. The clock then jumps to where it should be. A host that set or read it meanwhile
+    /// is late by as much.
     #[must_use]
     pub fn clock_stood_still(&self) -> Duration {
         Duration::from_millis(self.bus.clock_gap_ms())
@@ -142,7 +141,7 @@ impl fmt::Debug for EmulatedBoard {
 mod tests {
     use super::*;
 
-    /// The board's side is played by the test.
+    /// A board whose own side is played by the test.
     fn board(words: &[(usize, u32)]) -> EmulatedBoard {
         let folder = tempfile::tempdir().unwrap();
         let bus = ExternalBus::open(&folder.path().join("memory")).unwrap();
@@ -160,7 +159,7 @@ mod tests {
         assert_eq!(panicked.reset_cause(), Some(ResetCause::Panic));
         assert_eq!(panicked.last_words(), "panic");
         assert_eq!(panicked.fault_starts_ago(), NonZeroU32::new(3));
-        // Whatever stands there, no more is taken than there is room for.
+        // Whatever length is given, no more is taken than there is room for.
         let garbled = board(&[(0x8018, 0x0001_0001), (0x8080, u32::MAX)]);
         assert_eq!((garbled.reset_cause(), garbled.last_words().len()), (None, 92));
     }

@@ -2,21 +2,22 @@
 //!
 //! # Design
 //! QEMU's standard input and output are the RS-232 port. The contacts are a latch in the board's
-//! external memory, a file that both sides map, and there the board says which sample it took last.
+//! external memory, a file that both sides map. There the board also says which sample it took
+//! last.
 //!
-//! On a Genius bus the file also holds the shared RAM of the board's GENI, and whoever plays the
-//! bus plays the GENI too.
+//! On a Genius bus the file also holds the shared RAM of the board's GENI. Whoever plays the bus
+//! plays the GENI, too.
 //!
-//! On the same bus the board finds its battery-backed clock: a count of milliseconds from here,
-//! written whenever the board is looked after, at least every 2 ms unless this computer is busy. It
-//! begins with this computer's time of day, so it goes on from one simulator to the next with the
-//! same memory.
+//! The board finds its battery-backed clock in the same external memory: a count of milliseconds
+//! that is written from here whenever the board is looked after, at least every 2 ms unless this
+//! computer is busy. The count starts with this computer's time of day, so the clock goes on from
+//! one simulator to the next with the same memory.
 //!
-//! A step is written when its time has come, and not before the board has sampled the step before:
-//! on a stalled machine contacts move late, but no two moves become one and none is lost. What was
-//! played is recorded with the samples around it. A board that starts anew by itself takes the
-//! contacts as it finds them; they move again when it samples them, and a move that it was caught
-//! in was none.
+//! A step is written when its time has come, and not before the board has sampled the step before.
+//! On a stalled machine contacts move late, but no two moves become one and none is lost. Each move
+//! is kept with the samples around it. A board that restarts by itself takes the contacts as it
+//! finds them. They move again once it samples them, and a move that the restart interrupted does
+//! not count.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -43,10 +44,10 @@ use crate::qemu::emulator_files::EmulatorFiles;
 use crate::qemu::external_bus::ExternalBus;
 use crate::qemu::process::{PROGRAM, Qemu, is_temporary, never_wait, read_printed, spawn};
 
-/// How long the image may take to answer: QEMU starts slowly on a busy machine.
+/// How long the image may take to answer, because QEMU starts slowly on a busy machine.
 const ANSWER_WITHIN: Duration = Duration::from_secs(60);
 
-/// How often it is asked meanwhile.
+/// How often the image is asked meanwhile.
 const ASK_EVERY: Duration = Duration::from_millis(250);
 
 /// Bytes that may wait for the board, and for the host.
@@ -72,20 +73,20 @@ pub(crate) struct Emulator {
     player: Player,
     played: Vec<Played>,
     moving: Option<Moving>,
-    /// By how much the latest moves came late at most.
+    /// By how much the latest contact move came late.
     late_ms: u64,
     pace: Pace,
-    /// Holds the memory, where no file was given, and what QEMU prints. Goes last.
+    /// Holds the memory, where no file was given, and what QEMU prints. Dropped last.
     directory: TempDir,
 }
 
-/// A move of contacts that the board has not sampled.
+/// A move of contacts that the board has not sampled yet.
 struct Moving {
     moved: Move,
     tick_before: u32,
 }
 
-/// How far a board is that has been switched on.
+/// How far a board is that has just been switched on.
 struct ComingUp {
     began: Instant,
     asked: Option<Instant>,
@@ -103,8 +104,8 @@ struct Running {
 }
 
 impl Emulator {
-    /// A board without power. It has a GENI if it is to be on a Genius bus. Where its log is a pipe
-    /// that nobody reads, this waits, unless told to stop.
+    /// A board without power. It has a GENI if it is to be on a Genius bus. If its log is a pipe
+    /// that nobody reads, this waits unless told to stop.
     pub(crate) fn new(
         options: &EmulatorOptions,
         model: Model,
@@ -144,7 +145,7 @@ impl Emulator {
         Arc::clone(&self.bus)
     }
 
-    /// Counts time as somebody else does, from now on.
+    /// Counts time as `pace` does from now on.
     pub(crate) fn keep_pace(&mut self, pace: Pace) {
         self.pace = pace;
     }
@@ -174,7 +175,7 @@ impl Emulator {
     pub(crate) fn switch_on(&mut self) -> Result<(), SimError> {
         self.switch_off();
         self.bus.clear_sample();
-        // Not for this run, and not the time of another one.
+        // A fault to force, or a time, from an earlier run is not for this one.
         self.bus.force(0);
         self.bus.set_clock(self.clock.now_ms());
         self.begin_booting();
@@ -183,7 +184,7 @@ impl Emulator {
         Ok(())
     }
 
-    /// Whether the board that was switched on answers by now; to be asked again and again.
+    /// Whether the board that was switched on answers by now. To be asked repeatedly.
     pub(crate) fn is_up(&mut self) -> Result<bool, SimError> {
         self.look_after()?;
         let (Some(running), Some(coming_up)) = (&mut self.running, &mut self.coming_up) else {
@@ -204,7 +205,7 @@ impl Emulator {
                 running.ask(&Command::QueryConfiguration);
             }
         } else if !coming_up.settled {
-            // Answers come in order: after this one, none to the questions before is left to
+            // Answers come in order. After this one, no answer to an earlier question is left to
             // confuse a host.
             coming_up.settled = true;
             running.ask(&Command::QueryMode);
@@ -220,7 +221,7 @@ impl Emulator {
             .iter()
             .map(|running| PollFd::new(&running.output, PollFlags::IN))
             .collect();
-        // Whatever comes of it, the caller looks again.
+        // Whatever the outcome, the caller looks again.
         let _ = poll(&mut output, Some(&timeout));
     }
 
@@ -242,7 +243,7 @@ impl Emulator {
         Ok(Running { qemu, input, output, to_board: VecDeque::new(), from_board: FromBoard::new() })
     }
 
-    /// Turns the clock on, carries bytes to and from QEMU and sees that it is alive.
+    /// Advances the clock, carries bytes to and from QEMU and checks that it is alive.
     fn look_after(&mut self) -> Result<(), SimError> {
         self.bus.set_clock(self.clock.now_ms());
         let Some(running) = &mut self.running else { return Ok(()) };
@@ -256,14 +257,14 @@ impl Emulator {
         running.carry().map_err(SimError::io("talk to the emulator"))
     }
 
-    /// Contacts that were about to be sampled have moved: the board takes them as they are when it
-    /// starts.
+    /// Ends the moves that the board has not sampled yet, because it takes the contacts as they are
+    /// when it starts.
     fn begin_booting(&mut self) {
         self.booting = true;
         self.moving = None;
     }
 
-    /// Whether the board is about to start, by itself or because it was switched on.
+    /// Whether the board is starting, by itself or because it was switched on.
     fn is_booting(&mut self) -> bool {
         let boots = self.bus.boots();
         if boots != self.boots {
@@ -316,7 +317,7 @@ impl Running {
             match self.input.write(first) {
                 Ok(written) => drop(self.to_board.drain(..written)),
                 Err(error) if is_temporary(&error) => break,
-                // It is ending; the next look at the process says how.
+                // QEMU is ending. The next look at the process says how.
                 Err(error) if error.kind() == ErrorKind::BrokenPipe => break,
                 Err(error) => return Err(error),
             }
@@ -333,18 +334,18 @@ impl Running {
         Ok(())
     }
 
-    /// Drops what was said before anybody could listen, and the answers to our own questions.
+    /// Drops the output from before anybody could listen, and the answers to our own questions.
     fn forget_output(&mut self) {
         self.from_board.taken(usize::MAX);
     }
 }
 
-/// Bytes from the board, and the rates at which they are sent: the emulated UART does not tell, but
-/// every change of rate is announced by a configuration reply.
+/// Bytes from the board, and the rates at which they are sent. The emulated UART does not tell the
+/// rate, but a configuration reply announces every change of it.
 struct FromBoard {
     bytes: VecDeque<u8>,
     decoder: FrameDecoder<MAX_BODY_LEN>,
-    /// The rate of the first byte; `None` until the board has said anything about it.
+    /// The rate of the first byte; `None` until the board has announced one.
     rate: Option<Baud>,
     /// Where in `bytes` other rates begin.
     changes: VecDeque<(usize, Baud)>,
@@ -414,8 +415,7 @@ impl Machine for Emulator {
     fn receive(&mut self, bytes: &[u8]) {
         if let Some(running) = &mut self.running {
             running.to_board.extend(bytes);
-            // What cannot be written now is written by the next pass, which also reports what is
-            // wrong.
+            // What cannot be written now is written by the next pass, which also reports errors.
             let _ = running.carry();
         }
     }
@@ -463,14 +463,14 @@ impl Machine for Emulator {
     }
 
     fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
-        // While nobody takes what waits, more of it is no reason to wake up.
+        // While nobody takes the waiting output, more of it is no reason to wake up.
         let running =
             self.running.iter().filter(|running| running.from_board.bytes.len() < WAITING_LIMIT);
         running.map(|running| running.output.as_fd()).collect()
     }
 }
 
-/// Milliseconds since 1970, as this computer has it.
+/// Milliseconds since 1970 by this computer's clock.
 fn time_of_day_ms() -> u64 {
     let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since_1970.as_millis()).unwrap_or_default()
@@ -524,7 +524,7 @@ mod tests {
     fn an_emulator_that_ends_says_how_and_why() {
         let image = tempfile::NamedTempFile::new().unwrap();
         let mut options = EmulatorOptions::new(image.path());
-        // The shell knows no option -M.
+        // The shell does not know the option -M.
         options.program = Some("/bin/sh".into());
         let mut emulator =
             Emulator::new(&options, Model::Ser160, 0, false, &AtomicBool::new(false)).unwrap();

@@ -1,9 +1,10 @@
 //! What the emulator reads and writes besides its standard streams, and how it gets it.
 //!
 //! # Design
-//! A name that is looked up twice may lead to two things: whoever may write to the folder can put a
-//! link there in between. So we open, look at what we have got, and the emulator inherits that; of
-//! names it gets only the image's, which it reads, and those of sockets in a folder of our own.
+//! A name that is looked up twice may lead to two things, because anyone who may write to the
+//! folder can put a link there in between. So we open a file, check what we have got, and let the
+//! emulator inherit it. The only names that the emulator gets are the image's, which it reads, and
+//! those of sockets in a folder of our own.
 
 use std::ffi::OsString;
 use std::fs::{self, File, Metadata};
@@ -22,20 +23,20 @@ use crate::error::SimError;
 use crate::options::EmulatorOptions;
 use crate::qemu::external_bus::{ExternalBus, MEMORY_LEN};
 
-/// How often it is looked whether somebody reads the pipe that the log goes to.
+/// How often the log's pipe is tried while nobody reads it.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// The folder of a process's own descriptors.
 const DESCRIPTORS: &str = if cfg!(target_os = "linux") { "/proc/self/fd" } else { "/dev/fd" };
 
-/// Files for the emulator, as often as it is started.
+/// Files for the emulator, for as many starts as there are.
 pub struct EmulatorFiles {
     image: PathBuf,
     log: Option<File>,
 }
 
 impl EmulatorFiles {
-    /// Makes the log. Where that is a pipe, waits until somebody reads it, or until told to stop.
+    /// Makes the log. If the log is a pipe, waits until somebody reads it, or until told to stop.
     ///
     /// # Errors
     /// When the image is no file, or the log cannot be made or is something that is not ours.
@@ -45,8 +46,8 @@ impl EmulatorFiles {
         Ok(EmulatorFiles { image: options.image.clone(), log })
     }
 
-    /// Copies for an emulator that is about to be started; it must not be started later than this
-    /// goes.
+    /// Copies for an emulator that is about to be started. It must be started before they are
+    /// dropped.
     ///
     /// # Errors
     /// When this process can open no more files.
@@ -58,16 +59,16 @@ impl EmulatorFiles {
     }
 }
 
-/// Descriptors that every process inherits which is started meanwhile.
+/// Descriptors that every process started meanwhile inherits.
 pub struct HandedOver {
-    /// What the board is made of, for the emulator.
+    /// The emulator's arguments that say what the board is made of.
     pub arguments: Vec<OsString>,
     _memory: OwnedFd,
     _log: Option<OwnedFd>,
 }
 
 fn inherited(file: impl AsFd) -> io::Result<OwnedFd> {
-    // Without the flag that closes it.
+    // The copy is not closed when a process starts, as the original is.
     Ok(rustix::io::dup(file)?)
 }
 
@@ -98,7 +99,7 @@ fn arguments(image: &Path, memory: &OwnedFd, log: Option<&OwnedFd>) -> Vec<OsStr
     match log {
         None => arguments.push("null,id=log".into()),
         Some(log) => {
-            // Behind what it has logged already: the board may have been off in between.
+            // New text is appended to the log, because the board may have been off in between.
             arguments.push("file,id=log,append=on,path=/dev/fdset/1".into());
             arguments.extend(["-add-fd".into(), format!("fd={},set=1", log.as_raw_fd()).into()]);
         }
@@ -107,8 +108,8 @@ fn arguments(image: &Path, memory: &OwnedFd, log: Option<&OwnedFd>) -> Vec<OsStr
     arguments
 }
 
-/// Makes the file for the log. A pipe, a terminal or the null device may be there already: writing
-/// to one destroys nothing.
+/// Makes the file for the log. A pipe, a terminal or the null device may be there already, because
+/// writing to one destroys nothing.
 fn open_log(path: &Path, stop: &AtomicBool) -> Result<File, SimError> {
     let failed = |error| SimError::io(format!("make the log {}", path.display()))(error);
     let taken = || SimError::LogTaken(path.to_owned());
@@ -116,7 +117,8 @@ fn open_log(path: &Path, stop: &AtomicBool) -> Result<File, SimError> {
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
         made => return made.map_err(failed),
     }
-    // Before it is opened: there are devices that take notice of that. A link may lead nowhere.
+    // Checked before it is opened, because some devices react to being opened. A link may lead
+    // nowhere.
     let kind = fs::metadata(path).map_err(|_| taken())?.file_type();
     if !kind.is_fifo() && !kind.is_char_device() {
         return Err(taken());
@@ -132,7 +134,7 @@ fn open_log(path: &Path, stop: &AtomicBool) -> Result<File, SimError> {
         }
         thread::sleep(LOOK_EVERY);
     };
-    // By now it may be something else.
+    // It may be something else by now.
     let found = file.metadata().map_err(failed)?;
     if !found.file_type().is_fifo() && !isatty(&file) && !is_null(&found) {
         return Err(taken());
@@ -142,7 +144,7 @@ fn open_log(path: &Path, stop: &AtomicBool) -> Result<File, SimError> {
     Ok(file)
 }
 
-/// Opens what is there to write to it, without waiting for anybody.
+/// Opens what is already there to write to it, without waiting for anybody.
 fn open_device(path: &Path) -> rustix::io::Result<File> {
     let flags = OFlags::WRONLY | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
     rustix::fs::open(path, flags, rustix::fs::Mode::empty()).map(File::from)

@@ -2,8 +2,8 @@
 //!
 //! # Design
 //! The file is mapped and used one aligned 32-bit word at a time, except for the GENI window, which
-//! has bytes. Plain writes to the file would show up on the board as well, but the kernel copies a
-//! few bytes one by one, and an input latch caught between two of its bytes would be a contact
+//! has bytes. Plain writes to the file would reach the board as well. But the kernel copies a few
+//! bytes one by one, and an input latch that is read between two of its bytes would show a contact
 //! change that never was.
 
 use std::fs::{self, File, Metadata};
@@ -18,7 +18,7 @@ use rustix::fs::OFlags;
 use ser_board::last_words::MAX_TEXT_LEN;
 use ser_proto::Model;
 
-/// Bytes of the external memory; QEMU is told the same.
+/// Bytes of the external memory. QEMU is told the same number.
 pub(crate) const MEMORY_LEN: u64 = 16 << 20;
 
 /// The GENI board's shared RAM, byte by byte.
@@ -53,7 +53,7 @@ const CLOCK_COUNT_MS: usize = 0x8030;
 const BOOT_TIME_US: usize = 0x803C;
 /// Length of what its latest fault had to say, and then the text.
 const LAST_WORDS: usize = 0x8080;
-/// How many starts ago that was; 0 for never.
+/// How many starts ago the latest fault was; 0 for never.
 const LAST_WORDS_AGE: usize = 0x80E0;
 
 /// Two words that tell a file of ours from any other; written here.
@@ -61,13 +61,13 @@ const MARK: usize = 0x80F0;
 /// `SER bus1`.
 const MADE_BY_US: [u32; 2] = [u32::from_le_bytes(*b"SER "), u32::from_le_bytes(*b"bus1")];
 
-/// Opens a memory that was made before; nothing where the file is something else.
+/// Opens a memory that was made before; `None` where the file is something else.
 fn open_memory(path: &Path) -> io::Result<Option<File>> {
-    // Before it is opened: a pipe would wait for its other end.
+    // Checked before it is opened, because opening a pipe would wait for its other end.
     if !is_memory(&fs::symlink_metadata(path)?) {
         return Ok(None);
     }
-    // By now it may be something else.
+    // It may be something else by now.
     let flags = OFlags::NOFOLLOW | OFlags::NONBLOCK;
     let file = File::options()
         .read(true)
@@ -90,7 +90,7 @@ fn is_memory(found: &Metadata) -> bool {
 pub struct ExternalBus {
     memory: MmapRaw,
     file: File,
-    /// When the clock's count was written last, and the longest time between two such moments; 0
+    /// When the clock's count was last written, and the longest time between two such moments; 0
     /// for never.
     clock_written_ms: AtomicU64,
     clock_gap_ms: AtomicU64,

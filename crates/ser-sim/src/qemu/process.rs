@@ -14,10 +14,10 @@ use crate::error::SimError;
 /// The program that is started where no other one is named.
 pub const PROGRAM: &str = "qemu-system-arm";
 
-/// So much of what QEMU prints is shown: more than it has to say about itself.
+/// How much of QEMU's printed text is shown. QEMU has less than that to say about itself.
 const MAX_PRINTED_LEN: u64 = 16_384;
 
-/// The process; goes with us.
+/// The process. It is killed when this is dropped.
 pub struct Qemu(pub Child);
 
 impl Drop for Qemu {
@@ -33,7 +33,7 @@ impl Drop for Qemu {
 /// # Errors
 /// When it is not installed, or cannot be started.
 pub fn spawn(process: &mut Process, program: &Path) -> Result<Qemu, SimError> {
-    // Ctrl-C at the terminal is for us; we end it when we end.
+    // Ctrl-C at the terminal is for us. We end the emulator when we end.
     process.process_group(0);
     match process.spawn() {
         Err(error) if error.kind() == ErrorKind::NotFound => {
@@ -43,11 +43,11 @@ pub fn spawn(process: &mut Process, program: &Path) -> Result<Qemu, SimError> {
     }
 }
 
-/// What the emulator has printed, or its beginning.
+/// What the emulator has printed, cut at the limit.
 #[must_use]
 pub fn read_printed(path: &Path) -> String {
     let mut printed = Vec::new();
-    // It is an addition to a failure that is told in any case.
+    // The text only adds to a failure that is reported in any case.
     let _ = File::open(path).and_then(|file| file.take(MAX_PRINTED_LEN).read_to_end(&mut printed));
     String::from_utf8_lossy(&printed).trim().to_owned()
 }
@@ -61,7 +61,7 @@ pub fn never_wait(descriptor: impl AsFd) -> io::Result<()> {
     Ok(fcntl_setfl(&descriptor, flags | OFlags::NONBLOCK)?)
 }
 
-/// Whether it is worth trying again.
+/// Whether the operation is worth trying again.
 #[must_use]
 pub fn is_temporary(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)

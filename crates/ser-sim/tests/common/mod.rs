@@ -13,7 +13,7 @@ use rustix::fs::OFlags;
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use ser_proto::{Command, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Reply};
 
-/// Far longer than anything here takes: only a test that fails waits for it.
+/// Far longer than anything here takes. Only a test that fails waits for it.
 pub(crate) const LONG: Duration = Duration::from_secs(20);
 
 /// Waits until `condition` gives something.
@@ -24,7 +24,7 @@ pub(crate) fn wait_for<T>(what: &str, mut condition: impl FnMut() -> Option<T>) 
             return found;
         }
         assert!(began.elapsed() < LONG, "waited in vain: {what}");
-        // Only to leave the processor to those who are waited for.
+        // Gives the processor to those who are waited for.
         thread::park_timeout(Duration::from_millis(1));
     }
 }
@@ -61,7 +61,7 @@ impl Terminal {
         self.0.write_all(&frame(command)).unwrap();
     }
 
-    /// Sends a command and waits for the reply to it; other messages are passed over.
+    /// Sends a command and waits for the reply to it. Other messages are skipped.
     pub(crate) fn ask(&mut self, command: &Command) -> Reply {
         self.send(command);
         let mut decoder = FrameDecoder::<MAX_BODY_LEN>::new();
@@ -82,7 +82,7 @@ impl Terminal {
         self.read_within(LONG).expect("bytes from the node")
     }
 
-    /// Waits for bytes, but not for ever.
+    /// Waits for bytes, at most for `timeout`.
     pub(crate) fn read_within(&mut self, timeout: Duration) -> Option<Vec<u8>> {
         let timeout = Timespec::try_from(timeout).unwrap();
         let ready = poll(&mut [PollFd::new(&self.0, PollFlags::IN)], Some(&timeout)).unwrap();
@@ -95,7 +95,7 @@ impl Terminal {
     }
 }
 
-/// A host on TCP; `port` as [`Simulator::port`](ser_sim::Simulator::port) gives it.
+/// A host on TCP. `port` is what [`Simulator::port`](ser_sim::Simulator::port) returns.
 pub(crate) fn connect(port: &str) -> TcpStream {
     let stream = TcpStream::connect(port.strip_prefix("tcp://").unwrap()).unwrap();
     stream.set_read_timeout(Some(LONG)).unwrap();

@@ -15,16 +15,14 @@ Examples:
   cargo xtask simulate --hours 1 --bus-one-in 1 always on a bus
   cargo xtask simulate --load --hours 1         a change of all inputs in every millisecond
 
-A bus is lived through scan by scan, and everything else from one event to the next, hundreds of \
-times as fast. A life
-on a bus is over in minutes, and another one may take days: of a hundred hours, a few minutes \
-are on a bus. So both
-paces are told apart.";
+A bus is simulated scan by scan, everything else from one event to the next, hundreds of times as
+fast. A life on a bus is over in minutes, while another one may take days: of a hundred hours, a few
+minutes are on a bus. Therefore both paces are reported.";
 
 const MS_PER_HOUR: f64 = 3_600_000.0;
 
-/// A longer run is better given as more seeds: they go more ways, and what fails is sooner
-/// repeated.
+/// The longest run. More seeds are better than a longer run: they take more different ways, and a
+/// failure is repeated sooner.
 const MAX_HOURS: f64 = 100_000.0;
 
 /// Run the whole system in virtual time, with random operations and faults, and account for every
@@ -32,7 +30,7 @@ const MAX_HOURS: f64 = 100_000.0;
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask simulate", bin_name = "cargo xtask simulate", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Everything follows from this number.
+    /// The number from which everything follows.
     #[arg(long, default_value_t = 1, value_parser = at_least::<0>, allow_negative_numbers = true)]
     seed: u64,
 
@@ -40,23 +38,23 @@ struct Arguments {
     #[arg(long = "hours", value_name = "HOURS", default_value = "100", value_parser = duration_ms, allow_negative_numbers = true)]
     duration_ms: u64,
 
-    /// So many seeds, one after the other; after the largest there is comes 0.
+    /// How many seeds to run, one after the other. The largest seed is followed by 0.
     #[arg(long, default_value_t = 1, value_parser = at_least::<1>, allow_negative_numbers = true)]
     seeds: u64,
 
-    /// Of the lives, from power-up to power cut, the first and one in so many of the others are on
-    /// a Genius bus; with 0 there is no bus at all.
+    /// How often a life, from power-up to power cut, is on a Genius bus: the first life, and one in
+    /// this many of the others. With 0 there is no bus at all.
     #[arg(long, value_name = "LIVES", default_value_t = 8, value_parser = at_least::<0>, allow_negative_numbers = true)]
     bus_one_in: u64,
 
     /// All inputs toggle in every millisecond, and everybody reads, prints and reports as fast as
-    /// it goes.
+    /// possible.
     #[arg(long)]
     load: bool,
 }
 
 impl Arguments {
-    /// The seeds to run, of which there is at least one.
+    /// The seeds to run, at least one.
     fn seeds(&self) -> impl Iterator<Item = u64> {
         (0..self.seeds).map(|count| self.seed.wrapping_add(count))
     }
@@ -68,7 +66,7 @@ fn at_least<const LEAST: u64>(text: &str) -> Result<u64, String> {
     number.ok_or_else(|| format!("must be a whole number from {LEAST} to {}", u64::MAX))
 }
 
-/// Hours as milliseconds, at least one: a run of none would find nothing wrong.
+/// Hours as milliseconds, at least one, because an empty run would find nothing wrong.
 fn duration_ms(text: &str) -> Result<u64, String> {
     let hours = text.parse().ok().filter(|hours| *hours > 0.0 && *hours <= MAX_HOURS);
     #[expect(
@@ -89,8 +87,8 @@ fn main() -> ExitCode {
     run_all(&arguments).map_or_else(|code| code, |()| ExitCode::SUCCESS)
 }
 
-/// Runs all seeds, up to the first that fails or that nobody wants to hear of any more: then the
-/// exit code.
+/// Runs all seeds, up to the first that fails or until nobody reads the output any more. The error
+/// is the exit code.
 fn run_all(arguments: &Arguments) -> Result<(), ExitCode> {
     let mut total = Paces::default();
     for seed in arguments.seeds() {
@@ -116,7 +114,7 @@ fn run(seed: u64, arguments: &Arguments) -> Result<Paces, ExitCode> {
             Ok(paces)
         }
         Err(failure) => {
-            // Nobody is left to be told when standard error is gone.
+            // When standard error is gone, nobody is left to be told.
             let _ = writeln!(io::stderr(), "{failure}");
             Err(ExitCode::FAILURE)
         }
@@ -135,7 +133,7 @@ mod tests {
         parse(arguments).unwrap_or_else(|error| panic!("{arguments:?}: {error}"))
     }
 
-    /// It is refused for its value, in these words.
+    /// Checks that the arguments are refused for their value, in these words.
     fn assert_refused(arguments: &[&str], words: &str) {
         let error = parse(arguments).expect_err(words);
         assert_eq!(error.kind(), clap::error::ErrorKind::ValueValidation, "{error}");

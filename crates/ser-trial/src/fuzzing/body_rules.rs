@@ -1,24 +1,25 @@
-//! Which bodies are messages, by the tables of `docs/protocol.md`: the second opinion on what the
-//! parsers say.
+//! Which bodies are messages, by the tables of `docs/protocol.md`. This is the second opinion on
+//! what the parsers say.
 
 use chrono::NaiveDate;
 use ser_proto::{FrameEncoder, ParseError};
 
 use super::framing::frame_of;
 
-/// The first field that cannot have its value: where it starts, and the value.
+/// The first field with a value that it cannot have: where the field starts, and the value.
 pub(super) type Fault = Option<(usize, u16)>;
 
 /// What a table says about the bodies of one direction.
 pub(super) struct Rules {
-    /// Whether a body with this command byte may have so many bytes.
+    /// Whether a body with this command byte may have this many bytes.
     pub(super) has_length: fn(code: u8, length: usize) -> bool,
     /// The first field out of range, in a body whose length is right.
     pub(super) fault: fn(body: &[u8]) -> Fault,
 }
 
 impl Rules {
-    /// Whether a body is a message; if not, the error is the right one.
+    /// Checks that a body is taken for a message if it is one, and otherwise refused with the right
+    /// error.
     pub(super) fn assert_agree<T: std::fmt::Debug>(
         &self,
         body: &[u8],
@@ -60,8 +61,8 @@ impl Rules {
     }
 }
 
-/// Entries whose size is that of no model: in read replies, the only bodies of `R` that may be
-/// longer than a command.
+/// The error of entries whose size is that of no model. They occur in read replies, the only bodies
+/// of `R` that may be longer than a command.
 fn entry_size(rules: &Rules, body: &[u8]) -> Option<ParseError> {
     if body[0] != b'R' || !(rules.has_length)(b'R', 9) {
         return None;
@@ -76,19 +77,19 @@ pub(super) fn word(body: &[u8], offset: usize) -> u16 {
     u16::from_be_bytes([body[offset], body[offset + 1]])
 }
 
-/// The first byte, from `offset` on, that lies above its limit.
+/// The first byte, from `offset` on, that is above its limit.
 pub(super) fn above(body: &[u8], offset: usize, limits: &[u8]) -> Fault {
     let mut fields = (offset..).zip(limits);
     fields.find(|&(at, &limit)| body[at] > limit).map(|(at, _)| (at, body[at].into()))
 }
 
-/// The settings of a configuration, in both directions.
+/// The first wrong field in the settings of a configuration, in both directions.
 pub(super) fn settings_fault(body: &[u8]) -> Fault {
     let size = word(body, 1);
     if size > 2048 { Some((1, size)) } else { above(body, 3, &[7, 3, 31, 1]) }
 }
 
-/// A date and time from `offset` on.
+/// The first wrong field in a date and time from `offset` on.
 pub(super) fn time_fault(body: &[u8], offset: usize) -> Fault {
     let [year, month, day] = [body[offset], body[offset + 1], body[offset + 2]];
     if year > 99 {
@@ -106,7 +107,7 @@ pub(super) fn time_fault(body: &[u8], offset: usize) -> Fault {
         .or((millisecond > 999).then_some((offset + 6, millisecond)))
 }
 
-/// What is sent is what is canonical, and its frame is what the protocol says.
+/// Checks that what is sent is canonical, and that its frame is as the protocol says.
 pub(super) fn assert_emitted(emitted: ser_proto::Body, canonical: &[u8]) {
     assert_eq!(*emitted, *canonical);
     assert_eq!(FrameEncoder::new(emitted).collect::<Vec<u8>>(), frame_of(canonical));

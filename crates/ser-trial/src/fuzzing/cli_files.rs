@@ -11,15 +11,15 @@ use super::dribble::Dribble;
 /// What errors call the file.
 const NAME: &str = "contacts.csv";
 
-/// The nodes of the bus on which the file is tried, too.
+/// The nodes of the bus on which the file is tried as well.
 const NODES: [(u8, Model); 2] = [(5, Model::Ser160), (9, Model::Ser320)];
 
-/// The file is `data`. For both models, and for nodes on a bus:
+/// `data` is the file. For both models, and for nodes on a bus:
 ///
-/// - it is read or refused, however slowly it comes, always with the same result;
+/// - it is read or refused, always with the same result, however slowly it comes;
 /// - an error names the file and one of its lines;
-/// - steps are in order, of inputs that there are, none twice in a millisecond, and not more than
-///   there are lines;
+/// - steps are in order, only existing inputs move, none moves twice in a millisecond, and there
+///   are no more steps than lines;
 /// - steps that are written down again are read as the same steps.
 ///
 /// # Panics
@@ -61,7 +61,7 @@ fn check(data: &[u8], read: Reading<'_>) -> Option<Scenario> {
         }
         Err(error) => {
             assert_eq!(error.file, NAME);
-            // A header that is missing is missing behind the last line.
+            // A missing header is reported after the last line.
             let places = lines as u64 + u64::from(error.reason == ScenarioFault::NoHeader);
             assert!((1..=places).contains(&error.line), "line {} of {lines}", error.line);
             assert!(error.to_string().starts_with(&format!("{NAME}, line {}: ", error.line)));

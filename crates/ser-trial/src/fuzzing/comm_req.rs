@@ -2,11 +2,11 @@
 
 use ser_proto::genius::{CommReq, CommReqError, MAX_WORDS, bytes_of_words, words_of_bytes};
 
-/// `data` are the words, two bytes each, low byte first.
+/// `data` holds the words, two bytes each, low byte first.
 ///
-/// - Words are understood if, and only if, the table in `docs/genius.md` has such a block; they go
-///   out as the canonical words, and mean the same then.
-/// - What is refused is refused for a word that is there, is missing, or is too much.
+/// - Words are understood if, and only if, the table in `docs/genius.md` has such a block. They are
+///   written again as the canonical words, with the same meaning.
+/// - A refusal names a word that is wrong, is missing, or is too much.
 /// - Bytes come out of words as they went in.
 ///
 /// # Panics
@@ -32,7 +32,7 @@ pub fn comm_req(data: &[u8]) {
     }
 }
 
-/// Whether the words are a block by the table, with the latitude that it has.
+/// Whether the words are a block by the table, with the latitude that the table gives.
 fn is_block(words: &[u16]) -> bool {
     let [length, 0, _, status, 0, 0, command, rest @ ..] = words else { return false };
     let is_address = |word: u16| word <= 31 || word == 255;
@@ -66,7 +66,7 @@ fn canonical(block: &CommReq, words: &[u16]) -> Vec<u16> {
     let CommReq::Send(send) = block else { return words.to_vec() };
     let bytes = usize::from(words[11]);
     assert_eq!(send.data.len(), bytes);
-    // The word that the manual's rule counts in excess may be there, and word 0 may leave it out.
+    // The word that the manual's rule counts in excess may be present, and word 0 may leave it out.
     let mut canonical = words[..12 + bytes.div_ceil(2)].to_vec();
     canonical[0] = u16::try_from(bytes.div_ceil(2) + 7).expect("a short block");
     if bytes % 2 == 1

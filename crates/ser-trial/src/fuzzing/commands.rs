@@ -6,10 +6,10 @@ use super::body_rules::{Fault, Rules, above, assert_emitted, settings_fault, tim
 
 const RULES: Rules = Rules { has_length, fault };
 
-/// The body is `data`.
+/// `data` is the body.
 ///
-/// - It is understood, or refused with the very cause, as the tables of `docs/protocol.md` have it.
-/// - What was understood goes out in its canonical form, and means the same then.
+/// - It is understood, or refused with the right cause, as the tables of `docs/protocol.md` say.
+/// - A body that was understood is sent in its canonical form, with the same meaning.
 ///
 /// # Panics
 /// When one of these does not hold.
@@ -44,7 +44,7 @@ fn fault(body: &[u8]) -> Fault {
     }
 }
 
-/// Of several ways to say the same, the one that we use.
+/// The form that we use, where the same can be said in several ways.
 fn canonical(body: &[u8]) -> Vec<u8> {
     match *body {
         [b'C', a, b, baud, 1, address, print] => vec![b'C', a, b, baud, 0, address, print],

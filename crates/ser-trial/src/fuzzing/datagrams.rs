@@ -8,13 +8,13 @@ use ser_proto::{Command, Reply};
 
 use super::script::Script;
 
-/// `data` is source, destination, function, subfunction, priority and then what the datagram
+/// `data` is source, destination, function, subfunction and priority, followed by what the datagram
 /// carries.
 ///
-/// - The bus's own datagrams are understood if, and only if, `docs/genius.md` has them so, and go
-///   out as the same bytes; what is refused is refused for a reason that is there.
+/// - The bus's own datagrams are understood if, and only if, they are as `docs/genius.md` says, and
+///   are sent as the same bytes. A refusal gives a reason that applies.
 /// - A recorder's messages are those of `commands` and `replies`, and only under their own codes.
-/// - Global data go out as the bytes that came in; DIP switches are understood or refused.
+/// - Global data are sent as the bytes that came in. DIP switches are understood or refused.
 ///
 /// # Panics
 /// When one of these does not hold.
@@ -55,7 +55,7 @@ fn bus_message(datagram: &Datagram) {
             let mut expected = datagram.clone();
             if let (Subfunction::ReadIdReply, Some(rate)) = (subfunction, expected.data.last_mut())
             {
-                // Half a byte of it means nothing.
+                // Half of this byte has no meaning.
                 *rate &= 0xF0;
             }
             assert_eq!(sent, expected);
@@ -77,7 +77,7 @@ fn bus_message(datagram: &Datagram) {
     }
 }
 
-/// Whether a datagram has one of the layouts, or none that we know.
+/// Whether a datagram has one of the known layouts, or a code that we do not know.
 fn is_bus_message(datagram: &Datagram) -> bool {
     let data = &datagram.data[..];
     datagram.function == 0x20
@@ -118,7 +118,7 @@ fn recorder_message(datagram: &Datagram) {
         assert_eq!(sent.command(), Ok(command));
     }
     if let (Ok(reply), Address::Device(to)) = (reply, datagram.destination) {
-        // What came in a datagram fits one.
+        // What came in a datagram fits a datagram.
         let sent = Datagram::from_reply(datagram.source, to, &reply).expect("a reply that fits");
         assert_eq!(sent.reply(), Ok(reply));
     }

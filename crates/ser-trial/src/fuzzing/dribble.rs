@@ -2,7 +2,7 @@
 
 use std::io::{self, Read};
 
-/// Hands out a few bytes at a time; how many, the bytes say themselves.
+/// Hands out a few bytes at a time. The bytes themselves say how many.
 pub(super) struct Dribble<'a> {
     pub(super) data: &'a [u8],
 }

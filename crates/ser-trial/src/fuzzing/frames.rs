@@ -4,12 +4,12 @@ use ser_proto::{DroppedFrame, ESC, FrameDecoder, FrameError, MAX_BODY_LEN};
 
 use super::framing::{Seen, decode, frame_of};
 
-/// The stream is `data`. For decoders of every size that is in use:
+/// `data` is the stream. For decoders of every size that is in use:
 ///
-/// - what is found is what `docs/protocol.md` says, with every dropped frame at its true place;
-/// - it does not depend on how the stream is cut;
+/// - the decoder finds what `docs/protocol.md` says, with every dropped frame at its true place;
+/// - the result does not depend on how the stream is cut;
 /// - a good frame after the stream is found, whatever the stream was;
-/// - a body that was found, in a frame again, is found again.
+/// - a body that was found is found again when it is put into a frame.
 ///
 /// # Panics
 /// When one of these does not hold.
@@ -22,7 +22,7 @@ pub fn frames(data: &[u8]) {
 fn for_bodies_of_up_to<const N: usize>(stream: &[u8]) {
     let seen = decode::<N>(stream);
     assert_eq!(seen, by_the_book(stream, N));
-    // The byte at which a slice begins says how long it is.
+    // The first byte of a slice says how long the slice is.
     assert_eq!(
         decode_slices::<N>(stream, |slice| 1 + usize::from(slice[0]) % 9),
         seen,
@@ -60,8 +60,8 @@ fn decode_slices<const N: usize>(stream: &[u8], slice_len: impl Fn(&[u8]) -> usi
     seen
 }
 
-/// What is in a stream, found by looking at it as a whole: an ESC ends what was before it, so each
-/// stretch from one to the next can be understood alone.
+/// The contents of a stream, found by looking at it as a whole. An ESC ends what was before it, so
+/// each stretch from one ESC to the next can be understood alone.
 fn by_the_book(stream: &[u8], longest: usize) -> Vec<Seen> {
     let mut stretches = stream.split(|&byte| byte == ESC);
     let before = stretches.next().unwrap_or_default();
@@ -77,8 +77,8 @@ fn by_the_book(stream: &[u8], longest: usize) -> Vec<Seen> {
     seen
 }
 
-/// What follows an ESC up to the next one, or to the end of the stream: what becomes of the frame,
-/// and the text behind it.
+/// Understands what follows an ESC up to the next one, or to the end of the stream: the result of
+/// the frame, and the text after it.
 fn understand(stretch: &[u8], start: u64, is_last: bool, longest: usize) -> (Option<Seen>, &[u8]) {
     let digits = stretch.iter().take_while(|byte| byte.is_ascii_hexdigit()).count();
     let drop_at = |index: usize, cause| {

@@ -1,4 +1,4 @@
-//! The frame around a body, written down once more from the description in `docs/protocol.md`.
+//! The frame around a body, implemented a second time from the description in `docs/protocol.md`.
 
 use ser_proto::{Decoded, DroppedFrame, ESC, FrameDecoder};
 
@@ -13,7 +13,7 @@ pub(super) fn frame_of(body: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// What a decoder has found, in a form that can be kept.
+/// What a decoder has found, in a form that can be stored.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Seen {
     Text(u8),
@@ -31,7 +31,7 @@ impl From<Decoded<'_>> for Seen {
     }
 }
 
-/// What is in a stream, to its end.
+/// Everything that a decoder finds in a stream.
 pub(super) fn decode<const N: usize>(stream: &[u8]) -> Vec<Seen> {
     let mut decoder = FrameDecoder::<N>::new();
     let mut seen: Vec<Seen> =

@@ -1,10 +1,10 @@
 //! What must hold whatever arrives: one function per part of the system that takes bytes from
 //! outside.
 //!
-//! Each target takes any bytes and panics when a property does not hold; that nothing panics
-//! otherwise is the least of them. The fuzzer in `tests/fuzz` looks for bytes that break one, and
-//! the tests in `tests/fuzz_seeds.rs` go through those that are kept as seeds. Nothing here reads a
-//! clock or waits, so the same bytes always do the same.
+//! Each target takes any bytes and panics when a property does not hold. That the code under test
+//! never panics is the least of them. The fuzzer in `tests/fuzz` looks for bytes that break a
+//! property, and the tests in `tests/fuzz_seeds.rs` run those that are kept as seeds. Nothing here
+//! reads a clock or waits, so the same bytes always do the same.
 
 mod body_rules;
 mod captures;
@@ -44,7 +44,7 @@ pub struct Target {
     pub run: fn(&[u8]),
 }
 
-/// All of them.
+/// All targets.
 pub const TARGETS: [Target; 11] = [
     Target { name: "frames", run: frames },
     Target { name: "commands", run: commands },

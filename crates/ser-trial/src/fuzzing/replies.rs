@@ -6,11 +6,11 @@ use super::body_rules::{Fault, Rules, above, assert_emitted, settings_fault, wor
 
 const RULES: Rules = Rules { has_length, fault };
 
-/// The body is `data`.
+/// `data` is the body.
 ///
-/// - It is understood, or refused with the very cause, as the tables of `docs/protocol.md` have it.
-/// - What was understood goes out in its canonical form, and means the same then.
-/// - The entries of a read reply are as many as it says, and of a model that has their size.
+/// - It is understood, or refused with the right cause, as the tables of `docs/protocol.md` say.
+/// - A body that was understood is sent in its canonical form, with the same meaning.
+/// - A read reply has as many entries as it says, and its model has entries of this size.
 ///
 /// # Panics
 /// When one of these does not hold.
@@ -37,7 +37,7 @@ fn has_length(code: u8, length: usize) -> bool {
         b'E' | b'S' => length == 1,
         b'M' => length == 3,
         b'P' => [1, 3, 5].contains(&length),
-        // The entries are looked at when the header is in order.
+        // The entries are checked once the header is in order.
         b'R' => length >= 8,
         _ => false,
     }
@@ -61,7 +61,7 @@ fn fault(body: &[u8]) -> Fault {
     }
 }
 
-/// Of several ways to say the same, the one that we use.
+/// The form that we use, where the same can be said in several ways.
 fn canonical(body: &[u8]) -> Vec<u8> {
     match *body {
         [b'C', a, b, baud, 1, address, print] => vec![b'C', a, b, baud, 0, address, print],

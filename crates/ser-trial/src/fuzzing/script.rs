@@ -1,7 +1,7 @@
 //! Bytes that decide what happens.
 
-/// Decisions, taken from bytes in the order in which they are asked for. When there are no more,
-/// all are 0.
+/// Decisions, taken from bytes in the order in which they are asked for. When the bytes are used
+/// up, every further decision is 0.
 #[derive(Clone, Debug)]
 pub(super) struct Script<'a> {
     bytes: &'a [u8],
@@ -30,13 +30,13 @@ impl<'a> Script<'a> {
         u32::from(self.word()) | u32::from(self.word()) << 16
     }
 
-    /// The next bytes, as many as the first of them says, as far as there are so many.
+    /// The next bytes. The first of them says how many; there may be fewer.
     pub(super) fn run(&mut self) -> &'a [u8] {
         let count = usize::from(self.byte());
         self.take(count)
     }
 
-    /// The next `count` bytes, as far as there are so many.
+    /// The next `count` bytes, or as many as there are.
     pub(super) fn take(&mut self, count: usize) -> &'a [u8] {
         let (taken, rest) = self.bytes.split_at(count.min(self.bytes.len()));
         self.bytes = rest;

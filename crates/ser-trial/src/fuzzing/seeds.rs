@@ -1,8 +1,8 @@
 //! Seeds: inputs that are kept, each in a file whose name says what it is.
 //!
-//! A file whose name ends with `.hex` is text: pairs of hexadecimal digits, `HH*COUNT` for a byte
-//! that is repeated, `"text"` for its ASCII characters, and `#` for a comment up to the end of the
-//! line. Any other file is what it is.
+//! A file whose name ends with `.hex` is text: pairs of hexadecimal digits, `HH*COUNT` for a
+//! repeated byte, `"text"` for its ASCII characters, and `#` for a comment up to the end of the
+//! line. Any other file is taken byte for byte.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,8 @@
-//! What `ser-cli` keeps between two runs of what it has delivered.
+//! The file in which `ser-cli` keeps, from one run to the next, what it has delivered.
 
 use ser_cli::Delivered;
 
-/// The content of the file is `data`: it is read or refused, and what is read is the same after it
+/// `data` is the content of the file. It is read or refused, and what is read is the same after it
 /// has been written down again.
 ///
 /// # Panics

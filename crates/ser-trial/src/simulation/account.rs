@@ -1,5 +1,5 @@
-//! What one reader was told, held against the ledger: each event once and in order, and each loss
-//! for what it was.
+//! What one reader was told, compared with the ledger: each event once and in order, and each loss
+//! reported as what it was.
 
 mod silence;
 #[cfg(test)]
@@ -17,32 +17,31 @@ use super::wrong::{Told, Wrong, erases};
 use silence::Silence;
 pub use silence::{Known, Unreported};
 
-/// The recorder's total counts modulo this, so that a reader may miss a multiple of it without a
-/// trace.
+/// The recorder's total counts modulo this, so a reader may miss a multiple of it without a trace.
 const TOTAL_WRAPS_AT: usize = 65_536;
 
-/// A reader that events come too fast for gives up some of the oldest that are still there: so many
-/// times as many as came during one of its requests.
+/// How many events a reader may give up that are still in the log, as a multiple of those that came
+/// during its reading. It gives up the oldest when events come too fast for it.
 const HASTE: usize = 4;
 
-/// What became of the events of a recorder, for one reader; each is in one of these.
+/// What became of the events of a recorder, for one reader. Each event is in one of these.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Delivered, once and in order.
     pub delivered: u64,
     /// Reported as overwritten, with the right count.
     pub overwritten: u64,
-    /// Went unread with an erase or the power, and that was reported.
+    /// Went unread with an erase or the power, and reported.
     pub gone: u64,
-    /// Went the same way without a report, for one of the reasons that there can be.
+    /// Went unread with an erase or the power, and not reported, for one of the allowed reasons.
     pub unreported: Unreported,
     /// Recorded while this reader's port was not connected.
     pub unwatched: u64,
-    /// Places at which inputs had changed unrecorded, and that was reported.
+    /// Places at which inputs had changed unrecorded, and reported.
     pub unrecorded: u64,
     /// Restarts of the log that were reported.
     pub restarts: u64,
-    /// Restarts of the log that left no trace which a reader could have found.
+    /// Restarts of the log that left no trace for a reader to find.
     pub traceless: u64,
     /// Losses whose count was too low by a multiple of 65536.
     pub wrapped: u64,
@@ -63,28 +62,29 @@ pub struct Account {
     life: u64,
     /// Index of the next event to be delivered.
     next: usize,
-    /// So many erases of this life, from the first one on, are behind the reader.
+    /// How many erases of this life, counted from the first one, are behind the reader.
     erases_behind: usize,
     /// Whether the log began anew with the power and the reader has not got past that.
     new_life: bool,
-    /// What was told and belongs before the next event.
+    /// Whether a restart of the log was reported since the latest event.
     restart_told: bool,
-    /// If that was told of an empty log: events from this one on came later, and are not what was
-    /// told of.
+    /// The first event that can have come after the reported restart, if that was told of an empty
+    /// log. Events from this one on are not among those the report told of.
     told_up_to: usize,
     lost_told: usize,
     /// Inputs that were told to have changed unrecorded.
     unrecorded_told: u32,
-    /// The total in the latest reply of its reading, and how far it has gone on since the first.
+    /// The total in the latest reply of the reading, and how far it has gone on since the first
+    /// reply.
     seen_total: Option<u16>,
     came_meanwhile: usize,
-    /// What the reader knows, and so would miss.
+    /// What the reader knows, and would therefore miss.
     known: Known,
     /// Events that went unread with the power, until it is seen whether that is reported.
     cut_off: u64,
-    /// The same events: the reading that the power cut through may have some of them in hand.
+    /// The same events. A reading that the power cut through may still hold some of them.
     in_hand: VecDeque<Recorded>,
-    /// Whether the log of that life had begun unseen, so that its count of losses is worth nothing.
+    /// Whether the log of that life had begun unseen. If so, its count of losses is worthless.
     in_hand_uncounted: bool,
     tally: Tally,
 }
@@ -119,7 +119,7 @@ impl Account {
         self.name
     }
 
-    /// What the reader has to go by.
+    /// Says what the reader has to go by.
     pub fn set_known(&mut self, known: Known) {
         self.known = known;
     }
@@ -131,8 +131,8 @@ impl Account {
         self.in_hand.clear();
     }
 
-    /// A reply of the reading says that the log has had so many events. Replies may be late, so how
-    /// many there are by now is not what the reader goes by.
+    /// Notes the log's total from a reply of the reading. Replies may be late, so the reader cannot
+    /// go by the number of events that there are by now.
     pub fn see_total(&mut self, total: u16) {
         let before = self.seen_total.replace(total).unwrap_or(total);
         self.came_meanwhile += usize::from(total.wrapping_sub(before));
@@ -151,7 +151,8 @@ impl Account {
         (self.life == ledger.life()).then_some(self.next)
     }
 
-    /// The power goes. What is unread is gone; if this reader was connected, it has to be told.
+    /// Notes that the power goes. What is unread is gone. If this reader was connected, it has to
+    /// be told.
     pub fn power_goes(&mut self, ledger: &Ledger, connected: bool) {
         let mut place = self.place(ledger).unwrap_or(0);
         if self.restart_told {
@@ -175,10 +176,10 @@ impl Account {
         self.lost_told = 0;
     }
 
-    /// The reader is told something.
+    /// Checks something that the reader is told.
     ///
     /// # Errors
-    /// When that is not so.
+    /// When it is not true.
     pub fn take(&mut self, delivery: &Delivery, ledger: &Ledger) -> Result<(), String> {
         self.life = ledger.life();
         match *delivery {
@@ -213,7 +214,7 @@ impl Account {
         Ok(())
     }
 
-    /// Erases that the reader may not have got past: of some it is not known exactly where they
+    /// Erases that the reader may not have got past. It is not always known exactly where they
     /// were.
     fn erases_ahead(&self, ledger: &Ledger) -> impl DoubleEndedIterator<Item = Erase> {
         let next = self.next;
@@ -255,8 +256,8 @@ impl Account {
         }
     }
 
-    /// Checks what was told of changes between the latest delivery and the event right after it.
-    /// Where an erase can have been between them, the reader need not know that event before.
+    /// Checks the changes that were reported between the latest delivery and the event right after
+    /// it. Where an erase can have been between them, the reader need not know the earlier event.
     fn check_unrecorded(
         &mut self,
         index: usize,
@@ -276,8 +277,8 @@ impl Account {
             .err()
     }
 
-    /// How many of the events in hand come before this one, if it is one of them and these are
-    /// reported as lost.
+    /// How many of the events in hand were skipped before this one, if it is one of them and the
+    /// skipped ones are reported as lost.
     fn in_hand_before(&self, entry: &Entry, lost: usize) -> Option<usize> {
         let first = if self.in_hand_uncounted { 0 } else { lost };
         let is = |skipped: &usize| self.in_hand.get(*skipped).is_some_and(|event| event.is(entry));
@@ -285,7 +286,7 @@ impl Account {
     }
 
     /// Delivers an event that was read before the power went. A small ring that is full again, and
-    /// stands as if the log had gone on, leaves no trace of that; the next reading misses the event
+    /// looks as if the log had gone on, leaves no trace of that. The next reading misses the event
     /// that was delivered last.
     fn deliver_in_hand(&mut self, skipped: usize) {
         self.in_hand.drain(..=skipped);
@@ -295,23 +296,23 @@ impl Account {
         self.known = Known::Event;
     }
 
-    /// Whether so much has happened since the latest delivery that the total tells little of it. It
-    /// can look as if the event delivered last must still be there, and then its absence looks like
+    /// Whether so much has happened since the latest delivery that the total tells little about it.
+    /// It may look as if the event delivered last must still be there; its absence then looks like
     /// an erase.
     fn has_wrapped(&self, ledger: &Ledger) -> bool {
         ledger.len() - self.next >= TOTAL_WRAPS_AT
     }
 
-    /// The erase from which on the total counts, where there seems to have been another one since.
+    /// The erase from which on the total counts, where the reader seems to see another erase since.
     fn looks_erased(&self, ledger: &Ledger) -> Option<Erase> {
         let latest =
             ledger.erases()[..self.erases_behind].last().copied().unwrap_or(Erase::POWER_UP);
         (self.restart_told && self.has_wrapped(ledger)).then_some(latest)
     }
 
-    /// The event after an erase of which there is no word, to a reader that knows the event before.
-    /// It leaves no trace where the log is full again; the count of what is lost is then that of
-    /// two totals that have nothing to do with each other.
+    /// The event after an erase that was not reported, for a reader that knows the event before.
+    /// Where the log is full again, the erase leaves no trace. The count of the loss is then the
+    /// difference of two unrelated totals.
     fn after_traceless(
         &self,
         erase: Erase,
@@ -322,15 +323,15 @@ impl Account {
         self.silence(erase, ledger).and_then(|_| found())
     }
 
-    /// Why the reader finds no trace of an erase, if it may find none.
+    /// Why the reader finds no trace of an erase, if it is allowed to find none.
     fn silence(&self, erase: Erase, ledger: &Ledger) -> Option<Silence> {
         let full_again = ledger.overwritten_before() > erase.from
             || ledger.len() - erase.from >= ledger.smallest_size().into();
         self.known.silence(full_again)
     }
 
-    /// An erase that lies between the latest delivery and the event of this index, that must have
-    /// been seen and of which there is no word.
+    /// An erase between the latest delivery and the event of this index that the reader must have
+    /// seen and that was not reported.
     fn silent_erase(&self, index: usize, ledger: &Ledger) -> Option<Erase> {
         if self.restart_told {
             return None;
@@ -343,8 +344,8 @@ impl Account {
         { erases }.find(|&erase| self.silence(erase, ledger).is_none())
     }
 
-    /// How many times the total has wrapped unseen before the event at `index` or so many rings
-    /// further on.
+    /// How many times the total has wrapped unseen before the event, which is the one at `index` or
+    /// lies a multiple of the wrap further on.
     fn wraps_until(
         &self,
         index: usize,
@@ -355,7 +356,7 @@ impl Account {
         (0..=wraps).find(|wraps| is(index + wraps * TOTAL_WRAPS_AT))
     }
 
-    /// Delivers an event of the same log, after so many that were reported as lost.
+    /// Delivers an event of the same log, after `lost` events that were reported as lost.
     fn go_on(
         &mut self,
         index: usize,
@@ -395,7 +396,7 @@ impl Account {
         self.deliver(index, ledger)
     }
 
-    /// Checks that the events before this one, which the reader was not given, can have been
+    /// Checks that the events before `index` that the reader was not given can have been
     /// overwritten.
     fn check_overwritten(&self, index: usize, lost: usize, ledger: &Ledger) -> Result<(), String> {
         let came = self.came_meanwhile;
@@ -419,7 +420,7 @@ impl Account {
             .err()
     }
 
-    /// These events are gone with this erase, with or without a word.
+    /// Counts events that went with this erase, reported or not.
     fn count_gone(
         &mut self,
         events: Range<usize>,
@@ -429,7 +430,7 @@ impl Account {
         let all = events.len() as u64;
         let told = match (self.restart_told, self.known) {
             (false, _) => 0,
-            // It was told right before an event.
+            // The restart was reported right before an event.
             (true, Known::Event) => all,
             (true, _) => told(events, self.told_up_to),
         };
@@ -437,7 +438,7 @@ impl Account {
         self.count_unreported(all - told, erase, ledger)
     }
 
-    /// What went unread with the power is gone, with or without a word.
+    /// Counts what went unread with the power, reported or not.
     fn count_cut_off(&mut self, ledger: &Ledger) -> Result<(), String> {
         let cut_off = std::mem::take(&mut self.cut_off);
         if self.restart_told {
@@ -465,7 +466,7 @@ impl Account {
         Ok(())
     }
 
-    /// What was told of a restart, or was not, has been accounted for.
+    /// Closes the account of a restart, reported or not.
     fn end_restart(&mut self) {
         self.tally.restarts += u64::from(self.restart_told);
         self.restart_told = false;
@@ -521,14 +522,14 @@ impl Account {
             .to_string()
     }
 
-    /// Checks that a reader that has read to the end has been told of everything.
+    /// Checks that a reader that has read to the end has been told everything.
     ///
     /// # Errors
     /// When it has not.
     pub fn finish_reading(&mut self, ledger: &Ledger) -> Result<(), String> {
         let len = ledger.len();
         let place = self.place(ledger).unwrap_or(0);
-        // An erase with nothing after it; that one need not be the last to have arrived.
+        // An erase with nothing after it. It need not be the last erase to have arrived.
         let emptied =
             self.erases_ahead(ledger).find(|erase| erase.to >= len).filter(|_| place < len);
         if (self.new_life || emptied.is_some()) && self.known == Known::Event && !self.restart_told
@@ -553,12 +554,13 @@ impl Account {
     }
 }
 
-/// How many of these events are before the one up to which a restart was told of.
+/// How many of these events are before the one up to which a restart was reported.
 fn told(events: Range<usize>, up_to: usize) -> u64 {
     events.end.min(up_to).saturating_sub(events.start) as u64
 }
 
-/// The event after an erase with so many reported as lost before it, or a multiple of 65536 more.
+/// The event after an erase, with exactly `lost` events reported as lost before it, or with a
+/// multiple of 65536 more.
 fn after_exactly(
     erase: Erase,
     lost: usize,

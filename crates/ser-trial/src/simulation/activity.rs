@@ -40,7 +40,7 @@ impl Activity {
         self.next_ms
     }
 
-    /// What happens now, and for how long nothing happens then.
+    /// What happens now, and for how long nothing happens afterwards.
     pub fn next_scene(&mut self, now_ms: u64, tempo: Tempo) -> Scenario {
         let mut steps = Vec::new();
         match self.chance.below(100) {
@@ -53,7 +53,7 @@ impl Activity {
         }
         let lasts_ms = steps.last().map_or(0, |step: &Step| step.at_ms);
         let pause_ms = match (tempo, self.chance.below(100)) {
-            // Behind the last millisecond of this scene comes the first of the next.
+            // The first millisecond of the next scene follows the last one of this scene.
             (Tempo::Flat, _) => 0,
             (Tempo::Busy, _) => self.chance.spread(1..=3_000),
             (Tempo::Plant, 0..60) => self.chance.spread(10..=60_000),
@@ -97,7 +97,7 @@ impl Activity {
         }
     }
 
-    /// The supply of all contacts goes, or comes.
+    /// The supply of all contacts goes or comes.
     fn together(&mut self, steps: &mut Vec<Step>) {
         for at_ms in 0..self.chance.within(1..=3) {
             (1..=self.inputs).for_each(|input| self.toggle(steps, at_ms * 7, input));

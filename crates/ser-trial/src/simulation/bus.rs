@@ -1,7 +1,7 @@
 //! The Genius bus of one life: recorders and the host with their boards, other devices, and what
 //! goes wrong.
 //!
-//! A bus is lived through in full, event by event, as its devices have something to do in every
+//! A bus is simulated in full, event by event, because its devices have something to do in every
 //! scan.
 
 use std::cell::RefCell;
@@ -30,15 +30,15 @@ use super::orders::{self, Way};
 use super::taps::{BusTap, Expected, Taken, TappedWindow, answered_as};
 use super::trail::Trail;
 
-/// Device numbers.
+/// Bus addresses.
 pub(super) const HOST: u8 = 31;
 const DEAF: u8 = 20;
 const FIRST_UNIT: u8 = 5;
 
-/// Reset line at power-up, as short as the boards allow.
+/// The reset line at power-up, held as shortly as the boards allow.
 const RESET: Start = Start::Reset { hold_ms: 20 };
 
-/// By then a recorder's board has sent a reply, or the reply has been given up.
+/// How soon a recorder's board has sent a reply, or given it up.
 const REPLIED_WITHIN_MS: u64 = 20_000;
 
 /// A recorder's connection to the bus.
@@ -47,15 +47,15 @@ struct UnitPort {
     port: GeniusPort<TappedWindow>,
     board: Handle<Board>,
     tap: BusTap,
-    /// Whether its board's interrupt line is connected. Without it the recorder goes by its looks
-    /// at the board.
+    /// Whether its board's interrupt line is connected. Without it the recorder depends on its own
+    /// looks at the board.
     has_line: bool,
-    /// How often the recorder had given its board up when it was served last.
+    /// How often the recorder had given up its board when it was last served.
     failures: u32,
-    /// Whether its board has started anew without the recorder's doing, so that it was looked at
-    /// too early.
+    /// Whether its board has started anew without the recorder's doing. The recorder then looked at
+    /// it too early.
     restarted: bool,
-    /// Since when datagrams had waited that a board which started anew took with it: the recorder
+    /// Since when datagrams had waited that were lost when the board started anew. The recorder
     /// waits for them until it finds that out.
     gone_since_ms: Option<u64>,
 }
@@ -71,7 +71,7 @@ pub struct BusHost {
 }
 
 impl BusHost {
-    /// A host that has not said anything yet to so many recorders.
+    /// A host that has not said anything yet to this many recorders.
     #[must_use]
     pub fn new(chance: Chance, units: usize) -> BusHost {
         const NAMES: [&str; 2] = ["bus, first", "bus, second"];
@@ -87,7 +87,7 @@ impl BusHost {
         }
     }
 
-    /// The bus is gone, and what was under way.
+    /// The bus is gone, with everything that was under way.
     pub fn power_cycled(&mut self, now_ms: u64) {
         self.outgoing.clear();
         self.talks.iter_mut().for_each(|talk| talk.give_up(now_ms));
@@ -208,7 +208,7 @@ impl BusLife {
         self.bus.borrow_mut().advance_to((now_ms - self.begin_ms) * 1000);
     }
 
-    /// Tick that a recorder's interrupt has in this microsecond of the bus.
+    /// The millisecond of the simulation in which this microsecond of the bus lies, as a tick.
     fn ms(&self, bus_us: u64) -> u64 {
         self.begin_ms + tick_ms(bus_us)
     }
@@ -225,8 +225,9 @@ impl BusLife {
         ledger.wait_after(self.untaken_since_ms(index));
     }
 
-    /// Since when the oldest datagram waits that a recorder still has to take from its board, by
-    /// its interrupt line or by its looks. From a board that has failed nothing will be taken.
+    /// Since when the oldest datagram waits that a recorder still has to take from its board. The
+    /// recorder knows it by its interrupt line or by its looks. From a board that has failed it
+    /// will take nothing.
     fn untaken_since_ms(&mut self, index: usize) -> Option<u64> {
         let UnitPort { port, board, tap, has_line, gone_since_ms, .. } = &mut self.units[index];
         if !port.is_ready() {
@@ -246,7 +247,7 @@ impl BusLife {
     /// its flag; `None` if there was no such look.
     ///
     /// # Errors
-    /// When a look lies outside of what it may be.
+    /// When a look lies outside its allowed range.
     fn arrived_ms(&self, index: usize, taken: &Taken, now_ms: u64) -> Result<Option<u64>, String> {
         let came_ms = self.ms(taken.arrived_us);
         if self.units[index].has_line {
@@ -261,7 +262,7 @@ impl BusLife {
         }
     }
 
-    /// Lets the port of a recorder live, whose node has come to the present.
+    /// Lets the port of a recorder work whose node has come to the present.
     ///
     /// # Errors
     /// When a datagram counts as arrived at a time at which it cannot have been seen.
@@ -292,7 +293,7 @@ impl BusLife {
                         ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS);
                     }
                 }
-                // A time is worth nothing if nobody knows when it came.
+                // A time is worthless if nobody knows when it arrived.
                 Ok(Command::SetClock(time)) => {
                     arrived_ms.into_iter().for_each(|at_ms| ledger.set_clock(at_ms, time));
                 }
@@ -346,7 +347,7 @@ impl BusLife {
         if self.driver.can_transmit()
             && let Some(next) = host.outgoing.pop_front()
         {
-            // Who is not there does not answer, and is asked again.
+            // A recorder that is not there does not answer, and is asked again.
             let _ = self.driver.transmit(next);
         }
         Ok(())
@@ -384,7 +385,8 @@ impl BusLife {
                 return Fault::Disconnect { device: chance.pick(&everybody), for_us };
             }
             3 => {
-                // Somebody turns the switches of another device to a recorder's number, and back.
+                // Somebody sets the switches of another device to a recorder's bus address, and
+                // back.
                 let number = chance.pick(&[FIRST_UNIT, DEAF]);
                 return Fault::Inside {
                     device: self.others[0],
@@ -401,7 +403,7 @@ impl BusLife {
         Fault::Inside { device: chance.pick(&boards), fault: inside }
     }
 
-    /// Nothing goes wrong from now on by anybody's doing.
+    /// From now on nobody makes anything go wrong.
     pub fn mend(&mut self, trail: &Trail) {
         trail.note("bus: mended");
         let mut bus = self.bus.borrow_mut();
@@ -422,7 +424,7 @@ impl BusLife {
         let bus = self.bus.borrow();
         let boards = self.units.iter().map(|unit| (unit.number, unit.board, unit.restarted));
         for (number, board, restarted) in boards.chain([(HOST, self.host, self.host_restarted)]) {
-            // Nobody tells a host that its board has started anew by itself: it finds out by
+            // Nobody tells a host that its board has started anew by itself. The host finds out by
             // looking.
             let allowed = |kind| restarted && kind == ViolationKind::TooEarly;
             let broken =

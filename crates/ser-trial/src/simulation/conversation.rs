@@ -11,7 +11,8 @@ use ser_proto::{Command, Configuration, ReadReply, Reply, TimeStamp};
 use super::account::{Account, Known};
 use super::ledger::Ledger;
 
-/// How often a reading begins anew because the log was changed under it, as the client has it.
+/// How often a reading begins anew because the log was changed under it. The client has the same
+/// limit.
 const MAX_RESYNCS: u32 = 4;
 
 /// What a host wants from a recorder.
@@ -21,12 +22,11 @@ pub enum Order {
     Read,
     /// The answer to a command.
     Ask(Command),
-    /// The clock to be set, with a time of its own for every attempt: this much later than the
-    /// first.
+    /// To set the clock, with a different time for every attempt: this much later than the first.
     SetClock(TimeStamp),
 }
 
-/// What the host is about.
+/// What the host is doing.
 enum Job {
     Rest,
     Read { reader: Box<LogReader>, resyncs: u32 },
@@ -35,7 +35,7 @@ enum Job {
     SetClock(TimeStamp),
 }
 
-/// What there was to be counted.
+/// Counts of what happened in a conversation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Talk {
     /// Requests that were answered.
@@ -44,7 +44,7 @@ pub struct Talk {
     pub unanswered: u64,
     /// Readings to the end of the log.
     pub readings: u64,
-    /// Readings that met with a log that was erased or resized under them.
+    /// Readings during which the log was erased or resized.
     pub disturbed: u64,
     /// Read replies that nobody was waiting for: auto reports, answers that came too late.
     pub reports: u64,
@@ -52,7 +52,7 @@ pub struct Talk {
     pub lines: u64,
 }
 
-/// The conversation.
+/// A host's conversation with one recorder.
 pub struct Conversation {
     session: Session,
     job: Job,
@@ -61,7 +61,7 @@ pub struct Conversation {
     size: u16,
     may_keep_up: bool,
     account: Account,
-    /// The settings in force, by the latest answer, until somebody asks.
+    /// The settings in force by the latest answer, until somebody takes them.
     in_force: Option<Configuration>,
     /// Requests in a row that were not answered.
     failures: u32,
@@ -74,7 +74,7 @@ pub struct Conversation {
     talk: Talk,
 }
 
-/// A message that wants to go out.
+/// A message to be sent.
 pub struct Outgoing {
     /// For a bus.
     pub command: Command,
@@ -104,19 +104,19 @@ impl Conversation {
         }
     }
 
-    /// The same with one request at a time, as the client does it on a bus.
+    /// The same conversation with one request at a time, as the client has it on a bus.
     #[must_use]
     pub fn one_at_a_time(self) -> Conversation {
         Conversation { session: self.session.one_at_a_time(), ..self }
     }
 
-    /// From now on every other reading goes on for as long as there is enough for a full reply,
+    /// Lets every other reading from now on continue as long as there is enough for a full reply,
     /// which may be for ever.
     pub fn keep_up(&mut self) {
         self.may_keep_up = true;
     }
 
-    /// The session, where the line changes.
+    /// The session, to tell it about changes of the line.
     pub fn session(&mut self) -> &mut Session {
         &mut self.session
     }
@@ -127,12 +127,12 @@ impl Conversation {
         &self.account
     }
 
-    /// The same, to be changed.
+    /// What the reader was told, mutably.
     pub fn account_mut(&mut self) -> &mut Account {
         &mut self.account
     }
 
-    /// What there was to be counted.
+    /// What was counted.
     #[must_use]
     pub fn talk(&self) -> Talk {
         self.talk
@@ -161,7 +161,7 @@ impl Conversation {
         self.in_force.take()
     }
 
-    /// Whether the latest order was a reading that began at this time or later and came to the end
+    /// Whether the latest order was a reading that began at this time or later and reached the end
     /// of the log.
     #[must_use]
     pub fn has_read_since(&self, ms: u64) -> bool {
@@ -185,15 +185,15 @@ impl Conversation {
         )
     }
 
-    /// Begins something. The host must be resting.
+    /// Begins an order. The host must be resting.
     pub fn begin(&mut self, order: Order, now_ms: u64) {
         self.at_end = false;
         self.began_ms = now_ms;
         match order {
             Order::Read => {
                 self.behind = false;
-                // Another host may have changed it, and a reading is only as good as the size that
-                // it goes by.
+                // The size is asked for again, because another host may have changed it, and a
+                // reading is only as good as the size that it assumes.
                 self.job = Job::LearnSize { resyncs: 0 };
                 self.request(Command::QueryConfiguration, now_ms);
             }
@@ -209,7 +209,7 @@ impl Conversation {
         }
     }
 
-    /// Forgets what is under way, as a program that is ended.
+    /// Forgets what is under way, like a program that is ended.
     pub fn give_up(&mut self, now_ms: u64) {
         self.session.cancel(duration(now_ms));
         self.job = Job::Rest;
@@ -217,7 +217,7 @@ impl Conversation {
 
     fn request(&mut self, command: Command, now_ms: u64) {
         self.session.cancel(duration(now_ms));
-        // Nothing else is under way now.
+        // No other request is under way now, so there is room.
         let _ = self.session.request(command);
     }
 
@@ -250,14 +250,14 @@ impl Conversation {
         }
     }
 
-    /// When there is something to be done, if nothing arrives before.
+    /// When there is something to do, if nothing arrives before.
     #[must_use]
     pub fn wake_ms(&self) -> Option<u64> {
         let at = self.session.poll_at()?;
         Some(u64::try_from(at.as_nanos().div_ceil(1_000_000)).unwrap_or(u64::MAX))
     }
 
-    /// Does what is due, and gives what wants to go out.
+    /// Does what is due, and returns what is to be sent.
     ///
     /// # Errors
     /// When the recorder's log is not what it must be.
@@ -284,7 +284,7 @@ impl Conversation {
         self.failures += 1;
         self.talk.unanswered += 1;
         match self.job {
-            // As an original unit, which does not know the question: the size stays what it was.
+            // An original recorder does not know the question. The size stays what it was.
             Job::LearnSize { resyncs } if resyncs > 0 => self.begin_reading(resyncs, now_ms),
             _ => self.job = Job::Rest,
         }
@@ -296,7 +296,7 @@ impl Conversation {
             return Some(Outgoing { command: *attempt.command(), frame: attempt.frame().to_vec() });
         };
         let mut attempt = self.session.dispatch(duration(now_ms))?;
-        // Each attempt has a time of its own, so that one sees which of them it was.
+        // Each attempt has a time of its own, which shows which attempt it was.
         let millisecond = (u32::from(time.millisecond) + attempt.number()) % 1000;
         attempt
             .set_time(TimeStamp { millisecond: u16::try_from(millisecond).unwrap_or(0), ..time });
@@ -358,7 +358,7 @@ impl Conversation {
                 Unsolicited::Line(_) => self.talk.lines += 1,
                 Unsolicited::Report(_) => {
                     self.talk.reports += 1;
-                    // Who is reading gets to these events anyway.
+                    // A reading that is under way gets to these events anyway.
                     self.behind |= !matches!(self.job, Job::Read { .. });
                 }
             }

@@ -1,5 +1,5 @@
-//! Debounce as one would explain it: a change counts when the input has stayed in its new state
-//! long enough, and it happened when the input went there.
+//! Debounce in its simplest form: a change counts when the input has stayed in its new state long
+//! enough, and it happened when the input went there.
 
 use ser_node::Debounce;
 
@@ -26,7 +26,7 @@ pub struct DebounceModel {
 pub type Accepted = (u8, u64);
 
 impl DebounceModel {
-    /// Inputs that have been in these states for ever.
+    /// Inputs that have always been in these states.
     #[must_use]
     pub fn new(debounce: Debounce, state: u32) -> DebounceModel {
         let mut inputs = [Input::default(); 32];
@@ -37,14 +37,14 @@ impl DebounceModel {
         DebounceModel { debounce, inputs, unsettled: 0, filtered: 0 }
     }
 
-    /// Inputs change in this millisecond. What was accepted before it comes out.
+    /// Inputs change in this millisecond. `out` gets what was accepted before.
     pub fn change(&mut self, at_ms: u64, changed: u32, out: &mut Vec<Accepted>) {
         self.settle(at_ms.saturating_sub(1), out);
         for bit in (0..32_u8).filter(|bit| changed >> bit & 1 == 1) {
             let input = &mut self.inputs[usize::from(bit)];
             input.now = !input.now;
             if input.now == input.accepted {
-                // There and back again.
+                // The input went there and back again.
                 self.filtered += 2;
             }
             input.since_ms = at_ms;
@@ -53,7 +53,7 @@ impl DebounceModel {
         }
     }
 
-    /// What has been accepted when the sample of `now_ms` has been taken.
+    /// Adds what has been accepted once the sample of `now_ms` has been taken.
     pub fn settle(&mut self, now_ms: u64, out: &mut Vec<Accepted>) {
         if self.unsettled == 0 {
             return;
@@ -69,7 +69,7 @@ impl DebounceModel {
         }
     }
 
-    /// Inputs change and nobody sees it happen.
+    /// Inputs change without anybody seeing it.
     pub fn follow(&mut self, changed: u32) {
         for bit in (0..32_u8).filter(|bit| changed >> bit & 1 == 1) {
             let input = &mut self.inputs[usize::from(bit)];

@@ -1,29 +1,30 @@
-//! A whole run in one number: two runs that differ anywhere have different ones, as good as always.
+//! A whole run in one number. Two runs that differ anywhere almost certainly have different
+//! numbers.
 
-/// FNV-1a, 64 bits.
+/// The FNV-1a hash, 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Digest(u64);
 
 impl Digest {
-    /// Of nothing.
+    /// The digest of nothing.
     #[must_use]
     pub const fn new() -> Digest {
         Digest(0xCBF2_9CE4_8422_2325)
     }
 
-    /// Of what there was, and these bytes.
+    /// Adds these bytes.
     pub fn bytes(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3);
         }
     }
 
-    /// Of what there was, and this number.
+    /// Adds this number.
     pub fn number(&mut self, number: u64) {
         self.bytes(&number.to_le_bytes());
     }
 
-    /// The number.
+    /// The digest of everything so far.
     #[must_use]
     pub const fn value(self) -> u64 {
         self.0

@@ -1,10 +1,10 @@
-//! What a recorder must have recorded, worked out from what was done to it and from nothing that it
+//! What a recorder must have recorded, worked out only from what was done to it, never from what it
 //! says.
 //!
-//! Every edge of every contact goes through here: filtered by debounce, stamped by the clock as it
-//! was set at that moment, recorded or not as the mode was. The result is a list of events that is
-//! never erased nor overwritten; erases are marks in it, between the events that they can have come
-//! between.
+//! Every edge of every contact goes through here. It is filtered by debounce, stamped by the clock
+//! as set at that moment, and recorded or not depending on the mode. The result is a list of events
+//! that is never erased nor overwritten. Erases are marks in the list, between the events that they
+//! can have come between.
 
 #[cfg(test)]
 mod tests;
@@ -22,19 +22,19 @@ use super::wrong::{Numbered, Told, Wrong, erases};
 /// A hundred years, 1970–2069: what two-digit years can tell apart.
 const CENTURY_MS: i64 = 36_525 * 86_400_000;
 
-/// So many events are kept at least: more than a log holds and a plant does while a printed line
-/// waits for a host that is stuck.
+/// How many events are kept at least. That is more than a log holds, and more than a plant produces
+/// while a printed line waits for a host that is stuck.
 const KEPT: usize = 1 << 17;
 
-/// For so long a reply may be on its way that tells older settings.
+/// How long a reply with older settings may be on its way.
 const SETTINGS_SETTLE_MS: u64 = 120_000;
 
-/// What became of edges; each is in one of these.
+/// What became of edges. Each edge is in one of these.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Edges {
-    /// All that contacts did.
+    /// All edges of the contacts.
     pub applied: u64,
-    /// In events.
+    /// Recorded in events.
     pub recorded: u64,
     /// While recording was stopped.
     pub stopped: u64,
@@ -42,9 +42,9 @@ pub struct Edges {
     pub filtered: u64,
     /// Beyond the capture queue, while the main loop was held up.
     pub queue_full: u64,
-    /// Not dealt with when the power was cut.
+    /// Not processed when the power was cut.
     pub cut_off: u64,
-    /// Not dealt with yet.
+    /// Not processed yet.
     pub undecided: u64,
 }
 
@@ -57,7 +57,7 @@ pub enum Port {
     Bus,
 }
 
-/// A change of the log that has been asked for and of which it is not known yet when it is done.
+/// A change of the log that was asked for, while it is not known when it is done.
 #[derive(Clone, Copy, Debug)]
 enum Due {
     /// The erase of this number.
@@ -66,61 +66,62 @@ enum Due {
     Size {
         /// `None` if it leaves the size alone.
         to: Option<u16>,
-        /// Whether the size was changed over another port meanwhile, so that the answer may be of
-        /// before.
+        /// Whether the size was changed over another port meanwhile. The answer may then be from
+        /// before that.
         doubtful: bool,
     },
 }
 
-/// What is known of one millisecond and not recorded yet.
+/// What is known of one millisecond and not yet recorded.
 #[derive(Clone, Copy, Debug, Default)]
 struct Waiting {
     /// Inputs that changed in it.
     changed: u32,
-    /// Inputs that had changed before it beyond the capture queue: its sample is the first to show
-    /// them.
+    /// Inputs whose earlier changes did not fit the capture queue. The sample of this millisecond
+    /// is the first to show them.
     dropped: u32,
 }
 
-/// The books of one recorder, from power-up to power-up.
+/// The ledger of one recorder, over all its lives.
 #[derive(Clone, Debug)]
 pub struct Ledger {
     mask: u32,
     hold_ms: u64,
     debounce: DebounceModel,
-    /// Accepted changes that an earlier one may still come before, or a datagram that has not been
-    /// read.
+    /// Accepted changes that are held back, because an earlier change or an unread datagram may
+    /// still come before them.
     waiting: BTreeMap<u64, Waiting>,
     /// When the oldest datagram arrived that the recorder has not taken from its board.
     wait_after_ms: Option<u64>,
-    /// Inputs that have changed beyond the capture queue since the latest change that was accepted.
+    /// Inputs whose changes did not fit the capture queue since the latest accepted change.
     dropped: u32,
-    /// Contacts, and inputs as the latest event has them.
+    /// The contacts now, and the inputs as of the latest event.
     contacts: u32,
     state: u32,
-    /// Inputs that changed since the latest event, with recording stopped or beyond the capture
-    /// queue.
+    /// Inputs that changed since the latest event while recording was stopped, or beyond the
+    /// capture queue.
     unrecorded: u32,
-    /// From which millisecond on the clock shows that much more than the simulation's time.
+    /// From which millisecond on the clock is ahead of the simulation's time, and by how much.
     clock: Vec<(u64, i64)>,
     recording: Vec<(u64, bool)>,
     events: VecDeque<Recorded>,
-    /// Events that nobody can be told any more, at the beginning of the list.
+    /// How many events at the beginning of the list were dropped because nobody can be told of
+    /// them.
     forgotten: usize,
     erases: Vec<Erase>,
-    /// With the time by which it will have been done, or never will be.
+    /// Each with the time by which it will have been done, or never will be.
     due: VecDeque<(Port, u64, Due)>,
     size: u16,
-    /// The settings in force, where they are known; the power does not change them.
+    /// The settings in force, where they are known. The power does not change them.
     configuration: Option<Configuration>,
-    /// They are known again from then on: on a bus, one does not see when a reply is made.
+    /// From when on the settings are known again. On a bus one does not see when a reply is made.
     known_from_ms: u64,
     now_ms: u64,
     /// Events before this one can have been overwritten.
     overwritten_before: usize,
     life: u64,
     edges: Edges,
-    /// In earlier lives.
+    /// Edges that debounce filtered in earlier lives.
     filtered_before: u64,
     accepted: Vec<Accepted>,
 }
@@ -157,7 +158,7 @@ impl Ledger {
         }
     }
 
-    /// The power comes on; the clock shows this.
+    /// Switches the power on; the clock shows `time_ms`.
     pub fn power_up(&mut self, now_ms: u64, time_ms: i64, size: u16, debounce: Debounce) {
         self.edges.cut_off += self.undecided();
         self.filtered_before += self.debounce.filtered();
@@ -179,14 +180,14 @@ impl Ledger {
         self.life += 1;
     }
 
-    /// The recorder has been on for that much longer, and its clock has gone on.
+    /// Ages the recorder: it has been on for that much longer, and its clock has gone on.
     pub fn grow_older(&mut self, by_ms: u64) {
         for (_, ahead_ms) in &mut self.clock {
             *ahead_ms += signed(by_ms);
         }
     }
 
-    /// Edges that are not decided upon.
+    /// Edges that are not decided yet.
     fn undecided(&self) -> u64 {
         let waiting: u64 =
             self.waiting.values().map(|waiting| u64::from(waiting.changed.count_ones())).sum();
@@ -204,7 +205,7 @@ impl Ledger {
         self.accepted = accepted;
     }
 
-    /// Contacts move, one move per millisecond, while the main loop is held up. For recorders
+    /// Contacts move, one move per millisecond, while the main loop is held up. Only for recorders
     /// without debounce.
     pub fn contacts_moved_unseen(&mut self, moves: impl Iterator<Item = (u64, u32)>) {
         for (count, (at_ms, changed)) in moves.enumerate() {
@@ -213,7 +214,7 @@ impl Ledger {
                 self.settle(at_ms);
                 continue;
             }
-            // In effect, and in no event.
+            // The change takes effect without an event.
             self.contacts ^= changed;
             let changed = changed & self.mask;
             self.dropped ^= changed;
@@ -233,13 +234,13 @@ impl Ledger {
         self.record_until(now_ms);
     }
 
-    /// Changes after this millisecond wait for a datagram that arrived in it, for as long as a
-    /// recorder holds any back.
+    /// Makes changes after this millisecond wait for a datagram that arrived in it, at most as long
+    /// as a recorder holds changes back.
     pub fn wait_after(&mut self, arrived_ms: Option<u64>) {
         self.wait_after_ms = arrived_ms;
     }
 
-    /// Records what waits for nothing when the sample of this millisecond has been taken.
+    /// Records what has nothing to wait for once the sample of this millisecond has been taken.
     fn record_until(&mut self, now_ms: u64) {
         while let Some(first) = self.waiting.first_entry() {
             let at_ms = *first.key();
@@ -256,7 +257,7 @@ impl Ledger {
 
     fn take_accepted(&mut self, accepted: &mut Vec<Accepted>) {
         if let Some((_, at_ms)) = accepted.first() {
-            // What waits from before does not know of them.
+            // Events that are already waiting do not know of the dropped changes.
             self.waiting.entry(*at_ms).or_default().dropped ^= std::mem::take(&mut self.dropped);
         }
         for (bit, at_ms) in accepted.drain(..) {
@@ -279,7 +280,7 @@ impl Ledger {
         self.note_overwritten();
     }
 
-    /// What is in the smallest log that there may be now.
+    /// Notes which events the smallest possible log no longer holds.
     fn note_overwritten(&mut self) {
         let size = usize::from(self.smallest_size());
         self.overwritten_before = self.overwritten_before.max(self.len().saturating_sub(size));
@@ -295,7 +296,7 @@ impl Ledger {
         sizes.fold(self.size, u16::min)
     }
 
-    /// The clock was set in this millisecond; samples after it have the new time, those excepted
+    /// The clock was set in this millisecond. Samples after it have the new time, except for those
     /// that have been recorded since.
     pub fn set_clock(&mut self, at_ms: u64, time: TimeStamp) {
         if let Some(time_ms) = stamp_ms(time) {
@@ -303,7 +304,7 @@ impl Ledger {
         }
     }
 
-    /// Recording was started or stopped in this millisecond, behind its sample.
+    /// Recording was started or stopped in this millisecond, after its sample.
     pub fn set_recording(&mut self, at_ms: u64, recording: bool) {
         set(&mut self.recording, at_ms, recording);
     }
@@ -315,7 +316,7 @@ impl Ledger {
         (ahead_ms + signed(now_ms)).rem_euclid(CENTURY_MS)
     }
 
-    /// A command has arrived that waits for its turn; what it changes is done by this time, or
+    /// A command has arrived that waits for its turn. What it changes is done by `until_ms`, or
     /// never.
     pub fn command_arrived(&mut self, port: Port, command: &Command, until_ms: u64) {
         match command {
@@ -323,7 +324,7 @@ impl Ledger {
                 self.erases.push(Erase { from: self.len(), to: usize::MAX, certain: false });
                 self.due.push_back((port, until_ms, Due::Erase(self.erases.len() - 1)));
             }
-            // Its answer looks the same.
+            // Its answer looks the same as a configuration's.
             Command::QueryConfiguration => {
                 self.due.push_back((port, until_ms, Due::Size { to: None, doubtful: false }));
             }
@@ -405,21 +406,21 @@ impl Ledger {
         Ok(())
     }
 
-    /// What was to be done by now has been done, or never will be.
+    /// Closes the changes whose time is over: they have been done, or never will be.
     pub fn expire(&mut self, now_ms: u64) {
         while self.due.iter().any(|&(_, until_ms, _)| until_ms <= now_ms) {
             self.finish(|_, until_ms, _| until_ms <= now_ms);
         }
     }
 
-    /// The oldest of these has been done, or never will be. Gives what it was.
+    /// Takes the oldest matching change, which has been done or never will be.
     fn finish(&mut self, is: impl Fn(Port, u64, &Due) -> bool) -> Option<Due> {
         let index = self.due.iter().position(|(of, until_ms, due)| is(*of, *until_ms, due))?;
         let (port, _, due) = self.due.remove(index)?;
         match due {
             Due::Erase(number) => self.erases[number].to = self.len(),
             Due::Size { to: Some(size), .. } => {
-                // Which of the two it is, the next configuration tells.
+                // The next configuration tells which of the two sizes it is.
                 self.size = self.size.min(size);
                 self.doubt_answers(|other| other != port);
             }
@@ -429,8 +430,7 @@ impl Ledger {
         Some(due)
     }
 
-    /// The size is another one now. Answers that are waiting in the queue of a port may be of
-    /// before.
+    /// The size has changed. Answers that wait in the queue of a port may be from before that.
     fn doubt_answers(&mut self, of: impl Fn(Port) -> bool) {
         for (_, _, due) in self.due.iter_mut().filter(|(port, ..)| of(*port)) {
             if let Due::Size { doubtful, .. } = due {
@@ -484,8 +484,9 @@ impl Ledger {
         Ok(())
     }
 
-    /// Indices from which on the total can count: all places where the latest erase can have been.
-    /// They are not done in the order in which they arrive, as each port has its own queue.
+    /// Indices from which on the total may count, which are all places where the latest erase can
+    /// have been. Erases are not done in the order in which they arrive, because each port has its
+    /// own queue.
     fn may_count_from(&self) -> impl Iterator<Item = usize> {
         let certain = self.erases.iter().filter(|erase| erase.certain);
         let earliest = certain.map(|erase| erase.from).max().unwrap_or(0);
@@ -512,13 +513,13 @@ impl Ledger {
         self.events.get(index.checked_sub(self.forgotten)?)
     }
 
-    /// The event of this index, for people.
+    /// The event of this index, in words.
     #[must_use]
     pub fn numbered(&self, number: usize) -> Numbered<'_> {
         Numbered { number, of: self.len(), event: self.event(number) }
     }
 
-    /// The events that are remembered, from the newest on.
+    /// The events that are remembered, from the newest to the oldest.
     pub fn latest(&self) -> impl Iterator<Item = &Recorded> {
         self.events.iter().rev()
     }
@@ -541,7 +542,7 @@ impl Ledger {
         self.life
     }
 
-    /// Forgets the events before this one that nobody can read or print any more.
+    /// Forgets the events before this one, which nobody can read or print any more.
     pub fn forget_before(&mut self, index: usize) {
         let held = self.len().saturating_sub(KEPT);
         let count = index.min(held).saturating_sub(self.forgotten);
@@ -553,13 +554,14 @@ impl Ledger {
     #[must_use]
     pub fn edges(&self) -> Edges {
         let undecided = self.undecided();
-        // Where a contact has come back before its change was accepted, both its edges are nothing.
+        // Where a contact has come back before its change was accepted, both edges count as
+        // filtered.
         let filtered = self.debounce.filtered() + self.filtered_before;
         Edges { filtered, undecided, ..self.edges }
     }
 }
 
-/// Puts a setting where it belongs: those that come by the other port may have been read before it.
+/// Inserts a setting in order of time. Settings from the other port may have been read before it.
 fn set<T>(settings: &mut Vec<(u64, T)>, at_ms: u64, value: T) {
     let place = settings.partition_point(|&(from_ms, _)| from_ms <= at_ms);
     settings.insert(place, (at_ms, value));

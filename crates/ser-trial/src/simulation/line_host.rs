@@ -21,7 +21,7 @@ const NS_PER_MS: u64 = 1_000_000;
 /// Start bit, eight data bits, stop bit.
 const BITS_PER_BYTE: u64 = 10;
 
-/// As the client looks for a recorder's rate.
+/// How long the host waits at each rate, as the client does when it looks for a recorder's rate.
 const SEARCH_TIMEOUT: Duration = Duration::from_millis(250);
 const USUAL_TIMEOUT: Duration = Duration::from_secs(1);
 const USUAL_RETRIES: u32 = 2;
@@ -29,7 +29,7 @@ const USUAL_RETRIES: u32 = 2;
 /// How long a host waits when nothing answers at any rate.
 const SEARCH_AGAIN_MS: u64 = 20_000;
 
-/// A command on the line is never given up by the recorder.
+/// The time limit of commands on the line: the recorder never gives one up.
 const NEVER: u64 = u64::MAX;
 
 /// What may be asked for now.
@@ -44,7 +44,7 @@ pub enum Errand {
     },
 }
 
-/// A byte on its way to the recorder, at this rate, and when it is there.
+/// A byte on its way to the recorder, its rate, and when it arrives.
 struct OnTheWay {
     at_ns: u64,
     byte: u8,
@@ -52,7 +52,7 @@ struct OnTheWay {
 }
 
 impl OnTheWay {
-    /// The tick that the recorder's interrupt reads when the byte is there: that of the latest
+    /// The tick that the recorder's interrupt reads when the byte arrives. It is that of the latest
     /// sample, as with the pulses of a GENI board.
     fn tick_ms(&self) -> u64 {
         self.at_ns / NS_PER_MS
@@ -71,14 +71,14 @@ pub struct LineHost {
     next_order_ms: u64,
     search_again_ms: u64,
     stuck_until_ms: u64,
-    /// Bad until then.
+    /// The line is bad until then.
     bad_until_ms: u64,
     one_in: OneIn,
     guard: FrameGuard,
-    /// The rate whose turn it is in the search for the recorder's, and the one to go back to.
+    /// The rate that is tried next in the search for the recorder's rate, and the one to return to.
     seeking: Option<(usize, Baud)>,
     tap: LineTap,
-    /// In earlier lives.
+    /// What was printed in earlier lives.
     printed_before: (u64, u64),
     heard: Vec<Heard>,
 }
@@ -110,20 +110,20 @@ impl LineHost {
         host
     }
 
-    /// Damaged frames that looked whole.
+    /// Damaged frames that looked intact.
     #[must_use]
     pub fn forged(&self) -> u64 {
         self.guard.stopped()
     }
 
-    /// Events that were printed, and events and edges that were said not to be.
+    /// The number of events printed, and the number of events and edges reported as not printed.
     #[must_use]
     pub fn printed(&self) -> (u64, u64) {
         let (printed, missing) = self.tap.printout.counts();
         (self.printed_before.0 + printed, self.printed_before.1 + missing)
     }
 
-    /// The recorder has been switched off and on: what was on the line is gone.
+    /// The recorder has been switched off and on. What was on the line is gone.
     pub fn power_cycled(&mut self) {
         self.on_the_way.clear();
         self.printed_before = self.printed();
@@ -132,7 +132,7 @@ impl LineHost {
         self.set_baud(self.baud);
     }
 
-    /// The recorder comes on in a plant that is as busy as this.
+    /// The recorder is switched on in a plant that is this busy.
     pub fn power_comes_on(&mut self, now_ms: u64, tempo: Tempo) {
         self.tempo = tempo;
         self.next_order_ms = now_ms;
@@ -164,7 +164,7 @@ impl LineHost {
         self.send(now_ms, &bytes);
     }
 
-    /// Somebody sends many commands at once, and waits for no answer.
+    /// Sends many commands at once without waiting for an answer.
     pub fn flood(&mut self, now_ms: u64) {
         for _ in 0..self.chance.within(17..=40) {
             let command = match orders::next_order(&mut self.chance, Way::Line) {
@@ -197,7 +197,7 @@ impl LineHost {
         self.free_ns = at_ns;
     }
 
-    /// When something happens here next, if the recorder says nothing.
+    /// When something happens next, if the recorder says nothing.
     #[must_use]
     pub fn next_ms(&self, now_ms: u64, errand: Errand) -> u64 {
         let byte_ms = self.on_the_way.front().map_or(NEVER, OnTheWay::tick_ms);
@@ -208,7 +208,7 @@ impl LineHost {
         byte_ms.min(order_ms).min(self.talk.wake_ms().unwrap_or(NEVER))
     }
 
-    /// When a host that rests begins something.
+    /// When a resting host begins something.
     fn order_ms(&self, errand: Errand) -> u64 {
         match errand {
             _ if self.is_searching() => self.search_again_ms,
@@ -268,7 +268,7 @@ impl LineHost {
     /// Takes what the recorder has said.
     ///
     /// # Errors
-    /// When it is nothing that a recorder says.
+    /// When it is nothing that a recorder may say.
     pub fn listen(
         &mut self,
         now_ms: u64,

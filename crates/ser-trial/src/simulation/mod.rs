@@ -1,19 +1,19 @@
-//! The whole system in one virtual time, left to chance and held to account: recorders with both
-//! their ports, the hosts that read them with the client's own code, boards, bus and contacts; and
-//! everything that goes wrong with them.
+//! The whole system in one virtual time, with random operations and a full account: recorders with
+//! both their ports, the hosts that read them with the client's own code, boards, bus and contacts,
+//! and everything that goes wrong with them.
 //!
-//! - [`world`] lets it all live: [`mod@unit`] is a recorder, [`line_host`] and [`bus`] are its
+//! - [`world`] runs it all: [`mod@unit`] is a recorder, [`line_host`] and [`bus`] are its
 //!   surroundings, [`activity`] moves the contacts, [`orders`] says what hosts want, [`noise`]
 //!   spoils the line.
-//! - [`ledger`] works out from what was done to a recorder which events it must have recorded, with
-//!   which stamps; [`taps`] tell it what the recorder was given, and [`debounce_model`] what its
-//!   inputs came to.
+//! - [`ledger`] works out which events a recorder must have recorded, and with which stamps, from
+//!   what was done to it. [`taps`] tell it what the recorder was given, and [`debounce_model`]
+//!   which input changes count.
 //! - [`printout`] reads what a recorder prints.
-//! - [`account`] holds what a reader was told against the ledger: every event once and in order, or
+//! - [`account`] compares what a reader was told with the ledger: every event once and in order, or
 //!   reported as lost with the right count.
 //!
-//! Everything follows from one seed. [`run`] gives a [`Report`] with a digest of all that happened,
-//! and the [`Paces`] at which it did; or a [`Failure`] that says how to repeat it.
+//! Everything follows from one seed. [`run`] returns a [`Report`] with a digest of all that
+//! happened, and the [`Paces`] of the run, or a [`Failure`] that says how to repeat it.
 
 pub mod account;
 pub mod activity;
@@ -48,7 +48,7 @@ pub use world::{Options, World};
 #[derive(Clone, Debug)]
 pub struct Failure {
     options: Options,
-    /// What else the command line has to say.
+    /// Further options of the command line that repeats the run.
     load: &'static str,
     what: String,
     at_ms: u64,
@@ -77,13 +77,13 @@ impl std::error::Error for Failure {}
 /// Runs a seed.
 ///
 /// # Errors
-/// When something is not as it must be, a panic included.
+/// When something is not as it must be. A panic counts as such.
 pub fn run(options: Options) -> Result<(Report, Paces), Box<Failure>> {
     live(options, "", World::run)
 }
 
-/// Runs a recorder at the limit of what it can record, with both ports busy all the time; the seed
-/// is of little consequence.
+/// Runs a recorder at the limit of what it can record, with both ports busy all the time. The seed
+/// matters little.
 ///
 /// # Errors
 /// As [`run`].
@@ -105,7 +105,7 @@ fn live(
     })
 }
 
-/// What a panic said.
+/// The message of a panic.
 fn words(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or_else(|| panic.downcast_ref::<&str>().copied());

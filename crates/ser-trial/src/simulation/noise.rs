@@ -1,27 +1,27 @@
 //! What happens to bytes on a bad line, and what bytes become at the wrong rate.
 //!
-//! The protocol's checksum has eight bits, so that one in 256 frames that are damaged beyond a
-//! single bit gets through as something else, and no host and no recorder could know. Towards the
-//! host such frames are stopped here, as the simulation is about what can be known; they are
-//! counted. Towards the recorder they go: the ledger hears what the recorder hears.
+//! The protocol's checksum has eight bits. One in 256 frames that are damaged in more than one bit
+//! therefore passes as another frame, and no host and no recorder could know. Towards the host such
+//! frames are stopped here and counted, because the simulation is about what can be known. Towards
+//! the recorder they pass, because the ledger hears what the recorder hears.
 
 use ser_proto::{Decoded, FrameDecoder, MAX_BODY_LEN};
 
 use super::chance::Chance;
 
-/// How bad the line is: one byte in so many suffers. `None` is a good line.
+/// How bad the line is: one byte in this many suffers. `None` is a good line.
 pub type OneIn = Option<u64>;
 
 /// A byte as it arrives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// This.
+    /// This byte.
     Byte(u8),
     /// Something without a stop bit.
     Error,
 }
 
-/// What a byte becomes on the way. `garbled`: the two ends have different rates.
+/// What a byte becomes on the way. `garbled` says that the two ends have different rates.
 pub fn travel(byte: u8, one_in: OneIn, garbled: bool, chance: &mut Chance, out: &mut Vec<Heard>) {
     if garbled {
         for _ in 0..chance.within(0..=2) {
@@ -34,7 +34,7 @@ pub fn travel(byte: u8, one_in: OneIn, garbled: bool, chance: &mut Chance, out: 
         return;
     }
     match chance.below(6) {
-        // Lost.
+        // The byte is lost.
         0 => {}
         1 => out.extend([Heard::Byte(byte), Heard::Byte(byte)]),
         2 => out.extend([Heard::Byte(byte), Heard::Byte(chance.byte())]),
@@ -44,7 +44,7 @@ pub fn travel(byte: u8, one_in: OneIn, garbled: bool, chance: &mut Chance, out: 
     }
 }
 
-/// Sees to it that no damaged frame looks whole to a host.
+/// Stops every damaged frame that would look intact to a host.
 #[derive(Clone)]
 pub struct FrameGuard {
     /// What the recorder has said, before it travelled.
@@ -54,7 +54,7 @@ pub struct FrameGuard {
     stopped: u64,
 }
 
-/// Frames that can be on their way at once: what the simulated line holds.
+/// How many frames can be on their way at once on the simulated line.
 const BODIES: usize = 1024;
 
 impl FrameGuard {
@@ -79,24 +79,25 @@ impl FrameGuard {
         }
     }
 
-    /// The host hears a byte, or another one if it would complete a frame that nobody has sent.
+    /// The host hears a byte. It gets another one if the byte would complete a frame that nobody
+    /// has sent.
     pub fn heard(&mut self, byte: u8) -> u8 {
         let mut ahead = self.heard.clone();
         let forged = match ahead.push(byte) {
-            // From the end: the oldest ones have been heard.
+            // Searched from the end, because the oldest bodies have already been heard.
             Some(Decoded::Frame(body)) => !self.bodies.iter().rev().any(|said| said == body),
             _ => false,
         };
         if forged {
             self.stopped += 1;
         }
-        // No digit, so that this frame is at an end.
+        // The replacement is not a digit, so it ends the frame.
         let byte = if forged { b'?' } else { byte };
         let _ = self.heard.push(byte);
         byte
     }
 
-    /// The host forgets what has begun.
+    /// The host forgets a frame that has begun.
     pub fn forget(&mut self) {
         let _ = self.heard.finish();
     }

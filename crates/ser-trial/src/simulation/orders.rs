@@ -5,10 +5,10 @@ use ser_proto::{AutoReport, Baud, Command, Configure, TimeStamp};
 use super::chance::Chance;
 use super::conversation::Order;
 
-/// Where reports can be sent on the bus: the host, a board that nobody looks after, and nobody.
+/// Where reports can be sent on the bus: to the host, to a board without a host, and to nobody.
 pub const ADDRESSES: [u8; 3] = [31, 20, 29];
 
-/// The way that orders go.
+/// The way by which orders go.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
     /// RS-232: its rate can be changed.
@@ -17,7 +17,7 @@ pub enum Way {
     Bus,
 }
 
-/// What a host asks for next. Most often it is the log.
+/// What a host asks for next, which is most often the log.
 pub fn next_order(chance: &mut Chance, way: Way) -> Order {
     match chance.below(100) {
         0..60 => Order::Read,
@@ -47,7 +47,7 @@ pub fn next_broadcast(chance: &mut Chance) -> Command {
 
 fn set_clock(chance: &mut Chance) -> Order {
     if chance.one_in(8) {
-        // There is no such day: refused by silence.
+        // There is no such day, so the recorder refuses it with silence.
         return Order::Ask(Command::SetClock(TimeStamp {
             month: 2,
             day: 30,
@@ -57,8 +57,8 @@ fn set_clock(chance: &mut Chance) -> Order {
     Order::SetClock(valid_time(chance))
 }
 
-/// Often a few seconds before midnight, before a New Year, a leap day or the end of the hundred
-/// years.
+/// A valid time. It is often a few seconds before midnight, a New Year, a leap day or the end of
+/// the hundred years.
 fn valid_time(chance: &mut Chance) -> TimeStamp {
     let eve = |year, month, day| TimeStamp {
         year,
@@ -93,8 +93,7 @@ fn small(chance: &mut Chance, from: u64, to: u64) -> u8 {
 }
 
 fn configure(chance: &mut Chance, way: Way) -> Configure {
-    // The slowest rates take minutes for what others do in seconds; a plant would not choose them
-    // either.
+    // The slowest rates take minutes for what others do in seconds, and no plant would choose them.
     let rates =
         [Baud::B300, Baud::B1200, Baud::B2400, Baud::B4800, Baud::B9600, Baud::B9600, Baud::B19200];
     let rate = chance.pick(&rates);
@@ -117,7 +116,7 @@ fn print(chance: &mut Chance) -> Command {
     Command::Print { start, count: u16::from(small(chance, 0, 60)) }
 }
 
-/// Outside of the log, or more than there can be.
+/// A read outside of the log, or of more entries than there can be.
 fn odd_read(chance: &mut Chance) -> Command {
     let start = chance.pick(&[0, 1, 2047, 2048, 2049, u16::MAX]);
     Command::Read { start, count: small(chance, 0, 255) }

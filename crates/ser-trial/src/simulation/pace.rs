@@ -9,7 +9,7 @@ use std::time::Duration;
 pub struct Pace {
     /// Virtual time, in milliseconds.
     pub virtual_ms: u64,
-    /// The computer's.
+    /// The computer's time.
     pub real: Duration,
 }
 
@@ -23,7 +23,7 @@ impl Pace {
         self.real.as_secs_f64() / 60.0
     }
 
-    /// Virtual hours a minute; nothing where there were none, or no time that one could measure.
+    /// Virtual hours a minute; `None` without virtual time or without a measurable real time.
     fn per_minute(self) -> Option<f64> {
         (self.virtual_ms > 0 && !self.real.is_zero()).then(|| self.hours() / self.minutes())
     }
@@ -37,8 +37,8 @@ impl Add for Pace {
     }
 }
 
-/// Both paces of a run, hundreds apart: a bus is lived through scan by scan, everything else from
-/// one event to the next.
+/// Both paces of a run, which differ by a factor of hundreds: a bus is simulated scan by scan,
+/// everything else from one event to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Paces {
     /// Of lives without a bus.
@@ -55,7 +55,7 @@ impl AddAssign for Paces {
 }
 
 /// As `20.02 h in 1.9 s: 1672 virtual hours a minute without a bus, 4.4 with one`, with a dash for
-/// what there was none of.
+/// a pace that does not exist.
 impl fmt::Display for Paces {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let all = self.without_bus + self.on_bus;

@@ -1,11 +1,11 @@
-//! What a recorder prints: every line is an event of the ledger, or says how many there is no line
-//! for.
+//! What a recorder prints. Every line is an event of the ledger, or says how many events have no
+//! line.
 
 use chrono::NaiveDateTime;
 
 use super::ledger::Ledger;
 
-/// Characters of date and time, behind the entry number and a space.
+/// The characters of date and time, after the entry number and a space.
 const STAMP: std::ops::Range<usize> = 5..28;
 
 /// The lines of one recorder.
@@ -18,10 +18,10 @@ pub struct Printout {
 }
 
 impl Printout {
-    /// The recorder prints a character.
+    /// Takes a character that the recorder prints.
     ///
     /// # Errors
-    /// When it completes a line that is not so.
+    /// When it completes a line that is not true.
     pub fn take(&mut self, character: u8, ledger: &Ledger) -> Result<(), String> {
         if character != b'\n' {
             self.line.push(character.into());
@@ -43,8 +43,8 @@ impl Printout {
         if known { Ok(()) } else { Err(format!("this line is printed and no event: {line:?}")) }
     }
 
-    /// Events that were printed, by command or by themselves, and events and edges that are said
-    /// not to be.
+    /// The number of events printed, by command or automatically, and the number of events and
+    /// edges reported as not printed.
     #[must_use]
     pub fn counts(&self) -> (u64, u64) {
         (self.events, self.missing)

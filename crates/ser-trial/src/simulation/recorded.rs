@@ -14,13 +14,13 @@ pub struct Recorded {
     pub state: u32,
     /// When it happened.
     pub at_ms: u64,
-    /// Inputs that changed since the event before, and of which no event tells; those that changed
-    /// back are not in it.
+    /// Inputs that changed since the event before without an event. Inputs that changed back are
+    /// not included.
     pub unrecorded: u32,
 }
 
 impl Recorded {
-    /// Whether this is what an entry says.
+    /// Whether an entry says the same.
     #[must_use]
     pub fn is(&self, entry: &Entry) -> bool {
         (self.changed, self.state) == (entry.changed.0, entry.state.0)
@@ -28,24 +28,24 @@ impl Recorded {
     }
 }
 
-/// Milliseconds since 1970; nothing if there is no such time.
+/// Milliseconds since 1970; `None` if there is no such time.
 pub(super) fn stamp_ms(time: TimeStamp) -> Option<i64> {
     NaiveDateTime::try_from(time).ok().map(|time| time.and_utc().timestamp_millis())
 }
 
-/// An erase, between two events: `from` is the index of the first event that may be after it, `to`
-/// of the last.
+/// An erase between two events. `from` is the index of the first event that may be after it, `to`
+/// that of the last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Erase {
-    /// The earliest it can have been.
+    /// The earliest index at which it can have been.
     pub from: usize,
-    /// The latest it can have been; grows until its reply has been seen.
+    /// The latest index at which it can have been. It grows until the erase's reply has been seen.
     pub to: usize,
-    /// Whether it has been, and not only may have been.
+    /// Whether it has certainly happened.
     pub certain: bool,
 }
 
 impl Erase {
-    /// Power-up is as good as an erase.
+    /// Power-up, which has the same effect as an erase.
     pub const POWER_UP: Erase = Erase { from: 0, to: 0, certain: true };
 }

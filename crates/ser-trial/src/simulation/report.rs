@@ -1,4 +1,4 @@
-//! What a run came to.
+//! The results of a run.
 
 use std::fmt;
 
@@ -12,14 +12,14 @@ use crate::digits::grouped;
 pub struct Hours {
     /// Virtual time in all.
     pub total_ms: u64,
-    /// Of these, with a Genius bus, every bus scan lived through.
+    /// Virtual time with a Genius bus, in which every bus scan is simulated.
     pub bus_ms: u64,
-    /// Steps of the simulation: where nothing happens, one of them is many milliseconds.
+    /// Steps of the simulation. Where nothing happens, one step is many milliseconds.
     pub steps: u64,
 }
 
 impl Hours {
-    /// So much time has passed in one step.
+    /// Counts the time of one step.
     pub fn count(&mut self, ms: u64, on_bus: bool) {
         self.total_ms += ms;
         self.bus_ms += if on_bus { ms } else { 0 };
@@ -32,7 +32,7 @@ impl Hours {
 pub struct Report {
     /// The seed.
     pub seed: u64,
-    /// Of every byte, message and operation with its time.
+    /// The digest of every byte, message and operation with its time.
     pub digest: u64,
     /// Operations and faults.
     pub operations: u64,
@@ -48,10 +48,11 @@ pub struct Report {
     pub line: Talk,
     /// What was talked about on the bus, per recorder.
     pub bus: Vec<Talk>,
-    /// Events that the first recorder has printed, each one an event of the ledger; and events and
-    /// edges that it has printed not to be printed.
+    /// The number of events that the first recorder has printed, each one an event of the ledger,
+    /// and the number of events and edges that it reported as not printed.
     pub printed: (u64, u64),
-    /// Damaged frames that an eight-bit checksum would have let through, stopped by the simulation.
+    /// Damaged frames that an eight-bit checksum would have let through. The simulation stopped
+    /// them.
     pub forged: u64,
 }
 

@@ -1,8 +1,7 @@
 //! What a recorder has been given: the bytes of its line, and the datagrams that it has taken from
 //! its board.
 //!
-//! The ledger lives on this. Each side is decoded here once more, next to the recorder and not by
-//! it.
+//! The ledger is based on this. Both are decoded here a second time, independently of the recorder.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -28,7 +27,8 @@ const RECEIVE_QUEUE_FLAG: u16 = map::INTERRUPT_STATUS.at(map::INTERRUPT_FIRST + 
 /// Bytes of the longest command that a recorder has room for.
 const MAX_COMMAND_LEN: usize = 16;
 
-/// What the recorder must have counted by now. Some counts are least ones: see [`Expected::check`].
+/// What the recorder must have counted by now. Some counts are lower bounds: see
+/// [`Expected::check`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Expected(pub Diagnostics);
 
@@ -44,7 +44,7 @@ impl Expected {
         } += 1;
     }
 
-    /// A body that is no command.
+    /// Counts a body that is not a command.
     pub fn parse_error(&mut self, error: ParseError) {
         let counts = &mut self.0;
         *match error {
@@ -85,7 +85,7 @@ impl Expected {
                 return Err(format!("{expected} {what}, and the recorder has counted {counted}"));
             }
         }
-        // A read behind the end is refused too, and a print job that finds no place is one more
+        // A read beyond the end is refused as well, and a print job that finds no room is one more
         // overrun.
         let least = [
             ("refused parameters", expected.parameters_refused, counted.parameters_refused),
@@ -106,12 +106,12 @@ impl Expected {
 pub struct LineTap {
     commands: FrameDecoder<MAX_COMMAND_LEN>,
     replies: FrameDecoder<MAX_BODY_LEN>,
-    /// What comes out besides.
+    /// The text that comes out.
     pub printout: Printout,
 }
 
 impl LineTap {
-    /// At power-up.
+    /// The tap at power-up.
     #[must_use]
     pub fn new() -> LineTap {
         LineTap {
@@ -121,8 +121,8 @@ impl LineTap {
         }
     }
 
-    /// A byte goes in. Gives the command that it completes, if the recorder has room for it; a
-    /// configuration that is refused is as good as a question.
+    /// A byte goes in. Returns the command that it completes, if the recorder has room for it. A
+    /// configuration that is refused counts as a question.
     pub fn goes_in(
         &mut self,
         byte: u8,
@@ -149,10 +149,10 @@ impl LineTap {
         }
     }
 
-    /// A byte comes out. Gives the reply that it completes.
+    /// A byte comes out. Returns the reply that it completes.
     ///
     /// # Errors
-    /// When the recorder says what is no reply, or prints what is no event.
+    /// When the recorder sends what is not a reply, or prints what is not an event.
     pub fn comes_out(&mut self, byte: u8, ledger: &Ledger) -> Result<Option<Reply>, String> {
         match self.replies.push(byte) {
             Some(Decoded::Frame(body)) => Reply::parse(body)
@@ -167,7 +167,7 @@ impl LineTap {
     }
 }
 
-/// The question whose answer a recorder gives to this.
+/// The question that the recorder answers when it gets this error.
 #[must_use]
 pub fn answered_as(error: ParseError) -> Option<Command> {
     match error {
@@ -193,62 +193,63 @@ pub struct Taken {
     pub broadcast: bool,
     /// When the board received it, in microseconds of the bus.
     pub arrived_us: u64,
-    /// The look to which a recorder without the interrupt line puts it; `None` if it saw no flag.
+    /// The look to which a recorder without the interrupt line assigns it; `None` if no look saw
+    /// its flag.
     pub seen_ms: Option<u64>,
 }
 
 /// What is taken through a window.
 #[derive(Debug, Default)]
 pub struct Taking {
-    /// Messages that have been taken and not been looked at.
+    /// Messages that have been taken and not yet processed.
     pub messages: Vec<Taken>,
-    /// How many datagrams the board had handed over when one was taken last.
+    /// How many datagrams the board had handed over when one was last taken.
     handed_over: u64,
     looks: Looks,
-    /// The datagram that was taken last still has to be put to a look; whether it is among the
-    /// messages.
+    /// Set while the datagram that was taken last still has to be assigned to a look. The value
+    /// says whether the datagram is among the messages.
     unseen: Option<bool>,
 }
 
-/// Looks that found the flag set, as a recorder without the interrupt line counts arrivals.
+/// Looks that found the flag set, which are the arrivals for a recorder without the interrupt line.
 ///
-/// Each stands for one datagram, in their order. Datagrams that share a flag leave later ones too
-/// few: the last has the look of the one before. See `docs/genius.md`.
+/// Each look stands for one datagram, in order. Datagrams that share a flag leave too few looks for
+/// later ones: the last has the look of the one before. See `docs/genius.md`.
 #[derive(Debug, Default)]
 struct Looks {
     /// The present, by the simulation's time.
     now_ms: u64,
-    /// Those that no datagram has been put to.
+    /// Looks that no datagram has been assigned to.
     seen_ms: VecDeque<u64>,
     latest_ms: Option<u64>,
 }
 
 impl Taking {
-    /// A recorder is about to look at its board, for the first time in this millisecond.
+    /// The recorder is about to look at its board, for the first time in this millisecond.
     pub fn begin(&mut self, now_ms: u64) {
         self.looks.now_ms = now_ms;
     }
 
-    /// It has looked. Gives the messages that it has taken.
+    /// The recorder has looked. Returns the messages that it has taken.
     pub fn end(&mut self) -> Vec<Taken> {
         self.put_to_a_look();
         std::mem::take(&mut self.messages)
     }
 
-    /// The recorder has given its board up, and has forgotten what it saw there.
+    /// The recorder has given up its board, and has forgotten what it saw there.
     pub fn board_failed(&mut self) {
         self.looks.seen_ms.clear();
         self.looks.latest_ms = None;
     }
 
-    /// When the oldest datagram was seen to arrive that has not been taken.
+    /// When the oldest datagram that has not been taken was seen to arrive.
     #[must_use]
     pub fn untaken_since_look_ms(&self) -> Option<u64> {
         self.looks.seen_ms.front().copied()
     }
 
-    /// The flag of a datagram that came while another one was read is seen before that is passed
-    /// on.
+    /// The flag of a datagram that came while another one was read is seen before that one is
+    /// passed on.
     fn put_to_a_look(&mut self) {
         let Some(is_message) = self.unseen.take() else { return };
         self.looks.latest_ms = self.looks.seen_ms.pop_front().or(self.looks.latest_ms);
@@ -257,7 +258,7 @@ impl Taking {
         }
     }
 
-    /// When the oldest datagram arrived that has not been taken from this board, in microseconds of
+    /// When the oldest datagram that has not been taken from this board arrived, in microseconds of
     /// the bus.
     #[must_use]
     pub fn untaken_since_us(&self, board: &Board) -> Option<u64> {
@@ -266,7 +267,7 @@ impl Taking {
     }
 }
 
-/// A window's tap: clones are the same.
+/// A window's tap. Clones are the same tap.
 pub type BusTap = Rc<RefCell<Taking>>;
 
 /// A board's window that tells what is taken through it.
@@ -276,7 +277,7 @@ pub struct TappedWindow {
 }
 
 impl TappedWindow {
-    /// Tells `tap` what is taken through `inner`.
+    /// A window that tells `tap` what is taken through `inner`.
     #[must_use]
     pub fn new(inner: BoardWindow, tap: BusTap) -> TappedWindow {
         TappedWindow { inner, tap }

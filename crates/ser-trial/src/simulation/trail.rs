@@ -1,4 +1,4 @@
-//! What was done last, for whoever looks into a run that failed.
+//! The latest operations, for anyone who looks into a failed run.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -7,10 +7,10 @@ use std::rc::Rc;
 
 use super::digest::Digest;
 
-/// So many operations are kept.
+/// How many operations are kept.
 const KEPT: usize = 60;
 
-/// The latest operations with their times, and the digest of all there were. Clones are the same
+/// The latest operations with their times, and the digest of all operations. Clones are the same
 /// trail.
 #[derive(Clone, Default)]
 pub struct Trail {
@@ -21,7 +21,7 @@ pub struct Trail {
 }
 
 impl Trail {
-    /// The present, from now on.
+    /// Sets the present.
     pub fn set_now(&self, now_ms: u64) {
         self.now_ms.set(now_ms);
     }
@@ -32,7 +32,7 @@ impl Trail {
         self.now_ms.get()
     }
 
-    /// Something is done.
+    /// Notes that something is done.
     pub fn note(&self, what: impl Display) {
         let text = what.to_string();
         self.mark(text.as_bytes());
@@ -44,14 +44,14 @@ impl Trail {
         latest.push_back((self.now_ms(), text));
     }
 
-    /// Something can be seen, at this moment, that must be the same in every run of the seed.
+    /// Adds something to the digest that must be the same at this moment in every run of the seed.
     pub fn mark(&self, bytes: &[u8]) {
         let mut digest = self.digest.borrow_mut();
         digest.number(self.now_ms());
         digest.bytes(bytes);
     }
 
-    /// Of everything so far.
+    /// The digest of everything so far.
     #[must_use]
     pub fn digest(&self) -> u64 {
         self.digest.borrow().value()

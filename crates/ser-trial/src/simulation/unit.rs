@@ -1,4 +1,4 @@
-//! One recorder with everything that outlives a power cut: its contacts, its books, what it keeps.
+//! One recorder with everything that outlives a power cut: its contacts, its ledger, what it keeps.
 
 use chrono::{DateTime, NaiveDateTime};
 use ser_node::{Debounce, HELD_BACK_MS, Rtc};
@@ -16,8 +16,8 @@ const NEVER_SET_MS: i64 = 946_684_800_000;
 /// 2026-11-22 10:00.
 const FIRST_DAY_MS: i64 = 1_795_341_600_000;
 
-/// A recorder holds a change back for so long at most, twice: until it is accepted, and until it is
-/// recorded.
+/// How long a recorder takes at most until a change is recorded. It holds the change back twice:
+/// until it is accepted, and until it is recorded.
 pub const SETTLING_MS: u64 = 2 * (HELD_BACK_MS + 1);
 
 /// A recorder.
@@ -26,7 +26,7 @@ pub struct Unit {
     pub model: Model,
     /// Its debounce times, which are part of the image.
     pub debounce: Debounce,
-    /// Its books.
+    /// Its ledger.
     pub ledger: Ledger,
     /// What it must have counted.
     pub expected: Expected,
@@ -34,7 +34,7 @@ pub struct Unit {
     pub activity: Activity,
     non_volatile: NonVolatile,
     has_clock: bool,
-    /// Edges lost in earlier lives: the recorder's own count begins anew.
+    /// Edges lost in earlier lives, because the recorder's own count begins anew.
     lost_before: u64,
 }
 
@@ -76,7 +76,7 @@ impl Unit {
         }
     }
 
-    /// The power will come on after so long: the battery-backed clock has gone on.
+    /// The power will come on after `off_ms`. The battery-backed clock has gone on meanwhile.
     pub fn power_comes_on(&mut self, now_ms: u64, off_ms: u64) {
         let first = self.ledger.life() == 0;
         let shows_ms = if first { FIRST_DAY_MS } else { self.ledger.time_ms(now_ms) };
@@ -95,7 +95,7 @@ impl Unit {
         self.lost_before = self.ledger.edges().queue_full;
     }
 
-    /// The node has come to the present: takes down what its contacts have done on the way.
+    /// The node has come to the present. Notes what its contacts have done on the way.
     pub fn follow(&mut self, node: &mut SimNode<'_>, now_ms: u64, held_up: bool) {
         let moves = node.take_played();
         let moves = moves.iter().map(|played| (played.start_ms + played.at_ms, played.changed.0));
@@ -108,8 +108,8 @@ impl Unit {
         self.ledger.expire(now_ms);
     }
 
-    /// Lets contacts begin what they do next, if it is time, or all at once if nothing else is
-    /// under way.
+    /// Lets contacts begin what they do next if it is time, or all at once if nothing else is under
+    /// way.
     pub fn play(&mut self, node: &mut SimNode<'_>, now_ms: u64, tempo: Tempo) {
         let may_begin = tempo == Tempo::Flat && node.next_move_ms().is_none();
         if may_begin || now_ms >= self.activity.next_ms() {

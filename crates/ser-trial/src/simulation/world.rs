@@ -1,5 +1,5 @@
-//! Recorders, hosts, lines and bus in one virtual time, life after life: a life is what lies
-//! between power-up and power cut.
+//! Recorders, hosts, lines and bus in one virtual time, life after life. A life lasts from power-up
+//! to power cut.
 
 use std::time::Instant;
 
@@ -19,10 +19,10 @@ use super::trail::Trail;
 use super::unit::{SETTLING_MS, Unit};
 use super::wrong::Wrong;
 
-/// Readers are at the end of the log by then, even at the lowest rate.
+/// The time by which readers are at the end of the log, even at the lowest rate.
 const CATCH_UP_MS: u64 = 8 * 3_600_000;
 
-/// Everything that a recorder can do unasked, at the highest rate.
+/// Settings with which a recorder does everything it can do unasked, at the highest rate.
 const PRINT_AND_REPORT: Configure = Configure {
     size: None,
     baud: Some(Baud::B19200),
@@ -31,23 +31,24 @@ const PRINT_AND_REPORT: Configure = Configure {
     auto_print: true,
 };
 
-/// In this time a capture queue does not fill, whatever the inputs do.
+/// The time in which a capture queue does not fill, whatever the inputs do.
 const MAX_DEBOUNCED_HOLD_UP_MS: u64 = 200;
 
-/// The tick wraps here.
+/// The number of ticks after which the tick wraps.
 const TICKS: u64 = 1 << 32;
 
-/// Events that all readers are past are forgotten this often.
+/// How often events that all readers have passed are forgotten.
 const FORGET_EVERY: u64 = 1 << 14;
 
-/// What a run is like.
+/// The options of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// Everything follows from this.
+    /// The number from which everything follows.
     pub seed: u64,
-    /// How long it lasts, in virtual time; the last life is lived to its end.
+    /// How long it lasts, in virtual time. The last life is completed.
     pub duration_ms: u64,
-    /// The first life is on a bus, and one in so many of the others; with 0 there is no bus at all.
+    /// How often a life is on a bus: the first life, and one in this many of the others. With 0
+    /// there is no bus at all.
     pub bus_one_in: u64,
 }
 
@@ -93,7 +94,7 @@ impl World {
         World { options, chance, trail, units, line, bus_host, now_ms: 0, hours, paces, recorded }
     }
 
-    /// Lives as long as the options say.
+    /// Runs as long as the options say.
     ///
     /// # Errors
     /// The first thing that is not as it must be.
@@ -110,7 +111,7 @@ impl World {
         self.report()
     }
 
-    /// Lives one life on a bus in which all inputs toggle in every millisecond, and all hosts read
+    /// Runs one life on a bus in which all inputs toggle in every millisecond, and all hosts read
     /// as fast as they can while the first recorder prints and reports everything.
     ///
     /// # Errors
@@ -137,7 +138,7 @@ impl World {
         self.report()
     }
 
-    /// A life has ended that began then; it was on a bus all the time or never.
+    /// Counts the time of a life that has ended. It was on a bus all the time or never.
     fn clock_life(&mut self, began: Instant, before: Hours) {
         let pace =
             Pace { virtual_ms: self.hours.total_ms - before.total_ms, real: began.elapsed() };
@@ -151,7 +152,8 @@ impl World {
         let accounts = [line.talk.account()]
             .into_iter()
             .chain(bus_host.talks.iter().map(Conversation::account));
-        // The line is the first recorder's, and then each has its conversation on the bus.
+        // The accounts are the line's, which belongs to the first recorder, and then one per
+        // recorder on the bus.
         for (account, unit) in accounts.clone().zip([0, 0, 1]) {
             let tally = account.tally();
             let accounted = tally.accounted();
@@ -253,7 +255,7 @@ impl World {
         let next_ms = moves.chain(scenes).fold(self.line.next_ms(self.now_ms, errand), u64::min);
         let end_ms =
             if errand == Errand::Any { life.end_ms.min(life.next_fault_ms) } else { u64::MAX };
-        // Nobody waits longer than that for nothing.
+        // Nobody waits longer than that in vain.
         next_ms.min(end_ms).clamp(soon_ms, self.now_ms + CATCH_UP_MS)
     }
 
@@ -285,7 +287,7 @@ impl World {
         Ok(())
     }
 
-    /// Lets bytes and datagrams arrive that are there now.
+    /// Lets bytes and datagrams arrive whose time has come.
     fn pass_on(&mut self, life: &mut Life<'_>, errand: Errand) -> Result<(), String> {
         let World { units, line, bus_host, now_ms, trail, .. } = self;
         let [first, second] = &mut units[..] else { return Err("two recorders".to_owned()) };
@@ -363,7 +365,7 @@ impl World {
             if all_toggle {
                 unit.play(node, self.now_ms, Tempo::Flat);
             }
-            // With debounce, what a full queue drops is more than the ledger can tell.
+            // With debounce, the ledger cannot tell what a full queue drops.
             let held_up = unit.debounce == Debounce::OFF || for_ms <= MAX_DEBOUNCED_HOLD_UP_MS;
             let until_ms = self.now_ms + for_ms;
             if held_up {
@@ -377,7 +379,8 @@ impl World {
         self.trail.set_now(self.now_ms);
     }
 
-    /// Lets everything come to rest and all hosts read everything, and checks that it is all there.
+    /// Lets everything come to rest and all hosts read everything, and checks that nothing is
+    /// missing.
     fn settle(&mut self, life: &mut Life<'_>) -> Result<(), String> {
         self.trail.note("everything calms down");
         self.line.mend();
@@ -445,7 +448,7 @@ impl World {
         Ok(life.nodes.into_iter().map(SimNode::power_off).collect())
     }
 
-    /// Forgets events that all readers are past.
+    /// Forgets events that all readers have passed.
     fn forget(&mut self, on_bus: bool) {
         let line = self.line.talk.account();
         for (index, unit) in self.units.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! How a failure is told: what was wrong, and one fact a line below it.
+//! How a failure is reported: what was wrong, and one fact a line below it.
 
 use std::fmt::{self, Display};
 
@@ -7,7 +7,7 @@ use ser_proto::Entry;
 
 use super::recorded::{Erase, Recorded, stamp_ms};
 
-/// Erases that are shown; a life can have thousands.
+/// How many erases are shown, because a life can have thousands.
 const SHOWN: usize = 8;
 
 /// What was wrong and the facts about it, each with a name.
@@ -18,20 +18,20 @@ pub struct Wrong {
 }
 
 impl Wrong {
-    /// With nothing to be said about it yet.
+    /// A failure without facts.
     #[must_use]
     pub fn new(what: impl Into<String>) -> Wrong {
         Wrong { what: what.into(), facts: Vec::new() }
     }
 
-    /// With one more fact.
+    /// Adds a fact.
     #[must_use]
     pub fn fact(mut self, name: &'static str, fact: impl Display) -> Wrong {
         self.facts.push((name, fact.to_string()));
         self
     }
 
-    /// As an error.
+    /// Makes it an error.
     ///
     /// # Errors
     /// Always.
@@ -60,7 +60,7 @@ impl Display for Recorded {
     }
 }
 
-/// An entry in the same words as an event of the books.
+/// An entry in the same words as an event of the ledger.
 #[derive(Clone, Copy, Debug)]
 pub struct Told<'a>(pub &'a Entry);
 
@@ -73,20 +73,24 @@ impl Display for Told<'_> {
                     .fmt(f)
             }
             None => {
-                write!(f, "{time}, which is no date  changed {:08x}  on {:08x}", changed.0, state.0)
+                write!(
+                    f,
+                    "{time}, which is not a date  changed {:08x}  on {:08x}",
+                    changed.0, state.0
+                )
             }
         }
     }
 }
 
-/// An event of the books by its number, with what it was.
+/// An event of the ledger by its number, with what it was.
 #[derive(Clone, Copy, Debug)]
 pub struct Numbered<'a> {
-    /// Counted from 0 at power-up.
+    /// Its number, counted from 0 at power-up.
     pub number: usize,
     /// How many there are.
     pub of: usize,
-    /// What it was, if it has been and is not forgotten.
+    /// What it was, if it has happened and is not forgotten.
     pub event: Option<&'a Recorded>,
 }
 
@@ -102,8 +106,8 @@ impl Display for Numbered<'_> {
     }
 }
 
-/// As `at 3`, `between 3 and 7`, `from 3 on`: before the event of this number; one that may not
-/// have been is in brackets.
+/// As `at 3`, `between 3 and 7`, `from 3 on`, each meaning before the event of this number. An
+/// erase that may not have happened is in brackets.
 impl Display for Erase {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Erase { from, to, certain } = *self;
@@ -117,7 +121,7 @@ impl Display for Erase {
     }
 }
 
-/// Erases one after the other, the latest of them if there are many.
+/// Erases in a row. If there are many, only the latest are shown.
 pub fn erases(erases: impl DoubleEndedIterator<Item = Erase>) -> String {
     let mut latest: Vec<String> =
         erases.rev().take(SHOWN + 1).map(|erase| erase.to_string()).collect();
@@ -159,7 +163,7 @@ mod tests {
         assert_eq!(Told(&entry).to_string(), text);
         let time = TimeStamp { month: 13, ..entry.time };
         let never = Entry { time, state: Inputs(2), ..entry };
-        let text = "2026-13-22T10:00:00.250, which is no date  changed 00200001  on 00000002";
+        let text = "2026-13-22T10:00:00.250, which is not a date  changed 00200001  on 00000002";
         assert_eq!(Told(&never).to_string(), text);
     }
 

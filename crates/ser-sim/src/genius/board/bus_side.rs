@@ -77,7 +77,7 @@ impl Device for Board {
                 Reason::Assign { address } => self.assigned(address, arrived),
                 Reason::UnreportedCommand | Reason::Reply => {}
             }
-            // What the host sends to all comes back to it.
+            // A broadcast of the host comes back to the host.
             if let Message::Datagram { to: BROADCAST, datagram } = message {
                 self.queue_received(self.number(), true, datagram.clone());
             }
@@ -169,8 +169,8 @@ impl Board {
         }
     }
 
-    /// Sorts an incoming datagram: some the board answers itself, some go to the host one way or
-    /// another.
+    /// Sorts an incoming datagram. Some the board answers itself; the others go to the host in one
+    /// way or another.
     fn take_datagram(&mut self, from: u8, broadcast: bool, datagram: &Datagram) {
         if datagram.is(subfunction::READ_ID) {
             let reply = Datagram::standard(subfunction::READ_ID_REPLY, self.identity().to_bytes());
@@ -180,7 +180,7 @@ impl Board {
         if is_memory_access(datagram) {
             return self.queue_request(from, datagram);
         }
-        // One Read ID reply can answer the board and the host, who asked independently.
+        // One Read ID reply can answer both the board and the host, who asked independently.
         let identity = Identity::parse(&datagram.data);
         let is_identity = datagram.is(subfunction::READ_ID_REPLY) && self.waits_for_identity(from);
         if let Some(identity) = identity.filter(|_| is_identity) {

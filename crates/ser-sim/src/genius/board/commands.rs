@@ -1,8 +1,8 @@
 //! The command block (chapter 10).
 //!
-//! Completion values are 4, 8 and 10h. A Transmit Datagram clears the block's options and the
-//! transmit buffer when the message is out; with the clear-status bit, which leaves the block to
-//! the host at once, when they have been read.
+//! Completion values are 4, 8 and 10h. When the message is out, a Transmit Datagram clears the
+//! block's options and the transmit buffer. With the clear-status bit, which leaves the block to
+//! the host at once, it clears them as soon as they have been read.
 
 use super::Board;
 use super::interrupts::Condition;
@@ -26,7 +26,7 @@ const CHANGE_CONFIGURATION: u8 = 4;
 const COMMAND_MASK: u8 = 0x3F;
 const CLEAR_STATUS: u8 = 0x80;
 
-/// How long the board waits for the reply that goes with a command.
+/// How long the board waits for the reply that belongs to a command.
 const REPLY_WITHIN_US: u64 = 10_000_000;
 /// Messages that the board can hold until their turn comes.
 const OUTBOX_LEN: usize = 16;
@@ -39,7 +39,7 @@ pub(super) enum CommandState {
         until_us: u64,
         work: Work,
     },
-    /// The datagram waits for its turn, or for the end of it.
+    /// The datagram waits for its turn or is being sent.
     Sending,
     /// The reply must come before `until_us`.
     AwaitingReply {
@@ -77,7 +77,7 @@ impl Board {
         let byte = self.ram.get(map::COMMAND);
         let command = byte & COMMAND_MASK;
         if byte & CLEAR_STATUS != 0 {
-            // Only one command can be carried out so; any other is dropped.
+            // Only one command can be carried out in this way. Any other is dropped.
             if command == TRANSMIT_DATAGRAM {
                 self.transmit_unreported();
             }
@@ -99,7 +99,7 @@ impl Board {
         self.live.command = CommandState::Working { until_us, work };
     }
 
-    /// The time of a command has come: work is done, or a reply has not.
+    /// The time of a command has come: its work is done, or its reply is missing.
     pub(super) fn go_on_with_command(&mut self) {
         match self.live.command {
             CommandState::Free | CommandState::Sending => {}
@@ -217,7 +217,7 @@ impl Board {
         self.message(options[0], options[1], options[2], options[3], options[4])
     }
 
-    /// `None` when something is not specified correctly.
+    /// The message to send; `None` when something is not specified correctly.
     fn message(
         &self,
         to: u8,

@@ -6,8 +6,8 @@ use super::presence::Power;
 use super::violations::{Violation, ViolationKind};
 use crate::genius::map::{self, RAM_LEN};
 
-/// What a host writes last to hand something over, so it is to be read first from a RAM that both
-/// can change.
+/// What a host writes last to hand something over. It is therefore read first from a RAM that both
+/// sides can change.
 const HANDED_OVER: [usize; 3] = [map::REQUEST_HEAD, map::COMMAND_STATUS, map::LOCKOUT_REQUEST];
 
 impl Board {
@@ -51,40 +51,40 @@ impl Board {
         }
     }
 
-    /// The shared RAM as it is, for looking at without being the host.
+    /// The shared RAM as it is, for an onlooker who is not the host.
     #[must_use]
     pub fn ram(&self) -> &[u8; RAM_LEN] {
         self.ram.bytes()
     }
 
-    /// What the host did although it must not; only the first few dozen are kept.
+    /// The rules that the host broke. Only the first few dozen are kept.
     #[must_use]
     pub fn violations(&self) -> &[Violation] {
         self.violations.kept()
     }
 
-    /// What the host did although it must not, since this was last asked.
+    /// The rules that the host broke since this was last asked.
     pub(crate) fn take_new_violations(&mut self) -> Vec<Violation> {
         self.violations.take_new()
     }
 
-    /// Whether the board has logged a device in.
+    /// Whether the board has logged in a device.
     pub(crate) fn has_logged_in(&self, number: u8) -> bool {
-        // A board that starts up has patterns there, and never a plain 1.
+        // A board that starts up has test patterns there, and never a plain 1.
         self.ram().get(map::device(number) + map::DEVICE_PRESENT) == Some(&1)
     }
 
     /// Takes over what another process has written to its image of the shared RAM since the latest
     /// [`publish`](Board::publish).
     ///
-    /// `image` is the whole RAM as that process sees it, and must not change meanwhile; otherwise
-    /// see [`sync_with`](Board::sync_with). A file that stands for the RAM begins as zeros.
+    /// `image` is the whole RAM as that process sees it, and must not change meanwhile. If it may
+    /// change, use [`sync_with`](Board::sync_with). A file that stands for the RAM begins as zeros.
     pub fn sync_from_host(&mut self, image: &[u8; RAM_LEN]) {
         self.sync_with(|offset| image[usize::from(offset)]);
     }
 
-    /// The same for an image that changes while it is read: pointers and flags are read first, so
-    /// that what they hand over is complete.
+    /// Does the same for an image that changes while it is read. Pointers and flags are read first,
+    /// so what they hand over is complete.
     pub fn sync_with(&mut self, mut read: impl FnMut(u16) -> u8) {
         let handed_over = HANDED_OVER.map(|at| (at, read(low_bits(at))));
         for at in 0..RAM_LEN {
@@ -104,8 +104,8 @@ impl Board {
         }
     }
 
-    /// Hands out every byte that differs from what the host's image holds, to be written there in
-    /// this order: data before the flags that announce them.
+    /// Hands out every byte that differs from the host's image. The bytes are to be written to that
+    /// image in this order: data before the flags that announce them.
     pub fn publish(&mut self, mut write: impl FnMut(u16, u8)) {
         let (ram, image) = (self.ram.bytes(), &mut self.host_image);
         let mut changed: Vec<usize> = (0..RAM_LEN).filter(|&at| ram[at] != image[at]).collect();
@@ -126,7 +126,8 @@ impl Board {
             }
             map::LOCKOUT_STATE => ViolationKind::Lockout,
             map::LOCKOUT_REQUEST => {
-                // Requested only when neither byte is set, released only when both are.
+                // A lockout is requested only when neither byte is set, and released only when both
+                // are.
                 let (requested, wanted) = (self.ram.bit0(at), byte & 1 != 0);
                 let granted = self.live.lockout.granted;
                 let allowed = if wanted { !requested && !granted } else { !requested || granted };
@@ -159,7 +160,7 @@ impl Board {
     }
 }
 
-/// How much else a byte announces: such bytes are published last.
+/// How much other data a byte announces. Bytes with a higher rank are published later.
 fn rank(at: usize) -> u8 {
     match at {
         map::INTERRUPT_STATUS | map::BOARD_OK => 3,

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use super::Board;
 use crate::genius::map::{INTERRUPT_DISABLE, INTERRUPT_STATUS};
 
-/// Why the host may be interrupted; the value is the place in both interrupt tables.
+/// Why the host may be interrupted. The value is the place in both interrupt tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Condition {
     RequestQueue = 1,
@@ -17,14 +17,14 @@ pub(super) enum Condition {
     LockoutGrant = 7,
 }
 
-/// Pulses that are remembered for whoever has not asked for them yet; of more only the latest.
+/// How many pulses that nobody has asked for are remembered. Of more, only the latest are.
 const REMEMBERED: usize = 64;
 
-/// The pin is low for a few microseconds only: the host's side must remember that.
+/// The interrupt pin. It is low for a few microseconds only, so the pulses must be remembered.
 #[derive(Clone, Debug, Default)]
 pub(super) struct InterruptPin {
     pulses: u64,
-    /// When those were that have not been asked for.
+    /// When the pulses were that nobody has asked for.
     untaken_us: VecDeque<u64>,
 }
 
@@ -50,14 +50,15 @@ impl Board {
         !self.take_interrupts().is_empty()
     }
 
-    /// When it has, in microseconds.
+    /// When the board has pulled the interrupt line since this was last asked, in microseconds.
     pub fn take_interrupts(&mut self) -> VecDeque<u64> {
         std::mem::take(&mut self.interrupts.untaken_us)
     }
 
-    /// Sets a flag; then, unless the host disabled it, the summary flag, and pulls the line.
+    /// Sets the condition's flag. Unless the host disabled it, also sets the summary flag and pulls
+    /// the line.
     ///
-    /// Every occurrence pulls it, whether or not the host has cleared the flag since the one
+    /// Every occurrence pulls the line, whether or not the host has cleared the flag since the one
     /// before.
     pub(super) fn raise(&mut self, condition: Condition) {
         let index = condition as usize;

@@ -6,7 +6,7 @@ use crate::genius::map::{self, MAX_CONTROL_LEN};
 
 type Buffer = [u8; MAX_CONTROL_LEN];
 
-/// What the bus processor works with: it goes on sending the same while the host locks the tables.
+/// The tables of the bus processor. It goes on sending them while the host locks the shared tables.
 pub(super) struct IoCopies {
     inputs: Vec<Option<Vec<u8>>>,
     outputs: Vec<Buffer>,
@@ -26,7 +26,7 @@ impl Default for IoCopies {
 }
 
 impl IoCopies {
-    /// Inputs or global data of a device that is logged in.
+    /// Takes the inputs or global data of a device that is logged in.
     pub(super) fn set_inputs(&mut self, address: u8, data: &[u8]) {
         self.inputs[usize::from(address)] = Some(data.to_vec());
     }
@@ -43,14 +43,15 @@ impl IoCopies {
         self.global[..usize::from(len)].to_vec()
     }
 
-    /// Inputs of a device that logged out before they reached the table never do.
+    /// Drops the inputs of a device that logged out before they reached the table.
     pub(super) fn forget_inputs(&mut self, address: u8) {
         self.inputs[usize::from(address)] = None;
     }
 }
 
 impl Board {
-    /// Once per scan: inputs to the host's tables, outputs from them; nothing during a lockout.
+    /// Copies inputs to the host's tables and outputs from them, once per scan. Does nothing during
+    /// a lockout.
     pub(super) fn exchange_tables(&mut self) {
         if self.live.lockout.granted {
             return;

@@ -1,4 +1,4 @@
-//! What a board knows only until it is reset.
+//! What a board forgets when it is reset.
 
 use super::commands::CommandState;
 use super::io_tables::IoCopies;

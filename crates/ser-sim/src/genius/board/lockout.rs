@@ -12,8 +12,8 @@ pub(super) struct Lockout {
 }
 
 impl Board {
-    /// Lets the state follow the request. The board's own accesses are never under way when it
-    /// looks.
+    /// Lets the state follow the request. The board never accesses the tables itself at the moment
+    /// when it looks.
     pub(super) fn follow_lockout_request(&mut self) {
         self.live.lockout.look_us = None;
         let wanted = self.ram.bit0(map::LOCKOUT_REQUEST);

@@ -8,7 +8,7 @@ use crate::genius::device::Message;
 use crate::genius::identity::{BlockKind, Identity};
 use crate::genius::map;
 
-/// A device that sends nothing for so many scans is logged out.
+/// How many scans a device may send nothing before it is logged out.
 const SILENT_SCANS: u8 = 3;
 /// How many scans the board waits for a Read ID reply before it asks again.
 const ASK_AGAIN_SCANS: u8 = 10;
@@ -22,7 +22,7 @@ enum State {
         output_len: u8,
         kind: u8,
     },
-    /// It has too much data; the board asks again only when it has been away.
+    /// The device has too much data. The board asks again only after the device has been away.
     Refused,
 }
 
@@ -57,7 +57,7 @@ impl LogIns {
         self.own_number_heard_us = Some(now_us);
     }
 
-    /// Logs nobody in before then.
+    /// Logs in nobody before then.
     pub(super) fn refuse_until(&mut self, until_us: u64) {
         self.refuse_until_us = until_us;
     }
@@ -107,8 +107,8 @@ impl Board {
         }
     }
 
-    /// A Read ID of the board's own is out; without an acknowledgement it asks again when it hears
-    /// the device again.
+    /// A Read ID of the board's own is out. Without an acknowledgement the board asks again when it
+    /// next hears the device.
     pub(super) fn asked_for_identity(&mut self, address: u8, arrived: bool) {
         let device = &mut self.live.log_ins.devices[usize::from(address)];
         device.asked_scans = if arrived { ASK_AGAIN_SCANS } else { 0 };
@@ -141,7 +141,7 @@ impl Board {
         self.raise(Condition::DeviceStatus);
     }
 
-    /// A device that is logged in says it was configured anew.
+    /// A device that is logged in says that it was reconfigured.
     pub(super) fn configuration_changed(&mut self, address: u8, identity: Identity) {
         let Some(device) = self.live.log_ins.devices.get_mut(usize::from(address)) else { return };
         let State::Present { input_len, output_len, kind } = device.state else { return };
@@ -174,7 +174,7 @@ impl Board {
         self.ram.set(entry + map::DEVICE_BLOCK, identity.kind as u8);
     }
 
-    /// Once per turn: logs out whom nobody has heard for three scans.
+    /// Logs out the devices that have been silent for three scans. Called once per turn.
     pub(super) fn miss_silent_devices(&mut self) {
         for address in 0..32 {
             let device = &mut self.live.log_ins.devices[usize::from(address)];
@@ -207,7 +207,7 @@ impl Board {
         self.ram.set(map::device(address) + map::DEVICE_PRESENT, 0);
     }
 
-    /// The configuration changed, or the device number.
+    /// Logs out all devices, because the configuration or the bus address changed.
     pub(super) fn log_out_all(&mut self) {
         let mut any = false;
         for address in 0..32 {
@@ -220,8 +220,8 @@ impl Board {
         }
     }
 
-    /// Follows the outputs flags of the device table: who is to take outputs from this board is
-    /// told so first.
+    /// Follows the outputs flags of the device table. A device that is to take outputs from this
+    /// board is told so first.
     pub(super) fn follow_outputs_flags(&mut self) {
         for address in 0..32 {
             let disabled = self.ram.bit0(map::device(address) + map::DEVICE_OUTPUTS);

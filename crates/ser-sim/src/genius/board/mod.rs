@@ -1,7 +1,7 @@
 //! A GENI board, as a host sees it through the shared RAM and other devices see it on the bus.
 //!
-//! Chapters and tables named here are those of the GENI board's manual. Readings of unclear places
-//! are in the comments of the module that acts on them.
+//! Chapters and tables named here are those of the GENI board's manual. Where the manual is
+//! unclear, the module that acts on the passage says in a comment how it reads it.
 
 mod bus_side;
 mod commands;
@@ -36,20 +36,22 @@ use super::map::RAM_LEN;
 
 /// A GENI board.
 ///
-/// The host's side: [`host_read`](Board::host_read) and [`host_write`](Board::host_write) at any
-/// time, or [`sync_from_host`](Board::sync_from_host) and [`publish`](Board::publish) when host and
-/// board share a file; the [`interrupt`](Board::take_interrupt) pin, the reset pin, the
-/// [lamps](Board::leds) and the switches. [`violations`](Board::violations) tells what the host did
-/// that the manual forbids.
+/// A host reaches the RAM with [`host_read`](Board::host_read) and
+/// [`host_write`](Board::host_write) at any time, or with [`sync_from_host`](Board::sync_from_host)
+/// and [`publish`](Board::publish) when host and board share a file. It also has the
+/// [`interrupt`](Board::take_interrupt) pin, the reset pin, the [lamps](Board::leds) and the
+/// switches. [`violations`](Board::violations) tells what the host did that the manual forbids.
 pub struct Board {
     options: BoardOptions,
     now_us: u64,
-    /// The switches as they stand; read at reset, except for the device number in a conflict.
+    /// The switches as they stand. They are read at reset; in a conflict the bus address is read at
+    /// once.
     switches: u8,
     monitor_plugged: bool,
     power: Power,
     ram: Ram,
-    /// The shared RAM as the host knows it, when that is another process with a file between.
+    /// The shared RAM as the host knows it, when the host is another process with a file in
+    /// between.
     host_image: Box<[u8; RAM_LEN]>,
     interrupts: InterruptPin,
     violations: Violations,
@@ -69,7 +71,7 @@ struct BoardFaults {
 }
 
 impl Board {
-    /// A board without power, which is as if it were held in reset.
+    /// A board without power. It behaves as if held in reset.
     #[must_use]
     pub fn new(options: BoardOptions) -> Board {
         let mut board = Board {
@@ -98,8 +100,8 @@ impl Board {
         board
     }
 
-    /// Turns the switches: takes effect at the next reset, and a device number also ends a
-    /// conflict.
+    /// Turns the switches. That takes effect at the next reset. In a conflict a new bus address
+    /// takes effect at once and ends the conflict.
     pub fn set_switches(&mut self, switches: u8) {
         self.switches = switches;
         self.leave_conflict();
@@ -111,7 +113,7 @@ impl Board {
         self.show_active();
     }
 
-    /// The device number in force.
+    /// The bus address in force.
     #[must_use]
     pub fn number(&self) -> u8 {
         self.live.setup.number()

@@ -5,7 +5,7 @@ use crate::genius::scan_time::BusTiming;
 /// A board's switches and constants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoardOptions {
-    /// The DIP switches: bits 0–4 device number, bits 5 and 6 baud rate, bit 7 outputs enabled.
+    /// The DIP switches: bits 0–4 bus address, bits 5 and 6 baud rate, bit 7 outputs enabled.
     pub switches: u8,
     /// Revision of the board's software.
     pub revision: u8,
@@ -16,7 +16,7 @@ pub struct BoardOptions {
 }
 
 impl BoardOptions {
-    /// The usual board with this device number, at the default rate.
+    /// The usual board with this bus address, at the default rate.
     #[must_use]
     pub fn at(number: u8) -> BoardOptions {
         BoardOptions { switches: 0xE0 | number & 0x1F, ..BoardOptions::default() }
@@ -36,19 +36,19 @@ impl BoardOptions {
 }
 
 impl Default for BoardOptions {
-    /// As delivered: all switches open, which is device 31 at 153.6 kbaud standard with outputs
-    /// enabled.
+    /// As delivered: all switches open, which is bus address 31 at 153.6 kbaud standard with
+    /// outputs enabled.
     fn default() -> Self {
         BoardOptions { switches: 0xFF, revision: 0x21, model: 4, timing: Timing::default() }
     }
 }
 
-/// How long a board takes for what the manual leaves open.
+/// How long a board takes where the manual leaves it open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
-    /// From reset to the board-OK flag; the manual has it between 1.7 and 2 seconds.
+    /// From reset to the board-OK flag. The manual gives 1.7 to 2 seconds.
     pub ok_after_us: u64,
-    /// Until it looks at what the host has written.
+    /// Until the board looks at what the host has written.
     pub notice_us: u64,
     /// For carrying out a command that needs no bus.
     pub work_us: u64,

@@ -1,6 +1,6 @@
 //! Whether a board runs, and whether it takes turns on the bus.
 
-/// Between the OK flag and the bus, and after a change of the configuration.
+/// How long the board stays off the bus after the OK flag, and after a change of the configuration.
 pub(super) const OFF_BUS_US: u64 = 1_500_000;
 
 /// What the processors do.
@@ -12,7 +12,7 @@ pub(super) enum Power {
     Stopped,
 }
 
-/// How far the start-up is.
+/// How far the start-up has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stage {
     Released,
@@ -24,11 +24,11 @@ pub(super) enum Stage {
 /// Whether a running board takes turns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Presence {
-    /// Not before then.
+    /// The board takes no turns before then.
     Off {
         until_us: u64,
     },
-    /// Another device has its number.
+    /// Another device has its bus address.
     Conflict {
         heard_us: u64,
     },

@@ -6,7 +6,7 @@ use super::Board;
 use super::interrupts::Condition;
 use crate::genius::datagram::Datagram;
 
-/// One more than these is lost.
+/// How many datagrams the queue holds. One more is lost.
 const LEN: usize = 15;
 
 #[derive(Clone, Debug)]
@@ -33,7 +33,7 @@ pub(super) struct ReceiveQueue {
 }
 
 impl Board {
-    /// Neither sender nor host learns of a datagram that finds the queue full.
+    /// Queues a datagram. Neither sender nor host learns of one that finds the queue full.
     pub(super) fn queue_received(&mut self, from: u8, broadcast: bool, datagram: Datagram) {
         if self.live.received.waiting.len() < LEN {
             let at_us = self.now_us;
@@ -47,7 +47,7 @@ impl Board {
         }
     }
 
-    /// The oldest datagram goes into the read buffer.
+    /// Takes the oldest datagram for the read buffer.
     pub(super) fn take_received(&mut self) -> Option<QueuedDatagram> {
         let received = self.live.received.waiting.pop_front()?;
         self.reads += 1;
@@ -55,13 +55,13 @@ impl Board {
         Some(received)
     }
 
-    /// The datagram that was read last, since the board was reset.
+    /// The datagram that was read last since the board was reset.
     #[must_use]
     pub fn latest_read(&self) -> Option<Read> {
         self.live.received.read
     }
 
-    /// When the oldest datagram arrived that has not been read, in microseconds.
+    /// When the oldest unread datagram arrived, in microseconds.
     #[must_use]
     pub fn unread_since_us(&self) -> Option<u64> {
         self.live.received.waiting.front().map(|received| received.at_us)

@@ -1,8 +1,8 @@
 //! Requests of other devices to read or write the host's memory (chapter 13).
 //!
-//! The header in front of a request's data on the bus is not described in the manual; here it is
-//! length and address as in the queue, which is also how `ser-proto` lays these datagrams out. It
-//! leaves no room for an auxiliary source address, so that is 0.
+//! The manual does not describe the header in front of a request's data on the bus. Here it is
+//! length and address as in the queue, and `ser-proto` lays these datagrams out in the same way.
+//! The header has no room for an auxiliary source address, so that is 0.
 
 use super::Board;
 use super::interrupts::Condition;
@@ -12,7 +12,7 @@ use crate::genius::datagram::{Datagram, MessagePriority, subfunction};
 use crate::genius::device::Message;
 use crate::genius::map::{REQUEST_HEAD, REQUEST_LEN, REQUEST_QUEUE, REQUEST_TAIL, REQUESTS};
 
-// Within a buffer:
+// Offsets within a buffer:
 const STATUS: usize = 1;
 const LENGTH: usize = 2;
 const SOURCE: usize = 6;
@@ -32,7 +32,7 @@ pub(super) struct RequestQueue {
     head: usize,
     /// The next buffer to fill.
     tail: usize,
-    /// The host wrote the tail pointer, which the board does not survive.
+    /// The host wrote the tail pointer, and the board does not survive that.
     hung: bool,
     /// When the board looks at the head pointer.
     pub(super) look_us: Option<u64>,
@@ -45,7 +45,7 @@ pub(super) fn is_memory_access(datagram: &Datagram) -> bool {
 }
 
 impl Board {
-    /// Neither sender nor host learns of a request that finds the queue full.
+    /// Queues a request. Neither sender nor host learns of one that finds the queue full.
     pub(super) fn queue_request(&mut self, from: u8, datagram: &Datagram) {
         let mut header = [0; HEADER_LEN];
         let header_len = datagram.data.len().min(HEADER_LEN);
@@ -77,7 +77,7 @@ impl Board {
         self.live.requests.hung = true;
     }
 
-    /// The host has moved the head pointer: does what the released buffers say.
+    /// Does what the released buffers say. The host has moved the head pointer.
     pub(super) fn look_at_requests(&mut self) {
         self.live.requests.look_us = None;
         let RequestQueue { head, tail, hung, .. } = self.live.requests;
@@ -103,7 +103,7 @@ impl Board {
         self.ram.set(at + STATUS, 0);
         self.live.requests.head = (self.live.requests.head + 1) % REQUESTS;
         if status & ERRORS != 0 {
-            // Nothing happens; the device that asked does not get an answer.
+            // Nothing happens, and the device that asked gets no answer.
         } else if status & BUSY != 0 {
             self.append_request(&buffer);
         } else if status & COMPLETE == 0 {

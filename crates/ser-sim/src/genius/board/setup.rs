@@ -58,11 +58,11 @@ impl Board {
         self.ram.set(map::BUFFER_LENGTH, setup.buffer_len);
     }
 
-    /// Takes what the host wrote into the setup table; gives the command's completion status.
+    /// Takes what the host wrote into the setup table, and returns the command's completion status.
     ///
-    /// With a new buffer length alone the board keeps taking its turns, but all devices are logged
-    /// out and none is logged in for the time. Before the board first enters the bus a change costs
-    /// no extra time.
+    /// If only the buffer length is new, the board keeps taking its turns, but all devices are
+    /// logged out and none is logged in for that time. Before the board first enters the bus a
+    /// change costs no extra time.
     pub(super) fn change_configuration(&mut self) -> u8 {
         let old = self.live.setup;
         let new = Setup {
@@ -76,7 +76,7 @@ impl Board {
             self.show_setup();
             return SYNTAX_ERROR;
         }
-        // A host that has overwritten the switches finds them right again in every case.
+        // A host that has overwritten the switches finds them restored in every case.
         self.ram.set(map::DIP_SWITCHES, old.switches);
         if new == old {
             return PROCESS_ERROR;
@@ -90,7 +90,7 @@ impl Board {
                 self.live.log_ins.refuse_until(self.now_us + OFF_BUS_US);
             }
             Presence::On | Presence::Off { .. } => self.stay_off_bus(OFF_BUS_US),
-            // The number is still taken.
+            // The bus address is still taken.
             Presence::Conflict { .. } => {}
         }
         COMPLETE

@@ -9,17 +9,18 @@ use super::violations::ViolationKind;
 use crate::genius::map;
 use crate::genius::outbox::Outbox;
 
-/// In this time after reset an access can make the board's watchdog time out.
+/// How long after reset an access can make the board's watchdog time out.
 const FRAGILE_US: u64 = 500;
-/// One interrupt that means nothing comes in that time.
+/// When after reset one interrupt comes that means nothing.
 const FALSE_INTERRUPT_US: u64 = 250;
-/// The self-test changes what is in the RAM; half of the time each pattern.
+/// When the self-test changes its pattern in the RAM. Each pattern stands for half of the time.
 const SECOND_PATTERN_US: u64 = 850_000;
-/// From here on the host may access the RAM.
+/// From this time after reset the host may access the RAM.
 const HOST_MAY_ACCESS_US: u64 = 1_700_000;
-/// A number that was heard this recently on the bus is in use: longer than the longest scan.
+/// How recently a bus address must have been heard to be in use. This is longer than the longest
+/// scan.
 const NUMBER_IN_USE_US: u64 = 1_200_000;
-/// Without a turn for so long, again longer than a scan, the board cannot get at the bus.
+/// After this long without a turn the board cannot get at the bus. This too is longer than a scan.
 const TURN_MISSED_US: u64 = 1_000_000;
 pub(super) const HEARTBEAT_US: u64 = 200_000;
 
@@ -44,14 +45,14 @@ pub struct Leds {
 }
 
 impl Board {
-    /// Pulls the reset line: everything stops.
+    /// Pulls the reset line. Everything stops.
     pub fn hold_reset(&mut self) {
         self.power = Power::InReset;
         self.live = Live::new(self.switches);
         self.ram.fill(0xFF);
     }
 
-    /// Lets the reset line go: the board starts.
+    /// Lets the reset line go. The board starts.
     pub fn release_reset(&mut self) {
         if self.power == Power::InReset {
             self.power = Power::SelfTest { released_us: self.now_us, stage: Stage::Released };
@@ -59,7 +60,7 @@ impl Board {
         }
     }
 
-    /// Time begins for a board that has known none.
+    /// Starts time for a board that has known none.
     pub(super) fn power_up_at(&mut self, now_us: u64) {
         self.now_us = now_us;
         if let Power::SelfTest { released_us, .. } = &mut self.power {
@@ -73,7 +74,7 @@ impl Board {
         self.power == Power::InReset
     }
 
-    /// The lamps. After a conflict of device numbers both blink.
+    /// The lamps. After a conflict of bus addresses both blink.
     #[must_use]
     pub fn leds(&self) -> Leds {
         let (board_ok, comm_ok) = match (self.power, self.live.presence) {
@@ -93,7 +94,7 @@ impl Board {
         self.power == Power::Running && self.live.presence == Presence::On
     }
 
-    /// An access in the time in which it is forbidden.
+    /// Handles an access at a time when the manual forbids it.
     pub(super) fn check_not_too_early(&mut self, offset: usize) {
         if let Power::SelfTest { released_us, .. } = self.power {
             let age_us = self.now_us - released_us;
@@ -137,8 +138,8 @@ impl Board {
                     reach(Stage::RamReady);
                     self.set_defaults();
                 } else {
-                    // The faults are all that the host gets to see; the rest of the RAM stays as it
-                    // is.
+                    // The host gets to see the faults and nothing else. The rest of the RAM stays
+                    // as it is.
                     self.power = Power::Stopped;
                     self.ram.write(map::STATUS, &[0; map::STATUS_LEN]);
                     self.ram.set(map::HARDWARE, faults);
@@ -172,7 +173,7 @@ impl Board {
         self.live.heartbeat_us = Some(self.now_us + HEARTBEAT_US);
     }
 
-    /// Takes no more turns for a while; what was on its way is lost.
+    /// Takes no turns for a while. What was on its way is lost.
     pub(super) fn stay_off_bus(&mut self, for_us: u64) {
         self.live.presence = Presence::Off { until_us: self.now_us + for_us };
         self.live.outbox = Outbox::default();
@@ -187,7 +188,7 @@ impl Board {
         }
     }
 
-    /// The waiting is over: onto the bus, unless the number is in use there.
+    /// Ends the wait: enters the bus, unless the bus address is in use there.
     pub(super) fn enter_bus(&mut self) {
         let in_use = self
             .live
@@ -208,7 +209,7 @@ impl Board {
         self.live.turn_missed_us = Some(self.now_us + TURN_MISSED_US);
     }
 
-    /// There is no getting at the bus: whoever was there is not, and what waits for its turn has
+    /// The board cannot get at the bus. All devices count as gone, and what waits for its turn has
     /// failed.
     pub(super) fn miss_turns(&mut self) {
         self.live.turn_missed_us = None;
@@ -228,7 +229,7 @@ impl Board {
         }
     }
 
-    /// In a conflict the board follows the switches for the device number without a reset.
+    /// Follows the switches for the bus address without a reset, as the board does in a conflict.
     pub(super) fn leave_conflict(&mut self) {
         let conflict = matches!(self.live.presence, Presence::Conflict { .. });
         if self.power == Power::Running && conflict && self.switches & 0x1F != self.number() {
@@ -239,7 +240,7 @@ impl Board {
         }
     }
 
-    /// A self-test found something: outputs and everything else stop at once.
+    /// A self-test found a fault: outputs and everything else stop at once.
     ///
     /// The manual clears the OK flag only when the status change interrupt is enabled.
     pub(super) fn fail_self_test(&mut self, faults: u8) {

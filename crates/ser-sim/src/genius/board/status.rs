@@ -7,9 +7,9 @@ use super::interrupts::Condition;
 use super::presence::Power;
 use crate::genius::map;
 
-/// This many errors ...
+/// How many errors within [`INTERVAL_US`] are excessive.
 const EXCESSIVE: usize = 10;
-/// ... in this time are excessive.
+/// The time in which errors are counted.
 const INTERVAL_US: u64 = 10_000_000;
 
 // Bits 1 and 3 of the byte, counted from 1.
@@ -38,7 +38,7 @@ impl BusErrors {
         Some(tenth + INTERVAL_US)
     }
 
-    /// When excessive errors are over.
+    /// When the errors stop being excessive.
     pub(super) fn due_us(&self) -> Option<u64> {
         self.calm_at_us().filter(|_| self.excessive)
     }
@@ -72,7 +72,7 @@ impl Board {
         }
     }
 
-    /// No scan time is known before the second turn on the bus.
+    /// Shows no scan time, because none is known before the second turn on the bus.
     pub(super) fn show_no_scan(&mut self) {
         self.ram.set_word(map::SCAN_TIME, 0xFFFF);
     }

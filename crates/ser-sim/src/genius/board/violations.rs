@@ -1,4 +1,4 @@
-//! What a host did although the manual forbids it.
+//! The rules of the manual that a host broke.
 
 use std::fmt;
 
@@ -9,8 +9,8 @@ pub enum ViolationKind {
     TooEarly,
     /// Access to the reserved area (chapter 3).
     ReservedArea,
-    /// A write to something only the board writes: the switches in the setup table, the status
-    /// table but for the OK flag, the device table but for the outputs flag (chapters 4, 5, 7).
+    /// A write to something that only the board writes: the switches in the setup table, the status
+    /// table except the OK flag, the device table except the outputs flag (chapters 4, 5, 7).
     ReadOnly,
     /// A write to the lockout state, or a request that does not fit it (chapter 9).
     Lockout,
@@ -25,7 +25,7 @@ pub enum ViolationKind {
 /// A rule that the host broke.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Violation {
-    /// When.
+    /// When it happened, in microseconds.
     pub at_us: u64,
     /// Which rule.
     pub kind: ViolationKind,
@@ -50,13 +50,13 @@ impl fmt::Display for Violation {
     }
 }
 
-/// How many are kept; a host that breaks rules does it again and again.
+/// How many are kept, because a host that breaks rules does so again and again.
 const KEPT: usize = 64;
 
 #[derive(Debug, Default)]
 pub(super) struct Violations {
     kept: Vec<Violation>,
-    /// How many of them have been taken as news.
+    /// How many of them have already been reported as new.
     told: usize,
 }
 

@@ -1,4 +1,4 @@
-//! The bus: published scan times, turns in order of device numbers, one datagram per scan.
+//! The bus: published scan times, turns in order of bus addresses, one datagram per scan.
 
 use std::thread;
 
@@ -37,7 +37,7 @@ fn a_station_adds_its_published_time_to_the_scan() {
     for (rate, bytes, hundredths) in PUBLISHED {
         let mut bus = Bus::new(rate);
         bus.connect(Board::powered(BoardOptions::at(31).rate(rate)));
-        // Enough traffic that the shortest scan does not hide anything.
+        // There is enough traffic that the shortest scan does not hide anything.
         let data = StationData { discrete_bytes: 64, channels: 0 };
         bus.connect(BusInterfaceUnit::new(1, rate, data, data));
         bus.advance_to(5 * SECOND_US);
@@ -45,7 +45,8 @@ fn a_station_adds_its_published_time_to_the_scan() {
         let half = StationData { discrete_bytes: bytes / 2, channels: 0 };
         bus.connect(BusInterfaceUnit::new(2, rate, half, half));
         bus.advance_by(5 * SECOND_US);
-        // What the tables give is rounded, not always the same way. The number was skipped before.
+        // The values of the tables are rounded, not always in the same way. The address was skipped
+        // before.
         let added_ns = bus.scan_time_ns().unwrap() - without_ns + rate.skip_ns();
         assert!(
             added_ns.abs_diff(hundredths * 10_000) <= 10_000,
@@ -61,7 +62,7 @@ fn no_scan_is_shorter_than_3_ms() {
     assert_eq!(rig.bus.scan_time_ns(), Some(MIN_SCAN_NS));
 }
 
-/// Notes whose turns it hears.
+/// A device that notes whose turns it hears.
 struct Listener {
     turns: Vec<u8>,
 }

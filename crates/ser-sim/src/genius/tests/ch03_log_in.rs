@@ -49,7 +49,8 @@ fn a_device_that_is_silent_for_three_scans_is_logged_out_and_back_in_when_it_sen
     rig.advance_ms(20);
     rig.write_all(host, 0x08A2, &[0; 8]);
 
-    // From the end of a turn of the board: two more turns pass, and on the third it is gone.
+    // Counted from the end of a turn of the board: two more turns pass, and on the third it is
+    // gone.
     rig.write(host, 0x08A6, 0);
     rig.wait_for(host, 0x08A6, 1);
     let turns = |rig: &Rig| rig.bus.get(host).interrupt_pulses();
@@ -126,7 +127,7 @@ fn with_outputs_disabled_nothing_is_sent_until_the_host_resets_the_flag() {
     assert!(rig.bus.advance_until(SECOND_US, |bus| bus.get(device).outputs() == 0xFF));
     assert_eq!(rig.bus.get(device).controllers().collect::<Vec<_>>(), [31]);
 
-    // And back: the block falls to its default outputs.
+    // Disabled again, the block falls back to its default outputs.
     rig.write(host, 0x1E01 + 8 * 9, 1);
     assert!(rig.bus.advance_until(SECOND_US, |bus| bus.get(device).outputs() == 0));
 }
@@ -233,7 +234,7 @@ fn there_is_room_for_32_devices() {
     for number in 0..31 {
         assert_eq!(rig.device(host, number)[2], 1, "{number}");
     }
-    // Nobody is there to answer on the board's own number.
+    // Nobody is there to answer at the board's own bus address.
     assert_eq!(rig.transmit(host, 31, [0x20, 0x13], 0, &[]), PROCESS_ERROR);
 }
 
@@ -253,7 +254,7 @@ fn inputs_of_a_device_that_is_not_logged_in_stay_out_of_the_table() {
 fn outputs_go_to_devices_that_are_logged_in_and_to_nobody_else() {
     let (mut rig, [host]) = Rig::started([31]);
     let filler = StationData { discrete_bytes: 100, channels: 0 };
-    // Enough traffic that the shortest scan does not hide anything.
+    // There is enough traffic that the shortest scan does not hide anything.
     rig.bus.connect(BusInterfaceUnit::new(3, BusTiming::default(), filler, filler));
     rig.write_all(host, 0x3000 + 128 * 9, &[0xFF; 64]);
     rig.advance_ms(500);

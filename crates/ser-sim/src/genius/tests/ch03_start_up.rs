@@ -37,7 +37,7 @@ fn after_the_self_test_the_shared_ram_holds_the_defaults() {
     for number in 0..32 {
         assert_eq!(rig.device(host, number)[1..3], [0, 0], "outputs enabled, not present");
     }
-    // "Empty" for the receive queue shows in the only way it can.
+    // An empty receive queue shows in the only way it can.
     assert_eq!(rig.read_datagram(host), None);
 }
 

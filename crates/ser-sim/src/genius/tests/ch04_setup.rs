@@ -74,7 +74,7 @@ fn a_board_at_another_rate_than_the_bus_does_not_get_on_it() {
 fn a_read_id_is_answered_with_high_priority() {
     let (mut rig, [low, host, asker]) = Rig::started([1, 30, 31]);
     for round in 0..5 {
-        // One that takes the only place in every scan, before the host's turn comes.
+        // Another device takes the only place in every scan, before the host's turn comes.
         for _ in 0..15 {
             rig.start_command(low, 0x82, &[31, 0x40, 0x50, 0, 0]);
             rig.wait_for(low, 0x08C2, 0);

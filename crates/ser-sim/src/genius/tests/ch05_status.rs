@@ -79,7 +79,7 @@ fn ten_errors_in_ten_seconds_are_excessive() {
     rig.advance_ms(10);
     assert_eq!((rig.read_word(host, 0x0896), rig.read(host, 0x0895)), (10, 0x04));
     assert_eq!(rig.read(host, 0x08A4), 1);
-    // Not fatal, and over when the errors are.
+    // Excessive errors are not fatal, and end when the errors do.
     rig.advance_ms(2_000);
     assert_eq!(rig.read(host, 0x0895), 0);
     assert!(rig.bus.get(host).is_on_bus());

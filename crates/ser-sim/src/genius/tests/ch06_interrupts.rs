@@ -10,7 +10,7 @@ const COMMAND_COMPLETE: u16 = 5;
 const RECEIVE_QUEUE: u16 = 6;
 const LOCKOUT_GRANT: u16 = 7;
 
-/// Clears all flags and disables every condition but one.
+/// Clears all flags and disables every condition except one.
 fn only(rig: &mut Rig, host: Host, index: u16) {
     for other in 1..8 {
         rig.write(host, 0x08B2 + other, u8::from(other != index));

@@ -79,7 +79,7 @@ fn forced_points_are_what_the_controller_sees_and_the_field_gets() {
     rig.advance_ms(200);
     assert_eq!(rig.read_array(host, 0x2000 + 128 * 3), [0b1100, 0x34, 0x12]);
     assert_eq!(rig.bus.get(unit).outputs(), [0x80, 0, 0]);
-    // Nothing happens to points that do not exist.
+    // Forcing points that do not exist has no effect.
     rig.bus.get_mut(unit).force_point(Side::Inputs, 8, Some(true));
     rig.bus.get_mut(unit).force_channel(Side::Outputs, 1, Some(1));
     rig.bus.get_mut(unit).force_channel(Side::Inputs, 0, None);

@@ -74,7 +74,7 @@ fn without_memory_for_it_it_is_a_process_error_and_can_be_sent_again() {
 fn with_the_clear_status_bit_the_block_is_free_at_once_and_nothing_is_reported() {
     let (mut rig, [a, b]) = Rig::started([30, 31]);
     rig.write_all(a, 0x08A2, &[0; 8]);
-    // Faster than the bus: a scan takes 3 ms.
+    // This is faster than the bus, on which a scan takes 3 ms.
     for number in 0..4 {
         rig.write(a, 0x08D2, number);
         rig.start_command(a, 0x82, &[31, 0x40, 0x50, 0, 1]);

@@ -130,7 +130,7 @@ fn a_lost_reply_is_the_same_as_none() {
 fn a_question_of_high_priority_does_not_wait() {
     let (mut rig, [low, host, other]) = Rig::started([1, 30, 31]);
     for (priority, waits) in [(0, true), (1, false)] {
-        // One that takes the only place of the next scans.
+        // Another device takes the only place of the next scans.
         for _ in 0..10 {
             rig.start_command(low, 0x82, &[31, 0x40, 0x50, 0, 0]);
             rig.wait_for(low, 0x08C2, 0);

@@ -14,7 +14,7 @@ fn each_host_gets_its_own_data() {
         (128, 56),
         "how much the sender may send"
     );
-    // Boards that start with outputs enabled send to everyone who takes data; only one of them
+    // Boards that start with outputs enabled send to everyone who takes data, but only one of them
     // should.
     rig.write(b, 0x1E01 + 8 * 31, 1);
     rig.write(c, 0x1E01 + 8 * 29, 1);

@@ -136,7 +136,7 @@ fn write_point_goes_into_the_queue_and_other_datagrams_do_not() {
     assert_eq!(rig.transmit(other, 30, [0x20, 0x0B], 0, &access(0, &[1, 1])), COMPLETE);
     assert!(next_request(&mut rig, host).is_some());
     assert_eq!(rig.read_datagram(host), None);
-    // The same subfunctions with another function code are something else.
+    // The same subfunctions with another function code mean something else.
     assert_eq!(rig.transmit(other, 30, [0x40, WRITE_DEVICE], 0, &[1]), COMPLETE);
     assert!(rig.read_datagram(host).is_some());
 }

@@ -1,4 +1,4 @@
-//! What goes wrong, goes wrong the same way every time, and the boards show what the manual says.
+//! Faults happen in the same way every time, and the boards show what the manual says.
 
 use super::rig::{COMPLETE, PROCESS_ERROR, Rig, SECOND_US, lengths};
 use crate::genius::{
@@ -61,7 +61,7 @@ fn two_boards_that_start_with_the_same_number_find_out_and_blink() {
     assert_ne!(rig.bus.traffic().collisions, 0);
     assert_ne!(rig.read_word(c, 0x0896), 0, "the others hear it as errors");
     assert_eq!(rig.read_word(c, 0x0898), 3);
-    // The number can be changed on the spot, without a reset.
+    // The bus address can be changed on the spot, without a reset.
     rig.bus.get_mut(b).set_switches(0xE0 | 5);
     rig.advance_ms(4_000);
     assert_eq!(rig.read(b, 0x0882), 0xE0 | 5);
@@ -137,7 +137,7 @@ fn bytes_at_random_do_not_upset_a_board() {
     for _ in 0..50_000 {
         let [low, high, byte, step, ..] = numbers.rand_u64().to_le_bytes();
         let offset = u16::from_le_bytes([low, high]);
-        // Most writes near what the board looks at.
+        // Most writes are near what the board looks at.
         let offset = if step & 1 == 0 { 0x0880 + offset % 0x60 } else { offset };
         rig.write(a, offset, byte % 17);
         rig.bus.advance_by(u64::from(step) * 10);

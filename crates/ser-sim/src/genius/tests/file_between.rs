@@ -11,8 +11,8 @@ impl File {
         File(Box::new([0; RAM_LEN]))
     }
 
-    /// One round of whoever plays the board: take what the host wrote, let time pass, hand out what
-    /// the board wrote.
+    /// One round of the process that plays the board: takes what the host wrote, lets time pass,
+    /// and hands out what the board wrote.
     fn exchange(&mut self, rig: &mut Rig, host: Host, us: u64) -> Vec<u16> {
         rig.bus.get_mut(host).sync_from_host(&self.0);
         rig.bus.advance_by(us);
@@ -88,7 +88,7 @@ fn what_hands_over_is_read_first_and_acted_on_last() {
     let ram = *rig.bus.get(host).ram();
     rig.bus.get_mut(host).sync_with(|offset| {
         order.push(offset);
-        // The host is in the middle of writing a command: it has not yet come to the status byte.
+        // The host is in the middle of writing a command, and has not yet come to the status byte.
         if offset == 0x08C3 { 4 } else { ram[usize::from(offset)] }
     });
     assert_eq!(order[..3], [0x0880, 0x08C2, 0x0A48]);

@@ -24,7 +24,7 @@ impl Rig {
         Rig { bus: Bus::with_noise(BusTiming::default(), noise) }
     }
 
-    /// Hosts with these device numbers, their boards just out of reset.
+    /// Connects hosts with these bus addresses, their boards just out of reset.
     pub(super) fn connect<const N: usize>(&mut self, numbers: [u8; N]) -> [Host; N] {
         numbers.map(|number| self.bus.connect(Board::powered(BoardOptions::at(number))))
     }
@@ -70,7 +70,7 @@ impl Rig {
         self.bus.get_mut(host).host_write_from(offset, bytes);
     }
 
-    /// A device's entry in the device configuration table.
+    /// A device's entry in the device table.
     pub(super) fn device(&mut self, host: Host, number: u8) -> [u8; 8] {
         self.read_array(host, 0x1E00 + 8 * u16::from(number))
     }
@@ -79,14 +79,15 @@ impl Rig {
         self.bus.advance_by(ms * 1000);
     }
 
-    /// Waits for a byte to have a value; the bound is generous, and missing it a failure.
+    /// Waits for a byte to have a value. The bound is generous, and missing it is a failure.
     pub(super) fn wait_for(&mut self, host: Host, offset: u16, value: u8) {
         let at = usize::from(offset);
         let came = self.bus.advance_until(20 * SECOND_US, |bus| bus.get(host).ram()[at] == value);
         assert!(came, "{offset:04X}h is {:02X}h", self.read(host, offset));
     }
 
-    /// The basic algorithm for starting a command: OK, block free, options, then the status byte.
+    /// The basic algorithm for starting a command: check OK, check that the block is free, write
+    /// the options, then the status byte.
     pub(super) fn start_command(&mut self, host: Host, command: u8, options: &[u8]) {
         assert_eq!(self.read(host, 0x0893), 1, "the board is not OK");
         let status = self.read(host, 0x08C2);
@@ -96,7 +97,7 @@ impl Rig {
         self.write(host, 0x08C2, 1);
     }
 
-    /// Algorithm 1 for completing a command: until the status byte is 4 or above.
+    /// Algorithm 1 for completing a command: wait until the status byte is 4 or above.
     pub(super) fn complete_command(&mut self, host: Host) -> u8 {
         let done = self.bus.advance_until(11 * SECOND_US, |bus| bus.get(host).ram()[0x08C2] >= 4);
         assert!(done, "the command does not end");
@@ -134,8 +135,8 @@ impl Rig {
         self.start_command(host, 2, &[to, codes[0], codes[1], priority, length]);
     }
 
-    /// Read Datagram: source, function, subfunction, directed, and the data; or none when the queue
-    /// is empty.
+    /// Read Datagram: returns source, function, subfunction, directed, and the data; `None` when
+    /// the queue is empty.
     pub(super) fn read_datagram(&mut self, host: Host) -> Option<([u8; 4], Vec<u8>)> {
         match self.command(host, 1, &[]) {
             COMPLETE => {
@@ -157,7 +158,7 @@ impl Rig {
         self.command(host, 4, &[])
     }
 
-    /// Every host kept the rules of the manual.
+    /// Checks that every host kept the rules of the manual.
     pub(super) fn assert_lawful(&self, hosts: &[Host]) {
         for &host in hosts {
             assert_eq!(self.bus.get(host).violations(), []);

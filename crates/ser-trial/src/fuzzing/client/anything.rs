@@ -1,4 +1,4 @@
-//! A unit that says anything.
+//! A recorder that says anything.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -12,7 +12,7 @@ use ser_proto::{Command, Entry, ReadReply, Reply};
 use crate::fuzzing::framing::frame_of;
 use crate::fuzzing::script::Script;
 
-/// Messages that nobody asked for and that are kept.
+/// How many messages that nobody asked for may be kept.
 const MAX_KEPT: u32 = 4096;
 
 const TIMEOUT: Duration = Duration::from_millis(300);
@@ -21,7 +21,7 @@ const TIMEOUT: Duration = Duration::from_millis(300);
 struct Talk {
     session: Session,
     now: Duration,
-    /// What is not answered.
+    /// Commands that are not answered yet.
     asked: Vec<Command>,
     readers: Readers,
 }
@@ -93,7 +93,7 @@ impl Talk {
         );
     }
 
-    /// Does what is due, and takes what there is.
+    /// Does what is due, and takes what has arrived.
     fn check(&mut self) {
         for sent in 0.. {
             let Some(attempt) = self.session.dispatch(self.now) else { break };
@@ -150,12 +150,12 @@ impl Talk {
     }
 }
 
-/// Readers of a log of a size that may be right.
+/// Readers of a log whose size may be the right one.
 struct Readers {
     size: u16,
     keeps_up: bool,
     reader: LogReader,
-    /// Requests of the reader that may be under way at once, and the starts of those that are.
+    /// How many requests of the reader may be under way at once, and the starts of those that are.
     window: usize,
     asked: VecDeque<u16>,
     /// All entries that the reader was shown.
@@ -163,7 +163,7 @@ struct Readers {
     range: RangeReader,
 }
 
-/// The sequence that a cursor may have: small, or larger than any recorder will ever count.
+/// A sequence for a cursor: small, or larger than any recorder will ever count.
 fn sequence(word: u16) -> u64 {
     match word {
         0xFF00.. => u64::MAX - u64::from(word & 0xFF),
@@ -190,7 +190,7 @@ impl Readers {
         }
     }
 
-    /// Takes a reply as it is, and as the answer to what was asked for.
+    /// Takes a reply as it is, and as the answer to a pending request.
     fn take(&mut self, reply: ReadReply) {
         let fitting = self.range.request().map_or(reply.start, |request| request.start);
         self.take_range(&ReadReply { start: fitting, ..reply.clone() });
@@ -225,7 +225,7 @@ impl Readers {
         });
         match self.reader.cursor() {
             Some(cursor) if delivered > 0 => assert_eq!(cursor.anchor, last),
-            // An empty log is the only one in which a cursor can stand without an event.
+            // Only in an empty log can a cursor stand without an event.
             cursor => {
                 assert!(cursor == before || cursor.is_some_and(|cursor| cursor.anchor.is_none()));
             }
@@ -238,7 +238,7 @@ impl Readers {
         assert_eq!(self.reader.is_waiting(), !self.asked.is_empty());
         self.ask();
         if result.is_err() || self.asked.is_empty() {
-            // As a program does: on from where this reading stopped.
+            // Continues where this reading stopped, as a program does.
             self.asked.clear();
             self.shown.clear();
             let reader =

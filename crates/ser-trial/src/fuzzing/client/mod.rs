@@ -7,19 +7,19 @@ mod truthful_unit;
 
 use super::script::Script;
 
-/// The first byte of `data` says which it is.
+/// The first byte of `data` selects one of two trials.
 ///
-/// Against anything:
+/// Against a line that brings anything:
 /// - an answer belongs to the request; what nobody asked for is kept up to a limit; lines have an
 ///   end;
 /// - readers take any reply to any request, and their cursors move as far as they deliver.
 ///
 /// Against a recorder that tells the truth, on a line that loses, cuts and damages messages and
 /// brings some late:
-/// - no event is delivered twice, out of order, or other than it was;
-/// - what is delivered and what is told to be lost are all events of a log;
-/// - no erase goes untold, unless the log is full again when it is looked at, or nothing was known
-///   of it before.
+/// - no event is delivered twice, out of order, or different from what it was;
+/// - the events delivered and the events reported as lost make up the whole log;
+/// - every erase is reported, unless the log is full again when it is looked at, or nothing was
+///   known of it before.
 ///
 /// # Panics
 /// When one of these does not hold.

@@ -17,37 +17,38 @@ const TIMEOUT: Duration = Duration::from_millis(100);
 /// Attempts of one request.
 const RETRIES: u32 = 2;
 
-/// Readings that begin anew because the log was changed under them, in a row.
+/// How many readings in a row may begin anew because the log was changed under them.
 const MAX_RESYNCS: u32 = 4;
 
-/// Messages are at most so late: a request may be repeated before the first answer has come.
+/// The longest delay of a message. A request may be repeated before the first answer has come.
 const LATEST: Duration = Duration::from_millis(150);
 
-/// Events between two readings of which the total can tell how many there were.
+/// How many events may lie between two readings for the total to tell their number.
 const MAX_UNREAD: u32 = u16::MAX as u32;
 
 /// The total counts modulo this.
 const TOTAL_TURNS_AT: u32 = 1 << 16;
 
-/// What has come to the host, in order.
+/// What has reached the host, in order.
 #[derive(Default)]
 struct Received {
     /// The event that must come next, unless some are lost.
     next: u32,
-    /// Whether the host knows the event before, so that it finds out when that is gone.
+    /// Whether the host knows the event before, and therefore finds out when it is gone.
     anchored: bool,
-    /// Whether it has been told, since the latest event, that the log began anew.
+    /// Whether a restart of the log was reported since the latest event.
     restart_told: bool,
-    /// So many have been told to be lost since the latest event.
+    /// How many events were reported as lost since the latest event.
     lost: u32,
-    /// Whether the total has turned since the latest event, and cannot tell how many there were.
+    /// Whether the total has wrapped since the latest event, so that it cannot tell how many there
+    /// were.
     turned: bool,
     /// Whether the log was erased since the reading began.
     erased_meanwhile: bool,
-    /// How often it was resized since.
+    /// How often the log was resized since the reading began.
     resized_meanwhile: u32,
-    /// Whether it was resized more than once during one reading, which may spoil the host's count
-    /// for good.
+    /// Whether the log was resized more than once during one reading, which may spoil the host's
+    /// count for good.
     muddled: bool,
 }
 
@@ -55,7 +56,7 @@ struct World {
     unit: TruthfulUnit,
     session: Session,
     now: Duration,
-    /// What the unit has said and the line has not brought yet.
+    /// What the recorder has said and the line has not brought yet.
     under_way: VecDeque<(Duration, Vec<u8>)>,
     to_unit: FrameDecoder<16>,
     received: Received,
@@ -84,7 +85,7 @@ pub(super) fn follow(mut script: Script<'_>) {
         match script.byte() % 8 {
             0 => world.record(script.byte().into()),
             1 => world.record(u32::from(script.word()) >> 6),
-            // Now and then enough to turn the total, which has 16 bits.
+            // Sometimes enough events to wrap the total, which has 16 bits.
             2 if script.byte() == 7 => world.record(0xFF00),
             2 if script.byte().is_multiple_of(4) => world.erase(),
             2 if script.byte().is_multiple_of(4) => world.resize(any_size(&mut script)),
@@ -92,7 +93,7 @@ pub(super) fn follow(mut script: Script<'_>) {
             _ => world.read_new(&mut script),
         }
     }
-    // On a line without faults the rest comes, too.
+    // On a line without faults, the rest arrives too.
     world.bring_all();
     world.read_new(&mut Script::new(&[]));
     world.received.assert_complete(&world.unit);
@@ -117,10 +118,10 @@ impl World {
         self.received.muddled |= self.received.resized_meanwhile > 1;
     }
 
-    /// Readings from the cursor on, until one comes to its end or the line is too bad.
+    /// Reads from the cursor on, until a reading comes to its end or the line is too bad.
     fn read_new(&mut self, script: &mut Script<'_>) {
         for _ in 0..=MAX_RESYNCS {
-            // The client asks for it.
+            // Reading on beyond the end is a choice of the client's.
             let keeps_up = self.unit.happened() % 2 == 1;
             let mut reader = LogReader::new(self.cursor, self.unit.size()).keeping_up(keeps_up);
             if let Some(position) = self.position.take() {
@@ -139,7 +140,7 @@ impl World {
         }
     }
 
-    /// One reading; `None` when there was no reply.
+    /// Makes one reading; `None` when there was no reply.
     fn read_once(
         &mut self,
         reader: &mut LogReader,
@@ -159,7 +160,8 @@ impl World {
             }
             let reply = self.next_reply(script)?;
             if std::mem::take(&mut first) {
-                // As the client does: they tell what the log is about to be read for.
+                // The client does the same: such reports only tell what the log is about to be read
+                // for.
                 self.session.forget_earlier_reports();
             }
             let (received, unit) = (&mut self.received, &self.unit);
@@ -171,7 +173,7 @@ impl World {
         }
     }
 
-    /// The reply to one of the requests over the line, with everything that may happen to them.
+    /// The reply to one of the requests over the line, which may do to them all that it can.
     fn next_reply(&mut self, script: &mut Script<'_>) -> Option<ReadReply> {
         loop {
             while let Some(attempt) = self.session.dispatch(self.now) {
@@ -217,7 +219,7 @@ impl World {
         }
     }
 
-    /// Lets the line do what it does to a message.
+    /// Sends a message over the line, which may lose, damage or delay it.
     fn say(&mut self, frame: &[u8], script: &mut Script<'_>) {
         let mut frame = frame.to_vec();
         let delay = match script.byte() {
@@ -232,7 +234,7 @@ impl World {
             0xE0.. => {
                 frame.splice(0..0, *b"\x1B12 noise\r\n");
             }
-            // One wrong digit is always seen, except in the length.
+            // One wrong digit is always noticed, except in the length.
             0xD8.. if at > 2 => frame[at] = if frame[at] == b'7' { b'8' } else { b'7' },
             0xD0.. if at > 0 => frame[at] = 0x80,
             _ => {}
@@ -240,7 +242,7 @@ impl World {
         self.under_way.push_back((self.now + delay, frame));
     }
 
-    /// The line brings what is due. A serial line keeps the order.
+    /// Lets the line bring what is due. A serial line keeps the order.
     fn bring(&mut self) {
         while self.under_way.front().is_some_and(|(at, _)| *at <= self.now)
             && let Some((_, frame)) = self.under_way.pop_front()
@@ -262,7 +264,7 @@ impl World {
         }
     }
 
-    /// A report is a reason to read, and no more: there may be readings without one, too.
+    /// Takes reports. A report is only a reason to read, and readings may happen without one.
     fn take_reports(&mut self) {
         while self.session.take_unsolicited().is_some() {}
     }
@@ -298,7 +300,7 @@ impl Received {
         assert!(number >= self.next, "{number} comes after {}", self.next - 1);
         let began = unit.log_began(number);
         let unseen = unit.was_full(began) && (self.erased_meanwhile || began >= self.next);
-        // Who knows no event of this log counts from its beginning on.
+        // A reader that knows no event of this log counts from the log's beginning.
         let from = if self.anchored { self.next } else { began };
         if self.anchored && began >= self.next {
             assert!(unseen, "no word of the erase before {began}");
@@ -317,7 +319,7 @@ impl Received {
         (self.restart_told, self.lost, self.turned) = (false, 0, false);
     }
 
-    /// On a line without faults everything has come.
+    /// Checks that everything has arrived on a line without faults.
     fn assert_complete(&self, unit: &TruthfulUnit) {
         let is_empty = unit.log_began(unit.happened()) == unit.happened();
         let told = self.restart_told || !self.anchored || self.next == unit.happened();

@@ -1,4 +1,4 @@
-//! A recorder whose events can be told apart: each carries its running number.
+//! A recorder whose events can be distinguished, because each carries its running number.
 
 use ser_proto::{Command, Entry, Inputs, Model, ReadReply, Reply, TimeStamp};
 
@@ -17,7 +17,7 @@ pub(super) struct TruthfulUnit {
 }
 
 impl TruthfulUnit {
-    /// A unit with a log of `size` entries that has counted to `total` already.
+    /// A recorder with a log of `size` entries that has already counted to `total`.
     pub(super) fn new(size: u16, total: u16) -> TruthfulUnit {
         let mut unit = TruthfulUnit {
             slots: Vec::new(),
@@ -36,7 +36,7 @@ impl TruthfulUnit {
         self.happened
     }
 
-    /// Where the log began in which this event is: the running number of the first one after an
+    /// Where the log that contains this event began: the running number of the first event after an
     /// erase.
     pub(super) fn log_began(&self, number: u32) -> u32 {
         self.erased_before.iter().rev().copied().find(|&began| began <= number).unwrap_or(0)
@@ -53,7 +53,7 @@ impl TruthfulUnit {
         end - began >= self.smallest.into()
     }
 
-    /// So many events happen.
+    /// Records `count` events.
     pub(super) fn record(&mut self, count: u32) {
         for _ in 0..count {
             let number = self.happened;
@@ -73,7 +73,7 @@ impl TruthfulUnit {
         self.erased_before.push(self.happened);
     }
 
-    /// Gives the ring another size; the newest events stay, from the first slot on.
+    /// Gives the ring another size. The newest events stay, from the first slot on.
     pub(super) fn resize(&mut self, size: u16) {
         if self.slots.len() == usize::from(self.size) {
             self.slots.rotate_left(self.next_slot);
@@ -108,7 +108,7 @@ impl TruthfulUnit {
         }
     }
 
-    /// An auto report of the newest events, as far as they do not go around the end of the ring.
+    /// An auto report of the newest events, up to the end of the ring.
     pub(super) fn report(&self, count: u8) -> Option<ReadReply> {
         let newest = self.next_slot.checked_sub(1).unwrap_or(usize::from(self.size) - 1);
         let first = newest.saturating_sub(usize::from(count % 10));
@@ -118,7 +118,7 @@ impl TruthfulUnit {
     }
 }
 
-/// The event with that running number. What changed goes together with the state before.
+/// The event with this running number. What changed and the state before fit together.
 fn entry(number: u32) -> Entry {
     let time =
         TimeStamp { year: 26, month: 1, day: 1, hour: 0, minute: 0, second: 0, millisecond: 0 };

@@ -1,4 +1,4 @@
-//! The driver and what is watched at it.
+//! The driver, and what is checked of it.
 
 use std::cell::{RefCell, RefMut};
 use std::collections::HashSet;
@@ -11,8 +11,8 @@ use geni_board::{
 
 use super::ram::{Ram, Window};
 
-/// Most accesses in one poll. The longest: a lockout is granted (128 bytes of global data), flags
-/// are set, devices are looked at.
+/// The most accesses in one poll. The longest poll gets a lockout granted (128 bytes of global
+/// data), sets flags and looks at devices.
 const MAX_ACCESSES: usize = 600;
 
 /// How a datagram that was accepted has to end.
@@ -25,24 +25,24 @@ enum Ending {
 /// A driver under watch.
 pub(super) struct Bench {
     pub(super) driver: Driver<Window>,
-    /// The configuration that was asked for last.
+    /// The latest configuration that was asked for.
     pub(super) wanted: Configuration,
     pub(super) now_ms: u32,
     ram: Rc<RefCell<Ram>>,
     polls: u32,
     counted: [u32; 21],
     on_its_way: Option<Ending>,
-    /// Whether the board has said last that it does not take the configuration.
+    /// Whether the board's latest answer refused the configuration.
     pub(super) was_refused: bool,
-    /// When the driver has seen a heartbeat last, and how long it may go without.
+    /// When the driver last saw a heartbeat, and how long it may go without.
     beat_ms: u32,
     heartbeat_timeout_ms: u32,
     /// Whether pulses of the interrupt line mean datagrams.
     pub(super) has_line: bool,
-    /// Ticks of looks that saw the flag of a datagram, and of pulses that mean one.
+    /// Ticks of looks that saw the flag of a datagram, and of pulses that mean a datagram.
     signs_ms: HashSet<u32>,
     pulsed_ms: u32,
-    /// When the reset line was last seen to go up: the board must be left alone for a while.
+    /// When the reset line was last seen to go up. The board must then be left alone for a while.
     released_ms: Option<u32>,
 }
 
@@ -75,7 +75,7 @@ impl Bench {
         self.polls
     }
 
-    /// The interrupt line was pulsed so long ago, or with the latest pulse if that was later.
+    /// The interrupt line was pulsed this long ago, or with the latest pulse if that was later.
     pub(super) fn pulse(&mut self, ago_ms: u32) {
         let since_latest_ms = self.now_ms.wrapping_sub(self.pulsed_ms);
         self.pulse_at(self.now_ms.wrapping_sub(ago_ms.min(since_latest_ms)));
@@ -90,19 +90,19 @@ impl Bench {
         self.driver.interrupt(tick_ms);
     }
 
-    /// Lets time pass in which the driver is not asked.
+    /// Lets time pass without polling the driver.
     pub(super) fn pass(&mut self, ms: u32) {
         self.now_ms = self.now_ms.wrapping_add(ms);
     }
 
-    /// A millisecond later: one poll with everything that must hold for it.
+    /// Polls once, a millisecond later, and checks everything that must hold of a poll.
     pub(super) fn poll(&mut self) -> Option<Event> {
         self.pass(1);
         self.ram().play_puppet();
         self.poll_now()
     }
 
-    /// The same in the present millisecond, with a RAM that is as it is.
+    /// Polls and checks in the present millisecond, with the RAM as it is.
     pub(super) fn poll_now(&mut self) -> Option<Event> {
         self.polls += 1;
         self.ram().accesses = 0;
@@ -137,7 +137,8 @@ impl Bench {
         }
     }
 
-    /// While it starts up a board gets more time, up to the poll in which it becomes ready.
+    /// Checks how long the driver goes without a heartbeat. A board that starts up gets more time,
+    /// up to the poll in which it becomes ready.
     fn check_heartbeat(&mut self, was_ready: bool) {
         if std::mem::take(&mut self.ram().beat_seen) {
             self.beat_ms = self.now_ms;
@@ -150,7 +151,7 @@ impl Bench {
         );
     }
 
-    /// Looks at what was written since this was last asked.
+    /// Checks what was written since this was last called.
     pub(super) fn check_writes(&mut self) {
         let written = std::mem::take(&mut self.ram().written);
         let buffer_len = u16::from(self.driver.configuration().buffer_len());
@@ -198,7 +199,7 @@ impl Bench {
         }
     }
 
-    /// A host that uses whatever it is offered.
+    /// Acts as a host that uses whatever it is offered.
     fn make_use_of(&mut self, event: &Event) {
         let mut bytes = [0; 256];
         if *event == Event::TablesLocked {
@@ -243,7 +244,7 @@ impl Bench {
     }
 }
 
-/// Whether a byte there is the host's to write, and can have this value.
+/// Whether the byte at this offset is the host's to write, and may have this value.
 fn may_write(offset: u16, byte: u8, buffer_len: u16) -> bool {
     let outputs = map::IO_TABLE.start + u16::from(map::DEVICE_COUNT) * buffer_len;
     match offset {
@@ -271,7 +272,7 @@ fn may_write(offset: u16, byte: u8, buffer_len: u16) -> bool {
     }
 }
 
-/// Every counter, so that a new one is not forgotten here.
+/// All counters. Destructuring keeps a new one from being forgotten here.
 fn as_array(counters: Counters) -> [u32; 21] {
     let Counters {
         failures,

@@ -1,5 +1,4 @@
-//! The GENI driver against a shared RAM that nobody is in charge of, and then against a board that
-//! works.
+//! The GENI driver against a shared RAM that nobody controls, and then against a board that works.
 
 mod bench;
 mod ram;
@@ -14,19 +13,19 @@ use super::script::Script;
 use bench::Bench;
 use ram::Puppet;
 
-/// Milliseconds that the hostility lasts at most.
+/// How many milliseconds the hostility lasts at most.
 const MAX_POLLS: u32 = 4_000;
 
 /// `data` says how the driver is set up, what changes in the RAM between two accesses and between
 /// two polls, what the host wants, and how time passes.
 ///
-/// - A poll does a bounded number of accesses, and none while the board must be left alone.
-/// - Nothing is written but what belongs to the host, and nothing read from the reserved area.
-///   Lockout is asked for and given back when it may be, by what the driver has seen.
+/// - A poll makes a bounded number of accesses, and none while the board must be left alone.
+/// - Only what belongs to the host is written, and nothing is read from the reserved area. Lockout
+///   is requested and given back only when that is allowed by what the driver has seen.
 /// - A board without a heartbeat is not trusted any longer than agreed.
-/// - A datagram is handed out with a tick at which its flag was seen or, where the interrupt line
-///   is for datagrams only, at which that was pulsed, or with none.
-/// - Counters never go back; each datagram that was accepted ends once, in the way that was asked
+/// - A datagram is handed out either with a tick or without one. The tick is one at which its flag
+///   was seen or, where the interrupt line is for datagrams only, at which the line was pulsed.
+/// - Counters never go back. Each datagram that was accepted ends once, in the way that was asked
 ///   for.
 /// - When a board that works takes over, the driver is ready within a bounded time, sends, keeps
 ///   the board's global data up to date, knows when datagrams arrive and breaks no rule of the
@@ -46,7 +45,7 @@ pub fn geni_driver(data: &[u8]) {
         act(&mut bench, &mut script);
         bench.poll();
     }
-    // It takes a hundred times as long as all the rest, so the fuzzer may leave it out.
+    // This takes a hundred times as long as all the rest, so the fuzzer may leave it out.
     if bits & 0x40 == 0 {
         recovery::assert_recovers(bench, warm);
     }
@@ -75,7 +74,7 @@ fn configuration(script: &mut Script<'_>) -> Configuration {
         .unwrap_or_else(|_| Configuration::new(7, 4, 0, 128).expect("possible lengths"))
 }
 
-/// Something happens between two polls.
+/// Lets something happen between two polls.
 fn act(bench: &mut Bench, script: &mut Script<'_>) {
     let what = script.byte();
     match what % 16 {
@@ -129,7 +128,7 @@ fn transmission(script: &mut Script<'_>) -> Transmission {
     }
 }
 
-/// Data of a length that may be right, or one of the other answers.
+/// Answers with data of a length that may be right, or with one of the other answers.
 fn answer(bench: &mut Bench, script: &mut Script<'_>) {
     let (kind, len) = (script.byte(), script.byte());
     let data = vec![kind; len.into()];
@@ -141,7 +140,7 @@ fn answer(bench: &mut Bench, script: &mut Script<'_>) {
     bench.check_writes();
     if let Err(AnswerError::WrongLength { expected }) = answered {
         assert_ne!(expected, len);
-        // The request still waits, and takes an answer that fits, if it is still there.
+        // The request is still waiting, and takes an answer that fits if it has not gone.
         let again = bench.driver.answer_request(RequestAnswer::Data(&vec![0; expected.into()]));
         assert!(matches!(again, Ok(()) | Err(AnswerError::NoRequest)), "{again:?}");
         bench.check_writes();

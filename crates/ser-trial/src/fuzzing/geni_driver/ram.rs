@@ -23,12 +23,12 @@ impl SharedRam for Window {
     }
 }
 
-/// What the RAM does after each poll, so that the driver gets further than to a board that does
-/// nothing.
+/// What the RAM does after each poll. It takes the driver further than a board that does nothing
+/// would.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Puppet {
     beats: bool,
-    /// The status that a command gets.
+    /// The status that a command ends with.
     completes: Option<u8>,
     locks: bool,
     restores_setup: bool,
@@ -51,22 +51,22 @@ impl Puppet {
     }
 }
 
-/// Both ends.
+/// The RAM from both sides.
 #[derive(Debug)]
 pub(super) struct Ram {
     bytes: Vec<u8>,
-    /// Where an access finds out whether the byte changes in this moment, and to what.
+    /// Decides for each access whether the byte changes at this moment, and to what.
     noise: Vec<u8>,
     noise_at: usize,
     /// How likely that is, of 256.
     pub(super) noisiness: u8,
     pub(super) puppet: Puppet,
-    /// The setup table as the driver wrote it last: what a board that restores it puts back.
+    /// The setup table as the driver last wrote it, which a board that restores it puts back.
     setup: [u8; 6],
     /// The board that has taken over.
     pub(super) board: Option<BoardHolder>,
     pub(super) accesses: usize,
-    /// What the driver has seen last in the lockout bytes.
+    /// What the driver last saw in the lockout bytes.
     lockout_seen: [u8; 2],
     /// Whether the driver has seen a heartbeat since this was last asked.
     pub(super) beat_seen: bool,
@@ -75,7 +75,7 @@ pub(super) struct Ram {
     pub(super) written: Vec<(u16, u8)>,
 }
 
-/// A board's window, which has nothing to show.
+/// A board's window, wrapped because it has no `Debug` output.
 pub(super) struct BoardHolder(pub(super) BoardWindow);
 
 impl std::fmt::Debug for BoardHolder {
@@ -131,7 +131,7 @@ impl Ram {
         self.accesses += 1;
         self.written.push((offset, byte));
         if offset == map::LOCKOUT_REQUEST {
-            // Asked for when neither byte is set, given back when both are.
+            // Lockout is requested when neither byte is set, and given back when both are.
             assert_eq!(self.lockout_seen, [1 - byte; 2], "lockout request {byte}");
         }
         if let Some(BoardHolder(board)) = &mut self.board {
@@ -152,7 +152,7 @@ impl Ram {
         byte
     }
 
-    /// What a board would have done since the last poll.
+    /// Does what a board would have done since the last poll.
     pub(super) fn play_puppet(&mut self) {
         let Puppet { beats, completes, locks, restores_setup } = self.puppet;
         if beats {
@@ -192,7 +192,7 @@ impl Ram {
         self.bytes[start..end].fill(byte);
     }
 
-    /// A finished Read Datagram command with any result, and the flag that there is more.
+    /// Shows a finished Read Datagram command with any result, and the flag that there is more.
     pub(super) fn put_datagram(&mut self, source: u8, directed: u8, len: u8) {
         self.set(map::READ_SOURCE, source);
         self.set(map::READ_DIRECTED, directed);
@@ -201,7 +201,7 @@ impl Ram {
         self.set(map::INTERRUPT_STATUS.at(6), 1);
     }
 
-    /// A request with any header in the buffer before the tail, and the tail anywhere.
+    /// Shows a request with any header in the buffer before the tail, and sets the tail anywhere.
     pub(super) fn put_request(&mut self, tail: u8, header: &[u8]) {
         let index = self.get(map::REQUEST_HEAD) % map::REQUEST_COUNT;
         for (at, &byte) in (u16::from(index) * map::REQUEST_LEN..).zip(header) {
@@ -213,7 +213,7 @@ impl Ram {
     }
 }
 
-/// Half of all bytes are those that mean something in flags, states and pointers.
+/// Half of the time a value that means something in flags, states and pointers.
 fn telling(byte: u8) -> u8 {
     match byte {
         0..=127 => [0, 1, 2, 4, 8, 0x10, 0x0F, 0x80][usize::from(byte % 8)],

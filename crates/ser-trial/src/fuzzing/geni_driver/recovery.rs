@@ -13,23 +13,23 @@ use ser_sim::genius::{
 use super::bench::Bench;
 use super::ram::BoardHolder;
 
-/// The driver's board.
+/// The bus address of the driver's board.
 const DRIVER: u8 = 5;
 
-/// A main loop that is in no hurry.
+/// The period of a slow main loop.
 const PACE_MS: u32 = 10;
 
-/// The longest pause between two attempts to start a board, all that a board may take before it
-/// counts as failed, and one start.
+/// The longest pause between two attempts to start a board, plus all that a board may take before
+/// it counts as failed, plus one start.
 const LIMIT_MS: u32 = 150_000;
 
-/// Whatever the driver still waits for from before the change is given up in this time.
+/// How long the driver may keep waiting for something from before the change.
 const SETTLED_MS: u32 = 5_500;
 
-/// A device that sends datagrams without a driver.
+/// The bus address of a device that sends datagrams without a driver.
 const SENDER: u8 = 9;
 
-/// A datagram has been sent and read by then.
+/// How soon a datagram has been sent and read.
 const DATAGRAM_MS: u32 = 5_000;
 
 /// Where the setup table, the interrupts that are not wanted, and this host's global data are.
@@ -47,8 +47,8 @@ struct Recovery {
     began_ms: u32,
 }
 
-/// Checks that the driver brings a board onto the bus that takes the place of the hostile RAM now:
-/// one that has just been switched on or, if it is `warm`, one that has been running for a while.
+/// Checks that the driver brings a board onto the bus. The board now takes the place of the hostile
+/// RAM. It has just been switched on or, if it is `warm`, has been running for a while.
 pub(super) fn assert_recovers(bench: Bench, warm: bool) {
     let mut recovery = Recovery::begin(bench, warm);
     recovery.settle();
@@ -62,7 +62,7 @@ pub(super) fn assert_recovers(bench: Bench, warm: bool) {
 
 impl Recovery {
     fn begin(bench: Bench, warm: bool) -> Recovery {
-        // The slowest bus has the fewest scans to go through.
+        // The slowest bus has the fewest scans to simulate.
         let rate = BusTiming::K38;
         let bus = Rc::new(RefCell::new(Bus::new(rate)));
         let board = bus.borrow_mut().connect(Board::new(BoardOptions::at(DRIVER).rate(rate)));
@@ -75,7 +75,7 @@ impl Recovery {
         bench.ram().board = Some(BoardHolder(window.clone()));
         let lived_ms = if warm { 5_000 } else { 0 };
         let began_ms = bench.now_ms.wrapping_sub(lived_ms);
-        // What it did before the driver was there.
+        // Pulses from before the driver was there.
         let _ = window.take_interrupts();
         Recovery { bench, bus, board, sender, window, began_ms }
     }
@@ -102,8 +102,8 @@ impl Recovery {
         self.began_ms.wrapping_add(tick_ms(bus_us) as u32)
     }
 
-    /// Until the driver has been on the bus for a while, and what it still had to send is dealt
-    /// with.
+    /// Waits until the driver has been on the bus for a while, and what it still had to send is
+    /// done.
     fn settle(&mut self) {
         let (mut waited_ms, mut settled_ms) = (0, 0);
         while settled_ms < SETTLED_MS {
@@ -124,8 +124,8 @@ impl Recovery {
         self.bus.borrow().get(self.board).violations().len()
     }
 
-    /// What the driver believes of the board that was there before may mislead it at first, but not
-    /// to requests that this board has never had.
+    /// Checks the rules. What the driver believes of the board that was there before may mislead it
+    /// at first, but not into requests that this board has never had.
     fn assert_lawful(&self, violations_before: usize) {
         let bus = self.bus.borrow();
         let violations = bus.get(self.board).violations();
@@ -160,14 +160,14 @@ impl Recovery {
         assert_eq!(sent, Some(Event::Sent(Ok(()))));
     }
 
-    /// Whether the board pulls its line for datagrams and nothing else. One that has taken the
-    /// place of another unseen was not told to, and its pulses may mean anything.
+    /// Whether the board pulls its line for datagrams and nothing else. A board that has taken the
+    /// place of another unseen was not told to, so its pulses may mean anything.
     fn pulls_for_datagrams(&self) -> bool {
         self.ram(INTERRUPT_DISABLE, 8) == [0, 1, 1, 1, 1, 1, 0, 1]
     }
 
-    /// With the interrupt line a datagram arrived in the millisecond of its pulse, by the board's
-    /// own word; without it, when its flag was looked for next.
+    /// Checks arrival times. With the interrupt line, a datagram arrived in the millisecond of its
+    /// pulse, as the board itself says. Without it, it arrived at the next look at its flag.
     fn assert_knows_arrivals(&mut self) {
         if self.bench.has_line && !self.pulls_for_datagrams() {
             return;
@@ -188,7 +188,7 @@ impl Recovery {
             let expected_ms = if self.bench.has_line {
                 pulsed_ms
             } else {
-                // Looks are at whole paces, and later than the arrival.
+                // Looks come at multiples of the pace, and after the arrival.
                 let paced_ms = self.bench.now_ms.wrapping_sub(pulsed_ms) % PACE_MS;
                 let at_once = paced_ms == 0 && read.arrived_us.is_multiple_of(1000);
                 pulsed_ms.wrapping_add(if paced_ms == 0 && !at_once { PACE_MS } else { paced_ms })

@@ -14,33 +14,33 @@ const MAX_COMMAND_LEN: usize = 16;
 /// Entries in a message on RS-232.
 const MAX_ENTRIES: u8 = 10;
 
-/// Virtual time under one supply of power: it bounds the work.
+/// Virtual time from one power-up to the next. The limit bounds the work.
 const MAX_MS: u64 = 20_000;
 
-/// A node that has something to say sends a byte in this time, at every rate that a slow host lets
-/// it have.
+/// The time in which a node that has something to say sends a byte, at every rate that a slow host
+/// allows it.
 const SILENCE_MS: u32 = 10;
 
-/// After this time no change of an input is held back any more.
+/// The time after which no change of an input is held back any more.
 const MAX_DEBOUNCE_MS: u32 = 2 * u8::MAX as u32;
 
 /// How the host treats the node's bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Host {
-    /// Takes each at once, so that it is certain when each command is carried out.
+    /// Takes each byte at once, so it is certain when each command is carried out.
     Prompt,
-    /// Takes them when the line has brought them, at the real rate and late.
+    /// Takes bytes when the line has brought them, at the real rate and late.
     Slow,
 }
 
-/// Both, under power.
+/// The node and its model, under power.
 pub(super) struct Bench<'a, 'm> {
     pub(super) node: SimNode<'a>,
     pub(super) model: &'m mut Recorder,
     host: Host,
     pub(super) inputs: u32,
     pub(super) tick_ms: u64,
-    /// Bytes on the line for every millisecond that passes, where their number matters.
+    /// How many bytes the line carries in a millisecond, where that matters.
     bytes_per_ms: Option<u32>,
     bytes: u32,
     pub(super) commands: FrameDecoder<MAX_COMMAND_LEN>,
@@ -99,7 +99,7 @@ impl<'a, 'm> Bench<'a, 'm> {
         }
     }
 
-    /// Lets a millisecond pass in which the node may be late with what it has to say.
+    /// Lets a millisecond pass. The node may be late with what it has to say.
     pub(super) fn pass_ms(&mut self) {
         self.tick_ms += 1;
         self.node.advance_to(self.node.now_ms() + 1);
@@ -224,11 +224,12 @@ impl<'a, 'm> Bench<'a, 'm> {
         }
     }
 
-    /// From here on all that the node says is compared: what it still owes to a slow host has been
-    /// said then.
+    /// Waits until the node has said all that it still owes to a slow host. From then on everything
+    /// that it says is compared.
     pub(super) fn settle(&mut self) {
         if self.host == Host::Slow {
-            // On a busy line a report brings together what debounce lets pass one after the other.
+            // On a busy line, one report may contain changes that debounce accepts one after the
+            // other.
             self.pass(MAX_DEBOUNCE_MS);
             while !self.is_silent() {}
             self.expected.clear();
@@ -236,14 +237,14 @@ impl<'a, 'm> Bench<'a, 'm> {
         }
     }
 
-    /// A command arrives, and everything is said.
+    /// Sends a command, and checks that everything expected is said.
     pub(super) fn ask(&mut self, frame: &[u8]) {
         self.receive(frame);
         while self.host == Host::Slow && !self.is_silent() {}
         assert_eq!(self.expected.pop_front(), None, "the node has not said it");
     }
 
-    /// Lets some time pass; whether the node said nothing in it.
+    /// Lets some time pass. Returns whether the node said nothing in it.
     fn is_silent(&mut self) -> bool {
         let mut silent = true;
         for _ in 0..SILENCE_MS {

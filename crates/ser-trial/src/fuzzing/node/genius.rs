@@ -1,4 +1,4 @@
-//! The recorder's other port: datagrams and auto reports over a board that is prompt.
+//! The recorder's other port: datagrams and auto reports over a board that acts at once.
 
 use std::collections::VecDeque;
 
@@ -16,11 +16,11 @@ pub(super) struct Genius {
     board: PromptBoard,
     /// Whether the board's interrupt line is connected.
     pub(super) has_line: bool,
-    /// The reply that is waited for.
+    /// The reply that is awaited.
     pub(super) reply: Option<Outgoing>,
     /// Events that auto report owes.
     pub(super) owed: VecDeque<Entry>,
-    /// Datagrams that are none for a recorder.
+    /// How many datagrams were not for a recorder.
     ignored: u32,
 }
 
@@ -32,7 +32,7 @@ impl Genius {
         Genius { port, board, has_line, reply: None, owed: VecDeque::new(), ignored: 0 }
     }
 
-    /// The port works in the present millisecond. Reports are compared with the events that are
+    /// Lets the port work in the present millisecond. Reports are compared with the events that are
     /// owed to `report_address`; `is_overwritten` says which of these the ring has lost.
     pub(super) fn serve(
         &mut self,
@@ -50,8 +50,8 @@ impl Genius {
         }
     }
 
-    /// Whether a datagram must be a report: everything that was asked has been answered, and events
-    /// are owed.
+    /// Whether a datagram must be a report, because everything that was asked has been answered and
+    /// events are owed.
     fn awaits_no_reply(&self, sent: &Outgoing) -> bool {
         !self.owed.is_empty() && matches!(Reply::parse(&sent.data), Ok(Reply::Read(_)))
     }
@@ -60,13 +60,13 @@ impl Genius {
         let header = (sent.destination, sent.function, sent.subfunction);
         assert_eq!(header, (address, FUNCTION_HORNER, SUBFUNCTION_SER));
         let Ok(Reply::Read(report)) = Reply::parse(&sent.data) else {
-            panic!("{sent:?} is no report")
+            panic!("{sent:?} is not a report")
         };
         assert!(!report.entries.is_empty(), "an empty report");
         for entry in report.entries {
             let place =
                 self.owed.iter().position(|owed| *owed == entry).expect("an event that is owed");
-            // What comes later is written on top of what comes first.
+            // Later events overwrite earlier ones.
             assert!(
                 self.owed.drain(..=place).rev().skip(1).all(|skipped| is_overwritten(&skipped)),
                 "left out"
@@ -85,14 +85,14 @@ impl Genius {
         });
     }
 
-    /// The board pulls its interrupt line for what it has been brought.
+    /// The board pulls its interrupt line for what it has received.
     pub(super) fn pulse(&mut self, node: &mut SimNode<'_>) {
         if self.has_line {
             node.interrupt(&mut self.port, node.now_ms());
         }
     }
 
-    /// Asks for a force table; there are four.
+    /// Asks for one of the four force tables.
     pub(super) fn bring_read_io_forces(&mut self, source: u8, table: u8) {
         self.ignored += u32::from(table > 3);
         self.board.bring(Incoming {

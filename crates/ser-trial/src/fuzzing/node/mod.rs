@@ -1,4 +1,4 @@
-//! The whole recorder in virtual time, against a model of a few plain vectors.
+//! The whole recorder in virtual time, against a model made of a few plain vectors.
 
 mod bench;
 mod genius;
@@ -16,22 +16,22 @@ use super::script::Script;
 use bench::{Bench, Host};
 use model::Recorder;
 
-/// How often the power goes at most.
+/// How often the power is cut at most.
 const MAX_POWER_CYCLES: u32 = 8;
 
-/// `data` says which model it is, what debounce times it has, whether it is on a bus, with or
-/// without the interrupt line, and what its clock shows, and then what happens: contacts move,
-/// bytes, commands and datagrams arrive, the UART misreads a byte, time passes, with or without the
-/// main loop, the power goes.
+/// `data` first says which model the recorder is, what debounce times it has, whether it is on a
+/// bus, with or without the interrupt line, and what its clock shows. Then it says what happens:
+/// contacts move; bytes, commands and datagrams arrive; the UART misreads a byte; time passes, with
+/// or without the main loop; the power goes.
 ///
-/// - What the node says is, to the byte and in its millisecond, what the model says: every reply,
+/// - What the node says is what the model says, to the byte and in its millisecond: every reply,
 ///   report and line.
-/// - The log is that of the model, with stamps by the clock of the model.
+/// - The log is that of the model, with stamps by the model's clock.
 /// - What was refused is counted.
 /// - Commands in datagrams are answered in the same way, and count from the millisecond of their
-///   pulse, or of the look that sees their flag; auto reports bring every event once; global data
+///   pulse, or of the look that sees their flag. Auto reports bring every event once. Global data
 ///   are the inputs.
-/// - The same log comes out when the host is slow and the line has its real rate; what is said is
+/// - The log is the same when the host is slow and the line has its real rate. What is said is
 ///   always a whole message.
 ///
 /// # Panics
@@ -86,15 +86,15 @@ impl Setup {
                 *time_ms = script.byte();
             }
         }
-        // Any moment of the century, near its end more often than not.
+        // Any moment of the century, most often near its end.
         let end_ms = 36_525 * 86_400_000;
         let time_ms = if bits & 0x10 == 0 {
             end_ms - i64::from(script.word())
         } else {
             i64::from(script.double_word()) * 734
         };
-        // What is asked over the bus is carried out a few milliseconds later, when no contact may
-        // move.
+        // A command over the bus is carried out a few milliseconds later, and no contact may move
+        // at that time.
         let host = if bits & 2 == 0 { Host::Prompt } else { Host::Slow };
         let is_on_bus = bits & 0x20 != 0 && host == Host::Prompt && debounce_ms == [0; 32];
         Setup {
@@ -122,7 +122,7 @@ impl Setup {
         }
     }
 
-    /// What was in force is remembered for debounce as far back as the fastest line can change it.
+    /// Debounce remembers what was in force as far back as the fastest line can change it.
     fn bytes_per_ms(&self) -> Option<u32> {
         self.debounce_ms.iter().any(|&time_ms| time_ms > 0).then_some(2)
     }
@@ -134,7 +134,7 @@ enum Power {
     Goes,
 }
 
-/// Something happens.
+/// Lets something happen.
 fn act(bench: &mut Bench<'_, '_>, script: &mut Script<'_>, host: Host) -> Power {
     match script.byte() % 12 {
         0 => bench.pass(script.byte().into()),
@@ -179,8 +179,8 @@ fn body<'a>(script: &mut Script<'a>) -> &'a [u8] {
     script.take(len)
 }
 
-/// Whether the log will be the same whenever the command is carried out after its arrival, and the
-/// host need not wait for hours until everything is said.
+/// Whether the log is the same whenever the command is carried out after its arrival, and everything
+/// is said without hours of waiting.
 fn is_free_of_order(body: &[u8]) -> bool {
     match Command::parse(body) {
         Ok(Command::Configure(configure)) => configure.size.is_none() && configure.baud.is_none(),
@@ -189,7 +189,7 @@ fn is_free_of_order(body: &[u8]) -> bool {
     }
 }
 
-/// Reads the whole log, each part of which is compared as it comes.
+/// Reads the whole log. Each part is compared as it arrives.
 fn assert_log(bench: &mut Bench<'_, '_>) {
     bench.settle();
     bench.check_global_data();

@@ -1,5 +1,5 @@
-//! A recorder with nothing in it but what the manual and `docs/protocol.md` say: plain vectors, no
-//! queue, no rush.
+//! A recorder that has only what the manual and `docs/protocol.md` say: plain vectors, no queue,
+//! and no limit of time.
 
 use std::collections::BTreeMap;
 
@@ -22,10 +22,10 @@ pub(super) enum Said {
     Owed(Entry),
 }
 
-/// What bad input is counted as.
+/// Counts of bad input.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Refused {
-    /// Datagrams without a command byte; frames without one never get so far.
+    /// Datagrams without a command byte. Frames without one never get this far.
     pub(super) empty: u32,
     pub(super) unknown: u32,
     pub(super) wrong_length: u32,
@@ -37,8 +37,8 @@ pub(super) struct Refused {
 struct History<T>(Vec<(u64, T)>);
 
 impl<T: Copy> History<T> {
-    /// What was in force when the sample of `tick_ms` was taken: it is taken before anything else
-    /// in its millisecond.
+    /// The value that was in force when the sample of `tick_ms` was taken. The sample comes before
+    /// everything else in its millisecond.
     fn at_sample(&self, tick_ms: u64) -> T {
         let earlier = self.0.iter().rev().find(|(since_ms, _)| *since_ms < tick_ms);
         earlier.unwrap_or(&self.0[0]).1
@@ -62,14 +62,14 @@ pub(super) struct Recorder {
     pub(super) refused: Refused,
     pub(super) last_broadcast: Option<LastBroadcast>,
 
-    /// The entries in their slots; those that do not exist yet are missing.
+    /// The entries in their slots. Entries that do not exist yet are not in it.
     slots: Vec<Entry>,
     next_slot: usize,
     total: u16,
     /// Calendar time at tick 0.
     offset_ms: History<i64>,
     recording: History<bool>,
-    /// Inputs after debounce, as accepted and as recorded.
+    /// Inputs after debounce: as accepted, and as recorded.
     accepted: u32,
     recorded: u32,
     /// Since when an input differs from its accepted state.
@@ -104,7 +104,8 @@ impl Recorder {
         recorder
     }
 
-    /// Loses everything but configuration and clock; the inputs as they are now are the baseline.
+    /// Loses everything except configuration and clock. The inputs as they are now are the
+    /// baseline.
     pub(super) fn power_cycle(&mut self, inputs: u32) {
         self.refused = Refused::default();
         self.last_broadcast = None;
@@ -121,7 +122,7 @@ impl Recorder {
         self.slots.len()
     }
 
-    /// Takes the state of the inputs in millisecond `tick_ms`; what is said because of it.
+    /// Takes the state of the inputs in millisecond `tick_ms`. Returns what is said because of it.
     pub(super) fn sample(&mut self, tick_ms: u64, inputs: u32) -> Vec<Said> {
         for index in 0..32 {
             let bit = 1 << index;
@@ -170,8 +171,8 @@ impl Recorder {
         said
     }
 
-    /// Takes the body of a good frame, or of a datagram, in millisecond `tick_ms`; what is said
-    /// because of it, with at most `max_entries` entries in a reply.
+    /// Takes the body of a good frame, or of a datagram, in millisecond `tick_ms`. Returns what is
+    /// said because of it, with at most `max_entries` entries in a reply.
     pub(super) fn body(&mut self, body: &[u8], tick_ms: u64, max_entries: u8) -> Vec<Said> {
         match Command::parse(body) {
             Ok(command) => self.command(&command, tick_ms, max_entries),
@@ -179,12 +180,12 @@ impl Recorder {
         }
     }
 
-    /// Takes the body of a datagram to everybody, which is not answered; the command, if there is
-    /// one.
+    /// Takes the body of a datagram to everybody, which is not answered. Returns the command, if
+    /// there is one.
     pub(super) fn broadcast(&mut self, body: &[u8], tick_ms: u64) -> Option<Command> {
         match Command::parse(body) {
             Ok(command) => {
-                // What only asks one recorder for something has no effect.
+                // A command that only asks one recorder for something has no effect.
                 if matches!(
                     command,
                     Command::Configure(_)
@@ -208,14 +209,14 @@ impl Recorder {
         within_century(self.offset_ms.latest(), tick_ms)
     }
 
-    /// The battery-backed clock is set to the time of this millisecond.
+    /// Sets the battery-backed clock to the time of this millisecond.
     pub(super) fn set_battery_clock(&mut self, tick_ms: u64) {
         self.rtc = DateTime::from_timestamp_millis(self.now_ms(tick_ms))
             .expect("within the century")
             .naive_utc();
     }
 
-    /// Whether an entry is not in the ring any more.
+    /// Whether an entry is no longer in the ring.
     pub(super) fn has_lost(&self, entry: &Entry) -> bool {
         !self.slots.contains(entry)
     }
@@ -310,7 +311,7 @@ impl Recorder {
         if before.size == self.configuration.size {
             return;
         }
-        // The newest entries that fit, in order, from slot 0.
+        // The newest entries that fit are kept in order, from slot 0.
         if self.slots.len() == usize::from(before.size) {
             self.slots.rotate_left(self.next_slot);
         }
@@ -319,7 +320,7 @@ impl Recorder {
         self.next_slot = self.slots.len() % size;
     }
 
-    /// The entries from number `start` on that exist, at most `count`.
+    /// The existing entries from number `start` on, at most `count`.
     fn read(&self, start: usize, count: usize) -> Reply {
         let existing =
             start.checked_sub(1).and_then(|slot| self.slots.get(slot..)).unwrap_or_default();

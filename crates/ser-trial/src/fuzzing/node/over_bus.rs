@@ -12,22 +12,22 @@ use super::model::Said;
 use super::prompt_board::{NUMBER, Outgoing};
 use crate::fuzzing::framing::frame_of;
 
-/// Everything that was brought over the bus is dealt with in this time.
+/// How soon everything that was brought over the bus is dealt with.
 const BUS_MS: u32 = 20;
 
-/// The main loop sees the flag of a datagram in the next millisecond, and a prompt board that is
-/// not busy hands it over in the one after that.
+/// How long a flag takes to be seen. The main loop sees the flag of a datagram in the next
+/// millisecond, and a free board that acts at once hands the datagram over in the one after that.
 const SEEN_AFTER_MS: u64 = 1;
 const READ_AFTER_MS: u64 = 2;
 
-/// The main loop is away for less than changes wait for a datagram.
+/// How long the main loop may be held up: less than changes wait for a datagram.
 const MAX_AWAY_MS: u8 = 200;
 
-/// The longest backlog of reports has gone in this time.
+/// How soon the longest backlog of reports has gone out.
 const MAX_REPORTING_MS: u32 = 4_000;
 
 impl Bench<'_, '_> {
-    /// The same with a Genius port that is ready.
+    /// The same bench with a Genius port that is ready.
     pub(super) fn on_bus(mut self, has_line: bool) -> Self {
         self.genius = Some(Genius::new(self.model.model, has_line));
         self.pass(BUS_MS);
@@ -35,7 +35,8 @@ impl Bench<'_, '_> {
         self
     }
 
-    /// Lets all reports go out: what is owed depends on what was in force when it happened.
+    /// Lets all reports go out, because what is owed depends on the settings at the time of the
+    /// event.
     pub(super) fn await_reports(&mut self) {
         let owes = |genius: &Genius| !genius.owed.is_empty();
         for _ in 0..MAX_REPORTING_MS {
@@ -77,7 +78,7 @@ impl Bench<'_, '_> {
             Said::Reply(reply) => {
                 reply_to(source, FUNCTION_HORNER, SUBFUNCTION_SER, reply.to_body().to_vec())
             }
-            other => panic!("{other:?} is no reply"),
+            other => panic!("{other:?} is not a reply"),
         });
         // Printouts go to the serial line.
         self.expected.extend(said);
@@ -85,7 +86,7 @@ impl Bench<'_, '_> {
         self.await_reply(expected.as_ref());
     }
 
-    /// Somebody asks for a force table: none is forced, and the values are those of the inputs.
+    /// Somebody asks for a force table. No input is forced, and the values are those of the inputs.
     pub(super) fn ask_forces(&mut self, source: u8, table: u8) {
         self.await_reports();
         let state = self.global_data();
@@ -125,9 +126,10 @@ impl Bench<'_, '_> {
         self.check_last_broadcast(expected);
     }
 
-    /// The same with the interrupt line while the main loop is away: it comes back after so long,
-    /// and finds contacts that have moved again and again since then. A recorder that says
-    /// something about each change would say it later than the model, so it must not.
+    /// The same with the interrupt line while the main loop is held up. The loop comes back after
+    /// this long and finds contacts that have moved repeatedly since. A recorder that says
+    /// something about each change would say it later than the model, so it must be set to say
+    /// nothing.
     pub(super) fn broadcast_while_away(
         &mut self,
         source: u8,
@@ -169,8 +171,8 @@ impl Bench<'_, '_> {
         self.node.hold_up_to(self.node.now_ms() + u64::from(for_ms));
     }
 
-    /// What the recorder will have to say about a broadcast that it reads so long from now, if it
-    /// heeds it.
+    /// What the recorder will say about a broadcast that it reads this long from now, if it acts on
+    /// the broadcast.
     fn expect_broadcast(
         &mut self,
         source: u8,
@@ -202,7 +204,7 @@ impl Bench<'_, '_> {
     fn last_broadcast(&mut self) -> LastBroadcast {
         let question = frame_of(&Command::LastBroadcast.to_body());
         for &byte in &question {
-            // It may stand in the middle of another frame.
+            // This frame may stand in the middle of another one.
             self.frames_dropped +=
                 u32::from(matches!(self.commands.push(byte), Some(Decoded::Dropped(_))));
         }

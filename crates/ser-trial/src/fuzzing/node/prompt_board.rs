@@ -1,5 +1,5 @@
-//! A GENI board that does everything in the moment in which it is told, so that it is certain when
-//! a datagram arrives.
+//! A GENI board that does everything at the moment it is told, so that it is certain when a
+//! datagram arrives.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -41,10 +41,10 @@ const COMPLETE: u8 = 4;
 const SYNTAX_ERROR: u8 = 8;
 const ALREADY_IN_FORCE: u8 = 0x10;
 
-/// In the interrupt table: a datagram is in the receive queue.
+/// The flag in the interrupt table that a datagram is in the receive queue.
 const RECEIVE_QUEUE: u16 = map::INTERRUPT_FIRST + 5;
 
-/// The recorder's own number on the bus.
+/// The recorder's own bus address.
 pub(super) const NUMBER: u8 = 5;
 
 /// A bus scan, in milliseconds.
@@ -70,7 +70,7 @@ impl PromptBoard {
         self.0.borrow_mut().sent.pop_front()
     }
 
-    /// What goes to everybody in every scan.
+    /// The global data that goes to everybody in every scan.
     pub(super) fn global_data(&self, len: usize) -> Vec<u8> {
         self.0.borrow().slice(map::BROADCAST_OUTPUT.start, len)
     }
@@ -78,7 +78,7 @@ impl PromptBoard {
 
 impl SharedRam for PromptBoard {
     fn read(&self, offset: u16) -> u8 {
-        // It never misses a beat.
+        // The heartbeat is always there.
         if offset == map::STATUS_OK { 1 } else { self.0.borrow().get(offset) }
     }
 

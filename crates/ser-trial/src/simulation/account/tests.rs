@@ -1,4 +1,4 @@
-//! The judge judged: what a reader must be told, and what must not pass.
+//! The checker checked: what a reader must be told, and what must be refused.
 
 use ser_node::Debounce;
 use ser_proto::{Command, Inputs, Model, Reply};
@@ -9,7 +9,7 @@ use crate::simulation::ledger::Port;
 const SIZE: u16 = 100;
 const RESTARTED: Delivery = Delivery::Lost { after: None, lost: Lost::LogRestarted };
 
-/// A recorder's books with a reader's account; the events are numbered over all lives.
+/// A recorder's ledger with a reader's account. The events are numbered over all lives.
 #[derive(Clone)]
 struct Case {
     ledger: Ledger,
@@ -25,7 +25,7 @@ impl Case {
         Case { ledger, account: Account::new("reader"), now_ms: 0, entries: Vec::new() }
     }
 
-    /// With so many events recorded and read.
+    /// A case in which `count` events are recorded and read.
     fn read_up_to(count: usize) -> Case {
         let mut case = Case::new();
         case.record(count);
@@ -54,10 +54,11 @@ impl Case {
         self.ledger.power_up(self.now_ms, time_ms, SIZE, Debounce::OFF);
     }
 
-    /// A reading that begins with these.
+    /// Begins a reading with these deliveries.
     fn read(&mut self, deliveries: &[Delivery]) -> Result<(), String> {
         self.account.begin_reading();
-        // It knows the last event that it was given, unless it has found the log empty since.
+        // The reader knows the last event that it was given, unless it has found the log empty
+        // since.
         let known = match self.account.known {
             Known::Event if self.account.restart_told => Known::EmptyLog,
             known => known,
@@ -66,14 +67,14 @@ impl Case {
         deliveries.iter().try_for_each(|delivery| self.account.take(delivery, &self.ledger))
     }
 
-    /// So many events from the one of this number on.
+    /// Delivers `count` events from the one numbered `from` on.
     fn deliver(&mut self, from: usize, count: usize) -> Result<(), String> {
         self.entries[from..from + count]
             .iter()
             .try_for_each(|entry| self.account.take(&delivery(*entry), &self.ledger))
     }
 
-    /// The end of the reading; and what it has come to, with nothing missing in it.
+    /// Ends the reading, and returns the tally. Every event must be accounted for in it.
     fn finish(&mut self) -> Result<Tally, String> {
         self.account.finish_reading(&self.ledger)?;
         let tally = self.account.tally();
@@ -90,7 +91,7 @@ fn overwritten(count: u32) -> Delivery {
     Delivery::Lost { after: None, lost: Lost::Overwritten { count } }
 }
 
-/// It is refused, in these words.
+/// Checks that it is refused in these words.
 fn assert_refused<T: std::fmt::Debug>(result: Result<T, String>, words: &str) {
     let error = result.expect_err(words);
     assert!(error.contains(words), "{error}");
@@ -178,7 +179,7 @@ fn events_come_once_in_order_and_as_recorded() {
     assert_refused(case.finish(), "events 5 to 5 have not been delivered");
 }
 
-/// Three events read, three unread, and then the log begins anew and has five more.
+/// Three events are read, three are unread, and then the log begins anew and has five more.
 fn began_anew(how: fn(&mut Case)) -> Case {
     let mut case = Case::read_up_to(3);
     case.record(3);
@@ -203,7 +204,7 @@ fn a_reported_restart_accounts_for_what_went_unread() {
 fn a_restart_without_a_word_is_refused() {
     assert_refused(began_anew(Case::erase).deliver(6, 1), "event 6 comes too early");
     assert_refused(began_anew(Case::power_cycle).deliver(6, 1), "no word of a restart");
-    // The wrong word is no better: nothing was overwritten.
+    // A wrong report is no better than none: nothing was overwritten.
     for how in [Case::erase, Case::power_cycle] {
         let mut case = began_anew(how);
         assert!(case.read(&[overwritten(3)]).and_then(|()| case.deliver(6, 1)).is_err());
@@ -325,7 +326,7 @@ fn what_comes_and_goes_after_a_restart_was_told_of_an_empty_log_is_not_reported_
 fn a_log_that_is_full_again_can_hide_an_erase() {
     let mut case = began_anew(Case::erase);
     case.record(SIZE.into());
-    // Two totals, 3 and 105, and the log holds the latest 100.
+    // The totals are 3 and 105, and the log holds the latest 100.
     case.read(&[overwritten(2)])
         .and_then(|()| case.deliver(11, SIZE.into()))
         .expect("it cannot know");
@@ -348,14 +349,14 @@ fn a_log_that_is_full_again_can_hide_that_the_power_went() {
 
 #[test]
 fn nothing_else_excuses_silence() {
-    // Full again since an erase is not full again since a later one.
+    // A log that was full again since one erase need not be full again since a later one.
     let mut case = began_anew(Case::erase);
     case.record(SIZE.into());
     case.erase();
     case.record(1);
     let last = case.entries.len() - 1;
     assert_refused(case.read(&[]).and_then(|()| case.deliver(last, 1)), "no word");
-    // Nor does anything in the books: events that are gone need a reason.
+    // The ledger excuses nothing either: events that are gone need a reason.
     let mut case = began_anew(Case::erase);
     let erase = case.ledger.erases()[0];
     assert_refused(case.account.count_gone(3..6, erase, &case.ledger), "nothing excuses that");
@@ -404,7 +405,7 @@ fn a_reading_through_a_power_cut_may_deliver_what_it_has_in_hand() {
         .take(&overwritten(2), &case.ledger)
         .and_then(|()| case.deliver(5, 2))
         .expect("they were read");
-    // The next reading has nothing of before, and has to be told.
+    // The next reading holds nothing from before, and has to be told.
     let next_reading = |from| {
         let mut case = case.clone();
         case.read(&[]).and_then(|()| case.deliver(from, 1))

@@ -1,4 +1,4 @@
-//! A log that is not as the books have it.
+//! Logs that differ from the ledger.
 
 use chrono::DateTime;
 use ser_proto::{AutoReport, Configure, Inputs, Model};
@@ -7,7 +7,7 @@ use super::*;
 
 const SIZE: u16 = 8;
 
-/// So many events recorded, and as entries of a log.
+/// A ledger with `count` events, and the same events as entries of a log.
 fn recorded(count: u64) -> (Ledger, Vec<Entry>) {
     let mut ledger = Ledger::new(Model::Ser160.mask());
     ledger.power_up(0, 0, SIZE, Debounce::OFF);
@@ -24,7 +24,7 @@ fn record(ledger: &mut Ledger, at_ms: impl Iterator<Item = u64>) {
 }
 
 impl Recorded {
-    /// As a recorder tells it.
+    /// The event as a recorder's entry.
     pub(in crate::simulation) fn to_entry(self) -> Entry {
         let time = DateTime::from_timestamp_millis(self.stamp_ms).expect("a time").naive_utc();
         let time = TimeStamp::try_from(time).expect("in this century");
@@ -32,7 +32,7 @@ impl Recorded {
     }
 }
 
-/// It is refused, in these words.
+/// Checks that it is refused in these words.
 fn assert_refused(result: Result<(), String>, words: &str) {
     let error = result.expect_err(words);
     assert!(error.contains(words), "{error}");
@@ -74,7 +74,7 @@ fn the_total_counts_from_the_latest_erase_on() {
     let (mut ledger, entries) = recorded(5);
     assert_refused(ledger.check_log(4, &entries), "counts 4 events");
     ledger.command_arrived(Port::Line, &Command::Erase, u64::MAX);
-    // As long as there is no reply, it may be to come.
+    // As long as there is no reply, the erase may still be to come.
     assert_eq!(ledger.check_log(5, &entries), Ok(()));
     assert_eq!(ledger.check_log(0, &[]), Ok(()));
     assert_refused(ledger.check_log(0, &entries), "counts 0 events");
@@ -95,7 +95,7 @@ fn an_erase_that_arrived_earlier_can_be_the_latest() {
     ledger.command_done(&Command::Erase);
     record(&mut ledger, 4..=5);
     assert_eq!(ledger.replied(Port::Line, &Reply::Erased), Ok(()));
-    // The line's was done with its reply, or a while before.
+    // The line's erase was done with its reply, or some time before.
     assert_eq!(ledger.check_log(0, &[]), Ok(()));
     let after: Vec<Entry> = ledger.events.iter().skip(3).map(|event| event.to_entry()).collect();
     assert_eq!(ledger.check_log(2, &after), Ok(()));
@@ -124,7 +124,7 @@ fn an_answer_that_waited_in_its_queue_does_not_undo_a_resize_over_the_other_port
     assert_eq!(ledger.smallest_size(), 3);
     record(&mut ledger, 6..=10);
     assert_eq!(ledger.overwritten_before(), 7);
-    // What is asked afterwards tells what is.
+    // A question asked afterwards is answered with the new settings.
     ledger.command_arrived(Port::Line, &Command::QueryConfiguration, u64::MAX);
     ledger.replied(Port::Line, &configuration(3)).expect("a reply");
     assert_eq!(ledger.smallest_size(), 3);
@@ -134,7 +134,7 @@ fn an_answer_that_waited_in_its_queue_does_not_undo_a_resize_over_the_other_port
 fn events_that_wait_do_not_show_what_was_dropped_after_them() {
     let mut ledger = Ledger::new(Model::Ser160.mask());
     ledger.power_up(0, 0, MAX_SIZE, Debounce::OFF);
-    // A datagram of millisecond 1 is read late, and the main loop is away meanwhile.
+    // A datagram of millisecond 1 is read late, while the main loop is held up.
     ledger.wait_after(Some(1));
     let queue_ms = QUEUE_LEN as u64;
     let moves = (2..2 + queue_ms).map(|at_ms| (at_ms, 1)).chain([(2 + queue_ms, 4)]);
