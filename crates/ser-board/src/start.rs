@@ -1,5 +1,7 @@
 //! What every board's recorder is made of, once its chip is up.
 
+use core::mem::MaybeUninit;
+
 use chrono::NaiveDate;
 use embedded_storage::nor_flash::MultiwriteNorFlash;
 use ser_node::{Capture, CaptureChannel, Debounce, Event, Node, NodeParts};
@@ -19,22 +21,27 @@ pub const NOT_BEFORE: NaiveDate = NaiveDate::from_ymd_opt(2026, 1, 1).unwrap();
 pub type BoardNode<'a, F, C> = Node<'a, FlashLog<'a, F>, ClockChip<'a, C>>;
 
 /// What a recorder keeps in RAM; belongs into a static.
-pub struct Memory {
+pub struct Memory<'a, F, C> {
     channel: CaptureChannel,
     events: [Event; LOG_LEN],
+    node: MaybeUninit<BoardNode<'a, F, C>>,
 }
 
-impl Memory {
+impl<F, C> Memory<'_, F, C> {
     /// As it is when the power comes.
     #[must_use]
-    pub const fn new() -> Memory {
-        Memory { channel: CaptureChannel::new(), events: [Event::EMPTY; LOG_LEN] }
+    pub const fn new() -> Self {
+        Memory {
+            channel: CaptureChannel::new(),
+            events: [Event::EMPTY; LOG_LEN],
+            node: MaybeUninit::uninit(),
+        }
     }
 }
 
-impl Default for Memory {
-    fn default() -> Memory {
-        Memory::new()
+impl<F, C> Default for Memory<'_, F, C> {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -52,17 +59,18 @@ pub struct BoardParts<F, C> {
 
 /// Powers a recorder up; gives the capture interrupt's end and the main loop's.
 pub fn start<'a, F: MultiwriteNorFlash, C: KeepsTime>(
-    memory: &'a mut Memory,
+    memory: &'a mut Memory<'a, F, C>,
     parts: BoardParts<F, C>,
     health: &Health<'a>,
-) -> (Capture<'a>, BoardNode<'a, F, C>) {
-    let (capture, reader) = memory.channel.split(parts.debounce);
-    let node = Node::new(NodeParts {
+) -> (Capture<'a>, &'a mut BoardNode<'a, F, C>) {
+    let Memory { channel, events, node } = memory;
+    let (capture, reader) = channel.split(parts.debounce);
+    let node = node.write(Node::new(NodeParts {
         model: parts.model,
-        log: &mut memory.events,
+        log: events,
         capture: reader,
         storage: FlashLog::new(parts.flash, health.storage),
         rtc: ClockChip::new(parts.clock, NOT_BEFORE, health.clock),
-    });
+    }));
     (capture, node)
 }

@@ -75,8 +75,8 @@ fn run(
         flash: flash.clone(),
         clock: Clock(day),
     };
-    let (mut capture, mut node) = start(&mut memory, board, &parts.health());
-    then(&mut capture, &mut node);
+    let (mut capture, node) = start(&mut memory, board, &parts.health());
+    then(&mut capture, node);
     parts.clock.state()
 }
 
@@ -137,7 +137,7 @@ fn debounce_and_model_are_the_boards() {
         flash: BoardFlash::new(2),
         clock: Clock(NOT_BEFORE),
     };
-    let (mut capture, mut node) = start(&mut memory, board, &parts.health());
+    let (mut capture, node) = start(&mut memory, board, &parts.health());
     capture.sample(1, 0);
     for tick_ms in 2..=4 {
         capture.sample(tick_ms, 0x0001_0001);

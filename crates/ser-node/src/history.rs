@@ -14,24 +14,79 @@ const SPAN: usize = WINDOW;
 /// Bits of a word.
 const BITS: usize = u32::BITS as usize;
 
+/// What holds a value for each millisecond of the span.
+pub(crate) trait Places<T> {
+    fn get(&self, place: usize) -> Option<T>;
+    fn put(&mut self, place: usize, value: T);
+}
+
+impl<T: Copy> Places<T> for [T; SPAN] {
+    fn get(&self, place: usize) -> Option<T> {
+        <[T]>::get(self, place).copied()
+    }
+
+    fn put(&mut self, place: usize, value: T) {
+        if let Some(at) = self.get_mut(place) {
+            *at = value;
+        }
+    }
+}
+
+/// One bit each.
+#[derive(Clone, Debug)]
+pub(crate) struct Bits([u32; SPAN / BITS]);
+
+impl Bits {
+    const NONE: Bits = Bits([0; SPAN / BITS]);
+
+    fn word(&self, place: usize) -> Option<u32> {
+        self.0.get(place / BITS).copied()
+    }
+}
+
+impl Places<bool> for Bits {
+    fn get(&self, place: usize) -> Option<bool> {
+        Some(self.word(place)? >> (place % BITS) & 1 == 1)
+    }
+
+    fn put(&mut self, place: usize, value: bool) {
+        if let Some(word) = self.0.get_mut(place / BITS) {
+            *word = *word & !(1 << (place % BITS)) | u32::from(value) << (place % BITS);
+        }
+    }
+}
+
 /// A value over time.
 #[derive(Clone, Debug)]
-pub(crate) struct History<T> {
+pub(crate) struct History<T, P = [T; SPAN]> {
     /// The value before the first millisecond that has a place, and when it was set.
     before: (u64, T),
     /// The latest setting of all. Its millisecond is the latest that has a place.
     latest: (u64, T),
     /// What was set last in each millisecond. The bits below tell where something was.
-    values: [T; SPAN],
-    is_set: [u32; SPAN / BITS],
+    values: P,
+    is_set: Bits,
 }
 
 impl<T: Copy> History<T> {
     pub(crate) const fn new(value: T) -> History<T> {
-        let (before, latest) = ((0, value), (0, value));
-        History { before, latest, values: [value; SPAN], is_set: [0; SPAN / BITS] }
+        History {
+            before: (0, value),
+            latest: (0, value),
+            values: [value; SPAN],
+            is_set: Bits::NONE,
+        }
     }
+}
 
+impl History<bool, Bits> {
+    /// Of something that is or is not: in a bit for each millisecond.
+    pub(crate) const fn of_bits(value: bool) -> Self {
+        History { before: (0, value), latest: (0, value), values: Bits::NONE, is_set: Bits::NONE }
+    }
+}
+
+impl<T: Copy, P: Places<T>> History<T, P> {
     /// Sets the value in millisecond `tick_ms`. The sample of that millisecond has been taken
     /// already.
     pub(crate) fn set(&mut self, tick_ms: u64, value: T) {
@@ -48,12 +103,8 @@ impl<T: Copy> History<T> {
             self.latest = (tick_ms, value);
         }
         let place = slot(tick_ms);
-        if let Some(at) = self.values.get_mut(place) {
-            *at = value;
-        }
-        if let Some(word) = self.is_set.get_mut(place / BITS) {
-            *word |= 1 << (place % BITS);
-        }
+        self.values.put(place, value);
+        self.is_set.put(place, true);
     }
 
     /// Gives the places of milliseconds that are too long ago to those up to `tick_ms`.
@@ -61,14 +112,11 @@ impl<T: Copy> History<T> {
         let begin_ms = tick_ms.saturating_sub(SPAN as u64 - 1);
         self.before = self.setting_before(begin_ms);
         if begin_ms > self.latest.0 {
-            self.is_set = [0; SPAN / BITS];
+            self.is_set = Bits::NONE;
             return;
         }
         for ms in self.latest.0 + 1..=tick_ms {
-            let place = slot(ms);
-            if let Some(word) = self.is_set.get_mut(place / BITS) {
-                *word &= !(1 << (place % BITS));
-            }
+            self.is_set.put(slot(ms), false);
         }
     }
 
@@ -96,7 +144,7 @@ impl<T: Copy> History<T> {
         let mut ms = tick_ms.checked_sub(1)?;
         while ms + SPAN as u64 > self.latest.0 {
             let place = slot(ms);
-            let word = *self.is_set.get(place / BITS)? << (BITS - 1 - place % BITS);
+            let word = self.is_set.word(place)? << (BITS - 1 - place % BITS);
             if word != 0 {
                 let at_ms = ms.checked_sub(word.leading_zeros().into())?;
                 // Further back the places are those of the latest milliseconds.
@@ -105,7 +153,7 @@ impl<T: Copy> History<T> {
                     .values
                     .get(slot(at_ms))
                     .filter(|_| has_place)
-                    .map(|&value| (at_ms, value));
+                    .map(|value| (at_ms, value));
             }
             ms = ms.checked_sub(place as u64 % BITS as u64 + 1)?;
         }
@@ -175,16 +223,20 @@ mod tests {
             settings in prop::collection::vec((0..600_u64, 0..500_u64), 0..60),
         ) {
             let (mut now_ms, mut history, mut list) = (start_ms, History::new(0), vec![(0, 0)]);
+            let mut bits = History::of_bits(false);
             for (number, (after_ms, ago_ms)) in (1..).zip(settings) {
                 now_ms += after_ms;
                 let tick_ms = now_ms.saturating_sub(ago_ms);
                 history.set(tick_ms, number);
+                bits.set(tick_ms, number % 3 == 1);
                 let behind = list.partition_point(|&(at_ms, _)| at_ms <= tick_ms);
                 list.insert(behind, (tick_ms, number));
                 let latest_ms = list.last().expect("the first").0;
                 for tick_ms in (latest_ms + 2).saturating_sub(SPAN_MS)..=latest_ms + 1 {
                     let behind = list.partition_point(|&(at_ms, _)| at_ms < tick_ms).max(1);
-                    prop_assert_eq!(history.at_sample(tick_ms), list[behind - 1].1, "{} {:?}", tick_ms, &list);
+                    let expected = list[behind - 1].1;
+                    prop_assert_eq!(history.at_sample(tick_ms), expected, "{} {:?}", tick_ms, &list);
+                    prop_assert_eq!(bits.at_sample(tick_ms), expected % 3 == 1, "{} {:?}", tick_ms, &list);
                 }
                 prop_assert_eq!(history.latest(), list.last().expect("the first").1);
             }

@@ -18,7 +18,7 @@ use crate::changes::Changes;
 use crate::clock::{Clock, Rtc, to_time_stamp};
 use crate::diagnostics::{Diagnostics, count};
 use crate::event_log::{Event, EventLog};
-use crate::history::History;
+use crate::history::{Bits, History};
 use crate::owed::Owed;
 use crate::print_line::PrintLine;
 use crate::printer::Printer;
@@ -47,7 +47,7 @@ pub(crate) struct Recorder<'a, S, R> {
     changes: Changes<'a>,
     log: EventLog<'a>,
     clock: Clock,
-    recording: History<bool>,
+    recording: History<bool, Bits>,
     configuration: Configuration,
     settings: Settings<S>,
     rtc: R,
@@ -75,7 +75,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
             changes: Changes::new(capture, model.mask()),
             log,
             clock: Clock::new(now_ms, rtc.read()),
-            recording: History::new(true),
+            recording: History::of_bits(true),
             configuration,
             settings,
             rtc,

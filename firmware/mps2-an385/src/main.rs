@@ -77,7 +77,7 @@ mod app {
         receive: ReceiveInterrupt,
         transmit: TransmitInterrupt,
         serial: SerialLine,
-        node: BoardNode<'static, BenchFlash, BenchClock>,
+        node: &'static mut BoardNode<'static, BenchFlash, BenchClock>,
         genius: Option<Genius>,
         lamps: Lamps,
         watchdog: Watchdog,
@@ -85,7 +85,7 @@ mod app {
     }
 
     #[init(local = [
-        memory: Memory = Memory::new(),
+        memory: Memory<'static, BenchFlash, BenchClock> = Memory::new(),
         rings: Rings = Rings::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {

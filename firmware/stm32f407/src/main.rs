@@ -84,7 +84,7 @@ mod app {
         serial_interrupt: SerialInterrupt,
         geni_line: InterruptLine,
         serial: SerialLine,
-        node: BoardNode<'static, ConfigurationFlash, ChipClock>,
+        node: &'static mut BoardNode<'static, ConfigurationFlash, ChipClock>,
         genius: Option<Genius>,
         lamps: Lamps,
         watchdog: Watchdog,
@@ -107,7 +107,7 @@ mod app {
     };
 
     #[init(local = [
-        memory: Memory = Memory::new(),
+        memory: Memory<'static, ConfigurationFlash, ChipClock> = Memory::new(),
         rings: Rings = Rings::new(),
         pulses: Pulses = Pulses::new(),
     ])]
