@@ -62,8 +62,8 @@ impl Watchdog {
     }
 }
 
-/// Clears the interrupt, which also restarts the time-out. A second call in the middle of the first
-/// does no harm: it does the same.
+/// Clears the interrupt, which also restarts the time-out. A call that interrupts another one has
+/// already done the other's work.
 pub(crate) fn acknowledge() {
     LOCKING.write(UNLOCK);
     INTERRUPT_CLEAR.write(1);
