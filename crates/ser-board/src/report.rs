@@ -19,7 +19,7 @@ pub fn last_words(boot: &Boot) {
     let told = boot.last_words.as_ref().filter(|words| words.starts_ago == 1);
     if boot.cause.is_fault() {
         let text = told.map_or("", |words| words.text.as_str());
-        defmt::error!("the run before ended with a fault: {}: {=str}", boot.cause, text);
+        defmt::error!("the previous run ended with a fault: {}: {=str}", boot.cause, text);
     }
     if let Some(words) = &boot.last_words
         && !(boot.cause.is_fault() && told.is_some())
