@@ -150,8 +150,8 @@ mod tests {
     fn what_is_no_datagram_is_refused_with_what_to_do() {
         for (words, what) in [
             ("20", "begins with its function"),
-            ("2", "no hexadecimal byte"),
-            ("20 0g", "no hexadecimal byte"),
+            ("2", "not a hexadecimal byte"),
+            ("20 0g", "not a hexadecimal byte"),
             ("20 1E 04", "1"),
             ("40 50 FF", "not a message"),
         ] {
