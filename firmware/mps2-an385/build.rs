@@ -12,8 +12,8 @@ fn main() {
     }
     println!("cargo::rustc-link-search={}", out.display());
     // cortex-m-rt's memory layout, which includes memory.x and device.x, and defmt's place for its
-    // strings: in the ELF file, not in the flash. Here and not in .cargo/config.toml, where
-    // RUSTFLAGS in the environment would hide them.
+    // strings, in the ELF file and not in the flash. They are named here and not in
+    // .cargo/config.toml, where RUSTFLAGS in the environment would hide them.
     for script in ["link.x", "defmt.x"] {
         println!("cargo::rustc-link-arg-bins=-T{script}");
     }

@@ -10,8 +10,8 @@ fn main() {
     println!("cargo::rerun-if-changed={SCRIPT}");
     fs::copy(SCRIPT, out.join(SCRIPT)).expect("the linker script lies beside build.rs");
     println!("cargo::rustc-link-search={}", out.display());
-    // In place of cortex-m-rt's link.x; defmt's script gives its strings a place in the ELF file,
-    // not in the flash. Here and not in .cargo/config.toml, where RUSTFLAGS in the environment
+    // Replaces cortex-m-rt's link.x. defmt's script places its strings in the ELF file, not in the
+    // flash. They are named here and not in .cargo/config.toml, where RUSTFLAGS in the environment
     // would hide them.
     for script in [SCRIPT, "defmt.x"] {
         println!("cargo::rustc-link-arg-bins=-T{script}");

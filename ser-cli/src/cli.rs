@@ -1,4 +1,4 @@
-//! The arguments of the command line: what is common to all subcommands, and the list of them.
+//! The arguments of the command line: those common to all subcommands, and the list of subcommands.
 
 use clap::{Args as _, CommandFactory, FromArgMatches, Parser, Subcommand};
 
@@ -10,8 +10,8 @@ use crate::error;
 const EXAMPLES: &str = "\
 Examples:
   ser-cli demo                          see it work, no recorder needed
-  ser-cli ports                         which serial ports there are
-  ser-cli -p /dev/ttyUSB0 status        is the recorder there? how is it?
+  ser-cli ports                         list the serial ports
+  ser-cli -p /dev/ttyUSB0 status        is the recorder there, and recording?
   ser-cli -p /dev/ttyUSB0 read          all events as a table
   ser-cli -p tcp://10.0.0.7:4000 watch  events as they happen
   export SER_PORT=/dev/ttyUSB0          say the port once
@@ -20,7 +20,8 @@ Exit codes: 0 done, 1 the recorder did not answer or something else failed, 2 th
 makes no sense. \
 Only data goes to standard output; everything else goes to standard error.";
 
-/// Subcommands that talk to no unit: how to reach one is accepted there, and not mentioned.
+/// Subcommands that talk to no recorder. They accept the options that say how to reach one, but do
+/// not list them in their help.
 const OFFLINE: [&str; 7] = ["ports", "decode", "encode", "comm-req", "sim", "demo", "completions"];
 
 /// Reads, configures, watches and simulates sequential event recorders (HE660SER160, HE660SER320).
@@ -58,7 +59,7 @@ enum Command {
 }
 
 impl Command {
-    /// Whether it does nothing but print.
+    /// Whether the command only prints.
     fn is_for_its_output(&self) -> bool {
         use Command::{CommReq, Completions, Decode, Encode, Print, Read, Watch};
         match self {
@@ -66,7 +67,7 @@ impl Command {
             Decode(_) | Encode(_) | CommReq(_) | Completions(_) => true,
             #[cfg(unix)]
             Command::Genius(args) => args.is_offline(),
-            // Their exit code alone says something: is the recorder there?
+            // Their exit code alone is informative: is the recorder there?
             _ => false,
         }
     }
@@ -83,7 +84,7 @@ impl Cli {
         })
     }
 
-    /// Reads the command line; help is an error, too.
+    /// Reads the command line. A request for help is returned as an error, too.
     pub(crate) fn from_command_line() -> Result<Cli, clap::Error> {
         Cli::try_from_words(std::env::args_os())
     }
@@ -171,7 +172,8 @@ mod tests {
         below.lines().map(str::trim).filter(|line| line.starts_with("ser-cli "))
     }
 
-    /// The words of an example up to a redirection, a pipe or the explanation two blanks away.
+    /// Checks the words of an example, up to a redirection, a pipe or the explanation after two
+    /// blanks.
     fn accepts(line: &str) {
         let command = line.split("  ").next().unwrap_or(line);
         let words = command.split(' ').take_while(|word| !["|", ">", ">>", "&"].contains(word));

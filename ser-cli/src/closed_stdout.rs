@@ -1,18 +1,18 @@
-//! Standard output that was closed before this program was started.
+//! Detects a standard output that was closed before this program started.
 //!
-//! It has one all the same: Rust opens `/dev/null` in its place, for reading and writing, before
-//! `main`, and writing there succeeds. Who sends output there on purpose (`> /dev/null`) opens it
-//! for writing. A few programs open it for both for those that they start; so only commands that
-//! are there for their output mind.
+//! Rust then opens `/dev/null` in its place, for reading and writing, before `main`, and writing
+//! there succeeds. A user who sends output there on purpose (`> /dev/null`) opens it for writing
+//! only. A few programs open it for both for their children, so only commands whose purpose is
+//! their output check for it.
 
 use crate::error::{Failure, Result};
 
-/// Fails where what a command prints would reach nobody.
+/// Fails if the command's output would reach nobody.
 pub(crate) fn check() -> Result<()> {
     if !was_closed() {
         return Ok(());
     }
-    Err(Failure::new("standard output is closed: what it prints would reach nobody")
+    Err(Failure::new("standard output is closed: the output would reach nobody")
         .hint("send it to a file or to a program; > /dev/null drops it"))
 }
 
@@ -30,7 +30,7 @@ fn was_closed() -> bool {
     both_ways && is_device && found.st_rdev == null.rdev()
 }
 
-/// Elsewhere closed outputs are not told apart.
+/// Other systems do not let closed outputs be told apart.
 #[cfg(not(unix))]
 fn was_closed() -> bool {
     false

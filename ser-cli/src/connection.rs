@@ -1,5 +1,5 @@
-//! From `--port` to a recorder that can be talked to, and from the client's errors to what the user
-//! is told.
+//! From `--port` to an open connection to a recorder, and from the client's errors to messages for
+//! the user.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -23,9 +23,9 @@ pub(crate) struct ConnectionArgs {
     /// Serial port of the recorder (/dev/ttyUSB0, COM3), tcp://HOST:PORT, or geni:FILE?node=N on a
     /// Genius bus.
     ///
-    /// FILE is the window that this computer shares with its GENI board, N the recorder's number on
-    /// the bus. For a board in this computer FILE is a device for memory; &offset=0x… says where in
-    /// it the window begins.
+    /// FILE is the window that this computer shares with its GENI board. N is the recorder's bus
+    /// address. For a board in this computer, FILE is a memory device, and &offset=0x… says where
+    /// the window begins in it.
     #[arg(
         short,
         long,
@@ -36,21 +36,21 @@ pub(crate) struct ConnectionArgs {
     )]
     pub(crate) port: Option<String>,
 
-    /// Rate of the serial port, 9600 if not given. Over TCP: of the terminal server's port, for
-    /// `clock set` to reckon with.
+    /// Rate of the serial port, 9600 if not given. Over TCP: rate of the terminal server's port,
+    /// for `clock set` to allow for.
     #[arg(long, global = true, value_name = "RATE", value_parser = values::baud)]
     pub(crate) baud: Option<Baud>,
 
-    /// How long the recorder may take to answer, on top of the time on the line: 500ms, 2s.
+    /// How long the recorder may take to answer, in addition to the time on the line: 500ms, 2s.
     #[arg(long, global = true, value_name = "TIME", value_parser = values::duration)]
     pub(crate) timeout: Option<Duration>,
 
-    /// How often a question is asked again when no good answer comes.
+    /// How often a question is repeated when no valid answer comes.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100))]
     pub(crate) retries: Option<u32>,
 }
 
-/// What the user calls the recorder.
+/// The user's name for the recorder.
 pub(crate) fn port_text(connection: &ConnectionArgs) -> Result<&str> {
     connection.port.as_deref().map(str::trim).filter(|port| !port.is_empty()).ok_or_else(no_port)
 }
@@ -65,7 +65,7 @@ fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint> {
     })
 }
 
-/// What the recorder is called wherever this program is started, and however the user spells it.
+/// The recorder's name, independent of the working directory and of the user's spelling.
 pub(crate) fn unit_name(connection: &ConnectionArgs) -> Result<UnitName> {
     Ok(UnitName::of(port_text(connection)?, &endpoint(connection)?))
 }
@@ -80,19 +80,19 @@ pub(crate) fn open(connection: &ConnectionArgs) -> Result<Unit> {
         }
         _ => Unit::open(&endpoint, baud_rate, options).map_err(|error| open_failure(&error))?,
     };
-    // A terminal server does not tell how fast its port is; who uses it may.
+    // A terminal server does not report its port's rate, so the user may state it.
     if let (false, Some(baud)) = (endpoint.has_baud(), connection.baud) {
         unit.set_line_rate(LineRate::BitsPerSecond(baud.bits_per_second()));
     }
     Ok(unit)
 }
 
-/// The rate of the line: the one that recorders are delivered with, if no other is given.
+/// The rate of the line; by default the one that recorders are delivered with.
 fn baud(connection: &ConnectionArgs) -> Baud {
     connection.baud.unwrap_or_default()
 }
 
-/// How patient the user wants us to be.
+/// The timeout and the number of retries that the user asks for.
 pub(crate) fn options(connection: &ConnectionArgs) -> Options {
     let mut options = Options::default();
     options.timeout = connection.timeout.unwrap_or(options.timeout);
@@ -100,11 +100,11 @@ pub(crate) fn options(connection: &ConnectionArgs) -> Options {
     options
 }
 
-/// Joins the Genius bus, whichever recorder on it is named.
+/// Opens the Genius bus, whichever recorder on it is named.
 #[cfg(unix)]
 pub(crate) fn open_bus(connection: &ConnectionArgs) -> Result<ser_client::GeniHost> {
     let Endpoint::Geni { window, .. } = endpoint(connection)? else {
-        return Err(Failure::usage(format!("{} is no Genius bus", port_text(connection)?))
+        return Err(Failure::usage(format!("{} is not a Genius bus", port_text(connection)?))
             .hint("name the window of this host's GENI board, as in --port geni:/dev/shm/host")
             .hint("no board at hand? ser-cli sim --genius /dev/shm/host --node 5"));
     };
@@ -112,14 +112,14 @@ pub(crate) fn open_bus(connection: &ConnectionArgs) -> Result<ser_client::GeniHo
     unless_interrupted(|stop| ser_client::GeniHost::open_unless(window, patience, stop))
 }
 
-/// Opens the window to a bus. An interrupt has to wait until what was written there is put back, as
-/// the window may turn out to be none.
+/// Opens the window to a bus. An interrupt has to wait until the bytes written there are put back,
+/// because the window may turn out to be something else.
 fn unless_interrupted<T>(
     open: impl FnOnce(&Arc<AtomicBool>) -> std::result::Result<T, OpenError>,
 ) -> Result<T> {
     let caught = Caught::for_now()?;
     let opened = open(caught.flag()).map_err(|error| open_failure(&error))?;
-    // It may have come at the last moment, when opening looked no more.
+    // The interrupt may have come at the last moment, after opening last looked for it.
     if caught.ends_interrupted() { Err(GeniusError::Interrupted.into()) } else { Ok(opened) }
 }
 
@@ -162,10 +162,10 @@ fn open_failure(error: &OpenError) -> Failure {
 impl From<RequestError> for Failure {
     fn from(error: RequestError) -> Failure {
         let hint =
-            error.hint().unwrap_or("try again; ser-cli status tells whether the recorder is well");
+            error.hint().unwrap_or("try again; ser-cli status shows whether the recorder works");
         let failure = Failure::new(&error).hint(hint);
         match error {
-            // A recorder that is asked at another rate sees no question, and says nothing.
+            // A recorder at another rate cannot read the question, and stays silent.
             RequestError::NoReply {
                 diagnosis: Diagnosis::Silent | Diagnosis::Garbage { .. } | Diagnosis::Damaged { .. },
                 ..
@@ -182,20 +182,18 @@ impl From<RequestError> for Failure {
     }
 }
 
-/// When nothing was understood at the rate of the port, looks whether the recorder is there at
-/// another one.
+/// If nothing was understood at the rate of the port, looks for the recorder at other rates.
 pub(crate) fn explain_silence(failure: Failure, connection: &ConnectionArgs) -> Failure {
     if !failure.is_unanswered() {
         return failure;
     }
     if !endpoint(connection).is_ok_and(|endpoint| endpoint.has_baud()) {
         return failure.hint(
-            "a recorder stays silent also when a terminal server talks to it at another rate \
-             than its own",
+            "a recorder also stays silent when a terminal server talks to it at the wrong rate",
         );
     }
     inform("no answer: looking for the recorder at other rates …");
-    // Whatever hinders the search, the failure that led to it is the one to tell.
+    // If the search itself fails, the failure that led to it is reported.
     match open(connection).ok().and_then(|mut unit| unit.find_baud().ok()) {
         Some(Some(found)) => {
             let (asked, found) = (baud(connection).bits_per_second(), found.bits_per_second());
@@ -207,7 +205,7 @@ pub(crate) fn explain_silence(failure: Failure, connection: &ConnectionArgs) -> 
     }
 }
 
-/// What went wrong on a Genius bus, with advice.
+/// The failure of a Genius bus, with advice.
 impl From<GeniusError> for Failure {
     fn from(error: GeniusError) -> Failure {
         let failure = Failure::new(error).hint(error.hint()).passing(error.may_pass());
@@ -220,17 +218,17 @@ impl From<GeniusError> for Failure {
     }
 }
 
-/// Asks for the settings; `None` from an original recorder, which does not know the question and
+/// Asks for the settings. `None` from an original recorder, which does not know the question and
 /// stays silent.
 ///
-/// A read, which every recorder answers, goes first: so a recorder that is not there at all is told
-/// apart, and waited for only once.
+/// A read, which every recorder answers, goes first. An absent recorder is thus recognised, and
+/// waited for only once.
 pub(crate) fn settings(unit: &mut Unit) -> Result<Option<Configuration>> {
     unit.log_position()?;
     unless_unanswered(unit.configuration())
 }
 
-/// `None` where a recorder that is there does not answer.
+/// `None` if a recorder that is there does not answer.
 pub(crate) fn unless_unanswered<T>(
     answer: std::result::Result<T, RequestError>,
 ) -> Result<Option<T>> {
@@ -245,16 +243,16 @@ pub(crate) fn unless_unanswered<T>(
     }
 }
 
-/// The failure to do without the settings.
+/// The failure of a command that needs the settings and cannot get them.
 pub(crate) fn settings_unknown() -> Failure {
     Failure::new(
-        "the recorder does not tell its settings: original recorders (HE660SER160, HE660SER320) \
+        "the recorder does not report its settings: original recorders (HE660SER160, HE660SER320) \
          never answer this query",
     )
 }
 
-/// How many entries the recorder's log holds: as the user says, or as the recorder says, or as it
-/// was the last time.
+/// How many entries the recorder's log holds: as the user says, else as the recorder says, else as
+/// remembered from the last time.
 pub(crate) fn log_size(
     unit: &mut Unit,
     given: Option<u16>,
@@ -269,13 +267,13 @@ pub(crate) fn log_size(
     }
 }
 
-/// The failure to do without the size of the log.
+/// The failure of a command that needs the size of the log and cannot get it.
 pub(crate) fn log_size_unknown() -> Failure {
     settings_unknown()
         .hint("say with --log-size N how many entries its log has (2048 as delivered)")
 }
 
-/// Tells that the recorder talks at another rate from now on, where the rate is ours to follow.
+/// Tells the user the recorder's new rate, where the rate of the port is ours to change.
 pub(crate) fn tell_new_baud(connection: &ConnectionArgs, now: &Configuration) -> Result<()> {
     if baud(connection) != now.baud && endpoint(connection)?.has_baud() {
         let rate = now.baud.bits_per_second();
@@ -285,7 +283,7 @@ pub(crate) fn tell_new_baud(connection: &ConnectionArgs, now: &Configuration) ->
     Ok(())
 }
 
-/// How long to wait in one go where an interrupt has to be noticed soon.
+/// The longest single wait where an interrupt must be noticed soon.
 pub(crate) const HEARTBEAT: Duration = Duration::from_millis(100);
 
 #[cfg(test)]

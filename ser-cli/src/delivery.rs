@@ -1,5 +1,5 @@
-//! Where deliveries go: events and losses to standard output, losses also to standard error, the
-//! rest to the progress bar.
+//! The destination of deliveries: events and losses go to standard output, losses also to standard
+//! error, and progress to the bar.
 
 use std::fmt::Display;
 
@@ -9,10 +9,10 @@ use crate::error::{Failure, Result, warn};
 use crate::output::{self, Annotator, Before, EventWriter, Format, Life, Loss, Record};
 use crate::progress::Progress;
 
-/// Gaps, and entries that are not valid, that are told of one by one; more are only counted.
+/// Gaps and invalid entries that are reported one by one; further ones are only counted.
 const TOLD: u32 = 3;
 
-/// Writes what a reading brings.
+/// Writes the deliveries of a reading.
 pub(crate) struct Outlet {
     writer: Box<dyn EventWriter>,
     annotator: Annotator,
@@ -22,12 +22,12 @@ pub(crate) struct Outlet {
 }
 
 impl Outlet {
-    /// On standard output, with a bar if the download is long; for a log of this life.
+    /// To standard output, with a bar if the download is long; for a log of this life.
     pub(crate) fn new(format: Format, life: Life, before: Before) -> Outlet {
         Outlet::with_progress(format, life, before, Progress::new())
     }
 
-    /// On standard output, without a bar: there is no end to wait for.
+    /// To standard output, without a bar, because there is no end.
     pub(crate) fn endless(format: Format, life: Life, before: Before) -> Outlet {
         Outlet::with_progress(format, life, before, Progress::none())
     }
@@ -42,8 +42,8 @@ impl Outlet {
         self.annotator.life()
     }
 
-    /// Writes deliveries and passes them on; `pending` more events are about to come. Before
-    /// anything is passed on, `remember` gets the life of the log.
+    /// Writes deliveries and passes them on; `pending` more events are about to come. `remember`
+    /// gets the life of the log before anything is passed on.
     pub(crate) fn take(
         &mut self,
         deliveries: &[Delivery],
@@ -81,17 +81,17 @@ impl Outlet {
         })
     }
 
-    /// The entries that come now have nothing to do with those before.
+    /// Says that the following entries are unrelated to those before.
     pub(crate) fn begin_anew(&mut self) {
         self.annotator.begin_anew();
     }
 
-    /// Passes on what is due also when nothing was delivered, such as the header of a file.
+    /// Passes on what is due even when nothing was delivered, such as the header of a file.
     pub(crate) fn flush(&mut self) -> Result<()> {
         Ok(self.writer.flush()?)
     }
 
-    /// The same at the end, and tells what was only counted.
+    /// Passes on what is due at the end, and reports what was only counted.
     pub(crate) fn finish(&mut self) -> Result<()> {
         self.progress.finish();
         if let Some(more) = self.not_valid.checked_sub(TOLD).filter(|&more| more > 0) {
@@ -105,12 +105,12 @@ impl Outlet {
         self.flush()
     }
 
-    /// Counts a place at which something may be missing that no delivery tells of.
+    /// Counts a place where events may be missing without a delivery that reports it.
     pub(crate) fn miss(&mut self) {
         self.gaps += 1;
     }
 
-    /// Fails if something is known to be missing in what was delivered.
+    /// Fails if events are known to be missing in what was delivered.
     pub(crate) fn require_complete(&self) -> Result<()> {
         match self.gaps {
             0 => Ok(()),
@@ -119,13 +119,13 @@ impl Outlet {
         }
     }
 
-    /// Whether something is known to be missing in what was delivered.
+    /// Whether events are known to be missing in what was delivered.
     pub(crate) fn has_gaps(&self) -> bool {
         self.gaps > 0
     }
 }
 
-/// Tells a loss, with the entry after it.
+/// Reports a loss, together with the entry after it.
 fn tell(loss: &Loss, after: &[Delivery]) {
     match place(after) {
         Some(entry) => warn(format_args!("lost ahead of entry {entry}: {}", loss.sentence())),
@@ -133,7 +133,7 @@ fn tell(loss: &Loss, after: &[Delivery]) {
     }
 }
 
-/// The entry that comes first after a loss.
+/// The first entry after a loss.
 fn place(deliveries: &[Delivery]) -> Option<impl Display> {
     deliveries.iter().find_map(|delivery| match delivery {
         Delivery::Event { entry_number, .. } => Some(*entry_number),

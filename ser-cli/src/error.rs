@@ -1,5 +1,4 @@
-//! What the user is told when something does not work: a message, what to try next, and the exit
-//! code.
+//! Failures as the user sees them: a message, what to try next, and the exit code.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -11,24 +10,24 @@ use ser_console::Harmless;
 /// The result of everything that a command does.
 pub(crate) type Result<T> = std::result::Result<T, Failure>;
 
-/// The recorder did not answer or refused, or something else went wrong while running.
+/// The recorder did not answer or refused, or something else went wrong at run time.
 pub(crate) const EXIT_FAILURE: u8 = 1;
 
-/// The command line asks for something that cannot be; clap uses the same code.
+/// The command line asks for something impossible. clap uses the same code.
 const EXIT_USAGE: u8 = 2;
 
-/// Everything went well, and events are missing in what was delivered; only if the user asked for
-/// that.
+/// Everything worked, but events are missing in what was delivered. Used only if the user asked for
+/// it.
 const EXIT_INCOMPLETE: u8 = 3;
 
 /// Why a command ended early.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// Whoever read our output has had enough (`| head`): nothing to complain about.
+    /// The reader of our output has stopped (`| head`): nothing to report.
     OutputClosed,
-    /// The user has had enough: nothing to complain about either.
+    /// The user interrupted the command: nothing to report either.
     Interrupted,
-    /// Something to tell.
+    /// A failure to report.
     Told(Box<Report>),
 }
 
@@ -38,9 +37,9 @@ pub(crate) struct Report {
     message: String,
     hints: Vec<String>,
     exit: u8,
-    /// Nothing that the recorder said was understood, if it said anything.
+    /// Nothing from the recorder was understood, if anything came at all.
     unanswered: bool,
-    /// It may work again without anybody doing anything here.
+    /// It may work again without any action here.
     may_pass: bool,
 }
 
@@ -50,7 +49,7 @@ impl Failure {
         Failure::with_exit(message, EXIT_FAILURE)
     }
 
-    /// A command line that makes no sense, found after clap has had its look: exit code 2.
+    /// A senseless command line that clap does not recognise as one: exit code 2.
     pub(crate) fn usage(message: impl Display) -> Failure {
         Failure::with_exit(message, EXIT_USAGE)
     }
@@ -73,7 +72,7 @@ impl Failure {
         }))
     }
 
-    /// Adds what to try next; every failure has at least one such line.
+    /// Adds what to try next. Every failure has at least one such line.
     pub(crate) fn hint(mut self, hint: impl Display) -> Failure {
         if let Failure::Told(report) = &mut self {
             report.hints.push(hint.to_string());
@@ -81,7 +80,7 @@ impl Failure {
         self
     }
 
-    /// Notes that nothing was understood of the unit: the rate may be wrong.
+    /// Notes that nothing from the recorder was understood: the rate may be wrong.
     pub(crate) fn unanswered(mut self) -> Failure {
         if let Failure::Told(report) = &mut self {
             report.unanswered = true;
@@ -89,12 +88,12 @@ impl Failure {
         self
     }
 
-    /// Whether nothing was understood of the recorder.
+    /// Whether nothing from the recorder was understood.
     pub(crate) fn is_unanswered(&self) -> bool {
         matches!(self, Failure::Told(report) if report.unanswered)
     }
 
-    /// Notes whether it may work again if one waits.
+    /// Notes whether waiting may help.
     pub(crate) fn passing(mut self, may_pass: bool) -> Failure {
         if let Failure::Told(report) = &mut self {
             report.may_pass = may_pass;
@@ -102,12 +101,12 @@ impl Failure {
         self
     }
 
-    /// Whether it may work again if one waits.
+    /// Whether waiting may help.
     pub(crate) fn may_pass(&self) -> bool {
         matches!(self, Failure::Told(report) if report.may_pass)
     }
 
-    /// Tells the user, who need not do anything about it yet.
+    /// Reports the failure as a warning, because no action is needed yet.
     pub(crate) fn warn(&self) {
         if let Failure::Told(report) = self {
             warn(&report.message);
@@ -119,7 +118,7 @@ impl Failure {
         match error.kind() {
             io::ErrorKind::BrokenPipe => Failure::OutputClosed,
             _ => Failure::new(format!("cannot write {what}: {error}"))
-                .hint("check that the place it goes to exists and has room"),
+                .hint("check that its destination exists and has room"),
         }
     }
 
@@ -129,7 +128,7 @@ impl Failure {
             .hint("check its name and your rights to it")
     }
 
-    /// Tells the user; gives the exit code.
+    /// Reports the failure; returns the exit code.
     pub(crate) fn report(&self) -> ExitCode {
         let Failure::Told(report) = self else { return ExitCode::SUCCESS };
         note("error", AnsiColor::Red, &report.message);
@@ -166,19 +165,19 @@ impl From<io::Error> for Failure {
     }
 }
 
-/// Tells the user something that does not end the command.
+/// Tells the user about a problem that does not end the command.
 pub(crate) fn warn(message: impl Display) {
     note("warning", AnsiColor::Yellow, message);
 }
 
-/// Adds what to do about a warning.
+/// Adds advice to a warning.
 pub(crate) fn advise(message: impl Display) {
     note("hint", AnsiColor::Cyan, message);
 }
 
-/// Tells the user something that is no problem.
+/// Tells the user something that is not a problem.
 pub(crate) fn inform(message: impl Display) {
-    // Nobody is left to be told when standard error is gone.
+    // Without standard error there is nobody to tell.
     let _ = writeln!(anstream::stderr(), "{}", Harmless(message));
 }
 

@@ -1,4 +1,4 @@
-//! Ctrl-C, and a polite kill, as something to ask for in a loop.
+//! Ctrl-C and the termination signal, as a flag to check in a loop.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -12,33 +12,33 @@ use crate::error::{EXIT_FAILURE, Failure, Result, advise};
 /// How soon an interrupt is noticed.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
-/// Signals so close together are one wish: `timeout` sends one to the program and one to its group,
-/// and a supervisor may send two of different kinds.
+/// Signals this close together count as one: `timeout` sends one to the program and one to its
+/// group, and a supervisor may send two of different kinds.
 const ONE_WISH: Duration = Duration::from_millis(500);
 
-/// What to tell when the program ends before it has tidied up.
+/// What to tell the user if the program ends before it has cleaned up.
 static LEFT_BEHIND: Mutex<Option<&str>> = Mutex::new(None);
 
-/// Set by an interrupt, once anybody wants to know of them.
+/// Set by an interrupt, once somebody checks for interrupts.
 static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// How many look at the flag. An interrupt that nobody looks for ends the program.
+/// How many check the flag. If nobody does, an interrupt ends the program.
 static LOOKING: AtomicUsize = AtomicUsize::new(0);
 
-/// From now on an interrupt sets the flag instead of ending the program. The flag is looked at
-/// between two questions to the recorder; whoever does not want to wait for that presses Ctrl-C
-/// once more, which ends the program at once.
+/// From now on an interrupt sets the flag instead of ending the program. The flag is checked
+/// between two questions to the recorder. A second Ctrl-C ends the program at once, for a user who
+/// does not want to wait for that.
 pub(crate) fn catch() -> Result<Arc<AtomicBool>> {
     // Before the first interrupt can come.
     LOOKING.fetch_add(1, Ordering::SeqCst);
     flag()
 }
 
-/// Looks at the flag as long as this is there.
+/// Checks the flag for as long as this exists.
 pub(crate) struct Caught(Arc<AtomicBool>);
 
 impl Caught {
-    /// The same as [`catch`] for something that has to be put back.
+    /// The same as [`catch`], for an operation that has something to put back.
     pub(crate) fn for_now() -> Result<Caught> {
         catch().map(Caught)
     }
@@ -47,8 +47,8 @@ impl Caught {
         &self.0
     }
 
-    /// Looks for the last time. An interrupt that comes later ends the program, unless somebody
-    /// else looks for it.
+    /// Checks for the last time. A later interrupt ends the program, unless somebody else checks
+    /// for it.
     pub(crate) fn ends_interrupted(self) -> bool {
         let flag = Arc::clone(&self.0);
         drop(self);
@@ -85,8 +85,8 @@ fn flag() -> Result<Arc<AtomicBool>> {
     Ok(flag)
 }
 
-/// Calls a function at every Ctrl-C, polite kill and hang-up. A signal that was ignored when the
-/// program was started (`nohup`) stays ignored.
+/// Calls a function at every Ctrl-C, termination signal and hang-up. A signal that was ignored when
+/// the program started (`nohup`) stays ignored.
 #[cfg(unix)]
 fn on_every_signal(mut caught: impl FnMut() + Send + 'static) -> io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -101,7 +101,7 @@ fn on_every_signal(mut caught: impl FnMut() + Send + 'static) -> io::Result<()> 
     Ok(())
 }
 
-/// The signals that are ignored, a bit each; 0 where the system does not tell.
+/// The ignored signals, one bit each; 0 where the system does not say.
 #[cfg(unix)]
 fn ignored_signals() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -114,14 +114,13 @@ fn on_every_signal(caught: impl FnMut() + Send + 'static) -> io::Result<()> {
     ctrlc::set_handler(caught).map_err(io::Error::other)
 }
 
-/// Does what may have to wait for others without end, as opening a pipe does, until there is an
-/// interrupt.
+/// Runs work that may wait without end, such as opening a pipe, until there is an interrupt.
 pub(crate) fn unless_interrupted<T: Send + 'static>(
     stop: &AtomicBool,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T> {
     let (sender, done) = channel();
-    // It cannot be cut short. Nobody waits for it, and it ends with the program.
+    // The work cannot be cut short. Nobody waits for it, and it ends with the program.
     thread::spawn(move || sender.send(work()));
     loop {
         match done.recv_timeout(LOOK_EVERY) {
@@ -132,7 +131,7 @@ pub(crate) fn unless_interrupted<T: Send + 'static>(
     }
 }
 
-/// Sets what is told if a second interrupt comes: what there is to put back by hand.
+/// Sets the text for a second interrupt: what the user has to put back by hand.
 pub(crate) fn leaves_behind(hint: Option<&'static str>) {
     *LEFT_BEHIND.lock().unwrap_or_else(PoisonError::into_inner) = hint;
 }

@@ -10,11 +10,11 @@ use crate::error::Result;
 use crate::output::{self, Before, Life};
 use crate::state::{Delivered, StateFile, StateLock};
 
-/// How much a crash may repeat, in time: writing the file after every event would wear a memory
-/// card.
+/// How much a crash may repeat, as a time. Writing the file after every event would wear out a
+/// memory card.
 const SAVE_EVERY: Duration = Duration::from_secs(1);
 
-/// Where what was delivered is remembered.
+/// The place where delivered events are remembered.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct StateArgs {
     /// Where to remember what was delivered; without it, the user's state directory
@@ -23,7 +23,7 @@ pub(crate) struct StateArgs {
     /// A recorder is the same however its port is spelled: by a relative path, by a link, by the
     /// device behind it, or, on this computer, by localhost, 127.0.0.1 or `::1`. A USB adapter that
     /// has a serial number is known by that (/dev/serial/by-id), not by the number that it gets
-    /// when it is plugged in. Numbers in /dev/pts are given anew: name a simulated recorder by its
+    /// when it is plugged in. Numbers in /dev/pts are reused: name a simulated recorder by its
     /// link.
     #[arg(long, env = "SER_STATE_DIR", hide_env_values = true, value_name = "DIR")]
     state_dir: Option<PathBuf>,
@@ -35,8 +35,8 @@ pub(crate) struct Keeper {
     saved: Option<Delivered>,
     unsaved: Option<Delivered>,
     saved_at: Instant,
-    /// Held until the end: two that read what is new would deliver it twice, or move the cursor
-    /// back.
+    /// Held until the end. Two runs that read new events at once would deliver them twice, or move
+    /// the cursor back.
     _lock: StateLock,
 }
 
@@ -50,12 +50,12 @@ impl Keeper {
         Ok(Keeper { file, saved, unsaved: None, saved_at: Instant::now(), _lock: lock })
     }
 
-    /// Where reading goes on.
+    /// Where reading continues.
     pub(crate) fn cursor(&self) -> Option<Cursor> {
         self.saved.and_then(|delivered| delivered.cursor)
     }
 
-    /// The life of the log that was read; a new one where nothing is remembered.
+    /// The life of the log that was read; a new one if nothing is remembered.
     pub(crate) fn life(&self) -> Result<Life> {
         match self.saved.and_then(|delivered| delivered.life) {
             Some(life) => Ok(life),
@@ -71,13 +71,13 @@ impl Keeper {
         Before { previous: cursor.and_then(|cursor| cursor.anchor).or(erased), erased, next_life }
     }
 
-    /// The size that the log had.
+    /// The remembered size of the log.
     pub(crate) fn size(&self) -> Option<u16> {
         self.saved.map(|delivered| delivered.size).filter(|&size| size > 0)
     }
 
-    /// Keeps the name of a life before anything of it is passed on: the next run must not give the
-    /// same events another one.
+    /// Saves the name of a life before any of its events is passed on, because the next run must
+    /// not give the same events another name.
     pub(crate) fn name(&mut self, life: Life, size: u16) -> Result<()> {
         let nothing = Delivered { cursor: None, size, life: None, next_life: None, erased: None };
         let known = self.unsaved.or(self.saved).unwrap_or(nothing);
@@ -91,7 +91,7 @@ impl Keeper {
         self.save()
     }
 
-    /// Everything up to `cursor`, in a log of this life, has reached standard output.
+    /// Notes that everything up to `cursor`, in a log of this life, has reached standard output.
     pub(crate) fn delivered(
         &mut self,
         cursor: Option<Cursor>,
@@ -101,7 +101,7 @@ impl Keeper {
         if cursor.is_none() {
             return Ok(());
         }
-        // The next event still has to go on from the last one of a log that was erased.
+        // The next event still has to continue from the last one of a log that was erased.
         let is_empty = cursor.is_some_and(|cursor| cursor.sequence == 0);
         let erased = self.saved.and_then(|saved| saved.erased).filter(|_| is_empty);
         let delivered = Delivered { cursor, size, life: Some(life), next_life: None, erased };
@@ -109,14 +109,14 @@ impl Keeper {
         self.save_if_due()
     }
 
-    /// How many events of a log with this total have not been delivered; 0 as well where nobody
-    /// reads what is new.
+    /// How many events of a log with this total have not been delivered. Also 0 if nobody reads new
+    /// events.
     pub(crate) fn unread(&self, total: u16) -> u16 {
         self.cursor().map_or(0, |cursor| total.wrapping_sub(cursor.total()))
     }
 
-    /// The log was erased, and its total was this. If everything in it had been delivered, nothing
-    /// is lost, and the next reading begins a new log.
+    /// Notes that the log was erased, with its total at that time. If everything in it had been
+    /// delivered, nothing is lost, and the next reading begins a new log.
     pub(crate) fn erased(&mut self, total: u16) -> Result<()> {
         let Some(cursor) = self.cursor() else { return Ok(()) };
         if self.unread(total) == 0 {
@@ -129,16 +129,16 @@ impl Keeper {
         Ok(())
     }
 
-    /// Writes what is not written yet, unless that was done a moment ago.
+    /// Writes unsaved changes, unless that was done a moment ago.
     pub(crate) fn save_if_due(&mut self) -> Result<()> {
         if self.saved_at.elapsed() >= SAVE_EVERY { self.save() } else { Ok(()) }
     }
 
-    /// Writes what is not written yet.
+    /// Writes unsaved changes.
     pub(crate) fn save(&mut self) -> Result<()> {
         if let Some(delivered) = self.unsaved.take() {
-            // The events have to be on the disk before it is remembered that they are: after a
-            // power cut it is better to get some twice than to miss some.
+            // The events must be on the disk before the file says so. After a power cut it is
+            // better to get some twice than to miss some.
             output::sync_stdout()?;
             self.file.save(&delivered)?;
             self.saved = Some(delivered);

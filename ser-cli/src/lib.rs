@@ -1,7 +1,7 @@
-//! The recorder's command line, as a library: the program is [`run`] and nothing else.
+//! The recorder's command line, as a library. The program only calls [`run`].
 //!
-//! What reads files of any origin can be used by itself, so that tests and fuzzers reach it:
-//! captures of a line ([`CaptureOptions`]), and what a run before has noted down ([`Delivered`]).
+//! The readers of untrusted files can be used separately, so that tests and fuzzers reach them:
+//! captures of a line ([`CaptureOptions`]), and the notes of an earlier run ([`Delivered`]).
 
 mod cli;
 mod closed_stdout;

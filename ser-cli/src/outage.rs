@@ -1,41 +1,41 @@
-//! A live view goes on when board, bus or recorder fail for a while: the failure is told, and only
-//! a long one is the end. `watch` and `genius globals --follow` live with failures in this way.
+//! A live view continues when board, bus or recorder fail for a while. It reports the failure, and
+//! only a long one ends it. `watch` and `genius globals --follow` treat failures this way.
 
 use std::time::{Duration, Instant};
 
 use crate::error::{Failure, Result, inform};
 
-/// A board that was reset is back on the bus within ten seconds, and somebody may have to reset it
+/// A board that was reset is back on the bus within ten seconds, but somebody may have to reset it
 /// first.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A failure that has not passed yet, if there is one.
+/// The present failure, if there is one.
 pub(crate) struct Outage {
     patience: Duration,
     since: Option<Instant>,
 }
 
 impl Outage {
-    /// None yet. Where more `patience` is wanted than a minute, it is had.
+    /// No failure yet. A `patience` of more than a minute replaces the default.
     pub(crate) fn new(patience: Duration) -> Outage {
         Outage { patience: patience.max(PATIENCE), since: None }
     }
 
-    /// Tells a failure that may pass, the first time; gives it back when it cannot pass, or has not
-    /// for too long.
+    /// Reports a failure that may pass, the first time. Returns it when it cannot pass, or has
+    /// lasted too long.
     pub(crate) fn bear(&mut self, failure: Failure, now: Instant) -> Result<()> {
         if !failure.may_pass() {
             return Err(failure);
         }
         let since = *self.since.get_or_insert_with(|| {
             failure.warn();
-            inform("this goes on as soon as that has passed");
+            inform("this continues as soon as that has passed");
             now
         });
         if now.saturating_duration_since(since) < self.patience { Ok(()) } else { Err(failure) }
     }
 
-    /// All is well; tells so if it was not.
+    /// Notes that all is well, and reports that if it was not.
     pub(crate) fn end(&mut self) {
         if self.since.take().is_some() {
             inform("all is well again");

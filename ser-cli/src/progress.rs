@@ -5,10 +5,10 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use ser_client::Delivery;
 
-/// Downloads of fewer events are over before a bar would be read.
+/// A download of fewer events is over before anybody could read a bar.
 const WORTH_A_BAR: u64 = 40;
 
-/// A bar, or nothing where standard error is no terminal or the download is short.
+/// A bar; nothing if standard error is not a terminal or the download is short.
 pub(crate) struct Progress {
     bar: Option<ProgressBar>,
     wanted: bool,
@@ -26,7 +26,7 @@ impl Progress {
         Progress { bar: None, wanted: false, delivered: 0 }
     }
 
-    /// These events are there, and `pending` more are to come.
+    /// Notes that these events have arrived and `pending` more are to come.
     pub(crate) fn advance(&mut self, deliveries: &[Delivery], pending: u32) {
         let events =
             deliveries.iter().filter(|delivery| matches!(delivery, Delivery::Event { .. })).count();
@@ -49,7 +49,7 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub(crate) fn finish(&mut self) {
         if let Some(bar) = self.bar.take() {
             bar.finish_and_clear();
@@ -69,7 +69,7 @@ fn bar() -> ProgressBar {
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} events, {eta} left") {
         bar.set_style(style);
     }
-    // The bar goes on breathing when the recorder hesitates.
+    // Keeps the bar moving while the recorder hesitates.
     bar.enable_steady_tick(Duration::from_millis(500));
     bar
 }

@@ -1,9 +1,9 @@
 //! What has been delivered already, kept in the user's state directory between two runs: one file
 //! per recorder.
 //!
-//! A recorder that was called otherwise before has its file under that name; it moves when it is
-//! written. Files are replaced as a whole, and only files of ours are: no link is followed, and
-//! nothing else is read to its end.
+//! A recorder that had another name before has its file under that name; the file moves when it is
+//! written. Files are replaced as a whole, and only our own files are: links are not followed, and
+//! other files are not read to their end.
 
 use std::error::Error;
 use std::fmt;
@@ -23,35 +23,35 @@ use crate::unit_name::UnitName;
 /// The layout of the file. A change that old versions would misread gets the next number.
 const VERSION: u32 = 2;
 
-/// The layout without sequence and life. What it remembers is still good.
+/// The layout without sequence and life. Its content is still valid.
 const VERSION_WITHOUT_LIFE: u32 = 1;
 
-/// No file of ours comes near this.
+/// A limit far above the length of our files.
 const MAX_LEN: u64 = 65_536;
 
 /// The longest name that file systems take, in bytes.
 const MAX_NAME_LEN: usize = 255;
 
-/// So much of a name that is too long is kept for people.
+/// How much of an overlong name is kept for people to read.
 const TELLING_LEN: usize = 100;
 
-/// Where a recorder's log had been read to.
+/// How far a recorder's log had been read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Delivered {
-    /// Behind the last event that was delivered; `None` while there is nothing but a name.
+    /// The position after the last event that was delivered; `None` while there is only a name.
     pub cursor: Option<Cursor>,
     /// Entries that the log could hold then.
     pub size: u16,
-    /// The life of the log; `None` in files of before lives had names.
+    /// The life of the log; `None` in files from before lives had names.
     pub life: Option<Life>,
-    /// The name of the next life, drawn before anything of it was delivered.
+    /// The name of the next life, drawn before any of its events was delivered.
     pub next_life: Option<Life>,
-    /// The last event of the log before, if that was erased when everything in it had been
+    /// The last event of the previous log, if that was erased after everything in it had been
     /// delivered.
     pub erased: Option<Entry>,
 }
 
-/// A text that does not say what was delivered, and why.
+/// A text that does not say what was delivered, and the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NotDelivered(String);
 
@@ -64,10 +64,10 @@ impl fmt::Display for NotDelivered {
 impl Error for NotDelivered {}
 
 impl Delivered {
-    /// Reads what [`to_text`](Self::to_text) has written.
+    /// Reads a text written by [`to_text`](Self::to_text).
     ///
     /// # Errors
-    /// When it has not: the text is damaged, or of another version.
+    /// When the text is damaged, or of another version.
     pub fn from_text(text: &[u8]) -> std::result::Result<Delivered, NotDelivered> {
         let content: Content =
             serde_json::from_slice(text).map_err(|error| NotDelivered(error.to_string()))?;
@@ -95,7 +95,7 @@ impl Delivered {
     /// The content of the state file of this recorder.
     ///
     /// # Errors
-    /// None that is known: there is nothing here that JSON does not have.
+    /// No error is known: JSON can express everything in here.
     pub fn to_text(&self, unit: &str) -> io::Result<String> {
         let Delivered { cursor, size, life, next_life, erased } = *self;
         let content = Content {
@@ -114,14 +114,14 @@ impl Delivered {
     }
 }
 
-/// The file of one unit.
+/// The file of one recorder.
 #[derive(Debug)]
 pub(crate) struct StateFile {
     path: PathBuf,
     unit: String,
-    /// Where the file may be from when the recorder was called otherwise.
+    /// Where the file may be if the recorder had another name.
     others: Vec<PathBuf>,
-    /// Of these, the one that was loaded.
+    /// Which of these was loaded.
     moves_from: Option<PathBuf>,
 }
 
@@ -135,7 +135,7 @@ pub(crate) struct StateLock {
 #[derive(Serialize, Deserialize)]
 struct Content {
     version: u32,
-    /// The recorder's name, for whoever looks into the file.
+    /// The recorder's name, for people who read the file.
     unit: String,
     /// The recorder's total after the last event, in version 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -161,7 +161,7 @@ fn life_named(name: Option<&str>) -> std::result::Result<Option<Life>, NotDelive
     life.map(Some).ok_or_else(|| NotDelivered("it names no life of the log".to_owned()))
 }
 
-/// An entry, field by field: its time need not be a date that exists.
+/// An entry, field by field, because its time need not be an existing date.
 #[derive(Serialize, Deserialize)]
 struct LastEntry {
     changed: u32,
@@ -172,7 +172,7 @@ struct LastEntry {
 }
 
 impl StateFile {
-    /// The file for this recorder, in `directory` or where the system wants state to be.
+    /// The file for this recorder, in `directory` or in the system's place for state.
     pub(crate) fn of_unit(unit: &UnitName, directory: Option<&Path>) -> Result<StateFile> {
         let directory = match directory {
             Some(directory) => directory.to_path_buf(),
@@ -182,7 +182,7 @@ impl StateFile {
         let others: Vec<PathBuf> = unit.others.iter().map(path).collect();
         let is_there = |path: &PathBuf| path.symlink_metadata().is_ok();
         let own = path(&unit.name);
-        // One that is kept under another name in its own right stays there, with its lock.
+        // A file that is kept under another name in its own right stays there, with its lock.
         let alias = || unit.aliases.iter().map(path).find(is_there);
         let path = match is_there(&own) || others.iter().any(is_there) {
             true => own,
@@ -191,9 +191,10 @@ impl StateFile {
         Ok(StateFile { path, unit: unit.name.clone(), others, moves_from: None })
     }
 
-    /// Takes the file for this run alone.
+    /// Locks the file for this run alone.
     pub(crate) fn lock(&self) -> Result<StateLock> {
-        // The state file itself is replaced whenever it is saved, so the lock is on one that stays.
+        // The state file itself is replaced whenever it is saved, so the lock is on a file that
+        // stays.
         let path = self.path.with_extension("lock");
         let failed = |what: &str, path: &Path, error: io::Error| {
             Failure::new(format!("cannot {what} {}: {error}", path.display()))
@@ -221,7 +222,7 @@ impl StateFile {
         }
     }
 
-    /// What had been delivered; `None` when nothing has yet.
+    /// What had been delivered; `None` when nothing has been yet.
     pub(crate) fn load(&mut self) -> Result<Option<Delivered>> {
         if let Some(delivered) = load_from(&self.path)? {
             return Ok(Some(delivered));
@@ -252,11 +253,11 @@ impl StateFile {
         let text = delivered.to_text(&self.unit)?;
         let directory = self.path.parent().unwrap_or(Path::new("."));
         fs::create_dir_all(directory)?;
-        // It may have been exchanged since it was loaded.
+        // The file may have been exchanged since it was loaded.
         if read_ours(&self.path)?.is_some_and(|found| Delivered::from_text(&found).is_err()) {
-            return Err(io::Error::new(ErrorKind::AlreadyExists, "it is something else by now"));
+            return Err(io::Error::new(ErrorKind::AlreadyExists, "it has been replaced meanwhile"));
         }
-        // Under a name that nobody can foresee; removed where what follows fails.
+        // Under an unpredictable name; removed if a later step fails.
         let mut temporary = temporary_file(directory)?;
         temporary.write_all(text.as_bytes())?;
         temporary.as_file().sync_all()?;
@@ -264,7 +265,7 @@ impl StateFile {
         if let Some(other) =
             self.moves_from.take().filter(|other| matches!(load_from(other), Ok(Some(_))))
         {
-            // Found again, it would be taken for what another recorder has delivered.
+            // If it were found again, it would be taken for another recorder's state.
             let _ = fs::remove_file(other);
         }
         Ok(())
@@ -285,10 +286,10 @@ fn load_from(path: &Path) -> Result<Option<Delivered>> {
     text.map(|text| Delivered::from_text(&text)).transpose().map_err(|why| damaged(&why))
 }
 
-/// Reads a file that is no longer than ours are; nothing where there is none.
+/// Reads a file of at most our maximum length; nothing if there is none.
 ///
 /// # Errors
-/// `InvalidData` where it cannot be one of ours.
+/// `InvalidData` if it cannot be one of ours.
 fn read_ours(path: &Path) -> io::Result<Option<Vec<u8>>> {
     let file = match open_ours(path, File::options().read(true)) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
@@ -304,9 +305,9 @@ fn read_ours(path: &Path) -> io::Result<Option<Vec<u8>>> {
     Ok(Some(text))
 }
 
-/// Opens a plain file. A link is not followed: what it leads to is not ours.
+/// Opens a plain file. Links are not followed, because their targets are not ours.
 fn open_ours(path: &Path, options: &mut fs::OpenOptions) -> io::Result<File> {
-    let no_file = || io::Error::new(ErrorKind::InvalidData, "it is a link, or no file at all");
+    let no_file = || io::Error::new(ErrorKind::InvalidData, "it is a link, or not a plain file");
     match fs::symlink_metadata(path) {
         Ok(found) if !found.is_file() => return Err(no_file()),
         Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
@@ -316,15 +317,15 @@ fn open_ours(path: &Path, options: &mut fs::OpenOptions) -> io::Result<File> {
     {
         use rustix::fs::OFlags;
         use std::os::unix::fs::OpenOptionsExt;
-        // Something else may come between looking and opening, even a pipe that waits for its other
-        // end.
+        // Something else may be put there between the check and the opening, even a pipe that waits
+        // for its other end.
         options.custom_flags((OFlags::NOFOLLOW | OFlags::NONBLOCK).bits().cast_signed());
     }
     let file = options.open(path)?;
     if file.metadata()?.is_file() { Ok(file) } else { Err(no_file()) }
 }
 
-/// With the rights that the user gives to new files.
+/// With the permissions that the user gives to new files.
 fn temporary_file(directory: &Path) -> io::Result<tempfile::NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".ser-cli-").suffix(".tmp");
@@ -346,8 +347,8 @@ fn default_directory() -> Result<PathBuf> {
     Ok(base.join("ser-cli"))
 }
 
-/// A name that any file system takes, that people can read, and that no other recorder's name
-/// gives.
+/// A name that any file system accepts, that people can read, and that is different for every
+/// recorder.
 fn file_name(unit: &str) -> String {
     const SUFFIX: &str = ".json";
     // Windows takes COM3.json for the port itself.
@@ -561,7 +562,7 @@ mod tests {
 
         fs::write(&state.path, "a letter").unwrap();
         let text = state.save(&delivered).unwrap_err().text();
-        assert!(text.contains("something else by now"), "{text}");
+        assert!(text.contains("has been replaced meanwhile"), "{text}");
         assert_eq!(fs::read_to_string(&state.path).unwrap(), "a letter");
 
         fs::remove_file(&state.path).unwrap();
@@ -598,7 +599,7 @@ mod tests {
         }
         assert_eq!(fs::read(&victim).unwrap(), before);
         assert!(state.path.is_symlink() && lock.is_symlink());
-        // Planted where the temporary file used to be.
+        // Planted under the former name of the temporary file.
         let former = state.path.with_extension("tmp");
         symlink(&victim, &former).unwrap();
         fs::remove_file(&state.path).unwrap();

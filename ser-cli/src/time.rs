@@ -8,8 +8,8 @@ use ser_proto::TimeStamp;
 const FORMATS: [&str; 4] =
     ["%Y-%m-%dT%H:%M:%S%.f", "%Y-%m-%d %H:%M:%S%.f", "%Y-%m-%dT%H:%M", "%Y-%m-%d %H:%M"];
 
-/// Understands `2026-11-22T10:00:00.250`, also with a blank for the `T`, without fraction or
-/// without seconds.
+/// Understands `2026-11-22T10:00:00.250`, also with a blank in place of the `T`, without fraction
+/// or without seconds.
 pub(crate) fn parse_time(text: &str) -> Result<TimeStamp, String> {
     if text.ends_with(['Z', 'z']) || text.get(19..).is_some_and(|tail| tail.contains(['+', '-'])) {
         return Err("a recorder's clock has no time zone: give the local time without Z or offset"
@@ -30,7 +30,8 @@ pub(crate) fn parse_time(text: &str) -> Result<TimeStamp, String> {
     stamp(time).map_err(|year| format!("a recorder's clock runs from 1970 to 2069, not in {year}"))
 }
 
-/// The stamp of a calendar time; its year when the two digits of a stamp cannot say it.
+/// The stamp of a calendar time. An error with its year if the two digits of a stamp cannot express
+/// it.
 pub(crate) fn stamp(time: NaiveDateTime) -> Result<TimeStamp, i32> {
     TimeStamp::try_from(time).map_err(|_| chrono::Datelike::year(&time))
 }
@@ -46,24 +47,23 @@ pub(crate) fn local_now() -> impl fmt::Display {
     Local::now().format("%Y-%m-%dT%H:%M:%S%.3f")
 }
 
-/// The time `elapsed` after `time`, which is a date; past the year 2069 it stays the same.
+/// The time `elapsed` after `time`, which is a date. Past the year 2069 the time stays the same.
 pub(crate) fn time_after(time: TimeStamp, elapsed: std::time::Duration) -> TimeStamp {
     let elapsed = TimeDelta::from_std(elapsed).unwrap_or_default();
     NaiveDateTime::try_from(time).map_or(time, |start| stamp(start + elapsed).unwrap_or(time))
 }
 
-/// Milliseconds of the hundred years that two digits tell apart, 1970–2069.
+/// Milliseconds of the hundred years that two digits can express, 1970–2069.
 const CENTURY_MS: i64 = 36_525 * 86_400_000;
 
-/// So close to each other are two stamps on either side of the end of 2069, where the two digits of
-/// the year begin anew: ten years. Further apart, a clock was set.
+/// The most that two stamps differ on either side of the end of 2069, where the two digits of the
+/// year begin again: ten years. With a larger difference, a clock was set.
 const AROUND_2069_MS: i64 = 10 * 366 * 86_400_000;
 
 /// The time between two events, with its sign. 2069 is followed by 1970.
 ///
-/// As `+0.001 s`, `+1m02.003 s`, `+3h01m02 s`, `+2d03h01m`: the further apart, the coarser, so that
-/// it is taken in at a glance and fits a narrow column. The times themselves always show the
-/// millisecond.
+/// As `+0.001 s`, `+1m02.003 s`, `+3h01m02 s`, `+2d03h01m`: the longer, the coarser, so that it is
+/// easy to read and fits a narrow column. The times themselves always show the millisecond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Delta {
     ms: i64,
@@ -78,7 +78,7 @@ impl Delta {
     }
 }
 
-/// From `earlier` to `later` as their years are written.
+/// From `earlier` to `later`, by their years as written.
 fn straight_ms(earlier: TimeStamp, later: TimeStamp) -> Option<i64> {
     let earlier = NaiveDateTime::try_from(earlier).ok()?;
     let later = NaiveDateTime::try_from(later).ok()?;
@@ -88,11 +88,11 @@ fn straight_ms(earlier: TimeStamp, later: TimeStamp) -> Option<i64> {
 /// How a recorder's clock went from one event to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ClockStep {
-    /// As time does.
+    /// Forward, as time does.
     Forward,
-    /// It was set back in between.
+    /// The clock was set back in between.
     Back,
-    /// From 2069 to 1970: the two digits of the year began anew.
+    /// From 2069 to 1970: the two digits of the year began again.
     YearsBeganAnew,
 }
 
@@ -204,11 +204,11 @@ mod tests {
         assert_eq!(ClockStep::between(last, first), Some(ClockStep::YearsBeganAnew));
         assert_eq!(ClockStep::between(first, last), Some(ClockStep::Back));
         assert_eq!(ClockStep::between(first, first), Some(ClockStep::Forward));
-        // A clock that had lost its time, and was set again.
+        // A clock that had lost its time and was set again.
         let today = parse_time("2026-11-22T10:00:00").unwrap();
         assert_eq!(ClockStep::between(today, first), Some(ClockStep::Back));
         assert_eq!(ClockStep::between(first, today), Some(ClockStep::Forward));
-        // At the turn of 1999 to 2000 nothing happens.
+        // The turn of 1999 to 2000 is nothing special.
         let before = parse_time("1999-12-31T23:59:59.999").unwrap();
         let after = parse_time("2000-01-01T00:00:00.000").unwrap();
         assert_eq!(Delta::between(before, after), Some(Delta { ms: 1 }));

@@ -1,22 +1,21 @@
-//! What a recorder is called: one name however the way to it is spelled, and the names that it may
-//! have had.
+//! The name of a recorder: the same one however its port is spelled, and the names that it may have
+//! had before.
 //!
 //! # Design
-//! Under its name is kept what was delivered from a recorder, so the name has to be the same from
-//! one run to the next.
+//! The state of a recorder is kept under its name, so the name must be the same in every run.
 //!
 //! - A link is a name that somebody has chosen because it lasts (`/dev/serial/by-id/…`,
-//!   `/dev/recorder1`), and stays.
-//! - The number of a USB adapter does not last. `/dev/ttyUSB0` is called what is in
-//!   `/dev/serial/by-id` for it, as long as that has the adapter's serial number: two adapters
-//!   without one would take turns at the same name.
-//! - The computer itself is `localhost`, also as `127.0.0.1` and `[::1]`.
+//!   `/dev/recorder1`), so it is kept.
+//! - The number of a USB adapter does not last. `/dev/ttyUSB0` is replaced by its link in
+//!   `/dev/serial/by-id`, if that contains the adapter's serial number. Two adapters without one
+//!   would take turns at the same name.
+//! - The computer itself is `localhost`, also if it is written `127.0.0.1` or `[::1]`.
 //!
-//! All other names of the recorder are looked under when there is nothing under this one. Other
-//! spellings of the same name, and names of versions before this one, give way to it. A name in its
-//! own right, such as that of the device that a link leads to, keeps what is under it: the recorder
-//! may be called by it again. The number of a pseudo-terminal is none of them, for the next program
-//! that wants one gets it.
+//! If there is no state under this name, all other names of the recorder are tried. State under
+//! other spellings of the same name, and under names of earlier versions, moves to this name. State
+//! under a name in its own right, such as that of the device that a link leads to, stays: the
+//! recorder may be called by it again. The number of a pseudo-terminal is not such a name, because
+//! the next program that wants one gets it.
 
 use std::fs;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
@@ -24,19 +23,19 @@ use std::path::{Path, PathBuf};
 
 use ser_client::{Endpoint, GeniWindow};
 
-/// A recorder's name, and others that it may have been called by.
+/// A recorder's name, and others that it may have had.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct UnitName {
     /// The name.
     pub(crate) name: String,
-    /// Other spellings, the most telling first.
+    /// Other spellings, the most descriptive first.
     pub(crate) others: Vec<String>,
     /// Names in their own right.
     pub(crate) aliases: Vec<String>,
 }
 
 impl UnitName {
-    /// Of the recorder behind `text`, which has been understood as `endpoint`.
+    /// The name of the recorder behind `text`, which has been understood as `endpoint`.
     pub(crate) fn of(text: &str, endpoint: &Endpoint) -> UnitName {
         let (name, others) = names(text, endpoint);
         let mut unit = UnitName { name, others: Vec::new(), aliases: Vec::new() };
@@ -58,7 +57,7 @@ fn names(text: &str, endpoint: &Endpoint) -> (String, Vec<String>) {
     match endpoint {
         Endpoint::Tcp { address } => tcp_names(address),
         Endpoint::Geni { window, node } => window_names(window, *node),
-        // Elsewhere the names of ports are no paths.
+        // On other systems the names of ports are not paths.
         Endpoint::Serial { path } if cfg!(unix) => {
             Devices::of_this_computer().names(Path::new(path))
         }
@@ -95,25 +94,25 @@ fn window_names(window: &GeniWindow, node: Option<u8>) -> (String, Vec<String>) 
     };
     let absolute = std::path::absolute(&window.file).ok();
     let canonical = fs::canonicalize(&window.file).ok().or(absolute.clone());
-    // At its beginning is where a window is if nothing else is said.
+    // Without an offset the window is at the beginning.
     let offset = window.offset.filter(|&offset| offset != 0);
     (name(canonical, offset), vec![name(absolute, window.offset)])
 }
 
-/// Where the system has its devices, and what it knows of them.
+/// The system's devices, and what it knows of them.
 struct Devices {
-    /// Links with what the adapter says of itself.
+    /// Links whose names come from what the adapter says of itself.
     by_id: PathBuf,
-    /// A folder for each terminal, with a link to the device that has it.
+    /// A folder for each terminal, with a link to its device.
     terminals: PathBuf,
-    /// Whose names are numbers that are given again at once.
+    /// The folder of names that are numbers and are reused at once.
     pseudo_terminals: PathBuf,
 }
 
-/// More links than one after the other are none that anybody has chosen.
+/// Nobody chooses names by a chain of more links.
 const MAX_LINKS: usize = 16;
 
-/// So far above a terminal is its USB adapter: port and interface are between them.
+/// How far above a terminal its USB adapter is: port and interface are between them.
 const MAX_LEVELS: usize = 4;
 
 impl Devices {
@@ -132,7 +131,7 @@ impl Devices {
             others.push(text(&absolute));
         }
         let Some(place) = place(path) else {
-            // It is not there, and opening it will say so.
+            // The port is not there, and opening it will say so.
             let name = others.pop().unwrap_or(text(path));
             return (name, others);
         };
@@ -157,13 +156,14 @@ impl Devices {
         links
     }
 
-    /// Whether the USB adapter of a terminal tells itself from others of its kind.
+    /// Whether the USB adapter of a terminal has a serial number that distinguishes it from others
+    /// of its kind.
     fn has_serial_number(&self, device: &Path) -> bool {
         let Some(name) = device.file_name() else { return false };
         let Ok(device) = fs::canonicalize(self.terminals.join(name).join("device")) else {
             return false;
         };
-        // The hubs above have serial numbers, too.
+        // The search must stop at the adapter, because the hubs above have serial numbers, too.
         let adapter =
             device.ancestors().take(MAX_LEVELS).find(|folder| folder.join("idVendor").exists());
         adapter.is_some_and(|adapter| adapter.join("serial").exists())
@@ -178,7 +178,7 @@ fn place(path: &Path) -> Option<PathBuf> {
     Some(fs::canonicalize(folder).ok()?.join(last))
 }
 
-/// The links that a link leads through, and not where it ends.
+/// The links that a link leads through, without its final target.
 fn links_from(place: &Path) -> Vec<PathBuf> {
     let next = |link: &PathBuf| {
         let target = fs::read_link(link).ok()?;
@@ -244,7 +244,7 @@ mod tests {
 
         use super::*;
 
-        /// A computer with adapters: a serial number, or none, makes no difference but in `/sys`.
+        /// A computer with adapters. A serial number only makes a difference in `/sys`.
         struct Computer {
             root: TempDir,
         }
@@ -318,7 +318,7 @@ mod tests {
             let (name, others) = computer.names("dev/ttyUSB0");
             assert_eq!(name, device);
             assert!(others.contains(&by_id));
-            // Who says so wants it so.
+            // The user asks for this name explicitly.
             assert_eq!(computer.names("dev/serial/by-id/CH340").0, by_id);
         }
 
@@ -348,7 +348,7 @@ mod tests {
                 assert_eq!(name, ser, "{path}");
                 assert!(!others.contains(&computer.text("dev/pts/7")), "{others:?}");
             }
-            // What an earlier version called it.
+            // The name that an earlier version used.
             let (_, others) = computer.names("sub/../ser");
             assert!(
                 others.contains(&format!("{}/sub/../ser", computer.text("").trim_end_matches('/')))

@@ -25,7 +25,7 @@ pub(crate) fn on_off(on: bool) -> &'static str {
     if on { "on" } else { "off" }
 }
 
-/// Where events are reported by themselves.
+/// Where events are reported automatically.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ReportVia {
     /// Nowhere.
@@ -46,7 +46,7 @@ impl From<ReportVia> for AutoReport {
     }
 }
 
-/// A rate that the recorder has.
+/// A rate that the recorder supports.
 pub(crate) fn baud(text: &str) -> Result<Baud, String> {
     text.parse().ok().and_then(Baud::from_bits_per_second).ok_or_else(|| {
         let rates: Vec<_> =

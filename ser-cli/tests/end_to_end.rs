@@ -151,7 +151,7 @@ fn watch_shows_events_as_they_happen_and_puts_the_configuration_back(kind: Kind)
     assert_eq!(change(), "1,0,3");
     assert_eq!(watch.interrupt(), Some(0));
     assert_eq!(bench.ok("config"), before);
-    // What watch has shown is not new any more.
+    // What watch has shown is no longer new.
     assert_eq!(bench.ok("read --new --format jsonl"), "");
 }
 
@@ -183,7 +183,7 @@ fn what_a_killed_simulator_has_left_behind_is_taken_over() {
         sim.wait();
         assert!(fs::symlink_metadata(&link).is_ok() && window.exists());
     }
-    // Unless somebody else has it by now.
+    // A file that somebody else has put there meanwhile is kept.
     fs::remove_file(&window).expect("removed");
     fs::write(&window, [0xA5; 16_384]).expect("written");
     let refused = command.output().expect("ser-cli runs");
@@ -328,7 +328,7 @@ fn each_way_of_not_being_there_has_its_own_message() {
 
 type Ended = (Option<i32>, Option<String>);
 
-/// Exit code and first line of what a command with little patience says, and all of it.
+/// Exit code and first line of the output of a command with a short timeout, and all its output.
 fn impatient(port: &str, rate: &str) -> (Ended, String) {
     let output = ser_cli()
         .args(["--port", port, "--baud", rate, "--timeout", "50ms", "--retries", "0", "status"])
@@ -341,7 +341,7 @@ fn impatient(port: &str, rate: &str) -> (Ended, String) {
 
 fn wrong_rate(port: &str) -> Ended {
     let mut ended = (None, None);
-    // The search is short, and the simulator may have to wait for its turn longer than that.
+    // The search is short, and the simulator may have to wait longer than that for the processor.
     wait_until("the recorder is found at its own rate", || {
         let (end, error) = impatient(port, "19200");
         assert!(error.contains("hint: "), "{error}");
@@ -462,7 +462,7 @@ fn a_unit_is_the_same_however_its_port_is_spelled() {
     }
     // One file and its lock.
     assert_eq!(fs::read_dir(bench.folder.path().join("state")).expect("a folder").count(), 2);
-    // A name that no file can have makes no difference.
+    // A name that no file can have changes nothing.
     let deep = bench.folder.path().join(format!("{}sub/../unit", "./".repeat(200)));
     assert_eq!(read(&deep), 0);
     let long = bench.folder.path().join("n".repeat(240));
@@ -497,7 +497,7 @@ fn two_signals_in_one_moment_are_one_wish() {
         let pid = watch.0.id();
         let all: Vec<_> = signals.split(' ').map(|name| format!("kill -{name} {pid}")).collect();
         let mut shell = Command::new("sh");
-        // One that comes too late finds nobody.
+        // A signal that comes too late finds no process.
         let _ = shell.arg("-c").arg(all.join("; ")).stderr(Stdio::null()).status();
         assert_eq!(watch.wait(), Some(0), "{signals}");
         assert_eq!(bench.ok("config"), before, "{signals}");
@@ -535,13 +535,13 @@ fn the_second_interrupt_ends_a_command_that_waits_for_a_silent_unit() {
     bench.sim.signal("-STOP");
     let began = Instant::now();
     wait_until("watch ends", || {
-        // However far apart they are, and whether the first comes in the middle of a question or
+        // However far apart the signals are, and whether the first comes during a question or
         // before it.
         watch.signal("-INT");
         watch.0.try_wait().expect("a child").is_some()
     });
     assert_eq!(watch.wait(), Some(1));
-    // Three attempts of 20 s are what the recorder would have had.
+    // The recorder would have had three attempts of 20 s.
     assert!(began.elapsed() < Duration::from_secs(55), "it has waited for the unit");
     let mut error = String::new();
     watch.0.stderr.take().expect("piped").read_to_string(&mut error).expect("text");
@@ -688,11 +688,11 @@ fn a_folder_is_no_capture() {
     assert!(text(&output.stderr).contains("hint: "), "{}", text(&output.stderr));
 }
 
-/// A database reads what a user gives it.
+/// A database reads the output in the way a user would load it.
 mod needs_sqlite3 {
     use super::*;
 
-    /// What `SQLite` says to a question about the table that a CSV file makes.
+    /// The answer of `SQLite` to a question about the table that a CSV file makes.
     fn asked(csv: &Path, question: &str) -> String {
         let import = format!(".import --csv '{}' events", csv.display());
         let output = Command::new("sqlite3").args([":memory:", &import, question]).output();
@@ -712,7 +712,7 @@ mod needs_sqlite3 {
             asked(&csv, "select entry, input, state from events order by entry + 0, input + 0"),
             "1|1|1\n1|16|1\n2|1|0\n3|16|0\n"
         );
-        // Both stamps are times to `SQLite`, too, and as far apart as the contacts moved.
+        // Both stamps are also times to `SQLite`, and as far apart as the contacts moved.
         let apart =
             "select round((max(julianday(time)) - min(julianday(time))) * 86400000) from events";
         assert_eq!(asked(&csv, apart), "9.0\n");

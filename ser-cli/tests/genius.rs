@@ -1,4 +1,4 @@
-//! The command line on a Genius bus: `ser-cli sim --genius` plays board, bus and recorders, and
+//! The command line on a Genius bus. `ser-cli sim --genius` provides board, bus and recorders, and
 //! every command reaches them through the file that is the host's window.
 #![cfg(unix)]
 
@@ -14,15 +14,15 @@ use common::{Running, ser_cli, wait_until};
 use ser_sim::testing::{PATIENCE, image};
 use tempfile::TempDir;
 
-/// For recorders that are there, on such a machine. A board may also stand still for so long.
+/// For recorders that are there, on a busy machine. A board may also stand still for this long.
 const PATIENT_TIMEOUT: &str = "60s";
 
-/// On a noisy bus a question gets lost now and then, and is asked again after that time.
+/// On a noisy bus a question gets lost now and then, and is asked again after this time.
 const NOISY_TIMEOUT: &str = "10s";
 
 const RETRIES: &str = "10";
 
-/// How far two clocks may be apart that one broadcast has set.
+/// How far apart two clocks may be after one broadcast has set both.
 const CLOCKS_AGREE_WITHIN_MS: u32 = 1;
 
 /// A bus made with `ser-cli sim`, whose contacts are moved through its standard input.
@@ -77,7 +77,7 @@ impl Bench {
         self.command(&self.port(node), arguments).output().expect("ser-cli runs")
     }
 
-    /// Standard output of a command to a recorder that works.
+    /// Standard output of a command to a working recorder.
     fn ok(&self, node: u8, arguments: &str) -> String {
         succeeded(arguments, &self.run(node, arguments))
     }
@@ -92,7 +92,7 @@ impl Bench {
         format!("geni:{}", self.window().display())
     }
 
-    /// Moves contacts, and waits until a recorder has so many entries in all.
+    /// Moves contacts, and waits until a recorder has that many entries in all.
     fn play(&mut self, csv: &str, node: u8, entries: usize) {
         let input = self.sim.0.stdin.as_mut().expect("piped");
         writeln!(input, "{csv}\n").expect("the simulator listens");
@@ -133,7 +133,7 @@ fn every_command_works_over_the_bus() {
         .join("\n");
     bench.play(&csv, 5, 25);
 
-    // Seven entries fit a datagram of the larger model and ten of the smaller: neither is lost or
+    // Seven entries fit a datagram of the larger model and ten of the smaller. None is lost or
     // doubled.
     for (node, input) in [(5, 1), (9, 16)] {
         let rows = without_times(&bench.ok(node, "read --all --format csv"));
@@ -158,7 +158,7 @@ fn every_command_works_over_the_bus() {
         "{}",
         stderr(&printed)
     );
-    // What is new is delivered once, to each reader of its own recorder.
+    // New events are delivered once, to each reader of its own recorder.
     assert_eq!(bench.ok(9, "read --new --format jsonl").lines().count(), 25);
     assert_eq!(bench.ok(9, "read --new --format jsonl"), "");
     bench.ok(5, "erase --yes");
@@ -210,7 +210,7 @@ fn the_bus_is_seen_and_spoken_to_as_a_whole() {
     let again = bench.command(&bench.bus(), "genius broadcast clock --at 2026-11-22T10:00:00");
     let (code, told) = told(again);
     assert_eq!(code, Some(1), "{told}");
-    assert!(told.contains("0 of 2 recorders heard it") && told.contains("not known"), "{told}");
+    assert!(told.contains("0 of 2 recorders received it") && told.contains("not known"), "{told}");
     // The same edge of two recorders gets the same stamp, or the next one.
     bench.play("ms,input,state,node\n0,1,1,5\n0,1,1,9", 5, 2);
     let stamp = |node| {
@@ -239,7 +239,7 @@ fn hour_ms(stamp: &str) -> u32 {
     (number(minute) * 60 + number(second)) * 1000 + number(millisecond)
 }
 
-/// The exit code and everything that a command says.
+/// The exit code of a command, and all its output.
 fn told(mut command: Command) -> (Option<i32>, String) {
     let output = command.output().expect("ser-cli runs");
     (output.status.code(), stderr(&output))
@@ -248,7 +248,7 @@ fn told(mut command: Command) -> (Option<i32>, String) {
 #[test]
 fn live_views_survive_a_board_that_stands_still() {
     let mut bench = Bench::start("--node 5:ser160");
-    // Short, so that standing still is noticed soon; what is wrong after that is waited for anyway.
+    // Short, so that a standstill is noticed soon. Commands wait for the failure to pass anyway.
     bench.timeout = "1s";
     let mut follow = bench.command(&bench.bus(), "genius globals --follow");
     survives(&mut bench, &mut follow, ["     5      16  none", "     5      16  7"], 1);
@@ -256,8 +256,8 @@ fn live_views_survive_a_board_that_stands_still() {
     survives(&mut bench, &mut watch, ["1,7,1", "2,7,0"], 0);
 }
 
-/// A live view shows one thing, then the simulator stands still until that is told, and then it
-/// shows another.
+/// A live view shows one thing; then the simulator stands still until that is reported; then the
+/// view shows another.
 fn survives(bench: &mut Bench, view: &mut Command, [before, after]: [&str; 2], contact: u8) {
     let mut view = Running::start(view.stdout(Stdio::piped()).stderr(Stdio::piped()));
     let (rows, told) = (view.lines(), view.told());
@@ -277,7 +277,7 @@ fn survives(bench: &mut Bench, view: &mut Command, [before, after]: [&str; 2], c
     assert_eq!(view.interrupt(), Some(0));
 }
 
-/// Whether such a line comes.
+/// Whether such a line arrives.
 fn wait_for(lines: &Receiver<String>, fits: impl Fn(&String) -> bool) -> bool {
     std::iter::from_fn(|| lines.recv_timeout(PATIENCE).ok()).any(|line| fits(&line))
 }
@@ -297,7 +297,7 @@ fn events_are_watched_over_the_bus_and_rs_232_works_beside_it() {
         Ok("entry,time,input,state,sequence,life,note")
     );
 
-    // The window belongs to one program at a time; the serial line is another way.
+    // The window belongs to one program at a time, but the serial line is a separate way.
     let second = bench.run(5, "status");
     assert_eq!(second.status.code(), Some(1));
     assert!(stderr(&second).contains("is in use"), "{}", stderr(&second));
@@ -328,7 +328,7 @@ fn events_are_watched_over_the_bus_and_rs_232_works_beside_it() {
 #[test]
 fn each_mistake_has_a_message_of_its_own() {
     let mut bench = Bench::start("--node 5");
-    // Nobody waits long for a board that is not there.
+    // A short timeout for a board that is not there.
     bench.timeout = NOISY_TIMEOUT;
     let folder = bench.folder.path().display().to_string();
     fs::write(bench.folder.path().join("short"), b"no window").expect("written");
@@ -360,16 +360,16 @@ fn each_mistake_has_a_message_of_its_own() {
     assert!(big.contains("is this the right file?") && !big.contains("offset"), "{big}");
     let output = bench.command("/dev/ttyS0", "genius devices").output().expect("ser-cli runs");
     assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("is no Genius bus"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("is not a Genius bus"), "{}", stderr(&output));
 
-    // Nobody's file is overwritten, and no number given twice.
+    // No existing file is overwritten, and no bus address is given twice.
     for (arguments, code, message) in [
         ("--genius short --node 5", 1, "exists already"),
         ("--genius new --node 5 --node 5", 2, "--node 5 is given twice"),
         (
             "--genius new --node 5 --node 9 --host-number 9",
             2,
-            "9 is the number of a --node, and the host's too",
+            "9 is the bus address of a --node, and the host's too",
         ),
         ("--genius new --node 5 --image none", 1, "cannot open the image none"),
     ] {
@@ -394,8 +394,8 @@ fn a_bus_may_be_slow_and_noisy_and_its_host_have_any_number() {
     let rows = without_times(&bench.ok(5, "read --all --format csv"));
     let expected = (1..=30).map(|entry| format!("{entry},1,{}", entry % 2));
     assert_eq!(rows[1..], expected.collect::<Vec<_>>(), "neither lost nor doubled");
-    // Which message meets with an accident depends on when the commands above were given, so one
-    // may have to wait for it.
+    // Which message is disturbed depends on when the commands above were given, so it may take a
+    // while.
     wait_until("the board has counted a bus error", || {
         let devices = bench.command(&bench.bus(), "genius devices").output().expect("ser-cli runs");
         let told = stderr(&devices);
@@ -442,7 +442,7 @@ fn ctrl_c_ends_the_wait_for_a_board_and_puts_back_what_was_written() {
     let folder = tempfile::tempdir().expect("a folder");
     let photo = folder.path().join("photo");
     let mut bytes = vec![0xA5; 0x4000];
-    // As if a board had said that it is well.
+    // Makes the board look healthy.
     bytes[0x0893] = 1;
     for command in ["status", "erase --yes", "watch", "genius devices", "genius globals --follow"] {
         fs::write(&photo, &bytes).expect("written");

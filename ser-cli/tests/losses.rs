@@ -1,4 +1,4 @@
-//! What is missing is in the file, and in the exit code where that is wanted.
+//! Losses are reported in the file, and in the exit code where that is requested.
 #![cfg(unix)]
 
 mod common;
@@ -23,8 +23,8 @@ fn columns(row: &str) -> Vec<&str> {
     row.splitn(7, ',').collect()
 }
 
-/// A recorder of 8 entries whose first three events have been read, and that has had twenty more
-/// since.
+/// A recorder of 8 entries whose first three events have been read, and which has recorded twenty
+/// more since.
 fn overrun() -> Bench {
     let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
     bench.ok("config --size 8");
@@ -36,7 +36,8 @@ fn overrun() -> Bench {
     bench
 }
 
-/// A recorder whose inputs can be seen, recorded or not: it is on a Genius bus, too.
+/// A recorder whose inputs can be seen whether or not they are recorded, because it is on a Genius
+/// bus, too.
 struct Seen {
     bench: Bench,
     window: tempfile::TempDir,
@@ -51,7 +52,7 @@ impl Seen {
         Seen { bench, window }
     }
 
-    /// Moves contacts while recording is stopped; afterwards these inputs are on.
+    /// Moves contacts while recording is stopped, until these inputs are on.
     fn contacts(&mut self, lines: &str, on: &str) {
         let input = self.bench.sim.0.stdin.as_mut().expect("piped");
         write!(input, "ms,input,state\n{lines}\n\n").expect("the simulator reads");
@@ -81,7 +82,7 @@ fn a_loss_is_in_the_table_too_and_in_the_exit_code_if_that_is_wanted() {
     let loss = "12 events were overwritten before they were read";
     assert!(table.lines().nth(1).is_some_and(|line| line.ends_with(loss)), "{table}");
     assert!(told.contains(loss) && told.contains("error: the output has a gap"), "{told}");
-    // It has been told. What comes now is complete.
+    // The loss has been reported. What comes now is complete.
     assert_eq!(bench.run("read --new --fail-on-loss").status.code(), Some(0));
 }
 
@@ -90,7 +91,7 @@ fn the_rows_of_a_log_and_its_losses_go_on_from_run_to_run() {
     let mut bench = overrun();
     let file = bench.folder.path().join("events.csv");
     assert_eq!(append(&bench, "read --new --format csv", &file).status.code(), Some(0));
-    // By somebody who knows nothing of what was read here.
+    // Erased by somebody who does not know what was read here.
     bench.ok(&format!("erase --yes --state-dir {}", bench.folder.path().join("another").display()));
     bench.contacts("0,1,0", 1);
     assert_eq!(
@@ -134,7 +135,7 @@ fn inputs_that_change_while_recording_is_stopped_are_named() {
         text(&output.stderr)
             .contains("lost ahead of entry 2: inputs 7 9 changed while nothing was recorded")
     );
-    // By number, too.
+    // Also when read by number.
     let range = bench.run("read --from 1 --count 2 --format csv --fail-on-loss");
     assert!(
         text(&range.stdout).contains(",,,,,0,\"lost an unknown number: not recorded, inputs 7 9\"")
@@ -142,7 +143,7 @@ fn inputs_that_change_while_recording_is_stopped_are_named() {
     assert_eq!(range.status.code(), Some(3));
 }
 
-/// `ser-cli` as a shell starts it with this, where `"$@"` stands for it.
+/// Runs `ser-cli` as a shell starts it with this script, in which `"$@"` stands for the command.
 fn in_shell(bench: &Bench, arguments: &str, script: &str) -> Output {
     let ser_cli = bench.command(arguments);
     let mut shell = Command::new("sh");
@@ -156,7 +157,7 @@ fn in_shell(bench: &Bench, arguments: &str, script: &str) -> Output {
     shell.output().expect("sh runs")
 }
 
-/// With a limit to the size of files, in blocks of 512 bytes or of 1024: as good as a full disk.
+/// With a limit to the size of files, in blocks of 512 or of 1024 bytes: equivalent to a full disk.
 fn limited(bench: &Bench, arguments: &str, file: &Path, blocks: u32) -> Output {
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\" >> '{}'", file.display());
     in_shell(bench, arguments, &script)
@@ -195,7 +196,7 @@ fn a_file_that_ends_in_a_row_gets_a_line_end_first() {
     assert!(rows[2].starts_with("1,") && rows[2].ends_with(",5,1,1,0,"), "{csv}");
 }
 
-/// A recorder whose log holds these entries, on TCP; gives its port.
+/// A recorder on TCP whose log holds these entries; returns its port.
 fn unit_with(entries: Vec<Entry>) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = format!("tcp://{}", listener.local_addr().expect("an address"));
@@ -207,7 +208,7 @@ fn unit_with(entries: Vec<Entry>) -> String {
     port
 }
 
-/// Answers what is asked until the client goes.
+/// Answers requests until the client goes.
 fn answer(mut client: TcpStream, entries: &[Entry]) {
     let mut decoder = FrameDecoder::<MAX_BODY_LEN>::new();
     let mut bytes = [0; 256];
@@ -318,8 +319,8 @@ fn what_an_erase_takes_along_unread_is_told() {
     assert_eq!(output.status.code(), Some(3));
     assert!(text(&output.stdout).contains("lost an unknown number after 1: log began anew"));
 
-    // And so is a change of which the new log has no event, as one between the last look and the
-    // erase.
+    // A change without an event in the new log is also lost, such as one between the last look and
+    // the erase.
     bench.ok("stop");
     seen.contacts("0,7,1", "  7");
     let bench = &mut seen.bench;

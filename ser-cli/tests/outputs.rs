@@ -14,7 +14,7 @@ use std::process::{Command, Output, Stdio};
 use common::{Running, ser_cli};
 use tempfile::TempDir;
 
-/// What a terminal obeys: it clears the screen, sets its title, turns text around.
+/// Text that a terminal obeys: it clears the screen, sets its title, and reverses text.
 const HOSTILE: &str = "\u{1B}[2J\u{1B}]0;x\u{7}\r\u{9B}1m\u{202E}";
 
 /// A simulated recorder with three events, on a pseudo-terminal and on a Genius bus.
@@ -45,7 +45,7 @@ impl Unit {
             true => format!("geni:{}?node=5", self.folder.path().join("host").display()),
             false => self.folder.path().join("unit").display().to_string(),
         };
-        // What is new is so for each command.
+        // Each command has its own state, so that new events are new to each.
         let state = tempfile::tempdir_in(self.folder.path()).expect("a folder").keep();
         command.env("SER_PORT", port).env("SER_STATE_DIR", state).args(["--timeout", "20s"]);
         command.args(line.split_whitespace()).stdin(Stdio::null());
@@ -57,7 +57,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).expect("UTF-8")
 }
 
-/// Every way to make it print, but for those that go on until Ctrl-C.
+/// Every way to make it print, except those that go on until Ctrl-C.
 const PRINTING: [&str; 27] = [
     "--help",
     "--version",
@@ -157,7 +157,7 @@ fn nothing_is_delivered_into_a_closed_output() {
         assert_eq!(status.code(), Some(1), "{line}");
         assert!(text(&stderr).contains("standard output is closed"), "{line}: {}", text(&stderr));
     }
-    // What is new still is.
+    // New events are still new.
     let new = "read --new --format jsonl";
     assert_eq!(text(&run(new).stdout).lines().count(), 3);
     fs::remove_dir_all(&state).expect("removed");
@@ -165,7 +165,7 @@ fn nothing_is_delivered_into_a_closed_output() {
     assert_eq!(text(&run(new).stdout), "", "passed over");
 }
 
-/// Neither a control character nor one that turns text around, line ends apart.
+/// Checks for control characters and for characters that reverse text; line ends are allowed.
 fn assert_harmless(what: &str, bytes: &[u8]) {
     let shown = text(bytes);
     let obeyed = |letter: char| letter.is_control() && letter != '\n' || letter == '\u{202E}';
@@ -207,7 +207,7 @@ fn names_and_arguments_do_nothing_to_a_terminal() {
     ];
     for words in words {
         let mut command = ser_cli();
-        // Help names the variable, and not what is in it.
+        // Help names the variable, not its value.
         command.env("SER_PORT", HOSTILE).args(words);
         let Output { status, stdout, stderr } = command.output().expect("ser-cli runs");
         let is_help = words.iter().any(|word| *word == "--help");

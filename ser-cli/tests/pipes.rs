@@ -1,4 +1,4 @@
-//! A pipe may stand wherever a file may, and nobody has to write to it or read it: the first Ctrl-C
+//! A pipe may stand wherever a file may, even if nobody writes to it or reads it: the first Ctrl-C
 //! ends the wait.
 #![cfg(target_os = "linux")]
 
@@ -19,7 +19,7 @@ fn pipe(folder: &Path) -> PathBuf {
     path
 }
 
-/// Whether a program catches Ctrl-C by now: before that it ends it in any case.
+/// Whether a program already catches Ctrl-C. Before that, Ctrl-C ends it in any case.
 fn catches_interrupts(program: &Running) -> bool {
     let status = fs::read_to_string(format!("/proc/{}/status", program.0.id())).expect("a process");
     let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).expect("a mask");

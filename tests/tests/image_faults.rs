@@ -138,7 +138,7 @@ fn survives(fault: ForcedFault, cause: ResetCause, words: impl Fn(&str) -> bool)
     assert!(board.wait(PATIENCE, |board| board.lamps().fault), "the fault lamp blinks");
     in_use.assert_goes_on();
     assert_eq!(board.boots(), boots + 1, "once is enough");
-    let told = format!("the run before ended with a fault: {cause:?}: {}", board.last_words());
+    let told = format!("the previous run ended with a fault: {cause:?}: {}", board.last_words());
     image_records::wait_for(&log, &[&told]);
 }
 

@@ -1,25 +1,24 @@
-//! The battery-backed clock: a driver of a clock chip as the `Rtc` that the recorder wants.
+//! The battery-backed clock: adapts a driver of a clock chip to the `Rtc` that the recorder needs.
 //!
-//! A clock that has stopped while the power was off still shows a date, and one with an empty
-//! battery shows any date. A wrong time in a recorder's log is worse than none, so a time is
-//! believed only if the chip has not lost it and it can be.
+//! A clock that stopped while the power was off still shows a date, and one with an empty battery
+//! shows any date. A wrong time in a recorder's log is worse than none. A time is therefore
+//! believed only if the chip has not lost it and it is plausible.
 //!
 //! # Design
-//! The driver implements `rtcc::DateTimeAccess`, as that of the DS3231 and its relatives does
-//! (crate `ds323x`), plus [`KeepsTime`] for what that trait leaves out. What is wrong with the
-//! clock is kept in [`ClockHealth`], which the board looks at after the recorder has taken the
-//! clock over.
+//! The driver implements `rtcc::DateTimeAccess`, as the driver of the DS3231 and its relatives does
+//! (crate `ds323x`), plus [`KeepsTime`] for what that trait leaves out. Faults of the clock are
+//! kept in [`ClockHealth`], which the board reads after the recorder has taken the clock over.
 //!
 //! # Tradeoffs
-//! Chips that count whole seconds are read in the middle of the second that they show and are set
-//! to the nearest one: half a second of error at most each time, until a host sets the recorder's
-//! clock.
+//! Chips that count whole seconds are read as the middle of the second that they show, and are set
+//! to the nearest second. The error is half a second at most each time, until a host sets the
+//! recorder's clock.
 //!
 //! # Notes
-//! `stm32f4xx-hal`'s own RTC has no such trait. Its `get_datetime` of version 0.23 panics on
-//! registers that hold no date, waits without bound for the shadow registers, and counts years from
-//! 1970, so that the chip sees leap years where there are none. See [`stm32_rtc`](crate::stm32_rtc)
-//! for the registers as date and time.
+//! `stm32f4xx-hal`'s own RTC has no such trait. In version 0.23 its `get_datetime` panics on
+//! registers that hold no date and waits without bound for the shadow registers. It also counts
+//! years from 1970, so the chip sees leap years where there are none. See
+//! [`stm32_rtc`](crate::stm32_rtc) for the registers as date and time.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
@@ -30,47 +29,48 @@ use ser_node::calendar::date_time;
 
 use crate::counter::Counter;
 
-/// What a clock chip has to say apart from the time.
+/// What a clock chip reports apart from the time.
 pub trait KeepsTime: DateTimeAccess {
-    /// What the chip counts in, in milliseconds: 1000 for whole seconds, 1 for milliseconds and
-    /// less. Not 0, 1000 at most.
+    /// The chip's resolution in milliseconds: 1000 for whole seconds, 1 for milliseconds and less.
+    /// Range: 1–1000.
     const RESOLUTION_MS: u16;
 
     /// Whether the clock has stood still since it was last set: oscillator stopped, battery lost,
-    /// never set.
+    /// or never set.
     ///
     /// # Errors
     /// When the chip does not answer.
     fn has_lost_time(&mut self) -> Result<bool, Self::Error>;
 
-    /// The clock has been set: from now on the time is good. Clears the chip's flag.
+    /// Says that the clock has been set and that its time is good from now on. Clears the chip's
+    /// flag.
     ///
     /// # Errors
     /// When the chip does not answer.
     fn time_is_good(&mut self) -> Result<(), Self::Error>;
 }
 
-/// How it stands with the clock.
+/// State of the clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ClockState {
     /// Not asked yet.
     Unknown,
-    /// It gave the time, or has been set.
+    /// It gave a time, or it has been set.
     Good,
-    /// It has stood still: the time was lost while the power was off.
+    /// It stood still: the time was lost while the power was off.
     Lost,
-    /// It shows a time that cannot be.
+    /// It shows an impossible time.
     Implausible,
     /// It does not answer.
     Silent,
 }
 
-/// What the board can see of a clock that the recorder owns; belongs into a static.
+/// The board's view of a clock that the recorder owns; for a static.
 #[derive(Debug, Default)]
 pub struct ClockHealth {
     state: AtomicU8,
-    /// Times that the clock did not take the time that it was to be set to.
+    /// How often the clock failed to take a new time.
     pub writes_failed: Counter,
 }
 
@@ -81,7 +81,7 @@ impl ClockHealth {
         ClockHealth { state: AtomicU8::new(0), writes_failed: Counter::new() }
     }
 
-    /// How it stands with the clock.
+    /// State of the clock.
     #[must_use]
     pub fn state(&self) -> ClockState {
         match self.state.load(Ordering::Relaxed) {
@@ -116,8 +116,8 @@ pub struct ClockChip<'a, C> {
 const FIRST_YEAR_BEYOND: i32 = 2070;
 
 impl<'a, C: KeepsTime> ClockChip<'a, C> {
-    /// A clock that is believed from `not_before` on: the day on which the firmware was made, or
-    /// the board.
+    /// A clock that is believed from `not_before` on: the day on which the firmware or the board
+    /// was made.
     pub const fn new(chip: C, not_before: NaiveDate, health: &'a ClockHealth) -> ClockChip<'a, C> {
         const {
             assert!(
@@ -128,13 +128,14 @@ impl<'a, C: KeepsTime> ClockChip<'a, C> {
         ClockChip { chip, not_before, health }
     }
 
-    /// Ends the adapter; gives the driver back.
+    /// Ends the adapter; returns the driver.
     pub fn release(self) -> C {
         self.chip
     }
 
     fn examine(&mut self) -> Result<NaiveDateTime, ClockState> {
-        // Asked first: a chip that has lost its time may hold what its driver takes for an error.
+        // Asked first: a chip that has lost its time may hold values that its driver takes for an
+        // error.
         if self.chip.has_lost_time().map_err(|_| ClockState::Silent)? {
             return Err(ClockState::Lost);
         }
@@ -143,7 +144,7 @@ impl<'a, C: KeepsTime> ClockChip<'a, C> {
         if shown.date() < self.not_before || shown.date() >= beyond {
             return Err(ClockState::Implausible);
         }
-        // What the time is ahead of what the chip shows, on average.
+        // How far the time is ahead of what the chip shows, on average.
         let half_a_step_ms = i64::from(C::RESOLUTION_MS / 2);
         date_time(shown.and_utc().timestamp_millis() + half_a_step_ms)
             .ok_or(ClockState::Implausible)
@@ -159,7 +160,8 @@ impl<'a, C: KeepsTime> ClockChip<'a, C> {
 fn rounded(time: NaiveDateTime, resolution_ms: u16) -> NaiveDateTime {
     let resolution_ms = i64::from(resolution_ms);
     let steps = (time.and_utc().timestamp_millis() + resolution_ms / 2).div_euclid(resolution_ms);
-    // Cannot fail within the years of the protocol; should it, the time itself is the next best.
+    // Cannot fail within the years of the protocol. If it did, the exact time would be the best
+    // substitute.
     date_time(steps * resolution_ms).unwrap_or(time)
 }
 
@@ -237,7 +239,7 @@ mod tests {
         ClockChip::new(Chip { shows: shows.map(time), lost }, made, health)
     }
 
-    /// What the recorder is told, and what the board sees.
+    /// What the recorder is told, and the state that the board sees.
     fn read<const STEP_MS: u16>(
         shows: Option<&str>,
         lost: bool,

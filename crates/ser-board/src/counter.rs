@@ -1,11 +1,11 @@
-//! Counts that one side keeps and another one reads, such as an interrupt and the main loop.
+//! Counts that one context keeps and another reads, such as an interrupt and the main loop.
 //!
-//! They are plain loads and stores, also on processors without atomic additions, so each has a
-//! single writer.
+//! They use plain loads and stores, also on processors without atomic additions. Each count
+//! therefore has a single writer.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// A count that stops at its largest value. Only one side may count.
+/// A count that stops at its largest value. Only one context may count.
 #[derive(Debug, Default)]
 pub struct Counter(AtomicU32);
 
@@ -16,13 +16,13 @@ impl Counter {
         Counter(AtomicU32::new(0))
     }
 
-    /// One more.
+    /// Counts one more.
     #[inline]
     pub fn count(&self) {
         self.0.store(self.get().saturating_add(1), Ordering::Relaxed);
     }
 
-    /// How many so far.
+    /// The count so far.
     #[inline]
     pub fn get(&self) -> u32 {
         self.0.load(Ordering::Relaxed)

@@ -1,30 +1,32 @@
-//! What a hard fault was: a stack that has run out, or something else, and what the registers tell
-//! of it.
+//! What a hard fault was, a stack overflow or something else, and what the registers say about it.
 //!
-//! The board hands over what the processor shows (ARMv7-M: Cortex-M3, M4, M7); what that means is
-//! here.
+//! The board passes in what the processor shows (ARMv7-M: Cortex-M3, M4, M7). This module
+//! interprets it.
 //!
 //! # Design
-//! A stack runs out in three ways. The processor finds no room for the registers that it saves when
-//! an interrupt comes; a function moves the stack pointer out of the stack and then writes there,
-//! and when the processor takes that fault, it finds no room either; or a function writes several
-//! registers at once, which fails as a whole, with the stack pointer still in the stack and room
-//! above it. Only the third one looks like any other bad access: it is known by its address, right
-//! below the stack's end.
+//! A stack overflows in three ways.
+//!
+//! 1. The processor finds no room for the registers that it saves when an interrupt comes.
+//! 2. A function moves the stack pointer out of the stack and then writes there. When the processor
+//!    takes that fault, it finds no room either.
+//! 3. A function writes several registers at once. The write fails as a whole, while the stack
+//!    pointer is still in the stack with room above it.
+//!
+//! Only the third one looks like any other bad access. Its address gives it away: it is right below
+//! the stack's end.
 //!
 //! # Notes
-//! An address counts only while its valid bit is set; without, the register holds that of an
-//! earlier fault, or anything. A processor that puts writes off may report them without an address
-//! (`IMPRECISERR`): such a fault tells no place, and is a hard fault. Where a memory protection
-//! unit watches the stack's end, there are none of these. (ARMv7-M architecture, B3.2.15, B3.2.18.)
+//! An address counts only while its valid bit is set; otherwise the register holds an earlier
+//! fault's address, or anything. A processor that delays writes may report them without an address
+//! (`IMPRECISERR`). Such a fault gives no place and counts as a hard fault. It does not occur where
+//! a memory protection unit watches the stack's end. (ARMv7-M architecture, B3.2.15, B3.2.18.)
 
 use crate::last_words::{Fault, Text};
 
 /// What the processor shows of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Evidence {
-    /// The registers that the processor has saved; none when it found no room for them in the
-    /// stack.
+    /// The registers that the processor saved; `None` when the stack had no room for them.
     pub saved: Option<SavedRegisters>,
     /// Configurable fault status (CFSR).
     pub status: u32,
@@ -32,11 +34,11 @@ pub struct Evidence {
     pub protected_address: u32,
     /// Address of a bus fault (BFAR).
     pub bus_address: u32,
-    /// Lowest address of the stack. Below it there is nothing that can be written.
+    /// Lowest address of the stack. Nothing below it can be written.
     pub stack_end: u32,
 }
 
-/// Registers that tell where the program was.
+/// Registers that show where the program was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SavedRegisters {
     /// Program counter.
@@ -45,20 +47,20 @@ pub struct SavedRegisters {
     pub lr: u32,
 }
 
-/// Bits of the status that say that saving registers has failed, those of the floating-point unit
-/// included: MSTKERR, MLSPERR, STKERR, LSPERR.
+/// Status bits that report a failed saving of registers, floating-point registers included:
+/// MSTKERR, MLSPERR, STKERR, LSPERR.
 const SAVING_FAILED: u32 = 1 << 4 | 1 << 5 | 1 << 12 | 1 << 13;
 /// MMARVALID.
 const PROTECTED_ADDRESS_VALID: u32 = 1 << 7;
 /// BFARVALID.
 const BUS_ADDRESS_VALID: u32 = 1 << 15;
 
-/// How far below its end an access is still one of the stack, in bytes: more than the largest frame
-/// of a function, and little enough that no null pointer comes near.
+/// How far below the stack's end an access still counts as one of the stack, in bytes. Larger than
+/// the largest frame of a function, and small enough to keep clear of null pointers.
 pub const BELOW_STACK_LEN: u32 = 4096;
 
 impl Evidence {
-    /// The address that could not be accessed, if there is one that counts.
+    /// The address that could not be accessed, if a valid one is known.
     #[must_use]
     pub const fn address(&self) -> Option<u32> {
         if self.status & PROTECTED_ADDRESS_VALID != 0 {
@@ -70,7 +72,7 @@ impl Evidence {
         }
     }
 
-    /// What it was.
+    /// The kind of fault.
     #[must_use]
     pub fn fault(&self) -> Fault {
         let below = self.stack_end.saturating_sub(BELOW_STACK_LEN)..self.stack_end;
@@ -82,7 +84,7 @@ impl Evidence {
         }
     }
 
-    /// What is known of it, as in `pc 00001234 lr 00001200 status 00008200 address a0000000`.
+    /// What is known about it, as in `pc 00001234 lr 00001200 status 00008200 address a0000000`.
     #[must_use]
     pub fn text(&self) -> Text {
         let saved = self.saved;
@@ -120,7 +122,7 @@ mod tests {
 
     const STACK_END: u32 = 0x1000_0000;
 
-    /// Registers are saved; both addresses are left over from before.
+    /// Registers are saved; both addresses are left over from earlier.
     const EVIDENCE: Evidence = Evidence {
         saved: Some(SavedRegisters { pc: 0x1234, lr: 0x1201 }),
         status: 0,
@@ -196,7 +198,7 @@ mod tests {
         let stack_of = |address| at(address) == Fault::StackOverflow;
         assert!(stack_of(STACK_END - 1) && stack_of(STACK_END - BELOW_STACK_LEN));
         assert!(!stack_of(STACK_END) && !stack_of(STACK_END - BELOW_STACK_LEN - 1));
-        // A stack at the beginning of all memory has nothing below.
+        // A stack at the start of all memory has nothing below it.
         let low = Evidence { status, protected_address: u32::MAX, stack_end: 8, ..EVIDENCE };
         assert_eq!(low.fault(), Fault::HardFault);
     }

@@ -1,4 +1,4 @@
-//! The configuration in flash memory: each of the two copies has a sector of its own, filled record
+//! The configuration in flash memory. Each of the two copies has a sector of its own, filled record
 //! by record.
 //!
 //! ```text
@@ -7,29 +7,30 @@
 //! ```
 //!
 //! # Design
-//! Saving writes the next slot. Only when the sector is full it is erased, and then only that one:
-//! the newest configuration stands in the other sector. The marker is cleared before an erase and
-//! written after it, so a sector whose erasing was cut short is erased again before anything is
-//! trusted to it, whatever its cells seem to hold. That a record is whole, and which of the two is
-//! newer, is for `ser_node` to say: it checks and numbers them.
+//! Saving writes the next slot. A sector is erased only when it is full, while the newest
+//! configuration stands in the other sector. The marker is cleared before an erase and written
+//! after it. A sector whose erase was cut short is therefore erased again before anything is
+//! written to it, whatever its cells seem to hold. `ser_node` checks and numbers the records, and
+//! decides which of them is intact and which is newer.
 //!
 //! # Tradeoffs
-//! A general store for keys and values, `sequential-storage`, reads every record of a sector to
-//! find the last, takes six times the code, brings panicking paths into the image, and needs two
-//! sectors of one size for each copy that is to have sectors of its own (of the four of 16 KiB on
-//! an STM32F407, the first has to hold the vector table). There is one value here, it has one
-//! length, and its check and number come with it: a log of slots will do. Two sectors of 16 KiB
-//! with 10 000 erasures each are good for 20 million changes.
+//! `sequential-storage`, a general store for keys and values, reads every record of a sector to
+//! find the last. It takes six times the code, brings panicking paths into the image, and needs two
+//! sectors of one size for each copy that has sectors of its own. Of the four sectors of 16 KiB on
+//! an STM32F407, the first has to hold the vector table. Here there is one value of one length,
+//! which brings its own check and number, so a log of slots is enough. Two sectors of 16 KiB with
+//! 10 000 erases each last for 20 million changes.
 //!
 //! # Notes
-//! A sector of 16 KiB takes 1023 records, one of 128 KiB 8191. As the copies take turns, an erase
-//! is due once in as many changes, and with the very first change of each copy. It takes 250–500 ms
-//! for 16 KiB and 1–2 s for 128 KiB on an STM32F4 (data sheet, "Flash memory programming", 32 bits
-//! at a time), and until it is done nothing can be read from that bank: code that runs from it
-//! stands still, interrupts included. So either the capture interrupt, all that it calls and the
-//! vector table are in RAM, and capture goes on while the main loop waits (its queue takes 256
-//! changes), or the samples of that time are missed: `ser_node` counts them. The board sees to its
-//! watchdog meanwhile. Writing a record takes 16 bytes of at most 100 µs.
+//! A sector of 16 KiB takes 1023 records, one of 128 KiB 8191. The copies take turns, so an erase
+//! is due once in as many changes, and with the very first change of each copy. On an STM32F4 it
+//! takes 250–500 ms for 16 KiB and 1–2 s for 128 KiB (data sheet, "Flash memory programming", 32
+//! bits at a time). Nothing can be read from that bank until the erase is done: code that runs from
+//! it stands still, interrupts included. There are two ways out. Either the capture interrupt, all
+//! that it calls and the vector table are in RAM; capture then goes on while the main loop waits,
+//! and its queue takes 256 changes. Or the samples of that time are missed, and `ser_node` counts
+//! them. The board feeds its watchdog meanwhile. Writing a record takes 16 bytes of at most 100 µs
+//! each.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -38,7 +39,7 @@ use ser_node::{CopyNumber, RECORD_LEN, Storage};
 
 use crate::counter::Counter;
 
-/// What stands in slot 0 of a sector that has been erased to the end.
+/// Content of slot 0 in a sector whose erase was completed.
 const MARKER: [u8; RECORD_LEN] = *b"SER settings 1\r\n";
 const CLEARED: [u8; RECORD_LEN] = [0; RECORD_LEN];
 const ERASED: u8 = 0xFF;
@@ -46,7 +47,7 @@ const ERASED: u8 = 0xFF;
 #[expect(clippy::cast_possible_truncation, reason = "16")]
 const SLOT_LEN: u32 = RECORD_LEN as u32;
 
-/// Counts that the storage shares with the board; belong into a static.
+/// Counts that the storage shares with the board; for a static.
 #[derive(Debug, Default)]
 pub struct FlashHealth {
     /// Records written.
@@ -92,7 +93,7 @@ pub struct FlashLog<'a, F> {
 }
 
 impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
-    /// Slots of a sector, the marker's included.
+    /// Slots of a sector, including the marker's.
     const SLOTS: u32 = {
         assert!(F::ERASE_SIZE.is_multiple_of(RECORD_LEN) && F::ERASE_SIZE >= 2 * RECORD_LEN);
         assert!(

@@ -8,8 +8,8 @@ use crate::budget::PULSE_RING_LEN;
 
 /// The lines of a GENI board as the main loop sees them.
 pub trait GeniBoard {
-    /// The tick of the oldest pulse of the interrupt line that was not asked for yet. A board that
-    /// does not connect the line never has one.
+    /// The tick of the oldest pulse of the interrupt line that has not been fetched yet. A board
+    /// that does not connect the line always returns `None`.
     fn next_pulse(&mut self) -> Option<u32>;
 
     /// Drives the reset line.
@@ -28,18 +28,18 @@ impl<W: SharedRam, B: GeniBoard> Genius<W, B> {
         Genius { port: GeniusPort::new(window, options), board }
     }
 
-    /// Hands the pulses of the interrupt line in. The node records what came after them later.
+    /// Hands in the pulses of the interrupt line. The node then holds back the changes after them.
     pub(crate) fn take_pulses<S: Storage, R: Rtc>(&mut self, node: &mut Node<'_, S, R>) {
-        // No more than there is room for: a line that chatters must not keep the main loop.
+        // Bounded by the ring's length: a chattering line must not keep the main loop busy.
         for _ in 0..PULSE_RING_LEN {
             let Some(tick_ms) = self.board.next_pulse() else { break };
             node.genius_interrupt(&mut self.port, tick_ms);
         }
     }
 
-    /// Does what is due, when the node has been polled.
+    /// Does what is due once the node has been polled.
     pub(crate) fn serve<S: Storage, R: Rtc>(&mut self, node: &mut Node<'_, S, R>) {
-        // The pass may have taken long. A flag that is seen now has had its pulse.
+        // The pass may have taken long. A flag that is seen now must have had its pulse handed in.
         self.take_pulses(node);
         node.genius_poll(&mut self.port);
         self.board.drive_reset(self.port.reset_held());
@@ -50,7 +50,7 @@ impl<W: SharedRam, B: GeniBoard> Genius<W, B> {
         self.port.is_ready()
     }
 
-    /// What was ignored, lost or repeated so far.
+    /// What has been ignored, lost or repeated since power-up.
     pub fn diagnostics(&self) -> GeniusDiagnostics {
         self.port.diagnostics()
     }

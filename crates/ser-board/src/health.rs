@@ -1,21 +1,20 @@
-//! What a board's own parts have to say against themselves: inputs, battery-backed clock,
-//! configuration memory.
+//! The faults of a board's own parts: inputs, battery-backed clock, configuration memory.
 //!
-//! Each part counts in a static of its own, since an interrupt or the node owns the part itself.
-//! [`Health`] brings the statics together for those who want to know: the log (`report`) and the
-//! fault lamp ([`leds`](crate::leds)).
+//! Each part counts in a static of its own, because an interrupt or the node owns the part itself.
+//! [`Health`] combines the statics for the log (`report`) and for the fault lamp
+//! ([`leds`](crate::leds)).
 
 use crate::clock_chip::{ClockHealth, ClockState};
 use crate::flash_log::FlashHealth;
 use crate::inputs::InputHealth;
 use crate::serialiser::SerialiserHealth;
 
-/// The parts of a board; belongs into a static.
+/// The parts of a board; for a static.
 #[derive(Clone, Copy, Debug)]
 pub struct Health<'a> {
     /// The inputs, however they are read.
     pub inputs: &'a InputHealth,
-    /// The chain of serialisers that the inputs are behind, if they are.
+    /// The chain of serialisers in front of the inputs, if there is one.
     pub serialisers: Option<&'a SerialiserHealth>,
     /// The battery-backed clock.
     pub clock: &'a ClockHealth,
@@ -23,12 +22,12 @@ pub struct Health<'a> {
     pub storage: &'a FlashHealth,
 }
 
-/// What had gone wrong at one moment since power-up.
+/// The fault counts since power-up, as of one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Failures {
     /// Samples that could not be taken.
     pub samples_failed: u32,
-    /// Times that sampling began to fail.
+    /// How often sampling began to fail.
     pub input_outages: u32,
     /// Transfers from serialisers that the bus reported as failed.
     pub serialiser_bus_errors: u32,
@@ -36,19 +35,19 @@ pub struct Failures {
     pub serialiser_check_errors: u32,
     /// Samples without field supply.
     pub field_supply_lost: u32,
-    /// Samples with a field supply that is lower than it should be.
+    /// Samples with too low a field supply.
     pub field_supply_low: u32,
     /// Samples of serialisers that are too hot.
     pub serialisers_too_hot: u32,
-    /// Times that the clock did not take the time.
+    /// How often the clock failed to take a new time.
     pub clock_writes_failed: u32,
     /// Accesses to the configuration memory that failed.
     pub storage_failed: u32,
 }
 
 impl Health<'_> {
-    /// Whether something is broken now: inputs that cannot be read, a clock or memory that does not
-    /// answer.
+    /// Whether something is broken now: inputs that cannot be read, or a clock or memory that does
+    /// not answer.
     #[must_use]
     pub fn is_broken(&self) -> bool {
         self.inputs.is_failing()
@@ -56,7 +55,7 @@ impl Health<'_> {
             || self.storage.is_failing()
     }
 
-    /// What has gone wrong so far.
+    /// The fault counts so far.
     #[must_use]
     pub fn failures(&self) -> Failures {
         let failures = Failures {
@@ -104,7 +103,7 @@ mod tests {
         }
     }
 
-    /// A port that can be read when this says so.
+    /// A port that can be read while the cell is true.
     struct Port<'a>(&'a Cell<bool>);
 
     impl InputPorts for Port<'_> {
@@ -144,7 +143,7 @@ mod tests {
             &parts.clock.writes_failed,
             &parts.storage.failed,
         ];
-        // Each another number of times.
+        // Each counter gets a different count.
         for (number, counter) in (1..).zip(counters) {
             (0..number).for_each(|_| counter.count());
         }

@@ -1,10 +1,10 @@
 //! The word of inputs: where its bits come from, and what happens when it cannot be read.
 //!
-//! Inputs on pins of the chip are read in one load each and are always there. Inputs behind a bus
-//! can fail to arrive: a sample that could not be taken must never look like contacts that moved.
-//! The [`Sampler`] then gives the inputs as they were last seen, says so, and counts. The capture
-//! interrupt goes on with these: its tick is the recorder's clock and feeds the watchdog, and a
-//! recorder that cannot see its inputs still has something to tell.
+//! Inputs on pins of the chip are read in one load per port and are always available. Inputs behind
+//! a bus may fail to arrive, and a failed sample must never look like contacts that moved. The
+//! [`Sampler`] then returns the inputs as they were last seen, marks them as held, and counts the
+//! failure. The capture interrupt continues with these, because its tick is the recorder's clock
+//! and feeds the watchdog. A recorder that cannot see its inputs can still report that.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -15,7 +15,7 @@ pub trait InputPorts {
     /// Why inputs cannot be read. `Infallible` for pins.
     type Error;
 
-    /// Reads all inputs at once, as they are on the wires.
+    /// Reads all inputs at once, as raw levels.
     ///
     /// # Errors
     /// When the inputs could not be read, or what was read cannot be trusted.
@@ -24,7 +24,7 @@ pub trait InputPorts {
 
 /// Two 16-bit ports as one word: inputs 1–16 from `low`, 17–32 from `high`.
 ///
-/// The two loads are a few clock cycles apart, which a sample every millisecond does not see.
+/// The two loads are a few clock cycles apart, which does not matter to a sample every millisecond.
 #[inline]
 #[must_use]
 pub const fn join(low: u16, high: u16) -> u32 {
@@ -45,7 +45,7 @@ impl Wiring {
     /// All 32 inputs, high when on.
     pub const DIRECT: Wiring = Wiring { connected: u32::MAX, active_low: 0 };
 
-    /// The inputs that are on, from what was read.
+    /// The inputs that are on, from the levels that were read.
     #[inline]
     #[must_use]
     pub const fn on(&self, read: u32) -> u32 {
@@ -53,12 +53,12 @@ impl Wiring {
     }
 }
 
-/// Counts that the sampler shares with the main loop; belong into a static.
+/// Counts that the sampler shares with the main loop; for a static.
 #[derive(Debug, Default)]
 pub struct InputHealth {
     /// Samples that could not be taken.
     pub failed: Counter,
-    /// Times that sampling began to fail, however long it did.
+    /// How often sampling began to fail, however long each failure lasted.
     pub outages: Counter,
     failing: AtomicBool,
 }
@@ -88,9 +88,9 @@ impl InputHealth {
 pub enum Sample {
     /// The inputs that are on.
     Fresh(u32),
-    /// The inputs could not be read; this is how they were last seen.
+    /// The inputs could not be read; these are the last ones seen.
     Held(u32),
-    /// The inputs have not been read yet, so there is nothing to begin with.
+    /// The inputs have never been read, so there is no first state yet.
     Unknown,
 }
 
@@ -100,7 +100,7 @@ pub struct Sampler<'a, P> {
     wiring: Wiring,
     health: &'a InputHealth,
     latest: Option<u32>,
-    /// As in `health`, which costs more to look at.
+    /// A copy of the flag in `health`, which costs more to read.
     failing: bool,
 }
 
@@ -110,7 +110,7 @@ impl<'a, P: InputPorts> Sampler<'a, P> {
         Sampler { ports, wiring, health, latest: None, failing: false }
     }
 
-    /// Ends sampling; gives the ports back.
+    /// Ends sampling; returns the ports.
     pub fn release(self) -> P {
         self.ports
     }

@@ -1,8 +1,8 @@
-//! What a recorder keeps across resets: why it was reset, what the latest fault had to say, how
+//! What a recorder keeps across resets: why it was reset, what the latest fault reported, and how
 //! often it has started.
 //!
 //! It lives in memory that start-up code leaves alone. After a power cut such memory holds
-//! anything, so nothing in it is believed without its check; after any other reset it holds what
+//! anything, so nothing in it is believed without its check. After any other reset it holds what
 //! was written.
 //!
 //! ```text
@@ -12,20 +12,21 @@
 //! ```
 //!
 //! # Design
-//! Two records, each with its own CRC-32: a fault that is cut short while it writes its words costs
-//! the words, never the count of boots. A fault's words stay, however many starts come after it,
-//! until the next fault's take their place or the power goes: whoever comes to see what happened
-//! comes late. The number of the boot that they belong to tells whether they are why the recorder
-//! starts, so they need not be touched to become old.
+//! There are two records, each with its own CRC-32. A fault that is cut short while it writes its
+//! words costs the words, never the count of boots. A fault's words stay through any number of
+//! starts, until the next fault replaces them or the power goes, because whoever comes to see what
+//! happened comes late. The record holds the number of the boot in which the fault happened. That
+//! number tells whether the fault is why the recorder starts, so the words need not be touched to
+//! become old.
 //!
 //! # Tradeoffs
-//! A panic's message is kept as far as it fits, 92 bytes; formatting it is up to the board, by
-//! [`Text`]'s `fmt::Write`.
+//! A panic's message is kept as far as it fits into 92 bytes. The board formats it, by [`Text`]'s
+//! `fmt::Write`.
 //!
 //! # Notes
 //! The board puts the array into a section that is neither zeroed nor loaded (`.uninit` of
-//! cortex-m-rt), reads it at start-up and writes it back; what is in it never has to be a valid
-//! value of any type but `u32`.
+//! cortex-m-rt). It reads the array at start-up and writes it back. The content never has to be a
+//! valid value of any type but `u32`.
 
 use core::fmt;
 use core::panic::Location;
@@ -47,10 +48,10 @@ const FAULT_MAGIC: u32 = u32::from_le_bytes(*b"SERw");
 
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// The memory itself. What it holds after power-up is anybody's guess.
+/// The memory itself. Its content after power-up is undefined.
 pub type Memory = [u32; WORDS];
 
-/// Why the recorder was about to reset itself. The numbers are those in memory.
+/// Why the recorder is about to reset itself. The numbers are those in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -59,9 +60,9 @@ pub enum Fault {
     Panic = 1,
     /// The processor found an impossible access or instruction.
     HardFault = 2,
-    /// The watchdog is about to bite: the main loop or capture stands still.
+    /// The watchdog is about to reset the chip: the main loop or capture stands still.
     Watchdog = 3,
-    /// The stack has run out.
+    /// The stack has overflowed.
     StackOverflow = 4,
 }
 
@@ -77,22 +78,21 @@ impl Fault {
     }
 }
 
-/// What the chip's reset flags say. Where several are set, the board gives the first of them in
-/// this order.
+/// The chip's reset flag. Where several are set, the board reports the first of them in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ResetFlag {
-    /// The power came.
+    /// Power came up.
     PowerOn,
-    /// The power sagged.
+    /// The supply voltage dropped.
     BrownOut,
     /// A watchdog.
     Watchdog,
-    /// The program asked for it.
+    /// The program requested it.
     Software,
-    /// The reset pin, which most chips pull for all the others too.
+    /// The reset pin, which most chips also pull for all other resets.
     Pin,
-    /// The chip does not tell.
+    /// The chip does not say.
     Unknown,
 }
 
@@ -100,28 +100,28 @@ pub enum ResetFlag {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ResetCause {
-    /// The power came.
+    /// Power came up.
     PowerOn,
-    /// The power sagged.
+    /// The supply voltage dropped.
     BrownOut,
     /// The reset pin.
     Pin,
-    /// The program asked for it.
+    /// The program requested it.
     Software,
-    /// The watchdog bit.
+    /// The watchdog reset the chip.
     Watchdog,
     /// The processor found an impossible access or instruction.
     HardFault,
     /// The program found an impossible state.
     Panic,
-    /// The stack had run out.
+    /// The stack had overflowed.
     StackOverflow,
     /// Nothing is known.
     Unknown,
 }
 
 impl ResetCause {
-    /// Whether the run before ended in a fault of the recorder.
+    /// Whether the previous run ended in a fault of the recorder.
     #[must_use]
     pub const fn is_fault(self) -> bool {
         matches!(
@@ -133,7 +133,7 @@ impl ResetCause {
         )
     }
 
-    /// A number for each, for memory that others read; it never changes. 0 is
+    /// A number for each cause, for memory that others read. The numbers never change: 0 is
     /// [`Unknown`](Self::Unknown), 1–4 are those of [`Fault`].
     #[must_use]
     pub const fn code(self) -> u8 {
@@ -150,7 +150,7 @@ impl ResetCause {
         }
     }
 
-    /// The cause with this number; `None` when there is none.
+    /// The cause with this number; `None` if there is none.
     #[must_use]
     pub const fn from_code(code: u8) -> Option<ResetCause> {
         Some(match code {
@@ -167,9 +167,10 @@ impl ResetCause {
         })
     }
 
-    /// `fault` is that of the run before. The flags know about the power; whatever the program
-    /// wrote down before a sag is not why it starts now. In all other cases the program knew better
-    /// than the flags: a panic ends in a software reset, a locked-up processor in the watchdog.
+    /// `fault` is that of the previous run. The flags know about the power: what the program wrote
+    /// down before a voltage drop is not why it starts now. In all other cases the program knew
+    /// better than the flags: a panic ends in a software reset, a locked-up processor in the
+    /// watchdog.
     const fn new(flag: ResetFlag, fault: Option<Fault>) -> ResetCause {
         match (flag, fault) {
             (ResetFlag::PowerOn, _) => ResetCause::PowerOn,
@@ -185,12 +186,12 @@ impl ResetCause {
     }
 }
 
-/// A text of bounded length. What does not fit is left out, never half of a character.
+/// A text of bounded length. What does not fit is left out; a character is never cut in half.
 #[derive(Clone, Copy)]
 pub struct Text {
     bytes: [u8; MAX_TEXT_LEN],
     len: usize,
-    /// Something was left out; what comes later would not belong behind it.
+    /// Something was left out, so nothing may be added after it.
     full: bool,
 }
 
@@ -202,8 +203,8 @@ impl Text {
     #[must_use]
     pub fn as_str(&self) -> &str {
         let bytes = self.bytes.get(..self.len).unwrap_or_default();
-        // Always valid: only whole characters go in. Memory that claims otherwise gives what is
-        // valid of it.
+        // Always valid, because only whole characters go in. If the memory is corrupt, the valid
+        // part is returned.
         match core::str::from_utf8(bytes) {
             Ok(text) => text,
             Err(error) => bytes
@@ -258,10 +259,10 @@ impl Text {
         self.push_str(digit.encode_utf8(&mut [0; 4]));
     }
 
-    /// What a panic has to say: place and message, as in `node.rs:42: no room`.
+    /// The text of a panic: place and message, as in `node.rs:42: no room`.
     ///
-    /// Messages with arguments would bring the formatting machinery with them: of these there is
-    /// the place alone.
+    /// A message with arguments would bring in the formatting machinery. Such a panic is reported
+    /// by its place alone.
     #[must_use]
     pub fn of_panic(place: Option<&Location<'_>>, message: Option<&str>) -> Text {
         let mut text = Text::EMPTY;
@@ -284,7 +285,7 @@ impl Text {
     }
 }
 
-/// As texts, whether or not something was left out.
+/// Compares the texts, whether or not something was left out.
 impl PartialEq for Text {
     fn eq(&self, other: &Text) -> bool {
         self.as_str() == other.as_str()
@@ -322,23 +323,23 @@ impl fmt::Write for Text {
     }
 }
 
-/// What the latest fault had to say.
+/// What the latest fault reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LastWords {
-    /// What it was.
+    /// The kind of fault.
     pub fault: Fault,
-    /// Where, and what else is known; may be empty.
+    /// The place, and what else is known; may be empty.
     pub text: Text,
-    /// How many starts ago: 1 when this start is the first one after it, 0 never.
+    /// How many starts ago: 1 when this is the first start after the fault; never 0.
     pub starts_ago: u32,
 }
 
-/// What is known at start-up about the runs before.
+/// What is known at start-up about earlier runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Boot {
-    /// How often the recorder has started since its memory was last lost, this time included.
+    /// How often the recorder has started since its memory was last lost, including this start.
     pub count: u32,
     /// Why it starts.
     pub cause: ResetCause,
@@ -347,16 +348,16 @@ pub struct Boot {
     pub last_words: Option<LastWords>,
 }
 
-/// Whether the memory holds what an earlier run of the program left. Where the chip does not tell
-/// why it was reset, memory that does not has been without power.
+/// Whether the memory holds what an earlier run of the program left. If it does not, it has been
+/// without power. That tells a chip without reset flags why it starts.
 #[must_use]
 pub fn is_kept(memory: &Memory) -> bool {
     let (boots, _) = memory.split_at(BOOT_WORDS);
     matches!(open(boots), Some([BOOT_MAGIC, _]))
 }
 
-/// Reads what the runs before left, counts the boot, and makes the memory ready for this run's last
-/// words. Those of an earlier run stay.
+/// Reads what earlier runs left, counts the boot, and prepares the memory for this run's last
+/// words. The words of an earlier run stay.
 pub fn boot(memory: &mut Memory, flag: ResetFlag) -> Boot {
     let (boots, words) = memory.split_at_mut(BOOT_WORDS);
     let before = match open(boots) {
@@ -368,7 +369,7 @@ pub fn boot(memory: &mut Memory, flag: ResetFlag) -> Boot {
     if let Some(left) = &left
         && before.is_none()
     {
-        // The numbers begin anew; the words belong to the run before the first one.
+        // The numbers start anew. The words belong to the run before the first one.
         write_fault(words, left.fault, &left.text, 0);
     }
     seal(boots, [BOOT_MAGIC, count].into_iter());
@@ -380,7 +381,7 @@ pub fn boot(memory: &mut Memory, flag: ResetFlag) -> Boot {
     Boot { count, cause: ResetCause::new(flag, fault), last_words }
 }
 
-/// Writes the last words of this run. Those of an earlier one are forgotten.
+/// Writes the last words of this run over those of an earlier one.
 pub fn write(memory: &mut Memory, fault: Fault, text: &Text) {
     let (boots, words) = memory.split_at_mut(BOOT_WORDS);
     let boot = match open(boots) {
@@ -390,7 +391,7 @@ pub fn write(memory: &mut Memory, fault: Fault, text: &Text) {
     write_fault(words, fault, text, boot);
 }
 
-/// What stands in a fault's record.
+/// The content of a fault's record.
 struct Left {
     fault: Fault,
     text: Text,
@@ -414,7 +415,7 @@ fn write_fault(words: &mut [u32], fault: Fault, text: &Text, boot: u32) {
     seal(words, [FAULT_MAGIC, head, boot].into_iter().chain(text));
 }
 
-/// The words in front of the check, if it is right.
+/// The words before the check, if the check is right.
 fn content(record: &[u32]) -> Option<&[u32]> {
     let (&check, content) = record.split_last()?;
     (checksum(content) == check).then_some(content)
@@ -424,7 +425,7 @@ fn open<const N: usize>(record: &[u32]) -> Option<[u32; N]> {
     content(record)?.try_into().ok()
 }
 
-/// Fills a record and puts the check behind it.
+/// Fills a record and appends the check.
 fn seal(record: &mut [u32], words: impl Iterator<Item = u32>) {
     let Some((check, content)) = record.split_last_mut() else { return };
     for (place, word) in content.iter_mut().zip(words) {
@@ -505,7 +506,7 @@ mod tests {
         assert_eq!(told.last_words, said(Fault::HardFault, "pc 0", 1));
     }
 
-    /// Memory that a short power cut has left whole, or one that has lost only the count.
+    /// Memory that survived a short power cut intact, or one that lost only the count.
     #[test]
     fn words_that_are_whole_are_told_whatever_became_of_the_count_or_the_power() {
         let mut memory = random();
@@ -613,8 +614,8 @@ mod tests {
         let _ = boot(&mut before, ResetFlag::Watchdog);
         let mut after = before;
         write(&mut after, Fault::Panic, &Text::from("a text that takes a few words"));
-        // The words begin behind the boots; with none of them written, those of the earlier run
-        // stand.
+        // The words begin after the boots. If none of them has been written, those of the earlier
+        // run stand.
         for cut in BOOT_WORDS + 2..WORDS {
             let mut memory = before;
             memory[..cut].copy_from_slice(&after[..cut]);
@@ -634,10 +635,10 @@ mod tests {
     #[test]
     fn a_long_text_ends_between_two_characters() {
         assert_eq!(Text::from("x".repeat(93).as_str()).as_str(), "x".repeat(92));
-        // Two bytes each: one would be cut in half at an odd place.
+        // Two bytes each, so that a cut at an odd place would halve one.
         let text = Text::from(format!("x{}", "é".repeat(50)).as_str());
         assert_eq!(text.as_str(), format!("x{}", "é".repeat(45)));
-        // A short character behind one that did not fit would belong elsewhere.
+        // A short character after one that did not fit would be out of place.
         let mut text = Text::from("y".repeat(90).as_str());
         text.push_str("€z");
         text.push_str("z");

@@ -7,9 +7,9 @@
 //! | communication | –                     | one message after the other   | –              | nobody asks     |
 //! | fault         | something was lost    | reset by a fault, first 10 s  | broken now     | all is well     |
 //!
-//! A single event or message lights its lamp for 100 ms. The run lamp blinks out of the main loop,
-//! so one that has stopped is a main loop that has stopped. Of several faults the fault lamp shows
-//! the worst: broken, then reset, then lost.
+//! A single event or message lights its lamp for 100 ms. The main loop makes the run lamp blink, so
+//! a lamp that has stopped means a main loop that has stopped. The fault lamp shows the worst of
+//! several faults: broken, then reset, then lost.
 
 use embedded_hal::digital::{OutputPin, PinState};
 use geni_board::SharedRam;
@@ -17,7 +17,7 @@ use ser_node::{Diagnostics, Node, Rtc, Storage};
 
 use crate::genius::{GeniBoard, Genius};
 
-/// How long a lamp is lit for one event, and dark before the next one lights it again, in
+/// How long a lamp is lit for one event, and then dark before the next event lights it again, in
 /// milliseconds.
 pub const PULSE_MS: u32 = 100;
 
@@ -30,8 +30,7 @@ pub const FAST_MS: u32 = 100;
 /// How long a reset by a fault is shown, in milliseconds.
 pub const SHOW_RESET_MS: u32 = 10_000;
 
-/// What the lamps are to tell. Counts may wrap; they only need to differ when something has
-/// happened.
+/// What the lamps show. Counts may wrap: they only need to differ when something has happened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Condition {
@@ -42,17 +41,17 @@ pub struct Condition {
     /// Messages received or sent so far, on any port.
     pub messages: u32,
     /// Something is broken now: see [`Health::is_broken`](crate::health::Health::is_broken), and
-    /// what the board knows besides.
+    /// what else the board knows.
     pub broken: bool,
-    /// The run before this one ended in a fault (panic, hard fault, stack overflow, watchdog).
+    /// The previous run ended in a fault (panic, hard fault, stack overflow, watchdog).
     pub reset_by_fault: bool,
-    /// Something that belonged into the log, or to a host, was lost since power-up.
+    /// Something that belonged in the log, or to a host, has been lost since power-up.
     pub lost: bool,
 }
 
 impl Condition {
-    /// What a recorder's lamps are to tell. `line_bytes` have come and gone on RS-232; the board
-    /// knows whether anything is broken and how the run before this one ended.
+    /// The condition that a recorder's lamps show. `line_bytes` counts bytes in both directions on
+    /// RS-232. The board supplies whether anything is broken and how the previous run ended.
     pub fn of<S: Storage, R: Rtc, W: SharedRam, B: GeniBoard>(
         node: &Node<'_, S, R>,
         line_bytes: u32,
@@ -72,10 +71,9 @@ impl Condition {
     }
 }
 
-/// Whether the counters tell of something that belonged to the user and is gone, or of stamps that
-/// are wrong.
+/// Whether the counters report a loss of the user's data, or wrong stamps.
 ///
-/// Garbled frames and refused commands are the other side's doing and no fault of the recorder.
+/// Garbled frames and refused commands are the other side's mistakes, not faults of the recorder.
 #[must_use]
 pub const fn has_lost(diagnostics: &Diagnostics) -> bool {
     let Diagnostics {
@@ -85,7 +83,7 @@ pub const fn has_lost(diagnostics: &Diagnostics) -> bool {
         events_unreported,
         events_unprinted,
         storage_errors,
-        // Without `..`, so that a new counter is thought of here.
+        // Without `..`, so that the compiler asks about every new counter here.
         frames_interrupted: _,
         frames_not_hex: _,
         frames_checksum: _,
@@ -113,7 +111,7 @@ pub struct Lamps {
     pub run: bool,
     /// An input has changed.
     pub event: bool,
-    /// Somebody talks to it.
+    /// A host communicates with it.
     pub communication: bool,
     /// Something is wrong.
     pub fault: bool,
@@ -146,8 +144,8 @@ impl Pulse {
 pub struct Leds {
     event: Pulse,
     communication: Pulse,
-    /// The first tick seen, and whether the time for showing a reset is over: the tick wraps, the
-    /// lamp must not come back.
+    /// The first tick seen, and whether the time for showing a reset is over. The tick wraps, and
+    /// the lamp must not come back then.
     started_ms: Option<u32>,
     reset_shown: bool,
 }
@@ -160,7 +158,8 @@ impl Leds {
         Leds { event: DARK, communication: DARK, started_ms: None, reset_shown: false }
     }
 
-    /// What is lit at `now_ms`, a tick that may wrap. Called in every pass of the main loop.
+    /// The lamps that are lit at `now_ms`, a tick that may wrap. Called in every pass of the main
+    /// loop.
     pub fn lamps(&mut self, now_ms: u32, condition: &Condition) -> Lamps {
         let started_ms = *self.started_ms.get_or_insert(now_ms);
         self.reset_shown |= now_ms.wrapping_sub(started_ms) >= SHOW_RESET_MS;
@@ -206,7 +205,7 @@ impl<P: OutputPin> Panel<P> {
     /// Lights the lamps. Pins are touched only when something changes.
     ///
     /// # Errors
-    /// When a pin cannot be set; it is tried again the next time.
+    /// When a pin cannot be set. The next call tries again.
     pub fn show(&mut self, lamps: Lamps) -> Result<(), P::Error> {
         if self.shown == Some(lamps) {
             return Ok(());

@@ -1,12 +1,13 @@
-//! What the recorder's boards share, apart from registers: everything here is tested on a desktop,
+//! What all boards of the recorder share except registers. Everything here is tested on a desktop,
 //! with mocks.
 //!
-//! A board brings up its chip, says in its interrupts which byte came and which pin is up, and
-//! leaves the rest to `ser_node` (what a recorder does) and to this crate (what a board does):
+//! A board brings up its chip and reports, in its interrupts, which byte came and which pin is
+//! high. It leaves the rest to `ser_node` (what a recorder does) and to this crate (what a board
+//! does):
 //!
 //! | module             | what it holds                                                                          |
 //! |--------------------|----------------------------------------------------------------------------------------|
-//! | [`start`]          | what every board's recorder is made of, once its chip is up                            |
+//! | [`start`]          | what every board's recorder consists of, once its chip is up                           |
 //! | [`budget`]         | ring lengths and interrupt priorities, each with its derivation                        |
 //! | [`ring`]           | a ring between an interrupt and the main loop that has no panicking path               |
 //! | [`serial_line`]    | the rings of the RS-232 line, and when the line is quiet enough for another rate       |
@@ -16,15 +17,15 @@
 //! | [`inputs`]         | the word of inputs: ports, wiring, and samples that could not be taken                 |
 //! | [`serialiser`]     | inputs behind industrial digital-input serialisers on SPI                              |
 //! | [`flash_log`]      | the configuration in flash memory                                                      |
-//! | [`clock_chip`]     | the battery-backed clock, with what it has to say against itself                       |
+//! | [`clock_chip`]     | the battery-backed clock, with its faults                                              |
 //! | [`stm32_rtc`]      | the calendar registers of STM32 clocks as date and time, and when to believe them      |
-//! | [`health`]         | what a board's parts have to say against themselves, for the log and the fault lamp     |
+//! | [`health`]         | the faults of a board's parts, for the log and the fault lamp                           |
 //! | [`leds`]           | what the four lamps mean                                                               |
-//! | [`fault`]          | what a hard fault was, by what the processor shows of it                               |
+//! | [`fault`]          | what a hard fault was, from what the processor shows                                   |
 //! | [`last_words`]     | what outlives a reset: its cause, the panic's text, the number of boots                |
 //! | [`log_writer`]     | frames of the log, one writer at a time, without a critical section                    |
 //! | `report`           | tells the log which counters have moved (feature `defmt`)                             |
-//! | [`counter`]        | counts that one side keeps and another one reads                                       |
+//! | [`counter`]        | counts that one context keeps and another reads                                        |
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 #![cfg_attr(

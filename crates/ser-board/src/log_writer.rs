@@ -1,15 +1,15 @@
 //! Frames of the log, one writer at a time, without a critical section.
 //!
 //! # Design
-//! Logging never delays the capture interrupt, so nothing guards a record that is being written.
-//! Whoever interrupts it writes nothing: contexts nest, and one that interrupts another has
-//! released the log again before the other goes on.
+//! Logging never delays the capture interrupt, so nothing guards a record while it is written. A
+//! context that interrupts the writer writes nothing. This is safe because contexts nest: an
+//! interrupting context has released the log before the interrupted one goes on.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use atomic_refcell::AtomicRefCell;
 
-/// What makes frames of records.
+/// Makes frames of records.
 pub trait FrameEncoder {
     /// Begins a frame.
     fn start_frame(&mut self, write: impl FnMut(&[u8]));
@@ -36,10 +36,10 @@ impl FrameEncoder for defmt::Encoder {
     }
 }
 
-/// Writes the records of the outermost context; belongs into a static. `write` puts bytes where the
-/// log goes.
+/// Writes the records of the outermost context; for a static. `write` puts bytes where the log
+/// goes.
 pub struct LogWriter<E> {
-    /// Records being written, one inside the other.
+    /// Records being written, one nested in the other.
     depth: AtomicU32,
     encoder: AtomicRefCell<E>,
 }
@@ -50,25 +50,25 @@ impl<E: FrameEncoder> LogWriter<E> {
         LogWriter { depth: AtomicU32::new(0), encoder: AtomicRefCell::new(encoder) }
     }
 
-    /// A record begins.
+    /// Begins a record.
     pub fn acquire(&self, write: impl FnMut(&[u8])) {
         self.depth.fetch_add(1, Ordering::Relaxed);
         self.outermost(|encoder| encoder.start_frame(write));
     }
 
-    /// A part of the record that began last.
+    /// Writes a part of the record that began last.
     pub fn write(&self, bytes: &[u8], write: impl FnMut(&[u8])) {
         self.outermost(|encoder| encoder.write(bytes, write));
     }
 
-    /// The record that began last is complete.
+    /// Completes the record that began last.
     pub fn release(&self, write: impl FnMut(&[u8])) {
         self.outermost(|encoder| encoder.end_frame(write));
         self.depth.fetch_sub(1, Ordering::Relaxed);
     }
 
     fn outermost(&self, step: impl FnOnce(&mut E)) {
-        // The encoder is lent to the outermost record only, so it is always there.
+        // Always present, because the encoder is lent to the outermost record only.
         if self.depth.load(Ordering::Relaxed) == 1
             && let Ok(mut encoder) = self.encoder.try_borrow_mut()
         {
@@ -126,7 +126,7 @@ mod tests {
         log.acquire(interrupted);
         record(&log, "inner", plain);
         log.write(b"outer", interrupted);
-        // Two levels of it.
+        // Two levels of interruption.
         log.acquire(plain);
         record(&log, "innermost", plain);
         log.release(plain);

@@ -1,8 +1,8 @@
 //! One pass of the main loop between the ports and the node, the same on every board.
 //!
-//! The board's part is a [`Line`]: its UART with the rings in front of it; and, where there is one,
-//! the [`GeniBoard`]. A pass never waits and does no more than the rings hold, so a line that takes
-//! and gives bytes as fast as they come cannot keep the main loop.
+//! The board supplies a [`Line`], its UART with the rings in front of it, and the [`GeniBoard`]
+//! where there is one. A pass never waits and does no more than the rings hold. A line that takes
+//! and gives bytes as fast as they come therefore cannot hold up the main loop.
 
 use geni_board::SharedRam;
 use ser_node::{Node, Rtc, Storage};
@@ -13,23 +13,23 @@ use crate::serial_line::ReceivedByte;
 
 /// A board's RS-232 line as the main loop sees it.
 pub trait Line {
-    /// The most bytes taken, and the most given, in one pass: the longer ring's length.
+    /// The most bytes received, and the most sent, in one pass: the longer ring's length.
     const MAX_BYTES: usize;
 
     /// The next byte, if it arrived no later than at this tick: see
     /// [`take_until`](crate::serial_line::take_until).
     fn receive(&mut self, now_ms: u32) -> Option<ReceivedByte>;
 
-    /// How many bytes were lost or misread since this was asked last.
+    /// How many bytes have been lost or misread since the last call.
     fn errors(&mut self) -> u32;
 
     /// Whether another byte may be sent.
     fn can_send(&self) -> bool;
 
-    /// Puts a byte in line for the transmitter. Called only when there is room.
+    /// Queues a byte for the transmitter. Called only when there is room.
     fn send(&mut self, byte: u8);
 
-    /// Whether everything sent has left the transmitter. Asked in every pass, see
+    /// Whether everything sent has left the transmitter. Asked in every pass; see
     /// [`Quiet`](crate::serial_line::Quiet).
     fn is_quiet(&mut self, now_ms: u32) -> bool;
 
@@ -37,13 +37,13 @@ pub trait Line {
     fn set_baud(&mut self, baud: Baud);
 }
 
-/// Hands over what has arrived, records what has changed, and takes what is to be sent. Gives the
+/// Hands over what has arrived, records what has changed, and takes what is to be sent. Returns the
 /// tick of the pass.
 ///
-/// The order is what makes stamps right: first the tick is read, then the pulses of the GENI
-/// board's interrupt line are taken, and then bytes that arrived no later than that tick.
-/// Interrupts come at any point. But a pulse that was not taken came after the tick was read, and
-/// is no older than any byte that is dealt with, nor than any change that is recorded.
+/// The order makes stamps right. The pass first reads the tick, then takes the pulses of the GENI
+/// board's interrupt line, and then takes the bytes that arrived no later than that tick.
+/// Interrupts come at any point. A pulse that this pass has not taken came after the tick was read,
+/// so it is not older than any byte handled or any change recorded here.
 pub fn pass<S: Storage, R: Rtc, L: Line, W: SharedRam, B: GeniBoard>(
     node: &mut Node<'_, S, R>,
     line: &mut L,
@@ -66,8 +66,8 @@ pub fn pass<S: Storage, R: Rtc, L: Line, W: SharedRam, B: GeniBoard>(
 fn take_in<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L, now_ms: u32) {
     node.serial_line_errors(line.errors());
     for _ in 0..L::MAX_BYTES {
-        // Commands that find no room in the node wait in the ring, and so do bytes that came after
-        // the tick was read.
+        // Commands that find no room in the node wait in the ring, as do bytes that came after the
+        // tick was read.
         if !node.serial_has_room() {
             break;
         }
@@ -77,7 +77,7 @@ fn take_in<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L,
 }
 
 fn change_baud<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L, now_ms: u32) {
-    // Asked in every pass, so that it has seen when the transmitter fell idle.
+    // Asked in every pass, so that the line notices when the transmitter falls idle.
     let quiet = line.is_quiet(now_ms);
     if let Some(baud) = node.baud_change()
         && quiet

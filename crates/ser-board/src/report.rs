@@ -1,7 +1,6 @@
-//! Tells the log how the runs before ended, which counters have moved, and how far down the stack
-//! has been.
+//! Logs how earlier runs ended, which counters have moved, and how deep the stack has been.
 //!
-//! The protocol has no place for any of this: the log is the only trace of what was dropped,
+//! The protocol has no place for any of this. The log is the only trace of what was dropped,
 //! refused or lost.
 
 use geni_board::Counters;
@@ -14,13 +13,13 @@ use crate::last_words::Boot;
 /// Counters that run all the time must not fill the log.
 const INTERVAL_MS: u32 = 1000;
 
-/// Logs how the run before ended, if it was a fault, or else what the latest fault had to say.
+/// Logs how the previous run ended, if that was a fault, or else what the latest fault reported.
 /// Called once, at start-up.
 pub fn last_words(boot: &Boot) {
     let told = boot.last_words.as_ref().filter(|words| words.starts_ago == 1);
     if boot.cause.is_fault() {
         let text = told.map_or("", |words| words.text.as_str());
-        defmt::error!("the run before ended with a fault: {}: {=str}", boot.cause, text);
+        defmt::error!("the previous run ended with a fault: {}: {=str}", boot.cause, text);
     }
     if let Some(words) = &boot.last_words
         && !(boot.cause.is_fault() && told.is_some())
@@ -49,8 +48,8 @@ pub struct Report<'a> {
 }
 
 impl<'a> Report<'a> {
-    /// Tells how it stands with the clock; the log knows nothing else, and is told a second from
-    /// `now_ms` for the first time.
+    /// Starts with the state of the clock already logged and nothing else. The first pass that logs
+    /// is a second after `now_ms`.
     #[must_use]
     pub fn new(now_ms: u32, health: &'a Health<'a>) -> Report<'a> {
         let clock = health.clock.state();
@@ -67,9 +66,9 @@ impl<'a> Report<'a> {
         }
     }
 
-    /// Logs what has changed, once a second at most. Called in every pass of the main loop; asks
-    /// for the counters, and for the most bytes of stack that have been in use, only when it is
-    /// time.
+    /// Logs what has changed, at most once a second. Called in every pass of the main loop. Asks
+    /// for the counters, and for the high-water mark of the stack in bytes, only when a second is
+    /// over.
     pub fn pass(
         &mut self,
         now_ms: u32,
@@ -121,8 +120,8 @@ fn log_clock(state: ClockState) {
     defmt::info!("battery-backed clock: {}", state);
 }
 
-/// One line for each counter of a structure that has moved. Every field is a counter or named as
-/// something else, so that a new one is not forgotten here.
+/// Logs a line for each counter of a structure that has moved. Every field is either listed as a
+/// counter or named as something else, so that a new one is not forgotten here.
 macro_rules! log_counters {
     ($Type:ident, $before:expr, $after:expr, [$($counter:ident),* $(,)?] $(, other [$($other:ident),*])?) => {
         let (before, after): (&$Type, &$Type) = ($before, $after);
@@ -214,7 +213,7 @@ fn log_changed_genius(before: &GeniusDiagnostics, after: &GeniusDiagnostics) {
         ],
         other[own_broadcasts]
     );
-    // Broadcasts and reports that arrived are what is meant to happen.
+    // Broadcasts and arrived reports are normal operation, so they are not logged.
     log_counters!(
         GeniusDiagnostics,
         before,

@@ -1,9 +1,9 @@
 //! The RS-232 line between the UART's interrupts and the main loop.
 //!
-//! A received byte keeps the tick at which it arrived, because the moment at which a command
-//! arrives matters to the recorder (it may set the clock), however late the main loop looks. A byte
-//! that is lost or misread is counted at once, by a count of its own: it is told even if no other
-//! byte ever comes, and when the ring has no room for anything.
+//! A received byte keeps the tick of its arrival, because the moment at which a command arrives
+//! matters (it may set the clock), however late the main loop looks. A byte that is lost or misread
+//! is counted at once, in a count of its own. The main loop learns of it even if no other byte ever
+//! comes and even if the ring is full.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
@@ -25,8 +25,8 @@ pub struct ReceivedByte {
     pub tick_ms: u32,
 }
 
-/// Takes the oldest byte out of the ring, if it arrived no later than at tick `now_ms`. One that
-/// has arrived since that tick was read waits for the next look.
+/// Takes the oldest byte out of the ring, if it arrived no later than at tick `now_ms`. A byte that
+/// arrived after that tick was read waits for the next look.
 pub fn take_until<const N: usize>(
     ring: &mut Reader<'_, ReceivedByte, N>,
     now_ms: u32,
@@ -61,8 +61,8 @@ impl Slot for ReceivedByte {
     }
 }
 
-/// Memory of the rings of both directions; belongs into a static. See [`budget`](crate::budget) for
-/// the lengths.
+/// Memory of the rings of both directions, for a static. See [`budget`](crate::budget) for the
+/// lengths.
 pub struct SerialRings<const RECEIVE: usize, const TRANSMIT: usize> {
     receive: Ring<ReceivedByte, RECEIVE>,
     transmit: Ring<u8, TRANSMIT>,
@@ -71,15 +71,15 @@ pub struct SerialRings<const RECEIVE: usize, const TRANSMIT: usize> {
 
 /// The ends of [`SerialRings`].
 pub struct SerialEnds<'a, const RECEIVE: usize, const TRANSMIT: usize> {
-    /// The receive interrupt's.
+    /// The receive interrupt's end.
     pub receiver: Receiver<'a, RECEIVE>,
-    /// The main loop's end of what was received.
+    /// The main loop's end of the received bytes.
     pub received: Reader<'a, ReceivedByte, RECEIVE>,
-    /// The main loop's end of what was not received as it was sent.
+    /// The main loop's end of the count of bytes lost or misread.
     pub errors: LineErrors<'a>,
-    /// The main loop's end of what is to be sent.
+    /// The main loop's end of the bytes to send.
     pub to_send: Writer<'a, u8, TRANSMIT>,
-    /// The transmit interrupt's.
+    /// The transmit interrupt's end.
     pub transmitter: Reader<'a, u8, TRANSMIT>,
 }
 
@@ -106,17 +106,16 @@ impl<const RECEIVE: usize, const TRANSMIT: usize> Default for SerialRings<RECEIV
     }
 }
 
-/// What a UART shows that keeps one received byte, such as those of STM32: SR's RXNE, ORE, and FE
-/// or NF.
+/// The status of a UART that holds one received byte, such as those of STM32: SR's RXNE, ORE, and
+/// FE or NF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReceiveStatus {
-    /// The data register holds a byte that was not taken yet.
+    /// The data register holds a byte that has not been taken yet.
     pub has_byte: bool,
-    /// A byte came that found the data register full, and is lost; what is in the data register
-    /// stays there.
+    /// A byte was lost because it found the data register full. The data register keeps its byte.
     pub overrun: bool,
-    /// The byte in the data register is not what was sent: its stop bit is missing, or noise was
-    /// seen.
+    /// The byte in the data register differs from what was sent: its stop bit is missing, or noise
+    /// was seen.
     pub misread: bool,
 }
 
@@ -127,15 +126,15 @@ pub struct Receiver<'a, const N: usize> {
 }
 
 impl<const N: usize> Receiver<'_, N> {
-    /// Whether another byte finds room. A UART that can keep bytes, or hold the other side back, is
-    /// left alone until then.
+    /// Whether another byte finds room. While there is none, a UART that can keep bytes or hold the
+    /// other side back is left alone.
     #[inline]
     #[must_use]
     pub fn has_room(&self) -> bool {
         self.ring.has_room()
     }
 
-    /// Takes a byte that the UART has. Without room it is lost.
+    /// Takes a byte from the UART. Without room it is lost.
     #[inline]
     pub fn push(&mut self, received: ReceivedByte) {
         if !self.ring.push(received) {
@@ -143,18 +142,18 @@ impl<const N: usize> Receiver<'_, N> {
         }
     }
 
-    /// A byte was lost or misread.
+    /// Counts a byte that was lost or misread.
     #[inline]
     pub fn count_error(&mut self) {
         self.errors.count();
     }
 
-    /// Takes what a UART has by what it has shown. `read` reads the data register, which clears all
-    /// that was shown.
+    /// Takes what a UART has, as its status shows. `read` reads the data register, which clears
+    /// every flag of that status.
     ///
-    /// A byte may come between looking and reading. The UART then shows an overrun and no byte the
-    /// next time, while its data register still holds the byte that was read: reading it again has
-    /// no other use than to clear the overrun.
+    /// A byte may arrive between the look at the status and the read. The UART then shows an
+    /// overrun and no byte the next time, while its data register still holds the byte that was
+    /// read. Reading it again only clears the overrun.
     #[inline]
     pub fn take(&mut self, shown: ReceiveStatus, read: impl FnOnce() -> u8, tick_ms: u32) {
         let ReceiveStatus { has_byte, overrun, misread } = shown;
@@ -178,7 +177,7 @@ pub struct LineErrors<'a> {
 }
 
 impl LineErrors<'_> {
-    /// How many there were since this was asked last.
+    /// How many bytes were lost or misread since the last call.
     pub fn take(&mut self) -> u32 {
         let errors = self.errors.get();
         let new = errors.wrapping_sub(self.told);
@@ -187,11 +186,11 @@ impl LineErrors<'_> {
     }
 }
 
-/// Tells when everything sent has left the transmitter, for UARTs that say no more than that they
+/// Tells when everything sent has left the transmitter, for UARTs that only report whether they
 /// have room.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Quiet {
-    /// Since when the transmitter has not been seen at work.
+    /// Since when the transmitter has been seen idle.
     since_ms: Option<u32>,
 }
 
@@ -202,8 +201,8 @@ impl Quiet {
         Quiet { since_ms: None }
     }
 
-    /// A byte has been put in line for the transmitter, which may have sent it before anybody looks
-    /// again.
+    /// Says that a byte has been queued for the transmitter, which may send it before the next
+    /// look.
     pub const fn sent(&mut self) {
         self.since_ms = None;
     }
@@ -211,10 +210,10 @@ impl Quiet {
     /// Looks at the transmitter. `idle` says that no byte waits in the ring or in the UART's data
     /// register.
     ///
-    /// True two characters' time after the first look that found it idle: one character may be in
-    /// the shift register. Counts from looks and not from bytes, so however late it is asked, no
-    /// character is cut short; but it has to be told of bytes that were [`sent`](Self::sent) in
-    /// between.
+    /// True two characters' time after the first look that found it idle, because one character may
+    /// be in the shift register. The time counts from looks and not from bytes: no character is cut
+    /// short, however rare the looks. Bytes sent in between must be reported by
+    /// [`sent`](Self::sent).
     pub fn look(&mut self, idle: bool, now_ms: u32, baud: Baud) -> bool {
         if !idle {
             self.since_ms = None;
@@ -225,7 +224,7 @@ impl Quiet {
     }
 }
 
-/// How long so many characters take, in milliseconds, rounded up.
+/// How long that many characters take, in milliseconds, rounded up.
 #[must_use]
 pub const fn character_ms(baud: Baud, characters: u32) -> u32 {
     (characters * CHARACTER_BITS * 1000).div_ceil(baud.bits_per_second())
@@ -282,14 +281,14 @@ mod tests {
         );
         ends.receiver.push(byte(b'y', 6));
         assert_eq!((ends.received.pop(), ends.errors.take()), (Some(byte(b'y', 6)), 0));
-        // Whoever splits the rings again has nothing to do with what was counted before.
+        // A new split starts without the errors counted before it.
         ends.receiver.count_error();
         assert_eq!(rings.split().errors.take(), 0);
     }
 
-    /// A UART as the reference manual of the STM32F4 describes it (RM0090, "Overrun error"):
-    /// reading the data register takes the byte, and clears the flags that the latest look at the
-    /// status has shown.
+    /// A UART as the reference manual of the STM32F4 describes it (RM0090, "Overrun error").
+    /// Reading the data register takes the byte and clears the flags that the latest look at the
+    /// status showed.
     #[derive(Default)]
     struct Uart {
         data: u8,
@@ -352,7 +351,7 @@ mod tests {
     fn an_overrun_without_a_byte_hands_over_nothing_and_counts_one() {
         let mut uart = Uart::default();
         uart.arrive(b'a');
-        // The second byte comes after the look and before the read, which leaves its overrun
+        // The second byte comes after the look and before the read. The read leaves its overrun
         // without a byte.
         assert_eq!(received_by(&mut uart, b"b"), (b"a".to_vec(), 1));
         assert_eq!(uart.reads, 2, "the second one clears the overrun");
@@ -366,7 +365,7 @@ mod tests {
         uart.arrive(b'a');
         uart.arrive(b'b');
         assert_eq!(received_by(&mut uart, b""), (b"a".to_vec(), 1));
-        // A third one between look and read is lost as well, under the same flag.
+        // A third byte between look and read is also lost, under the same flag.
         uart.arrive(b'c');
         uart.arrive(b'd');
         assert_eq!(received_by(&mut uart, b"e"), (b"c".to_vec(), 1));
@@ -398,7 +397,7 @@ mod tests {
         let mut quiet = Quiet::new();
         assert!(!quiet.look(false, 0, Baud::B19200));
         assert!(!quiet.look(true, 1000, Baud::B19200));
-        // 20 bits at 19200 bit/s take 1.04 ms; the tick may have been about to end.
+        // 20 bits at 19200 bit/s take 1.04 ms, and the tick may have been about to end.
         assert!(!quiet.look(true, 1002, Baud::B19200));
         assert!(quiet.look(true, 1003, Baud::B19200));
         assert!(!quiet.look(false, 1004, Baud::B19200));

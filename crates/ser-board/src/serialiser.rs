@@ -1,37 +1,35 @@
 //! Inputs behind industrial digital-input serialisers on SPI: the MAX31912/MAX31913 family in
 //! 16-bit mode.
 //!
-//! Each part turns eight 24 V inputs into a word of a shift register; parts in a chain pass on what
-//! comes in behind their own word. All parts latch their inputs in the moment in which chip select
-//! falls, so the inputs of a whole chain are of one instant, however long it takes to shift them
-//! out.
+//! Each part turns eight 24 V inputs into a word of a shift register. Parts in a chain pass on what
+//! comes in after their own word. All parts latch their inputs when chip select falls, so the
+//! inputs of a whole chain are from one instant, however long it takes to shift them out.
 //!
 //! ```text
 //!   | IN8 … IN1 |  CRC (5)  | UV1 | OT | UV2 |      most significant bit first, the part next to the controller first
 //!   |   byte 0  |             byte 1           |
 //! ```
 //!
-//! The check is a CRC over the eight inputs with the polynomial x⁵ + x⁴ + x² + 1, beginning with
-//! zero. UV1 is 0 while the field supply is too low for the inputs to mean anything; UV2 is 0 while
-//! it is lower than it should be; OT is 1 while the part is too hot. (Data sheets of the MAX31912,
-//! 19-6925, and the MAX31913, "Reading Serial Data". That of the MAX31911 gives undervoltage the
-//! other way round and a stop bit in place of UV2, so it is not of this family.)
+//! The check is a CRC over the eight inputs with the polynomial x⁵ + x⁴ + x² + 1 and initial value
+//! zero. UV1 is 0 while the field supply is too low for the inputs to mean anything. UV2 is 0 while
+//! the supply is lower than it should be. OT is 1 while the part is too hot. (Data sheets of the
+//! MAX31912, 19-6925, and the MAX31913, "Reading Serial Data". The MAX31911 is not of this family:
+//! its data sheet gives undervoltage the other way round and a stop bit in place of UV2.)
 //!
 //! # Design
-//! A word whose check fails, or whose part is without supply, spoils the whole sample: half of the
-//! inputs new and half of them old would be a state that never was. Warnings are counted, and the
-//! sample is good. A data line that is stuck is found either way: all zeros say no supply, all ones
-//! fail the check.
+//! A word whose check fails, or whose part is without supply, spoils the whole sample: a mix of new
+//! and old inputs would be a state that never existed. Warnings are counted, and the sample is
+//! good. A stuck data line is found either way: all zeros say no supply, all ones fail the check.
 //!
 //! # Tradeoffs
-//! With the field supply gone the inputs are held as they were, instead of all contacts seeming to
-//! open. That the supply is gone shows in [`SerialiserHealth::supply_lost`].
+//! Without field supply the inputs are held, instead of all contacts seeming to open.
+//! [`SerialiserHealth::supply_lost`] shows that the supply is gone.
 //!
 //! # Notes
 //! Four parts take 64 clocks, 13 µs at 5 MHz, in the capture interrupt. The bus must not be shared
-//! with anything that the main loop uses: the capture interrupt waits for nobody. A controller's
-//! SPI has hardly any errors to report, so the check is what finds trouble: every change of up to
-//! three bits, and of words that are noise through and through all but one in 32.
+//! with anything that the main loop uses, because the capture interrupt waits for nobody. A
+//! controller's SPI reports hardly any errors, so faults are found by the check. It finds every
+//! change of up to three bits, and all but one in 32 words of pure noise.
 
 use crc::{Algorithm, Crc, NoTable};
 use embedded_hal::spi::{MODE_0, Mode, SpiDevice};
@@ -46,7 +44,7 @@ const CHECK: Algorithm<u8> = Algorithm {
     refin: false,
     refout: false,
     xorout: 0,
-    // Of "123456789".
+    // The check of "123456789".
     check: 0x1C,
     residue: 0,
 };
@@ -60,22 +58,22 @@ const CHECK_SHIFT: u32 = 3;
 const WORD_LEN: usize = 2;
 const INPUTS_PER_PART: usize = 8;
 
-/// How the bus has to be set up: the clock rests low, data are taken with its rising edge and
-/// change with the falling one; the first bit is there as soon as chip select falls.
+/// How the bus must be set up: the clock idles low, data are taken on its rising edge and change on
+/// the falling one. The first bit is there as soon as chip select falls.
 pub const MODE: Mode = MODE_0;
 
 /// The fastest clock that the parts take, in hertz (data sheet, "SPI timing"; look it up for
-/// yours). An isolator in the lines delays what comes back against the clock that goes out: 5 MHz
+/// yours). An isolator in the lines delays the returning data against the outgoing clock: 5 MHz
 /// leave 100 ns for both ways.
 pub const MAX_CLOCK_HZ: u32 = 25_000_000;
 
-/// Why a sample is no good.
+/// Why a sample is not usable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SerialiserError {
     /// The bus reported an error.
     Bus,
-    /// The check of a part's word failed; parts count from 0, the one next to the controller.
+    /// The check of a part's word failed. Parts count from 0, the one next to the controller.
     Check {
         /// Which part.
         part: u8,
@@ -87,7 +85,7 @@ pub enum SerialiserError {
     },
 }
 
-/// Counts that the driver shares with the main loop; belong into a static.
+/// Counts that the driver shares with the main loop; for a static.
 #[derive(Debug, Default)]
 pub struct SerialiserHealth {
     /// Transfers that the bus reported as failed.
@@ -96,7 +94,7 @@ pub struct SerialiserHealth {
     pub check_errors: Counter,
     /// Samples without field supply.
     pub supply_lost: Counter,
-    /// Samples with a field supply that is lower than it should be.
+    /// Samples with too low a field supply.
     pub supply_low: Counter,
     /// Samples of parts that are too hot.
     pub too_hot: Counter,
@@ -116,8 +114,8 @@ impl SerialiserHealth {
     }
 }
 
-/// A chain of 1–4 parts with chip select and clock in common. Inputs 1–8 are those of the part next
-/// to the controller.
+/// A chain of 1–4 parts that share chip select and clock. Inputs 1–8 are those of the part next to
+/// the controller.
 pub struct Serialisers<'a, SPI, const PARTS: usize> {
     spi: SPI,
     health: &'a SerialiserHealth,
@@ -135,7 +133,7 @@ impl<'a, SPI: SpiDevice, const PARTS: usize> Serialisers<'a, SPI, PARTS> {
         Serialisers { spi, health }
     }
 
-    /// Ends the driver; gives the bus back.
+    /// Ends the driver; returns the bus.
     pub fn release(self) -> SPI {
         self.spi
     }
@@ -186,7 +184,7 @@ mod tests {
 
     const ALL_WELL: u8 = SUPPLY_OK | SUPPLY_GOOD;
 
-    /// What a part shifts out: its check is computed bit by bit, as its shift register does.
+    /// What a part shifts out. Its check is computed bit by bit, as in the part's shift register.
     fn word(inputs: u8, flags: u8) -> [u8; WORD_LEN] {
         let mut register = 0_u8;
         for bit in (0..8).rev() {
@@ -267,7 +265,7 @@ mod tests {
             for &first in &positions {
                 for &second in &positions {
                     for &third in &positions {
-                        // Twice the same position stands for a single bit.
+                        // The same position twice means a single bit.
                         let flipped = if second == third {
                             1 << first
                         } else {
@@ -305,7 +303,7 @@ mod tests {
         assert_eq!(counts(&health), [0, 0, 1, 1, 1]);
     }
 
-    /// A bus that reports an error; the mock of embedded-hal knows none.
+    /// A bus that reports an error, which the mock of embedded-hal cannot.
     struct Broken;
 
     impl embedded_hal::spi::ErrorType for Broken {
@@ -328,7 +326,7 @@ mod tests {
         assert_eq!(counts(&health), [1, 0, 0, 0, 0]);
     }
 
-    /// One millisecond after the other, as a board's capture interrupt does it.
+    /// One sample after the other, as a board's capture interrupt takes them.
     fn run<P: InputPorts>(sampler: &mut Sampler<'_, P>, capture: &mut Capture<'_>, samples: u32) {
         for tick_ms in 1..=samples {
             match sampler.sample() {
@@ -354,8 +352,7 @@ mod tests {
         let mut channel = CaptureChannel::new();
         let (mut capture, reader) = channel.split(Debounce::OFF);
         run(&mut sampler, &mut capture, 9);
-        // The tick has gone on, the contacts have not moved, and everything that went wrong has
-        // been counted.
+        // The tick has gone on, the contacts have not moved, and every fault has been counted.
         assert_eq!(state_and_tick(&reader), (0x000F, 9));
         assert_eq!((inputs.failed.get(), inputs.outages.get()), (7, 3));
         assert_eq!(counts(&serialisers), [0, 3, 4, 0, 0]);

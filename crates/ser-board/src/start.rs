@@ -1,4 +1,4 @@
-//! What every board's recorder is made of, once its chip is up.
+//! What every board's recorder consists of once its chip is up.
 
 use core::mem::MaybeUninit;
 
@@ -14,13 +14,13 @@ use crate::health::Health;
 /// Events that the log holds: the largest size that can be configured.
 pub const LOG_LEN: usize = 2048;
 
-/// No clock can show an earlier day: there was no such recorder.
+/// No clock can show an earlier day, because the recorder did not exist then.
 pub const NOT_BEFORE: NaiveDate = NaiveDate::from_ymd_opt(2026, 1, 1).unwrap();
 
 /// A node whose configuration is in flash memory `F` and whose clock is the chip `C`.
 pub type BoardNode<'a, F, C> = Node<'a, FlashLog<'a, F>, ClockChip<'a, C>>;
 
-/// What a recorder keeps in RAM; belongs into a static.
+/// What a recorder keeps in RAM. It belongs in a static.
 pub struct Memory<'a, F, C> {
     channel: CaptureChannel,
     events: [Event; LOG_LEN],
@@ -28,7 +28,7 @@ pub struct Memory<'a, F, C> {
 }
 
 impl<F, C> Memory<'_, F, C> {
-    /// As it is when the power comes.
+    /// The state at power-up.
     #[must_use]
     pub const fn new() -> Self {
         Memory {
@@ -45,7 +45,7 @@ impl<F, C> Default for Memory<'_, F, C> {
     }
 }
 
-/// What a board has that differs from board to board.
+/// The parts that differ from board to board.
 pub struct BoardParts<F, C> {
     /// Which recorder it is.
     pub model: Model,
@@ -57,7 +57,7 @@ pub struct BoardParts<F, C> {
     pub clock: C,
 }
 
-/// Powers a recorder up; gives the capture interrupt's end and the main loop's.
+/// Powers a recorder up; returns the capture interrupt's end and the main loop's.
 pub fn start<'a, F: MultiwriteNorFlash, C: KeepsTime>(
     memory: &'a mut Memory<'a, F, C>,
     parts: BoardParts<F, C>,

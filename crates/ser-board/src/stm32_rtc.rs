@@ -1,8 +1,8 @@
 //! The calendar registers of STM32 clocks (RTC version 2: F2, F4, F7, L4 …) as date and time,
-//! without the registers.
+//! without register access.
 //!
-//! The board gives access to SSR, TR and DR; when what they show can be believed, and what their
-//! bits mean, is here. Names and layouts are those of the reference manual (RM0090, chapter
+//! The board gives access to SSR, TR and DR. This module decides when their content can be believed
+//! and what its bits mean. Names and layouts are those of the reference manual (RM0090, chapter
 //! "Real-time clock").
 //!
 //! ```text
@@ -12,20 +12,20 @@
 //! ```
 //!
 //! # Design
-//! The two digits of the year are those of 2000–2099: the chip takes every year divisible by four
-//! as a leap year, which holds in these years and with no other first year that is not a multiple
-//! of four. Registers that hold no date give `None`, never a panic.
+//! The two digits of the year stand for 2000–2099. The chip takes every year divisible by four as a
+//! leap year. That is right for these years, and wrong for any first year that is not a multiple of
+//! four. Registers that hold no date give `None`, never a panic.
 //!
-//! The registers go on while they are read, one after the other, and one that is read in the moment
-//! in which it changes may show anything (BYPSHAD; the shadow registers, which spare one that, have
-//! to be waited for). So all three are read until two rounds in a row show the same: [`read`].
+//! The registers change while they are read one after the other, and a register read in the moment
+//! of a change may show anything (BYPSHAD). The shadow registers would avoid that, but have to be
+//! waited for. [`read`] therefore reads all three until two rounds in a row show the same.
 //!
 //! # Notes
-//! With `PREDIV_A` 0 and `PREDIV_S` 7FFFh a 32768 Hz crystal is read back in steps of 31 µs, at the
-//! price of a little more current from the battery; the usual values of 7Fh and 255 give 3.9 ms.
-//! Writing TR begins a second anew, so a time with milliseconds is written in two steps:
+//! With `PREDIV_A` 0 and `PREDIV_S` 7FFFh, a 32768 Hz crystal is read back in steps of 31 µs, at
+//! the cost of a little more current from the battery. The usual values of 7Fh and 255 give 3.9 ms.
+//! Writing TR begins a new second, so a time with milliseconds is written in two steps:
 //! [`Calendar::from_date_time`], then the [`Shift`]. ISR's INITS bit says whether the calendar has
-//! been set since the backup domain had power.
+//! been set since the backup domain got power.
 
 use chrono::{Datelike, NaiveDate, NaiveDateTime, Timelike};
 use ser_node::calendar::{Date, date_time};
@@ -40,17 +40,17 @@ pub struct Calendar {
     pub dr: u32,
 }
 
-/// What goes into the shift register, to set the fraction of the second.
+/// The content of the shift register that sets the fraction of the second.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Shift {
     /// Whether a second is added (ADD1S).
     pub add_second: bool,
-    /// By how many steps of SSR the clock is put back (SUBFS).
+    /// By how many steps of SSR the clock is set back (SUBFS).
     pub subtract: u16,
 }
 
-/// The registers themselves, each read from the clock in the moment in which it is asked for.
+/// The registers themselves, each read from the clock at the moment of the call.
 pub trait CalendarRegisters {
     /// Sub-second register.
     fn ssr(&mut self) -> u16;
@@ -62,15 +62,15 @@ pub trait CalendarRegisters {
     fn dr(&mut self) -> u32;
 }
 
-/// Rounds until it is given up: the fastest register changes every 31 µs, and a round takes less
-/// than one.
+/// Rounds before the read is given up. The fastest register changes every 31 µs, and a round takes
+/// less than one such step.
 const MAX_ROUNDS: u32 = 16;
 
-/// SSR and the calendar, of one moment. `None` when they never stand still, which no clock that
-/// works does.
+/// SSR and the calendar, from one moment. `None` when they never stand still, which does not happen
+/// with a working clock.
 ///
-/// Between two looks at an equal SSR the clock has not moved, for a whole second is longer than any
-/// round takes: date and time that were read in between are of that moment.
+/// The clock has not moved between two looks at an equal SSR, because a whole second is longer than
+/// any round takes. Date and time read in between are from that moment.
 pub fn read(registers: &mut impl CalendarRegisters) -> Option<(u16, Calendar)> {
     let mut round = || {
         let ssr = registers.ssr();
@@ -90,7 +90,7 @@ const PM: u32 = 1 << 22;
 const NANOSECONDS: i64 = 1_000_000_000;
 
 impl Calendar {
-    /// The registers for a time, its fraction left out. `None` outside of 2000–2099.
+    /// The registers for a time without its fraction. `None` outside of 2000–2099.
     #[must_use]
     pub fn from_date_time(time: NaiveDateTime) -> Option<Calendar> {
         let Date { year, month, day } = Date::of(time)?;
@@ -104,7 +104,7 @@ impl Calendar {
         })
     }
 
-    /// Date and time in the registers, `ssr` and `prediv_s` giving the fraction. `None` when they
+    /// Date and time in the registers; `ssr` and `prediv_s` give the fraction. `None` when they
     /// hold none.
     ///
     /// After a shift SSR may be greater than `PREDIV_S` for up to a second: the clock is then that
@@ -128,15 +128,15 @@ impl Calendar {
 }
 
 impl Shift {
-    /// What sets the fraction of the second right after a calendar with the whole seconds of `time`
-    /// was started; `None` when it is less than a step.
+    /// The shift that sets the fraction of the second, to be written right after a calendar with
+    /// the whole seconds of `time` was started. `None` when the fraction is less than a step.
     ///
-    /// A clock can only be put back by less than a second, so it is put forward by a whole one
-    /// first.
+    /// A clock can only be set back, by less than a second, so a whole second is added at the same
+    /// time.
     #[must_use]
     pub fn to_fraction_of(time: NaiveDateTime, prediv_s: u16) -> Option<Shift> {
         let steps = i64::from(prediv_s) + 1;
-        // chrono shows a leap second as a second and more.
+        // chrono expresses a leap second as more than a second.
         let nanoseconds = i64::from(time.nanosecond()).min(NANOSECONDS - 1);
         let ahead = nanoseconds * steps / NANOSECONDS;
         let subtract = u16::try_from(steps - ahead).ok()?;
@@ -144,8 +144,8 @@ impl Shift {
     }
 }
 
-/// What the clock is ahead of the full second, in nanoseconds; negative for up to a second after a
-/// shift.
+/// How far the clock is ahead of the full second, in nanoseconds; negative for up to a second after
+/// a shift.
 fn ahead_ns(ssr: u16, prediv_s: u16) -> i64 {
     let steps = i64::from(prediv_s) + 1;
     let ahead = i64::from(prediv_s) - i64::from(ssr);
@@ -156,7 +156,7 @@ fn to_bcd(number: u32) -> u32 {
     ((number / 10) << 4) | (number % 10)
 }
 
-/// The number in the low bits that `mask` leaves; `None` when a digit is none.
+/// The number in the low bits that `mask` leaves; `None` when they hold no decimal digits.
 fn from_bcd(bits: u32, mask: u32) -> Option<u32> {
     let bits = bits & mask;
     let (tens, units) = (bits >> 4, bits & 0xF);
@@ -187,7 +187,7 @@ mod tests {
         let registers = Calendar::from_date_time(time("2026-11-22T19:58:37")).unwrap();
         assert_eq!(registers.to_date_time(0x7F, 0xFF), Some(time("2026-11-22T19:58:37.500")));
         assert_eq!(registers.to_date_time(0, 999), Some(time("2026-11-22T19:58:37.999")));
-        // A quarter of a second behind, for a moment, after a shift.
+        // A quarter of a second behind, for a moment after a shift.
         assert_eq!(registers.to_date_time(0x13F, 0xFF), Some(time("2026-11-22T19:58:36.750")));
     }
 
@@ -232,12 +232,12 @@ mod tests {
         assert_eq!(Shift::to_fraction_of(time("2026-11-22T10:00:00"), 0x7FFF), None);
     }
 
-    /// A clock that takes a step in front of some of the looks at its registers, counted from 0.
-    /// The look itself may then show anything.
+    /// A clock that takes a step before some of the looks at its registers, counted from 0. That
+    /// look may then show anything.
     struct Moving {
         steps_at: fn(u32, u32) -> bool,
         argument: u32,
-        /// Turns bits of what is seen in the moment of a step.
+        /// Bits that are flipped in a look at the moment of a step.
         torn: u32,
         looks: u32,
         ssr: u16,
@@ -245,7 +245,7 @@ mod tests {
     }
 
     impl Moving {
-        /// A step before the new year.
+        /// A clock one step before the new year.
         fn new(steps_at: fn(u32, u32) -> bool, argument: u32, torn: u32) -> Moving {
             Moving {
                 steps_at,
@@ -313,8 +313,8 @@ mod tests {
                 mixed += u32::from(seen != (0, old) && seen != new);
             }
         }
-        // Each of the three looks of a single round is one at which it would be wrong, two of them
-        // even without noise.
+        // A single round would be wrong at each of the three looks, at two of them even without
+        // noise.
         assert_eq!(mixed, 3 * 3 + 2);
     }
 
@@ -348,7 +348,7 @@ mod tests {
             prop_assume!(written.year() < 2100);
             let mut registers = Calendar::from_date_time(written).unwrap();
             let mut ssr = prediv_s;
-            // What the chip does with a shift right after the start of a second.
+            // What the chip does on a shift right after the start of a second.
             if let Some(shift) = Shift::to_fraction_of(written, prediv_s) {
                 prop_assert!(shift.add_second && shift.subtract <= prediv_s);
                 let second = registers.to_date_time(prediv_s, prediv_s).unwrap() + TimeDelta::seconds(1);

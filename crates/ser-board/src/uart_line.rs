@@ -1,4 +1,4 @@
-//! The main loop's end of the RS-232 line, whatever the UART: rings on this side, registers on the
+//! The main loop's end of the RS-232 line, for any UART: rings on this side, registers on the
 //! board's.
 
 use ser_proto::Baud;
@@ -7,27 +7,28 @@ use crate::main_loop::Line;
 use crate::ring::{Reader, Writer};
 use crate::serial_line::{self, LineErrors, ReceivedByte};
 
-/// A UART as the main loop's end of the line sees it. Bytes come and go in the interrupts.
+/// A UART as the main loop's end of the line sees it. The interrupts move the bytes.
 pub trait Uart {
-    /// The main loop has made room for all that was received. A UART whose interrupt holds bytes
+    /// Says that the main loop has made room for received bytes. A UART whose interrupt holds bytes
     /// back while the ring is full lets them through again.
     fn let_through(&mut self);
 
-    /// A byte is about to be put into the ring to send.
+    /// Says that a byte is about to enter the ring to send.
     fn will_send(&mut self);
 
-    /// A byte has been put into the ring to send: the transmit interrupt is to come, now or as soon
-    /// as the UART has room.
+    /// Says that a byte has entered the ring to send. The transmit interrupt must come now, or as
+    /// soon as the UART has room.
     fn wake_transmitter(&mut self);
 
-    /// Whether everything has left the transmitter. `ring_empty` says that no byte waits for it.
+    /// Whether everything has left the transmitter. `ring_empty` says that no byte waits in the
+    /// ring.
     fn is_quiet(&mut self, ring_empty: bool, now_ms: u32) -> bool;
 
     /// Changes the rate. Called only when the line is quiet.
     fn set_baud(&mut self, baud: Baud);
 }
 
-/// The rings' ends that are the main loop's, with the UART behind them.
+/// The main loop's ends of the rings, with the UART behind them.
 pub struct UartLine<'a, U, const RECEIVE: usize, const TRANSMIT: usize> {
     uart: U,
     received: Reader<'a, ReceivedByte, RECEIVE>,
@@ -37,7 +38,7 @@ pub struct UartLine<'a, U, const RECEIVE: usize, const TRANSMIT: usize> {
 }
 
 impl<'a, U: Uart, const RECEIVE: usize, const TRANSMIT: usize> UartLine<'a, U, RECEIVE, TRANSMIT> {
-    /// The ends as [`SerialEnds`](crate::serial_line::SerialEnds) has them.
+    /// Takes the ends from [`SerialEnds`](crate::serial_line::SerialEnds).
     pub const fn new(
         uart: U,
         received: Reader<'a, ReceivedByte, RECEIVE>,
@@ -52,7 +53,7 @@ impl<'a, U: Uart, const RECEIVE: usize, const TRANSMIT: usize> UartLine<'a, U, R
         !self.received.is_empty()
     }
 
-    /// Bytes that have come and gone, wrapping.
+    /// Bytes received and sent; wraps.
     pub const fn bytes(&self) -> u32 {
         self.bytes
     }
@@ -84,7 +85,7 @@ impl<U: Uart, const RECEIVE: usize, const TRANSMIT: usize> Line
     fn send(&mut self, byte: u8) {
         self.bytes = self.bytes.wrapping_add(1);
         self.uart.will_send();
-        // There is room, the main loop has asked.
+        // There is room, because the main loop has asked.
         let _ = self.to_send.push(byte);
         self.uart.wake_transmitter();
     }
@@ -103,7 +104,7 @@ mod tests {
     use super::*;
     use crate::serial_line::{SerialEnds, SerialRings};
 
-    /// What the line does with its UART, in order.
+    /// What the line does with its UART, in that order.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     enum Did {
         LetThrough,
@@ -155,7 +156,7 @@ mod tests {
         receiver.push(late);
         assert!(line.has_received());
         assert_eq!((line.receive(6), &line.uart.did[..]), (Some(first), &[][..]));
-        // What came after the tick was read waits, and room there is.
+        // A byte that came after the tick was read waits, although there is room.
         assert_eq!((line.receive(6), &line.uart.did[..]), (None, &[Did::LetThrough][..]));
         assert_eq!((line.receive(7), line.receive(7)), (Some(late), None));
         assert_eq!((line.bytes(), line.has_received()), (2, false));

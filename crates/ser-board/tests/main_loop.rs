@@ -149,7 +149,7 @@ impl Memory {
 }
 
 impl Board<'_> {
-    /// A millisecond in which the main loop does not get to run.
+    /// Passes a millisecond in which the main loop does not run.
     fn stall_ms(&mut self, inputs: u32) {
         self.tick_ms += 1;
         self.capture.sample(self.tick_ms, inputs);
@@ -255,7 +255,7 @@ fn bytes_beyond_the_ring_are_counted_as_line_errors() {
         board.receiver.push(ReceivedByte { byte: b'.', tick_ms: 0 });
     }
     board.receiver.count_error();
-    // At once: no byte may ever follow.
+    // At once, because no further byte may ever follow.
     board.pass_ms(1);
     assert_eq!(board.node.diagnostics().line_errors, 11);
     board.arrive(&Command::QueryMode);

@@ -1,5 +1,5 @@
-//! RTIC takes nothing but literals for priorities. These are the budget's, on both boards, and
-//! there are no others.
+//! RTIC takes only literals for priorities. This test checks that both boards use the budget's
+//! values and no others.
 
 use std::fs;
 use std::path::{Path, PathBuf};

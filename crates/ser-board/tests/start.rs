@@ -1,4 +1,4 @@
-//! A recorder as a board starts it: what it finds of the run before, and what it takes for granted.
+//! A recorder as a board starts it: what it finds of the previous run, and what it assumes.
 
 #[allow(dead_code, reason = "no power is cut here")]
 mod flash;

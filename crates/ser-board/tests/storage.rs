@@ -1,9 +1,9 @@
 //! The promise about configurations: after a power cut at any moment, the recorder comes up with
 //! the old one or the new one.
 //!
-//! A whole recorder is asked over its RS-232 line, as a host would; the power fails at every single
-//! write to the flash memory while it stores, through the erasing of sectors, and again while it
-//! recovers.
+//! The tests talk to a whole recorder over its RS-232 line, as a host would. The power fails at
+//! every single write to the flash memory while it stores, during the erasing of sectors, and again
+//! while it recovers.
 
 mod flash;
 
@@ -24,7 +24,7 @@ use ser_proto::{
     MAX_BODY_LEN, Model, Reply,
 };
 
-/// Sectors small enough for a walk through many erases; the layout does not depend on their size.
+/// Sectors small enough to go through many erases. The layout does not depend on their size.
 const SMALL: usize = 128;
 /// Sectors 0–3 of an STM32F407.
 const REAL: usize = 16 * 1024;
@@ -41,7 +41,7 @@ fn configuration(number: u16) -> Configuration {
     }
 }
 
-/// Memory of a recorder that is on; made once, since there are thousands of power-ups.
+/// RAM of a recorder that is on. Made once, because there are thousands of power-ups.
 struct Ram {
     channel: CaptureChannel,
     log: Vec<Event>,
@@ -110,7 +110,7 @@ fn log<const SECTOR: usize, const WORD: usize>(
     FlashLog::new(flash.clone(), &HEALTH)
 }
 
-/// What must not be done: both copies in one sector, which is erased for every change and then
+/// The wrong way to store: both copies in one sector, which is erased for every change and then
 /// written anew.
 struct OneSector(Flash<SMALL, 1>);
 
@@ -145,8 +145,8 @@ fn stored<const SECTOR: usize, const WORD: usize, S: Storage>(
     flash
 }
 
-/// Stores configuration after configuration; cuts the power at every step of each one and, after
-/// each power-up, at some steps of the next one. Gives how many cuts there were.
+/// Stores configuration after configuration. Cuts the power at every step of each one and, after
+/// each power-up, at some steps of the next one. Returns the number of cuts.
 fn cut_everywhere<const SECTOR: usize, const WORD: usize, S: Storage>(
     open: fn(&Flash<SECTOR, WORD>) -> S,
     changes: Range<u16>,
@@ -170,7 +170,7 @@ fn cut_everywhere<const SECTOR: usize, const WORD: usize, S: Storage>(
     cuts
 }
 
-/// Cuts the power so many steps into a change. False when the change is done before that.
+/// Cuts the power that many steps into a change. False when the change is done before that.
 fn cut<const SECTOR: usize, const WORD: usize, S: Storage>(
     ram: &mut Ram,
     flash: &Flash<SECTOR, WORD>,
@@ -183,7 +183,7 @@ fn cut<const SECTOR: usize, const WORD: usize, S: Storage>(
     assert_eq!(recorder.configuration(), *old, "before the change to {new:?}");
     let before = flash.steps();
     flash.cut_after(steps, steps);
-    // Whether or not it could be stored, it is in force until the power goes.
+    // The configuration is in force until the power goes, whether or not it could be stored.
     recorder.configure(new);
     let is_cut = flash.steps() - before == steps && recorder.node.diagnostics().storage_errors != 0;
     flash.power_up();
@@ -198,8 +198,8 @@ fn cut<const SECTOR: usize, const WORD: usize, S: Storage>(
     is_cut
 }
 
-/// Goes on with a memory that has seen a cut: the next changes hold, and a second cut does no more
-/// harm than the first.
+/// Goes on with a memory that has seen a cut: the next changes are kept, and a second cut does no
+/// more harm than the first.
 fn cut_again<const SECTOR: usize, const WORD: usize, S: Storage>(
     ram: &mut Ram,
     flash: &Flash<SECTOR, WORD>,
@@ -225,7 +225,7 @@ fn cut_again<const SECTOR: usize, const WORD: usize, S: Storage>(
 
 #[test]
 fn a_cut_at_any_write_leaves_the_old_or_the_new_configuration() {
-    // Seven records to a sector: eleven erases of sectors in use.
+    // Seven records per sector: eleven erases of sectors in use.
     let cuts = cut_everywhere(log::<SMALL, 1>, 1..80) + cut_everywhere(log::<SMALL, 4>, 1..80);
     assert!(cuts > 20_000, "{cuts}");
 }
@@ -237,7 +237,7 @@ fn a_cut_around_the_erase_of_a_real_sector_leaves_the_old_or_the_new_configurati
     assert!(cuts > 1000, "{cuts}");
 }
 
-/// The bench sees a configuration that is lost: this storage comes up with the default one.
+/// Checks that the bench notices a lost configuration: this storage comes up with the default one.
 #[test]
 #[should_panic(expected = "is neither")]
 fn copies_that_share_a_sector_would_not_pass() {
@@ -266,7 +266,7 @@ fn memory_that_held_something_else_is_as_good_as_new() {
 fn an_erase_is_as_rare_as_the_documentation_says() {
     assert_eq!(FlashLog::<Flash<REAL, 1>>::RECORDS_PER_SECTOR, 1023);
     assert_eq!(FlashLog::<Flash<{ 128 * 1024 }, 1>>::RECORDS_PER_SECTOR, 8191);
-    // One erase prepares each sector; after that the copies take turns.
+    // One erase prepares each sector; then the copies take turns.
     let changes =
         [(1, [1, 0]), (2, [1, 1]), (2046, [1, 1]), (2047, [2, 1]), (2048, [2, 2]), (4092, [2, 2])];
     for (last, [first, second]) in changes {

@@ -1,4 +1,4 @@
-//! Cost of one capture tick: the work of the 1 kHz interrupt, without the main loop's share. Times
+//! Cost of one capture tick: the work of the 1 kHz interrupt without the main loop's share. Times
 //! are per tick.
 
 use std::hint::black_box;

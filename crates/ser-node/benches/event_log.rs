@@ -1,8 +1,8 @@
-//! What the event log costs, beside the rings of `heapless`, which one would use instead.
+//! The cost of the event log, compared with the rings of `heapless`, the usual alternative.
 //!
-//! The work is the recorder's: `append` adds an event to a full log, and the oldest one goes;
-//! `read_ten` finds the ten entries of a read reply in the middle of the ring; `read_all` takes all
-//! 2048 from the oldest to the newest. Both rivals do less: they know no entry numbers that outlive
+//! The work is the recorder's. `append` adds an event to a full log, and the oldest one goes.
+//! `read_ten` finds the ten entries of a read reply in the middle of the ring. `read_all` takes all
+//! 2048 from the oldest to the newest. Both rivals do less: they have no entry numbers that outlive
 //! a wrap, no total, and no size that can be changed.
 
 use std::hint::black_box;
@@ -20,7 +20,7 @@ fn event(number: i64) -> Event {
     Event { time_ms: number, changed: 1, state: u32::MAX }
 }
 
-/// Events that fill the ring, and go on to its middle.
+/// Events that fill the ring once and then continue to its middle.
 fn past() -> impl Iterator<Item = Event> {
     (0..).map(event).take(LEN + LEN / 2)
 }

@@ -8,9 +8,9 @@ use ser_proto::{Command, ParseError};
 pub(crate) enum Way {
     /// The RS-232 line.
     Line,
-    /// The Genius bus, from the device of this number.
+    /// The Genius bus, from the device with this bus address.
     Bus(u8),
-    /// The Genius bus, to all recorders. Nobody is answered.
+    /// The Genius bus, to all recorders. It gets no reply.
     Broadcast,
 }
 
@@ -19,7 +19,7 @@ pub(crate) enum Way {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Arrival {
     pub(crate) command: Result<Command, ParseError>,
-    /// The tick of arrival, or of reading where nobody saw it arrive.
+    /// The tick of arrival. The tick of reading where nobody saw the arrival.
     pub(crate) tick_ms: u32,
     pub(crate) is_seen: bool,
     pub(crate) way: Way,

@@ -1,9 +1,8 @@
 //! From milliseconds to a date, in the years 1970–2099.
 //!
-//! In these years every fourth one is a leap year, and what is left of the calendar is divisions by
-//! constants. A library for all years looks things up in tables, and the compiler cannot see that
-//! it never looks beyond their ends: each look has a path to a panic, and the interrupts of a
-//! recorder must have none.
+//! Every fourth of these years is a leap year, so the calendar needs only divisions by constants. A
+//! library for all years uses look-up tables, and the compiler cannot see that it stays inside
+//! them: each look-up has a path to a panic. The interrupts of a recorder must have none.
 
 use chrono::{NaiveDate, NaiveDateTime};
 
@@ -13,7 +12,7 @@ const DAY_SECONDS: i64 = 24 * 60 * 60;
 /// A day of the years 1970–2099.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Date {
-    /// In full.
+    /// All four digits.
     pub year: u16,
     /// 1–12.
     pub month: u8,
@@ -22,15 +21,16 @@ pub struct Date {
 }
 
 impl Date {
-    /// Days of all these years: of 130, 32 are leap years.
+    /// Days of these 130 years, 32 of which are leap years.
     const ALL_DAYS: u32 = 130 * 365 + 32;
 
-    /// The date so many days after 1970-01-01; `None` after 2099.
+    /// The date that many days after 1970-01-01; `None` after 2099.
     #[must_use]
     pub fn after_1970(days: u32) -> Option<Date> {
         const YEAR_DAYS: u32 = 365;
         const FOUR_YEARS_DAYS: u32 = 4 * YEAR_DAYS + 1;
-        /// From 1 March 1968. Years that begin in March have their leap day at the very end.
+        /// Days from 1 March 1968 to 1970. A year that begins in March has its leap day at the very
+        /// end.
         const DAYS_TO_1970: u32 = 306 + YEAR_DAYS;
 
         if days >= Date::ALL_DAYS {
@@ -60,7 +60,7 @@ impl Date {
     }
 }
 
-/// The date and time so many milliseconds after 1970 began; `None` outside of 1970–2099.
+/// The date and time that many milliseconds after the start of 1970; `None` outside of 1970–2099.
 #[must_use]
 pub fn date_time(calendar_ms: i64) -> Option<NaiveDateTime> {
     let (Date { year, month, day }, ms) = split(calendar_ms)?;
@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn every_day_is_the_one_that_the_library_knows() {
         for days in 0..Date::ALL_DAYS {
-            // Another time of day on each, the first and the last millisecond among them.
+            // A different time of day on each date, including the first and the last millisecond.
             for ms in [0, i64::from(days) * 7919 % DAY_MS, DAY_MS - 1] {
                 let calendar_ms = i64::from(days) * DAY_MS + ms;
                 let known = DateTime::from_timestamp_millis(calendar_ms).unwrap().naive_utc();

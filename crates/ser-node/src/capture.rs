@@ -1,16 +1,16 @@
 //! The interrupt's half of the recorder: read all inputs, filter, compare, queue.
 //!
 //! [`Capture::sample`] runs once per millisecond at the highest priority and waits for nothing. It
-//! hands changes to the main loop through a queue; a change that finds the queue full is counted,
-//! and the main loop notices from the states that something is missing in between.
+//! hands changes to the main loop through a queue. A change that finds the queue full is counted.
+//! The main loop notices from the states that a change is missing.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use crate::debounce::{Debounce, Filter};
 use crate::ring::{Reader, Ring, Slot, Writer};
 
-/// How many changes may wait for the main loop: a quarter of a second with a change every
-/// millisecond. A power of two, as rings want it.
+/// Changes that may wait for the main loop: a quarter of a second with a change every millisecond.
+/// A power of two, as a ring requires.
 pub const QUEUE_LEN: usize = 256;
 
 /// Inputs that changed in one sample.
@@ -19,7 +19,7 @@ pub const QUEUE_LEN: usize = 256;
 pub(crate) struct Sample {
     /// When, in milliseconds since power-up, wrapping.
     pub(crate) tick_ms: u32,
-    /// The inputs that changed; none in the very first sample, which is the baseline.
+    /// The inputs that changed. Empty in the very first sample, which is the baseline.
     pub(crate) changed: u32,
     /// The inputs that are on.
     pub(crate) state: u32,
@@ -62,7 +62,7 @@ struct Shared {
 }
 
 impl CaptureChannel {
-    /// An empty channel; belongs into a static.
+    /// An empty channel, for a static.
     #[must_use]
     pub const fn new() -> CaptureChannel {
         CaptureChannel {
@@ -110,11 +110,10 @@ pub struct Capture<'a> {
 }
 
 impl Capture<'_> {
-    /// Takes the state of all inputs at `tick_ms`, a count of milliseconds since power-up that
-    /// wraps.
+    /// Takes the state of all inputs at `tick_ms`, a wrapping count of milliseconds since power-up.
     ///
-    /// The count is expected to grow by one. Where it grows by more, the samples between were
-    /// missed: they are counted, and the inputs are taken to have stayed as they were.
+    /// The count is expected to grow by one. If it grows by more, the samples in between were
+    /// missed: they are counted, and the inputs are assumed to have stayed as they were.
     #[inline]
     pub fn sample(&mut self, tick_ms: u32, inputs: u32) {
         match &mut self.filter {
@@ -129,12 +128,12 @@ impl Capture<'_> {
         }
         self.inputs = inputs;
         self.tick_ms = tick_ms;
-        // Last: who reads this tick finds everything up to it in the queue.
+        // Last: whoever reads this tick finds all changes up to it in the queue.
         self.shared.tick_ms.store(tick_ms, Ordering::Release);
     }
 
-    /// Takes the baseline. Apart from the rest, which would have to make room for it on the stack
-    /// in every millisecond.
+    /// Takes the baseline. Kept apart, because inlined it would cost stack space in every
+    /// millisecond.
     #[cold]
     #[inline(never)]
     fn begin(&mut self, tick_ms: u32, inputs: u32) {
@@ -152,23 +151,23 @@ impl Capture<'_> {
         }
     }
 
-    /// Makes up for the samples between the latest one and that of `tick_ms`. False when that one
-    /// is none.
+    /// Makes up for the samples between the latest one and that of `tick_ms`. False when `tick_ms`
+    /// itself calls for no sample.
     ///
-    /// Apart from the rest, so that a sample that is on time pays for one comparison.
+    /// Kept apart, so that a sample on time pays for one comparison only.
     #[cold]
     #[inline(never)]
     fn catch_up(&mut self, tick_ms: u32, elapsed: u32) -> bool {
         if elapsed == 0 || elapsed > u32::MAX / 2 {
-            // There is one sample to a millisecond, and none to one that is past.
+            // Each millisecond has one sample; a past one gets no further sample.
             return false;
         }
         self.make_up(tick_ms, elapsed - 1);
         true
     }
 
-    /// Runs the filter over samples that were missed, so that debounce times stay times and do not
-    /// become counts.
+    /// Runs the filter over missed samples, so that debounce times remain times and do not become
+    /// counts of samples.
     fn make_up(&mut self, tick_ms: u32, missed: u32) {
         let count = &self.shared.samples_missed;
         count.store(count.load(Ordering::Relaxed).saturating_add(missed), Ordering::Relaxed);
@@ -232,7 +231,7 @@ impl CaptureReader<'_> {
         &self.debounce
     }
 
-    /// The next change for which `due` says yes.
+    /// The next change, if `due` accepts it.
     pub(crate) fn next_if(&mut self, due: impl FnOnce(&Sample) -> bool) -> Option<Sample> {
         if self.queue.peek().as_ref().is_some_and(due) { self.queue.pop() } else { None }
     }
@@ -270,7 +269,7 @@ mod tests {
         let read = drain(&mut reader);
         assert_eq!(read.len(), QUEUE_LEN);
         assert_eq!(reader.edges_lost(), 2 * (300 - 256));
-        // The last change was dropped, and is in effect all the same.
+        // The last change was dropped, but its state is in effect.
         assert_eq!(reader.state(), 0b11);
     }
 
@@ -291,7 +290,7 @@ mod tests {
         let (mut capture, mut reader) = channel.split(Debounce::OFF.with(1, 5));
         capture.sample(10, 0);
         capture.sample(11, 1);
-        // Nine samples are missed; input 1 was seen to change at 11, so the change is accepted as
+        // Nine samples are missed. Input 1 was seen to change at 11, so its change is accepted as
         // of 16. Input 2 has no debounce: the late sample is the first to see it, and its tick is
         // the stamp.
         capture.sample(21, 0b11);

@@ -1,11 +1,11 @@
-//! The changes of the inputs on their way from capture to the log: in order, and no earlier than
-//! everything that decides about them is known.
+//! The changes of the inputs on their way from capture to the log. They come out in order, and only
+//! when everything that decides about them is known.
 
 use crate::capture::CaptureReader;
 use crate::sequencer::{Change, Sequencer};
 use crate::ticks::Ticks;
 
-/// The main loop's end of the capture channel, with what puts its samples in order.
+/// The main loop's end of the capture channel, and the sequencer that orders its samples.
 pub(crate) struct Changes<'a> {
     capture: CaptureReader<'a>,
     ticks: Ticks,
@@ -20,7 +20,7 @@ impl<'a> Changes<'a> {
         Changes { capture, ticks: Ticks::new(), sequencer, mask }
     }
 
-    /// The interrupt's half: what it counts, and the inputs as they are now.
+    /// The main loop's end of capture: its counters and the present inputs.
     pub(crate) fn capture(&self) -> &CaptureReader<'a> {
         &self.capture
     }

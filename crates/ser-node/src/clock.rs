@@ -1,8 +1,8 @@
 //! Date and time: the millisecond tick plus an offset.
 //!
-//! Setting the clock moves the offset and never the tick. A change that happened before the clock
-//! was set but is recorded only afterwards, because debounce held it back, still gets the time of
-//! the setting of its moment.
+//! Setting the clock moves the offset and never the tick. Debounce may hold a change back until
+//! after the clock has been set. Such a change still gets its time from the setting that was in
+//! force when it happened.
 
 use chrono::NaiveDateTime;
 use ser_proto::TimeStamp;
@@ -15,8 +15,8 @@ pub trait Rtc {
     /// The time now, asked once at power-up; `None` when it is not known.
     fn read(&mut self) -> Option<NaiveDateTime>;
 
-    /// Takes over the time, when the recorder's clock is set. `now` is that of the call, not of the
-    /// command's arrival.
+    /// Takes over the time when the recorder's clock is set. `now` is the time of this call, not of
+    /// the command's arrival.
     fn write(&mut self, now: NaiveDateTime);
 }
 
@@ -35,16 +35,16 @@ impl Rtc for NoRtc {
 /// 2000-01-01 00:00, in milliseconds since 1970.
 const NEVER_SET_MS: i64 = 946_684_800_000;
 
-/// A hundred years, 1970–2069: what two-digit years can tell apart.
+/// A hundred years, 1970–2069: the range that two-digit years can express.
 const CENTURY_MS: i64 = 36_525 * 24 * 60 * 60 * 1000;
 
-/// Milliseconds since 1970 at tick 0, within the hundred years; 42 bits of them, as many of these
-/// are remembered.
+/// Milliseconds since 1970 at tick 0, within the hundred years. Stored in 42 bits, because many
+/// offsets are remembered.
 #[derive(Clone, Copy, Debug)]
 struct Offset([u16; 3]);
 
 impl Offset {
-    /// The offset of a clock that shows `now_ms` in `tick_ms`.
+    /// The offset of a clock that shows `now_ms` at `tick_ms`.
     fn new(now_ms: i64, tick_ms: u64) -> Offset {
         let [a, b, c, d, e, f, ..] =
             now_ms.saturating_sub_unsigned(tick_ms).rem_euclid(CENTURY_MS).to_le_bytes();
@@ -70,17 +70,17 @@ impl Clock {
         Clock { offset: History::new(Offset::new(now_ms, tick_ms)) }
     }
 
-    /// In `tick_ms` the clock shows `now`.
+    /// Sets the clock so that it shows `now` at `tick_ms`.
     pub(crate) fn set(&mut self, tick_ms: u64, now: NaiveDateTime) {
         self.offset.set(tick_ms, Offset::new(to_calendar_ms(now), tick_ms));
     }
 
-    /// Calendar time of the sample of `tick_ms`, as the clock was set then.
+    /// Calendar time of the sample of `tick_ms`, by the setting in force then.
     pub(crate) fn stamp_ms(&self, tick_ms: u64) -> i64 {
         within_century(self.offset.at_sample(tick_ms).ms(), tick_ms)
     }
 
-    /// Calendar time in `tick_ms`, as the clock is set now.
+    /// Calendar time at `tick_ms`, by the present setting.
     pub(crate) fn now_ms(&self, tick_ms: u64) -> i64 {
         within_century(self.offset.latest().ms(), tick_ms)
     }
@@ -95,7 +95,7 @@ fn to_calendar_ms(time: NaiveDateTime) -> i64 {
     time.and_utc().timestamp_millis()
 }
 
-/// The date and time `calendar_ms` milliseconds after 1970 began, within the hundred years of
+/// The date and time that many milliseconds after the start of 1970, within the hundred years of
 /// two-digit years.
 pub(crate) fn to_time_stamp(calendar_ms: i64) -> TimeStamp {
     const EPOCH: TimeStamp =
@@ -141,7 +141,7 @@ mod tests {
         assert_eq!(to_time_stamp(clock.now_ms(1000)).to_string(), "2026-11-22T12:00:00.250");
         assert_eq!(shows(&clock, 1001), "2026-11-22T12:00:00.251");
         assert_eq!(shows(&clock, 1751), "2026-11-22T12:00:01.001");
-        // What was sampled before keeps the time of the old setting.
+        // Earlier samples keep the time of the old setting.
         assert_eq!(shows(&clock, 1000), "2026-11-22T10:00:00.995");
     }
 

@@ -1,17 +1,17 @@
 //! The per-input debounce filter: a change counts when the input has held its new state long
 //! enough.
 //!
-//! All inputs are filtered together with bit-parallel counters: plane `p` holds bit `p` of every
-//! input's counter, so one pass over the planes counts for 32 inputs, and the work is the same
-//! whatever the inputs do.
+//! Bit-parallel counters filter all inputs together: plane `p` holds bit `p` of every input's
+//! counter. One pass over the planes counts for 32 inputs, and the work is the same whatever the
+//! inputs do.
 
-/// Counters are eight bits wide: debounce times reach 255 ms.
+/// Counters are eight bits wide, so debounce times reach 255 ms.
 const PLANES: usize = 8;
 
-/// Debounce time of every input, in milliseconds; 0 is off.
+/// Debounce time of every input, in milliseconds; 0 switches it off.
 ///
-/// With `n` milliseconds an input must stay in its new state for `n` ms before the change is
-/// recorded, and the event carries the time at which the new state was first seen.
+/// With `n` milliseconds, an input must stay in its new state for `n` ms before the change is
+/// recorded. The event carries the time at which the new state was first seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Debounce {
@@ -28,7 +28,7 @@ impl Debounce {
         Debounce { times_ms: [time_ms; 32] }
     }
 
-    /// The same, but with `time_ms` for input `number` (1–32). Other numbers change nothing.
+    /// The same times, but with `time_ms` for input `number` (1–32). Other numbers change nothing.
     #[must_use]
     pub fn with(mut self, number: u8, time_ms: u8) -> Debounce {
         if let Some(time) =
@@ -58,8 +58,8 @@ impl Debounce {
 
 /// One bit of the counter of every input.
 ///
-/// A counter starts at 256 less the time and counts up. What is kept is in which bits it differs
-/// from its start, so that starting anew is a mask.
+/// A counter starts at 256 minus the time and counts up. The stored bits are the difference from
+/// that start, so that a mask restarts the counter.
 #[derive(Clone, Copy, Debug, Default)]
 struct Plane {
     moved: u32,
@@ -67,7 +67,7 @@ struct Plane {
 }
 
 impl Plane {
-    /// Adds the carry to the counters that are `counting`, and starts the others anew. Gives the
+    /// Adds the carry to the counters that are `counting` and restarts the others. Returns the
     /// carry for the next plane.
     #[inline]
     fn count(&mut self, counting: u32, carry: u32) -> u32 {
@@ -82,20 +82,20 @@ impl Plane {
 pub(crate) struct Filter {
     accepted: u32,
     planes: [Plane; PLANES],
-    /// Inputs that have been in their new state for their time: one more sample of it, and it is
-    /// accepted.
+    /// Inputs that have held their new state for their time. One more sample of it, and the change
+    /// is accepted.
     due: u32,
-    /// Inputs without a time, which are always due.
+    /// Inputs without a debounce time, which are always due.
     without: u32,
 }
 
 impl Filter {
-    /// A filter that takes `inputs` for accepted.
+    /// A filter that starts with `inputs` as the accepted state.
     pub(crate) fn new(debounce: &Debounce, inputs: u32) -> Filter {
         let mut planes = [Plane::default(); PLANES];
         let mut without = 0;
         for (input, time_ms) in debounce.times_ms.iter().enumerate() {
-            // 256 less the time, without its ninth bit.
+            // 256 minus the time, without the ninth bit.
             let start = time_ms.wrapping_neg();
             without |= u32::from(start == 0) << input;
             for (bit, plane) in planes.iter_mut().enumerate() {
@@ -123,8 +123,8 @@ impl Filter {
         self.accepted ^= accepted;
         if !self.is_off() {
             let counting = differ ^ accepted;
-            // Written out: this is half of the capture interrupt, and a loop would take half as
-            // long again.
+            // Unrolled by hand: this is half of the capture interrupt, and a loop would take half
+            // as long again.
             let [a, b, c, d, e, f, g, h] = &mut self.planes;
             let carry = a.count(counting, counting);
             let carry = b.count(counting, carry);
@@ -145,7 +145,7 @@ mod tests {
 
     use super::*;
 
-    /// The filter as one would write it for one input: how long has the new state lasted?
+    /// A plain filter for one input, as the reference: how long has the new state lasted?
     struct OneInput {
         time_ms: u8,
         accepted: bool,
@@ -169,7 +169,7 @@ mod tests {
         fn thirty_two_inputs_at_once_equal_one_input_at_a_time(
             times in prop::array::uniform32(prop_oneof![Just(0_u8), 1..4_u8, any::<u8>()]),
             start: u32,
-            // Runs of equal samples, so that long debounce times are reached too.
+            // Runs of equal samples, so that long debounce times are also reached.
             runs in prop::collection::vec((any::<u32>(), 1..300_usize), 0..40),
         ) {
             let debounce = Debounce { times_ms: times };

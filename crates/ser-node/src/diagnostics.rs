@@ -33,8 +33,8 @@ pub struct Diagnostics {
     pub edges_lost: u32,
     /// Milliseconds in which no sample was taken.
     pub samples_missed: u32,
-    /// Settings of clock or mode that were read when changes after their arrival had been recorded
-    /// already: these have the clock and mode of before.
+    /// Settings of clock or mode that were read too late: changes after their arrival had already
+    /// been recorded. Those changes have the old clock and mode.
     pub settings_late: u32,
     /// Events overwritten before auto report had sent them.
     pub events_unreported: u32,

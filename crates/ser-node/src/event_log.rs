@@ -1,7 +1,7 @@
 //! The ring of the newest events.
 //!
-//! Inside, every event has a sequence number that never repeats while the power is on; entry
-//! numbers, next slot and the 16-bit total of the protocol are views of it. Appending overwrites
+//! Internally every event has a sequence number that never repeats while the power is on. The
+//! protocol's entry numbers, next slot and 16-bit total are derived from it. Appending overwrites
 //! the oldest event once the ring is full.
 
 use ser_proto::MAX_SIZE;
@@ -27,7 +27,7 @@ impl Event {
 #[derive(Debug)]
 pub struct EventLog<'a> {
     storage: &'a mut [Event],
-    /// Entries in use as ring, at most the storage. Invariant: `len <= size`, `next_slot < size`
+    /// Slots in use as the ring, at most the storage. Invariant: `len <= size`, `next_slot < size`
     /// (or both 0), and `next_slot == len` until the ring is full.
     size: usize,
     len: usize,
@@ -94,14 +94,14 @@ impl<'a> EventLog<'a> {
         self.next_sequence - 1
     }
 
-    /// Forgets all events; total and next slot begin at zero again, sequence numbers go on.
+    /// Forgets all events. Total and next slot begin at zero again; sequence numbers continue.
     pub fn erase(&mut self) {
         self.len = 0;
         self.next_slot = 0;
         self.erased_at = self.next_sequence;
     }
 
-    /// Changes the size (clamped to 1 … capacity) and keeps the newest events that fit, in order,
+    /// Changes the size (clamped to 1 … capacity). The newest events that fit are kept, in order,
     /// from slot 0. The total stays.
     pub fn resize(&mut self, size: u16) {
         let size = usize::from(size.min(self.capacity()).max(1)).min(self.storage.len());
@@ -109,7 +109,7 @@ impl<'a> EventLog<'a> {
             return;
         }
         let kept = self.len.min(size);
-        // In a ring that has wrapped, what is newer than the last slot goes on in slot 0.
+        // In a ring that has wrapped, the events newer than the last slot continue in slot 0.
         let first =
             if self.len == self.size { self.next_slot + self.len - kept } else { self.len - kept };
         let first = if first < self.size { first } else { first - self.size };
@@ -141,8 +141,7 @@ impl<'a> EventLog<'a> {
         self.next_sequence
     }
 
-    /// The entry number under which the event with this sequence number is found, if it is still
-    /// there.
+    /// The entry number of the event with this sequence number, if it is still there.
     #[must_use]
     pub fn entry_number(&self, sequence: u64) -> Option<u16> {
         let back = usize::try_from(self.next_sequence.checked_sub(sequence)?).ok()?;
@@ -158,8 +157,8 @@ impl<'a> EventLog<'a> {
     }
 }
 
-/// Turns a ring so that slot `first` becomes slot 0. Reversing both parts and then the whole does
-/// it without a path to a panic, which the library's rotation has.
+/// Rotates a ring so that slot `first` becomes slot 0. Reverses both parts and then the whole,
+/// because the library's rotation has a path to a panic.
 fn move_to_front(ring: &mut [Event], first: usize) {
     if let Some((before, from_first)) = ring.split_at_mut_checked(first) {
         before.reverse();
@@ -179,8 +178,8 @@ mod tests {
 
     use super::*;
 
-    /// The log as one would write it without caring for memory: everything since the erase, and
-    /// what was cut off.
+    /// The log written without regard for memory: everything since the erase, minus what was cut
+    /// off.
     #[derive(Default)]
     struct Reference {
         kept: Vec<Event>,

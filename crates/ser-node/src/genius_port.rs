@@ -1,28 +1,31 @@
 //! The Genius port: datagrams in, datagrams out, and the state of all inputs in every bus scan,
 //! through a GENI board.
 //!
-//! Commands come as datagrams 40h/50h, directed or by broadcast; replies go to the sender of a
-//! directed one. The board is reset when it fails, and the bus is joined again; RS-232 and
-//! recording know nothing of it.
+//! Commands come as datagrams 40h/50h, directed or by broadcast. Replies go to the sender of a
+//! directed one. The port resets the board when it fails, and the board then joins the bus again.
+//! RS-232 and recording are not affected.
 //!
-//! The port turns datagrams into commands and replies into datagrams; what a command means, and who
-//! waits for which reply, is not known here. A [`Node`](crate::Node) carries from one to the other.
+//! The port turns datagrams into commands and replies into datagrams. It knows neither what a
+//! command means nor who waits for which reply. A [`Node`](crate::Node) carries from one to the
+//! other.
 //!
-//! - **Time of arrival** is the tick at which the board raised its Receive-Queue flag: that of the
-//!   pulse that was handed in ([`genius_interrupt`](crate::Node::genius_interrupt)), or, without
-//!   the line, of the [`genius_poll`](crate::Node::genius_poll) that saw the flag. However long the
-//!   board then takes to hand the datagram over, clock, mode and Last Broadcast go by it, and
-//!   changes that come after it wait for it ([`HELD_BACK_MS`](crate::HELD_BACK_MS)).
-//! - **Replies** are sent once. A host that misses one asks again, as on RS-232; a repeated reply
+//! - **Time of arrival** is the tick at which the board raised its Receive-Queue flag. That is the
+//!   tick of the pulse that was handed in ([`genius_interrupt`](crate::Node::genius_interrupt)) or,
+//!   without the line, of the [`genius_poll`](crate::Node::genius_poll) that saw the flag. Clock,
+//!   mode and Last Broadcast go by this tick, however long the board then takes to hand the
+//!   datagram over. Changes after it wait for the datagram ([`HELD_BACK_MS`](crate::HELD_BACK_MS)).
+//! - **Replies** are sent once. A host that misses one asks again, as on RS-232. A repeated reply
 //!   might be taken for the answer to the next command.
-//! - **Auto reports** are repeated until their receiver has acknowledged one, with growing pauses,
-//!   as a receiver that is not there would cost all others their place in the bus scan. A receiver
-//!   may get one twice when its acknowledgement was lost; total and next slot show it. All devices
-//!   together have one datagram of normal priority per bus scan, and those with low numbers have
-//!   the first chance: after each report as many scans are left to the others as there are others.
-//! - **Read I/O Forces** is answered with the recorder's own input tables: none is forced, and the
-//!   values are the states of the inputs. There are no outputs, so these tables are empty.
-//! - **Requests for memory** are refused: a recorder has none.
+//! - **Auto reports** are repeated, with growing pauses, until their receiver has acknowledged one.
+//!   The pauses grow because an absent receiver would otherwise cost all other devices their place
+//!   in the bus scan. A receiver may get a report twice when its acknowledgement was lost; total
+//!   and next slot show that. All devices together have one datagram of normal priority per bus
+//!   scan, and low bus addresses have the first chance. After each report the port therefore leaves
+//!   one scan to each other device.
+//! - **Read I/O Forces** is answered with the recorder's own input tables. No input is forced, and
+//!   the values are the states of the inputs. The recorder has no outputs, so the output tables are
+//!   empty.
+//! - **Requests for memory** are refused, because a recorder has no memory to read.
 
 mod diagnostics;
 mod options;
@@ -47,22 +50,22 @@ use reporter::Reporter;
 pub use diagnostics::GeniusDiagnostics;
 pub use options::GeniusOptions;
 
-/// What the board had to say.
+/// What the board reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FromBus {
     /// A command.
     Arrived(Arrival),
     /// A device asks for a force table.
     ForcesAsked { device: u8, table: ForceTable },
-    /// So many events from `first` on have reached their receiver.
+    /// That many events from `first` on have reached their receiver.
     Reported { first: u64, entries: usize },
-    /// The board has failed, and whoever asked knows nothing of us any more.
+    /// The board has failed. Hosts that asked no longer expect an answer.
     Failed,
     /// Something that concerns the port alone.
     DealtWith,
 }
 
-/// The datagram that the driver has.
+/// The kind of datagram that the driver is sending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum OnItsWay {
     Reply,
@@ -71,16 +74,16 @@ enum OnItsWay {
 
 /// The Genius port of a [`Node`](crate::Node), over the shared RAM of its GENI board.
 ///
-/// In every turn of its main loop a board hands in the pulses of the interrupt line
-/// ([`Node::genius_interrupt`](crate::Node::genius_interrupt)), calls
-/// [`Node::poll`](crate::Node::poll), then [`Node::genius_poll`](crate::Node::genius_poll), and
-/// then drives the GENI board's reset line with [`reset_held`](Self::reset_held).
+/// In every pass of its main loop a board does four things, in this order: it hands in the pulses
+/// of the interrupt line ([`Node::genius_interrupt`](crate::Node::genius_interrupt)), calls
+/// [`Node::poll`](crate::Node::poll), calls [`Node::genius_poll`](crate::Node::genius_poll), and
+/// drives the GENI board's reset line with [`reset_held`](Self::reset_held).
 pub struct GeniusPort<W> {
     driver: Driver<W>,
     model: Model,
     on_its_way: Option<OnItsWay>,
     reporter: Reporter,
-    /// Devices that are logged in, number 0 in bit 0.
+    /// Devices that are logged in, bus address 0 in bit 0.
     others: u32,
     diagnostics: GeniusDiagnostics,
 }
@@ -98,7 +101,7 @@ impl<W: SharedRam> GeniusPort<W> {
         }
     }
 
-    /// Whether the board's reset line is to be held low until the port is polled again.
+    /// Whether the board's reset line must be held low until the next poll.
     pub fn reset_held(&self) -> bool {
         self.driver.reset_held()
     }
@@ -108,28 +111,29 @@ impl<W: SharedRam> GeniusPort<W> {
         self.driver.ram_mut()
     }
 
-    /// Whether the board is started and configured. Whether it has its turns on the bus is in its
-    /// [`status`](Self::status).
+    /// Whether the board is started and configured. Its [`status`](Self::status) says whether it
+    /// has its turns on the bus.
     pub fn is_ready(&self) -> bool {
         self.driver.is_ready()
     }
 
-    /// The board's status table as it was looked at last, if it was since the board was started.
+    /// The board's status table as last read; `None` if it has not been read since the board
+    /// started.
     pub fn status(&self) -> Option<Status> {
         self.driver.status()
     }
 
-    /// What was ignored, lost or repeated so far.
+    /// What has been ignored, lost or repeated since power-up.
     pub fn diagnostics(&self) -> GeniusDiagnostics {
         GeniusDiagnostics { board: self.driver.counters(), ..self.diagnostics }
     }
 
-    /// The board's interrupt line was pulsed at `tick_ms`.
+    /// Says that the board's interrupt line was pulsed at `tick_ms`.
     pub(crate) fn interrupt(&mut self, tick_ms: u32) {
         self.driver.interrupt(tick_ms);
     }
 
-    /// When the oldest datagram arrived that waits to be read.
+    /// When the oldest datagram that waits to be read arrived.
     pub(crate) fn oldest_arrival_ms(&self) -> Option<u32> {
         self.driver.oldest_arrival_ms()
     }
@@ -137,11 +141,11 @@ impl<W: SharedRam> GeniusPort<W> {
     /// Shows the state of all inputs in every bus scan.
     pub(crate) fn show(&mut self, inputs: Inputs) {
         let global = GlobalData { model: self.model, state: inputs }.to_bytes();
-        // As long as the model says, and that is what was configured.
+        // Never refused: the length follows from the model, and so did the configured one.
         let _ = self.driver.set_global_data(&global);
     }
 
-    /// The next thing that the board has to say, if any.
+    /// The next event of the board, if any.
     pub(crate) fn poll(&mut self, now_ms: u32) -> Option<FromBus> {
         Some(match self.driver.poll(now_ms)? {
             Event::Received(datagram) => self.receive(&datagram, now_ms),
@@ -162,7 +166,7 @@ impl<W: SharedRam> GeniusPort<W> {
                 }
                 FromBus::DealtWith
             }
-            // The driver remembers or has dealt with it, or it is not asked for.
+            // The driver remembers or has handled these, or the port never asks for them.
             Event::Configured(_)
             | Event::StatusChanged(_)
             | Event::RequestRefused(_)
@@ -191,12 +195,12 @@ impl<W: SharedRam> GeniusPort<W> {
         self.reply_sent(sent);
     }
 
-    /// So many requests get no reply.
+    /// Counts that many requests that get no reply.
     pub(crate) fn count_lost(&mut self, replies: usize) {
         count(&mut self.diagnostics.replies_lost, replies as u64);
     }
 
-    /// Whether a report may go now, or is to be waited with.
+    /// Whether a report may go now.
     pub(crate) fn may_report(&self, now_ms: u32) -> bool {
         self.reporter.may_send(now_ms)
     }
@@ -210,7 +214,7 @@ impl<W: SharedRam> GeniusPort<W> {
         }
     }
 
-    /// Nobody gets reports over the bus: the next one that is ever asked for need not wait.
+    /// Ends the pause, because nobody gets reports over the bus now. The next report need not wait.
     pub(crate) fn forget_pause(&mut self) {
         self.reporter.hurry();
     }
@@ -240,7 +244,7 @@ impl<W: SharedRam> GeniusPort<W> {
 
     fn receive_message(&mut self, datagram: &ReceivedDatagram, now_ms: u32) -> FromBus {
         let command = Command::parse(&datagram.data);
-        // The time that it brings was that of its arrival, and no other is known to be right.
+        // The time in it was right at its arrival, and the tick of its arrival is not known.
         if datagram.arrived_ms.is_none() && matches!(command, Ok(Command::SetClock(_))) {
             count(&mut self.diagnostics.clocks_refused, 1);
             return FromBus::DealtWith;
@@ -272,8 +276,8 @@ impl<W: SharedRam> GeniusPort<W> {
         FromBus::DealtWith
     }
 
-    /// How long it takes until each other device could have sent a datagram: a scan each, and what
-    /// is left of this one.
+    /// How long it takes until each other device could have sent a datagram: one scan each, and the
+    /// rest of the present one.
     fn turns_of_others_ms(&self) -> u32 {
         let scan_ms = self.status().and_then(|status| status.scan_ms).unwrap_or(0);
         u32::from(scan_ms) * (self.others.count_ones() + 1)
@@ -306,17 +310,17 @@ impl<W: SharedRam> GeniusPort<W> {
     }
 }
 
-/// The bit of a device number; there are 32 of these.
+/// The bit of a bus address, 0–31.
 fn bit(number: u8) -> u32 {
     1_u32.checked_shl(number.into()).unwrap_or(0)
 }
 
-/// The reply to Read I/O Forces: the table's number and the table. Nothing is ever forced. A host
-/// that shows the values of inputs without looking which of them are forced sees what they are.
+/// The reply to Read I/O Forces: the table's number and the table. Nothing is ever forced. The
+/// input values are real, for a host that shows them without checking which of them are forced.
 fn forces(table: ForceTable, inputs: GlobalData) -> Vec<u8, { ser_proto::genius::MAX_DATA }> {
     let mut forces = IoForces::none(table, inputs.model);
     if table == ForceTable::InputValues {
-        // The table is as long as the inputs are: both go by the model.
+        // The table is as long as the inputs, because the model decides both lengths.
         for (content, byte) in forces.contents.iter_mut().zip(inputs.to_bytes()) {
             *content = byte;
         }

@@ -1,14 +1,13 @@
-//! A value, and what it was a short while ago.
+//! A value and its recent past.
 //!
-//! Changes are recorded up to [`HELD_BACK_MS`](crate::HELD_BACK_MS) after they happened. What was
-//! in force when they happened decides about them. A history therefore has a place for every
-//! millisecond of that span. Settings may come over both ports, in any number, and may be read in
-//! any order: none that still decides about a change is forgotten.
+//! A change is recorded up to [`HELD_BACK_MS`](crate::HELD_BACK_MS) after it happened, by the value
+//! that was in force when it happened. A history therefore has a place for every millisecond of
+//! that span. Settings may come over both ports, in any number, and may be read in any order: no
+//! setting that still decides about a change is forgotten.
 
 use crate::sequencer::{WINDOW, slot};
 
-/// Milliseconds that are remembered. The oldest change that is still to be recorded lies less far
-/// back.
+/// Milliseconds that are remembered. The oldest change still to be recorded is younger than this.
 const SPAN: usize = WINDOW;
 
 /// Bits of a word.
@@ -63,7 +62,7 @@ pub(crate) struct History<T, P = [T; SPAN]> {
     before: (u64, T),
     /// The latest setting of all. Its millisecond is the latest that has a place.
     latest: (u64, T),
-    /// What was set last in each millisecond. The bits below tell where something was.
+    /// The last value set in each millisecond. The bits below say which milliseconds have one.
     values: P,
     is_set: Bits,
 }
@@ -91,8 +90,8 @@ impl<T: Copy, P: Places<T>> History<T, P> {
     /// already.
     pub(crate) fn set(&mut self, tick_ms: u64, value: T) {
         if tick_ms + SPAN as u64 <= self.latest.0 {
-            // All changes of that time have been recorded. The setting may still be the latest one
-            // before those that have a place.
+            // All changes of that time have been recorded. This setting may still be the latest one
+            // before the milliseconds that have a place.
             if tick_ms >= self.before.0 {
                 self.before = (tick_ms, value);
             }
@@ -107,7 +106,7 @@ impl<T: Copy, P: Places<T>> History<T, P> {
         self.is_set.put(place, true);
     }
 
-    /// Gives the places of milliseconds that are too long ago to those up to `tick_ms`.
+    /// Reuses the places of milliseconds that are too long ago for those up to `tick_ms`.
     fn go_on_to(&mut self, tick_ms: u64) {
         let begin_ms = tick_ms.saturating_sub(SPAN as u64 - 1);
         self.before = self.setting_before(begin_ms);
@@ -130,16 +129,16 @@ impl<T: Copy, P: Places<T>> History<T, P> {
         self.setting_before(tick_ms).1
     }
 
-    /// The latest setting before this millisecond, and when it was.
+    /// The latest setting before this millisecond, and its time.
     fn setting_before(&self, tick_ms: u64) -> (u64, T) {
-        // Nearly always: clocks are seldom set.
+        // The usual case: clocks are seldom set.
         if tick_ms > self.latest.0 {
             return self.latest;
         }
         self.find_before(tick_ms).unwrap_or(self.before)
     }
 
-    /// The same among those that have a place.
+    /// The same, among the settings that have a place.
     fn find_before(&self, tick_ms: u64) -> Option<(u64, T)> {
         let mut ms = tick_ms.checked_sub(1)?;
         while ms + SPAN as u64 > self.latest.0 {
@@ -147,7 +146,7 @@ impl<T: Copy, P: Places<T>> History<T, P> {
             let word = self.is_set.word(place)? << (BITS - 1 - place % BITS);
             if word != 0 {
                 let at_ms = ms.checked_sub(word.leading_zeros().into())?;
-                // Further back the places are those of the latest milliseconds.
+                // Further back, the places already belong to the latest milliseconds.
                 let has_place = at_ms + SPAN as u64 > self.latest.0;
                 return self
                     .values
@@ -195,7 +194,7 @@ mod tests {
         let seen: String = [10, 11, 20, 21].map(|tick| history.at_sample(tick)).iter().collect();
         assert_eq!(seen, "abbc");
         assert_eq!(history.latest(), 'c');
-        // Also when there is no place for it any more.
+        // The setting counts although it has no place any more.
         history.set(5_000, 'e');
         history.set(30, 'd');
         history.set(15, 'x');
@@ -211,12 +210,12 @@ mod tests {
         for tick_ms in 2_000 - SPAN_MS + 2..=2_001 {
             assert_eq!(history.at_sample(tick_ms), tick_ms - 1);
         }
-        // Before the first of them stands the one that was forgotten last.
+        // The setting that was forgotten last stands before the first remembered one.
         assert_eq!(history.at_sample(2), 2_000 - SPAN_MS);
     }
 
     proptest! {
-        /// A list that forgets nothing gives the same for all that can still be asked.
+        /// Compares with a list that forgets nothing, for every question that can still be asked.
         #[test]
         fn it_is_a_list_of_settings(
             start_ms in prop_oneof![Just(0_u64), Just(u64::from(u32::MAX) - 300)],

@@ -1,4 +1,4 @@
-//! The recorder itself, without a single pin, register or clock of its own.
+//! The recorder itself. It owns no pin, no register and no clock.
 //!
 //! One contact change goes through these files, in this order:
 //!
@@ -7,12 +7,12 @@
 //! 2. [`sequencer`]: the main loop puts changes in the order in which they began;
 //! 3. [`clock`]: ticks since power-up become date and time;
 //! 4. [`event_log`]: the ring of up to 2048 events;
-//! 5. `recorder`: owns all of that, serves the commands and says what is to go out;
+//! 5. `recorder`: owns all of that, serves the commands and decides what to send;
 //! 6. `serial_port`: the bytes of the RS-232 line; [`genius_port`]: the datagrams of the Genius
 //!    bus, for boards that have one.
 //!
-//! A port knows no recorder: it makes an `arrival` of what came in, and bytes of what is to go out.
-//! [`Node`] carries from one to the other.
+//! A port does not know the recorder. It turns what came in into an `arrival`, and what is to go
+//! out into bytes. [`Node`] carries data from one to the other.
 //!
 //! Time and bytes are passed in; bytes come out. A board or the simulator calls [`Capture::sample`]
 //! every millisecond and [`Node::poll`] as often as it can. Nothing here blocks, allocates or

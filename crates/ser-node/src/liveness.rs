@@ -1,7 +1,7 @@
 //! Decides whether the watchdog may be fed.
 
-/// Feeds only while both halves of the recorder make progress: the main loop by asking, capture by
-/// its tick.
+/// Allows feeding only while both halves of the recorder make progress. The main loop proves it by
+/// asking, capture by its tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Liveness {
     last_tick_ms: Option<u32>,
@@ -15,7 +15,7 @@ impl Liveness {
     }
 
     /// Called at the end of every pass of the main loop with the tick of the latest sample. True
-    /// when the watchdog may be fed: capture has sampled since the last time.
+    /// when capture has sampled since the last call, so the watchdog may be fed.
     pub fn pass(&mut self, tick_ms: u32) -> bool {
         let sampled = self.last_tick_ms != Some(tick_ms);
         self.last_tick_ms = Some(tick_ms);

@@ -1,9 +1,9 @@
 //! The recorder as a board or the simulator sees it: samples, bytes and ticks in, bytes out.
 //!
 //! A main loop reads the tick, hands over the bytes that have arrived, calls [`Node::poll`] with
-//! that tick, and takes bytes to send for as long as there is room for them. Nothing is decided
-//! here: the ports know bytes, the recorder knows what they mean, and a node carries from one to
-//! the other.
+//! that tick, and takes bytes to send for as long as there is room for them. A node decides
+//! nothing: the ports know bytes, the recorder knows what they mean, and the node carries from one
+//! to the other.
 
 use geni_board::SharedRam;
 use ser_proto::genius::max_entries;
@@ -18,7 +18,7 @@ use crate::serial_port::SerialPort;
 use crate::settings::Storage;
 use crate::waiting::Request;
 
-/// Things the GENI board has to say that are dealt with in one poll.
+/// Events of the GENI board that one poll handles at most.
 const EVENTS_PER_POLL: usize = 4;
 
 /// A recorder.
@@ -34,7 +34,7 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         Node { serial: SerialPort::new(recorder.configuration().baud), recorder }
     }
 
-    /// The tick of the latest sample: what a main loop reads first and passes to
+    /// The tick of the latest sample. A main loop reads it first and passes it to
     /// [`poll`](Self::poll) last.
     pub fn tick_ms(&self) -> u32 {
         self.recorder.tick_ms()
@@ -43,17 +43,17 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
     /// Records all changes up to the sample of `now_ms`.
     ///
     /// The main loop reads `now_ms` from [`tick_ms`](Self::tick_ms) *before* it hands over received
-    /// bytes: a command that arrives later than `now_ms` then never finds changes recorded that
-    /// came after it.
+    /// bytes. A change that came after a command is then never recorded before that command is
+    /// seen.
     pub fn poll(&mut self, now_ms: u32) {
         self.recorder.record_until(now_ms);
     }
 
-    /// Takes a byte from the RS-232 line that arrived at `tick_ms`, and the command that it
-    /// completes.
+    /// Takes a byte that arrived from the RS-232 line at `tick_ms`. The command that it completes
+    /// is accepted here.
     ///
-    /// Clock and mode are set at once, by that tick; everything else is done when the reply has its
-    /// turn.
+    /// Clock and mode are set at once, as of that tick. Every other command is carried out when its
+    /// reply has its turn.
     pub fn serial_receive(&mut self, byte: u8, tick_ms: u32) {
         match self.serial.receive(byte, tick_ms) {
             Some(Ok(arrival)) => self.recorder.arrived(&arrival),
@@ -63,18 +63,18 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
     }
 
     /// Whether another command finds room to wait for its turn. A board that can keep bytes back
-    /// does so until then.
+    /// does so while this is false.
     pub fn serial_has_room(&self) -> bool {
         self.recorder.has_room(Way::Line)
     }
 
-    /// The UART lost or misread so many more bytes.
+    /// Counts that many more bytes that the UART lost or misread.
     pub fn serial_line_errors(&mut self, bytes: u32) {
         self.recorder.count_line_errors(bytes);
     }
 
-    /// The next byte for the RS-232 line; `None` when there is nothing to send, or the rate must
-    /// change first.
+    /// The next byte for the RS-232 line. `None` when there is nothing to send, or when the rate
+    /// must change first.
     pub fn serial_transmit(&mut self) -> Option<u8> {
         if let Some(byte) = self.serial.next_byte() {
             return Some(byte);
@@ -91,10 +91,9 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.recorder.configuration().baud
     }
 
-    /// The rate to which the line shall change, as soon as all bytes handed out have left the
-    /// transmitter.
+    /// The rate to which the line must change once all bytes handed out have left the transmitter.
     ///
-    /// Until [`baud_changed`](Self::baud_changed) is called, nothing more is handed out.
+    /// Nothing more is handed out until [`baud_changed`](Self::baud_changed) is called.
     pub fn baud_change(&self) -> Option<Baud> {
         self.serial.baud_change(self.baud())
     }
@@ -104,29 +103,30 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.serial.baud_changed(baud);
     }
 
-    /// The interrupt line of the GENI board was pulsed at `tick_ms`: a datagram arrived then.
-    /// Called before [`poll`](Self::poll), so that no change after it is recorded before it has
-    /// been read. A board that does not connect the line need not call this; the flags are looked
-    /// at all the same.
+    /// Says that the GENI board pulsed its interrupt line at `tick_ms`, because a datagram arrived
+    /// then. Called before [`poll`](Self::poll), which then records no change after that tick until
+    /// the datagram has been read. A board that does not connect the line need not call this: the
+    /// flags are polled in any case.
     pub fn genius_interrupt<W: SharedRam>(&mut self, port: &mut GeniusPort<W>, tick_ms: u32) {
         port.interrupt(tick_ms);
         self.recorder.hold_after(port.oldest_arrival_ms());
     }
 
-    /// Does what is due on the Genius bus, a bounded amount of it: global data, commands that have
-    /// arrived, one datagram to be sent. Called after [`poll`](Self::poll).
-    // Apart from the main loop: in one function they are longer than a table of jumps reaches, and
-    // what a compiler does instead, no check of an image follows.
+    /// Does a bounded amount of the work that is due on the Genius bus: global data, commands that
+    /// have arrived, one datagram to send. Called after [`poll`](Self::poll).
+    // Not inlined into the main loop: the merged function would be too long for the branches of a
+    // jump table. The code that a compiler emits instead cannot be followed by the image check.
     #[inline(never)]
     pub fn genius_poll<W: SharedRam>(&mut self, port: &mut GeniusPort<W>) {
-        // Not that of `poll`: what was done since may have taken long, and a flag is seen now.
+        // Read anew, not taken from `poll`: work since then may have taken long, and a flag is seen
+        // now.
         let now_ms = self.tick_ms();
         port.show(self.recorder.inputs());
         for _ in 0..EVENTS_PER_POLL {
             let Some(said) = port.poll(now_ms) else { break };
             self.deal_with(said, port);
-            // That may have taken long, as the storing of a configuration does. Pulses are handed
-            // in before flags are looked at again.
+            // That may have taken long, as storing a configuration does. Pulses must be handed in
+            // before the flags are looked at again.
             if self.tick_ms() != now_ms {
                 break;
             }
@@ -137,7 +137,7 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         }
     }
 
-    /// What was dropped, refused or lost so far.
+    /// What has been dropped, refused or lost since power-up.
     pub fn diagnostics(&self) -> Diagnostics {
         self.recorder.diagnostics()
     }
@@ -152,20 +152,19 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.recorder.events()
     }
 
-    /// What a read of `count` entries (at most 10) from number `start` on would bring now, without
-    /// a port and without a trace.
+    /// What a read of `count` entries (at most 10) from number `start` on would return now. Uses no
+    /// port and leaves no trace.
     pub fn read(&self, start: u16, count: u8) -> ReadReply {
         self.recorder.read(start, count.into())
     }
 
-    /// Commands that have arrived since power-up on any port, those included that were refused;
-    /// wraps.
+    /// Commands that have arrived on any port since power-up, refused ones included; wraps.
     pub fn commands(&self) -> u32 {
         self.recorder.commands()
     }
 
-    /// Lines up the next message for RS-232: replies first, then what was ordered, then what nobody
-    /// asked for.
+    /// Lines up the next message for RS-232: replies first, then ordered print jobs, then
+    /// unsolicited messages.
     fn begin_message(&mut self) {
         let Node { recorder, serial } = self;
         if let Some(reply) = recorder.next_line_reply() {
@@ -188,13 +187,13 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
                 }
             }
             FromBus::Reported { first, entries } => self.recorder.reported(first, entries),
-            // By the time the board is back, nobody waits for these any more.
+            // Nobody waits for these replies any more once the board is back.
             FromBus::Failed => port.count_lost(self.recorder.forget_bus_requests()),
             FromBus::DealtWith => {}
         }
     }
 
-    /// Replies go before reports: somebody waits for them.
+    /// Sends replies before reports, because a host waits for a reply.
     fn send_on_bus<W: SharedRam>(&mut self, port: &mut GeniusPort<W>, now_ms: u32) {
         let max_entries = max_entries(self.recorder.model());
         match self.recorder.next_bus_request() {

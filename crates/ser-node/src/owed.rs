@@ -1,7 +1,7 @@
-//! Events that somebody is still to be told of.
+//! Events that a receiver has not been told of yet.
 //!
-//! Only a position in the log is kept, so nothing is lost until the ring overwrites it, and then it
-//! is counted.
+//! Only a position in the log is kept. No event is lost until the ring overwrites it, and that is
+//! counted.
 
 use crate::event_log::EventLog;
 
@@ -16,24 +16,25 @@ impl Owed {
     /// Everything since power-up.
     pub(crate) const ALL: Owed = Owed { next: 0 };
 
-    /// None of the events that there are; the next one is the first.
+    /// None of the existing events; the next one is the first.
     pub(crate) fn none(log: &EventLog<'_>) -> Owed {
         Owed { next: log.next_sequence() }
     }
 
-    /// Passes over what the ring has overwritten; says how many events these were.
+    /// Skips what the ring has overwritten; returns how many events that were.
     pub(crate) fn skip_overwritten(&mut self, log: &EventLog<'_>) -> u64 {
         let overwritten = log.oldest_sequence().saturating_sub(self.next);
         self.next += overwritten;
         overwritten
     }
 
-    /// Sequence number of the first event that is owed, as soon as there is one.
+    /// Sequence number of the first event owed, or of the next event if none is owed.
     pub(crate) fn first(self) -> u64 {
         self.next
     }
 
-    /// So many events from `first` on have been told of. Means nothing when others are owed by now.
+    /// Marks that many events from `first` on as told. Has no effect when other events are owed by
+    /// now.
     pub(crate) fn told(&mut self, first: u64, events: usize) {
         if self.next == first {
             self.next += events as u64;

@@ -41,7 +41,7 @@ impl PrintLine {
         line.end()
     }
 
-    /// The line that stands for something that cannot be printed any more.
+    /// The line that stands for something that can no longer be printed.
     pub(crate) fn lost(count: u32, what: &[u8]) -> PrintLine {
         let mut line = PrintLine::default();
         line.text(b"*** ");

@@ -1,4 +1,4 @@
-//! What a printer on the RS-232 line is to print: the jobs that were ordered, and auto print.
+//! What a printer on the RS-232 line prints: ordered jobs, and auto print.
 
 use heapless::Deque;
 
@@ -17,7 +17,7 @@ struct Job {
     left: u16,
 }
 
-/// The jobs, and how far auto print has come.
+/// The jobs, and the progress of auto print.
 pub(crate) struct Printer {
     jobs: Deque<Job, MAX_JOBS>,
     owed: Owed,
@@ -29,17 +29,18 @@ impl Printer {
         Printer { jobs: Deque::new(), owed: Owed::ALL, edges_lost_printed: 0 }
     }
 
-    /// Puts a job in line; false when too many are waiting.
+    /// Queues a job; false when too many are waiting.
     pub(crate) fn order(&mut self, start: u16, count: u16) -> bool {
         self.jobs.push_back(Job { next: start, left: count }).is_ok()
     }
 
-    /// Auto print is switched on or off. It begins with the next event.
+    /// Notes that auto print was switched on or off. It begins with the next event.
     pub(crate) fn auto_print_changed(&mut self, log: &EventLog<'_>) {
         self.owed = Owed::none(log);
     }
 
-    /// Erased events are not printed, and neither is what a job was still to find among them.
+    /// Drops everything still to be printed, because the events were erased: jobs and auto print
+    /// alike.
     pub(crate) fn erased(&mut self, log: &EventLog<'_>) {
         self.owed = Owed::none(log);
         self.jobs.clear();
@@ -63,13 +64,13 @@ impl Printer {
         None
     }
 
-    /// Without auto print, nothing that capture lost is told later.
+    /// Notes losses while auto print is off, so that they are not printed later.
     pub(crate) fn is_off(&mut self, edges_lost: u32) {
         self.edges_lost_printed = edges_lost;
     }
 
-    /// The next line of auto print: what is lost comes before what is there. Counts events that
-    /// were overwritten unprinted.
+    /// The next line of auto print: losses come before the events that are there. Counts events
+    /// that were overwritten unprinted.
     pub(crate) fn next_auto(
         &mut self,
         log: &EventLog<'_>,

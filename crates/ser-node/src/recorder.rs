@@ -1,8 +1,8 @@
 //! What the recorder knows and does, whichever port asks: log, clock, configuration, recording
 //! mode, and the commands that wait to be answered.
 //!
-//! Commands are answered in the order in which they came. What nobody asked for (print jobs, auto
-//! report, auto print) goes out when no command is waiting, from the log itself.
+//! Commands are answered in the order in which they came. Unsolicited output (print jobs, auto
+//! report, auto print) is taken from the log itself when no command is waiting.
 
 use chrono::NaiveDateTime;
 use ser_proto::genius::ForceTable;
@@ -56,7 +56,7 @@ pub(crate) struct Recorder<'a, S, R> {
     /// Events to report, whichever port reports.
     to_report: Owed,
     last_broadcast: Option<LastBroadcast>,
-    /// Commands that have arrived on any port, wrapping.
+    /// Commands that have arrived on any port; wraps.
     commands: u32,
     diagnostics: Diagnostics,
 }
@@ -117,7 +117,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         u32::from_le_bytes([a, b, c, d])
     }
 
-    /// Commands that have arrived, those included that were refused; wraps.
+    /// Commands that have arrived, refused ones included; wraps.
     pub(crate) fn commands(&self) -> u32 {
         self.commands
     }
@@ -131,12 +131,12 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
-    /// A frame on the RS-232 line was given up.
+    /// Counts a frame on the RS-232 line that was given up.
     pub(crate) fn count_frame_error(&mut self, error: FrameError) {
         self.diagnostics.count_frame_error(error);
     }
 
-    /// The UART lost or misread so many more bytes.
+    /// Counts that many more bytes that the UART lost or misread.
     pub(crate) fn count_line_errors(&mut self, bytes: u32) {
         count(&mut self.diagnostics.line_errors, bytes.into());
     }
@@ -154,8 +154,8 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         until_ms
     }
 
-    /// A datagram that arrived at this tick waits to be read: changes that come after it are
-    /// recorded when it has been, as it may set clock or mode.
+    /// Holds back changes after this tick: a datagram that arrived then waits to be read and may
+    /// set clock or mode.
     pub(crate) fn hold_after(&mut self, arrived_ms: Option<u32>) {
         self.changes.hold_after(arrived_ms);
     }
@@ -165,17 +165,17 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         self.waiting.has_room(way)
     }
 
-    /// Takes a command. Clock and mode are set at once, by its tick; everything else is done when
-    /// the reply has its turn. What changed before is recorded first, by the clock and mode of that
-    /// time.
+    /// Takes a command. Earlier changes are recorded first, by the clock and mode of their time.
+    /// Clock and mode are then set at once, as of the command's tick. Everything else is done when
+    /// the reply has its turn.
     pub(crate) fn arrived(&mut self, arrival: &Arrival) {
         let Arrival { command, tick_ms, is_seen, way } = *arrival;
         if !is_seen && matches!(command, Ok(Command::SetMode { .. })) {
-            // Better late than never; but changes of that time have been judged by the mode of
-            // before.
+            // The setting takes effect late, which is better than never. Changes after its arrival
+            // have already been recorded by the old mode.
             count(&mut self.diagnostics.settings_late, 1);
         }
-        // What came over the line and is no command is counted as that, room or no room.
+        // Bad input from the line is counted as bad input whether or not there is room.
         let needs_room = command.is_ok() || way != Way::Line;
         if needs_room && !self.waiting.has_room(way) {
             count(&mut self.diagnostics.commands_overrun, 1);
@@ -196,7 +196,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
-    /// A device on the bus asks for a force table. False when there is no room for its question.
+    /// Takes a bus device's question for a force table. False when there is no room for it.
     pub(crate) fn forces_asked(&mut self, device: u8, table: ForceTable) -> bool {
         self.waiting.push_forces(device, table)
     }
@@ -211,18 +211,18 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         None
     }
 
-    /// The request from the bus whose turn it is, and the number of the device that asks.
+    /// The request from the bus whose turn it is, and the bus address of the device that asks.
     pub(crate) fn next_bus_request(&mut self) -> Option<(u8, Request)> {
         self.waiting.next_from_bus()
     }
 
-    /// Forgets what waits for the bus; says how many requests it were.
+    /// Forgets the requests that wait for the bus; returns how many there were.
     pub(crate) fn forget_bus_requests(&mut self) -> usize {
         self.waiting.forget_bus()
     }
 
-    /// Carries out what is still to be done, and gives the reply, with at most `max_entries`
-    /// entries; `None` when it is refused by silence.
+    /// Carries out what is still to be done and returns the reply, with at most `max_entries`
+    /// entries. `None` when the command is refused, which the protocol does by silence.
     pub(crate) fn reply(&mut self, pending: Pending, max_entries: usize) -> Option<Reply> {
         Some(match pending {
             Pending::ClockSet => Reply::ClockSet,
@@ -247,7 +247,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         })
     }
 
-    /// The entries from `start` on that exist, at most `count` and not around the end of the ring.
+    /// The existing entries from `start` on: at most `count`, and never across the end of the ring.
     pub(crate) fn read(&self, start: u16, count: usize) -> ReadReply {
         let entries = (start..=self.log.len())
             .map_while(|number| self.log.entry(number))
@@ -268,7 +268,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         self.printer.next_ordered(&self.log)
     }
 
-    /// The next auto report for the RS-232 line. There is nobody to acknowledge it.
+    /// The next auto report for the RS-232 line. Nobody acknowledges it.
     pub(crate) fn next_line_report(&mut self) -> Option<Reply> {
         if self.configuration.auto_report != AutoReport::Rs232 {
             return None;
@@ -288,10 +288,10 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         self.printer.next_auto(&self.log, edges_lost, &mut self.diagnostics.events_unprinted)
     }
 
-    /// The oldest events that auto report owes to its receiver, and the sequence number of the
-    /// first one.
+    /// The oldest events that auto report still owes to its receiver, and the sequence number of
+    /// the first one.
     ///
-    /// They stay owed until [`reported`](Self::reported); those that the ring has overwritten
+    /// They stay owed until [`reported`](Self::reported). Those that the ring has overwritten
     /// meanwhile are counted.
     pub(crate) fn report(&mut self, max_entries: usize) -> Option<(u64, ReadReply)> {
         let overwritten = self.to_report.skip_overwritten(&self.log);
@@ -303,7 +303,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         Some((first, self.read(start, owed.min(max_entries))))
     }
 
-    /// So many events from `first` on have reached their receiver. Means nothing when others are
+    /// Marks that many events from `first` on as delivered. Has no effect when other events are
     /// owed by now.
     pub(crate) fn reported(&mut self, first: u64, entries: usize) {
         self.to_report.told(first, entries);
@@ -327,7 +327,8 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
-    /// Counts a body that is no command; some are answered all the same, with what is in force.
+    /// Counts a body that is no command. Some of these are answered nevertheless, with the values
+    /// in force.
     fn refuse(&mut self, error: ParseError) -> Option<Pending> {
         self.diagnostics.count_parse_error(error);
         match error {
@@ -340,8 +341,8 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
-    /// Carries out the rest of a command that was meant for all recorders. Reading and printing,
-    /// which are requests of one host to one recorder, have no effect.
+    /// Carries out the rest of a command that was broadcast to all recorders. Reading and printing
+    /// have no effect: they are requests of one host to one recorder.
     fn finish_broadcast(
         &mut self,
         command: Option<Command>,
@@ -352,8 +353,8 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
             self.reply(pending, 0);
         }
         let Some(command) = command else { return };
-        // The time is that of reception by the clock as it is now: after a broadcast that set it,
-        // the time that was set.
+        // The time of reception, by the clock as it is now. After a broadcast that set the clock,
+        // this is the time that was set.
         let time = to_time_stamp(self.clock.now_ms(tick_ms));
         self.last_broadcast = Some(LastBroadcast {
             code: command.code().byte(),
@@ -372,14 +373,16 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         let configuration = configure.apply_to(&self.configuration);
         self.log.resize(configuration.size);
         if configuration.auto_report != self.configuration.auto_report {
-            // It begins with the next event when it is switched on, or over to the other port.
+            // Auto report begins with the next event when it is switched on or moved to the other
+            // port.
             self.to_report = Owed::none(&self.log);
         }
         if configuration.auto_print != self.configuration.auto_print {
             self.printer.auto_print_changed(&self.log);
         }
         self.configuration = configuration;
-        // Also when nothing changes: it may be in force and not stored, because storing failed.
+        // Stored even when nothing changes: the configuration may be in force without being stored,
+        // because storing failed earlier.
         if !self.settings.holds(&configuration) && self.settings.save(&configuration).is_err() {
             count(&mut self.diagnostics.storage_errors, 1);
         }
@@ -388,7 +391,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
 
     fn erase(&mut self) -> Reply {
         self.log.erase();
-        // Erased events are not owed to anybody.
+        // Erased events are no longer owed to anybody.
         self.to_report = Owed::none(&self.log);
         self.printer.erased(&self.log);
         Reply::Erased
@@ -407,7 +410,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         Pending::Mode { recording: self.recording.latest() }
     }
 
-    /// Counts a setting that changes after its arrival did not find any more.
+    /// Counts a setting that came too late for changes after its arrival.
     fn count_late(&mut self, tick_ms: u64) {
         if self.changes.is_past(tick_ms) {
             count(&mut self.diagnostics.settings_late, 1);
@@ -419,10 +422,11 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
     }
 
     fn set_clock(&mut self, time: TimeStamp, tick_ms: u64) {
-        // The parser let no impossible date through.
+        // The parser lets no impossible date through.
         if let Ok(time) = NaiveDateTime::try_from(time) {
             self.clock.set(tick_ms, time);
-            // The battery-backed clock starts from what it is given when it is given it.
+            // The battery-backed clock starts at the value it is given, at the moment it is given.
+            // It therefore gets the time of now, not of the command's arrival.
             let now_ms = self.changes.now_ms();
             self.rtc.write(date_time(self.clock.now_ms(now_ms)).unwrap_or(time));
         }

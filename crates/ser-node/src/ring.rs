@@ -1,20 +1,20 @@
-//! A ring between an interrupt and the main loop: one end puts items in, the other one takes them
-//! out, neither waits.
+//! A ring between an interrupt and the main loop. One end puts items in, the other takes them out,
+//! and neither waits.
 //!
 //! # Design
-//! Every cell is made of atomics, so the ring is shared without a line of unsafe code. The two
-//! positions run freely and wrap; a position is turned into a cell by masking with a length that
-//! the compiler knows. Hence no division, no bounds check that could fail and no panicking path,
-//! which an interrupt of the highest priority must not have.
+//! Every cell is made of atomics, so the ring is shared without any unsafe code. The two positions
+//! run freely and wrap; a mask of a length known to the compiler turns a position into a cell. The
+//! code therefore has no division, no bounds check that could fail and no panicking path. An
+//! interrupt of the highest priority must have none of these.
 //!
 //! # Tradeoffs
 //! An item has to fit into a handful of atomics (see [`Slot`]). `heapless::spsc` takes any item,
-//! but its two ends forget the length: each step then divides by a number from memory, and the
+//! but its two ends forget the length. Each step then divides by a number from memory, and the
 //! compiler adds the panic for zero.
 //!
 //! # Notes
 //! All `N` cells can be in use. On Cortex-M the loads and stores are the ordinary ones; acquire and
-//! release cost a barrier instruction each.
+//! release each cost a barrier instruction.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, AtomicUsize, Ordering};
 
@@ -51,7 +51,7 @@ impl Slot for u8 {
     }
 }
 
-/// A tick, for instance.
+/// For ticks, for instance.
 impl Slot for u32 {
     type Cell = AtomicU32;
     const EMPTY: AtomicU32 = AtomicU32::new(0);
@@ -67,31 +67,31 @@ impl Slot for u32 {
     }
 }
 
-/// Memory of a ring; belongs into a static.
+/// Memory of a ring, for a static.
 pub struct Ring<T: Slot, const N: usize> {
     /// Position of the oldest item. Only the [`Reader`] moves it.
     head: AtomicUsize,
-    /// Position behind the newest item. Only the [`Writer`] moves it.
+    /// Position after the newest item. Only the [`Writer`] moves it.
     tail: AtomicUsize,
     cells: [T::Cell; N],
 }
 
 impl<T: Slot, const N: usize> Ring<T, N> {
-    /// An empty ring. `N` has to be a power of two; anything else does not compile.
+    /// An empty ring. `N` must be a power of two; anything else does not compile.
     #[must_use]
     pub const fn new() -> Ring<T, N> {
         const { assert!(N.is_power_of_two(), "a position becomes a cell by masking") };
         Ring { head: AtomicUsize::new(0), tail: AtomicUsize::new(0), cells: [T::EMPTY; N] }
     }
 
-    /// The two ends. What was in the ring before stays in it.
+    /// The two ends. Items that are in the ring stay in it.
     pub fn split(&mut self) -> (Writer<'_, T, N>, Reader<'_, T, N>) {
         (Writer { ring: self }, Reader { ring: self })
     }
 
     #[inline]
     fn cell(&self, position: usize) -> Option<&T::Cell> {
-        // Always there: the mask is less than the length.
+        // Always `Some`: the mask is less than the length.
         self.cells.get(position & (N - 1))
     }
 }
@@ -108,7 +108,7 @@ pub struct Writer<'a, T: Slot, const N: usize> {
 }
 
 impl<T: Slot, const N: usize> Writer<'_, T, N> {
-    /// Whether another item finds room. Stays true until this end has put one in.
+    /// Whether another item finds room. Once true, it stays true until this end has put one in.
     #[inline]
     #[must_use]
     pub fn has_room(&self) -> bool {
@@ -117,7 +117,7 @@ impl<T: Slot, const N: usize> Writer<'_, T, N> {
 
     #[inline]
     fn has_room_at(&self, tail: usize) -> bool {
-        // Acquire: the reader has done with the cell before it says so.
+        // Acquire: the reader is done with the cell before it moves the head.
         tail.wrapping_sub(self.ring.head.load(Ordering::Acquire)) < N
     }
 
@@ -139,7 +139,7 @@ impl<T: Slot, const N: usize> Writer<'_, T, N> {
         if let Some(cell) = self.ring.cell(tail) {
             item.store(cell);
         }
-        // Release: who sees the new tail sees the item.
+        // Release: whoever sees the new tail sees the item.
         self.ring.tail.store(tail.wrapping_add(1), Ordering::Release);
         true
     }
@@ -155,7 +155,7 @@ impl<T: Slot, const N: usize> Reader<'_, T, N> {
     #[inline]
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        // Acquire: who sees the new tail sees the item.
+        // Acquire: whoever sees the new tail sees the item.
         self.ring.tail.load(Ordering::Acquire) == self.ring.head.load(Ordering::Relaxed)
     }
 
@@ -190,7 +190,7 @@ mod tests {
 
     use super::*;
 
-    /// Machines stall for seconds.
+    /// Generous, because machines stall for seconds.
     const PATIENCE: Duration = Duration::from_secs(120);
 
     #[test]

@@ -1,28 +1,28 @@
 //! Puts accepted changes in the order in which they began.
 //!
 //! A debounced change is accepted late but stamped with its first moment. Inputs with different
-//! debounce times are therefore accepted in another order than they changed. The sequencer holds
-//! changes back for as long as an earlier one can still turn up, the longest debounce time, and
-//! hands them on in order; without debounce it holds nothing back.
+//! debounce times are therefore accepted in a different order from the one in which they changed.
+//! The sequencer holds changes back for the longest debounce time, because an earlier one can turn
+//! up until then, and hands them on in order. Without debounce it holds nothing back.
 //!
-//! It also holds changes back that came after a datagram which has arrived and not been read: what
-//! it says about clock and mode decides about them.
+//! The sequencer also holds back changes that came after a datagram which has arrived but has not
+//! been read. That datagram may set the clock and mode by which they are recorded.
 
 use ser_proto::Inputs;
 
 use crate::debounce::Debounce;
 
-/// Changes of so many different milliseconds can be waiting.
+/// Changes of that many different milliseconds can wait.
 const WINDOW_MS: u32 = 320;
 
 /// The same, as a number of places.
 pub(crate) const WINDOW: usize = WINDOW_MS as usize;
 
-/// How long a change is held back at most, in milliseconds: for debounce, and for a datagram that
-/// arrived before it. With the longest debounce time of 255 ms that leaves 64 ms for the datagram.
+/// The longest time that a change is held back, in milliseconds: for debounce, and for a datagram
+/// that arrived before it. The longest debounce time of 255 ms leaves 64 ms for the datagram.
 pub const HELD_BACK_MS: u64 = WINDOW_MS as u64 - 1;
 
-/// Inputs that changed in the same millisecond, by the time of their first moment.
+/// Inputs that changed in the same millisecond, by their first moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Change {
@@ -38,7 +38,8 @@ pub struct Change {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Place {
     changed: u32,
-    /// Inputs that capture had to drop: they are in effect from here on, and in no change.
+    /// Inputs whose change capture had to drop. Their new state is in effect from here on, but in
+    /// no change.
     dropped: u32,
 }
 
@@ -52,7 +53,7 @@ pub(crate) struct Sequencer {
     hold_ms: u64,
     /// Changes by the low bits of the tick at which they began.
     waiting: [Place; WINDOW],
-    /// Places that are not empty.
+    /// Number of places that are not empty.
     waiting_count: usize,
     /// Changes after this tick wait.
     hold_after_ms: Option<u64>,
@@ -96,19 +97,19 @@ impl Sequencer {
         self.handed_on_ms > tick_ms
     }
 
-    /// Takes a change that was accepted at `tick_ms`; every earlier one must have been taken out
+    /// Takes a change that was accepted at `tick_ms`. Every earlier one must have been taken out
     /// with [`next`](Self::next).
     pub(crate) fn push(&mut self, tick_ms: u64, changed: u32, state: u32) {
-        // Changes that capture had to drop are in no sample, but the states show them.
+        // Changes that capture had to drop are in no sample, but they show in the states.
         let dropped = state ^ changed ^ self.accepted;
         self.accepted = state;
         self.put(tick_ms, changed, |place, bit| place.changed |= bit);
-        // They were accepted before this sample, and began no later than a change of this sample
-        // would have: what waits from before that time does not know of them.
+        // The dropped changes were accepted before this sample and began no later than a change of
+        // this sample would have. Waiting changes from before that time must not show them.
         self.put(tick_ms, dropped, |place, bit| place.dropped |= bit);
     }
 
-    /// Puts inputs that were accepted at `tick_ms` to the millisecond in which they changed.
+    /// Enters inputs that were accepted at `tick_ms` in the millisecond in which they changed.
     fn put(&mut self, tick_ms: u64, inputs: u32, put: impl Fn(&mut Place, u32)) {
         for number in Inputs(inputs).numbers() {
             let began_ms = tick_ms.saturating_sub(self.debounce.time_ms(number).into());
@@ -119,7 +120,7 @@ impl Sequencer {
         }
     }
 
-    /// The next change in order, when all samples before `before_ms` have been pushed.
+    /// The next change in order, once all samples before `before_ms` have been pushed.
     pub(crate) fn next(&mut self, before_ms: u64) -> Option<Change> {
         let in_order_ms = before_ms.saturating_sub(self.hold_ms);
         let end_ms = match self.hold_after_ms {
@@ -150,9 +151,10 @@ impl Sequencer {
 
 /// The place of a millisecond among the latest [`WINDOW`] of them.
 ///
-/// In steps of 32 bits: a Cortex-M divides those with one instruction, and 64 bits with hundreds.
+/// Calculates in steps of 32 bits: a Cortex-M divides 32 bits with one instruction and 64 bits with
+/// hundreds.
 pub(crate) fn slot(tick_ms: u64) -> usize {
-    /// What 2^32 leaves.
+    /// 2^32 modulo the window.
     const WRAP: u32 = 0_u32.wrapping_sub(WINDOW_MS) % WINDOW_MS;
     const { assert!(WINDOW_MS <= 1 << 16, "the product fits") };
     let [a, b, c, d, e, f, g, h] = tick_ms.to_le_bytes();
@@ -168,8 +170,8 @@ mod tests {
     use crate::CaptureChannel;
     use crate::ticks::Ticks;
 
-    /// Runs samples through capture and sequencer, with the main loop looking only every `every`
-    /// samples.
+    /// Runs samples through capture and sequencer; the main loop looks only at every `every`-th
+    /// sample.
     fn sequence(debounce: Debounce, samples: &[u32], every: usize) -> Vec<Change> {
         let mut channel = CaptureChannel::new();
         let (mut capture, mut reader) = channel.split(debounce);
@@ -194,8 +196,8 @@ mod tests {
         changes
     }
 
-    /// What must come out: for each input alone, the first moments of changes that lasted; then
-    /// sorted by time.
+    /// The expected result: the first moments of lasting changes, for each input alone, sorted by
+    /// time.
     fn expected(debounce: Debounce, samples: &[u32]) -> Vec<(u64, u32)> {
         let mut toggles = std::collections::BTreeMap::<u64, u32>::new();
         for bit in 0..32_u8 {
@@ -315,7 +317,7 @@ mod tests {
         sequencer.hold_after(Some(8));
         sequencer.push(9, 0b0001, 0b0001);
         sequencer.push(10, 0b0010, 0b0011);
-        // Input 3 came on in between, and went with the sample that found no room.
+        // Input 3 came on in between, in a sample that found no room.
         sequencer.push(20, 0b0001, 0b0110);
         assert_eq!(sequencer.next(21), None);
         sequencer.hold_after(None);
@@ -332,7 +334,7 @@ mod tests {
         sequencer.baseline(0);
         sequencer.push(100, 0b0010, 0b0010);
         sequencer.push(101, 0b0001, 0b0011);
-        // Input 3 is on, and nobody has seen when: before 105.
+        // Input 3 is on. Nobody has seen when it came on, but it was before 105.
         sequencer.push(110, 0b0011, 0b0100);
         let seen: Vec<_> = std::iter::from_fn(|| sequencer.next(121)).map(Some).collect();
         let expected = [

@@ -1,6 +1,6 @@
 //! The RS-232 port: bytes become commands; replies and text lines become bytes.
 //!
-//! The port has one message at a time, and what follows it is asked for when it has gone out.
+//! The port holds one message at a time. It asks for the next one when that has gone out.
 
 use ser_proto::{Baud, Command, Decoded, FrameDecoder, FrameEncoder, FrameError, Reply};
 
@@ -46,8 +46,8 @@ impl SerialPort {
         SerialPort { decoder: FrameDecoder::new(), outgoing: Outgoing::Nothing, baud }
     }
 
-    /// Takes a byte that arrived at `tick_ms`; gives the command that it completes, or what was
-    /// wrong with the frame.
+    /// Takes a byte that arrived at `tick_ms`. Returns the command that it completes, or the fault
+    /// of the frame.
     pub(crate) fn receive(
         &mut self,
         byte: u8,
@@ -59,17 +59,17 @@ impl SerialPort {
                 Some(Ok(Arrival { command, tick_ms, is_seen: true, way: Way::Line }))
             }
             Decoded::Dropped(dropped) => Some(Err(dropped.cause)),
-            // Nobody talks text to a recorder.
+            // A recorder expects no text.
             Decoded::Text(_) => None,
         }
     }
 
-    /// Sends a reply after what is being sent, which must be nothing.
+    /// Sends a reply. Nothing else may be on its way.
     pub(crate) fn send(&mut self, reply: &Reply) {
         self.outgoing = Outgoing::Frame(FrameEncoder::new(reply.to_body()));
     }
 
-    /// Sends a line of text after what is being sent, which must be nothing.
+    /// Sends a line of text. Nothing else may be on its way.
     pub(crate) fn print(&mut self, line: PrintLine) {
         self.outgoing = Outgoing::Line(line);
     }
@@ -79,14 +79,14 @@ impl SerialPort {
         self.outgoing.next()
     }
 
-    /// The rate to which the line shall change now. A configuration is carried out when its reply
+    /// The rate to which the line must change now. A configuration is carried out when its reply
     /// goes out, so that reply is the last message at the old rate.
     pub(crate) fn baud_change(&self, configured: Baud) -> Option<Baud> {
         let drained = matches!(self.outgoing, Outgoing::Nothing);
         (configured != self.baud && drained).then_some(configured)
     }
 
-    /// The line has changed its rate.
+    /// Notes that the line has changed its rate.
     pub(crate) fn baud_changed(&mut self, baud: Baud) {
         self.baud = baud;
     }

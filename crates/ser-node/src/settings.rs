@@ -1,12 +1,12 @@
-//! The configuration in non-volatile memory: two checked copies, of which one is always whole.
+//! The configuration in non-volatile memory: two checked copies, one of which is always intact.
 //!
 //! ```text
 //! | 'S' | format | sequence (4) | configuration (6) | CRC-32 (4) |    16 bytes, numbers little-endian
 //! ```
 //!
-//! Saving writes the older copy and leaves the newer one alone, so a power cut while writing costs
-//! the new configuration at most, never both. The configuration is stored as it stands in a `C`
-//! reply.
+//! Saving writes the older copy and leaves the newer one alone. A power cut during a write
+//! therefore costs the new configuration at most, never both. The configuration is stored in the
+//! form of a `C` reply.
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use ser_proto::{Code, Configuration, Reply};
@@ -18,7 +18,7 @@ const MAGIC: u8 = b'S';
 const FORMAT: u8 = 1;
 const CHECKED_LEN: usize = RECORD_LEN - 4;
 
-/// Without a table: a few hundred cycles on a rare occasion are cheaper than a kilobyte of flash.
+/// Without a table: a few hundred cycles on a rare occasion cost less than a kilobyte of flash.
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// One of the two places for a copy. They must not share an erase unit.
@@ -42,32 +42,32 @@ pub trait Storage {
     /// When the memory cannot be read.
     fn read(&mut self, copy: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), Self::Error>;
 
-    /// Writes a copy. If the power fails on the way, the other copy must be as it was.
+    /// Writes a copy. The other copy must stay as it was, even if the power fails during the write.
     ///
     /// # Errors
     /// When the memory cannot be written.
     fn write(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), Self::Error>;
 }
 
-/// The configuration could not be stored; it is in force until the power goes.
+/// The configuration could not be stored. It is in force until the power goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct NotStored;
 
 /// Loads and saves the configuration.
 pub(crate) struct Settings<S> {
     storage: S,
-    /// The copy that holds the newest record, its sequence number, and what it says.
+    /// The copy that holds the newest record, its sequence number and its content.
     newest: Option<(CopyNumber, u32, Configuration)>,
 }
 
 impl<S: Storage> Settings<S> {
-    /// Reads both copies; gives the newest whole one, or the default configuration.
+    /// Reads both copies; returns the newest intact one, or the default configuration.
     pub(crate) fn load(mut storage: S) -> (Settings<S>, Configuration) {
         let first = read(&mut storage, CopyNumber::First);
         let second = read(&mut storage, CopyNumber::Second);
         let newest = match (first, second) {
-            // The second is newer when it is ahead by less than half of the range: sequence numbers
-            // may wrap.
+            // The second copy is newer when it is ahead by less than half of the range, because
+            // sequence numbers may wrap.
             (Some((older, _)), Some((newer, configuration)))
                 if newer.wrapping_sub(older) <= u32::MAX / 2 =>
             {
@@ -160,7 +160,8 @@ mod tests {
 
     use super::*;
 
-    /// Memory that outlives the recorder and whose power can be cut after so many bytes written.
+    /// Memory that outlives the recorder. Its power can be cut after a given number of bytes
+    /// written.
     #[derive(Clone)]
     struct Memory {
         copies: Rc<RefCell<[[u8; RECORD_LEN]; 2]>>,
@@ -197,7 +198,7 @@ mod tests {
             for (index, &byte) in record.iter().enumerate() {
                 let mut left = self.bytes_until_power_cut.borrow_mut();
                 if *left == 0 {
-                    // The byte under way is neither the old one nor the new one.
+                    // The byte being written is neither the old one nor the new one.
                     self.copies.borrow_mut()[copy as usize][index] ^= 0xA5;
                     return Err(PowerCut);
                 }

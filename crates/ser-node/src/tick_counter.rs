@@ -1,19 +1,19 @@
-//! Milliseconds from a free-running hardware counter, for boards: what the tick of every sample is
-//! made of.
+//! Milliseconds from a free-running hardware counter. Boards make the tick of every sample from
+//! them.
 
 use core::num::NonZeroU32;
 
-/// Counts milliseconds by what a free-running 32-bit counter has moved on since the last look.
+/// Counts milliseconds by the progress of a free-running 32-bit counter since the last look.
 ///
-/// An interrupt that comes late, or whose predecessors were swallowed, loses no time this way: the
-/// next look makes up for all of it, as long as there is one a millisecond before the counter has
-/// gone round. The first look counts half a millisecond on, so that looks which jitter around one
-/// per millisecond give exactly one each.
+/// No time is lost when an interrupt comes late or its predecessors were swallowed: the next look
+/// makes up for all of it. It must come at least one millisecond before the counter has gone round
+/// once. The first look adds half a millisecond, so that looks which jitter around one per
+/// millisecond give exactly one tick each.
 #[derive(Clone, Copy, Debug)]
 pub struct TickCounter {
     counts_per_ms: NonZeroU32,
     latest_count: u32,
-    /// Counts that do not make a millisecond yet; always less than `counts_per_ms`.
+    /// Counts that do not make up a millisecond yet; always less than `counts_per_ms`.
     remainder: u32,
     tick_ms: u32,
 }
@@ -26,7 +26,7 @@ impl TickCounter {
         TickCounter { counts_per_ms, latest_count: count, remainder, tick_ms: 0 }
     }
 
-    /// Looks at the counter; gives the tick when at least one millisecond has passed.
+    /// Looks at the counter; returns the tick when at least one millisecond has passed.
     #[inline]
     pub fn advance(&mut self, count: u32) -> Option<u32> {
         let elapsed = count.wrapping_sub(self.latest_count);
@@ -80,7 +80,7 @@ mod tests {
             start: u32,
             steps in prop::collection::vec(prop_oneof![0..100_000_u32, any::<u32>()], 0..50),
         ) {
-            // A round less a millisecond.
+            // One turn of the counter minus a millisecond.
             let steps = steps.into_iter().map(|step| step.min(u32::MAX - counts_per_ms));
             let mut ticks = TickCounter::new(NonZeroU32::new(counts_per_ms).unwrap(), start);
             let (mut passed, mut latest) = (0_u64, 0);

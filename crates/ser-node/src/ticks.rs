@@ -1,10 +1,10 @@
-//! Milliseconds since power-up, made wide enough never to wrap.
+//! Milliseconds since power-up, widened so that they never wrap.
 //!
 //! The interrupt counts in 32 bits, which wrap after 49.7 days; the main loop works in 64.
 
 /// Extends wrapping 32-bit ticks to 64 bits.
 ///
-/// Right as long as every tick given is less than 24.8 days away from the latest one.
+/// Correct as long as every tick given is less than 24.8 days away from the latest one.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ticks {
     latest_ms: u64,

@@ -1,6 +1,6 @@
-//! The firmware version as a recorder tells it.
+//! The firmware version as a recorder reports it.
 
-/// Firmware version as the `M` reply has it, in hundredths: 0.1.0 is 10, 1.2.3 is 123.
+/// Firmware version as in the `M` reply, in hundredths: 0.1.0 is 10, 1.2.3 is 123.
 pub const VERSION: u8 = 100 * digit(env!("CARGO_PKG_VERSION_MAJOR"))
     + 10 * digit(env!("CARGO_PKG_VERSION_MINOR"))
     + digit(env!("CARGO_PKG_VERSION_PATCH"));

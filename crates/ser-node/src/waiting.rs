@@ -1,5 +1,4 @@
-//! Requests that have arrived and whose replies wait for their turn, in the order in which they
-//! came.
+//! Requests that have arrived and whose replies wait for their turn, in order of arrival.
 
 use heapless::Deque;
 use ser_proto::Command;
@@ -7,15 +6,15 @@ use ser_proto::genius::ForceTable;
 
 use crate::arrival::Way;
 
-/// Requests that may wait on each way while a message is being sent. A GENI board itself holds no
-/// more than 15 commands.
+/// Requests that may wait on each way while a message is being sent. A GENI board itself holds at
+/// most 15 commands.
 const MAX_WAITING: usize = 16;
 
 /// A command that has arrived and whose reply waits for its turn.
 ///
-/// Where the moment of arrival matters, the command has been carried out. All others are carried
+/// A command whose moment of arrival matters has already been carried out. All others are carried
 /// out when their turn comes, so that a read is never answered from a log that a later command has
-/// erased already.
+/// already erased.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) enum Pending {
@@ -28,17 +27,17 @@ pub(crate) enum Pending {
 }
 
 /// What a device on the bus asks for. The content is looked up when the reply goes out, so that it
-/// is true then.
+/// is current.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Request {
     Command(Pending),
     Forces(ForceTable),
 }
 
-/// Requests by the way on which they came.
+/// Waiting requests, by the way on which they came.
 pub(crate) struct Waiting {
     line: Deque<Pending, MAX_WAITING>,
-    /// With the number of the device that asks.
+    /// With the bus address of the device that asks.
     bus: Deque<(u8, Request), MAX_WAITING>,
 }
 
@@ -56,7 +55,7 @@ impl Waiting {
         }
     }
 
-    /// Puts a command in line; false when there is no room.
+    /// Queues a command; false when there is no room.
     pub(crate) fn push(&mut self, way: Way, pending: Pending) -> bool {
         match way {
             Way::Line => self.line.push_back(pending).is_ok(),
@@ -65,7 +64,7 @@ impl Waiting {
         }
     }
 
-    /// Puts a device's question for a force table in line; false when there is no room.
+    /// Queues a device's question for a force table; false when there is no room.
     pub(crate) fn push_forces(&mut self, device: u8, table: ForceTable) -> bool {
         self.bus.push_back((device, Request::Forces(table))).is_ok()
     }
@@ -75,12 +74,12 @@ impl Waiting {
         self.line.pop_front()
     }
 
-    /// The request from the bus whose turn it is, and who asks.
+    /// The request from the bus whose turn it is, and the bus address of the device that asks.
     pub(crate) fn next_from_bus(&mut self) -> Option<(u8, Request)> {
         self.bus.pop_front()
     }
 
-    /// Forgets what waits for the bus; says how much it was.
+    /// Forgets the requests that wait for the bus; returns how many there were.
     pub(crate) fn forget_bus(&mut self) -> usize {
         let waiting = self.bus.len();
         self.bus.clear();

@@ -1,4 +1,5 @@
-//! The recorder on its RS-232 line, as the manual tells it: bytes in, bytes out, in virtual time.
+//! The recorder on its RS-232 line, as the manual describes it: bytes in, bytes out, in virtual
+//! time.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -18,7 +19,7 @@ use ser_proto::{
 struct Survivors {
     copies: Rc<RefCell<[[u8; RECORD_LEN]; 2]>>,
     clock: Rc<RefCell<Option<NaiveDateTime>>>,
-    /// Whether memory refuses to be written.
+    /// Whether the memory refuses to be written.
     write_protected: Rc<RefCell<bool>>,
 }
 
@@ -66,7 +67,7 @@ impl Bench {
         Bench::powered_up(model, debounce, log_len, survivors, 0)
     }
 
-    /// A recorder that finds its contacts like this at power-up.
+    /// A recorder that finds its contacts in this state at power-up.
     fn powered_up(
         model: Model,
         debounce: Debounce,
@@ -88,7 +89,7 @@ impl Bench {
         bench
     }
 
-    /// Lets time pass with the contacts as they are.
+    /// Lets time pass without any contact moving.
     fn pass_ms(&mut self, ms: u32) {
         for _ in 0..ms {
             self.tick_ms += 1;
@@ -103,7 +104,7 @@ impl Bench {
         self.pass_ms(1);
     }
 
-    /// So many events, one per millisecond, on input 1.
+    /// Makes that many events, one per millisecond, on input 1.
     fn events(&mut self, count: u32) {
         for _ in 0..count {
             self.contacts(self.inputs ^ 1);
@@ -120,7 +121,7 @@ impl Bench {
         std::iter::from_fn(|| self.node.serial_transmit()).collect()
     }
 
-    /// Sends a command and gives everything that comes back.
+    /// Sends a command and returns everything that comes back.
     fn ask(&mut self, command: &Command) -> Vec<Reply> {
         self.send(FrameEncoder::new(command.to_body()));
         replies(&self.line())
@@ -268,7 +269,7 @@ fn a_board_can_ask_for_what_its_lamps_tell() {
 fn a_contact_that_bounces_is_stamped_with_the_sample_from_which_it_held() {
     let mut bench = Bench::with(Model::Ser160, Debounce::uniform(20), 2048, Survivors::default());
     bench.ask(&Command::SetClock(TEN_O_CLOCK));
-    // Closed at 1, 8 and 12 ms, and open in between, before it holds.
+    // Closed at 1, 8 and 12 ms, and open in between, before it stays closed.
     for (inputs, ms) in [(1, 2), (0, 5), (1, 1), (0, 3), (1, 60)] {
         bench.inputs = inputs;
         bench.pass_ms(ms);
@@ -282,7 +283,7 @@ fn a_debounced_change_is_stamped_with_its_first_moment_and_recorded_by_the_mode_
     bench.ask(&Command::SetClock(TEN_O_CLOCK));
     bench.contacts(1);
     bench.pass_ms(10);
-    // Stopped and set to another time while the change waits for its debounce time.
+    // Recording stops and the clock is set while the change waits for its debounce time.
     bench.ask(&Command::SetMode { recording: false });
     bench.ask(&Command::SetClock(TimeStamp { hour: 23, ..TEN_O_CLOCK }));
     bench.pass_ms(30);
@@ -378,7 +379,7 @@ fn a_read_out_of_range_is_answered_with_what_exists_and_counted() {
     }
     bench.ask(&Command::Print { start: 3000, count: 1 });
     assert_eq!(bench.diagnostics().parameters_refused, 4);
-    // Nothing there yet, or nothing asked for, is no mistake.
+    // A read of entries that do not exist yet, or of none, is no mistake.
     bench.read(3, 10);
     bench.read(1, 0);
     assert_eq!(bench.diagnostics().parameters_refused, 4);
@@ -451,7 +452,7 @@ fn the_clock_is_set_when_the_last_byte_arrives() {
 fn a_main_loop_that_comes_late_stamps_as_if_it_had_been_there() {
     let survivors = Survivors::default();
     let mut bench = Bench::with(Model::Ser160, Debounce::OFF, 2048, survivors.clone());
-    // For 100 ms nobody polls: a change, the command at tick 51, another change.
+    // Nobody polls for 100 ms: a change, the command at tick 51, another change.
     let arrival_ms = bench.tick_ms + 50;
     for ms in 1..=100 {
         let inputs = u32::from(ms >= 20) | u32::from(ms >= 70) << 1;
@@ -461,7 +462,7 @@ fn a_main_loop_that_comes_late_stamps_as_if_it_had_been_there() {
     for byte in FrameEncoder::new(Command::SetClock(TEN_O_CLOCK).to_body()) {
         bench.node.serial_receive(byte, arrival_ms);
     }
-    // So does the battery-backed clock, which shows the time from the moment on in which it is
+    // The battery-backed clock is set too. It shows the time from the moment at which it is
     // written.
     let now = survivors.clock.borrow().expect("was set");
     assert_eq!(TimeStamp::try_from(now), Ok(TimeStamp { millisecond: 50, ..TEN_O_CLOCK }));
@@ -517,7 +518,7 @@ fn a_query_shows_the_configuration_and_changes_nothing() {
 #[test]
 fn a_bad_field_leaves_the_whole_configuration_unchanged() {
     let mut bench = Bench::new(Model::Ser160);
-    // 1024 entries would do, 40 is no report address.
+    // 1024 entries would be allowed, but 40 is no report address.
     bench.send(*b"\x1B074304000602280077");
     assert_eq!(replies(&bench.line()), [Reply::Configuration(Configuration::default())]);
     assert_eq!(bench.diagnostics().parameters_refused, 1);
@@ -649,7 +650,7 @@ fn auto_report_sends_every_event_once_in_order() {
     let [Reply::Read(first)] = &replies(&bench.line())[..] else { panic!("no report") };
     assert_eq!((first.start, first.entries.len(), first.total), (3, 1, 3));
     assert_eq!(first.entries, bench.read(3, 1).entries);
-    // While the line was busy, twelve more events came: ten go into one message.
+    // Twelve more events came while the line was busy; ten go into one message.
     bench.events(12);
     let [Reply::Read(ten), Reply::Read(two)] = &replies(&bench.line())[..] else {
         panic!("no reports")
@@ -813,7 +814,7 @@ fn every_malformed_frame_is_dropped_and_counted_and_the_next_good_one_answered()
         bench.line();
         bench.send(*b"\x1B014C4C");
         assert_eq!(replies(&bench.line()), [Reply::LastBroadcast(None)], "after {bytes:X?}");
-        // Once, and under no other name.
+        // Each is counted once, and under no other name.
         let mut expected = Diagnostics::default();
         *counter(&mut expected) = 1;
         assert_eq!(bench.diagnostics(), expected, "after {bytes:X?}");

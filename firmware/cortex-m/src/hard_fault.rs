@@ -1,9 +1,10 @@
-//! The hard fault handler's way in.
+//! The entry of the hard fault handler.
 //!
 //! # Design
-//! It changes to a stack of its own before it does anything, so that a stack that has run out is a
-//! fault like any other. The processor's own attempt to save registers there fails as well, and it
-//! then enters the handler without them (ARMv7-M architecture, B1.5.11, derived exceptions).
+//! The handler changes to a stack of its own before it does anything else, so that a stack overflow
+//! is a fault like any other. The processor's own attempt to save registers on the old stack fails
+//! as well, and it then enters the handler without them (ARMv7-M architecture, B1.5.11, derived
+//! exceptions).
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -14,7 +15,7 @@ use ser_board::fault::{Evidence, SavedRegisters};
 
 use crate::stack;
 
-/// Bytes; `cargo xtask firmware` shows how much of it is needed.
+/// Bytes; `cargo xtask firmware` shows how much of them is needed.
 #[doc(hidden)]
 pub const STACK_LEN: usize = 1024;
 
@@ -33,11 +34,11 @@ pub static FAULT_STACK: FaultStack = FaultStack(UnsafeCell::new(MaybeUninit::uni
 /// What the processor shows. `frame` is where it has saved registers, if there was room for them.
 ///
 /// # Safety
-/// For the hard fault handler, and `frame` is the stack pointer with which it was entered.
+/// Only for the hard fault handler. `frame` must be the stack pointer with which it was entered.
 #[doc(hidden)]
 pub unsafe fn evidence(frame: *const ExceptionFrame) -> Evidence {
     let saved = stack::contains(frame).then(|| {
-        // SAFETY: the processor has put it there, and nobody else is at work.
+        // SAFETY: the processor has put the registers there, and no other code is running.
         let frame = unsafe { &*frame };
         SavedRegisters { pc: frame.pc(), lr: frame.lr() }
     });
@@ -55,12 +56,12 @@ pub unsafe fn evidence(frame: *const ExceptionFrame) -> Evidence {
     }
 }
 
-/// Makes the handler of the image: calls `end`, a `fn(Fault, &Text) -> !`, with what it was.
+/// Makes the image's handler, which calls `end`, a `fn(Fault, &Text) -> !`, with the kind of fault.
 #[macro_export]
 macro_rules! hard_fault {
     ($end:path) => {
         /// # Safety
-        /// For the vector table.
+        /// Only for the vector table.
         #[unsafe(naked)]
         #[unsafe(no_mangle)]
         unsafe extern "C" fn HardFault() -> ! {

@@ -1,9 +1,10 @@
-//! The memory that outlives a reset, and the only way to write to it: on the way there.
+//! The memory that outlives a reset. A program writes to it only at start-up and on the way to a
+//! reset.
 //!
 //! # Notes
-//! It is read and written word by word and volatile: nobody gave it a first value, and after a
-//! power cut it holds anything. `ser_board` checks what it finds. A power cut that was short may
-//! leave it whole.
+//! The memory is read and written word by word and volatile: it has no first value, and after a
+//! power cut it holds anything. `ser_board` checks what it finds. A short power cut may leave it
+//! intact.
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -16,7 +17,7 @@ use ser_board::last_words::{self, Boot, Fault, Memory, ResetFlag, Text, WORDS};
 struct Kept(UnsafeCell<MaybeUninit<Memory>>);
 
 // SAFETY: used by `boot`, which runs once and before there are interrupts, and by `end`, which does
-// not return: whoever is interrupted by it does not go on, so no two of them are ever at work.
+// not return. Whatever `end` interrupts never continues, so no two of them are ever at work.
 unsafe impl Sync for Kept {}
 
 #[unsafe(link_section = ".uninit.LAST_WORDS")]
@@ -27,7 +28,7 @@ fn with_memory<T>(change: impl FnOnce(&mut Memory) -> T) -> T {
     let kept: *mut u32 = KEPT.0.get().cast();
     let mut memory = [0; WORDS];
     for (number, word) in memory.iter_mut().enumerate() {
-        // SAFETY: inside of the array; any value is a word. See `Kept` for who else might.
+        // SAFETY: inside the array; any value is a word. See `Kept` for other users.
         *word = unsafe { ptr::read_volatile(kept.wrapping_add(number)) };
     }
     let result = change(&mut memory);
@@ -38,11 +39,11 @@ fn with_memory<T>(change: impl FnOnce(&mut Memory) -> T) -> T {
     result
 }
 
-/// What is known about the runs before; counts the start. `flag` says why the chip was reset, by
-/// the chip's own flags or by what is in the memory.
+/// What is known about earlier runs; counts the start. `flag` says why the chip was reset, from the
+/// chip's own flags or from the content of the memory.
 ///
 /// # Safety
-/// This is called once only, before there are interrupts.
+/// Call once only, before there are interrupts.
 pub unsafe fn boot(flag: impl FnOnce(&Memory) -> ResetFlag) -> Boot {
     with_memory(|memory| {
         let flag = flag(memory);

@@ -1,7 +1,7 @@
-//! What the images have in common because their processors do, Cortex-M3 and Cortex-M4F alike: what
+//! What the images have in common because of their processors, Cortex-M3 and Cortex-M4F alike: what
 //! ends a run, what is left of it, and what the program is kept from.
 //!
-//! Everything here touches memory or registers of the processor itself. What can be said without is
+//! Everything here touches memory or registers of the processor itself. Everything that does not is
 //! in `ser_board`.
 #![no_std]
 

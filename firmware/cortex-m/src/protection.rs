@@ -1,10 +1,9 @@
-//! The memory protection unit: what a program never touches is a fault when it is touched all the
-//! same.
+//! The memory protection unit: makes an access to what a program never uses a fault.
 //!
 //! # Design
-//! A board says what it is kept from; the rest keeps the processor's own map. What lies below the
-//! stack belongs on every board's list: where there is no memory, a store may as well be swallowed,
-//! and a stack that has run out would go unnoticed until something is read back.
+//! A board lists what it is kept from; the rest keeps the processor's own map. The range below the
+//! stack belongs on every board's list. Where there is no memory, a store may be swallowed, and a
+//! stack overflow would go unnoticed until something is read back.
 //!
 //! # Notes
 //! Faults end in the hard fault handler, for which the unit is off. (ARMv7-M architecture, B3.5.)
@@ -21,10 +20,10 @@ const SHAREABLE: u32 = 1 << 18;
 const BUFFERABLE: u32 = 1 << 16;
 const ENABLE: u32 = 1 << 0;
 
-/// The unit is on, outside of fault handlers; what is in no region has the processor's own map.
+/// The unit is on, except in fault handlers. What is in no region has the processor's own map.
 const CONTROL: u32 = 1 << 2 | ENABLE;
 
-/// A range of addresses and what may be done there.
+/// A range of addresses and its permissions.
 #[derive(Clone, Copy)]
 pub struct Region {
     base: u32,
@@ -32,32 +31,32 @@ pub struct Region {
 }
 
 impl Region {
-    /// Nothing may be done there.
+    /// A region without any access.
     #[must_use]
     pub const fn nothing(base: u32, len: u32) -> Region {
         Region::new(base, len, NEVER_EXECUTE)
     }
 
-    /// Data, every access done once, in order and as it was written (device memory).
+    /// A data region with each access done once, in order and as written (device memory).
     #[must_use]
     pub const fn device(base: u32, len: u32) -> Region {
         Region::new(base, len, NEVER_EXECUTE | FULL_ACCESS | SHAREABLE | BUFFERABLE)
     }
 
-    /// The length is a power of two, 32 at least, and the base a multiple of it. For constants: all
-    /// else does not compile.
+    /// The length is a power of two, at least 32, and the base a multiple of it. For constants:
+    /// anything else does not compile.
     const fn new(base: u32, len: u32, attributes: u32) -> Region {
         assert!(len.is_power_of_two() && len >= 32 && base.is_multiple_of(len));
-        // The size is a power of two, given as its exponent less one.
+        // The size is given as its exponent minus one.
         Region { base, size_and_attributes: attributes | (len.ilog2() - 1) << 1 | ENABLE }
     }
 }
 
-/// Switches the protection on, for good. Where regions overlap, the later one holds.
+/// Switches the protection on, for good. Where regions overlap, the later one applies.
 ///
 /// # Safety
-/// The regions take nothing from the program that it uses, and what it shares with nobody is not
-/// among device memory.
+/// The regions forbid nothing that the program uses. Memory that the program shares with nobody is
+/// not declared device memory.
 pub unsafe fn enable<const N: usize>(mpu: &MPU, regions: [Region; N]) {
     const { assert!(N <= REGIONS) };
     for (number, region) in (0..).zip(regions) {

@@ -1,5 +1,5 @@
-//! The stack: where it is and how much of it has been in use. The linker script of the board sets
-//! it aside.
+//! The stack: its place, and how much of it has been in use. The board's linker script sets it
+//! aside.
 
 use core::ptr;
 
@@ -22,14 +22,14 @@ fn start() -> usize {
     (&raw const _stack_start).addr()
 }
 
-/// Whether all of `value` lies in the stack. It may point anywhere.
+/// Whether all of `value` lies in the stack. `value` may point anywhere.
 #[inline]
 pub fn contains<T>(value: *const T) -> bool {
     value.addr() >= end()
         && value.addr().checked_add(size_of::<T>()).is_some_and(|above| above <= start())
 }
 
-/// Bytes of the stack that have been in use at some time since boot.
+/// Most bytes of the stack that have been in use since boot.
 pub fn high_water() -> usize {
     let mut lowest = &raw const _stack_end;
     // SAFETY: from the stack's lowest word up to the frame of this function there is memory, all of

@@ -1,15 +1,15 @@
-//! The very first step after a reset: the clock behind the tick begins to count.
+//! The very first step after a reset: starts the clock behind the tick.
 //!
-//! So the time that a start takes is known, with what the start-up code does before there are
-//! variables: the bench reads it off the external bus.
+//! This makes the time that a start takes measurable, including the start-up code that runs before
+//! there are variables. The bench reads it on the external bus.
 
 use core::arch::naked_asm;
 
-/// Starts timer 1, which counts down from the top and is never stopped again; `timer` goes on with
-/// it.
+/// Starts timer 1, which counts down from the top and is never stopped again. `timer` takes it
+/// over.
 ///
 /// # Safety
-/// Called by the start-up code, before there are variables.
+/// Only for the start-up code, before there are variables.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 unsafe extern "C" fn __pre_init() {

@@ -1,15 +1,15 @@
-//! The configuration's memory: flash of two small sectors, played on the external bus.
+//! The configuration's memory: a simulated flash of two small sectors on the external bus.
 //!
 //! # Design
-//! Cells do what those of flash do: writing takes bits from 1 to 0 and never back, erasing sets a
-//! whole sector. So the image stores through the same `flash_log` as the board to flash, and the
-//! bench, which can end the emulator at any moment, finds what a power cut leaves. Sectors are
-//! small so that erasing comes round within a few changes.
+//! The cells behave like those of flash: a write turns bits from 1 to 0 and never back, and an
+//! erase sets a whole sector. The image therefore stores through the same `flash_log` as the board
+//! to flash. The bench, which can end the emulator at any moment, finds what a power cut leaves.
+//! The sectors are small so that an erase is due within a few changes.
 //!
 //! # Notes
-//! Nothing takes time here, nothing refuses, and cells keep what is half done as clean bits. What a
-//! chip's own controller does (locks, busy flags, the stalled bank) is in the board to flash alone,
-//! and has not been tried.
+//! Nothing takes time here, nothing refuses, and half-written cells keep clean bits. What a chip's
+//! own controller does (locks, busy flags, the stalled bank) is only in the board to flash, and has
+//! not been tried.
 
 use embedded_storage::nor_flash::{
     ErrorType, MultiwriteNorFlash, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase,
@@ -31,14 +31,14 @@ pub(crate) struct BenchFlash(());
 
 impl BenchFlash {
     /// # Safety
-    /// This is called once only: the memory belongs to whoever has it.
+    /// Call once only: the memory belongs to the caller.
     pub(crate) const unsafe fn open() -> BenchFlash {
         BenchFlash(())
     }
 }
 
 impl ErrorType for BenchFlash {
-    /// Outside of the memory, or not a multiple of what can be done at once.
+    /// Outside the memory, or not a multiple of the access unit.
     type Error = NorFlashErrorKind;
 }
 

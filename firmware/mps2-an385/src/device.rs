@@ -1,18 +1,17 @@
-//! What ARM's application note AN385 says about the chip: interrupt numbers, clock, addresses.
+//! Facts about the chip from ARM's application note AN385: interrupt numbers, clock, addresses.
 //!
-//! Takes the place of a generated device crate; the few registers in use are described where they
-//! are driven.
+//! Replaces a generated device crate. The few registers in use are described where they are driven.
 
 use cortex_m::interrupt::InterruptNumber;
 
 /// Clock of processor and peripherals.
 pub(crate) const CLOCK_HZ: u32 = 25_000_000;
 
-/// Where the peripherals are.
+/// Base addresses of the peripherals.
 pub(crate) mod base {
-    /// Timer that gives the capture interrupt.
+    /// Timer of the capture interrupt.
     pub(crate) const TIMER0: usize = 0x4000_0000;
-    /// Timer that counts without end.
+    /// Free-running timer.
     pub(crate) const TIMER1: usize = 0x4000_1000;
     /// RS-232.
     pub(crate) const UART0: usize = 0x4000_4000;
@@ -24,7 +23,7 @@ pub(crate) mod base {
     pub(crate) const EXTERNAL_BUS: usize = 0x2100_0000;
 }
 
-/// Bits of an interrupt priority that the chip has.
+/// Number of bits in an interrupt priority.
 pub(crate) const NVIC_PRIO_BITS: u8 = 3;
 
 /// The interrupts in use.
@@ -49,7 +48,7 @@ unsafe impl InterruptNumber for Interrupt {
     }
 }
 
-/// One place of the vector table.
+/// One entry of the vector table.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub(crate) union Vector {

@@ -34,26 +34,27 @@
 //! - Causes: 0 unknown, 1 panic, 2 hard fault, 3 watchdog, 4 stack overflow, 5 the program asked
 //!   for it, 6 power.
 //! - Faults that can be forced: 1 hard fault, 2 the main loop hangs, 3 panic, 4 stack overflow, 5
-//!   capture stops, 6 stack overflow by a store, 7 reset without a word. The recorder clears the
-//!   word before it obeys.
-//! - Two words with a seal are good when the seal is the inverse of (low xor (high rotated by 16
+//!   capture stops, 6 stack overflow by a store, 7 reset without last words. The recorder clears
+//!   the word before it obeys.
+//! - Two words with a seal are valid when the seal is the inverse of (low xor (high rotated by 16
 //!   bits)).
 //!
 //! # Design
-//! Straps are read once, at boot. After each sample the recorder writes first its tick and then
-//! what it saw: whoever changes the latch and then finds the change at 8020h knows that it has been
-//! sampled, and not later than at the tick that stands at 8004h. It is what a trigger output is to
-//! a scope. Before a boot is counted, both are set to what no sample can have written, so that
-//! nobody takes the run before for this one. The reset line is counted because the bench looks at
-//! it now and then, and a GENI board misses no pulse.
+//! Straps are read once, at boot. After each sample the recorder writes first the tick of the
+//! sample and then its inputs. A bench that changes the latch and then finds the change at 8020h
+//! therefore knows that it has been sampled, at the latest at the tick that stands at 8004h. This
+//! does what a trigger output does for a scope. Before a boot is counted, both words are set to
+//! values that no sample can have written, so that the previous run is not taken for this one. The
+//! resets of the GENI board are counted because the bench only looks now and then, while a real
+//! GENI board misses no pulse.
 //!
 //! # Tradeoffs
-//! Everything sits on one bus, so one file on the desktop holds all there is to see and to set.
+//! Everything is on one bus, so one file on the desktop holds all there is to see and to set.
 //!
 //! # Notes
-//! QEMU backs the bus with a file; what is written on either side is seen on the other at once. The
-//! file outlives the emulator, and so do the configuration and the clock. On the real board the
-//! memory there is a PSRAM.
+//! QEMU backs the bus with a file. What one side writes, the other sees at once. The file outlives
+//! the emulator, and so do the configuration and the clock. On the real board the memory there is a
+//! PSRAM.
 
 use core::ptr::{self, NonNull};
 
@@ -124,15 +125,15 @@ pub(crate) fn read_inputs() -> u32 {
     INPUT_LATCH.read()
 }
 
-/// Tells the bench that the sample of `tick_ms` has been taken, and what it was. The order is a
-/// promise: see the design.
+/// Tells the bench that the sample of `tick_ms` has been taken, and its inputs. The order of the
+/// writes is a promise: see the design.
 #[inline]
 pub(crate) fn mark_sample(tick_ms: u32, inputs: u32) {
     SAMPLE_COUNTER.write(tick_ms);
     SAMPLED_INPUTS.write(inputs);
 }
 
-/// Which recorder the board is strapped to be.
+/// The model that the board is strapped for.
 pub(crate) fn model() -> Model {
     match MODEL_STRAP.read() {
         160 => Model::Ser160,
@@ -146,7 +147,7 @@ pub(crate) fn debounce() -> Debounce {
     Debounce::uniform(time_ms)
 }
 
-/// The port of the node with its board.
+/// The node's Genius port with its board.
 pub(crate) type Genius = genius::Genius<WindowRam, GeniBoard>;
 
 /// A GENI board that is fitted: its shared RAM and its reset line.
@@ -194,7 +195,7 @@ pub(crate) fn change_lamps(change: impl FnOnce(u32) -> u32) {
     LAMPS.write(change(LAMPS.read()));
 }
 
-/// The fault that the bench wants, 0 for none; it is wanted once.
+/// The fault that the bench requests, 0 for none. Each request counts once.
 #[inline]
 pub(crate) fn take_forced_fault() -> u32 {
     let number = FORCED_FAULT.read();
@@ -204,7 +205,7 @@ pub(crate) fn take_forced_fault() -> u32 {
     number
 }
 
-/// Shows how much of the stack has been in use at most.
+/// Shows the most bytes of the stack that have been in use.
 pub(crate) fn mark_stack(bytes: usize) {
     STACK_BYTES.write(u32::try_from(bytes).unwrap_or(u32::MAX));
 }
@@ -214,7 +215,7 @@ pub(crate) fn mark_boot_time(microseconds: u32) {
     BOOT_TIME_US.write(microseconds);
 }
 
-/// Counts a boot and lays open what the latest fault had to say. Gives the count.
+/// Counts a boot and publishes what the latest fault reported. Returns the count.
 pub(crate) fn mark_boot(boot: &Boot) -> u32 {
     SAMPLE_COUNTER.write(0);
     SAMPLED_INPUTS.write(!INPUT_LATCH.read());
@@ -233,7 +234,7 @@ pub(crate) fn mark_boot(boot: &Boot) -> u32 {
         // SAFETY: see the map; a text has no more than `MAX_TEXT_LEN` bytes.
         unsafe { word(offset) }.write(u32::from_le_bytes(whole));
     }
-    // Last: who sees the new count finds all of it.
+    // Last: whoever sees the new count finds all of it.
     let count = BOOT_COUNT.read().wrapping_add(1);
     BOOT_COUNT.write(count);
     count
@@ -249,7 +250,7 @@ pub(crate) struct SealedWords {
 
 impl SealedWords {
     /// # Safety
-    /// As for [`word`], and so for the two words behind.
+    /// As for [`word`], for this word and the two after it.
     const unsafe fn at(offset: usize) -> SealedWords {
         // SAFETY: promised by the caller.
         #[expect(clippy::multiple_unsafe_ops_per_block, reason = "one reason for all three")]
@@ -268,11 +269,11 @@ impl SealedWords {
         (seal == seal_of(low, high)).then_some(u64::from(high) << 32 | u64::from(low))
     }
 
-    /// Writes a number, which stays without a good seal for now.
+    /// Writes a number that has no valid seal yet.
     pub(crate) fn write_unsealed(self, number: u64) {
         let [a, b, c, d, e, f, g, h] = number.to_le_bytes();
         let (low, high) = (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]));
-        // Broken for the old number and for the new one.
+        // Invalid for the old number and for the new one.
         self.seal.write(!seal_of(low, high));
         self.low.write(low);
         self.high.write(high);
@@ -284,7 +285,7 @@ impl SealedWords {
     }
 }
 
-/// A single changed word always breaks it, and so do zeros.
+/// A single changed word always invalidates it, and so do zeros.
 const fn seal_of(low: u32, high: u32) -> u32 {
     !(low ^ high.rotate_left(16))
 }

@@ -1,16 +1,14 @@
-//! What happens when something goes wrong for good: it is written down for the next start, and the
-//! board resets.
+//! What happens on a fatal fault: it is written down for the next start, and the board resets.
 //!
 //! # Design
-//! Nothing is logged here. The last words are, by the start that follows, which also lays them
-//! where the bench can read them.
+//! Nothing is logged here. The start that follows logs the last words and puts them where the bench
+//! can read them.
 //!
 //! # Tradeoffs
-//! A fault costs the log, which is in the memory that nobody can vouch for any more. Recording goes
-//! on within milliseconds: a start takes some 62,000 instructions, most of them for clearing that
-//! memory (4.0 ms with QEMU's `-icount shift=6`, 64 ns for each; 2–10 ms at the emulator's own
-//! speed on a busy computer). The watchdog needs its four seconds first, on this board; see
-//! `watchdog`.
+//! A fault costs the event log, because its memory can no longer be trusted. Recording goes on
+//! within milliseconds: a start takes some 62,000 instructions, most of them for clearing that
+//! memory (4.0 ms with QEMU's `-icount shift=6`, 64 ns each; 2–10 ms at the emulator's own speed on
+//! a busy computer). On this board the watchdog first needs its four seconds; see `watchdog`.
 
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -21,17 +19,18 @@ use ser_cortex_m::last_words;
 
 use crate::watchdog;
 
-/// The last words are being written, and nobody has the last word after that.
+/// The last words are being written. Nothing may write others after them.
 static ENDING: AtomicBool = AtomicBool::new(false);
 
 /// The watchdog's first time-out has come and the second one has not.
 static WATCHDOG_BARKED: AtomicBool = AtomicBool::new(false);
 
-/// What is known about the runs before. QEMU tells no cause of a reset, and its memory keeps what
-/// it holds until the emulator ends: memory that no run has written has been without power.
+/// What is known about earlier runs. QEMU reports no cause of a reset, and its memory keeps its
+/// content until the emulator ends. Memory that no run has written has therefore been without
+/// power.
 ///
 /// # Safety
-/// This is called once only, before there are interrupts.
+/// Call once only, before there are interrupts.
 pub(crate) unsafe fn boot() -> Boot {
     let flag =
         |memory: &Memory| if is_kept(memory) { ResetFlag::Unknown } else { ResetFlag::PowerOn };
@@ -39,7 +38,7 @@ pub(crate) unsafe fn boot() -> Boot {
     unsafe { last_words::boot(flag) }
 }
 
-/// The watchdog has been fed after all. True when its first time-out had come.
+/// Says that the watchdog has been fed. Returns true when its first time-out had already come.
 pub(crate) fn watchdog_fed() -> bool {
     let barked = WATCHDOG_BARKED.load(Ordering::Relaxed);
     if barked {
@@ -53,7 +52,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     end(Fault::Panic, &Text::of_panic(info.location(), info.message().as_str()))
 }
 
-/// A time-out of the watchdog: the first one is a warning, the second one writes down what stands
+/// A time-out of the watchdog. The first one is a warning; the second one writes down what stands
 /// still, and resets.
 #[exception]
 unsafe fn NonMaskableInt() {

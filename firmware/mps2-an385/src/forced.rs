@@ -1,7 +1,7 @@
-//! Faults that the bench forces, to see what this very image does about them.
+//! Faults that the bench forces, to see how this very image handles them.
 //!
-//! A word of the external bus says which; it is cleared before it is obeyed, so that the next start
-//! is sane. Only the emulated board has such a word.
+//! A word of the external bus selects the fault. It is cleared before the fault happens, so that
+//! the next start is sane. Only the emulated board has such a word.
 
 use core::arch::naked_asm;
 use core::hint::black_box;
@@ -12,11 +12,11 @@ use crate::device::Interrupt;
 use crate::external_bus;
 use crate::mmio::Word;
 
-/// Where the chip has nothing: reading it is a bus fault.
-// SAFETY: a multiple of four, outside of all memory; what reading it does is wanted.
+/// An address where the chip has nothing: reading it is a bus fault.
+// SAFETY: a multiple of four, outside of all memory; the fault that a read causes is wanted.
 const NOTHING: Word = unsafe { Word::at(0xA000_0000) };
 
-/// Does what the bench wants, if it wants anything. Called in every pass of the main loop.
+/// Causes the fault that the bench requests, if any. Called in every pass of the main loop.
 #[inline]
 pub(crate) fn obey() {
     match external_bus::take_forced_fault() {
@@ -25,8 +25,8 @@ pub(crate) fn obey() {
     }
 }
 
-/// In one piece, so that whoever looks for panics and recursion in the image knows where they are
-/// meant to be.
+/// Kept in one function, so that a check of the image for panics and recursion knows where they are
+/// intended.
 #[cold]
 #[inline(never)]
 fn force(number: u32) {
@@ -42,15 +42,14 @@ fn force(number: u32) {
             recurse(0);
         }
         5 => NVIC::mask(Interrupt::TIMER0),
-        // SAFETY: it does not come back, and what it does to the stack nobody sees but the fault
-        // handler.
+        // SAFETY: it does not return, and only the fault handler sees what it does to the stack.
         6 => unsafe { store_below_stack() },
         7 => SCB::sys_reset(),
         _ => {}
     }
 }
 
-/// Gets as deep as the stack allows.
+/// Recurses as deep as the stack allows.
 #[expect(unconditional_recursion, reason = "it is meant to run out of stack")]
 #[inline(never)]
 fn recurse(depth: u32) -> u32 {
@@ -59,15 +58,15 @@ fn recurse(depth: u32) -> u32 {
     recurse(kept.wrapping_add(1)).wrapping_add(kept)
 }
 
-/// Runs out of stack as a function does that saves many registers at once: nine find no room, and
-/// the eight that the processor saves when it takes the fault do.
+/// Overflows the stack as a function does that saves many registers at once. Nine registers find no
+/// room, while the eight that the processor saves when it takes the fault do.
 ///
 /// # Safety
-/// Nobody needs what is in the stack any more.
+/// The content of the stack is no longer needed.
 #[unsafe(naked)]
 unsafe extern "C" fn store_below_stack() -> ! {
     naked_asm!(
-        // An interrupt in between would be a stack that runs out in another way.
+        // An interrupt in between would overflow the stack in another way.
         "cpsid i",
         "movw r0, #:lower16:_stack_end",
         "movt r0, #:upper16:_stack_end",

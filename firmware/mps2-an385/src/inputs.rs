@@ -9,7 +9,7 @@ use crate::external_bus;
 
 pub(crate) static HEALTH: InputHealth = InputHealth::new();
 
-/// How contacts are wired for a model: closed is 1.
+/// Wiring of the contacts for a model: closed is 1.
 pub(crate) const fn wiring(model: Model) -> Wiring {
     Wiring { connected: model.mask(), active_low: 0 }
 }

@@ -35,8 +35,8 @@ pub(crate) struct Lamps {
 }
 
 impl Lamps {
-    /// Run, event, communication, fault: bits 0–3. Whoever has this is the only one to change the
-    /// word.
+    /// Run, event, communication, fault: bits 0–3. The owner of this value is the only one to
+    /// change the word.
     pub(crate) fn new() -> Lamps {
         let [run, event, communication, fault] =
             [0, 1, 2, 3].map(|number| Lamp { bit: 1 << number });

@@ -5,13 +5,13 @@
 //! `ser_board::log_writer`.
 //!
 //! # Tradeoffs
-//! Polling holds up the main loop by the length of a record (2 ms at most), which is why events are
-//! not logged. Only `init` and the main loop log: what a fault has to say is logged by the start
-//! that follows.
+//! Polling holds up the main loop for the length of a record (2 ms at most), so events are not
+//! logged. Only `init` and the main loop log. What a fault reports is logged by the start that
+//! follows.
 //!
 //! # Notes
-//! `ser-cli sim` writes the frames into a file; `cargo xtask log` turns them into text with the ELF
-//! file's help.
+//! `ser-cli sim` writes the frames to a file. `cargo xtask log` turns them into text with the help
+//! of the ELF file.
 
 use crate::device::{self, base};
 use crate::mmio::Word;
@@ -35,7 +35,7 @@ const CONTROL: Word = unsafe { Word::at(base::UART1 + 0x8) };
 // SAFETY: as above.
 const BAUD_DIVIDER: Word = unsafe { Word::at(base::UART1 + 0x10) };
 
-/// Starts the UART. Without, log records go nowhere.
+/// Starts the UART. Without this, log records go nowhere.
 pub(crate) fn start() {
     BAUD_DIVIDER.write(device::CLOCK_HZ / BITS_PER_SECOND);
     CONTROL.write(TRANSMIT_ENABLE);

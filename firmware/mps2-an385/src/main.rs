@@ -1,8 +1,8 @@
 //! The recorder on ARM's MPS2 board with the AN385 image (Cortex-M3), as QEMU emulates it.
 //!
 //! Three interrupts and a main loop: capture (highest priority), RS-232 in, RS-232 out, and `idle`,
-//! which does all the rest, the GENI board included. They share no resource, hence nobody ever
-//! locks anything, and capture waits for nobody.
+//! which does all the rest, including the GENI board. They share no resource, so nothing is ever
+//! locked, and capture waits for nobody.
 #![no_std]
 #![no_main]
 
@@ -48,11 +48,12 @@ mod app {
     use crate::watchdog::Watchdog;
     use crate::{fault, forced, log};
 
-    /// There is nothing below the stack, and nobody says so: QEMU swallows what is written there.
+    /// There is no memory below the stack, and QEMU does not report that: it swallows what is
+    /// written there.
     const BELOW_STACK: Region = Region::nothing(0x1000_0000, 0x1000_0000);
 
-    // RTIC takes nothing but literals for priorities; `crates/ser-board/tests/priorities.rs` sees
-    // that the tasks have these.
+    // RTIC takes only literals for priorities. `crates/ser-board/tests/priorities.rs` checks that
+    // the tasks have these.
     const _: () = {
         assert!(budget::CAPTURE_PRIORITY == 3);
         assert!(budget::RECEIVE_PRIORITY == 2);
@@ -187,8 +188,8 @@ mod app {
             );
             forced::obey();
 
-            // A byte that arrives just now waits for the next interrupt, a millisecond at most.
-            // Looking with interrupts off would spare it that, and delay the capture interrupt
+            // A byte that arrives right now waits for the next interrupt, a millisecond at most.
+            // Looking with interrupts off would avoid that, but delay the capture interrupt
             // instead.
             if !serial.has_received() {
                 cortex_m::asm::wfi();
@@ -196,7 +197,7 @@ mod app {
         }
     }
 
-    /// The most that has been in use of the stack; the bench sees it, too.
+    /// The most bytes of the stack that have been in use; also shown to the bench.
     fn stack_bytes() -> usize {
         let bytes = stack::high_water();
         external_bus::mark_stack(bytes);

@@ -2,7 +2,7 @@
 
 use core::ptr;
 
-/// A 32-bit word that hardware, or another processor, reads and writes too.
+/// A 32-bit word that hardware, or another processor, also reads and writes.
 #[derive(Clone, Copy)]
 pub(crate) struct Word {
     address: usize,

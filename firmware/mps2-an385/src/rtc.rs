@@ -1,19 +1,19 @@
-//! The battery-backed clock: milliseconds that the bench counts on the external bus, and what they
-//! mean.
+//! The battery-backed clock: milliseconds that the bench counts on the external bus, and their
+//! meaning.
 //!
 //! # Design
-//! The bench counts whether or not the board runs, as a clock chip does on its battery. What the
-//! clock shows is that count plus an offset, which setting the clock writes into memory that
-//! outlives the power. A fresh memory file holds no offset: the clock has never been set.
+//! The bench counts whether or not the board runs, as a clock chip does on its battery. The clock
+//! shows that count plus an offset. Setting the clock writes the offset into memory that outlives
+//! the power. A fresh memory file holds no offset: the clock has never been set.
 //!
 //! # Tradeoffs
-//! The clock is as good as the bench is punctual: it writes its count every 2 ms when its computer
-//! has the time, and late when not. Setting and reading are late alike, so with an idle computer
-//! these errors cancel but for 2 ms.
+//! The clock is as good as the bench is punctual. The bench writes its count every 2 ms when its
+//! computer has time for it, and late when not. Setting and reading are late alike, so on an idle
+//! computer these errors cancel to within 2 ms.
 //!
 //! # Notes
-//! Two words that are being written may be caught half new, half old; their check tells, and they
-//! are read again.
+//! Two words may be read while they are being written, half new and half old. Their check shows
+//! that, and they are read again.
 
 use chrono::NaiveDateTime;
 use rtcc::DateTimeAccess;
@@ -24,8 +24,8 @@ use crate::external_bus::{CLOCK_COUNT_MS, CLOCK_OFFSET_MS};
 
 pub(crate) static HEALTH: ClockHealth = ClockHealth::new();
 
-/// Looks at the count before it is given up: the bench takes a few instructions to write it, and
-/// may be held up in the middle by its computer.
+/// Looks at the count before it is given up. The bench takes a few instructions to write it, and
+/// its computer may hold it up half-way.
 const MAX_LOOKS: u32 = 10_000;
 
 /// What went wrong.
@@ -33,7 +33,7 @@ const MAX_LOOKS: u32 = 10_000;
 pub(crate) enum RtcError {
     /// The bench does not count.
     NotThere,
-    /// What is shown, or was to be, is no date.
+    /// The clock shows, or was to show, no valid date.
     NoDate,
 }
 
@@ -42,7 +42,7 @@ pub(crate) struct BenchClock(());
 
 impl BenchClock {
     /// # Safety
-    /// This is called once only: its offset belongs to whoever has it.
+    /// Call once only: the offset belongs to the caller.
     pub(crate) const unsafe fn open() -> BenchClock {
         BenchClock(())
     }

@@ -1,16 +1,16 @@
 //! The capture interrupt and the clock behind it.
 //!
 //! # Design
-//! Timer 0 interrupts every millisecond. Timer 1 counts without end from reset on (see `boot`), and
-//! the tick is read off it: the interrupt says *look now*, never *one more millisecond*.
+//! Timer 0 interrupts every millisecond. Timer 1 has run freely since reset (see `boot`), and the
+//! tick is read from it. The interrupt says *look now*, never *one more millisecond*.
 //!
 //! # Tradeoffs
-//! Two timers instead of one. With a tick that counts interrupts, every interrupt that comes later
-//! than the next one is due would put the clock back for good.
+//! This takes two timers instead of one. With a tick that counts interrupts, every interrupt that
+//! comes later than the next one is due would set the clock back for good.
 //!
 //! # Notes
-//! The timers count down; timer 1 goes round after 172 s, which is how long the interrupt may stay
-//! away unnoticed. The watchdog acts long before that.
+//! The timers count down. Timer 1 wraps after 172 s; the interrupt may stay away for that long
+//! without a wrong tick. The watchdog acts long before that.
 
 use core::num::NonZeroU32;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -64,8 +64,8 @@ const TIMER1: Registers = unsafe { Registers::at(base::TIMER1) };
 
 static TICK_MS: AtomicU32 = AtomicU32::new(0);
 
-/// Milliseconds since boot, wrapping. The same tick as that of the latest sample, for those who
-/// have no part in capture.
+/// Milliseconds since boot, wrapping. The tick of the latest sample, for those who have no part in
+/// capture.
 pub(crate) fn tick_ms() -> u32 {
     TICK_MS.load(Ordering::Relaxed)
 }
@@ -75,7 +75,7 @@ pub(crate) struct Timer {
     ticks: TickCounter,
 }
 
-/// Time since reset, in microseconds; good for the first 172 s.
+/// Time since reset, in microseconds; valid for the first 172 s.
 pub(crate) fn since_reset_us() -> u32 {
     count_up() / (device::CLOCK_HZ / 1_000_000)
 }
@@ -87,8 +87,8 @@ impl Timer {
         Timer { ticks: TickCounter::new(COUNTS_PER_MS, count_up()) }
     }
 
-    /// Takes the interrupt back; gives the tick, or `None` when the one before has already counted
-    /// this millisecond.
+    /// Acknowledges the interrupt. Returns the tick, or `None` when the previous interrupt has
+    /// already counted this millisecond.
     #[inline]
     pub(crate) fn on_interrupt(&mut self) -> Option<u32> {
         TIMER0.interrupt_clear.write(1);

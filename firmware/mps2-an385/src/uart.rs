@@ -2,18 +2,18 @@
 //!
 //! # Design
 //! The rings of `ser_board` lie between the interrupts and the main loop. When the main loop is
-//! behind and the ring is full, the interrupt is masked and the byte stays in the UART, so that
-//! what is lost is lost there, and the UART's overrun flag tells.
+//! behind and the ring is full, the interrupt is masked and the byte stays in the UART. Bytes are
+//! therefore lost only in the UART, whose overrun flag reports it.
 //!
 //! # Tradeoffs
-//! The UART holds one byte per direction; at 19200 bit/s the receive interrupt has half a
-//! millisecond, which only the capture interrupt delays.
+//! The UART holds one byte per direction. At 19200 bit/s the receive interrupt has half a
+//! millisecond, and only the capture interrupt delays it.
 //!
 //! # Notes
-//! The transmit interrupt comes when the byte buffer becomes *empty*, never because it *is* empty,
-//! hence the main loop pends it. "Not full" says nothing about the shift register: that the line is
-//! quiet is found out by waiting. QEMU keeps no line speed: bytes come and go as fast as the other
-//! side takes them, and it holds back what the UART has no room for.
+//! The transmit interrupt comes when the byte buffer *becomes* empty, never because it *is* empty,
+//! so the main loop pends it. "Not full" says nothing about the shift register, so the line counts
+//! as quiet only after a wait. QEMU has no line speed: bytes come and go as fast as the other side
+//! takes them, and it holds back what the UART has no room for.
 
 use cortex_m::peripheral::NVIC;
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
@@ -51,7 +51,7 @@ const BAUD_DIVIDER: Word = unsafe { Word::at(base::UART0 + 0x10) };
 /// Memory of both rings.
 pub(crate) type Rings = SerialRings<RECEIVE_RING_LEN, TRANSMIT_RING_LEN>;
 
-/// Starts the UART; gives the main loop's end and the two interrupts' ends.
+/// Starts the UART; returns the main loop's end and the two interrupts' ends.
 pub(crate) fn start(
     rings: &'static mut Rings,
     baud: Baud,
@@ -85,7 +85,7 @@ impl ReceiveInterrupt {
     pub(crate) fn on_interrupt(&mut self, tick_ms: u32) {
         while STATE.read() & RECEIVE_FULL != 0 {
             if !self.receiver.has_room() {
-                // The main loop lets it through again when it has made room.
+                // The main loop unmasks it when it has made room.
                 NVIC::mask(Interrupt::UART0_RX);
                 return;
             }
@@ -106,7 +106,7 @@ pub(crate) struct TransmitInterrupt {
 }
 
 impl TransmitInterrupt {
-    /// Gives the UART what it has room for.
+    /// Fills the UART as far as it has room.
     pub(crate) fn on_interrupt(&mut self) {
         INTERRUPT_CLEAR.write(TRANSMIT_INTERRUPT);
         while STATE.read() & TRANSMIT_FULL == 0 {
@@ -128,7 +128,7 @@ pub(crate) struct Uart0 {
 impl Uart for Uart0 {
     fn let_through(&mut self) {
         if !NVIC::is_enabled(Interrupt::UART0_RX) {
-            // SAFETY: the interrupt masked itself outside of any critical section, waiting for
+            // SAFETY: the interrupt masked itself, outside of any critical section, and waits for
             // this.
             unsafe { NVIC::unmask(Interrupt::UART0_RX) };
         }

@@ -1,21 +1,21 @@
 //! The watchdog.
 //!
 //! # Design
-//! The first time-out is the non-maskable interrupt, which only takes note of it (see `fault`); the
-//! second one leaves the last words and resets the board. A main loop that is late, but alive,
-//! feeds in between and goes on.
+//! The first time-out is the non-maskable interrupt, which only notes it (see `fault`). The second
+//! one writes the last words and resets the board. A main loop that is late but alive feeds the
+//! watchdog in between and continues.
 //!
 //! # Tradeoffs
-//! Two seconds each: a recorder that hangs is back after four. Shorter times would reset an
-//! emulator whose host is busy.
+//! Two seconds for each time-out: a recorder that hangs is back after four. Shorter times would
+//! reset an emulator whose host is busy.
 //!
 //! # Notes
-//! The interrupt is a level that stays until it is cleared, and whether a processor takes a
-//! non-maskable interrupt again while its level stays is not laid down: so it is cleared, and it is
-//! the second interrupt that resets. Clearing it begins a new period. A processor that takes no
-//! interrupt at all does not clear either; then the watchdog resets it at the second time-out by
-//! itself. (Cortex-M System Design Kit, "APB watchdog".) Registers are locked except while they are
-//! written, so that a program gone wild is unlikely to switch the watchdog off.
+//! The interrupt is a level that stays until it is cleared. It is not specified whether a processor
+//! takes a non-maskable interrupt again while its level stays. The handler therefore clears it, and
+//! the second interrupt resets. Clearing it begins a new period. A processor that takes no
+//! interrupt at all does not clear it either; the watchdog itself then resets it at the second
+//! time-out. (Cortex-M System Design Kit, "APB watchdog".) Registers are locked except while they
+//! are written, so that a runaway program is unlikely to switch the watchdog off.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -23,7 +23,7 @@ use crate::device::{self, base};
 use crate::mmio::Word;
 use crate::timer;
 
-/// Each of the two.
+/// Length of each time-out.
 const TIMEOUT_MS: u32 = 2000;
 
 const UNLOCK: u32 = 0x1ACC_E551;
@@ -46,7 +46,7 @@ static FED_MS: AtomicU32 = AtomicU32::new(0);
 pub(crate) struct Watchdog(());
 
 impl Watchdog {
-    /// Starts it; from now on it wants to be fed.
+    /// Starts it; from now on it must be fed.
     pub(crate) fn start() -> Watchdog {
         LOCKING.write(UNLOCK);
         LOAD.write(device::CLOCK_HZ / 1000 * TIMEOUT_MS);
@@ -55,22 +55,22 @@ impl Watchdog {
         Watchdog(())
     }
 
-    /// Starts the time anew; `now_ms` is the tick of the latest sample.
+    /// Restarts the time-out; `now_ms` is the tick of the latest sample.
     pub(crate) fn feed(&mut self, now_ms: u32) {
         FED_MS.store(now_ms, Ordering::Relaxed);
         acknowledge();
     }
 }
 
-/// Clears the interrupt, which also starts the time anew. One that comes in the middle of another
-/// has done what that was to do.
+/// Clears the interrupt, which also restarts the time-out. A call that interrupts another one has
+/// already done the other's work.
 pub(crate) fn acknowledge() {
     LOCKING.write(UNLOCK);
     INTERRUPT_CLEAR.write(1);
     LOCKING.write(LOCK);
 }
 
-/// Which half of the recorder has made no progress since the watchdog was fed.
+/// The half of the recorder that has made no progress since the watchdog was fed.
 pub(crate) fn what_stands_still() -> &'static str {
     if timer::tick_ms() == FED_MS.load(Ordering::Relaxed) {
         "capture stands still"

@@ -1,15 +1,15 @@
-//! What runs from flash: until everything else is in RAM.
+//! The code that runs from flash, until everything else is in RAM.
 //!
-//! Out of reset the processor takes stack and entry from the first two words of the flash.
+//! Out of reset the processor takes its stack and entry from the first two words of the flash.
 //! cortex-m-rt's start-up code then copies the image into RAM, vector table included, and calls
-//! `main` there; see `ram-image.x`. The first thing that `init` does is to go over to that table.
+//! `main` there; see `ram-image.x`. The first thing that `init` does is to switch to that table.
 
 use core::arch::naked_asm;
 
 use cortex_m::asm;
 use cortex_m::peripheral::SCB;
 
-/// One place of the vector table.
+/// One entry of the vector table.
 #[repr(C)]
 union Vector {
     handler: unsafe extern "C" fn() -> !,
@@ -29,8 +29,8 @@ unsafe extern "C" {
 const NONE: Vector = Vector { reserved: 0 };
 const FAULT: Vector = Vector { handler: boot_fault };
 
-/// The vector table until [`use_vectors_in_ram`]. Interrupts are off then; whatever happens all the
-/// same is a reset.
+/// The vector table until [`use_vectors_in_ram`]. Interrupts are off until then, so any exception
+/// is a reset.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".boot_vectors")]
 static BOOT_VECTORS: [Vector; 16] = [
@@ -52,12 +52,12 @@ static BOOT_VECTORS: [Vector; 16] = [
     FAULT,
 ];
 
-/// The very first step: the watchdog, with the 0.5 s that it has by itself (4096 steps of 4 periods
-/// of some 32 kHz). From here on, a start that gets stuck, be it at a crystal that does not swing,
-/// is tried again.
+/// The very first step: starts the watchdog with its default time-out of 0.5 s (4096 steps of 4
+/// periods of some 32 kHz). From here on, a start that gets stuck is tried again, for instance at a
+/// crystal that does not oscillate.
 ///
 /// # Safety
-/// Called by the start-up code, before there are variables.
+/// Only for the start-up code, before there are variables.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".boot")]
@@ -67,7 +67,7 @@ unsafe extern "C" fn __pre_init() {
 }
 
 /// # Safety
-/// For the vector table.
+/// Only for the vector table.
 #[unsafe(naked)]
 #[unsafe(link_section = ".boot")]
 unsafe extern "C" fn boot_fault() -> ! {

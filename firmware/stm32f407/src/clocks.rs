@@ -1,4 +1,4 @@
-//! The clocks: 84 MHz out of the 8 MHz crystal.
+//! The clocks: 84 MHz from the 8 MHz crystal.
 //!
 //! ```text
 //! 8 MHz crystal ÷4 ─┐
@@ -8,23 +8,23 @@
 //! ```
 //!
 //! # Design
-//! A crystal that does not swing, or stops later, leaves the recorder with the chip's RC oscillator
-//! in its place: the same clocks, 1 % off at 25 °C and by several percent where it is hot or cold
-//! (data sheet, "HSI oscillator characteristics"). It goes on recording, and the fault lamp is lit
-//! for as long. Beyond some 4 % off, both ends together, RS-232 does not answer any more.
+//! If the crystal does not oscillate, or stops later, the chip's RC oscillator takes its place: the
+//! same clocks, 1 % off at 25 °C and by several percent where it is hot or cold (data sheet, "HSI
+//! oscillator characteristics"). The recorder goes on recording, and the fault lamp is lit
+//! meanwhile. RS-232 stops working when both ends together are off by more than some 4 %.
 //!
 //! # Tradeoffs
 //! The chip could run twice as fast. But the external bus has the processor's clock, and holds what
-//! it writes for one period of it and no more: at 168 MHz the buffers in front of the GENI board
-//! would eat that up (see `geni_bus`, which does not compile then). The recorder has time to spare
+//! it writes for one clock period and no more. At 168 MHz the buffers in front of the GENI board
+//! would use that up (see `geni_bus`, which does not compile then). The recorder has time to spare
 //! at either speed.
 //!
-//! PCLK1 is a quarter of what it could be, because the serial line's divider has 16 bits: at 42 MHz
-//! it ends at 641 bit/s, and the protocol has 300.
+//! PCLK1 is a quarter of its maximum, because the serial line's divider has 16 bits. At 42 MHz its
+//! slowest rate is 641 bit/s, and the protocol needs 300.
 //!
 //! # Notes
-//! The flash is read by the start-up code and for the configuration only; its wait states are set
-//! all the same, its caches stay off. (RM0090, chapters "Reset and clock control" and "Embedded
+//! Only the start-up code and the configuration read the flash. Its wait states are set
+//! nevertheless; its caches stay off. (RM0090, chapters "Reset and clock control" and "Embedded
 //! flash memory interface".)
 
 use cortex_m::asm;
@@ -37,7 +37,7 @@ const CRYSTAL_DIVIDER: u8 = 4;
 const RC_DIVIDER: u8 = 8;
 const MULTIPLIER: u16 = 168;
 const OUTPUT_DIVIDER: u32 = 4;
-/// For the 48 MHz of USB, which is not in use; 0 and 1 are not allowed.
+/// For the 48 MHz of USB, which is not in use. 0 and 1 are not allowed.
 const USB_DIVIDER: u8 = 7;
 
 /// Clock of the processor and of the external bus.
@@ -56,31 +56,31 @@ const FLASH_WAIT_STATES: u8 = 2;
 
 const _: () = {
     assert!(HCLK_HZ == 84_000_000);
-    // The PLL's input should be 2 MHz, its oscillator has to stay within 100–432 MHz.
+    // The PLL's input should be 2 MHz; its oscillator must stay within 100–432 MHz.
     assert!(
         CRYSTAL_HZ / CRYSTAL_DIVIDER as u32 == 2_000_000 && RC_HZ / RC_DIVIDER as u32 == 2_000_000
     );
     assert!(2 * MULTIPLIER >= 100 && 2 * MULTIPLIER <= 432);
-    // The slowest rate has to fit into the divider of the serial line.
+    // The slowest rate must fit into the divider of the serial line.
     assert!(PCLK1_HZ / 300 < 1 << 16);
 };
 
-/// What PCLK1 is divided by.
+/// The divider from HCLK to PCLK1.
 const PCLK1_DIVIDER: u32 = 8;
 
 /// Looks at the crystal before it is given up, some 10 clocks of 16 MHz each: 125 ms, where 2 ms
 /// are typical.
 const CRYSTAL_LOOKS: u32 = 200_000;
 
-/// What the clocks are made of.
+/// The source of the clocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Source {
     Crystal,
-    /// The crystal does not swing.
+    /// The crystal does not oscillate.
     RcOscillator,
 }
 
-/// Brings the clocks up. Whatever takes forever here ends with the watchdog.
+/// Brings the clocks up. The watchdog ends whatever hangs here.
 pub(crate) fn start(rcc: &RCC, flash: &FLASH) -> Source {
     // SAFETY: more wait states than needed are safe at any speed.
     flash.acr().modify(|_, w| unsafe { w.latency().bits(FLASH_WAIT_STATES) });
@@ -112,15 +112,15 @@ pub(crate) fn start(rcc: &RCC, flash: &FLASH) -> Source {
     rcc.cfgr().modify(|_, w| w.sw().pll());
     while !rcc.cfgr().read().sws().is_pll() {}
     if from_crystal {
-        // A crystal that stops is a non-maskable interrupt.
+        // A crystal that stops raises the non-maskable interrupt.
         rcc.cr().modify(|_, w| w.csson().set_bit());
     }
     source
 }
 
 /// Waits until a part whose clock has just been switched on can be written to: a clock of its bus,
-/// and one more (device errata, "Delay after an RCC peripheral clock enabling"). What is written
-/// earlier may be lost.
+/// and one more (device errata, "Delay after an RCC peripheral clock enabling"). An earlier write
+/// may be lost.
 pub(crate) fn settle() {
     asm::dsb();
     asm::delay(2 * PCLK1_DIVIDER + 2);

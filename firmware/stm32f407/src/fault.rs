@@ -1,9 +1,8 @@
-//! What happens when something goes wrong for good: it is written down for the next start, and the
-//! board resets.
+//! What happens on a fatal fault: it is written down for the next start, and the board resets.
 //!
 //! # Design
-//! Nothing is logged here. The last words are, by the start that follows: the log's memory may be
-//! what has gone wrong, and a probe that comes later finds them too.
+//! Nothing is logged here; the start that follows logs the last words. The log's memory may be what
+//! has gone wrong, and a probe that is attached later still finds the last words.
 
 use core::panic::PanicInfo;
 
@@ -17,7 +16,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     last_words::end(Fault::Panic, &Text::of_panic(info.location(), info.message().as_str()))
 }
 
-/// The crystal has stopped; the processor goes on with its RC oscillator, and so will the next
+/// The crystal has stopped. The processor goes on with its RC oscillator, and so will the next
 /// start.
 #[exception]
 unsafe fn NonMaskableInt() -> ! {

@@ -1,14 +1,14 @@
 //! The configuration's flash: sectors 2 and 3, 16 KiB each.
 //!
 //! # Design
-//! Everything runs from RAM, so erasing and writing stop nobody: capture and the serial interrupts
+//! Everything runs from RAM, so erasing and writing stop nothing: capture and the serial interrupts
 //! go on, and the main loop waits here. While it waits for an erase it feeds the watchdog, as long
-//! as capture makes progress and the erase takes no longer than it may.
+//! as capture makes progress and the erase stays within its time limit.
 //!
 //! # Notes
-//! 32 bits at a time, which wants 2.7 V at least: the brown-out reset has to be at its highest
-//! level, which `reset` tells the log if it is not. Times (data sheet, "Flash memory programming"):
-//! 250–500 ms to erase a sector of 16 KiB, 16–100 µs to write a word.
+//! Writes are 32 bits at a time, which requires 2.7 V at least. The brown-out reset must therefore
+//! be at its highest level; `reset` logs a warning if it is not. Times (data sheet, "Flash memory
+//! programming"): 250–500 ms to erase a sector of 16 KiB, 16–100 µs to write a word.
 
 use core::arch::global_asm;
 use core::ptr;
@@ -25,8 +25,8 @@ use stm32f4::stm32f407::FLASH;
 use crate::timer;
 use crate::watchdog::Watchdog;
 
-/// Where sector 2 begins; ram-image.x keeps the image away from it, and does not link with another
-/// place.
+/// Start of sector 2. ram-image.x keeps the image away from it, and does not link if the two
+/// differ.
 pub(crate) const BASE: u32 = 0x0800_8000;
 /// Sectors 2 and 3.
 pub(crate) const LEN: u32 = 2 * SECTOR_LEN;
@@ -48,9 +48,9 @@ const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 /// 32 bits at a time.
 const WORD_LEN: usize = 4;
 
-/// Twice what the data sheet grants an erase.
+/// Twice the data sheet's maximum for an erase.
 const ERASE_MAX_MS: u32 = 1000;
-/// Looks at a write before it is given up: some ten clocks each, a millisecond.
+/// Looks at a write before it is given up, some ten clocks each: a millisecond.
 const WRITE_LOOKS: u32 = 8400;
 
 pub(crate) static HEALTH: FlashHealth = FlashHealth::new();
@@ -58,11 +58,11 @@ pub(crate) static HEALTH: FlashHealth = FlashHealth::new();
 /// What went wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FlashError {
-    /// Outside of the memory, or not a multiple of what can be done at once.
+    /// Outside the memory, or not a multiple of the access unit.
     Range(NorFlashErrorKind),
-    /// It has not ended in time.
+    /// The operation has not ended in time.
     TimedOut,
-    /// The controller has refused or given up.
+    /// The controller has refused or aborted the operation.
     Refused,
 }
 
@@ -86,22 +86,22 @@ impl ConfigurationFlash {
         ConfigurationFlash { registers, watchdog }
     }
 
-    /// Takes the lock off for as long as `change` takes, and sees whether it went well.
+    /// Unlocks the flash while `change` runs, and checks whether it went well.
     fn change(
         &mut self,
         change: impl FnOnce(&mut Self) -> Result<(), FlashError>,
     ) -> Result<(), FlashError> {
-        // While the flash is at work a write to its registers stalls the bus, and capture with it.
+        // While the flash is at work, a write to its registers stalls the bus, and capture with it.
         if self.is_busy() {
             return Err(FlashError::TimedOut);
         }
-        // A change that was not done in time has left it as it was.
+        // A change that timed out has left the flash unlocked.
         self.registers.cr().write(|w| w.lock().set_bit());
         for key in KEYS {
             // SAFETY: the key register takes any value.
             self.registers.keyr().write(|w| unsafe { w.bits(key) });
         }
-        // Whatever went wrong before must not count as this time's.
+        // Errors of an earlier change must not count against this one.
         self.registers.sr().write(|w| {
             w.pgserr().clear_bit_by_one().pgperr().clear_bit_by_one().pgaerr().clear_bit_by_one();
             w.wrperr().clear_bit_by_one().operr().clear_bit_by_one().eop().clear_bit_by_one()
@@ -115,7 +115,7 @@ impl ConfigurationFlash {
             || status.pgperr().bit_is_set()
             || status.pgaerr().bit_is_set()
             || status.wrperr().bit_is_set();
-        // Ends what was begun, too: all else in the register becomes zero.
+        // Also ends a started operation: all other bits of the register become zero.
         self.registers.cr().write(|w| w.lock().set_bit());
         changed.and(if refused { Err(FlashError::Refused) } else { Ok(()) })
     }
@@ -148,22 +148,22 @@ impl ConfigurationFlash {
     /// and idle.
     fn write_word(&mut self, offset: u32, word: u32) -> Result<(), FlashError> {
         self.registers.cr().modify(|_, w| w.psize().psize32().pg().set_bit());
-        // SAFETY: as memory, the word is nobody's. ram-image.x hands sectors 2 and 3 to no section,
-        // and does not link if these are others: no variable and no code is there. Nothing forms a
-        // reference to it; it is read by `read` alone, through this value, of which there is one
-        // and which is borrowed for writing. It is aligned and inside of the sectors (`check_write`
-        // has looked at the whole range), where the protection unit grants access. As hardware,
-        // unlocked flash takes a store of 32 bits with PG set and PSIZE at 32 bits. Whatever bits
-        // are written over whatever others, the worst is a cell that holds something else, and the
-        // record's check finds that. That nothing can be read from the bank meanwhile stops nobody:
-        // everything runs from RAM.
+        // SAFETY: as memory, nothing else uses the word. ram-image.x assigns sectors 2 and 3 to no
+        // section, and does not link if these are other sectors: no variable and no code is there.
+        // No reference to it is ever formed. Only `read` reads it, through this value, which exists
+        // once and is borrowed for writing. It is aligned and inside the sectors (`check_write` has
+        // checked the whole range), where the protection unit grants access. As hardware, unlocked
+        // flash takes a store of 32 bits with PG set and PSIZE at 32 bits. Whatever bits are
+        // written over whatever others, the worst is a cell that holds something else, and the
+        // record's check finds that. Nothing can be read from the bank meanwhile, which stops
+        // nothing: everything runs from RAM.
         unsafe { ptr::write_volatile(address(offset).cast::<u32>(), word) };
         asm::dsb();
         if (0..WRITE_LOOKS).any(|_| !self.is_busy()) { Ok(()) } else { Err(FlashError::TimedOut) }
     }
 }
 
-/// Where the byte at `offset` is.
+/// Address of the byte at `offset`.
 fn address(offset: u32) -> *mut u8 {
     ptr::with_exposed_provenance_mut((BASE + offset) as usize)
 }
@@ -173,18 +173,19 @@ impl ErrorType for ConfigurationFlash {
 }
 
 impl ReadNorFlash for ConfigurationFlash {
-    /// By words, as it is written: finding the newest record is most of what a start does.
+    /// Reads by words, as writes do. Finding the newest record is most of the work of a start.
     const READ_SIZE: usize = WORD_LEN;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
         check_read(self, offset, bytes.len()).map_err(FlashError::Range)?;
-        // A load from a bank that is at work stalls the bus until it is done, and capture with it.
+        // A load from a bank that is at work stalls the bus until the bank is done, and capture
+        // with it.
         if self.is_busy() {
             return Err(FlashError::TimedOut);
         }
         for (offset, word) in (offset..).step_by(WORD_LEN).zip(bytes.as_chunks_mut().0) {
-            // SAFETY: inside of the memory and aligned, as just checked; see `write_word` for whose
-            // it is. Any value is a word.
+            // SAFETY: inside the memory and aligned, as just checked; see `write_word` for why
+            // nothing else uses it. Any value is a word.
             *word = unsafe { ptr::read_volatile(address(offset).cast::<u32>()) }.to_le_bytes();
         }
         Ok(())
@@ -222,6 +223,6 @@ impl NorFlash for ConfigurationFlash {
     }
 }
 
-/// A bit that is 0 stays 0 and the others may follow, one write after the other: there is no check
-/// word beside the data.
+/// A bit that is 0 stays 0, and the others may be cleared by later writes: there is no check word
+/// beside the data.
 impl MultiwriteNorFlash for ConfigurationFlash {}

@@ -1,8 +1,8 @@
 //! The GENI board on the external bus: the 16 KiB window, its timing, reset and interrupt.
 //!
 //! # Timing
-//! From the GENI board's manual, chapter 2, "Timing for Shared RAM Read Cycle" and "… Write Cycle";
-//! a clock of the bus is 1/84 MHz = 11.9 ns.
+//! From the GENI board's manual, chapter 2, "Timing for Shared RAM Read Cycle" and "… Write Cycle".
+//! A clock of the bus is 1/84 MHz = 11.9 ns.
 //!
 //! | what                                 | board asks for  | set up as                              | gives         |
 //! |--------------------------------------|-----------------|----------------------------------------|---------------|
@@ -17,13 +17,13 @@
 //! | data bus free after select (thz2)    | 32 ns at most   | BUSTURN 8 clocks                       | 95 ns         |
 //!
 //! The 60 ns are for the buffers between board and controller, 10 ns each way, for 10 ns of wire,
-//! and for what the controller wants to see before it reads (data sheet, "Asynchronous … read
-//! timings": a clock and 4 ns).
+//! and for the setup time that the controller needs before it reads (data sheet, "Asynchronous …
+//! read timings": a clock and 4 ns).
 //!
 //! **Hold when writing.** The controller keeps data, address and select for one clock after `/WR`
 //! has risen, and has no field to make that longer. Of the 11.9 ns, 10.9 are left for data and
 //! select and 9.9 for the address (data sheet, "Asynchronous … write timings": `th(Data_NWE)`,
-//! `th(NE_NWE)`, `th(A_NWE)`) †. Then each takes its own way, and it is the worst that counts:
+//! `th(NE_NWE)`, `th(A_NWE)`) †. Each signal then takes its own way, and the worst case counts:
 //! `/WR` through a 74AHCT541 at its slowest, 10 ns †; the data through a 74LVC8T245 at its fastest,
 //! 0.5 ns †; address and select through a 74AHCT541 at its fastest, 1 ns †.
 //!
@@ -33,38 +33,34 @@
 //! | address                       | 9.9 ns              | 1.0 ns           | 10 ns           | 0.9 ns |
 //! | select (the manual has none)  | 10.9 ns             | 1.0 ns           | 10 ns           | 1.9 ns |
 //!
-//! With a clock of 168 MHz, 4.6 ns would be missing for the data. The data buffer stays enabled for
-//! as long as the select line is low and turned to the board for as long as `/RD` is high, so it
-//! does not let go earlier. When reading, the board holds its data for 2 ns (tdh), and the
-//! controller asks for none.
+//! With a clock of 168 MHz the data would lack 4.6 ns. The data buffer stays enabled while the
+//! select line is low, and turned to the board while `/RD` is high, so it does not let go earlier.
+//! When reading, the board holds its data for 2 ns (tdh), and the controller needs no hold.
 //!
-//! † Look it up in the issue of the data sheet that belongs to the part.
+//! † Look it up in the data sheet issue that belongs to the part.
 //!
 //! # Design
-//! Mode D of the controller's asynchronous accesses is the one in which both strobes are high for
-//! the whole of address setup *and* hold, so that the board's recovery time is kept without the
-//! program's help.
+//! In mode D of the controller's asynchronous accesses both strobes are high during address setup
+//! *and* address hold. The board's recovery time is thus kept without the program's help.
 //!
-//! `/RST` is driven low from the moment in which the pins are set up, and a pull-down holds it low
-//! before that: a recorder that is not running must not leave a board on the bus that goes on
-//! telling old inputs. Hence it is push-pull.
+//! `/RST` is driven low as soon as the pins are set up, and a pull-down holds it low before that. A
+//! recorder that is not running must not leave a board on the bus that keeps reporting old inputs.
+//! For that reason the line is push-pull.
 //!
 //! # Tradeoffs
-//! The board's `/GENRDY` could end the strobe earlier, by half of it at best (ASYNCWAIT with
-//! WAITPOL high, since the line is high while the board is busy; DATAST then is 4 clocks and 30 ns
-//! at least). It is not used: the manual says that the line may stay high for ever after a reset, a
-//! broken board may hold it, and an access that waits on the bus can be interrupted by nothing.
-//! Capture would stand still, and the watchdog would reset a recorder that is well, over and over.
-//! With a strobe of fixed length the worst that a GENI board can do is to hand over wrong bytes,
-//! which its driver deals with. A pass of the main loop with 128 bytes of a datagram takes 0.15 ms
-//! for them.
+//! The board's `/GENRDY` could end the strobe earlier, at best after half its length (ASYNCWAIT
+//! with WAITPOL high, since the line is high while the board is busy; DATAST is then at least 4
+//! clocks and 30 ns). It is not used. The manual says that the line may stay high for ever after a
+//! reset, a broken board may hold it, and nothing can interrupt an access that waits on the bus.
+//! Capture would stand still, and the watchdog would reset a sound recorder over and over. With a
+//! strobe of fixed length the worst that a GENI board can do is to deliver wrong bytes, which its
+//! driver handles. For 128 bytes of a datagram a pass of the main loop spends 0.15 ms here.
 //!
 //! # Notes
-//! `/INT` pulses for 5.44 µs; its edge is latched by the interrupt controller. The port lets
-//! nothing but arriving datagrams pull it, and each pulse leaves its tick in a ring: however long
-//! the main loop is away, it learns when they came. During the 0.5 ms after `/RST`, in which the
-//! board must be left alone, a false pulse is to be expected: what counts is a pulse whose flag is
-//! set.
+//! `/INT` pulses for 5.44 µs, and the interrupt controller latches its edge. The port lets only
+//! arriving datagrams pull it. Each pulse leaves its tick in a ring, so the main loop learns when
+//! the datagrams came, however long it was away. During the 0.5 ms after `/RST`, in which the board
+//! must be left alone, a false pulse is to be expected: a pulse counts only if its flag is set.
 
 use core::ptr::{self, NonNull};
 
@@ -76,22 +72,22 @@ use stm32f4::stm32f407::{EXTI, FSMC, GPIOG, RCC, SYSCFG};
 
 use crate::{clocks, pins};
 
-/// Where the controller has the bank of select line 1.
+/// Address of the controller's bank for select line 1.
 pub(crate) const BANK: u32 = 0x6000_0000;
 /// The board's shared RAM.
 pub(crate) const WINDOW_LEN: u32 = 1 << 14;
 
-/// Nanoseconds of so many clocks of the bus.
+/// Nanoseconds of that many bus clocks.
 const fn ns(clocks: u32) -> u32 {
     clocks * 1_000_000 / (clocks::HCLK_HZ / 1000)
 }
 
-/// Clocks of the bus that take at least so long.
+/// Bus clocks that take at least that long.
 const fn clocks_for(ns: u32) -> u32 {
     (ns * (clocks::HCLK_HZ / 1_000_000)).div_ceil(1000)
 }
 
-/// A clock of the bus, in picoseconds, rounded down.
+/// One bus clock in picoseconds, rounded down.
 const CLOCK_PS: u32 = 1_000_000_000 / (clocks::HCLK_HZ / 1000);
 
 const ADDRESS_SETUP: u32 = 8;
@@ -100,51 +96,51 @@ const TURNAROUND: u32 = 8;
 const STROBE: u32 = clocks_for(READY_DELAY_MAX_NS + MARGIN_NS);
 const MODE_D: u32 = 3;
 
-/// CLKDIV and DATLAT mean nothing without a clock on the bus; they stay as they are out of reset.
+/// CLKDIV and DATLAT mean nothing without a clock on the bus. They keep their reset values.
 const UNUSED: u32 = 0xFF << 20;
 
 /// The timing register: ADDSET, ADDHLD, DATAST, BUSTURN, ACCMOD.
 const TIMING: u32 =
     ADDRESS_SETUP | ADDRESS_HOLD << 4 | STROBE << 8 | TURNAROUND << 16 | UNUSED | MODE_D << 28;
 
-// What the board asks for.
+// What the board requires.
 const READY_DELAY_MAX_NS: u32 = 937;
 const RECOVERY_MIN_NS: u32 = 136;
 const CYCLE_MIN_NS: u32 = 615;
 const RELEASE_MAX_NS: u32 = 32;
 const HOLD_MIN_PS: u32 = 0;
 
-// What lies in between.
+// Buffers, wire and the controller's setup time.
 const MARGIN_NS: u32 = 60;
 const BUFFER_MAX_NS: u32 = 10;
 const STROBE_BUFFER_MAX_PS: u32 = BUFFER_MAX_NS * 1000;
 const ADDRESS_BUFFER_MIN_PS: u32 = 1000;
 const DATA_BUFFER_MIN_PS: u32 = 500;
-/// By how much the controller's hold may be less than a clock.
+/// How much shorter than a clock the controller's hold may be.
 const DATA_HOLD_LACKS_PS: u32 = 1000;
 const SELECT_HOLD_LACKS_PS: u32 = 1000;
 const ADDRESS_HOLD_LACKS_PS: u32 = 2000;
 
-/// Whether what is held long enough by the controller is so at the board, where the end of `/WR`
-/// arrives later.
+/// Whether a signal that the controller holds is also held long enough at the board, where the end
+/// of `/WR` arrives later.
 const fn is_held(lacks_ps: u32, buffer_min_ps: u32) -> bool {
     CLOCK_PS + buffer_min_ps >= STROBE_BUFFER_MAX_PS + lacks_ps + HOLD_MIN_PS
 }
 
 const _: () = {
     assert!(ns(STROBE) >= READY_DELAY_MAX_NS + MARGIN_NS);
-    // The end of a strobe may come late at the board, and the beginning of the next one early.
+    // The end of a strobe may reach the board late, and the start of the next one early.
     assert!(ns(ADDRESS_SETUP + ADDRESS_HOLD) >= RECOVERY_MIN_NS + BUFFER_MAX_NS);
     assert!(ns(ADDRESS_SETUP + ADDRESS_HOLD + STROBE) >= CYCLE_MIN_NS);
     assert!(ns(TURNAROUND) >= RELEASE_MAX_NS + 2 * BUFFER_MAX_NS);
     assert!(is_held(DATA_HOLD_LACKS_PS, DATA_BUFFER_MIN_PS));
     assert!(is_held(SELECT_HOLD_LACKS_PS, ADDRESS_BUFFER_MIN_PS));
     assert!(is_held(ADDRESS_HOLD_LACKS_PS, ADDRESS_BUFFER_MIN_PS));
-    // The fields have four bits, that of the strobe eight.
+    // The fields have four bits; the strobe's has eight.
     assert!(ADDRESS_SETUP < 16 && ADDRESS_HOLD < 16 && TURNAROUND < 16 && STROBE < 256);
 };
 
-/// Ticks of pulses that the main loop does not know yet.
+/// Ticks of pulses that the main loop has not taken yet.
 pub(crate) type Pulses = Ring<u32, PULSE_RING_LEN>;
 
 /// The edge of `/INT`.
@@ -154,7 +150,7 @@ pub(crate) struct InterruptLine {
 }
 
 impl InterruptLine {
-    /// Listens to falling edges on pin 5 of port G.
+    /// Listens for falling edges on pin 5 of port G.
     pub(crate) fn start(
         rcc: &RCC,
         routing: &SYSCFG,
@@ -172,15 +168,15 @@ impl InterruptLine {
     }
 
     pub(crate) fn on_interrupt(&mut self, tick_ms: u32) {
-        // Written ones are cleared, the others stay.
+        // Bits written as one are cleared; the others stay.
         self.edges.pr().write(|w| w.pr5().clear_bit_by_one());
-        // What finds no room has none at the board either; a line that is not connected may pulse
-        // as it likes.
+        // A datagram whose pulse finds no room has no room at the board either. A line that is not
+        // connected may pulse as it likes.
         let _ = self.pulses.push(tick_ms);
     }
 }
 
-/// The port of the node with its board.
+/// The node's Genius port with its board.
 pub(crate) type Genius = genius::Genius<WindowRam, GeniBoard>;
 
 /// A GENI board that is fitted: its reset and interrupt lines.
@@ -193,7 +189,7 @@ impl GeniBoard {
     /// Opens the window.
     ///
     /// # Safety
-    /// This is called once only: the window belongs to whoever has it.
+    /// Call once only: the window belongs to the caller.
     pub(crate) unsafe fn open(
         rcc: &RCC,
         bus: &FSMC,

@@ -1,4 +1,4 @@
-//! The contacts: three ports read one right after the other.
+//! The contacts: three ports, read one right after the other.
 
 use core::convert::Infallible;
 
@@ -10,7 +10,7 @@ use stm32f4::stm32f407::{GPIOB, GPIOC, GPIOG};
 /// There is no chain of serialisers.
 pub(crate) const SERIALISERS: Option<&'static SerialiserHealth> = None;
 
-/// How contacts are wired for a model: an optocoupler pulls its pin low while current flows.
+/// Wiring of the contacts for a model: an optocoupler pulls its pin low while current flows.
 pub(crate) const fn wiring(model: Model) -> Wiring {
     Wiring { connected: model.mask(), active_low: u32::MAX }
 }

@@ -1,4 +1,4 @@
-//! The four lamps: which pins they are on, and what the recorder is asked before they are lit.
+//! The four lamps: their pins, and the conditions that light them.
 
 use core::convert::Infallible;
 

@@ -2,24 +2,24 @@
 //!
 //! # Design
 //! A frame goes into a ring that the probe empties while the processor runs. Without a probe, or
-//! with one that is slow, the ring is full and the rest of the frame is dropped: the log never
-//! waits, whatever the probe asks for. No critical section guards it: see `ser_board::log_writer`.
+//! with a slow one, the ring is full and the rest of the frame is dropped. The log never waits,
+//! whatever the probe asks for. No critical section guards it; see `ser_board::log_writer`.
 //!
 //! # Tradeoffs
-//! `defmt-rtt` waits when a probe asks for it, or switches interrupts off, and panics when it is
+//! `defmt-rtt` waits when a probe asks for it, or switches interrupts off. It panics when it is
 //! entered twice.
 //!
 //! # Notes
-//! Only `init` and the main loop log. A frame that was cut off is skipped by the decoder, which
-//! finds the next one at its delimiter.
+//! Only `init` and the main loop log. The decoder skips a frame that was cut off, and finds the
+//! next one by its delimiter.
 
 use ser_board::log_writer::LogWriter;
 use stm32f4::stm32f407::DBGMCU;
 
 use crate::{rtt, timer};
 
-/// Keeps the memory's clock running while the processor sleeps: else a probe could only look when
-/// it is awake.
+/// Keeps the memory's clock running while the processor sleeps. Otherwise a probe could only read
+/// while the processor is awake.
 pub(crate) fn start(debug: &DBGMCU) {
     debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
 }

@@ -1,17 +1,16 @@
 //! The recorder on an STM32F407 (Cortex-M4F at 84 MHz), 144 pins: the board to flash.
 //! `docs/hardware.md` says how it is wired.
 //!
-//! Three interrupts and a main loop: capture (highest priority), RS-232 in both directions, the
-//! GENI board's line, and `idle`, which does all the rest. They share no resource, hence nobody
-//! ever locks anything, and capture waits for nobody, not even for the flash: everything runs from
-//! RAM (`ram-image.x`).
+//! Four parts: capture (highest priority), RS-232 in both directions, the GENI board's line, and
+//! the main loop, `idle`, which does all the rest. They share no resource, so nothing is ever
+//! locked. Capture waits for nobody, not even for the flash: everything runs from RAM
+//! (`ram-image.x`).
 //!
 //! # Tradeoffs
-//! Registers are named by the register crate, and there is no HAL between. `stm32f4xx-hal` takes
-//! the ports of 16 inputs pin by pin, waits without bound and unwraps what it reads from the clock
-//! (whose leap years it counts from 1970), knows the flash in sectors of 128 KiB only, and brings
-//! paths to a panic into the image. What it would have saved is a few dozen lines, one file per
-//! part of the chip.
+//! Registers are named by the register crate, without a HAL in between. `stm32f4xx-hal` takes the
+//! ports of 16 inputs pin by pin, waits without bound, unwraps what it reads from the clock (whose
+//! leap years it counts from 1970), knows only sectors of 128 KiB of the flash, and brings paths to
+//! a panic into the image. It would have saved a few dozen lines in one file per part of the chip.
 #![no_std]
 #![no_main]
 
@@ -65,8 +64,8 @@ mod app {
     use crate::watchdog::Watchdog;
     use crate::{boot, log, pins, protection, reset};
 
-    // RTIC takes nothing but literals for priorities; `crates/ser-board/tests/priorities.rs` sees
-    // that the tasks have these.
+    // RTIC takes only literals for priorities. `crates/ser-board/tests/priorities.rs` checks that
+    // the tasks have these.
     const _: () = {
         assert!(budget::CAPTURE_PRIORITY == 3);
         assert!(budget::RECEIVE_PRIORITY == 2);
@@ -91,7 +90,7 @@ mod app {
         start: Start,
     }
 
-    /// What start-up found and the lamps tell.
+    /// What start-up found and the lamps show.
     pub(crate) struct Start {
         clock_source: Source,
         was_fault: bool,
@@ -232,8 +231,8 @@ mod app {
             let diagnostics = || (node.diagnostics(), genius.as_ref().map(Genius::diagnostics));
             report.pass(now_ms, diagnostics, stack::high_water);
 
-            // A byte that arrives just now waits for the next interrupt, a millisecond at most.
-            // Looking with interrupts off would spare it that, and delay the capture interrupt
+            // A byte that arrives right now waits for the next interrupt, a millisecond at most.
+            // Looking with interrupts off would avoid that, but delay the capture interrupt
             // instead.
             if !serial.has_received() {
                 cortex_m::asm::wfi();

@@ -1,24 +1,23 @@
-//! Every pin, once: what it is for and how it is set up.
+//! Every pin, once: its purpose and its setup.
 //!
 //! # Design
-//! [`ASSIGNMENTS`] is the only place where pins are given away. The compiler turns it into register
-//! values and refuses a table in which two assignments share a pin. `docs/hardware.md` tells the
+//! [`ASSIGNMENTS`] is the only place where pins are assigned. The compiler turns it into register
+//! values and refuses a table in which two assignments share a pin. `docs/hardware.md` gives the
 //! same with package pins and parts.
 //!
 //! # Tradeoffs
-//! With the external bus in place no chip of the family has two whole ports left: of the 144 pins'
-//! ports only B is whole. So inputs 17–32 are half a port each, taken where no shifting is needed:
-//! one load per port and one OR. The three loads lie some 0.1 µs apart, which samples a millisecond
-//! apart do not see.
+//! With the external bus in place, no chip of the family has two whole ports left: of the 144 pins'
+//! ports only B is whole. Inputs 17–32 are therefore half a port each, chosen so that no shifting
+//! is needed: one load per port and one OR. The three loads are some 0.1 µs apart, which does not
+//! matter to samples a millisecond apart.
 //!
 //! # Notes
-//! Only straps and the serial line's receiver have the chip's pull-ups. They are 30–50 kΩ, but 8–15
-//! kΩ at PA10 and PB12 (data sheet, "I/O static characteristics"), which a closed contact on PB12
-//! could not pull to a valid low; and they must be off on a pin that is driven above the chip's
-//! supply, as 5 V logic may do. So field inputs and the GENI board's lines are held from outside,
-//! and where nothing is fitted outside nothing holds them; `docs/hardware.md` says with what. Ports
-//! that are not listed, and pins such as those of debugger and crystals, stay as they are out of
-//! reset.
+//! Only the straps and the serial line's receiver have the chip's pull-ups. They are 30–50 kΩ, but
+//! 8–15 kΩ at PA10 and PB12 (data sheet, "I/O static characteristics"), and a closed contact on
+//! PB12 could not pull that to a valid low. They must also be off on a pin that is driven above the
+//! chip's supply, as 5 V logic may do. External resistors therefore hold the field inputs and the
+//! GENI board's lines, and where none is fitted the pin floats; `docs/hardware.md` gives the
+//! values. Unlisted ports, and pins such as those of debugger and crystals, keep their reset state.
 
 use stm32f4::stm32f407::{GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG, RCC};
 
@@ -35,17 +34,17 @@ enum Port {
 
 #[derive(Clone, Copy)]
 enum Role {
-    /// Without a pull-up: held from outside.
+    /// Without a pull-up: an external resistor holds it.
     Input,
     /// With the chip's pull-up: open is high.
     PulledInput,
-    /// Push-pull, low to begin with.
+    /// Push-pull, initially low.
     Output,
-    /// Of a peripheral, by the number of its alternate function.
+    /// Used by a peripheral, by the number of its alternate function.
     Alternate(u8),
     /// The same, with the chip's pull-up.
     PulledAlternate(u8),
-    /// Not touched: it has its role by hardware.
+    /// Not touched: the hardware gives it its role.
     Fixed,
 }
 
@@ -55,7 +54,7 @@ impl Role {
     }
 }
 
-/// Pins whose pull-up is four times as strong as all others: see the notes.
+/// Pins whose pull-up is four times as strong as all others; see the notes.
 const fn strongly_pulled(port: Port) -> u16 {
     match port {
         Port::A => pin(10),
@@ -154,7 +153,7 @@ const fn pins<const N: usize>(numbers: [u8; N]) -> u16 {
     set
 }
 
-/// Bits of a register that are set up, and to what.
+/// Bits of a register to set up, and their values.
 #[derive(Clone, Copy)]
 struct Bits {
     mask: u32,
@@ -191,8 +190,8 @@ const OUTPUT: u32 = 0b01;
 const ALTERNATE: u32 = 0b10;
 const PULL_UP: u32 = 0b01;
 const NO_PULL: u32 = 0b00;
-/// 50 MHz at 40 pF: edges of the external bus in a few nanoseconds, without the overshoot of the
-/// fastest setting.
+/// 50 MHz at 40 pF: edges of the external bus within a few nanoseconds, without the overshoot of
+/// the fastest setting.
 const FAST: u32 = 0b10;
 
 impl SetUp {
@@ -205,8 +204,8 @@ impl SetUp {
         data: Bits::NONE,
     };
 
-    /// Of a port, from the table. Does not compile when a pin has two roles, or a pull-up that is
-    /// stronger than is reckoned.
+    /// The registers of a port, from the table. Does not compile when a pin has two roles, or a
+    /// pull-up that is stronger than the calculation allows.
     const fn of(port: Port) -> SetUp {
         let mut set_up = SetUp::NONE;
         let mut taken = 0;
@@ -274,8 +273,8 @@ macro_rules! set_up {
     ($($port:ident: $registers:expr),* $(,)?) => {$({
         const SET_UP: SetUp = SetUp::of(Port::$port);
         let registers = $registers;
-        // SAFETY: the table's values, in registers that take any; the level and function of a pin
-        // are set before its mode, so that none ever drives what it should not.
+        // SAFETY: the table's values, in registers that take any value. The level and function of a
+        // pin are set before its mode, so that no pin ever drives what it should not.
         unsafe {
             registers.odr().modify(|r, w| w.bits(SET_UP.data.in_place_of(r.bits())));
             registers.pupdr().modify(|r, w| w.bits(SET_UP.pull.in_place_of(r.bits())));
@@ -298,13 +297,14 @@ pub(crate) struct Ports {
     pub(crate) g: GPIOG,
 }
 
-/// Gives every pin its role. From here on the GENI board is held in reset until its port lets go.
+/// Gives every pin its role. From here on the GENI board is held in reset until its port releases
+/// it.
 pub(crate) fn set_up(rcc: &RCC, ports: &Ports) {
     rcc.ahb1enr().modify(|_, w| {
         w.gpioaen().set_bit().gpioben().set_bit().gpiocen().set_bit().gpioden().set_bit();
         w.gpioeen().set_bit().gpiofen().set_bit().gpiogen().set_bit()
     });
-    // A port answers two clocks after its own was switched on.
+    // A port answers two clocks after its own clock was switched on.
     let _ = rcc.ahb1enr().read();
     set_up!(A: &ports.a, B: &ports.b, C: &ports.c, D: &ports.d, E: &ports.e, F: &ports.f, G: &ports.g);
 }

@@ -8,14 +8,13 @@
 //! | 60000000h–60003FFFh  | shared RAM of the GENI board                       | data, one access at a time    |
 //!
 //! # Design
-//! *That nothing runs from flash* is what capture stands on while a sector is erased, so it is not
-//! left to the linker's word: a jump or a load that leaves the RAM is a fault at once, on the
-//! bench, and not a stalled sample once a year. The same region catches null pointers and a stack
-//! that has run out.
+//! Capture goes on during an erase only because *nothing runs from flash*, so this does not rely on
+//! the linker alone. A jump or a load that leaves the RAM is a fault at once, on the bench, and not
+//! a stalled sample once a year. The same region catches null pointers and a stack overflow.
 //!
 //! # Notes
-//! By itself the processor takes the external bus for ordinary memory, whose accesses may be
-//! repeated, joined and put off. Device memory has every access done once, in order and as it was
+//! By default the processor treats the external bus as ordinary memory, whose accesses may be
+//! repeated, joined and delayed. In device memory every access is done once, in order and as
 //! written.
 
 use cortex_m::peripheral::MPU;

@@ -3,11 +3,11 @@
 use ser_board::last_words::ResetFlag;
 use stm32f4::stm32f407::{FLASH, RCC};
 
-/// Why the chip was reset. Asking clears the flags: the next reset adds its own.
+/// Why the chip was reset. Reading clears the flags; the next reset adds its own.
 pub(crate) fn take_flag(rcc: &RCC) -> ResetFlag {
     let flags = rcc.csr().read();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
-    // In the order of `ResetFlag`: power-up sets the brown-out flag too, and all of them set that
+    // In the order of `ResetFlag`: power-up also sets the brown-out flag, and all resets set that
     // of the pin.
     if flags.porrstf().bit_is_set() {
         ResetFlag::PowerOn
@@ -24,7 +24,7 @@ pub(crate) fn take_flag(rcc: &RCC) -> ResetFlag {
     }
 }
 
-/// Whether the option bytes keep the chip in reset below 2.7 V, as writing the flash needs it.
+/// Whether the option bytes keep the chip in reset below 2.7 V, as writing the flash requires.
 pub(crate) fn guards_brown_out(flash: &FLASH) -> bool {
     const LEVEL_3: u8 = 0b00;
     flash.optcr().read().bor_lev().bits() == LEVEL_3

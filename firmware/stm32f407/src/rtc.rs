@@ -2,17 +2,17 @@
 //!
 //! # Design
 //! The crystal takes up to seconds to start when the battery is new, and recording waits for no
-//! clock: it is switched on at start-up and looked at again when the clock is set. Every wait is
+//! clock. It is switched on at start-up and checked again when the clock is set. Every wait is
 //! bounded.
 //!
 //! # Tradeoffs
-//! All 15 bits of the divider are synchronous: the clock is read back in steps of 31 µs instead of
-//! 4 ms, and the battery gives a little more current.
+//! All 15 bits of the divider are synchronous. The clock is read back in steps of 31 µs instead of
+//! 4 ms, and draws a little more current from the battery.
 //!
 //! # Notes
-//! That the clock was never set, or has lost battery *and* supply, shows in INITS; a crystal that
-//! stood still while the battery held does not show, the chip has no flag for that. (RM0090,
-//! chapter "Real-time clock".)
+//! INITS shows that the clock was never set, or has lost battery *and* supply. A crystal that stood
+//! still while the battery held does not show: the chip has no flag for that. (RM0090, chapter
+//! "Real-time clock".)
 
 use chrono::NaiveDateTime;
 use rtcc::DateTimeAccess;
@@ -35,9 +35,9 @@ pub(crate) static HEALTH: ClockHealth = ClockHealth::new();
 /// What went wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RtcError {
-    /// The crystal does not swing.
+    /// The crystal does not oscillate.
     NoCrystal,
-    /// The clock does not do as it is told.
+    /// The clock does not respond.
     TimedOut,
     /// The registers hold no date, or cannot hold this one.
     NoDate,
@@ -54,10 +54,10 @@ impl ChipClock {
     pub(crate) fn start(clocks: &RCC, power: &PWR, registers: RTC) -> ChipClock {
         clocks.apb1enr().modify(|_, w| w.pwren().set_bit());
         settle();
-        // The battery-backed registers are locked out of reset.
+        // The battery-backed registers are locked after reset.
         power.cr().modify(|_, w| w.dbp().set_bit());
-        // What is written before the lock is off is lost. A lock that stays, and a choice that does
-        // not, leave a clock without crystal: it is not believed, and does not let itself be set.
+        // A write before the lock is off is lost. A lock that stays, or a choice that does not
+        // stay, leaves a clock without a crystal. Such a clock is not believed and cannot be set.
         let _ = wait_for(|| power.cr().read().dbp().bit_is_set());
         let _ = wait_for(|| {
             choose_crystal(clocks);
@@ -65,8 +65,8 @@ impl ChipClock {
             control.lseon().bit_is_set() && control.rtcsel().is_lse()
         });
         clocks.bdcr().modify(|_, w| w.rtcen().set_bit());
-        // SAFETY: from here on its register of the battery-backed part is all that is used, and
-        // that is only read.
+        // SAFETY: from here on only its register of the battery-backed part is used, and that is
+        // only read.
         ChipClock { clocks: unsafe { RCC::steal() }, registers }
     }
 
@@ -89,8 +89,8 @@ impl ChipClock {
     fn set(&mut self, calendar: Calendar, shift: Option<Shift>) -> Result<(), RtcError> {
         self.initialise(|registers| {
             registers.cr().modify(|_, w| w.fmt().twenty_four_hour().bypshad().set_bit());
-            // The divider takes two writes, the synchronous part first. SAFETY: both fields take
-            // any value; date and time are what `Calendar` says they are.
+            // The divider takes two writes, the synchronous part first.
+            // SAFETY: both fields take any value; date and time are what `Calendar` says they are.
             #[expect(clippy::multiple_unsafe_ops_per_block, reason = "one reason for all four")]
             unsafe {
                 registers.prer().modify(|_, w| w.prediv_s().bits(PREDIV_S));
@@ -122,11 +122,11 @@ impl ChipClock {
     }
 }
 
-/// Has the clock count the 32 kHz crystal, and switches that on.
+/// Switches the 32 kHz crystal on and makes the clock count it.
 fn choose_crystal(clocks: &RCC) {
     if !clocks.bdcr().read().rtcsel().is_lse() {
-        // A choice that another program has made holds until all of this part is reset; without a
-        // choice there is nothing to lose.
+        // A choice made by another program holds until all of this part is reset. Without a choice
+        // there is nothing to lose.
         clocks.bdcr().modify(|_, w| w.bdrst().set_bit());
         clocks.bdcr().modify(|_, w| w.bdrst().clear_bit());
         clocks.bdcr().modify(|_, w| w.rtcsel().lse());
@@ -177,7 +177,8 @@ impl KeepsTime for ChipClock {
 
     fn has_lost_time(&mut self) -> Result<bool, RtcError> {
         let is_set = self.registers.isr().read().inits().bit_is_set();
-        // Set with another divider by another program: its sub-seconds mean something else.
+        // Another program has set the clock with another divider, so its sub-seconds mean something
+        // else.
         let is_ours = self.registers.prer().read().prediv_s().bits() == PREDIV_S;
         Ok(!(is_set && is_ours && self.has_crystal()))
     }

@@ -2,7 +2,7 @@
 //! up.
 //!
 //! The probe finds the control block by its symbol, or by its mark in memory. It moves the read
-//! position, the program the write position; what does not fit is dropped.
+//! position, and the program moves the write position. What does not fit is dropped.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
@@ -23,7 +23,7 @@ struct Channel {
     len: u32,
     write: AtomicU32,
     read: AtomicU32,
-    /// What the probe would like to happen when the ring is full. It is dropped in any case.
+    /// The probe's wish for a full ring. New bytes are dropped in any case.
     mode: AtomicU32,
 }
 
@@ -45,13 +45,13 @@ static _SEGGER_RTT: ControlBlock = ControlBlock {
     },
 };
 
-/// Puts bytes into the ring, as far as there is room. One writer at a time: see `log`.
+/// Puts bytes into the ring, as far as there is room. One writer at a time; see `log`.
 pub(crate) fn write(bytes: &[u8]) {
     let Channel { buffer, write, read, .. } = &_SEGGER_RTT.up;
     let mut position = write.load(Ordering::Relaxed) as usize % LEN;
     for &byte in bytes {
         let next = (position + 1) % LEN;
-        // A full ring has one cell free, or it would look empty.
+        // A full ring keeps one cell free, or it would look empty.
         if next == read.load(Ordering::Relaxed) as usize % LEN {
             break;
         }

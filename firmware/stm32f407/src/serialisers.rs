@@ -1,13 +1,12 @@
 //! The contacts behind serialisers on SPI1, in place of `inputs` (feature `serialiser`).
 //!
 //! # Design
-//! What the parts say is `ser_board::serialiser`'s to read; here are the registers. The bytes are
-//! waited for, in the capture interrupt: four parts take 12 µs at 5.25 MHz. Nobody else uses the
-//! bus.
+//! `ser_board::serialiser` interprets what the parts send; this file has the registers. The capture
+//! interrupt waits for the bytes: four parts take 12 µs at 5.25 MHz. Nothing else uses the bus.
 //!
 //! # Notes
-//! Chip select is a pin that the program drives. Out of `pins` it is low, which lets parts latch
-//! and changes nothing: without a clock they shift nothing out.
+//! The program drives chip select as a pin. `pins` sets it low at first, which lets parts latch and
+//! changes nothing: without a clock they shift nothing out.
 
 use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
 use ser_board::inputs::{InputPorts, Wiring};
@@ -32,15 +31,15 @@ const MAX_LOOKS: u32 = 1000;
 /// Health of the chain.
 pub(crate) static CHAIN_HEALTH: SerialiserHealth = SerialiserHealth::new();
 
-/// The same, for the board's.
+/// The same, for the board's health.
 pub(crate) const SERIALISERS: Option<&'static SerialiserHealth> = Some(&CHAIN_HEALTH);
 
-/// How contacts are wired for a model: a part shows a current that flows as 1.
+/// Wiring of the contacts for a model: a part shows a flowing current as 1.
 pub(crate) const fn wiring(model: Model) -> Wiring {
     Wiring { connected: model.mask(), active_low: 0 }
 }
 
-/// The chain of the model.
+/// The chain for the model.
 pub(crate) enum InputPins {
     Two(Serialisers<'static, Bus, 2>),
     Four(Serialisers<'static, Bus, 4>),
@@ -53,7 +52,7 @@ impl InputPins {
         clocks::settle();
         let bus = Bus { spi, port };
         bus.select(false);
-        // 8 bits, the most significant one first; the pin that would select this chip is not in
+        // 8 bits, the most significant one first. The pin that would select this chip is not in
         // use.
         bus.spi.cr1().write(|w| {
             w.mstr().set_bit().br().div8().cpol().clear_bit().cpha().clear_bit();
@@ -109,7 +108,7 @@ impl ErrorType for Bus {
 impl SpiDevice for Bus {
     /// Parts are only read; another operation is an error.
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), ErrorKind> {
-        // What a transfer that was given up has left would be taken for the first byte of this one.
+        // A leftover byte of an aborted transfer would be taken for the first one of this transfer.
         let _ = self.spi.dr().read();
         self.select(true);
         let done = operations.iter_mut().try_for_each(|operation| match operation {

@@ -1,4 +1,4 @@
-//! The straps: what the board is, read once at start-up. A strap is *set* when its jumper is
+//! The straps: how the board is set up, read once at start-up. A strap is *set* when its jumper is
 //! closed.
 //!
 //! | pin | strap     | open            | set             |
@@ -16,7 +16,7 @@ use stm32f4::stm32f407::GPIOE;
 
 use crate::clocks;
 
-/// Time for the pull-ups: 50 kΩ charge 200 pF of jumper and wire in 10 µs.
+/// Time for the pull-ups: 50 kΩ charge the 200 pF of jumper and wire in 10 µs.
 const SETTLE_CLOCKS: u32 = clocks::HCLK_HZ / 1_000_000 * 50;
 
 /// The straps as they were found.

@@ -1,12 +1,12 @@
 //! The capture interrupt and the clock behind it.
 //!
 //! # Design
-//! Timer 3 interrupts every millisecond. Timer 2 counts microseconds without end, and the tick is
-//! read off it: the interrupt says *look now*, never *one more millisecond*. Both have the same
-//! clock, so they do not drift apart.
+//! Timer 3 interrupts every millisecond. Timer 2 is a free-running count of microseconds, and the
+//! tick is read from it. The interrupt says *look now*, never *one more millisecond*. Both have the
+//! same clock, so they do not drift apart.
 //!
 //! # Notes
-//! Timer 2 goes round after 71 minutes, which is how long the interrupt may stay away unnoticed.
+//! Timer 2 wraps after 71 minutes; the interrupt may stay away for that long without a wrong tick.
 //! The watchdog acts long before that.
 
 use core::num::NonZeroU32;
@@ -25,8 +25,8 @@ const _: () = assert!(PRESCALER as u32 * COUNTS_PER_SECOND == clocks::TIMER_HZ);
 
 static TICK_MS: AtomicU32 = AtomicU32::new(0);
 
-/// Milliseconds since boot, wrapping. The same tick as that of the latest sample, for those who
-/// have no part in capture.
+/// Milliseconds since boot, wrapping. The tick of the latest sample, for those who have no part in
+/// capture.
 pub(crate) fn tick_ms() -> u32 {
     TICK_MS.load(Ordering::Relaxed)
 }
@@ -43,7 +43,7 @@ impl Timer {
     pub(crate) fn start(rcc: &RCC, counter: TIM2, interval: TIM3) -> Timer {
         rcc.apb1enr().modify(|_, w| w.tim2en().set_bit().tim3en().set_bit());
         clocks::settle();
-        // The update event takes the prescaler over; its flag must not count as an interrupt.
+        // The update event loads the prescaler. Its flag must not count as an interrupt.
         counter.psc().write(|w| w.psc().set(PRESCALER - 1));
         counter.arr().write(|w| w.arr().set(u32::MAX));
         counter.egr().write(|w| w.ug().set_bit());
@@ -61,8 +61,8 @@ impl Timer {
         Timer { interval, counter, ticks }
     }
 
-    /// Takes the interrupt back; gives the tick, or `None` when the one before has already counted
-    /// this millisecond.
+    /// Acknowledges the interrupt. Returns the tick, or `None` when the previous interrupt has
+    /// already counted this millisecond.
     #[inline]
     pub(crate) fn on_interrupt(&mut self) -> Option<u32> {
         self.interval.sr().write(|w| w.uif().clear_bit());

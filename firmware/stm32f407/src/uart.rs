@@ -2,13 +2,13 @@
 //!
 //! # Design
 //! The rings of `ser_board` lie between the interrupt and the main loop. Both directions share one
-//! interrupt, at the priority of the receiver, which has one character's time; the transmitter's
-//! part of it is a byte and a half dozen instructions.
+//! interrupt, at the priority of the receiver, which has one character's time. The transmitter's
+//! part of it is a byte and half a dozen instructions.
 //!
 //! # Notes
-//! Transmission complete is set when the last stop bit has left, so the line is known to be quiet
-//! and not guessed. What an overrun or a framing error leaves in the data register, `ser_board`
-//! knows; both are counted as line errors.
+//! Transmission complete is set when the last stop bit has left, so the line is known to be quiet,
+//! not assumed. `ser_board` interprets what an overrun or a framing error leaves in the data
+//! register; both are counted as line errors.
 
 use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
 use ser_board::ring::Reader;
@@ -22,7 +22,7 @@ use crate::clocks;
 /// Memory of both rings.
 pub(crate) type Rings = SerialRings<RECEIVE_RING_LEN, TRANSMIT_RING_LEN>;
 
-/// Starts the serial port; gives the main loop's end and the interrupt's end.
+/// Starts the serial port; returns the main loop's end and the interrupt's end.
 pub(crate) fn start(
     rcc: &RCC,
     uart: USART2,
@@ -34,8 +34,9 @@ pub(crate) fn start(
     set_divider(&uart, baud);
     uart.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
     let SerialEnds { receiver, received, errors, to_send, transmitter } = rings.split();
-    // SAFETY: the two ends share the registers. The interrupt alone touches the data register, the
-    // main loop alone the divider; for the one bit that both change see `Usart2::wake_transmitter`.
+    // SAFETY: the two ends share the registers. Only the interrupt touches the data register, and
+    // only the main loop the divider. For the one bit that both change see
+    // `Usart2::wake_transmitter`.
     let shared = unsafe { USART2::steal() };
     (
         UartLine::new(Usart2(shared), received, errors, to_send),
@@ -47,7 +48,7 @@ fn set_divider(uart: &USART2, baud: Baud) {
     let bits_per_second = baud.bits_per_second();
     #[expect(clippy::cast_possible_truncation, reason = "see `clocks`: 35 000 at 300 bit/s")]
     let divider = ((clocks::PCLK1_HZ + bits_per_second / 2) / bits_per_second) as u16;
-    // SAFETY: with 16 samples per bit the register is the divider as it is.
+    // SAFETY: with 16 samples per bit the register holds the divider as it is.
     uart.brr().write(|w| unsafe { w.bits(divider) });
 }
 
@@ -59,7 +60,7 @@ pub(crate) struct SerialInterrupt {
 }
 
 impl SerialInterrupt {
-    /// Takes the byte that has arrived, and gives one for which there is room.
+    /// Takes the byte that has arrived, and sends one if there is room.
     pub(crate) fn on_interrupt(&mut self, tick_ms: u32) {
         // Reading status and then data clears the error flags.
         let status = self.uart.sr().read();
@@ -93,15 +94,15 @@ pub(crate) type SerialLine = UartLine<'static, Usart2, RECEIVE_RING_LEN, TRANSMI
 pub(crate) struct Usart2(USART2);
 
 impl Uart for Usart2 {
-    /// What finds no room is lost: nothing is held back.
+    /// Bytes that find no room are lost: nothing is held back.
     fn let_through(&mut self) {}
 
     fn will_send(&mut self) {}
 
     fn wake_transmitter(&mut self) {
-        // The interrupt may clear this bit between reading and writing, because it has found the
-        // ring empty just before. Then it is set here, where it belongs; nothing else in the
-        // register ever changes.
+        // The interrupt may clear this bit between the read and the write, because it has just
+        // found the ring empty. Then it is set here, as it should be. Nothing else in the register
+        // ever changes.
         self.0.cr1().modify(|_, w| w.txeie().set_bit());
     }
 

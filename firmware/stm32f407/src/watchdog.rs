@@ -1,18 +1,19 @@
 //! The independent watchdog.
 //!
 //! # Design
-//! It has an RC oscillator of its own, which may run at anything between 17 and 47 kHz (data sheet,
-//! "LSI oscillator characteristics"). So the time-out is 400 ms by the nominal 32 kHz, 272 ms at
-//! least and 753 ms at most: a recorder that hangs is recording again within a second, the start
-//! included, and a main loop may stay away for the 100 ms that the budget grants it.
+//! It has an RC oscillator of its own, which may run at 17–47 kHz (data sheet, "LSI oscillator
+//! characteristics"). The time-out is 400 ms at the nominal 32 kHz, 272 ms at least and 753 ms at
+//! most. A recorder that hangs is recording again within a second, the start included. The main
+//! loop may stay away for the 100 ms that the budget grants it.
 //!
 //! # Tradeoffs
-//! A time-out that covers the erasing of a flash sector (0.5 s) could not keep that second. Erasing
-//! feeds instead, for as long as capture goes on and no longer than an erase may take: see `flash`.
+//! A time-out that covers the erasing of a flash sector (0.5 s) could not keep that second. The
+//! erase feeds the watchdog instead, as long as capture makes progress and the erase stays within
+//! its time limit; see `flash`.
 //!
 //! # Notes
-//! The chip gives no warning before it bites; what it was is then only known from the reset flag.
-//! It was started before anything else, by `boot`, with a time-out of its own.
+//! The chip gives no warning before the watchdog resets it; only the reset flag then tells the
+//! cause. `boot` started it before anything else, with its default time-out.
 
 use ser_board::budget::MAIN_LOOP_STALL_MS;
 use stm32f4::stm32f407::{DBGMCU, IWDG};
@@ -37,17 +38,18 @@ const START: u16 = 0xCCCC;
 const UNLOCK: u16 = 0x5555;
 const FEED: u16 = 0xAAAA;
 
-/// Looks at the registers' hand-over to the slow clock, which takes five of its periods: 0.3 ms.
+/// Looks at the transfer of the registers to the slow clock, which takes five of its periods: 0.3
+/// ms.
 const MAX_LOOKS: u32 = 50_000;
 
-/// The running watchdog. Whoever has a copy may feed it.
+/// The running watchdog. Any copy may feed it.
 #[derive(Clone, Copy)]
 pub(crate) struct Watchdog(());
 
 impl Watchdog {
-    /// Sets the time-out; from now on it wants to be fed.
+    /// Sets the time-out; from now on it must be fed.
     pub(crate) fn start(watchdog: &IWDG, debug: &DBGMCU) -> Watchdog {
-        // A debugger that stops the processor is not to be bitten.
+        // The watchdog must not reset a processor that a debugger has stopped.
         debug.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
         key(watchdog, START);
         key(watchdog, UNLOCK);
@@ -58,7 +60,7 @@ impl Watchdog {
         Watchdog(())
     }
 
-    /// Starts the time anew.
+    /// Restarts the time-out.
     pub(crate) fn feed(self) {
         // SAFETY: the key register takes single writes from anywhere.
         key(&unsafe { IWDG::steal() }, FEED);

@@ -12,7 +12,7 @@ use crate::time::{local_time_in, parse_time, time_after};
 const EXAMPLES: &str = "\
 Examples:
   ser-cli clock set                               to the time of this computer
-  ser-cli clock set --at 2026-11-22T10:00:00.250  to any other";
+  ser-cli clock set --at 2026-11-22T10:00:00.250  to a given time";
 
 /// Set the recorder's clock.
 #[derive(Debug, clap::Args)]
@@ -24,14 +24,15 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum What {
-    /// Set the clock; events that are recorded already keep their times.
+    /// Set the clock; events that are already recorded keep their times.
     ///
     /// The time sent is the one at which the last byte arrives, so that the line adds no delay. The
-    /// recorder knows no time zone and no daylight saving time. Shown is the time that was sent.
+    /// recorder knows no time zone and no daylight saving time. The output shows the time that was
+    /// sent.
     #[command(after_help = EXAMPLES)]
     Set {
-        /// The time to set, as it will be when the last byte arrives; the local time of this
-        /// computer if not given.
+        /// The time to set, as it will be when the last byte arrives; this computer's local time if
+        /// not given.
         #[arg(long, value_name = "TIME", value_parser = parse_time)]
         at: Option<TimeStamp>,
     },
@@ -39,7 +40,7 @@ enum What {
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let What::Set { at } = args.what;
-    // Checked before anything is sent; no download takes us from one century into the next.
+    // Checked before anything is sent. No download lasts from one century into the next.
     if at.is_none() {
         local_time_in(std::time::Duration::ZERO).map_err(|year| {
             Failure::new(format!(
@@ -51,7 +52,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let mut unit = connection::open(connection)?;
     let mut asked_first = None;
     let sent = unit.set_clock(|ahead| match at {
-        // An attempt that is repeated sets the time that it has become since the first one.
+        // A repeated attempt sets the time that has been reached since the first one.
         Some(at) => {
             let now = Instant::now();
             time_after(at, now.duration_since(*asked_first.get_or_insert(now)))
@@ -64,6 +65,6 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     Ok(())
 }
 
-/// No recorder and no client takes this for a date.
+/// Neither a recorder nor a client accepts this as a date.
 const NO_TIME: TimeStamp =
     TimeStamp { year: 0, month: 0, day: 0, hour: 0, minute: 0, second: 0, millisecond: 0 };

@@ -1,4 +1,4 @@
-//! `comm-req`: the word blocks with which a PLC program talks to a recorder, and back.
+//! `comm-req`: the word blocks with which a PLC program talks to a recorder, and the reverse.
 
 mod parse;
 mod table;
@@ -40,11 +40,11 @@ Examples:
   ser-cli comm-req parse 7 0 8 99 0 0 13 70 8 199 0040h 0050h 5
   ser-cli comm-req parse --data 014Dh 007Dh --bytes 3";
 
-/// Show the `COMM_REQ` blocks of a PLC that send a message to a recorder or fetch its answer;
+/// Show the `COMM_REQ` blocks with which a PLC sends a message to a recorder or fetches its answer;
 /// nothing is sent.
 ///
-/// Words are shown in decimal and hex, ready to be typed into a PLC. The other way round, words
-/// become a message.
+/// Words are shown in decimal and hex, ready to be typed into a PLC. In the other direction, words
+/// are turned into a message.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -60,27 +60,27 @@ enum What {
     /// The block that fetches what a recorder has sent (`COMM_REQ` 13).
     #[command(after_help = DEQUEUE_EXAMPLES)]
     Dequeue(DequeueArgs),
-    /// What the words of a block, or of fetched data, say.
+    /// The meaning of a block's words, or of fetched data.
     #[command(after_help = PARSE_EXAMPLES)]
     Parse(parse::Args),
 }
 
 #[derive(Debug, clap::Args)]
 struct SendArgs {
-    /// Bus address of the recorder, 0-31, or `all` for a broadcast, which is carried out and not
+    /// Bus address of the recorder, 0-31, or `all` for a broadcast, which is carried out but not
     /// answered.
     #[arg(long, value_name = "N", value_parser = values::address)]
     to: Address,
 
-    /// Where the PLC shall put the outcome: %R100, %AI1, %AQ1, %I1, %Q1, %W1.
+    /// Where the PLC puts the outcome: %R100, %AI1, %AQ1, %I1, %Q1, %W1.
     #[arg(long, value_name = "PLACE", default_value = "%R100", value_parser = values::reference)]
     status: PlcReference,
 
-    /// Whether the datagram waits for a bus scan in which nobody else sends one.
+    /// Whether the datagram waits for a bus scan in which no other device sends one.
     #[arg(long, value_name = "PRIORITY", default_value = "normal")]
     priority: values::PriorityName,
 
-    /// Only the words, in decimal, on one line.
+    /// Print only the words, in decimal, on one line.
     #[arg(long)]
     line: bool,
 
@@ -94,7 +94,7 @@ struct DequeueArgs {
     #[arg(long, value_name = "N", value_parser = values::device)]
     from: BusAddress,
 
-    /// Where the PLC shall put the first word.
+    /// Where the PLC puts the first word.
     #[arg(long, value_name = "PLACE", default_value = "%R200", value_parser = values::reference)]
     into: PlcReference,
 
@@ -102,11 +102,11 @@ struct DequeueArgs {
     #[arg(long, value_name = "N", default_value = "70")]
     max_words: NonZeroU16,
 
-    /// Where the PLC shall put the outcome.
+    /// Where the PLC puts the outcome.
     #[arg(long, value_name = "PLACE", default_value = "%R100", value_parser = values::reference)]
     status: PlcReference,
 
-    /// Only the words, in decimal, on one line.
+    /// Print only the words, in decimal, on one line.
     #[arg(long)]
     line: bool,
 }
@@ -128,7 +128,7 @@ fn write(out: &mut dyn Write, block: &CommReq, line: bool) -> io::Result<()> {
 
 impl SendArgs {
     fn block(&self) -> CommReq {
-        // A block does not say who sends it: that is the PLC's bus controller, whatever its
+        // A block does not name its sender, which is the PLC's bus controller, whatever its
         // address.
         let datagram = Datagram::from_command(SOMEBODY, self.to, &self.message.command());
         CommReq::Send(SendDatagram {
@@ -248,11 +248,11 @@ mod tests {
     #[test]
     fn fetched_data_become_a_message_from_the_unit() {
         assert_eq!(output("parse --data 014Dh 007Dh --bytes 3"), "recording, version 1.25\n");
-        // The PLC does not say how many bytes; one of the last word may be missing.
+        // The PLC does not say how many bytes there are; the last word may contain only one.
         assert_eq!(output("parse --data 014Dh 007Dh"), "recording, version 1.25\n");
         assert_eq!(
             output("parse --data -32699"),
-            "no message: message E never has 2 bytes (45 80)\n"
+            "not a message: message E never has 2 bytes (45 80)\n"
         );
     }
 
@@ -272,7 +272,7 @@ mod tests {
         ] {
             let block = output(&format!("send --to 31 --line {message}"));
             let text = output(&format!("parse {block}"));
-            assert!(!text.contains("no message"), "{message}: {text}");
+            assert!(!text.contains("not a message"), "{message}: {text}");
         }
     }
 }

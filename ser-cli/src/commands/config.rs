@@ -16,12 +16,12 @@ Examples:
   ser-cli config --size 1024 --auto-print off  change two of them
   ser-cli config --line-baud 19200             from then on: --baud 19200";
 
-/// Show or change the recorder's settings. What is not given stays as it is; the recorder keeps
-/// them without power.
+/// Show or change the recorder's settings. Settings that are not given stay as they are; the
+/// recorder keeps them without power.
 ///
-/// To keep what is not given, the recorder is asked first. An original recorder does not answer
-/// that: give it at least --auto-report, --report-to and --auto-print, which its protocol cannot
-/// leave out.
+/// To keep the settings that are not given, the command asks the recorder first. An original
+/// recorder does not answer that: give it at least --auto-report, --report-to and --auto-print,
+/// which its protocol cannot leave out.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -40,11 +40,11 @@ pub(crate) struct Settings {
     #[arg(long, value_name = "RATE", value_parser = values::baud)]
     line_baud: Option<Baud>,
 
-    /// Where the recorder reports events by itself.
+    /// Where the recorder reports events automatically.
     #[arg(long, value_name = "WHERE")]
     auto_report: Option<ReportVia>,
 
-    /// Genius address that gets the reports, 0–31.
+    /// Bus address that gets the reports, 0–31.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_REPORT_ADDRESS)))]
     report_to: Option<u8>,
 
@@ -54,7 +54,7 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
-    /// These settings, and those of `base` where none is given.
+    /// These settings, completed from `base`.
     pub(crate) fn on_top_of(&self, base: Configure) -> Configure {
         Configure {
             size: self.size.or(base.size),
@@ -74,8 +74,8 @@ impl Settings {
             && auto_print.is_none()
     }
 
-    /// Whether the command can be put together without knowing what is in force: it can say itself
-    /// that size and rate shall stay.
+    /// Whether the command is complete without the settings in force: it can express that size and
+    /// rate stay.
     fn is_sufficient(&self) -> bool {
         self.auto_report.is_some() && self.report_to.is_some() && self.auto_print.is_some()
     }
@@ -109,14 +109,14 @@ fn change(unit: &mut Unit, settings: &Settings) -> Result<Configuration> {
         true => keep,
         false => {
             let now = connection::settings(unit)?.ok_or_else(settings_unknown)?;
-            // Size and rate are kept by leaving them out, so that a rate is set only when one is
+            // Leaves size and rate out, which keeps them. A rate is thus set only when one is
             // given.
             Configure { size: None, baud: None, ..now.into() }
         }
     };
     unit.configure(settings.on_top_of(base)).map_err(|error| match error {
         RequestError::Refused { in_force } => Failure::new(format!(
-            "the recorder did not take the settings; in force are: size {}, {} baud, auto report \
+            "the recorder did not accept the settings; it now has: size {}, {} baud, auto report \
              {}, report to {}, auto print {}",
             in_force.size,
             in_force.baud.bits_per_second(),
@@ -131,11 +131,12 @@ fn change(unit: &mut Unit, settings: &Settings) -> Result<Configuration> {
 
 fn settings_unknown() -> Failure {
     connection::settings_unknown().hint(
-        "all can be set without asking: give --auto-report, --report-to and --auto-print together",
+        "to set everything without asking the recorder, give --auto-report, --report-to and \
+         --auto-print together",
     )
 }
 
-/// The settings other than the size, one a line.
+/// The settings other than the size, one per line.
 pub(crate) fn write_line_settings(
     out: &mut dyn Write,
     configuration: &Configuration,

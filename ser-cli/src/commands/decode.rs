@@ -1,4 +1,4 @@
-//! `decode`: a capture of the line, or bodies, back to messages.
+//! `decode`: turns a capture of the line, or bodies, back into messages.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Read};
@@ -11,16 +11,16 @@ use crate::output::Palette;
 const EXAMPLES: &str = "\
 Examples:
   ser-cli decode capture.bin                    a capture of the line
-  ser-cli decode --from recorder capture.bin    only it was listened to
+  ser-cli decode --from recorder capture.bin    only the recorder's side
   echo '1B 30 31 34 35 34 35' | ser-cli decode  hex text
-  echo 52 01 F4 05 | ser-cli decode --body      bodies, one a line";
+  echo 52 01 F4 05 | ser-cli decode --body      bodies, one per line";
 
 /// Show what the bytes of a capture mean, damaged ones included.
 ///
-/// Each line of the list gives the place (bytes from the start; in hex text line:column), who sent
-/// it, and what it says. Damage is listed where it is found, and decoding goes on behind it; a
-/// summary goes to standard error. The exit code is 0 also when something was damaged: the decoding
-/// itself worked.
+/// Each line of the list gives the place (bytes from the start; in hex text line:column), the
+/// sender, and the message. Damage is listed where it is found, and decoding continues after it; a
+/// summary goes to standard error. The exit code is 0 even when something was damaged, because the
+/// decoding itself worked.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -71,6 +71,6 @@ fn open(args: &Args) -> Result<(String, Box<dyn Read>)> {
 fn summarize(tally: Tally) {
     inform(tally);
     if tally.is_empty() {
-        advise("nothing in there to decode; bodies without ESC frames need --body");
+        advise("nothing to decode in the input; bodies without ESC frames need --body");
     }
 }

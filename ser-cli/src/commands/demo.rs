@@ -1,4 +1,4 @@
-//! `demo`: the main job from end to end, without hardware.
+//! `demo`: the main use from end to end, without hardware.
 
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -18,14 +18,14 @@ Examples:
   ser-cli demo
   ser-cli demo --image firmware.elf  the ARM image, in QEMU";
 
-/// Scenarios last seconds; an emulator on a busy computer may be slower than its clock.
+/// Scenarios last seconds, but an emulator on a busy computer may run slower than its clock.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Play a breaker trip to a simulated recorder, and read the sequence of events from it.
 ///
-/// Everything is real but the contacts: the recorder's own code samples them every millisecond, the
+/// Only the contacts are simulated. The recorder's own code samples them every millisecond, and the
 /// client asks for the events in the frames of the RS-232 protocol, at 9600 baud over a
-/// pseudo-terminal. It takes a few seconds.
+/// pseudo-terminal. The demo takes a few seconds.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -52,10 +52,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let clock = unit.set_clock(|ahead| local_time_in(ahead).unwrap_or(EPOCH))?;
     story.step(&format!("Its clock is set: {clock}."), "ser-cli -p /tmp/ser clock set")?;
     unit.erase()?;
-    story.step(
-        "Its log is erased: what comes now is the incident.",
-        "ser-cli -p /tmp/ser erase --yes",
-    )?;
+    story.step("Its log is erased. Now comes the incident.", "ser-cli -p /tmp/ser erase --yes")?;
     story.step(
         &format!(
             "A feeder fault: its relay trips the breaker, which recloses once,\n\
@@ -65,7 +62,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         "ser-cli sim --pty /tmp/ser --contacts trip.csv",
     )?;
     play(&simulator, trip.incident)?;
-    story.step("And this is what it has recorded.", "ser-cli -p /tmp/ser read")?;
+    story.step("This is what it has recorded.", "ser-cli -p /tmp/ser read")?;
     let configuration = unit.configuration()?;
     let download = download(&mut unit, &configuration, trip.names, &mut story)?;
     // The emulator's line is as fast as the computer.
@@ -121,7 +118,7 @@ impl Trip {
     }
 }
 
-/// What came of reading the log.
+/// The result of reading the log.
 struct Download {
     events: u32,
     lost: u32,
@@ -154,7 +151,7 @@ fn download(
 }
 
 impl Download {
-    /// `baud` is the rate of the line, where the simulated line keeps to it.
+    /// `baud` is the rate of the line, if the simulated line keeps to it.
     fn summary(&self, baud: Option<Baud>) -> String {
         let complete = match self.lost {
             0 => "complete".to_string(),
@@ -179,7 +176,7 @@ struct Story<W> {
 }
 
 impl<W: Write> Story<W> {
-    /// What has happened, and how to do it oneself.
+    /// What has happened, and the command for doing it oneself.
     fn step(&mut self, text: &str, command: &str) -> Result<()> {
         let Palette { command: style, faint, .. } = self.palette;
         writeln!(self.out, "{text}")?;
@@ -193,7 +190,7 @@ impl<W: Write> Story<W> {
     }
 }
 
-/// What a computer whose clock no recorder can follow gets.
+/// Shown on a computer whose date no recorder can express.
 const EPOCH: ser_proto::TimeStamp = ser_proto::TimeStamp {
     year: 70,
     month: 1,

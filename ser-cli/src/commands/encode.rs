@@ -1,4 +1,4 @@
-//! `encode`: a command to the bytes that go over the line.
+//! `encode`: turns a command into the bytes that go over the line.
 
 use std::io::{self, Write};
 
@@ -18,7 +18,7 @@ Examples:
   ser-cli encode query-mode --raw > /dev/ttyUSB0
   ser-cli encode erase | ser-cli decode --from host";
 
-/// Show the bytes of a command, without sending it.
+/// Show the bytes of a command without sending it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -39,8 +39,8 @@ pub(crate) struct Args {
 pub(crate) enum Message {
     /// `C` alone: ask for the configuration (original recorders stay silent).
     QueryConfig,
-    /// `C`: change the configuration; size and rate that are not given are kept, the rest becomes 0
-    /// or off.
+    /// `C`: change the configuration; size and rate are kept if not given, the other settings
+    /// become 0 or off.
     Config(Settings),
     /// `E`: erase the event buffer.
     Erase,
@@ -57,7 +57,7 @@ pub(crate) enum Message {
         /// Number of the first entry.
         #[arg(long, value_name = "N", value_parser = values::entries())]
         from: u16,
-        /// How many.
+        /// How many entries.
         #[arg(long, value_name = "N", value_parser = values::entries())]
         count: u16,
     },
@@ -66,7 +66,7 @@ pub(crate) enum Message {
         /// Number of the first entry.
         #[arg(long, value_name = "N", value_parser = values::entries())]
         from: u16,
-        /// How many, up to 10; 0 asks for total and next slot only.
+        /// How many entries, up to 10; 0 asks for total and next slot only.
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=10))]
         count: u8,
     },

@@ -1,4 +1,4 @@
-//! `erase`: away with the events.
+//! `erase`: erases all events.
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
@@ -8,19 +8,16 @@ const EXAMPLES: &str = "\
 Examples:
   ser-cli read --new --fail-on-loss >> log && ser-cli erase --yes
 
-What read --new and watch have delivered is remembered, and so is this erase: if everything had \
-been delivered, the \
-next read --new goes on with the new log and tells of no loss. What is recorded between a read \
-and the erase is erased, \
-too, and then told as a loss. In the moment of the erase itself, a change that is undone before \
-the next event leaves \
-no trace.";
+The erase is remembered, together with what read --new and watch have delivered. If everything \
+had been delivered, the next read --new continues with the new log and reports no loss. Events \
+recorded between a read and the erase are erased, too, and then reported as a loss. A change at \
+the very moment of the erase leaves no trace if it is undone before the next event.";
 
-/// Erase all events in the recorder. There is no way back.
+/// Erase all events in the recorder. This cannot be undone.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// Do it; without it nothing is done.
+    /// Confirm the erase; without it nothing is done.
     #[arg(long)]
     yes: bool,
 
@@ -37,8 +34,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         .hint("keep them first: ser-cli read --all --format csv > events.csv")
         .hint("then add --yes"));
     }
-    // A memory that cannot be read, or that another run is using, is a reason to stop before
-    // anything is gone.
+    // If the state file cannot be read, or another run is using it, the command must stop before
+    // anything is erased.
     let mut keeper = Keeper::load(&args.state, connection)?;
     let mut unit = connection::open(connection)?;
     let total = unit.log_position()?.total;
@@ -57,7 +54,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
 fn erased(total: u16) -> String {
     let events = if total == 1 { "1 event".to_owned() } else { format!("{total} events") };
     format!(
-        "event buffer erased; {events} had been recorded since the erase before (the recorder \
+        "event buffer erased; {events} had been recorded since the previous erase (the recorder \
          counts modulo 65536)"
     )
 }

@@ -33,9 +33,8 @@ Examples:
   ser-cli genius globals
   ser-cli genius globals --follow
 
-With --follow the bus is looked at ten times a second, and the time is that of this computer. \
-What comes and goes \
-in between is not seen here: ser-cli watch shows every event, stamped by the recorder.";
+With --follow the bus is read ten times a second, and the times are this computer's. Changes that \
+come and go in between are not seen; ser-cli watch shows every event, stamped by the recorder.";
 
 const FORCES_EXAMPLES: &str = "\
 Examples:
@@ -59,7 +58,7 @@ Examples:
   ser-cli genius dip 10100111                   what do these switches say?
   ser-cli genius dip --address 5 --rate 38.4K   how are they to be set?";
 
-/// Look at a Genius bus as a whole, and speak to all its recorders at once.
+/// Look at a Genius bus as a whole, and send commands to all its recorders at once.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -68,7 +67,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// Whether no bus is needed, and nothing is done but printing.
+    /// Whether the command needs no bus and only prints.
     pub(crate) fn is_offline(&self) -> bool {
         matches!(self.what, What::Decode { .. } | What::Dip { .. })
     }
@@ -81,11 +80,11 @@ enum What {
         #[command(flatten)]
         who: Who,
     },
-    /// Show the live inputs of every recorder, all of one and the same bus scan. The exit code is 1
-    /// when there is none.
+    /// Show the live inputs of every recorder, all from the same bus scan. The exit code is 1 when
+    /// there is no recorder.
     #[command(after_help = GLOBALS_EXAMPLES)]
     Globals {
-        /// Go on and show every recorder again whose inputs have changed, until Ctrl-C.
+        /// Continue until Ctrl-C, and show each recorder again when its inputs have changed.
         #[arg(long)]
         follow: bool,
         #[command(flatten)]
@@ -94,17 +93,18 @@ enum What {
     /// Show which inputs or outputs of a device are forced, and to what.
     #[command(after_help = FORCES_EXAMPLES)]
     Forces {
-        /// The device's number, 0-31.
+        /// The device's bus address, 0-31.
         #[arg(long, value_name = "N", value_parser = device)]
         node: BusAddress,
         /// Which table.
         #[arg(long)]
         table: TableName,
     },
-    /// Tell all recorders something, and check by their last broadcast that each has received it.
+    /// Send a command to all recorders, and check by their last broadcast that each has received
+    /// it.
     ///
-    /// A broadcast is not answered, so every recorder that is logged in is asked before and
-    /// afterwards. The exit code is 0 when all of them are known to have received it, and 1
+    /// Recorders do not answer a broadcast, so every recorder that is logged in is asked before and
+    /// after it. The exit code is 0 when all of them are known to have received it, and 1
     /// otherwise, also when there is none.
     #[command(after_help = BROADCAST_EXAMPLES)]
     Broadcast {
@@ -113,14 +113,14 @@ enum What {
         #[command(flatten)]
         who: Who,
     },
-    /// Say in words what a datagram means. No bus is needed.
+    /// Explain what a datagram means. No bus is needed.
     #[command(after_help = DECODE_EXAMPLES)]
     Decode {
         /// Function code, subfunction code and data, in hexadecimal.
         #[arg(required = true, value_name = "HEX")]
         bytes: Vec<String>,
     },
-    /// Say what a recorder's DIP switches mean, or how to set them. No bus is needed.
+    /// Show what a recorder's DIP switches mean, or how to set them. No bus is needed.
     #[command(after_help = DIP_EXAMPLES)]
     Dip {
         /// Switches 1 to 8 as eight digits: 1 is open, 0 is closed.
@@ -135,11 +135,11 @@ enum What {
     },
 }
 
-/// Who is taken for a recorder.
+/// Which devices are taken for recorders.
 #[derive(Clone, Copy, Debug, clap::Args)]
 struct Who {
-    /// Take the devices with this model number for recorders, and ask nobody. Without it every
-    /// device that sends as much as a recorder is asked.
+    /// Take the devices with this model number for recorders, and ask none. Without it, every
+    /// device that sends as many bytes of global data as a recorder is asked.
     #[arg(long, value_name = "N", global = true)]
     model_number: Option<u8>,
 }
@@ -197,7 +197,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
 }
 
-/// Who might be a recorder and does not answer as one, in words; none when there is nobody.
+/// The devices that might be recorders and do not answer as such, in words; `None` if there are
+/// none.
 fn silent_candidates(silent: &[u8]) -> Option<String> {
     let numbers: Vec<_> = silent.iter().map(u8::to_string).collect();
     let numbers = Some(numbers.join(", ")).filter(|numbers| !numbers.is_empty())?;
@@ -206,8 +207,8 @@ fn silent_candidates(silent: &[u8]) -> Option<String> {
 
 fn no_recorder() -> Failure {
     Failure::new("no recorder is logged in")
-        .hint("ser-cli genius devices lists what is; check numbers and bus rate")
-        .hint("a recorder that cannot answer is taken for one with --model-number")
+        .hint("ser-cli genius devices lists the devices; check bus addresses and bus rate")
+        .hint("--model-number N takes a device for a recorder even if it cannot answer")
 }
 
 #[cfg(test)]

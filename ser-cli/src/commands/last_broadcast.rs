@@ -1,4 +1,4 @@
-//! `last-broadcast`: the last command that came over the Genius bus as a broadcast.
+//! `last-broadcast`: the last command that arrived over the Genius bus as a broadcast.
 
 use std::io::{self, Write};
 
@@ -11,7 +11,7 @@ Examples:
 
 /// Show which command the recorder last received as a Genius broadcast, and when.
 ///
-/// Broadcasts get no reply on the bus; this is how to check that one was received.
+/// Broadcasts get no reply on the bus; use this to check that one was received.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {}

@@ -1,4 +1,4 @@
-//! The subcommands, one file each: arguments, help and what is done.
+//! The subcommands, one file each: arguments, help and action.
 
 pub(crate) mod clock;
 pub(crate) mod comm_req;

@@ -10,7 +10,7 @@ use crate::error::{Result, advise, inform};
 const EXAMPLES: &str = "\
 Examples:
   ser-cli ports
-  ser-cli status -p /dev/ttyUSB0  ask the recorder on one of them how it is";
+  ser-cli status -p /dev/ttyUSB0  ask the recorder on one of them";
 
 /// List the serial ports of this computer.
 ///
@@ -26,12 +26,12 @@ pub(crate) fn run(_args: &Args) -> Result<()> {
     if ports.is_empty() {
         inform("this computer has no serial ports");
         advise("plug in a USB adapter, or use a terminal server with --port tcp://HOST:PORT");
-        advise("ser-cli sim --pty /tmp/ser simulates a unit");
+        advise("ser-cli sim --pty /tmp/ser simulates a recorder");
     }
     Ok(())
 }
 
-/// A port a line, whatever the ports are called.
+/// One port per line, whatever the ports are called.
 fn table(out: &mut dyn Write, ports: &[PortInfo]) -> io::Result<()> {
     let paths: Vec<String> = ports.iter().map(|port| Harmless(&port.path).line()).collect();
     let width = paths.iter().map(String::len).max().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! `print`: the recorder prints entries on its RS-232 port, which is the line we are on.
+//! `print`: the recorder prints entries on its RS-232 port, to which this computer is connected.
 
 use std::io::{self, Write};
 use std::ops::Range;
@@ -14,14 +14,14 @@ const EXAMPLES: &str = "\
 Examples:
   ser-cli print --from 1 --count 20";
 
-/// A line with 32 changes and a good deal more.
+/// More than the length of a line with 32 changes.
 const LONGEST_LINE: usize = 300;
 
-/// Let the recorder print entries as lines of text, and show them.
+/// Make the recorder print entries as lines of text, and show them.
 ///
-/// The recorder prints on its RS-232 port whatever the command came by. Through a terminal server
-/// or a printer sharer the lines arrive here only if they are passed on. Waiting ends when all
-/// lines are there, or none comes any more.
+/// The recorder prints on its RS-232 port, however the command reached it. Through a terminal
+/// server or a printer sharer the lines arrive here only if they are passed on. The command ends
+/// when all lines are there, or when no more come.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -29,7 +29,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", value_parser = values::entries())]
     from: u16,
 
-    /// How many.
+    /// How many entries.
     #[arg(long, value_name = "N", value_parser = values::entries())]
     count: u16,
 }
@@ -59,7 +59,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         }
     }
     if wanted.missing > 0 || (wanted.damaged > 0 && !wanted.is_complete()) {
-        return Err(Failure::new("lines that were asked for arrived damaged, or not at all")
+        return Err(Failure::new("requested lines arrived damaged or not at all")
             .hint("repeat the command")
             .hint("ser-cli read gets the same entries protected by checksums"));
     }
@@ -72,11 +72,11 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     Ok(())
 }
 
-/// Damage, or lines that the recorder prints by itself (auto print).
+/// Reports damage, or lines that the recorder prints automatically (auto print).
 fn tell_left_out(line: &TextLine) {
     match is_damaged(line) {
         true => warn(format_args!("a line arrived damaged and is left out: {}", line.text)),
-        false => inform(format_args!("not asked for, left out: {}", line.text)),
+        false => inform(format_args!("not requested, left out: {}", line.text)),
     }
 }
 
@@ -84,14 +84,14 @@ fn is_damaged(line: &TextLine) -> bool {
     line.noise > 0 || line.cut
 }
 
-/// The lines that are to come. A recorder with auto print on sends others in between.
+/// The lines that are to come. A recorder with auto print on sends other lines in between.
 struct Wanted {
     /// Entry numbers that have not come yet.
     entries: Range<u32>,
     printed: u16,
-    /// Lines that were left out before one that came.
+    /// Lines missing before one that came.
     missing: u32,
-    /// Lines that were damaged, ours or not: who can tell.
+    /// Damaged lines, whether ours or not, which cannot be known.
     damaged: u32,
 }
 
@@ -122,8 +122,8 @@ impl Wanted {
     }
 }
 
-/// The number that an entry's line begins with: four digits, or more, and a blank. What is left of
-/// a line whose beginning is missing has none.
+/// The number at the beginning of an entry's line: four digits or more, and a blank. A line whose
+/// beginning is missing has none.
 fn entry_number(line: &str) -> Option<u32> {
     let (number, _) = line.split_once(' ')?;
     let is_number = number.len() >= 4 && number.bytes().all(|byte| byte.is_ascii_digit());

@@ -32,35 +32,32 @@ A sequence number counts the events of a log since it was erased. The life names
 it is 0 where nothing is remembered (without --new). A file that is continued (>>) gets no \
 second header.
 
-What is missing is in the output where it belongs, in every format, and on standard error: how \
-many events were \
-overwritten, that the log began anew, which inputs changed while nothing was recorded. The exit \
-code then is 0, \
-with --fail-on-loss it is 3, also for a ring that had gone round before it was first read.";
+Losses are reported in the output at their place, in every format, and on standard error: how \
+many events were overwritten, that the log began anew, which inputs changed while nothing was \
+recorded. The exit code is then 0. With --fail-on-loss it is 3, also for a ring that had wrapped \
+before it was first read.";
 
 /// Read events.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// Everything the recorder has, oldest first; this is what happens if nothing else is asked
-    /// for.
+    /// Everything the recorder has, oldest first. This is the default.
     #[arg(long, conflicts_with_all = ["new", "from", "count"])]
     all: bool,
 
-    /// What has not been delivered yet by read --new or watch from this port; remembered from run
-    /// to run.
+    /// Events not yet delivered by read --new or watch from this port; remembered from run to run.
     #[arg(long, conflicts_with_all = ["from", "count"])]
     new: bool,
 
-    /// Number of the first entry, as the recorder numbers them: place in memory, not age.
+    /// Number of the first entry, as the recorder numbers them: by place in memory, not by age.
     #[arg(long, value_name = "N", requires = "count", value_parser = values::entries())]
     from: Option<u16>,
 
-    /// How many entries; those that exist are read.
+    /// How many entries; only existing ones are read.
     #[arg(long, value_name = "N", requires = "from", value_parser = values::entries())]
     count: Option<u16>,
 
-    /// How the events are written.
+    /// The format of the events.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 
@@ -98,8 +95,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let remembered = keeper.as_ref().and_then(Keeper::size);
     let size = connection::log_size(&mut unit, args.log_size, remembered)?;
     let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), size, &stop);
-    // What did reach standard output is remembered also when the recorder fell silent in the
-    // middle, or after Ctrl-C.
+    // Events that reached standard output are remembered even if the recorder fell silent in
+    // between, or after Ctrl-C.
     let saved = keeper.as_mut().map_or(Ok(()), Keeper::save);
     let delivered = outlet.finish().and(result)?;
     saved?;
@@ -130,8 +127,8 @@ fn read_by_cursor(
     Ok(summary.delivered)
 }
 
-/// Reads entries by number. Neither cursor nor size come into it: the recorder answers with what
-/// exists.
+/// Reads entries by number. Needs neither cursor nor size: the recorder answers with the existing
+/// entries.
 fn read_range(
     unit: &mut Unit,
     outlet: &mut Outlet,
@@ -146,7 +143,7 @@ fn read_range(
             Delivery::Event { entry_number, .. } => reader.is_seam(entry_number),
             Delivery::Lost { .. } => false,
         };
-        // In the order of their numbers the oldest entry comes after the newest.
+        // By number, the oldest entry comes after the newest.
         let (newest, oldest) =
             deliveries.split_at(deliveries.iter().position(is_seam).unwrap_or(0));
         outlet.take(newest, pending, &mut |_| Ok(()))?;
@@ -181,7 +178,7 @@ fn check_interrupt(stop: &AtomicBool) -> Result<()> {
     match stop.load(Ordering::Relaxed) {
         false => Ok(()),
         true => Err(Failure::new("interrupted before everything was read")
-            .hint("repeat the command; read --new goes on where it stopped")),
+            .hint("repeat the command; read --new continues where it stopped")),
     }
 }
 

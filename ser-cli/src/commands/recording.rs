@@ -1,4 +1,4 @@
-//! `start` and `stop`: whether the recorder records.
+//! `start` and `stop`: switch recording on and off.
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Result, inform};
@@ -11,7 +11,7 @@ const STOP_EXAMPLES: &str = "\
 Examples:
   ser-cli stop --port /dev/ttyUSB0";
 
-/// Start recording. What changed while the recorder was stopped is no event.
+/// Start recording. Changes while the recorder was stopped do not become events.
 #[derive(Debug, clap::Args)]
 #[command(after_help = START_EXAMPLES)]
 pub(crate) struct StartArgs {}

@@ -37,13 +37,13 @@ Contacts are CSV: milliseconds from the start, input, 1 closed or 0 open.
   250,7,0
 On a Genius bus a fourth column, node, says whose input it is.
 On standard input (--contacts -) times count from the arrival of the first
-line; an empty line ends a scenario, and more may follow. Lines that come one by
-one are given 100 ms, so that the first of them are not late.
+line; an empty line ends a scenario, and more may follow. A scenario that
+arrives line by line begins 100 ms later, so that its first lines are not late.
 
-When the recorder answers, what to give to --port is written to standard output,
-one line for each way to reach one.";
+Once the recorder answers, the values for --port are written to standard output,
+one line for each way to reach a recorder.";
 
-/// Which recorder.
+/// The model of the recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum ModelName {
     /// HE660SER160, 16 inputs.
@@ -73,24 +73,24 @@ struct BusNode {
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// Which recorder.
+    /// The model of the recorder.
     #[arg(long, value_enum, default_value = "ser320")]
     model: ModelName,
 
-    /// Make this symbolic link to the recorder's pseudo-terminal; it appears when the recorder
-    /// answers and goes with it.
+    /// Make this symbolic link to the recorder's pseudo-terminal; it exists only while the recorder
+    /// answers.
     #[arg(long, value_name = "LINK", conflicts_with = "tcp")]
     pty: Option<PathBuf>,
 
-    /// Put recorders on a Genius bus; this file becomes the window of the host's GENI board, and
-    /// goes with the simulator.
+    /// Put recorders on a Genius bus; this file becomes the window of the host's GENI board, and is
+    /// removed with the simulator.
     ///
     /// The first recorder also has its RS-232 port, where --pty or --tcp say.
     #[arg(long, value_name = "FILE", requires = "node", help_heading = bus::HEADING)]
     genius: Option<PathBuf>,
 
-    /// Number of a recorder on the Genius bus, 0-31, and which recorder it is if not --model; may
-    /// be repeated.
+    /// Bus address of a recorder on the Genius bus, 0-31, and its model if it is not that of
+    /// --model; may be repeated.
     #[arg(long, value_name = "N[:MODEL]", requires = "genius", value_parser = bus_node, help_heading = bus::HEADING)]
     node: Vec<BusNode>,
 
@@ -99,12 +99,12 @@ pub(crate) struct Args {
 
     /// Listen on this address instead, for one client at a time; port 0 takes a free one.
     ///
-    /// Whoever reaches the address may do everything, erase included: on 127.0.0.1 this computer,
-    /// on 0.0.0.0 anybody.
+    /// Anybody who reaches the address may do everything, erase included: on 127.0.0.1 this
+    /// computer only, on 0.0.0.0 anybody.
     #[arg(long, value_name = "HOST:PORT", value_parser = tcp_address)]
     tcp: Option<String>,
 
-    /// How long a client may be silent before it gives way to another one; `never` lets it stay.
+    /// How long a silent client keeps its place when another one wants it; `never` lets it stay.
     #[arg(long, value_name = "TIME", default_value = "600s", value_parser = patience)]
     tcp_idle: Patience,
 
@@ -112,22 +112,22 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     contacts: Option<PathBuf>,
 
-    /// How long an input has to be steady until it counts.
+    /// How long an input must be steady before a change counts.
     #[arg(long, value_name = "MS", default_value_t = 0)]
     debounce: u8,
 
-    /// Send as slowly as the line's rate, as a real recorder does; without it, answers come at
+    /// Send only as fast as the line's rate, as a real recorder does; without it, answers come at
     /// once.
     #[arg(long, conflicts_with = "image")]
     paced: bool,
 
-    /// Run this ARM image (mps2-an385) in QEMU instead of the built-in node.
+    /// Run this ARM image (mps2-an385) in QEMU instead of the built-in recorder.
     ///
     /// On a Genius bus the image is the first --node; the others are built in.
     #[arg(long, value_name = "ELF")]
     image: Option<PathBuf>,
 
-    /// Write what the image logs to this file, which must not exist yet; a pipe or a terminal may.
+    /// Write the image's log to this file, which must not exist yet; a pipe or a terminal may.
     #[arg(long, value_name = "FILE", requires = "image")]
     log: Option<PathBuf>,
 }
@@ -162,7 +162,7 @@ fn options(args: &Args, stop: &AtomicBool) -> Result<SimOptions> {
     })
 }
 
-/// The emulated board if there is an image, the built-in node otherwise.
+/// The emulated board if there is an image, otherwise the built-in recorder.
 pub(crate) fn backend(
     image: Option<&Path>,
     log: Option<PathBuf>,
@@ -175,12 +175,12 @@ pub(crate) fn backend(
     options.check_image().map_err(|error| {
         Failure::new(error)
             .hint("cargo xtask firmware builds the images and says where they are")
-            .hint("or leave --image out: the built-in node needs none")
+            .hint("or leave --image out: the built-in recorder needs none")
     })?;
     Ok(Backend::Emulator(options))
 }
 
-/// Reads the contacts. That waits for whoever writes them, where they come from a pipe.
+/// Reads the contacts. From a pipe, that waits for the writer.
 fn contacts(args: &Args, genius: Option<&GeniusOptions>, stop: &AtomicBool) -> Result<Contacts> {
     let Some(path) = args.contacts.clone() else { return Ok(Contacts::None) };
     let (model, nodes) = (args.model.into(), genius.map(|genius| genius.nodes.clone()));
@@ -196,13 +196,12 @@ fn genius(args: &Args, window: &Path, model: Model) -> Result<GeniusOptions> {
     for (index, node) in nodes.iter().enumerate() {
         if nodes.iter().take(index).any(|other| other.number == node.number) {
             return Err(Failure::usage(format!("--node {} is given twice", node.number))
-                .hint("every device on a bus has a number of its own"));
+                .hint("every device on a bus has its own address"));
         }
     }
     if nodes.len() > MAX_NODES {
-        return Err(
-            Failure::usage("a bus has 32 numbers, and the host needs one").hint("leave a node out")
-        );
+        return Err(Failure::usage("a bus has 32 addresses, and the host needs one")
+            .hint("leave out one --node"));
     }
     let nodes = nodes.iter().map(|node| (node.number, node.model.map_or(model, Model::from)));
     args.bus.apply(GeniusOptions::new(window, nodes.collect()))
@@ -231,7 +230,7 @@ fn contacts_failure(contacts: std::result::Result<Contacts, SimError>) -> Result
     })
 }
 
-/// How long a client may be silent while another one waits; `None` is for ever.
+/// How long a client may be silent while another one waits; `None` means for ever.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Patience(Option<Duration>);
 
@@ -240,7 +239,7 @@ fn patience(text: &str) -> std::result::Result<Patience, String> {
     time.map(Patience).map_err(|why| format!("{why}; or never"))
 }
 
-/// An address to listen on, as far as one can tell without asking the system.
+/// Checks an address to listen on, as far as possible without asking the system.
 fn tcp_address(text: &str) -> std::result::Result<String, String> {
     match text.rsplit_once(':') {
         Some((host, port)) if !host.is_empty() && port.parse::<u16>().is_ok() => {
@@ -250,10 +249,11 @@ fn tcp_address(text: &str) -> std::result::Result<String, String> {
     }
 }
 
-/// Tells all the ways to reach the recorders, one a line.
+/// Prints all the ways to reach the recorders, one per line.
 fn announce(ports: &str) -> Result<()> {
     let mut out = io::stdout().lock();
-    // A script gets them letter by letter; a terminal would obey some.
+    // A script gets the names unchanged. A terminal would obey control characters, so they are
+    // filtered there.
     let is_terminal = out.is_terminal();
     let shown = |port: &str| if is_terminal { Harmless(port).line() } else { port.to_owned() };
     let written = ports.lines().try_for_each(|port| writeln!(out, "{}", shown(port)));
@@ -266,7 +266,7 @@ fn announce(ports: &str) -> Result<()> {
     Ok(())
 }
 
-/// What went wrong in the simulator, with advice.
+/// The failure of the simulator, with advice.
 impl From<SimError> for Failure {
     fn from(error: SimError) -> Failure {
         let failure = match &error {
@@ -286,8 +286,7 @@ impl From<SimError> for Failure {
             }
             SimError::LogTaken(_) => "choose a name that does not exist, as in --log /tmp/ser.log",
             SimError::EmulatorMissing { .. } => {
-                "or leave --image out: the built-in node needs \
-             no emulator"
+                "or leave --image out: the built-in recorder needs no emulator"
             }
             SimError::EmulatorEnded { .. } | SimError::NoAnswer { .. } => {
                 "is this an image for mps2-an385? Build it with cargo xtask firmware"
@@ -302,8 +301,7 @@ impl From<SimError> for Failure {
                  one"
                 }
                 io::ErrorKind::AddrNotAvailable => {
-                    "that is not this computer: 127.0.0.1 is; 0.0.0.0 is, too, and there anybody \
-                     may erase"
+                    "that is not this computer: use 127.0.0.1, or 0.0.0.0, where anybody may erase"
                 }
                 _ => "check names, rights, and that no other simulator runs there",
             },

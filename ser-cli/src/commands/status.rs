@@ -16,14 +16,14 @@ Examples:
 
 /// Ask the recorder what it is doing: recording or not, log, settings, latest event.
 ///
-/// Original recorders answer only a part of this; the rest is shown as not known.
+/// Original recorders answer only some of this; the rest is shown as not known.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {}
 
 pub(crate) fn run(_args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let mut unit = connection::open(connection)?;
-    // Every recorder answers a read: one that does not is not there, and need not be waited for
+    // Every recorder answers a read. One that does not is not there, and must not be waited for
     // again.
     let position = unit.log_position()?;
     let mode = unless_unanswered(unit.mode())?;
@@ -48,8 +48,8 @@ fn latest_event(
     position: LogPosition,
     size: Option<u16>,
 ) -> Result<Option<(u16, Entry, Model)>> {
-    // Entry n is slot n - 1, and the newest is in the slot before the next. Behind slot 0 stands
-    // the last one.
+    // Entry n is slot n - 1, and the newest is in the slot before the next one. Before slot 0 comes
+    // the last slot.
     let number = match (position.next_slot, size) {
         (0, None) => return Ok(None),
         (0, Some(size)) => size,

@@ -24,31 +24,28 @@ Examples:
   ser-cli watch --poll --interval 5s   leaves the recorder's settings alone
   ser-cli watch --log-size 2048        an original recorder
 
-First comes what has not been delivered yet (as read --new), then every event as it happens. The \
-recorder is told to \
-report by itself (auto report on RS-232); on the way out, also after Ctrl-C or an error, it gets \
-back the setting \
-it had. Recorders that report to the Genius bus keep doing so and are asked every second \
-instead, and so are original \
-recorders. Every now and then the log itself is looked at, so that a report lost on the line is \
-an event late, not lost.
-While events come so fast that reports and readings are more than the line carries, the recorder \
-is told not to report \
-and is read without a pause. What is overwritten all the same is counted, where it belongs.
-On a Genius bus a board or a recorder that fails is waited for, a minute or as long as --timeout \
-says.";
+Undelivered events come first (as with read --new), then every event as it happens. The command \
+makes the recorder report automatically (auto report on RS-232), and restores the setting at the \
+end, also after Ctrl-C or an error. Recorders that report to the Genius bus continue to, and are \
+asked every second instead; so are original recorders. The log itself is also checked now and \
+then, so that a report lost on the line delays its event and does not lose it.
+While events come faster than the line can carry reports and readings together, the recorder is \
+told not to report and is read without a pause. Events that are overwritten nevertheless are \
+counted in the output, at their place.
+On a Genius bus the command waits for a board or a recorder that fails, for a minute or as long \
+as --timeout says.";
 
-/// How often the recorder is asked when it does not report by itself.
+/// How often a recorder that does not report automatically is asked.
 const POLL_EVERY: Duration = Duration::from_secs(1);
 
-/// How often the log is looked at when the recorder does report.
+/// How often the log of a recorder that does report is checked.
 const CHECK_EVERY: Duration = Duration::from_secs(10);
 
 /// Show events as they happen.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// How the events are written: as by read.
+    /// The format of the events, as for read.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 
@@ -56,15 +53,15 @@ pub(crate) struct Args {
     #[arg(long)]
     fail_on_loss: bool,
 
-    /// Ask the recorder again and again instead of letting it report.
+    /// Keep asking the recorder instead of making it report.
     #[arg(long)]
     poll: bool,
 
-    /// How often to ask; 1s when polling, and 10s in addition to reports, if not given.
+    /// How often to ask; if not given, 1s when polling, and 10s in addition to reports.
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     interval: Option<Duration>,
 
-    /// How many entries the recorder's log holds; needed for original recorders, which do not tell.
+    /// How many entries the recorder's log holds; needed for original recorders, which do not say.
     #[arg(long, value_name = "N", value_parser = values::entries())]
     log_size: Option<u16>,
 
@@ -81,9 +78,10 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let watcher = match plan.reports {
         Some(Reports { switch, found }) => {
             if !switch.is_on {
-                inform("the recorder reports by itself until Ctrl-C");
+                inform("the recorder reports automatically until Ctrl-C");
             }
-            // From the first try on: the recorder may have carried out what it did not answer.
+            // Set before the first attempt: the recorder may have carried out a command that it did
+            // not answer.
             interrupt::leaves_behind(Some(not_put_back(&found)));
             LogWatcher::reporting(follower, plan.interval, switch)
         }
@@ -102,26 +100,26 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             saved.and(restored)?;
             if args.fail_on_loss { watch.outlet.require_complete() } else { Ok(()) }
         }
-        // The first failure is the one to tell; most often the second has the same cause.
+        // The first failure is reported; usually the second has the same cause.
         (Err(failure), Err(_)) => Err(found.iter().map(not_put_back).fold(failure, Failure::hint)),
         (Err(failure), Ok(())) => Err(failure),
     }
 }
 
-/// What to tell when the setting that was found could not be put back.
+/// The text for a setting that was found and could not be put back.
 const fn not_put_back(found: &Configuration) -> &'static str {
     match found.auto_report {
         AutoReport::Off => {
-            "the recorder may still report by itself; ser-cli config --auto-report off puts that \
-             back"
+            "the recorder may still report automatically; ser-cli config --auto-report off \
+             undoes that"
         }
         AutoReport::Rs232 => {
-            "the recorder may have stopped reporting; ser-cli config --auto-report rs232 puts \
-             that back"
+            "the recorder may have stopped reporting; ser-cli config --auto-report rs232 undoes \
+             that"
         }
         AutoReport::Genius => {
-            "the recorder may have stopped reporting; ser-cli config --auto-report genius puts \
-             that back"
+            "the recorder may have stopped reporting; ser-cli config --auto-report genius undoes \
+             that"
         }
     }
 }
@@ -151,7 +149,7 @@ fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
     let Some(found) = connection::settings(unit)? else {
         let size = args.log_size.or(remembered).ok_or_else(connection::log_size_unknown)?;
         inform(
-            "the recorder does not tell its settings, as original recorders do not: it is asked \
+            "the recorder does not report its settings (original recorders never do): it is asked \
              for events",
         );
         return Ok(polling(size));
@@ -174,9 +172,7 @@ fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
             }
             AutoReport::Off => Ok(reporting(false)),
             AutoReport::Genius | AutoReport::Rs232 => {
-                inform(
-                    "the recorder reports elsewhere and goes on doing so: it is asked for events",
-                );
+                inform("the recorder reports elsewhere and continues to: it is asked for events");
                 Ok(polling(size))
             }
         },
@@ -184,15 +180,14 @@ fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
         AutoReport::Off => Ok(reporting(false)),
         AutoReport::Genius => {
             inform(
-                "the recorder reports to the Genius bus and goes on doing so: it is asked for \
-                 events",
+                "the recorder reports to the Genius bus and continues to: it is asked for events",
             );
             Ok(polling(size))
         }
     }
 }
 
-/// The settings with auto reports to this computer, by the way by which it is connected.
+/// The settings with auto reports to this computer, over the connection in use.
 fn reporting_here(unit: &Unit, found: Configuration) -> Configure {
     let keep = keep_size_and_rate(found);
     match unit.bus_address() {
@@ -224,14 +219,14 @@ struct Watch {
 }
 
 impl Watch {
-    /// Goes on until an interrupt, or a failure that does not pass.
+    /// Runs until an interrupt, or a failure that does not pass.
     fn run(&mut self) -> Result<()> {
         loop {
             match self.step() {
                 Ok(()) => self.outage.end(),
                 Err(failure) => {
                     self.outage.bear(failure, Instant::now())?;
-                    // All is well when that goes well.
+                    // If that works, all is well.
                     self.watcher.read_next();
                     thread::sleep(HEARTBEAT);
                 }
@@ -248,7 +243,7 @@ impl Watch {
             keeper.delivered(step.cursor, step.size, outlet.life())?;
             if stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
         })?;
-        // Also when there is nothing to deliver, a file gets its header.
+        // A file gets its header even when there is nothing to deliver.
         outlet.flush()
     }
 

@@ -1,4 +1,4 @@
-//! A whole capture: what it looks like, and its messages one after the other.
+//! A whole capture: its format, and its messages one after the other.
 
 use std::io::{self, BufRead, BufReader, Read, Write};
 
@@ -6,7 +6,7 @@ use ser_proto::ESC;
 
 use super::{CaptureFormat, Decoder, Listing, Side};
 
-/// How far into the input an ESC is looked for before it is taken for hex text.
+/// How far into the input an ESC is searched for before the input is taken for hex text.
 const SNIFF_LEN: usize = 64 * 1024;
 
 /// How to read a capture.
@@ -15,16 +15,16 @@ pub struct CaptureOptions {
     /// Who sent the bytes; without it, messages that both sides could have sent are shown with both
     /// readings.
     pub from: Option<Side>,
-    /// What the input looks like; without it, it is hex text if its first line is and no ESC is
-    /// near its beginning.
+    /// The format of the input; without it, hex text if the first line is hex and no ESC is near
+    /// the beginning.
     pub format: Option<CaptureFormat>,
     /// Whether the input holds bodies without framing: in hex text one per line, raw a single one.
     pub bodies: bool,
 }
 
 impl CaptureOptions {
-    /// Decodes all of `input` and lists what it holds, damage included. Any bytes are a capture.
-    /// When reading fails, what came before is listed, and the error is given back.
+    /// Decodes all of `input` and lists its content, damage included. Any bytes are a capture. When
+    /// reading fails, the bytes before are listed, and the error is returned.
     ///
     /// # Errors
     /// When the list cannot be written.
@@ -57,7 +57,7 @@ impl CaptureOptions {
     }
 }
 
-/// Whether the first line that is not empty consists of what hex text consists of, or is a comment.
+/// Whether the first line that is not empty contains only characters of hex text, or is a comment.
 fn begins_as_hex(start: &[u8]) -> bool {
     let first = start.trim_ascii_start().split(|&byte| byte == b'\n').next().unwrap_or_default();
     let code = first.split(|&byte| byte == b'#').next().unwrap_or_default();
@@ -68,7 +68,7 @@ fn begins_as_hex(start: &[u8]) -> bool {
     })
 }
 
-/// Reads until an ESC shows up, at most [`SNIFF_LEN`] bytes.
+/// Reads until an ESC appears, at most [`SNIFF_LEN`] bytes.
 fn sniff(input: &mut impl Read) -> (Vec<u8>, Option<io::Error>) {
     let mut start = vec![0; SNIFF_LEN];
     let mut len = 0;
@@ -176,7 +176,7 @@ mod tests {
                 "1:19  damage    odd number of digits: a single 3, skipped",
                 "1:1  damage    frame given up at line 2, column 1: a new frame began before it \
                  was complete",
-                "2:13  damage    '?' is no hexadecimal digit, skipped",
+                "2:13  damage    '?' is not a hexadecimal digit, skipped",
                 "2:1  host      erase the event buffer",
                 "1 message, 3 damaged places"
             ]
@@ -189,7 +189,7 @@ mod tests {
             decoded(CaptureOptions { bodies: true, ..ANY }, b"52 01 F4 05\n\n1B\n53"),
             [
                 "1:1  host      read 5 entries from entry 500",
-                "3:1  damage    no message: unknown command byte 1Bh (1B)",
+                "3:1  damage    not a message: unknown command byte 1Bh (1B)",
                 "4:1  recorder  clock set",
                 "2 messages, 1 damaged place"
             ]
@@ -207,7 +207,7 @@ mod tests {
         let hex = CaptureOptions { format: Some(CaptureFormat::Hex), ..ANY };
         assert_eq!(
             decoded(hex, b"\x1B")[0],
-            "1:1  damage    an ESC byte in hex text (--format raw?) is no hexadecimal digit, \
+            "1:1  damage    an ESC byte in hex text (--format raw?) is not a hexadecimal digit, \
              skipped"
         );
         let raw = CaptureOptions { format: Some(CaptureFormat::Raw), ..ANY };

@@ -7,10 +7,10 @@ use ser_proto::{Decoded, ESC, FrameDecoder};
 
 use super::{HexText, HexToken, Kind, LineAssembler, Listing, Place, Side, explain};
 
-/// A body never is longer: its length has to fit a byte.
+/// The maximum length of a body, because its length has to fit a byte.
 const MAX_BODY: usize = 255;
 
-/// What a capture looks like.
+/// The format of a capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum CaptureFormat {
     /// The bytes as they are.
@@ -19,15 +19,14 @@ pub enum CaptureFormat {
     Hex,
 }
 
-/// What comes out of the input, in; lines of the list, out.
+/// Takes the bytes of the input; writes the lines of the list.
 pub(crate) struct Decoder {
     from: Option<Side>,
     format: CaptureFormat,
     hex: HexText,
     /// How much of a raw input has been taken.
     offset: u64,
-    // Every length that a frame can announce fits, so that an impossible one is named for what it
-    // is.
+    // Every length that a frame can announce fits, so that an impossible one is reported as such.
     frames: FrameDecoder<MAX_BODY>,
     frame_start: Place,
     text: LineAssembler,
@@ -53,7 +52,7 @@ impl Decoder {
         }
     }
 
-    /// Takes the next part of the input. What came through a pipe is shown when it came.
+    /// Takes the next part of the input. Bytes from a pipe are shown as soon as they come.
     pub(crate) fn take<W: Write>(&mut self, bytes: &[u8], list: &mut Listing<W>) -> io::Result<()> {
         for &byte in bytes {
             match self.format {
@@ -74,7 +73,7 @@ impl Decoder {
         match token {
             HexToken::Byte(byte, place) => self.byte(byte, place, list),
             HexToken::Junk(character, place) => {
-                let text = format!("{} is no hexadecimal digit, skipped", shown(character));
+                let text = format!("{} is not a hexadecimal digit, skipped", shown(character));
                 list.add(place, Kind::Damage, &text, &[])
             }
             HexToken::Half(digit, place) => {
@@ -90,7 +89,7 @@ impl Decoder {
             if body.is_empty() {
                 self.body_start = place;
             }
-            // One more than can be is kept, to tell that it is too much.
+            // One byte more than possible is kept, to recognise that the body is too long.
             if body.len() <= MAX_BODY {
                 body.push(byte);
             }
@@ -122,7 +121,7 @@ impl Decoder {
         Ok(())
     }
 
-    /// Ends the input: what is unfinished is listed.
+    /// Ends the input, and lists what is unfinished.
     pub(crate) fn finish<W: Write>(&mut self, list: &mut Listing<W>) -> io::Result<()> {
         if let Some(token) = self.hex.finish() {
             self.token(token, list)?;
@@ -158,7 +157,7 @@ impl Decoder {
 
 fn shown(character: char) -> String {
     match character {
-        char::REPLACEMENT_CHARACTER => "a byte that is no text".to_string(),
+        char::REPLACEMENT_CHARACTER => "a byte that is not text".to_string(),
         '\x1B' => "an ESC byte in hex text (--format raw?)".to_string(),
         other => format!("'{}'", other.escape_debug()),
     }

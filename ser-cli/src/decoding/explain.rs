@@ -1,4 +1,4 @@
-//! A message in words.
+//! A message as text.
 
 use clap::ValueEnum;
 use ser_proto::{
@@ -19,7 +19,7 @@ pub enum Side {
     Recorder,
 }
 
-/// What a body says.
+/// The meaning of a body.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Explanation {
     pub(crate) kind: Kind,
@@ -29,14 +29,13 @@ pub(crate) struct Explanation {
 }
 
 impl Explanation {
-    /// Whether the body is no message.
+    /// Whether the body is not a message.
     pub(crate) fn is_damage(&self) -> bool {
         self.kind == Kind::Damage
     }
 }
 
-/// Puts a body into words; when `from` is not known and both sides could have sent it, both
-/// readings.
+/// Explains a body. If `from` is not known and both sides could have sent it, gives both readings.
 pub(crate) fn explain(body: &[u8], from: Option<Side>) -> Explanation {
     let command = (from != Some(Side::Recorder)).then(|| Command::parse(body));
     let reply = (from != Some(Side::Host)).then(|| Reply::parse(body));
@@ -67,7 +66,7 @@ fn no_message(body: &[u8], as_command: Option<ParseError>, as_reply: Option<Pars
         (Some(why), _) | (None, Some(why)) => why.to_string(),
         (None, None) => "empty".to_string(),
     };
-    format!("no message: {why} ({})", hex_text(body))
+    format!("not a message: {why} ({})", hex_text(body))
 }
 
 /// Bytes as `52 01 F4 05`.
@@ -257,11 +256,14 @@ mod tests {
 
     #[test]
     fn what_is_no_message_is_shown_with_the_reason() {
-        assert_eq!(text(&[0x58, 1], None), "Damage: no message: unknown command byte 58h (58 01)");
+        assert_eq!(
+            text(&[0x58, 1], None),
+            "Damage: not a message: unknown command byte 58h (58 01)"
+        );
         let why = Command::parse(&[0x4D, 2, 0]).unwrap_err();
         assert_eq!(
             text(&[0x4D, 2, 0], Some(Side::Host)),
-            format!("Damage: no message: {why} (4D 02 00)")
+            format!("Damage: not a message: {why} (4D 02 00)")
         );
         let no_command = Command::parse(&[0x52, 0, 1, 0, 0, 0, 0, 0, 9]).unwrap_err();
         let both = text(&[0x52, 0, 1, 0, 0, 0, 0, 0, 9], None);

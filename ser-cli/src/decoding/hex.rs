@@ -1,7 +1,7 @@
 //! Bytes written as hexadecimal text: `1B 30 31 …`, with or without blanks.
 //!
-//! Blanks and commas separate, `0x` may stand before a byte, `#` starts a comment that ends with
-//! the line.
+//! Blanks and commas separate bytes, `0x` may precede a byte, and `#` starts a comment that ends
+//! with the line.
 
 use super::Place;
 
@@ -10,10 +10,10 @@ use super::Place;
 pub(crate) enum HexToken {
     /// A byte, and where its first digit stands.
     Byte(u8, Place),
-    /// A character that has no meaning here; a digit right before it goes with it, and so do more
-    /// of its kind.
+    /// A character without meaning here. A digit right before it belongs to it, and so do more
+    /// characters of its kind.
     Junk(char, Place),
-    /// A digit that lacks the second one.
+    /// A digit without a second one.
     Half(char, Place),
     /// The line has ended.
     LineEnd,
@@ -26,7 +26,7 @@ pub(crate) struct HexText {
     column: u64,
     digit: Option<(u8, Place)>,
     in_comment: bool,
-    /// Whether the last character was junk: a run of it is one finding.
+    /// Whether the last character was junk: a run of junk is one finding.
     in_junk: bool,
     utf8: Utf8,
 }
@@ -105,7 +105,7 @@ impl HexText {
     }
 }
 
-/// Puts the bytes of a character together, so that columns count what people see.
+/// Assembles the bytes of a character, so that columns count visible characters.
 #[derive(Debug, Default)]
 struct Utf8 {
     bytes: [u8; 4],

@@ -1,4 +1,4 @@
-//! Text between frames, a line at a time.
+//! Text between frames, one line at a time.
 
 use ser_client::MAX_LINE_LEN;
 
@@ -9,10 +9,10 @@ use super::{Kind, Place};
 pub(crate) struct Line {
     /// Where it starts.
     pub(crate) place: Place,
-    /// Text, or noise if there is a byte that no printer prints.
+    /// Text, or noise if it contains a byte that no printer prints.
     pub(crate) kind: Kind,
-    /// Printable ASCII as it is, everything else as `\x1f`: a capture must not be able to steer the
-    /// terminal.
+    /// Printable ASCII as it is, everything else as `\x1f`, because a capture must not be able to
+    /// control the terminal.
     pub(crate) text: String,
 }
 
@@ -24,18 +24,18 @@ pub(crate) struct LineAssembler {
 }
 
 impl LineAssembler {
-    /// Takes a byte that stands at `place`; gives the line that it completes.
+    /// Takes the byte at `place`; returns the line that it completes.
     pub(crate) fn push(&mut self, byte: u8, place: Place) -> Option<Line> {
         if byte == b'\n' {
             return self.finish();
         }
         self.start.get_or_insert(place);
         self.line.push(byte);
-        // A capture without line ends takes no more memory than one with.
+        // A capture without line ends must not take more memory than one with them.
         if self.line.len() >= MAX_LINE_LEN { self.finish() } else { None }
     }
 
-    /// Ends the line; an empty one is none.
+    /// Ends the line; an empty one does not count.
     pub(crate) fn finish(&mut self) -> Option<Line> {
         let place = self.start.take()?;
         let bytes = std::mem::take(&mut self.line);

@@ -1,14 +1,14 @@
-//! The list that `decode` writes: where, what kind, and in words.
+//! The list that `decode` writes: place, kind and text.
 
 use std::fmt;
 use std::io::{self, Write};
 
 use crate::output::Palette;
 
-/// Where something stands in the input.
+/// A place in the input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
-    /// In a binary capture: bytes before it.
+    /// In a binary capture: the number of bytes before it.
     Offset(u64),
     /// In hex text: line and column, both from 1.
     Text {
@@ -38,7 +38,7 @@ impl Place {
     }
 }
 
-/// What a line of the list is about.
+/// The subject of a line in the list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// A message from the host.
@@ -55,18 +55,18 @@ pub(crate) enum Kind {
     Damage,
 }
 
-/// How many there were of what.
+/// Counts of the listed items.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Messages in frames that are whole, or bodies.
+    /// Messages in intact frames, or bodies.
     pub messages: u64,
     /// Lines of text between frames.
     pub lines: u64,
-    /// Places where something is broken.
+    /// Places where the capture is damaged.
     pub damages: u64,
 }
 
-/// Writes the list and keeps count.
+/// Writes the list and counts.
 #[derive(Debug)]
 pub struct Listing<W> {
     out: W,

@@ -1,4 +1,4 @@
-//! From a capture of the line back to messages: the reading behind `ser-cli decode`.
+//! Turns a capture of the line back into messages, for `ser-cli decode`.
 
 mod capture;
 mod decoder;

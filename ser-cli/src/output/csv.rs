@@ -8,14 +8,14 @@ use super::{Event, EventWriter, Loss};
 pub(super) const HEADER: &str = "entry,time,input,state,sequence,life,note";
 
 /// Writes rows like `17,2026-11-22T10:00:00.250,3,1,120,9f3c5a7e21b04d68,`. The header comes first,
-/// also when no event follows. A loss has nothing in the first four columns.
+/// even when no event follows. A loss has nothing in the first four columns.
 pub(crate) struct Csv<W> {
     out: W,
     header_due: bool,
 }
 
 impl<W: Write> Csv<W> {
-    /// After a header that is there already, or not.
+    /// `has_header` says whether the header is already there.
     pub(crate) fn new(out: W, has_header: bool) -> Csv<W> {
         Csv { out, header_due: !has_header }
     }
@@ -36,7 +36,7 @@ impl<W: Write> EventWriter for Csv<W> {
         self.header()?;
         let note = event.note().unwrap_or_default();
         if event.entry.changed.is_empty() {
-            // It is there, so it has a row.
+            // An odd event without changes still needs a row.
             self.change(event, ",", &note)?;
         }
         for input in event.entry.changed.numbers() {

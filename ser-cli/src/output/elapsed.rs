@@ -1,4 +1,4 @@
-//! How long after the others an event happened, as the tables show it.
+//! The time between an event and the others, as the tables show it.
 
 use ser_proto::TimeStamp;
 
@@ -12,8 +12,8 @@ pub(crate) struct Elapsed {
 }
 
 impl Elapsed {
-    /// The time since the previous and since the first event: empty for the first event itself, `?`
-    /// where one of the two has no possible date.
+    /// The time since the previous and since the first event. Empty for the first event itself; `?`
+    /// if one of the two has an impossible date.
     pub(crate) fn at(&mut self, time: TimeStamp) -> [String; 2] {
         let since = [self.previous, self.first].map(|earlier| match earlier {
             None => String::new(),

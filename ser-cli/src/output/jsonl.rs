@@ -18,7 +18,7 @@ pub(crate) struct JsonLines<W> {
 
 #[derive(Serialize)]
 struct EventLine {
-    /// The number under which the recorder has it.
+    /// The recorder's number for it.
     entry: u16,
     /// In the recorder's own time, as it was read.
     time: String,
@@ -40,14 +40,14 @@ struct LossLine {
     lost: Option<u32>,
     /// `exactly`, `at least` or `unknown`.
     count: &'static str,
-    /// The sequence of the last event before.
+    /// The sequence of the last event before the loss.
     after: Option<u64>,
     /// `overwritten`, `log began anew` or `not recorded`.
     why: &'static str,
     /// The inputs that changed without being recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
     inputs: Option<Vec<u8>>,
-    /// Of the last event before.
+    /// The life of the last event before the loss.
     life: String,
 }
 

@@ -1,8 +1,8 @@
-//! Which log an event belongs to.
+//! Names the log that an event belongs to.
 //!
-//! A log lives from power-up or erase to the next. The recorder has no name for its lives, so
-//! whoever remembers from run to run what was read draws one at random: together with the sequence
-//! it tells an event from all others.
+//! A log lives from power-up or erase to the next. The recorder has no name for its lives, so a
+//! program that remembers from run to run draws one at random. Together with the sequence, the name
+//! distinguishes an event from all others.
 
 use std::fmt;
 use std::io;
@@ -12,24 +12,24 @@ use std::io;
 pub struct Life(u64);
 
 impl Life {
-    /// Of a reading that remembers nothing; written as `0`.
+    /// The life of a reading that remembers nothing; written as `0`.
     pub const UNKNOWN: Life = Life(0);
 
-    /// A life that begins to be known now.
+    /// A new name, for a life that becomes known now.
     ///
     /// # Errors
-    /// When the system gives no random numbers.
+    /// When the system provides no random numbers.
     pub(crate) fn begin() -> io::Result<Life> {
         loop {
             match getrandom::u64()? {
-                // That would be nobody's.
+                // 0 is the unknown life.
                 0 => {}
                 name => return Ok(Life(name)),
             }
         }
     }
 
-    /// The life of this name, as [`Display`](fmt::Display) writes it.
+    /// The life with this name, as written by [`Display`](fmt::Display).
     pub(crate) fn from_name(name: &str) -> Option<Life> {
         let value = u64::from_str_radix(name, 16).ok()?;
         Some(Life(value)).filter(|life| life.to_string() == name)

@@ -24,7 +24,7 @@ pub(crate) use rows::{Rows, sync_stdout};
 pub(crate) use sequence::{PointNames, Sequence};
 pub(crate) use table::Table;
 
-/// How events are written.
+/// The format of events.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Format {
     /// For people: with the time since the previous and since the first event.
@@ -44,11 +44,11 @@ pub(crate) trait EventWriter {
     /// Writes that events are missing here.
     fn lost(&mut self, loss: &Loss) -> io::Result<()>;
 
-    /// Passes on what has been written so far: whole rows.
+    /// Passes on what has been written so far, in whole rows.
     fn flush(&mut self) -> io::Result<()>;
 }
 
-/// The writer of `format` on standard output. A file that is continued gets no second header.
+/// The writer of `format` on standard output. A continued file gets no second header.
 pub(crate) fn to_stdout(format: Format) -> Box<dyn EventWriter> {
     match format {
         Format::Table => {
@@ -63,7 +63,7 @@ pub(crate) fn to_stdout(format: Format) -> Box<dyn EventWriter> {
     }
 }
 
-/// Writes `name` and what it is in two columns, as `status` and `config` do.
+/// Writes `name` and its value in two columns, as `status` and `config` do.
 pub(crate) fn field(
     out: &mut dyn Write,
     name: &str,

@@ -1,21 +1,21 @@
-//! The few styles in use, and none at all where colour is not wanted.
+//! The few styles in use, and none where colour is not wanted.
 
 use anstyle::{AnsiColor, Style};
 
-/// What things look like.
+/// The styles of the output.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Palette {
     /// Column titles.
     pub(crate) title: Style,
-    /// What is there but seldom looked at.
+    /// Details that are seldom needed.
     pub(crate) faint: Style,
     /// An input that went on.
     pub(crate) on: Style,
     /// What needs attention: lost events, damage.
     pub(crate) alarm: Style,
-    /// The event that began it all.
+    /// The event that started an incident.
     pub(crate) first_out: Style,
-    /// What the user could type.
+    /// A command that the user could type.
     pub(crate) command: Style,
 }
 
@@ -25,8 +25,7 @@ impl Palette {
         Palette::default()
     }
 
-    /// Styles if standard output is a terminal that takes them and the user has nothing against
-    /// them.
+    /// Styles if standard output is a terminal that supports them and the user does not object.
     pub(crate) fn of_stdout() -> Palette {
         match anstream::AutoStream::choice(&std::io::stdout()) {
             anstream::ColorChoice::Never => Palette::plain(),

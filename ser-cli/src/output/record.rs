@@ -1,4 +1,4 @@
-//! What the writers of all formats are given: events and losses, each with its place in the log.
+//! The input of the writers of all formats: events and losses, each with its place in the log.
 
 use std::fmt;
 use std::io;
@@ -9,42 +9,42 @@ use ser_proto::{Entry, Model};
 use super::{EventWriter, Life};
 use crate::time::ClockStep;
 
-/// An event, and what is to be said about it.
+/// An event, with its notes.
 #[derive(Clone, Debug)]
 pub(crate) struct Event {
-    /// The number under which the recorder has it.
+    /// The recorder's number for it.
     pub(crate) number: u16,
-    /// The recorder's total after it, from 1; `None` where that is not known.
+    /// The recorder's total after it, from 1; `None` if that is not known.
     pub(crate) sequence: Option<u64>,
     pub(crate) life: Life,
-    /// What was read.
+    /// The entry as it was read.
     pub(crate) entry: Entry,
-    /// What a reader of the entry has to know; mostly nothing.
+    /// Remarks for a reader of the entry; usually none.
     pub(crate) notes: Vec<Note>,
 }
 
-/// What is remarkable about an event.
+/// A remark on an event.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Note {
-    /// The entry cannot be what the recorder meant; this is why.
+    /// The entry cannot be what the recorder meant, for this reason.
     Odd(String),
-    /// Its clock shows an earlier time than at the event before, which came first all the same.
+    /// Its clock shows an earlier time than at the previous event, which nevertheless came first.
     ClockWentBack,
-    /// The two digits of the year have begun anew since the event before: 1970 follows 2069.
+    /// The two digits of the year have begun again since the previous event: 1970 follows 2069.
     YearsBeganAnew,
 }
 
-/// Events that are missing.
+/// Missing events.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Loss {
-    /// The sequence of the last event before; 0 at the beginning of a log.
+    /// The sequence of the last event before the loss; 0 at the beginning of a log.
     pub(crate) after: Option<u64>,
     pub(crate) life: Life,
     pub(crate) lost: Lost,
 }
 
 impl Loss {
-    /// How many: a number and how sure it is.
+    /// How many events: a number and its certainty.
     pub(crate) fn count(&self) -> (Option<u32>, &'static str) {
         match self.lost {
             Lost::Overwritten { count } => (Some(count), "exactly"),
@@ -62,7 +62,7 @@ impl Loss {
         }
     }
 
-    /// For a person.
+    /// The loss in a sentence for people.
     pub(crate) fn sentence(&self) -> String {
         let events = |count: u32| match count {
             1 => "1 event was".to_string(),
@@ -138,20 +138,20 @@ pub(crate) struct Annotator {
     before: Before,
 }
 
-/// What is known from earlier of the log that is read.
+/// What an earlier run knew about the log that is read.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Before {
     /// The last event that was delivered.
     pub(crate) previous: Option<Entry>,
-    /// The same, when the log was erased right after it: the first event of the new log goes on
-    /// from its state.
+    /// The last event before the log was erased, if it was erased right after that. The first event
+    /// of the new log continues from its state.
     pub(crate) erased: Option<Entry>,
-    /// The name of the next life, if one was drawn already.
+    /// The name of the next life, if one has been drawn already.
     pub(crate) next_life: Option<Life>,
 }
 
 impl Annotator {
-    /// Of a log of this life.
+    /// For a log of this life.
     pub(crate) fn new(life: Life, before: Before) -> Annotator {
         Annotator { life, before }
     }
@@ -161,12 +161,12 @@ impl Annotator {
         self.life
     }
 
-    /// The entries that come now have nothing to do with those before.
+    /// Says that the following entries are unrelated to those before.
     pub(crate) fn begin_anew(&mut self) {
         self.before.previous = None;
     }
 
-    /// Hands a delivery to a writer as the records that it is, and gives these back.
+    /// Turns a delivery into records, hands these to a writer, and returns them.
     pub(crate) fn write(
         &mut self,
         delivery: &Delivery,
@@ -210,7 +210,7 @@ impl Annotator {
     }
 }
 
-/// One of the things that a reading brings.
+/// One item of a reading.
 pub(crate) enum Record {
     Event(Event),
     Loss(Loss),
@@ -328,7 +328,7 @@ mod tests {
         let [Record::Loss(loss)] = &records[..] else { panic!() };
         assert_eq!(loss.life, life, "the loss belongs to the log of before");
         assert!(![life, Life::UNKNOWN].contains(&annotator.life()));
-        // A name that was drawn before a crash may be in a file already.
+        // A name that was drawn before a crash may already be in a file.
         let next = Life::begin().unwrap();
         let mut annotator =
             Annotator::new(life, Before { next_life: Some(next), ..Before::default() });

@@ -1,21 +1,21 @@
-//! Standard output as a place for whole rows.
+//! Standard output for whole rows.
 //!
-//! What is written is passed on at each flush, whole rows at a time. If a file takes only a part of
-//! it, as on a full disk, that part is taken back: the file ends with a whole row, and the next
-//! run, which delivers the same events again, goes on there. A file that ends in the middle of a
-//! row all the same (the power went) gets a line end first.
+//! Rows are passed on at each flush, always whole ones. If a file takes only a part of them, as on
+//! a full disk, that part is taken back. The file then ends with a whole row, and the next run,
+//! which delivers the same events again, continues there. A file that nevertheless ends in the
+//! middle of a row (after a power cut) first gets a line end.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
-/// The first line of a file is looked for in so many bytes.
+/// How many bytes are searched for the first line of a file.
 const FIRST_LINE: usize = 256;
 
 /// Collects rows for standard output.
 pub(crate) struct Rows {
     rows: Vec<u8>,
     file: Option<File>,
-    /// Whether what was written can be taken back.
+    /// Whether written bytes can be taken back.
     is_regular: bool,
 }
 
@@ -27,12 +27,13 @@ struct Before {
 }
 
 impl Rows {
-    /// Rows for standard output; says whether the file that it is begins with `header` already.
+    /// Rows for standard output; also returns whether the file behind it already begins with
+    /// `header`.
     pub(crate) fn to_stdout(header: &str) -> (Rows, bool) {
         match stdout_file() {
             Ok(file) if is_regular(&file) => Rows::to_file(file, header, reopen_stdout),
-            // Standard output as the library has it takes a closed one for a good one. A Windows
-            // console needs the library, because it wants other bytes.
+            // The library treats a closed standard output as a good one. A Windows console needs
+            // the library, because it wants other bytes.
             file => {
                 let file = file.ok().filter(|_| cfg!(unix));
                 (Rows { rows: Vec::new(), file, is_regular: false }, false)
@@ -45,7 +46,7 @@ impl Rows {
         if is_empty {
             return (Rows { rows: Vec::new(), file: Some(file), is_regular: true }, false);
         }
-        // Where the file cannot be looked into, it is taken for one of ours.
+        // A file that cannot be inspected is assumed to be one of ours.
         let before = reopen(&file).and_then(look);
         let has_header = before.as_ref().map_or(true, |before| before.begins_with(header));
         let ends_in_row = before.is_ok_and(|before| before.ends_in_row);
@@ -70,7 +71,7 @@ impl Rows {
         Ok(())
     }
 
-    /// Takes back what was written of rows that did not all fit.
+    /// Takes back the written part of rows that did not all fit.
     fn fail(&mut self, written: usize, error: io::Error) -> io::Result<()> {
         match &mut self.file {
             Some(file) if self.is_regular => take_back(file, written, error),
@@ -80,8 +81,8 @@ impl Rows {
 }
 
 impl Before {
-    /// Whether the first line is this header, however spreadsheets and terminals have dressed it
-    /// up.
+    /// Whether the first line is this header, however spreadsheets and terminals have changed its
+    /// form.
     fn begins_with(&self, header: &str) -> bool {
         let text = String::from_utf8_lossy(&self.first_line);
         let plain = anstream::adapter::strip_str(&text).to_string();
@@ -100,16 +101,16 @@ impl Write for Rows {
             return Ok(());
         }
         let passed_on = self.pass_on();
-        // What could not be passed on is delivered again by the next reading.
+        // The next reading delivers again what could not be passed on.
         self.rows.clear();
         passed_on
     }
 }
 
-/// Cuts off the last bytes of a file if these are the ones that were just written: others may write
-/// to it, too.
+/// Cuts off the last bytes of a file if they are the ones just written, because others may write to
+/// it, too.
 fn take_back(file: &mut File, written: usize, error: io::Error) -> io::Result<()> {
-    // The first error is the one to tell; a row that stays cut is ended by the next run.
+    // The first error is reported. If the cut fails, the next run ends the broken row.
     let _ = cut_off(file, written as u64);
     Err(error)
 }
@@ -137,14 +138,14 @@ fn is_regular(file: &File) -> bool {
     file.metadata().is_ok_and(|metadata| metadata.is_file())
 }
 
-/// Sees to it that what was written to standard output is on the disk, if it is a file there.
+/// Makes sure that everything written to standard output is on the disk, if it is a file.
 ///
 /// # Errors
-/// When the disk did not take it.
+/// When the disk did not accept the data.
 pub(crate) fn sync_stdout() -> io::Result<()> {
     match stdout_file() {
         Ok(file) if is_regular(&file) => file.sync_data(),
-        // Terminals and pipes cannot, and need not, do this.
+        // Terminals and pipes cannot be synced, and need not be.
         _ => Ok(()),
     }
 }
@@ -166,7 +167,7 @@ fn stdout_file() -> io::Result<File> {
     Err(io::ErrorKind::Unsupported.into())
 }
 
-/// The file behind standard output once more, to read: a shell opens it for writing only.
+/// Reopens the file behind standard output for reading, because a shell opens it for writing only.
 #[cfg(target_os = "linux")]
 fn reopen_stdout(file: &File) -> io::Result<File> {
     use std::os::fd::AsRawFd;
@@ -231,7 +232,7 @@ mod tests {
         assert_eq!(fs::read(&path).unwrap(), b"");
         rows.flush().unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"1,2\n");
-        // A file that cannot be looked into is one of ours.
+        // A file that cannot be inspected is assumed to be one of ours.
         assert!(appending(&path).1);
     }
 
@@ -245,7 +246,7 @@ mod tests {
         assert_eq!(take_back(&mut file, 2, full()).unwrap_err().kind(), io::ErrorKind::StorageFull);
         assert_eq!(fs::read(&path).unwrap(), b"1,2\n");
         file.write_all(b"3,").unwrap();
-        // Somebody else has written meanwhile.
+        // Another program has written in the meantime.
         File::options().append(true).open(&path).unwrap().write_all(b"theirs\n").unwrap();
         take_back(&mut file, 2, full()).unwrap_err();
         assert_eq!(fs::read(&path).unwrap(), b"1,2\n3,theirs\n");

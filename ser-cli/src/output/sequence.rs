@@ -1,4 +1,4 @@
-//! The sequence of events of one incident: by the names of the inputs, with the event that began
+//! The sequence of events of one incident, by the names of the inputs, with the event that started
 //! it.
 
 use std::collections::BTreeMap;
@@ -8,17 +8,18 @@ use ser_proto::{Entry, TimeStamp};
 
 use super::{Elapsed, Event, EventWriter, Loss, Palette};
 
-/// What the inputs are called.
+/// The names of the inputs.
 pub(crate) type PointNames = BTreeMap<u8, String>;
 
 /// An incident lasts seconds.
 const WIDTH: usize = "+59.999 s".len();
 
-/// What stands before the changes of an event, so that its second change goes below the first.
+/// The width of everything before the changes of an event, so that its second change goes below the
+/// first.
 const INDENT: usize = 5 + 1 + 12 + 2 + WIDTH + 1 + WIDTH + 2;
 
-/// Writes lines like `2 10:00:00.262  +0.012 s  +0.012 s  17 ON  87T trip`, made to fit 80 columns: no date, and a
-/// line for each change.
+/// Writes lines like `2 10:00:00.262  +0.012 s  +0.012 s  17 ON  87T trip`, made to fit 80 columns:
+/// no date, and one line per change.
 pub(crate) struct Sequence<W> {
     out: W,
     palette: Palette,

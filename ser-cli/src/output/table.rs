@@ -7,7 +7,7 @@ use ser_proto::Entry;
 
 use super::{Elapsed, Event, EventWriter, Loss, Palette};
 
-/// Wide enough for a delta of less than an hour, and for a shorter text of more.
+/// Wide enough for a time of less than an hour, and for the shorter text of a longer one.
 const WIDTH: usize = "+59m59.999 s".len();
 
 /// Writes lines like `17  2026-11-22T10:00:00.250  +0.012 s  +1.204 s  3 ON  17 OFF`.
@@ -19,7 +19,7 @@ pub(crate) struct Table<W> {
 }
 
 impl<W: Write> Table<W> {
-    /// After a header that is there already, or not.
+    /// `has_header` says whether the header is already there.
     pub(crate) fn new(out: W, palette: Palette, has_header: bool) -> Table<W> {
         Table { out, palette, header_due: !has_header, elapsed: Elapsed::default() }
     }

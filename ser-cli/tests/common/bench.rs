@@ -1,4 +1,4 @@
-//! A simulated recorder on a pseudo-terminal, for the tests that use it as a user does.
+//! A simulated recorder on a pseudo-terminal, for tests that use the command line as a user does.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -54,14 +54,14 @@ impl Bench {
         self.command(arguments).output().expect("ser-cli runs")
     }
 
-    /// Standard output of a command that must go well.
+    /// Standard output of a command that must succeed.
     pub(crate) fn ok(&self, arguments: &str) -> String {
         let output = self.run(arguments);
         assert_eq!(output.status.code(), Some(0), "{arguments}: {}", text(&output.stderr));
         text(&output.stdout)
     }
 
-    /// Standard error of a command that must end with this code, and with nothing on standard
+    /// Standard error of a command that must end with this code and print nothing on standard
     /// output.
     pub(crate) fn fails(&self, code: i32, arguments: &str) -> String {
         let output = self.run(arguments);
@@ -73,7 +73,7 @@ impl Bench {
         text(&output.stderr)
     }
 
-    /// Moves contacts and waits until so many entries more have been recorded.
+    /// Moves contacts and waits until that many more entries have been recorded.
     pub(crate) fn contacts(&mut self, lines: &str, entries: usize) {
         let before = self.entries();
         let input = self.sim.0.stdin.as_mut().expect("piped");

@@ -1,4 +1,4 @@
-//! A running `ser-cli`, for the tests that use it as a user does.
+//! A running `ser-cli`, for tests that use it as a user does.
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
 #[cfg(unix)]
@@ -34,13 +34,13 @@ impl Running {
         assert!(Command::new("kill").args([name, &id]).status().expect("kill runs").success());
     }
 
-    /// Presses Ctrl-C and gives the exit code.
+    /// Presses Ctrl-C and returns the exit code.
     pub(crate) fn interrupt(&mut self) -> Option<i32> {
         self.signal("-INT");
         self.wait()
     }
 
-    /// Waits for the end; gives the exit code.
+    /// Waits for the end; returns the exit code.
     pub(crate) fn wait(&mut self) -> Option<i32> {
         let mut code = None;
         wait_until("ser-cli ends", || {
@@ -71,7 +71,7 @@ fn lines_of(output: impl Read + Send + 'static) -> Receiver<String> {
 }
 
 impl Drop for Running {
-    /// Politely first: a simulator that is killed outright leaves its emulator behind.
+    /// Politely first: a simulator that is killed leaves its emulator behind.
     fn drop(&mut self) {
         for signal in ["-TERM", "-CONT"] {
             let _ = Command::new("kill")

@@ -1,8 +1,8 @@
-//! Flash memory as on an STM32F4, whose power can fail at any single write.
+//! Flash memory as in an STM32F4, whose power can fail at any single write.
 //!
-//! Bits go from 1 to 0 when written and back only by erasing a whole sector. Power is a budget of
-//! steps: each byte written is a step, and so is each part of an erase. When it runs out, the step
-//! under way is done in part, and nothing works any more until [`Flash::power_up`].
+//! Writing turns bits from 1 to 0; only erasing a whole sector turns them back. Power is a budget
+//! of steps: each byte written is a step, and so is each part of an erase. When the budget runs
+//! out, the current step is done in part, and nothing works any more until [`Flash::power_up`].
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -23,8 +23,8 @@ pub(crate) struct Flash<const SECTOR: usize, const WORD: usize>(Rc<RefCell<Cells
 struct Cells {
     bytes: Vec<u8>,
     erased: Vec<u32>,
-    /// Sectors whose erasing was cut short. Whatever their cells seem to hold, nothing written
-    /// there would stay.
+    /// Sectors whose erase was cut short. Nothing written there would last, whatever their cells
+    /// seem to hold.
     weak: Vec<bool>,
     /// Steps until the power fails; `None` when it does not.
     power: Option<u64>,
@@ -54,14 +54,14 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         })))
     }
 
-    /// A memory of its own with the same contents, and power.
+    /// A separate memory with the same contents, and with power.
     pub(crate) fn copy(&self) -> Self {
         let copy = Flash(Rc::new(RefCell::new(self.0.borrow().clone())));
         copy.power_up();
         copy
     }
 
-    /// The power fails in the step after so many.
+    /// Makes the power fail in the step after that many.
     pub(crate) fn cut_after(&self, steps: u64, seed: u64) {
         let mut cells = self.0.borrow_mut();
         cells.power = Some(steps);
@@ -72,7 +72,7 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         self.0.borrow_mut().power = None;
     }
 
-    /// Memory that has been used for something else.
+    /// Fills the memory as if it had been used for something else.
     pub(crate) fn fill_with_noise(&self, seed: u64) {
         let mut cells = self.0.borrow_mut();
         cells.sow(seed);
@@ -93,7 +93,7 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
 }
 
 impl Cells {
-    /// Makes what is left to chance depend on `seed`, and on nothing else.
+    /// Makes everything left to chance depend on `seed` alone.
     fn sow(&mut self, seed: u64) {
         self.noise = Rand64::new(seed.into());
     }
@@ -130,12 +130,12 @@ impl Cells {
             self.bytes[at] = new;
             return Ok(());
         }
-        // Some of the bits that were to become 0 have.
+        // Some of the bits that were to become 0 have done so.
         self.bytes[at] = old & (new | self.noise());
         Err(PowerCut)
     }
 
-    /// Takes all cells of a sector a part of the way to 1; the last step takes them there.
+    /// Takes all cells of a sector part of the way to 1; the last step completes it.
     fn erase(&mut self, from: usize, to: usize) -> Result<(), PowerCut> {
         for step in 1..=ERASE_STEPS {
             if !self.step() {

@@ -10,16 +10,16 @@ const NO_REFERENCE: u16 = 0xFFFF;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GeniusOptions {
-    /// The recorder's model: it decides how many bytes of global data there are.
+    /// The recorder's model, which decides the length of its global data.
     pub model: Model,
     /// State of the board when the port begins.
     pub start: Start,
     /// Whether [`GeniusPort::reset_held`](super::GeniusPort::reset_held) reaches the board. Without
-    /// it, a failed board can only be waited for.
+    /// it, the recorder can only wait for a failed board to recover.
     pub reset_line: bool,
     /// How long the board may go without a heartbeat.
     pub heartbeat_timeout_ms: u32,
-    /// Reference address that the board tells devices that ask; it means nothing to the recorder.
+    /// Reference address that the board tells devices that ask. It means nothing to the recorder.
     pub reference: u16,
 }
 
@@ -41,16 +41,16 @@ impl GeniusOptions {
             Model::Ser160 => 2,
             Model::Ser320 => 4,
         };
-        // Nobody looks at other devices' inputs, but with shorter buffers the board would not log
-        // all of them in.
+        // The recorder does not read other devices' inputs, but with shorter buffers the board
+        // would not log all devices in.
         let configuration =
             Configuration::new(self.reference, len, 0, Configuration::DEFAULT.buffer_len());
         Options {
             start: self.start,
             reset_line: self.reset_line,
             heartbeat_timeout_ms: self.heartbeat_timeout_ms,
-            // A pulse of the line is a datagram, then. All else can wait until flags are looked at
-            // anyway.
+            // A pulse of the line then always means a datagram. All else can wait until the flags
+            // are polled.
             interrupts: Interrupts::RECEIVE_QUEUE,
             ..Options::new(configuration.unwrap_or(Configuration::DEFAULT))
         }
@@ -58,7 +58,7 @@ impl GeniusOptions {
 }
 
 impl Default for GeniusOptions {
-    /// For the 16-input model.
+    /// Options for the 16-input model.
     fn default() -> GeniusOptions {
         GeniusOptions::new(Model::Ser160)
     }

@@ -1,4 +1,4 @@
-//! Words back to a block, and data back to a message.
+//! Turns words back into a block, and data back into a message.
 
 use std::io::Write;
 
@@ -14,7 +14,7 @@ pub(super) struct Args {
     #[arg(required = true, value_name = "WORD", value_parser = values::word, allow_negative_numbers = true)]
     words: Vec<u16>,
 
-    /// The words are data that a PLC has fetched from a recorder, and no block.
+    /// The words are data that a PLC has fetched from a recorder, not a block.
     #[arg(long)]
     data: bool,
 
@@ -43,7 +43,7 @@ pub(super) fn run(args: &Args, out: &mut dyn Write) -> Result<()> {
     }
 }
 
-/// What a block that sends a message to a recorder says to it.
+/// The message that a block sends to a recorder, in words.
 pub(super) fn message(block: &CommReq) -> Option<String> {
     match block {
         CommReq::Send(send) if is_for_a_recorder(send.function, send.subfunction) => {
@@ -57,7 +57,7 @@ fn is_for_a_recorder(function: u8, subfunction: u8) -> bool {
     (function, subfunction) == (FUNCTION_HORNER, SUBFUNCTION_SER)
 }
 
-/// Where nobody says how many bytes there are, the high half of the last word may be none.
+/// If the number of bytes is not given, the high half of the last word may not be data.
 fn fetched(words: &[u16], bytes: Option<usize>) -> Explanation {
     let explained =
         |count| explain(&bytes_of_words(words, count).collect::<Vec<_>>(), Some(Side::Recorder));

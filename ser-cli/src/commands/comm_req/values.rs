@@ -6,7 +6,7 @@ use ser_proto::genius::{Address, BusAddress, MemoryType, PlcReference, Priority}
 /// How urgent a datagram is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum PriorityName {
-    /// In a bus scan in which nobody else sends one.
+    /// In a bus scan in which no other device sends one.
     Normal,
     /// In any case; the scan gets longer.
     High,

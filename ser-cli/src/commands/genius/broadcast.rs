@@ -1,4 +1,4 @@
-//! `genius broadcast`: one command to all recorders, and whether each has received it.
+//! `genius broadcast`: one command to all recorders, and a check that each has received it.
 
 use std::fmt;
 use std::io::{self, Write};
@@ -15,7 +15,7 @@ use crate::time::{local_time_in, parse_time};
 pub(super) enum What {
     /// Set all clocks, to the time at which the broadcast arrives.
     Clock {
-        /// The time to set; the local time of this computer if not given.
+        /// The time to set; this computer's local time if not given.
         #[arg(long, value_name = "TIME", value_parser = parse_time)]
         at: Option<TimeStamp>,
     },
@@ -23,9 +23,9 @@ pub(super) enum What {
     Start,
     /// Stop recording everywhere.
     Stop,
-    /// Erase all events of all recorders. There is no way back.
+    /// Erase all events of all recorders. This cannot be undone.
     Erase {
-        /// Do it; without it nothing is done.
+        /// Confirm the erase; without it nothing is done.
         #[arg(long)]
         yes: bool,
     },
@@ -39,7 +39,7 @@ pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> 
     }
     let host = connection::open_bus(connection)?;
     let found = host.recorders(how)?;
-    // It is not asked whether such a device has heard it.
+    // Such a device is not asked whether it has received the broadcast.
     if let Some(silent) = silent_candidates(&found.silent) {
         warn(&silent);
     }
@@ -49,7 +49,7 @@ pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> 
     }
     let ask =
         || nodes.iter().map(|&node| last_broadcast(&host, node, connection)).collect::<Vec<_>>();
-    // The same command may have come before.
+    // The same command may have been broadcast before.
     let before = ask();
     let command = send(what, &host)?;
     let checks: Vec<_> = nodes
@@ -69,7 +69,7 @@ pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> 
     conclude(&checks)
 }
 
-/// Sends the command, and says which time it has if it has one.
+/// Sends the command, and tells the user the time in it, if any.
 fn send(what: What, host: &GeniHost) -> Result<Command> {
     let command = match what {
         What::Clock { at: Some(time) } => Command::SetClock(time),
@@ -101,17 +101,17 @@ fn last_broadcast(host: &GeniHost, node: u8, connection: &ConnectionArgs) -> Ans
         .map_err(|error| error.to_string())
 }
 
-/// Whether a recorder has heard a broadcast.
+/// Whether a recorder has received a broadcast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Heard {
     Yes,
     No,
-    /// It did not say what it heard, before or after, or had heard the very same before.
+    /// It did not say what it received, before or after, or it had received the very same before.
     NotKnown,
 }
 
 impl Heard {
-    /// Judges by what the recorder heard last before it and after it.
+    /// Judges by the last broadcast that the recorder received, before and after.
     fn of(command: &Command, before: &Answer, after: &Answer) -> Heard {
         let Ok(after) = after else { return Heard::NotKnown };
         let Some(last) = after.filter(|last| last.code == command.code().byte()) else {
@@ -120,15 +120,15 @@ impl Heard {
         match before {
             Err(_) => Heard::NotKnown,
             Ok(before) if *before != Some(last) => Heard::Yes,
-            // It shows the time that was set, not the time at which it was: twice the same looks
-            // like once.
+            // The recorder shows the time that was set, not the time at which it was set. The same
+            // setting twice looks like one.
             Ok(_) if matches!(command, Command::SetClock(_)) => Heard::NotKnown,
             Ok(_) => Heard::No,
         }
     }
 }
 
-/// What became of the broadcast at one recorder: a row of the table.
+/// The result of the broadcast at one recorder: a row of the table.
 struct Check {
     node: u8,
     heard: Heard,
@@ -149,19 +149,19 @@ impl fmt::Display for Check {
             Err(why) => return f.write_str(why),
         }
         if self.heard == Heard::NotKnown {
-            f.write_str(" (cannot be told from one before)")?;
+            f.write_str(" (cannot be told from an earlier one)")?;
         }
         Ok(())
     }
 }
 
-/// A failure unless everybody is known to have heard it.
+/// Fails unless every recorder is known to have received it.
 fn conclude(checks: &[Check]) -> Result<()> {
     let those = |heard: Heard| {
         let nodes = checks.iter().filter(move |check| check.heard == heard);
         nodes.map(|check| check.node.to_string()).collect::<Vec<_>>()
     };
-    inform(format_args!("{} of {} recorders heard it", those(Heard::Yes).len(), checks.len()));
+    inform(format_args!("{} of {} recorders received it", those(Heard::Yes).len(), checks.len()));
     let (deaf, unknown) = (those(Heard::No).join(", "), those(Heard::NotKnown).join(", "));
     let message = match (deaf.is_empty(), unknown.is_empty()) {
         (true, true) => return Ok(()),

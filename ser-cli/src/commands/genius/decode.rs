@@ -1,4 +1,4 @@
-//! `genius decode`: a datagram's codes and data in words.
+//! `genius decode`: explains a datagram's codes and data.
 
 use std::io::{self, Write};
 
@@ -31,7 +31,7 @@ fn bytes_of(words: &[String]) -> Result<Vec<u8>> {
         };
         let of_part: Option<Vec<u8>> = digits.as_bytes().chunks(2).map(of_pair).collect();
         bytes.extend(of_part.filter(|of_part| !of_part.is_empty()).ok_or_else(|| {
-            Failure::usage(format!("{part:?} is no hexadecimal byte"))
+            Failure::usage(format!("{part:?} is not a hexadecimal byte"))
                 .hint("every byte has two digits: ser-cli genius decode 20 00")
         })?);
     }
@@ -42,7 +42,7 @@ fn hex_digit(digit: u8) -> Option<u8> {
     char::from(digit).to_digit(16).and_then(|digit| u8::try_from(digit).ok())
 }
 
-/// What a datagram says, and what it carries.
+/// What a datagram means, and its content.
 fn lines_of(bytes: &[u8]) -> Result<Vec<String>> {
     let &[function, subfunction, ref data @ ..] = bytes else {
         return Err(Failure::usage("a datagram begins with its function and its subfunction code")
@@ -90,7 +90,7 @@ fn of_the_bus(subfunction: u8, data: &Data) -> Result<Vec<String>> {
     Ok(std::iter::once(message.to_string()).chain(details).collect())
 }
 
-/// The bits that a Write Point changes, a byte a line.
+/// The bits that a Write Point changes, one byte per line.
 fn changes(write: &WritePoint) -> Vec<String> {
     let bits = |mask: u8| {
         let bits: Vec<_> =
@@ -150,10 +150,10 @@ mod tests {
     fn what_is_no_datagram_is_refused_with_what_to_do() {
         for (words, what) in [
             ("20", "begins with its function"),
-            ("2", "no hexadecimal byte"),
-            ("20 0g", "no hexadecimal byte"),
+            ("2", "not a hexadecimal byte"),
+            ("20 0g", "not a hexadecimal byte"),
             ("20 1E 04", "1"),
-            ("40 50 FF", "no message"),
+            ("40 50 FF", "not a message"),
         ] {
             assert!(decoded(words).contains(what), "{words}: {}", decoded(words));
         }

@@ -1,4 +1,4 @@
-//! `genius devices`: who is on the bus.
+//! `genius devices`: the devices on the bus.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -48,7 +48,7 @@ const NO_REFERENCE: u16 = 0xFFFF;
 /// A device as a row of the table.
 struct Row<'a> {
     device: &'a BusDevice,
-    /// What it sends, if it is a recorder.
+    /// Its global data, if it is a recorder.
     recorder: Option<&'a GlobalData>,
 }
 

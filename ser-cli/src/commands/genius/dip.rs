@@ -1,4 +1,4 @@
-//! `genius dip`: the DIP switches of a recorder, both ways.
+//! `genius dip`: the DIP switches of a recorder, in both directions.
 
 use std::io::{self, Write};
 
@@ -7,7 +7,7 @@ use ser_proto::genius::{BusAddress, BusRate, BusSettings, DipSwitches};
 
 use crate::error::{Failure, Result};
 
-/// The rate of a bus as the switches have it.
+/// The bus rates that the switches offer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Rate {
     /// 153.6 kbit/s standard.
@@ -35,7 +35,7 @@ impl From<Rate> for BusRate {
     }
 }
 
-/// Shows what the switches say, or how to set them.
+/// Shows what the switches mean, or how to set them.
 pub(super) fn run(
     switches: Option<DipSwitches>,
     address: Option<BusAddress>,

@@ -16,8 +16,7 @@ pub(super) fn run(connection: &ConnectionArgs, node: u8, table: ForceTable) -> R
     Ok(())
 }
 
-/// The bytes, the first one first, and the points that are set in them, should they be discrete
-/// ones.
+/// The bytes in order, and the points that are set in them, in case they are discrete ones.
 fn text(table: ForceTable, contents: &[u8]) -> String {
     if contents.is_empty() {
         return format!("{table}: the device has no such points");

@@ -20,7 +20,7 @@ use crate::time::local_now;
 /// How often the bus is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// What the recorders say, by their numbers.
+/// The recorders' global data, by bus address.
 type Globals = BTreeMap<u8, GlobalData>;
 
 pub(super) fn run(connection: &ConnectionArgs, follow: bool, how: Recognition) -> Result<()> {
@@ -35,7 +35,10 @@ pub(super) fn run(connection: &ConnectionArgs, follow: bool, how: Recognition) -
     match stop {
         Some(stop) => {
             if globals.is_empty() {
-                advise("no recorder is logged in yet; ser-cli genius devices lists what is");
+                advise(
+                    "no recorder is logged in yet; ser-cli genius devices lists the devices that \
+                     are",
+                );
             }
             inform("the bus is followed until Ctrl-C");
             let outage = Outage::new(connection::options(connection).timeout);
@@ -52,7 +55,7 @@ pub(super) fn run(connection: &ConnectionArgs, follow: bool, how: Recognition) -
     }
 }
 
-/// A bus that is followed.
+/// Follows a bus.
 struct Follow {
     host: GeniHost,
     how: Recognition,
@@ -61,7 +64,7 @@ struct Follow {
 }
 
 impl Follow {
-    /// Shows everything once, and then whoever differs from what was shown before.
+    /// Shows everything once, and then each recorder that differs from what was shown before.
     fn run(&mut self, mut now: Globals, out: &mut dyn Write) -> Result<()> {
         writeln!(out, "{:<23}  {HEADER}", "time")?;
         let mut shown = Globals::new();
@@ -79,8 +82,7 @@ impl Follow {
         }
     }
 
-    /// What the recorders say a moment later, or when what is wrong has passed; `None` at an
-    /// interrupt.
+    /// The recorders' data a moment later, or once a failure has passed; `None` at an interrupt.
     fn next(&mut self) -> Result<Option<Globals>> {
         while !self.stop.load(Ordering::Relaxed) {
             thread::sleep(LOOK_EVERY);
@@ -106,10 +108,10 @@ fn changes(before: &Globals, now: &Globals) -> Vec<String> {
 
 const HEADER: &str = "node  inputs  on";
 
-/// A recorder as a row of the table; without inputs when it has left the bus.
+/// A recorder as a row of the table; without inputs if it has left the bus.
 fn row(node: u8, global: Option<&GlobalData>) -> String {
     match global {
-        None => format!("{node:>4}       -  not on the bus any more"),
+        None => format!("{node:>4}       -  no longer on the bus"),
         Some(global) => {
             let on = if global.state.is_empty() { "none".to_string() } else { global.to_string() };
             format!("{node:>4}  {:>6}  {on}", global.model.inputs())
@@ -130,7 +132,7 @@ mod tests {
         let now = Globals::from([(5, global(5)), (6, global(0)), (9, global(0))]);
         assert_eq!(
             changes(&before, &now),
-            ["   5      16  1 3", "   7       -  not on the bus any more", "   9      16  none"]
+            ["   5      16  1 3", "   7       -  no longer on the bus", "   9      16  none"]
         );
         assert_eq!(changes(&now, &now), Vec::<String>::new());
     }

@@ -1,4 +1,4 @@
-//! What a simulated Genius bus is like: how fast, how noisy, and which number the host has.
+//! The properties of a simulated Genius bus: its rate, its noise, and the host's bus address.
 
 use clap::ValueEnum;
 use ser_sim::GeniusOptions;
@@ -7,7 +7,7 @@ use ser_sim::genius::{BusTiming, Noise};
 use super::device;
 use crate::error::{Failure, Result};
 
-/// How fast a bus is, by the names that `docs/genius.md` uses.
+/// The rate of a bus, by the names that `docs/genius.md` uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum RateName {
     /// The usual rate.
@@ -36,39 +36,39 @@ impl From<RateName> for BusTiming {
     }
 }
 
-/// Where `sim --help` lists what is about the bus.
+/// The heading of the bus options in `sim --help`.
 pub(super) const HEADING: &str = "Genius bus";
 
-/// The options of `sim` that are about the bus alone.
+/// The options of `sim` that concern only the bus.
 #[derive(Debug, clap::Args)]
 pub(super) struct BusArgs {
-    /// How fast the Genius bus is.
+    /// Rate of the Genius bus.
     #[arg(long, value_name = "RATE", requires = "genius", default_value = "153.6K", ignore_case = true, help_heading = HEADING)]
     bus_rate: RateName,
 
-    /// The host's number on the Genius bus, 0-31; the highest that is free if not given.
+    /// The host's bus address on the Genius bus, 0-31; the highest free one if not given.
     #[arg(long, value_name = "N", requires = "genius", value_parser = host_number, help_heading = HEADING)]
     host_number: Option<u8>,
 
-    /// Disturb the Genius bus: of all messages so many percent are damaged, as many are missed by
+    /// Disturb the Genius bus: this percentage of all messages is damaged, as many are missed by
     /// one receiver, and as many arrive without the sender knowing.
     #[arg(long, value_name = "PERCENT", requires = "genius", value_parser = ppm, help_heading = HEADING)]
     bus_noise: Option<u32>,
 
-    /// Which messages suffer; the same number gives the same sequence of accidents.
+    /// Selects the disturbed messages; the same number gives the same sequence of disturbances.
     #[arg(long, value_name = "N", requires = "bus_noise", default_value_t = 1, help_heading = HEADING)]
     seed: u64,
 }
 
 impl BusArgs {
-    /// The same bus as the user wants it.
+    /// Applies the user's options to a bus.
     pub(super) fn apply(&self, bus: GeniusOptions) -> Result<GeniusOptions> {
         let host_number = self.host_number.unwrap_or(bus.host_number);
         if bus.nodes.iter().any(|&(node, _)| node == host_number) {
             return Err(Failure::usage(format!(
-                "{host_number} is the number of a --node, and the host's too"
+                "{host_number} is the bus address of a --node, and the host's too"
             ))
-            .hint("every device on a bus has a number of its own")
+            .hint("every device on a bus has its own address")
             .hint("leave --host-number out, and the host gets one that is free"));
         }
         let ppm = self.bus_noise.unwrap_or(0);
@@ -82,7 +82,7 @@ fn host_number(text: &str) -> std::result::Result<u8, String> {
     device(text).ok_or_else(|| "not a bus address: 0 to 31".to_string())
 }
 
-/// Percent as millionths.
+/// A percentage in millionths.
 fn ppm(text: &str) -> std::result::Result<u32, String> {
     match text.parse() {
         Ok(percent @ 0.0..=100.0) => {
