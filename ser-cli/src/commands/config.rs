@@ -45,7 +45,11 @@ pub(crate) struct Settings {
     auto_report: Option<ReportVia>,
 
     /// Bus address that gets the reports, 0–31.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_REPORT_ADDRESS)))]
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_REPORT_ADDRESS))
+    )]
     report_to: Option<u8>,
 
     /// Whether the recorder prints every event as a line of text on RS-232.

@@ -124,7 +124,11 @@ enum What {
     #[command(after_help = DIP_EXAMPLES)]
     Dip {
         /// Switches 1 to 8 as eight digits: 1 is open, 0 is closed.
-        #[arg(value_name = "SWITCHES", value_parser = dip::switches, conflicts_with_all = ["address", "rate"])]
+        #[arg(
+            value_name = "SWITCHES",
+            value_parser = dip::switches,
+            conflicts_with_all = ["address", "rate"]
+        )]
         switches: Option<DipSwitches>,
         /// The bus address that the recorder is to have, 0-31.
         #[arg(long, value_name = "N", value_parser = device)]

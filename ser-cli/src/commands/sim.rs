@@ -91,7 +91,13 @@ pub(crate) struct Args {
 
     /// Bus address of a recorder on the Genius bus, 0-31, and its model if it is not that of
     /// --model; may be repeated.
-    #[arg(long, value_name = "N[:MODEL]", requires = "genius", value_parser = bus_node, help_heading = bus::HEADING)]
+    #[arg(
+        long,
+        value_name = "N[:MODEL]",
+        requires = "genius",
+        value_parser = bus_node,
+        help_heading = bus::HEADING
+    )]
     node: Vec<BusNode>,
 
     #[command(flatten)]

@@ -35,7 +35,13 @@ struct Arguments {
     seed: u64,
 
     /// Virtual time per seed, in hours: more than 0, at most 100000, which are eleven years.
-    #[arg(long = "hours", value_name = "HOURS", default_value = "100", value_parser = duration_ms, allow_negative_numbers = true)]
+    #[arg(
+        long = "hours",
+        value_name = "HOURS",
+        default_value = "100",
+        value_parser = duration_ms,
+        allow_negative_numbers = true
+    )]
     duration_ms: u64,
 
     /// How many seeds to run, one after the other. The largest seed is followed by 0.
@@ -44,7 +50,13 @@ struct Arguments {
 
     /// How often a life, from power-up to power cut, is on a Genius bus: the first life, and one in
     /// this many of the others. With 0 there is no bus at all.
-    #[arg(long, value_name = "LIVES", default_value_t = 8, value_parser = at_least::<0>, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "LIVES",
+        default_value_t = 8,
+        value_parser = at_least::<0>,
+        allow_negative_numbers = true
+    )]
     bus_one_in: u64,
 
     /// All inputs toggle in every millisecond, and everybody reads, prints and reports as fast as

@@ -43,20 +43,45 @@ pub(super) const HEADING: &str = "Genius bus";
 #[derive(Debug, clap::Args)]
 pub(super) struct BusArgs {
     /// Rate of the Genius bus.
-    #[arg(long, value_name = "RATE", requires = "genius", default_value = "153.6K", ignore_case = true, help_heading = HEADING)]
+    #[arg(
+        long,
+        value_name = "RATE",
+        requires = "genius",
+        default_value = "153.6K",
+        ignore_case = true,
+        help_heading = HEADING
+    )]
     bus_rate: RateName,
 
     /// The host's bus address on the Genius bus, 0-31; the highest free one if not given.
-    #[arg(long, value_name = "N", requires = "genius", value_parser = host_number, help_heading = HEADING)]
+    #[arg(
+        long,
+        value_name = "N",
+        requires = "genius",
+        value_parser = host_number,
+        help_heading = HEADING
+    )]
     host_number: Option<u8>,
 
     /// Disturb the Genius bus: this percentage of all messages is damaged, as many are missed by
     /// one receiver, and as many arrive without the sender knowing.
-    #[arg(long, value_name = "PERCENT", requires = "genius", value_parser = ppm, help_heading = HEADING)]
+    #[arg(
+        long,
+        value_name = "PERCENT",
+        requires = "genius",
+        value_parser = ppm,
+        help_heading = HEADING
+    )]
     bus_noise: Option<u32>,
 
     /// Selects the disturbed messages; the same number gives the same sequence of disturbances.
-    #[arg(long, value_name = "N", requires = "bus_noise", default_value_t = 1, help_heading = HEADING)]
+    #[arg(
+        long,
+        value_name = "N",
+        requires = "bus_noise",
+        default_value_t = 1,
+        help_heading = HEADING
+    )]
     seed: u64,
 }
 
