@@ -1,51 +1,67 @@
 //! Counters of what was lost, refused or out of order.
 
-/// Counts since the driver was made. A counter stops at its largest value.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Counters {
+macro_rules! counters {
+    ($($(#[$doc:meta])+ $name:ident,)+) => {
+        /// Counts since the driver was made. A counter stops at its largest value.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        pub struct Counters {
+            $($(#[$doc])+ pub $name: u32,)+
+        }
+
+        impl Counters {
+            /// All counters by name.
+            #[must_use]
+            pub const fn all(&self) -> [(&'static str, u32); [$(stringify!($name)),+].len()] {
+                [$((stringify!($name), self.$name)),+]
+            }
+        }
+    };
+}
+
+counters! {
     /// Times the board was found to have failed.
-    pub failures: u32,
+    failures,
     /// Times the board was reset because of that.
-    pub resets: u32,
+    resets,
     /// Times the board left the bus.
-    pub bus_losses: u32,
+    bus_losses,
     /// Bus errors that the board counted.
-    pub bus_errors: u32,
+    bus_errors,
     /// Configurations that the board refused.
-    pub configurations_refused: u32,
+    configurations_refused,
     /// Commands that were not finished in time.
-    pub commands_timed_out: u32,
+    commands_timed_out,
     /// Commands that finished after they had been given up.
-    pub commands_late: u32,
+    commands_late,
     /// Commands that had to wait because the block held another program's command.
-    pub commands_blocked: u32,
+    commands_blocked,
     /// Commands that the board refused as wrong.
-    pub commands_refused: u32,
+    commands_refused,
     /// Commands that failed: no acknowledgement, no reply, no memory.
-    pub commands_failed: u32,
+    commands_failed,
     /// Commands that ended with an undefined status, or vanished.
-    pub commands_unknown: u32,
+    commands_unknown,
     /// Received datagrams with an impossible source or length.
-    pub datagrams_refused: u32,
+    datagrams_refused,
     /// This board's own broadcasts, which it always receives too.
-    pub own_broadcasts: u32,
+    own_broadcasts,
     /// Requests for this host's memory that were refused.
-    pub requests_refused: u32,
+    requests_refused,
     /// Requests refused because no answer came in time; also in `requests_refused`.
-    pub requests_unanswered: u32,
+    requests_unanswered,
     /// Requests refused because of an impossible length; also in `requests_refused`.
-    pub requests_malformed: u32,
+    requests_malformed,
     /// Times the request queue was found full: requests may have been lost.
-    pub request_queue_full: u32,
+    request_queue_full,
     /// Request queue pointers that were out of range.
-    pub request_pointers_refused: u32,
+    request_pointers_refused,
     /// Device table entries that contradict themselves.
-    pub device_records_refused: u32,
+    device_records_refused,
     /// Lockouts in force that this driver had not asked for.
-    pub lockouts_foreign: u32,
+    lockouts_foreign,
     /// Lockouts that ended before the driver gave them back.
-    pub lockouts_lost: u32,
+    lockouts_lost,
 }
 
 /// Adds one to a counter that stops at its largest value.

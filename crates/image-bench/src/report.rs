@@ -341,7 +341,8 @@ impl Report {
                 [told.delivered, told.overwritten, talk.answered, talk.reports].map(grouped);
             writeln!(
                 f,
-                "  {name:<26}{delivered:>12} read once + {overwritten} reported as overwritten  {mark}; {answered} answers and {reports} reports"
+                "  {name:<26}{delivered:>12} read once + {overwritten} reported as overwritten  {mark}; \
+                 {answered} answers and {reports} reports"
             )?;
         }
         let [to, from] = [carried.to, carried.from].map(|bytes| grouped(bytes * 1000 / ms));

@@ -729,7 +729,11 @@ fn change(recorder: &mut Recorder, change: Change) -> usize {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 2000,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     /// Nothing happens during the readings: exactly what the recorder no longer holds is lost.
     #[test]
@@ -747,7 +751,8 @@ proptest! {
         let (told, _) = host.read(&mut recorder, |_| {});
         host.judge(&told, first_of_life);
         if past > 0 {
-            prop_assert_eq!(told.iter().filter(|told| matches!(told, Told::Event(_))).count(), recorder.held());
+            let events = told.iter().filter(|told| matches!(told, Told::Event(_))).count();
+            prop_assert_eq!(events, recorder.held());
         }
         let mut next_serial = recorder.history.last().map_or(1, |entry| serial(entry) + 1);
         prop_assert!(host.expected.is_none_or(|expected| expected == next_serial));

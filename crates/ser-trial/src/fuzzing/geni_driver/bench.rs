@@ -30,7 +30,7 @@ pub(super) struct Bench {
     pub(super) now_ms: u32,
     ram: Rc<RefCell<Ram>>,
     polls: u32,
-    counted: [u32; 21],
+    counted: Counters,
     on_its_way: Option<Ending>,
     /// Whether the board's latest answer refused the configuration.
     pub(super) was_refused: bool,
@@ -55,7 +55,7 @@ impl Bench {
             now_ms,
             ram,
             polls: 0,
-            counted: [0; 21],
+            counted: Counters::default(),
             on_its_way: None,
             was_refused: false,
             beat_ms: now_ms,
@@ -161,10 +161,11 @@ impl Bench {
     }
 
     fn check_counters(&mut self) {
-        let counted = as_array(self.driver.counters());
-        let went_back = counted.iter().zip(&self.counted).position(|(now, before)| now < before);
-        assert_eq!(went_back, None, "a counter went back: {:?}", self.driver.counters());
-        self.counted = counted;
+        let counters = self.driver.counters();
+        let mut both = counters.all().into_iter().zip(self.counted.all());
+        let went_back = both.find(|((_, now), (_, before))| now < before);
+        assert_eq!(went_back, None, "a counter went back");
+        self.counted = counters;
     }
 
     fn check_event(&mut self, event: &Event) {
@@ -270,54 +271,4 @@ fn may_write(offset: u16, byte: u8, buffer_len: u16) -> bool {
         _ if map::BROADCAST_OUTPUT.contains(offset) => true,
         _ => offset >= outputs && offset < outputs + u16::from(map::DEVICE_COUNT) * buffer_len,
     }
-}
-
-/// All counters. Destructuring keeps a new one from being forgotten here.
-fn as_array(counters: Counters) -> [u32; 21] {
-    let Counters {
-        failures,
-        resets,
-        bus_losses,
-        bus_errors,
-        configurations_refused,
-        commands_timed_out,
-        commands_late,
-        commands_blocked,
-        commands_refused,
-        commands_failed,
-        commands_unknown,
-        datagrams_refused,
-        own_broadcasts,
-        requests_refused,
-        requests_unanswered,
-        requests_malformed,
-        request_queue_full,
-        request_pointers_refused,
-        device_records_refused,
-        lockouts_foreign,
-        lockouts_lost,
-    } = counters;
-    [
-        failures,
-        resets,
-        bus_losses,
-        bus_errors,
-        configurations_refused,
-        commands_timed_out,
-        commands_late,
-        commands_blocked,
-        commands_refused,
-        commands_failed,
-        commands_unknown,
-        datagrams_refused,
-        own_broadcasts,
-        requests_refused,
-        requests_unanswered,
-        requests_malformed,
-        request_queue_full,
-        request_pointers_refused,
-        device_records_refused,
-        lockouts_foreign,
-        lockouts_lost,
-    ]
 }
