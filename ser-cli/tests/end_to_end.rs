@@ -545,7 +545,7 @@ fn the_second_interrupt_ends_a_command_that_waits_for_a_silent_unit() {
     assert!(began.elapsed() < Duration::from_secs(55), "it has waited for the unit");
     let mut error = String::new();
     watch.0.stderr.take().expect("piped").read_to_string(&mut error).expect("text");
-    assert!(error.contains("hint: the recorder may still report by itself"), "{error}");
+    assert!(error.contains("hint: the recorder may still report automatically"), "{error}");
 }
 
 #[test]

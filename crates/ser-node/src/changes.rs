@@ -1,5 +1,5 @@
 //! The changes of the inputs on their way from capture to the log. They come out in order, and only
-//! when everything that decides about them is known.
+//! when the clock and mode of their millisecond are known.
 
 use crate::capture::CaptureReader;
 use crate::sequencer::{Change, Sequencer};

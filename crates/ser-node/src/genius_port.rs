@@ -20,8 +20,8 @@
 //!   The pauses grow because an absent receiver would otherwise cost all other devices their place
 //!   in the bus scan. A receiver may get a report twice when its acknowledgement was lost; total
 //!   and next slot show that. All devices together have one datagram of normal priority per bus
-//!   scan, and low bus addresses have the first chance. After each report the port therefore leaves
-//!   one scan to each other device.
+//!   scan, and low bus addresses have the first chance. After each report the port therefore waits
+//!   out the present scan and one scan for each other device.
 //! - **Read I/O Forces** is answered with the recorder's own input tables. No input is forced, and
 //!   the values are the states of the inputs. The recorder has no outputs, so the output tables are
 //!   empty.

@@ -9,8 +9,8 @@
 //!
 //! # Tradeoffs
 //! An item has to fit into a handful of atomics (see [`Slot`]). `heapless::spsc` takes any item,
-//! but its two ends forget the length. Each step then divides by a number from memory, and the
-//! compiler adds the panic for zero.
+//! but its two ends do not have the length in their types. Each step then divides by a number from
+//! memory, and the compiler adds the panic for zero.
 //!
 //! # Notes
 //! All `N` cells can be in use. On Cortex-M the loads and stores are the ordinary ones; acquire and

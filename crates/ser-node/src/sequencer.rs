@@ -5,8 +5,8 @@
 //! The sequencer holds changes back for the longest debounce time, because an earlier one can turn
 //! up until then, and hands them on in order. Without debounce it holds nothing back.
 //!
-//! The sequencer also holds back changes that came after a datagram which has arrived but has not
-//! been read. That datagram may set the clock and mode by which they are recorded.
+//! The sequencer also holds back changes that came after a datagram that waits, unread, in the GENI
+//! board. That datagram may set the clock and mode by which they are recorded.
 
 use ser_proto::Inputs;
 

@@ -1,4 +1,5 @@
-//! The configuration in non-volatile memory: two checked copies, one of which is always intact.
+//! The configuration in non-volatile memory: two checked copies, of which at least one is always
+//! intact.
 //!
 //! ```text
 //! | 'S' | format | sequence (4) | configuration (6) | CRC-32 (4) |    16 bytes, numbers little-endian

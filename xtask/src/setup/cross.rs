@@ -24,7 +24,7 @@ pub(crate) const CORTEX_M3: Target = "thumbv7m-none-eabi";
 pub(crate) const CORTEX_M4F: Target = "thumbv7em-none-eabihf";
 
 /// The oldest Rust that `Cargo.toml` allows.
-const OLDEST_RUST: (u32, u32) = (1, 88);
+const OLDEST_RUST: (u32, u32) = (1, 89);
 
 /// Time limit for a download. The target's library is a few megabytes, so a slower network is
 /// useless.

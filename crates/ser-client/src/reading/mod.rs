@@ -1,7 +1,7 @@
 //! Which entries of a log to ask for, and what the replies mean, without clock and port.
 //!
 //! [`reader`] delivers every event once, from a cursor on. [`range_reader`] delivers entries by
-//! their numbers. The other files hold the types that both take and hand out.
+//! their numbers. The other files hold the types that both readers use.
 
 pub(crate) mod cursor;
 pub(crate) mod delivery;

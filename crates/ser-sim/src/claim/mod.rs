@@ -1,4 +1,5 @@
-//! A name in the file system that one simulator has for itself, and what it has put there.
+//! A path that one simulator owns, such as `/tmp/ser`, and the record of what it made there, and
+//! what it has put there.
 //!
 //! # Design
 //! What stands under a name does not tell who made it, nor whether that simulator still runs. A

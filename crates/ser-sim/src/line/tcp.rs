@@ -4,10 +4,10 @@
 //! next. A slow client slows down what the node sends and nothing else.
 //!
 //! # Design
-//! Nobody keeps the place for ever. A client whose computer is gone, or the way to it, does not
-//! answer the probes of TCP and is given up within two minutes. One that is there and says nothing
-//! may be listening, as long as it likes; but when another one comes, and it has not said anything
-//! for ten minutes, it gives way.
+//! No client can block the line for ever. A client whose computer is gone, or the way to it, does
+//! not answer the probes of TCP and is given up within two minutes. One that is there and says
+//! nothing may be listening, as long as it likes; but when another one comes, and it has not said
+//! anything for ten minutes, it gives way.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::mem;

@@ -1,7 +1,7 @@
 //! What is asked next, while replies are still to come.
 //!
-//! With an anchor, events are read ahead of it up to `DEPTH` replies, and then the anchor itself is
-//! asked for. If events come faster than that, requests for events and probes of the ring
+//! With an anchor, events are read ahead of it up to `DEPTH` replies in all, the anchor being the
+//! last is asked for. If events come faster than that, requests for events and probes of the ring
 //! alternate. Everything else is asked for alone.
 
 use ser_proto::{MAX_ENTRIES, MAX_SIZE};
