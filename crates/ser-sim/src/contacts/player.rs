@@ -1,4 +1,4 @@
-//! Which contacts move when: scenarios laid out one after the other on one time line.
+//! Which contacts move when: scenarios played one after the other.
 
 use std::collections::VecDeque;
 

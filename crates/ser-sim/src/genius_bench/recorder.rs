@@ -1,7 +1,7 @@
-//! A recorder on the bus, under power: the built-in node or the ARM image, each with its GENI
+//! A recorder on the bus, under power: the built-in one or the ARM image, each with its GENI
 //! board.
 //!
-//! The built-in node lives in virtual time and reaches its board directly. The image lives in real
+//! The built-in recorder lives in virtual time and reaches its board directly. The image lives in real
 //! time. It reaches its board's shared RAM through the emulated board's external memory, which is
 //! compared with the simulated board's RAM once per millisecond.
 

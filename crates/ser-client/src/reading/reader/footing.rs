@@ -1,4 +1,4 @@
-//! What a reading stands on: why it believes that the next event follows what was delivered.
+//! How a reading knows that the next event follows what was delivered.
 //!
 //! A reading with an anchor looks for it in each reply that should hold it. If the anchor is
 //! overwritten or there never was one, the size of the ring must show that the log is still the

@@ -1,8 +1,11 @@
 //! Whether the ring was made larger.
 //!
-//! A log that is not full and holds fewer entries than it has had events was in a smaller ring
-//! before, or its size is not the given one. An entry after the head would be from the round
-//! before: the ring then turns earlier than it should.
+//! A log that is not full and holds fewer entries than it has had events either was in a smaller
+//! ring before, or its size is not the given one. Say that 300 events have been recorded, the next
+//! slot is 120, and the size is believed to be 256. If the ring had 120 slots before and was made
+//! larger, its entries are in the first 120 slots and the slots after them are empty. If the slots
+//! after them hold entries, these are of the round before: the ring has 180 slots, and the given
+//! size is wrong.
 
 use super::head::Head;
 use crate::reading::disturbed::Disturbed;

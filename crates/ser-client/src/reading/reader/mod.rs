@@ -9,6 +9,13 @@
 //! awaited. One request at a time is enough. With two, the next reply can follow the last one
 //! without a gap.
 //!
+//! # The files
+//!
+//! `locating` makes the first request and finds what the reading stands on. From then on,
+//! `requests` plans what is asked next, and `replies` and `ring` take what comes. All three work on
+//! `progress`. The files below it hold a part each: `head`, `footing`, `growth`, `losses`,
+//! `overrun`, `outstanding` and `read_ahead`.
+//!
 //! # How it works
 //!
 //! Events have a running index, 0 for the first after an erase. A recorder with total `T` and next
@@ -23,9 +30,9 @@
 //! what is recorded later has another time.
 //!
 //! If a reply shows the anchor, nothing was erased between the reply that first brought it and this
-//! one. Whatever was copied between these two, in whichever order it was asked for, is of the same
-//! log. This argument needs one thing: replies have to be taken in the order in which they were
-//! copied. Requests may overlap, be lost, or be repeated.
+//! one. All replies copied between these two are of the same log, whatever the order of the
+//! requests. This argument needs one thing: replies have to be taken in the order in which they
+//! were copied. Requests may overlap, be lost, or be repeated.
 //!
 //! Nine events fit the reply that begins with the anchor. If there are no more, one request is all.
 //! If there are more, those that do not fit are asked for first, up to seven replies, and are kept.
@@ -94,13 +101,6 @@
 //!   for more.
 //!
 //! The size of the ring must be right. An original recorder does not tell it.
-//!
-//! # The files
-//!
-//! `locating` makes the first request and finds what the reading stands on. From then on,
-//! `requests` plans what is asked next, and `replies` and `ring` take what comes. All three work on
-//! `progress`. The files below it hold a part each: `head`, `footing`, `growth`, `losses`,
-//! `overrun`, `outstanding` and `read_ahead`.
 
 mod footing;
 mod growth;
