@@ -96,6 +96,16 @@ pub(crate) enum ClockStep {
     YearsBeganAnew,
 }
 
+impl fmt::Display for ClockStep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            ClockStep::Back => "the clock went back",
+            ClockStep::YearsBeganAnew => "the two-digit year began anew after 2069",
+            ClockStep::Forward => "the clock went on",
+        })
+    }
+}
+
 impl ClockStep {
     /// From `earlier` to `later`; `None` when one of them is no date.
     pub(crate) fn between(earlier: TimeStamp, later: TimeStamp) -> Option<ClockStep> {

@@ -4,10 +4,13 @@ use std::io::{self, Write};
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
+use chrono::NaiveDateTime;
 use ser_client::{LineRate, TextLine, Unsolicited};
+use ser_proto::TimeStamp;
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
+use crate::time::ClockStep;
 use crate::values;
 
 const EXAMPLES: &str = "\
@@ -45,12 +48,16 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         + LineRate::from(unit.bits_per_second()).time_for(LONGEST_LINE);
     let mut out = io::stdout().lock();
     let mut wanted = Wanted::new(args.from, args.count);
+    let mut clock = PrintedClock(None);
     let mut until = Instant::now() + patience;
     while !wanted.is_complete() {
         match unit.wait_event(until.saturating_duration_since(Instant::now()))? {
             None => break,
             Some(Unsolicited::Report(_)) => {}
             Some(Unsolicited::Line(line)) if wanted.take(&line) => {
+                if let Some(step) = clock.step_to(&line.text) {
+                    warn(format_args!("before the next line, {step}"));
+                }
                 writeln!(out, "{}", line.text)?;
                 out.flush()?;
                 until = Instant::now() + patience;
@@ -122,6 +129,27 @@ impl Wanted {
     }
 }
 
+/// The time of the previous line, to tell where the recorder's clock did not go on.
+struct PrintedClock(Option<TimeStamp>);
+
+impl PrintedClock {
+    /// The step to a line's time, unless the clock simply went on or one of the two is no date.
+    fn step_to(&mut self, line: &str) -> Option<ClockStep> {
+        let later = time_of(line);
+        let earlier = std::mem::replace(&mut self.0, later);
+        let step = ClockStep::between(earlier?, later?)?;
+        (step != ClockStep::Forward).then_some(step)
+    }
+}
+
+/// The time of an entry's line, as in `0001 2026-11-22 10:00:00.250  3 ON`.
+fn time_of(line: &str) -> Option<TimeStamp> {
+    let mut words = line.split_whitespace().skip(1);
+    let time = format!("{} {}", words.next()?, words.next()?);
+    let time = NaiveDateTime::parse_from_str(&time, "%Y-%m-%d %H:%M:%S%.3f").ok()?;
+    TimeStamp::try_from(time).ok()
+}
+
 /// The number at the beginning of an entry's line: four digits or more, and a blank. A line whose
 /// beginning is missing has none.
 fn entry_number(line: &str) -> Option<u32> {
@@ -133,6 +161,19 @@ fn entry_number(line: &str) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_clock_that_does_not_go_on_is_told_between_two_lines() {
+        let mut clock = PrintedClock(None);
+        let mut step = |time: &str| clock.step_to(&format!("0001 {time}  3 ON"));
+        assert_eq!(step("2026-11-22 10:00:00.250"), None);
+        assert_eq!(step("2026-11-22 10:00:00.250"), None);
+        assert_eq!(step("2026-11-22 10:00:00.249"), Some(ClockStep::Back));
+        assert_eq!(step("2069-12-31 23:59:59.999"), None);
+        assert_eq!(step("1970-01-01 00:00:00.000"), Some(ClockStep::YearsBeganAnew));
+        assert_eq!(step("2026-00-22 10:00:00.250"), None);
+        assert_eq!(step("1970-01-01 00:00:00.000"), None);
+    }
 
     fn line(text: &str) -> TextLine {
         TextLine { text: text.to_string(), ..TextLine::default() }

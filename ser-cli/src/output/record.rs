@@ -111,11 +111,11 @@ impl fmt::Display for Loss {
 
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Note::Odd(why) => why,
-            Note::ClockWentBack => "the clock went back",
-            Note::YearsBeganAnew => "the two-digit year began anew after 2069",
-        })
+        match self {
+            Note::Odd(why) => f.write_str(why),
+            Note::ClockWentBack => ClockStep::Back.fmt(f),
+            Note::YearsBeganAnew => ClockStep::YearsBeganAnew.fmt(f),
+        }
     }
 }
 

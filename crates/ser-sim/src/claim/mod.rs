@@ -86,8 +86,26 @@ impl Claim {
         self.record_what_is_there().inspect_err(|_| drop(fs::remove_file(&self.name)))
     }
 
+    /// The same for a file that we have open: whatever its name leads to by now, this is ours.
+    ///
+    /// # Errors
+    /// As for [`remember`](Self::remember). Only the file itself is removed again.
+    pub(crate) fn remember_file(&self, file: &File) -> io::Result<()> {
+        let made = Identity::of(&file.metadata()?);
+        self.record(&made).inspect_err(|_| {
+            let found = fs::symlink_metadata(&self.name);
+            if found.is_ok_and(|found| Identity::of(&found) == made) {
+                drop(fs::remove_file(&self.name));
+            }
+        })
+    }
+
     fn record_what_is_there(&self) -> io::Result<()> {
-        let Identity { device, inode, born_ns } = Identity::of(&fs::symlink_metadata(&self.name)?);
+        self.record(&Identity::of(&fs::symlink_metadata(&self.name)?))
+    }
+
+    fn record(&self, made: &Identity) -> io::Result<()> {
+        let Identity { device, inode, born_ns } = made;
         // A record cut short by a crash does not parse, and what is under the name stays.
         let text = format!("{device} {inode} {born_ns}\n");
         self.record.set_len(0)?;

@@ -39,7 +39,7 @@ impl HostWindow {
             }
             file => file.map_err(doing())?,
         };
-        let ready = claim.remember().and_then(|()| file.write_all_at(&[0; RAM_LEN], 0));
+        let ready = claim.remember_file(&file).and_then(|()| file.write_all_at(&[0; RAM_LEN], 0));
         ready.map_err(doing())?;
         Ok(HostWindow { path: path.to_owned(), file, image: Box::new([0; RAM_LEN]), _claim: claim })
     }
