@@ -1,5 +1,5 @@
-//! The node's Genius port in the main loop, over the GENI board that a recorder's board is wired
-//! to.
+//! The recorder's Genius port in the main loop, over the GENI board that a recorder's board is
+//! wired to.
 
 use geni_board::SharedRam;
 use ser_node::{GeniusDiagnostics, GeniusOptions, GeniusPort, Node, Rtc, Storage};

@@ -1,7 +1,7 @@
 //! The faults of a board's own parts: inputs, battery-backed clock, configuration memory.
 //!
-//! Each part counts in a static of its own, because an interrupt or the node owns the part itself.
-//! [`Health`] combines the statics for the log (`report`) and for the fault lamp
+//! Each part counts in a static of its own, because an interrupt or the recorder owns the part
+//! itself. [`Health`] combines the statics for the log (`report`) and for the fault lamp
 //! ([`leds`](crate::leds)).
 
 use crate::clock_chip::{ClockHealth, ClockState};

@@ -1,4 +1,4 @@
-//! One pass of the main loop between the ports and the node, the same on every board.
+//! One pass of the main loop between the ports and the recorder, the same on every board.
 //!
 //! The board supplies a [`Line`], its UART with the rings in front of it, and the [`GeniBoard`]
 //! where there is one. A pass never waits and does no more than the rings hold. A line that takes

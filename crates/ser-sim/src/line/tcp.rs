@@ -1,13 +1,13 @@
 //! A serial line over TCP, for one client at a time.
 //!
-//! A second client is told who has the line, and closed; a client that goes makes room for the
-//! next. A slow client slows down what the node sends and nothing else.
+//! A second client is told who has the line, and its connection is closed. A client that leaves
+//! makes room for the next. A slow client slows down what the recorder sends and nothing else.
 //!
 //! # Design
-//! No client can block the line for ever. A client whose computer is gone, or the way to it, does
-//! not answer the probes of TCP and is given up within two minutes. One that is there and says
-//! nothing may be listening, as long as it likes; but when another one comes, and it has not said
-//! anything for ten minutes, it gives way.
+//! No client can block the line for ever. A client whose computer is gone, or cannot be reached any
+//! more, does not answer the probes of TCP and is given up within two minutes. A client that is
+//! there and says nothing may be listening, and may do so as long as it likes. If it has been
+//! silent for ten minutes and another client comes, it gives way.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::mem;
