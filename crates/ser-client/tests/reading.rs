@@ -672,6 +672,28 @@ fn replies_that_make_no_sense_end_the_reading() {
     assert_eq!(result, Err(Disturbed::NoProgress));
 }
 
+#[test]
+fn an_overrun_reading_comes_past_everything_that_had_happened_when_it_began() {
+    // What was given up to get ahead of the recorder reaches beyond that.
+    let rate = 57;
+    let mut recorder = Recorder::after(2048, 65_566);
+    let mut host = Host { window: 3, lost: vec![false], ..Host::new() };
+    host.expected = recorder.first_serial_known();
+    host.rate = rate;
+    for (before, percents) in
+        [(42, &[51, 95, 95, 0, 60, 15][..]), (9, &[32, 13, 71]), (19, &[64, 79, 20, 23])]
+    {
+        recorder.append_many(before);
+        let due = recorder.history.last().map(serial).unwrap();
+        let mut percents = percents.iter().cycle();
+        let (told, _) = host.read(&mut recorder, |recorder| {
+            recorder.append_many(rate as usize * percents.next().unwrap() / 100);
+        });
+        host.judge(&told, 1);
+        assert!(host.expected.unwrap() > due, "{:?} is not after {due}", host.expected);
+    }
+}
+
 fn any_size() -> impl Strategy<Value = usize> {
     prop_oneof![
         Just(1),

@@ -1,7 +1,7 @@
 //! What is asked next, while replies are still to come.
 //!
-//! With an anchor, events are read ahead of it up to `DEPTH` replies in all, the anchor being the
-//! last is asked for. If events come faster than that, requests for events and probes of the ring
+//! With an anchor, events are read ahead of it, up to `DEPTH` replies in all, and the anchor is
+//! asked for last. If events come faster than that, requests for events and probes of the ring
 //! alternate. Everything else is asked for alone.
 
 use ser_proto::{MAX_ENTRIES, MAX_SIZE};
@@ -129,9 +129,12 @@ impl Progress {
             return Some(Asked { request: self.probe(), purpose: Purpose::Probe });
         }
         let all = self.outstanding.len();
-        let first = self.unasked_from(self.next.max(self.overrun.given_up), all);
-        // A loss is delivered with the event after it.
-        if is_reading || (first >= self.target && !self.losses.is_pending()) {
+        let begin = self.next.max(self.overrun.given_up);
+        let first = self.unasked_from(begin, all);
+        // A loss is delivered with the event after it. So is what was given up: as long as no later
+        // event is known or asked for, the reading has not come past it.
+        let is_past_loss = !self.losses.is_pending() && (first > begin || self.next >= self.target);
+        if is_reading || (first >= self.target && is_past_loss) {
             return None;
         }
         let first = self.overrun.worth_asking_from(first, self.head);
