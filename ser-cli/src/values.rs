@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use clap::ValueEnum;
+use ser_proto::genius::{BusAddress, BusRate};
 use ser_proto::{AutoReport, Baud, MAX_SIZE};
+use ser_sim::genius::BusTiming;
 
 /// A setting that is on or off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -44,6 +46,52 @@ impl From<ReportVia> for AutoReport {
             ReportVia::Rs232 => AutoReport::Rs232,
         }
     }
+}
+
+/// The rate of a bus, by the names that `docs/genius.md` uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BusRateName {
+    /// The usual rate.
+    #[default]
+    #[value(name = "153.6K", alias = "153k6", alias = "153.6K-standard")]
+    Standard,
+    /// The same with longer pauses, for long cables.
+    #[value(name = "153.6K-extended", alias = "153k6e")]
+    Extended,
+    /// For longer cables.
+    #[value(name = "76.8K", alias = "76k8")]
+    Half,
+    /// For the longest cables.
+    #[value(name = "38.4K", alias = "38k4")]
+    Quarter,
+}
+
+impl From<BusRateName> for BusTiming {
+    fn from(name: BusRateName) -> BusTiming {
+        match name {
+            BusRateName::Standard => BusTiming::K153Standard,
+            BusRateName::Extended => BusTiming::K153Extended,
+            BusRateName::Half => BusTiming::K76,
+            BusRateName::Quarter => BusTiming::K38,
+        }
+    }
+}
+
+impl From<BusRateName> for BusRate {
+    fn from(name: BusRateName) -> BusRate {
+        match name {
+            BusRateName::Standard => BusRate::K153_6Standard,
+            BusRateName::Extended => BusRate::K153_6Extended,
+            BusRateName::Half => BusRate::K76_8,
+            BusRateName::Quarter => BusRate::K38_4,
+        }
+    }
+}
+
+/// A bus address, 0-31.
+pub(crate) fn bus_address(text: &str) -> Result<BusAddress, String> {
+    let number = text.parse().ok().and_then(BusAddress::new);
+    number.ok_or_else(|| "not a bus address: 0 to 31".to_string())
 }
 
 /// A rate that the recorder supports.

@@ -84,7 +84,7 @@ const JUDGED: [(&str, &str, usize, &str); 29] = [
     (
         "crates/ser-sim/src/claim/mod.rs",
         "remove_file(",
-        3,
+        2,
         "what the claim's record says is ours, or what was just made",
     ),
     (

@@ -91,7 +91,7 @@ struct SendArgs {
 #[derive(Debug, clap::Args)]
 struct DequeueArgs {
     /// Bus address of the recorder, 0-31.
-    #[arg(long, value_name = "N", value_parser = values::device)]
+    #[arg(long, value_name = "N", value_parser = crate::values::bus_address)]
     from: BusAddress,
 
     /// Where the PLC puts the first word.

@@ -13,6 +13,7 @@ use ser_proto::genius::{BusAddress, DipSwitches, ForceTable};
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result};
+use crate::values::{self, BusRateName};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -94,7 +95,7 @@ enum What {
     #[command(after_help = FORCES_EXAMPLES)]
     Forces {
         /// The device's bus address, 0-31.
-        #[arg(long, value_name = "N", value_parser = device)]
+        #[arg(long, value_name = "N", value_parser = values::bus_address)]
         node: BusAddress,
         /// Which table.
         #[arg(long)]
@@ -131,11 +132,11 @@ enum What {
         )]
         switches: Option<DipSwitches>,
         /// The bus address that the recorder is to have, 0-31.
-        #[arg(long, value_name = "N", value_parser = device)]
+        #[arg(long, value_name = "N", value_parser = values::bus_address)]
         address: Option<BusAddress>,
         /// The rate of the bus.
-        #[arg(long, value_name = "RATE", default_value = "153.6K")]
-        rate: dip::Rate,
+        #[arg(long, value_name = "RATE", default_value = "153.6K", ignore_case = true)]
+        rate: BusRateName,
     },
 }
 
@@ -179,11 +180,6 @@ impl From<TableName> for ForceTable {
             TableName::OutputValues => ForceTable::OutputValues,
         }
     }
-}
-
-fn device(text: &str) -> std::result::Result<BusAddress, String> {
-    let number = text.parse().ok().and_then(BusAddress::new);
-    number.ok_or_else(|| "not a bus address: 0 to 31".to_string())
 }
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {

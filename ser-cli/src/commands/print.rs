@@ -4,13 +4,12 @@ use std::io::{self, Write};
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use chrono::NaiveDateTime;
 use ser_client::{LineRate, TextLine, Unsolicited};
 use ser_proto::TimeStamp;
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
-use crate::time::ClockStep;
+use crate::time::{ClockStep, parse_time};
 use crate::values;
 
 const EXAMPLES: &str = "\
@@ -145,9 +144,7 @@ impl PrintedClock {
 /// The time of an entry's line, as in `0001 2026-11-22 10:00:00.250  3 ON`.
 fn time_of(line: &str) -> Option<TimeStamp> {
     let mut words = line.split_whitespace().skip(1);
-    let time = format!("{} {}", words.next()?, words.next()?);
-    let time = NaiveDateTime::parse_from_str(&time, "%Y-%m-%d %H:%M:%S%.3f").ok()?;
-    TimeStamp::try_from(time).ok()
+    parse_time(&format!("{} {}", words.next()?, words.next()?)).ok()
 }
 
 /// The number at the beginning of an entry's line: four digits or more, and a blank. A line whose

@@ -224,7 +224,7 @@ fn bus_node(text: &str) -> std::result::Result<BusNode, String> {
 }
 
 fn device(text: &str) -> Option<u8> {
-    text.parse().ok().and_then(BusAddress::new).map(BusAddress::number)
+    values::bus_address(text).ok().map(BusAddress::number)
 }
 
 fn contacts_failure(contacts: std::result::Result<Contacts, SimError>) -> Result<Contacts> {

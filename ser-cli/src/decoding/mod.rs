@@ -14,6 +14,6 @@ pub(crate) use explain::{Explanation, explain, hex_text};
 pub use listing::{Listing, Tally};
 
 use decoder::Decoder;
-use hex::{HexText, HexToken};
+pub(crate) use hex::{HexText, HexToken};
 use lines::LineAssembler;
 use listing::{Kind, Place};

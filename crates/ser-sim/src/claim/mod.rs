@@ -83,25 +83,24 @@ impl Claim {
     /// When that cannot be noted. Then the thing itself is removed again, because nobody else
     /// would.
     pub(crate) fn remember(&self) -> io::Result<()> {
-        self.record_what_is_there().inspect_err(|_| drop(fs::remove_file(&self.name)))
+        self.note(&Identity::of(&fs::symlink_metadata(&self.name)?))
     }
 
     /// The same for a file that we have open: whatever its name leads to by now, this is ours.
     ///
     /// # Errors
-    /// As for [`remember`](Self::remember). Only the file itself is removed again.
+    /// As for [`remember`](Self::remember).
     pub(crate) fn remember_file(&self, file: &File) -> io::Result<()> {
-        let made = Identity::of(&file.metadata()?);
-        self.record(&made).inspect_err(|_| {
+        self.note(&Identity::of(&file.metadata()?))
+    }
+
+    fn note(&self, made: &Identity) -> io::Result<()> {
+        self.record(made).inspect_err(|_| {
             let found = fs::symlink_metadata(&self.name);
-            if found.is_ok_and(|found| Identity::of(&found) == made) {
+            if found.is_ok_and(|found| Identity::of(&found) == *made) {
                 drop(fs::remove_file(&self.name));
             }
         })
-    }
-
-    fn record_what_is_there(&self) -> io::Result<()> {
-        self.record(&Identity::of(&fs::symlink_metadata(&self.name)?))
     }
 
     fn record(&self, made: &Identity) -> io::Result<()> {

@@ -1,7 +1,9 @@
 //! Places in a PLC, bus addresses and words, as people write them.
 
 use clap::ValueEnum;
-use ser_proto::genius::{Address, BusAddress, MemoryType, PlcReference, Priority};
+use ser_proto::genius::{Address, MemoryType, PlcReference, Priority};
+
+use crate::values::bus_address;
 
 /// How urgent a datagram is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -21,17 +23,11 @@ impl From<PriorityName> for Priority {
     }
 }
 
-/// A bus address, 0-31.
-pub(super) fn device(text: &str) -> Result<BusAddress, String> {
-    let number = text.parse().ok().and_then(BusAddress::new);
-    number.ok_or_else(|| "not a bus address: 0 to 31".to_string())
-}
-
 /// A bus address, or `all`.
 pub(super) fn address(text: &str) -> Result<Address, String> {
     match text {
         "all" | "255" => Ok(Address::Broadcast),
-        _ => device(text)
+        _ => bus_address(text)
             .map(Address::from)
             .map_err(|_| "not a bus address: 0 to 31, or all".to_string()),
     }
@@ -109,6 +105,8 @@ mod tests {
     fn an_address_is_a_device_or_all() {
         assert_eq!(address("all"), Ok(Address::Broadcast));
         assert_eq!(address("31").map(Address::number), Ok(31));
-        assert!(address("32").is_err() && device("all").is_err() && device("-1").is_err());
+        assert!(
+            address("32").is_err() && bus_address("all").is_err() && bus_address("-1").is_err()
+        );
     }
 }

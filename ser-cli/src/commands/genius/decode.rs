@@ -7,7 +7,7 @@ use ser_proto::genius::{
     WritePoint,
 };
 
-use crate::decoding::{explain, hex_text};
+use crate::decoding::{HexText, HexToken, explain, hex_text};
 use crate::error::{Failure, Result};
 
 pub(super) fn run(words: &[String]) -> Result<()> {
@@ -23,13 +23,7 @@ fn bytes_of(words: &[String]) -> Result<Vec<u8>> {
     let parts = words.iter().flat_map(|word| word.split([' ', ',', '\t', '\n']));
     let mut bytes = Vec::new();
     for part in parts.filter(|part| !part.is_empty()) {
-        let digits = part.strip_prefix("0x").or_else(|| part.strip_prefix("0X")).unwrap_or(part);
-        let digits = digits.strip_suffix(['h', 'H']).unwrap_or(digits);
-        let of_pair = |pair: &[u8]| match pair {
-            [high, low] => Some(hex_digit(*high)? << 4 | hex_digit(*low)?),
-            _ => None,
-        };
-        let of_part: Option<Vec<u8>> = digits.as_bytes().chunks(2).map(of_pair).collect();
+        let of_part = bytes_of_word(part.strip_suffix(['h', 'H']).unwrap_or(part));
         bytes.extend(of_part.filter(|of_part| !of_part.is_empty()).ok_or_else(|| {
             Failure::usage(format!("{part:?} is not a hexadecimal byte"))
                 .hint("every byte has two digits: ser-cli genius decode 20 00")
@@ -38,8 +32,16 @@ fn bytes_of(words: &[String]) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn hex_digit(digit: u8) -> Option<u8> {
-    char::from(digit).to_digit(16).and_then(|digit| u8::try_from(digit).ok())
+/// `None` when there is anything but whole bytes.
+fn bytes_of_word(word: &str) -> Option<Vec<u8>> {
+    let mut hex = HexText::new();
+    let mut tokens: Vec<_> = word.bytes().flat_map(|byte| hex.push(byte)).flatten().collect();
+    tokens.extend(hex.finish());
+    let byte = |token: &HexToken| match token {
+        HexToken::Byte(byte, _) => Some(*byte),
+        HexToken::Junk(..) | HexToken::Half(..) | HexToken::LineEnd => None,
+    };
+    tokens.iter().map(byte).collect()
 }
 
 /// What a datagram means, and its content.

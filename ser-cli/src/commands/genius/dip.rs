@@ -2,44 +2,16 @@
 
 use std::io::{self, Write};
 
-use clap::ValueEnum;
-use ser_proto::genius::{BusAddress, BusRate, BusSettings, DipSwitches};
+use ser_proto::genius::{BusAddress, BusSettings, DipSwitches};
 
 use crate::error::{Failure, Result};
-
-/// The bus rates that the switches offer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum Rate {
-    /// 153.6 kbit/s standard.
-    #[value(name = "153.6K")]
-    Standard,
-    /// 153.6 kbit/s extended, for long cables.
-    #[value(name = "153.6K-extended")]
-    Extended,
-    /// 76.8 kbit/s.
-    #[value(name = "76.8K")]
-    Half,
-    /// 38.4 kbit/s.
-    #[value(name = "38.4K")]
-    Quarter,
-}
-
-impl From<Rate> for BusRate {
-    fn from(rate: Rate) -> BusRate {
-        match rate {
-            Rate::Standard => BusRate::K153_6Standard,
-            Rate::Extended => BusRate::K153_6Extended,
-            Rate::Half => BusRate::K76_8,
-            Rate::Quarter => BusRate::K38_4,
-        }
-    }
-}
+use crate::values::BusRateName;
 
 /// Shows what the switches mean, or how to set them.
 pub(super) fn run(
     switches: Option<DipSwitches>,
     address: Option<BusAddress>,
-    rate: Rate,
+    rate: BusRateName,
 ) -> Result<()> {
     let switches = match (switches, address) {
         (Some(switches), _) => switches,
@@ -93,7 +65,7 @@ mod tests {
              standard"
         );
         let address = BusAddress::new(5).expect("an address");
-        assert_eq!(BusSettings { address, rate: Rate::Standard.into() }.switches(), read);
+        assert_eq!(BusSettings { address, rate: BusRateName::Standard.into() }.switches(), read);
         for wrong in ["", "1010011", "101001110", "10100112", "0xA7"] {
             assert!(switches(wrong).is_err(), "{wrong}");
         }

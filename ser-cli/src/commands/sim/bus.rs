@@ -1,40 +1,11 @@
 //! The properties of a simulated Genius bus: its rate, its noise, and the host's bus address.
 
-use clap::ValueEnum;
 use ser_sim::GeniusOptions;
-use ser_sim::genius::{BusTiming, Noise};
+use ser_sim::genius::Noise;
 
 use super::device;
 use crate::error::{Failure, Result};
-
-/// The rate of a bus, by the names that `docs/genius.md` uses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum RateName {
-    /// The usual rate.
-    #[default]
-    #[value(name = "153.6K", alias = "153k6", alias = "153.6K-standard")]
-    Standard,
-    /// The same with longer pauses, for long cables.
-    #[value(name = "153.6K-extended", alias = "153k6e")]
-    Extended,
-    /// For longer cables.
-    #[value(name = "76.8K", alias = "76k8")]
-    Half,
-    /// For the longest cables.
-    #[value(name = "38.4K", alias = "38k4")]
-    Quarter,
-}
-
-impl From<RateName> for BusTiming {
-    fn from(name: RateName) -> BusTiming {
-        match name {
-            RateName::Standard => BusTiming::K153Standard,
-            RateName::Extended => BusTiming::K153Extended,
-            RateName::Half => BusTiming::K76,
-            RateName::Quarter => BusTiming::K38,
-        }
-    }
-}
+use crate::values::BusRateName;
 
 /// The heading of the bus options in `sim --help`.
 pub(super) const HEADING: &str = "Genius bus";
@@ -51,7 +22,7 @@ pub(super) struct BusArgs {
         ignore_case = true,
         help_heading = HEADING
     )]
-    bus_rate: RateName,
+    bus_rate: BusRateName,
 
     /// The host's bus address on the Genius bus, 0-31; the highest free one if not given.
     #[arg(
