@@ -1,0 +1,50 @@
+//! What is known to be missing.
+
+use ser_proto::Inputs;
+
+use super::Life;
+
+/// Entries, or changes, that are known to be missing at a place of a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gap {
+    /// The life of the last entry before it.
+    pub life: Life,
+    /// The sequence of the last entry before it; 0 at the beginning of a log.
+    pub after: Option<u64>,
+    /// How many entries.
+    pub lost: Lost,
+    /// Why.
+    pub why: Why,
+}
+
+/// How many entries are missing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Lost {
+    /// This many.
+    Exactly(u32),
+    /// This many or more.
+    AtLeast(u32),
+    /// Nobody knows.
+    Unknown,
+}
+
+/// Why entries are missing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Why {
+    /// Newer entries took their places before they were read.
+    Overwritten,
+    /// The log began anew, and what was unread then is gone.
+    LogBeganAnew,
+    /// These inputs (bit 0 is input 1) changed and no entry says when.
+    NotRecorded(u32),
+    /// The recorder, or the host that reads it, could not be reached.
+    NotReached,
+}
+
+impl Why {
+    /// Changed without being recorded.
+    #[must_use]
+    pub const fn not_recorded(inputs: Inputs) -> Why {
+        Why::NotRecorded(inputs.0)
+    }
+}
