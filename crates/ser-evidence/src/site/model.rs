@@ -61,7 +61,7 @@ pub struct Recorder {
     pub clock: ClockRule,
     /// The most that its clock drifts, in parts per billion.
     pub drift_ppb: u32,
-    /// The most that its drift changes, in parts per billion.
+    /// The band in which its drift stays, from its lowest to its highest, in parts per billion.
     pub wander_ppb: u32,
     /// How long a change takes through its input circuits.
     pub delays: Delays,

@@ -1,0 +1,147 @@
+//! What recorders know about each other's clocks.
+//!
+//! All recorders that hear a broadcast hear it at one instant, however long it was under way. Two
+//! recorders that watch one contact see it move once. Either bounds the difference of two clocks,
+//! whatever is unknown about both.
+
+use std::collections::BTreeMap;
+
+use super::offsets::{Home, RunClock};
+
+/// How often bounds are passed on over all links. Each round passes them one link further.
+const MOST_ROUNDS: usize = 1000;
+
+/// The clock of run `one` began to show `x` between `lo` and `hi` microseconds after that of run
+/// `other` began to show `other_x`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Link {
+    pub(crate) one: usize,
+    pub(crate) other: usize,
+    pub(crate) x: i64,
+    pub(crate) other_x: i64,
+    pub(crate) lo: i64,
+    pub(crate) hi: i64,
+    /// Who says so.
+    pub(crate) why: LinkReason,
+}
+
+/// Why two clocks are linked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LinkReason {
+    /// Both recorders received this broadcast.
+    Broadcast(u64),
+    /// Both saw the contact of these points move, by their indices in the site.
+    Contact(usize, usize),
+}
+
+/// All links, from either end.
+#[derive(Debug, Default)]
+pub(crate) struct Links {
+    by_pair: BTreeMap<(usize, usize), Vec<Link>>,
+}
+
+impl Link {
+    /// The same, seen from the other end.
+    fn reversed(self) -> Link {
+        Link {
+            one: self.other,
+            other: self.one,
+            x: self.other_x,
+            other_x: self.x,
+            lo: -self.hi,
+            hi: -self.lo,
+            why: self.why,
+        }
+    }
+}
+
+impl Links {
+    pub(crate) fn new(links: &[Link]) -> Links {
+        let mut by_pair: BTreeMap<(usize, usize), Vec<Link>> = BTreeMap::new();
+        for &link in links {
+            for link in [link, link.reversed()] {
+                by_pair.entry((link.one, link.other)).or_default().push(link);
+            }
+        }
+        by_pair.values_mut().for_each(|links| links.sort_by_key(|link| (link.x, *link)));
+        Links { by_pair }
+    }
+
+    /// How long after run `other` began to show `other_x` run `one` began to show `x`, by the
+    /// nearest links on both sides.
+    pub(crate) fn difference(
+        &self,
+        runs: &[RunClock],
+        (one, x): (usize, i64),
+        (other, other_x): (usize, i64),
+    ) -> Option<(i64, i64)> {
+        let links = self.by_pair.get(&(one, other))?;
+        let (clock, other_clock) = (runs.get(one)?, runs.get(other)?);
+        let next = links.partition_point(|link| link.x < x);
+        let previous = next.checked_sub(1).and_then(|previous| links.get(previous));
+        let mut known: Option<(i64, i64)> = None;
+        for link in [previous, links.get(next)].into_iter().flatten() {
+            let (least, most) = clock.elapsed(x.saturating_sub(link.x));
+            let (other_least, other_most) =
+                other_clock.elapsed(link.other_x.saturating_sub(other_x));
+            let lo = least.saturating_add(link.lo).saturating_add(other_least);
+            let hi = most.saturating_add(link.hi).saturating_add(other_most);
+            known = Some(known.map_or((lo, hi), |known| (known.0.max(lo), known.1.min(hi))));
+        }
+        known
+    }
+}
+
+/// Lets the clocks bound each other until nothing changes any more. Links that contradict what is
+/// known otherwise are left out and returned.
+pub(crate) fn tighten(runs: &mut Vec<RunClock>, links: &mut Vec<Link>) -> Vec<Link> {
+    links.sort_unstable();
+    links.dedup();
+    let untouched = runs.clone();
+    let mut wrong = Vec::new();
+    while let Some(contradiction) = pass_on(runs, links) {
+        runs.clone_from(&untouched);
+        links.retain(|link| *link != contradiction);
+        wrong.push(contradiction);
+    }
+    wrong
+}
+
+/// Passes bounds on over all links; the first one that cannot be, if there is one.
+fn pass_on(runs: &mut [RunClock], links: &[Link]) -> Option<Link> {
+    for _ in 0..MOST_ROUNDS {
+        let mut is_news = false;
+        for link in links {
+            for home in common_homes(runs, link) {
+                for link in [*link, link.reversed()] {
+                    let (lo, hi) = runs.get(link.other)?.instant(home, link.other_x);
+                    let known = (plus(lo, link.lo), plus(hi, link.hi));
+                    match runs.get_mut(link.one)?.learn(home, link.x, known) {
+                        None => return Some(link_as_given(link, links)),
+                        Some(news) => is_news |= news,
+                    }
+                }
+            }
+        }
+        if !is_news {
+            break;
+        }
+    }
+    None
+}
+
+/// The link as it is in the list, whichever end it was seen from.
+fn link_as_given(link: Link, links: &[Link]) -> Link {
+    if links.contains(&link) { link } else { link.reversed() }
+}
+
+fn plus(end: i64, us: i64) -> i64 {
+    if end == i64::MIN || end == i64::MAX { end } else { end.saturating_add(us) }
+}
+
+fn common_homes(runs: &[RunClock], link: &Link) -> Vec<Home> {
+    let (Some(one), Some(other)) = (runs.get(link.one), runs.get(link.other)) else {
+        return Vec::new();
+    };
+    one.homes().filter(|home| other.homes().any(|other| other == *home)).collect()
+}

@@ -1,0 +1,24 @@
+//! From observations of a recorder's clock to its offset, with its doubt.
+//!
+//! A recorder's clock drifts slowly and is set now and then. The entries between two sets are a
+//! *run*. All observations of a run bound its offset, each less so the further away it is. Two
+//! recorders that heard one broadcast, or that watch one contact, bound each other's.
+//!
+//! `envelope` reckons with bounds that age; `hosts` knows the clocks of the observers; `runs` finds
+//! where clocks were set; `placing` says to which run an observation belongs; `offsets` makes bounds
+//! of them, and `links` lets recorders bound each other. `local` is for clocks that nobody observed.
+//! `model` puts all this together.
+
+pub(crate) mod envelope;
+pub(crate) mod hosts;
+pub(crate) mod links;
+pub(crate) mod local;
+pub(crate) mod model;
+pub(crate) mod offsets;
+pub(crate) mod placing;
+pub(crate) mod runs;
+
+pub use links::LinkReason;
+pub use local::Nominal;
+pub use model::Finding;
+pub use offsets::Home;

@@ -1,0 +1,188 @@
+//! Takes records one by one, from many sources, in any order.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::gaps::{self, ToldGaps};
+use super::join::{self, Segment};
+use super::{Held, History, LifeHistory, RecorderHistory};
+use crate::record::{
+    ClockObservation, ClockStep, EntryRecord, Gap, Life, LifeRecord, Record, Watched,
+};
+use crate::site::{Recorder, Site};
+
+/// Collects the records of all sources.
+///
+/// A source is one reading or one file. Entries whose life has no name belong together only within
+/// a source, so say where the next one [begins](Self::begin_source).
+#[derive(Debug, Default)]
+pub struct Collector {
+    recorders: BTreeMap<String, Collected>,
+}
+
+/// What was collected of one recorder.
+#[derive(Debug, Default)]
+struct Collected {
+    lives: BTreeMap<Life, Vec<Held>>,
+    /// Readings that do not know their life.
+    unnamed: Vec<Segment>,
+    /// Whether the next entry without a life begins another one of these.
+    begins_segment: bool,
+    life_records: Vec<LifeRecord>,
+    gaps: Vec<Gap>,
+    observations: Vec<ClockObservation>,
+    steps: Vec<ClockStep>,
+    watched: Vec<Watched>,
+}
+
+impl Collector {
+    /// Nothing yet.
+    #[must_use]
+    pub fn new() -> Collector {
+        Collector::default()
+    }
+
+    /// Says that what follows is from another source.
+    pub fn begin_source(&mut self) {
+        for collected in self.recorders.values_mut() {
+            collected.begins_segment = true;
+        }
+    }
+
+    /// Takes a record of the recorder of this name.
+    pub fn add(&mut self, recorder: &str, record: &Record) {
+        let collected = self.recorder(recorder);
+        match *record {
+            Record::Entry(ref entry) => collected.add_entry(entry),
+            Record::Gap(gap) => collected.gaps.push(gap),
+            Record::Clock(observation) => collected.observations.push(observation),
+            Record::Step(step) => collected.steps.push(step),
+            Record::Life(life) => collected.life_records.push(life),
+            Record::Watched(watched) => collected.watched.push(watched),
+        }
+    }
+
+    /// Takes everything of another collector, whose sources are other ones.
+    pub fn merge(&mut self, other: Collector) {
+        for (name, other) in other.recorders {
+            let collected = self.recorder(&name);
+            for (life, entries) in other.lives {
+                collected.lives.entry(life).or_default().extend(entries);
+            }
+            collected.unnamed.extend(other.unnamed);
+            collected.begins_segment = true;
+            collected.life_records.extend(other.life_records);
+            collected.gaps.extend(other.gaps);
+            collected.observations.extend(other.observations);
+            collected.steps.extend(other.steps);
+            collected.watched.extend(other.watched);
+        }
+    }
+
+    /// Puts everything together. Recorders of the site of which nothing was collected are there,
+    /// too, without a life.
+    #[must_use]
+    pub fn finish(mut self, site: &Site) -> History {
+        let names: BTreeSet<String> = self
+            .recorders
+            .keys()
+            .cloned()
+            .chain(site.recorders.iter().map(|recorder| recorder.name.clone()))
+            .collect();
+        let recorders = names.into_iter().map(|name| {
+            let collected = self.recorders.remove(&name).unwrap_or_default();
+            collected.finish(&name, site)
+        });
+        History { recorders: recorders.collect() }
+    }
+
+    fn recorder(&mut self, name: &str) -> &mut Collected {
+        // Most records follow one of the same recorder, and need no name of their own.
+        if !self.recorders.contains_key(name) {
+            self.recorders.insert(name.to_owned(), Collected::default());
+        }
+        self.recorders.entry(name.to_owned()).or_default()
+    }
+}
+
+impl Collected {
+    fn add_entry(&mut self, record: &EntryRecord) {
+        let EntryRecord { life, sequence, number, entry } = *record;
+        match sequence {
+            Some(sequence) if life.is_known() => {
+                self.lives.entry(life).or_default().push(Held { sequence, entry, number });
+            }
+            _ => self.add_unnamed(sequence, number, record),
+        }
+    }
+
+    fn add_unnamed(&mut self, sequence: Option<u64>, number: u16, record: &EntryRecord) {
+        let entry = record.entry;
+        let is_by_number = sequence.is_none();
+        let continues = |segment: &&mut Segment| {
+            let last = segment.entries.last().map_or(0, |held| held.sequence);
+            segment.is_by_number == is_by_number && sequence.is_none_or(|sequence| sequence > last)
+        };
+        let last = match self.begins_segment {
+            true => None,
+            false => self.unnamed.last_mut().filter(continues),
+        };
+        self.begins_segment = false;
+        match last {
+            Some(segment) => {
+                let next = segment.entries.last().map_or(1, |held| held.sequence + 1);
+                let sequence = sequence.unwrap_or(next);
+                segment.entries.push(Held { sequence, entry, number });
+            }
+            None => {
+                let sequence = sequence.unwrap_or(1);
+                let entries = vec![Held { sequence, entry, number }];
+                self.unnamed.push(Segment { entries, is_by_number });
+            }
+        }
+    }
+
+    fn finish(mut self, name: &str, site: &Site) -> RecorderHistory {
+        let id = site.recorder(name);
+        let described = id.and_then(|id| site.recorders.get(id.0)).cloned();
+        let mut conflicts = Vec::new();
+        let unnamed = std::mem::take(&mut self.unnamed);
+        let named = std::mem::take(&mut self.lives);
+        let mut lives = join::lives(named, unnamed, &mut conflicts);
+        self.life_records.sort_unstable_by_key(|record| record.life);
+        for life in &mut lives {
+            self.describe(life);
+        }
+        let told = ToldGaps::new(self.gaps);
+        for life in &mut lives {
+            life.gaps = gaps::of_life(life, &told);
+        }
+        conflicts.sort_unstable_by_key(|conflict| (conflict.life, conflict.sequence));
+        RecorderHistory {
+            recorder: described.unwrap_or_else(|| Recorder::named(name)),
+            site: id,
+            lives,
+            observations: sorted(self.observations),
+            steps: sorted(self.steps),
+            watched: sorted(self.watched),
+            conflicts,
+        }
+    }
+
+    /// Adds what the life records say.
+    fn describe(&self, life: &mut LifeHistory) {
+        let records = self.life_records.iter().filter(|record| Some(record.life) == life.life);
+        for record in records {
+            life.is_exact |= record.is_exact;
+            life.erased = life.erased.max(record.erased);
+        }
+    }
+}
+
+/// In an order that depends on nothing but the content, each once.
+fn sorted<T: std::fmt::Debug + PartialEq>(records: Vec<T>) -> Vec<T> {
+    let mut keyed: Vec<(String, T)> =
+        records.into_iter().map(|record| (format!("{record:?}"), record)).collect();
+    keyed.sort_by(|one, other| one.0.cmp(&other.0));
+    keyed.dedup_by(|one, other| one.1 == other.1);
+    keyed.into_iter().map(|(_, record)| record).collect()
+}

@@ -1,0 +1,95 @@
+//! What is missing in a life: found in its entries, explained by what was told.
+
+use std::collections::BTreeMap;
+
+use super::{Held, LifeHistory};
+use crate::record::{Gap, Life, Lost, Why};
+
+/// Something missing at a place of a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LogGap {
+    /// How many entries of the life come before it, of those that are held: it is ahead of the
+    /// entry at this place.
+    pub place: usize,
+    /// The sequence of the last entry before it; 0 at the beginning of the log.
+    pub after: u64,
+    /// How many entries.
+    pub lost: Lost,
+    /// Why.
+    pub why: Why,
+}
+
+/// Gaps as they were told, by where they are.
+#[derive(Debug, Default)]
+pub(super) struct ToldGaps {
+    by_place: BTreeMap<(Life, u64), Vec<Gap>>,
+}
+
+impl ToldGaps {
+    pub(super) fn new(gaps: Vec<Gap>) -> ToldGaps {
+        let mut by_place: BTreeMap<(Life, u64), Vec<Gap>> = BTreeMap::new();
+        for gap in gaps {
+            if let Some(after) = gap.after {
+                by_place.entry((gap.life, after)).or_default().push(gap);
+            }
+        }
+        for gaps in by_place.values_mut() {
+            gaps.sort_by_key(|gap| (gap.why, gap.lost));
+            gaps.dedup();
+        }
+        ToldGaps { by_place }
+    }
+
+    fn at(&self, life: Life, after: u64) -> &[Gap] {
+        self.by_place.get(&(life, after)).map_or(&[], Vec::as_slice)
+    }
+}
+
+/// Everything that is missing in a life.
+pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps) -> Vec<LogGap> {
+    if life.is_by_number {
+        return Vec::new();
+    }
+    let mut gaps = Vec::new();
+    let first = life.entries.first().map_or(1, |held| held.sequence);
+    if first > 1 {
+        gaps.push(hole(life, told, 0, 0, first - 1));
+    }
+    for (place, pair) in life.entries.windows(2).enumerate() {
+        let [before, after] = pair else { continue };
+        let missing = after.sequence - before.sequence - 1;
+        if missing > 0 {
+            gaps.push(hole(life, told, place + 1, before.sequence, missing));
+        } else if let Some(inputs) = unrecorded(before, after) {
+            let (after, why) = (before.sequence, Why::NotRecorded(inputs));
+            gaps.push(LogGap { place: place + 1, after, lost: Lost::Unknown, why });
+        }
+    }
+    let last = life.entries.last().map_or(0, |held| held.sequence);
+    let ends = told.at(life.name(), last).iter().filter(|gap| gap.why == Why::LogBeganAnew);
+    for gap in ends.take(usize::from(life.life.is_some())) {
+        let (place, lost, why) = (life.entries.len(), gap.lost, gap.why);
+        gaps.push(LogGap { place, after: last, lost, why });
+    }
+    gaps
+}
+
+/// Inputs that changed between neighbours without a record.
+fn unrecorded(before: &Held, after: &Held) -> Option<u32> {
+    let inputs = before.entry.state.0 ^ after.entry.changed.0 ^ after.entry.state.0;
+    (inputs != 0).then_some(inputs)
+}
+
+/// Entries that are missing between two that are held. What was told about the place says why.
+fn hole(life: &LifeHistory, told: &ToldGaps, place: usize, after: u64, missing: u64) -> LogGap {
+    let missing = u32::try_from(missing).unwrap_or(u32::MAX);
+    let told = told.at(life.name(), after).first();
+    // Before the first reading nobody counted how often the total had wrapped.
+    let is_counted = after > 0 || life.is_exact;
+    LogGap {
+        place,
+        after,
+        lost: if is_counted { Lost::Exactly(missing) } else { Lost::AtLeast(missing) },
+        why: told.map_or(Why::NotReached, |gap| gap.why),
+    }
+}

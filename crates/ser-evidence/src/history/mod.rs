@@ -1,0 +1,105 @@
+//! All that is known of each recorder, put together from any number of sources.
+//!
+//! Readings of the same log overlap, and not all of them know which life of the log they read. They
+//! are joined by what entries are: recorder, life and sequence, or, where the life has no name, by
+//! their content. The result is the same whatever the order of the sources.
+
+mod collector;
+mod gaps;
+mod join;
+
+use ser_proto::Entry;
+
+pub use collector::Collector;
+pub use gaps::LogGap;
+
+use crate::record::{ClockObservation, ClockStep, Life, Watched};
+use crate::site::{Recorder, RecorderId};
+
+/// Everything that is known of all recorders.
+#[derive(Debug)]
+pub struct History {
+    /// By name.
+    pub recorders: Vec<RecorderHistory>,
+}
+
+/// Everything that is known of one recorder.
+#[derive(Debug)]
+pub struct RecorderHistory {
+    /// Its name and properties.
+    pub recorder: Recorder,
+    /// Where it is in the site file, if it is there.
+    pub site: Option<RecorderId>,
+    /// The lives of its log: first those with a name, by name, then those without, by content.
+    pub lives: Vec<LifeHistory>,
+    /// What its clock showed.
+    pub observations: Vec<ClockObservation>,
+    /// Where its clock may have been set without anybody knowing to what.
+    pub steps: Vec<ClockStep>,
+    /// When nothing was missed.
+    pub watched: Vec<Watched>,
+    /// Entries that cannot both be true, each with the sequence that they share.
+    pub conflicts: Vec<Conflict>,
+}
+
+/// One life of a recorder's log.
+#[derive(Debug, Default)]
+pub struct LifeHistory {
+    /// Its name; [`Life::UNKNOWN`] if no reading knew it.
+    pub life: Option<Life>,
+    /// Whether sequences count from the beginning of the log. Otherwise a multiple of 65536 may be
+    /// missing in them.
+    pub is_exact: bool,
+    /// Whether the places of the entries are those of a reading by number, which tells no sequence.
+    pub is_by_number: bool,
+    /// The life before, if the log was erased by command.
+    pub erased: Option<Life>,
+    /// All entries, by sequence, each once.
+    pub entries: Vec<Held>,
+    /// What is missing, by place.
+    pub gaps: Vec<LogGap>,
+}
+
+/// An entry in its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Held {
+    /// The total after it.
+    pub sequence: u64,
+    /// The entry as it was read.
+    pub entry: Entry,
+    /// Its number in the ring.
+    pub number: u16,
+}
+
+/// Two entries at one place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Conflict {
+    /// The life.
+    pub life: Life,
+    /// Their sequence.
+    pub sequence: u64,
+    /// The one that is shown.
+    pub shown: Entry,
+    /// The other one.
+    pub other: Entry,
+}
+
+impl LifeHistory {
+    /// The place of the first entry with at least this sequence.
+    #[must_use]
+    pub fn place_of(&self, sequence: u64) -> usize {
+        self.entries.partition_point(|held| held.sequence < sequence)
+    }
+
+    /// The entry with this sequence.
+    #[must_use]
+    pub fn entry(&self, sequence: u64) -> Option<&Held> {
+        self.entries.get(self.place_of(sequence)).filter(|held| held.sequence == sequence)
+    }
+
+    /// The life's name.
+    #[must_use]
+    pub fn name(&self) -> Life {
+        self.life.unwrap_or(Life::UNKNOWN)
+    }
+}

@@ -1,0 +1,148 @@
+//! The time between two changes, and their order.
+
+use super::{ChangeId, EventId, Timeline};
+use crate::clock::envelope::{NO_HI, NO_LO};
+use crate::clock::offsets::ends;
+use crate::site::Delays;
+use crate::time::shown;
+
+/// How often a recorder looks at its inputs, in microseconds.
+const PERIOD_US: i64 = 1000;
+
+/// The time from one change to another, in microseconds; negative if the other came first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Delta {
+    /// The least; `None` if that is not known.
+    pub lo_us: Option<i64>,
+    /// The most; `None` if that is not known.
+    pub hi_us: Option<i64>,
+}
+
+/// What is known of the order of two entries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// The first one came first.
+    Before,
+    /// The second one came first.
+    After,
+    /// They are one sample.
+    Same,
+    /// Nobody knows.
+    Unknown,
+}
+
+impl Delta {
+    fn of((lo, hi): (i64, i64)) -> Delta {
+        Delta { lo_us: (lo != NO_LO).then_some(lo), hi_us: (hi != NO_HI).then_some(hi) }
+    }
+
+    /// The middle, if both ends are known.
+    #[must_use]
+    pub fn middle_us(self) -> Option<i64> {
+        Some(self.lo_us?.midpoint(self.hi_us?))
+    }
+
+    /// How far the truth may be from the middle, if both ends are known.
+    #[must_use]
+    pub fn doubt_us(self) -> Option<i64> {
+        Some((self.hi_us?.saturating_sub(self.lo_us?) + 1) / 2)
+    }
+}
+
+impl Timeline<'_> {
+    /// What is known of the order of two entries. Inside a life the sequence decides. Between
+    /// recorders it takes bounds that do not meet.
+    #[must_use]
+    pub fn order(&self, one: EventId, other: EventId) -> Order {
+        if (one.recorder, one.life) == (other.recorder, other.life) {
+            return match one.place.cmp(&other.place) {
+                std::cmp::Ordering::Less => Order::Before,
+                std::cmp::Ordering::Equal => Order::Same,
+                std::cmp::Ordering::Greater => Order::After,
+            };
+        }
+        let (lo, hi) = self.moved_between((one, None), (other, None));
+        match () {
+            () if lo > 0 => Order::Before,
+            () if hi < 0 => Order::After,
+            () => Order::Unknown,
+        }
+    }
+
+    /// The time from one change to another.
+    #[must_use]
+    pub fn delta(&self, one: ChangeId, other: ChangeId) -> Delta {
+        let sides = ((one.event, Some(one.input)), (other.event, Some(other.input)));
+        Delta::of(self.moved_between(sides.0, sides.1))
+    }
+
+    /// From the movement of one contact to that of another.
+    fn moved_between(
+        &self,
+        one: (EventId, Option<u8>),
+        other: (EventId, Option<u8>),
+    ) -> (i64, i64) {
+        let (lo, hi) = self.samples_between(one.0, other.0);
+        let (one_lo, one_hi) = self.delay_ends(one.0, one.1);
+        let (other_lo, other_hi) = self.delay_ends(other.0, other.1);
+        let lo = if lo == NO_LO { NO_LO } else { lo.saturating_add(other_lo - one_hi) };
+        let hi = if hi == NO_HI { NO_HI } else { hi.saturating_add(other_hi - one_lo) };
+        (lo, hi)
+    }
+
+    /// How long after its contact moved the sample was taken, negated: the earliest and the latest
+    /// movement, from the sample. Of one input, or of any change of this recorder.
+    pub(super) fn delay_ends(&self, event: EventId, input: Option<u8>) -> (i64, i64) {
+        let Some(recorder) = self.recorder(event) else { return (0, 0) };
+        let Delays { closing_us, opening_us } = recorder.recorder.delays;
+        let is_on = input.and_then(|input| Some(self.held(event)?.entry.state.contains(input)));
+        let (shortest, longest) = match is_on {
+            Some(true) => closing_us,
+            Some(false) => opening_us,
+            None => (closing_us.0.min(opening_us.0), closing_us.1.max(opening_us.1)),
+        };
+        // Where in its millisecond an original recorder looks is not known.
+        let late = if recorder.recorder.is_original { PERIOD_US } else { 0 };
+        (-PERIOD_US - i64::from(longest), late - i64::from(shortest))
+    }
+
+    /// From one sample to another, by everything that is known about both.
+    fn samples_between(&self, one: EventId, other: EventId) -> (i64, i64) {
+        let mut known = (NO_LO, NO_HI);
+        let mut take = |(lo, hi): (i64, i64)| known = (known.0.max(lo), known.1.min(hi));
+        for (home, bound) in self.samples(one) {
+            let same = self.samples(other).into_iter().filter(|(other, _)| *other == home);
+            for (_, other) in same {
+                take(difference(bound, other));
+            }
+        }
+        take(difference(ends(self.sample_utc(one)), ends(self.sample_utc(other))));
+        if let Some(elapsed) = self.elapsed_between(one, other) {
+            take(elapsed);
+        }
+        known
+    }
+
+    /// From one sample to another, by the clocks alone: in the same run, or in two that are linked.
+    fn elapsed_between(&self, one: EventId, other: EventId) -> Option<(i64, i64)> {
+        let run = |event: EventId| self.clock(event)?.sure_run(self.held(event)?.sequence);
+        let x = |event: EventId, run: usize| {
+            let stamp = shown(&self.held(event)?.entry.time)?;
+            Some(self.model.runs.get(run)?.unwrapped(stamp))
+        };
+        let (one_run, other_run) = (run(one)?, run(other)?);
+        let (one_x, other_x) = (x(one, one_run)?, x(other, other_run)?);
+        if one_run == other_run {
+            return Some(self.model.runs.get(one_run)?.elapsed(other_x - one_x));
+        }
+        let links = &self.model.by_pair;
+        links.difference(&self.model.runs, (other_run, other_x), (one_run, one_x))
+    }
+}
+
+/// From somewhere in one bound to somewhere in the other.
+fn difference(from: (i64, i64), to: (i64, i64)) -> (i64, i64) {
+    let lo = if to.0 == NO_LO || from.1 == NO_HI { NO_LO } else { to.0.saturating_sub(from.1) };
+    let hi = if to.1 == NO_HI || from.0 == NO_LO { NO_HI } else { to.1.saturating_sub(from.0) };
+    (lo, hi)
+}

@@ -1,0 +1,116 @@
+//! The list itself: the lives of all recorders, merged.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::{EventId, Timeline, event_id};
+
+/// Something in the list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Item {
+    /// An entry.
+    Entry(EventId),
+    /// Something is missing ahead of this entry (which may be one past the last of its life): the
+    /// gap of this index in the life's list.
+    Gap(EventId, usize),
+    /// The recorder's clock was set ahead of this entry, or may have been.
+    ClockSet(EventId),
+}
+
+/// Everything in the list, in order. Entries whose time is not known at all come last.
+pub struct Items<'t> {
+    timeline: &'t Timeline<'t>,
+    heads: BinaryHeap<Reverse<Head>>,
+    /// What comes before the next head.
+    pending: Vec<Item>,
+}
+
+/// The next entry of a life. Ordered as the list is.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Head {
+    /// Whether nothing is known of its time.
+    is_timeless: bool,
+    key: i64,
+    recorder: u32,
+    life: u32,
+    place: u32,
+}
+
+impl<'t> Timeline<'t> {
+    /// Everything in the list, in order.
+    #[must_use]
+    pub fn items(&'t self) -> Items<'t> {
+        let mut heads = BinaryHeap::new();
+        for (recorder, of_recorder) in self.history.recorders.iter().enumerate() {
+            for life in 0..of_recorder.lives.len() {
+                heads.extend(self.head(event_id(recorder, life, 0)).map(Reverse));
+            }
+        }
+        Items { timeline: self, heads, pending: Vec::new() }
+    }
+
+    /// The entries alone, in order.
+    pub fn entries(&'t self) -> impl Iterator<Item = EventId> + 't {
+        self.items().filter_map(|item| match item {
+            Item::Entry(event) => Some(event),
+            Item::Gap(..) | Item::ClockSet(_) => None,
+        })
+    }
+
+    fn head(&self, event: EventId) -> Option<Head> {
+        self.held(event)?;
+        let key = self.sort_key(event);
+        let EventId { recorder, life, place } = event;
+        let key_or_last = key.unwrap_or(i64::MAX);
+        Some(Head { is_timeless: key.is_none(), key: key_or_last, recorder, life, place })
+    }
+
+    /// Gaps and clock sets that are shown ahead of an entry, the last one first.
+    fn ahead_of(&self, event: EventId) -> Vec<Item> {
+        let (Some(life), Some(clock)) = (self.life(event), self.clock(event)) else {
+            return Vec::new();
+        };
+        let place = event.place as usize;
+        let first = life.gaps.partition_point(|gap| gap.place < place);
+        let gaps =
+            life.gaps.iter().enumerate().skip(first).take_while(|(_, gap)| gap.place == place);
+        let mut items: Vec<Item> = gaps.map(|(index, _)| Item::Gap(event, index)).collect();
+        let sequence = |place: usize| life.entries.get(place).map(|held| held.sequence);
+        let previous = place.checked_sub(1).and_then(sequence);
+        // A step is shown where it was at the latest, and once.
+        let is_here = |before: u64| {
+            previous.is_none_or(|previous| before >= previous)
+                && sequence(place).is_some_and(|this| before < this)
+        };
+        if clock.runs.steps.iter().any(|step| is_here(step.before)) {
+            items.push(Item::ClockSet(event));
+        }
+        items.reverse();
+        items
+    }
+}
+
+impl Iterator for Items<'_> {
+    type Item = Item;
+
+    fn next(&mut self) -> Option<Item> {
+        if let Some(item) = self.pending.pop() {
+            return Some(item);
+        }
+        let Reverse(head) = self.heads.pop()?;
+        let event = EventId { recorder: head.recorder, life: head.life, place: head.place };
+        let next = EventId { place: head.place + 1, ..event };
+        self.pending.push(Item::Entry(event));
+        match self.timeline.head(next) {
+            Some(head) => self.heads.push(Reverse(head)),
+            // What is missing at the end of a life.
+            None => {
+                let mut at_end = self.timeline.ahead_of(next);
+                at_end.append(&mut self.pending);
+                self.pending = at_end;
+            }
+        }
+        self.pending.extend(self.timeline.ahead_of(event));
+        self.pending.pop()
+    }
+}

@@ -1,0 +1,209 @@
+//! The entries of all recorders in one list, with what is proven of their order.
+//!
+//! Each entry gets bounds for the instant of its sample: on the monotonic clock of the host that
+//! observed the recorder, on which recorders are compared, and in UTC. The list is sorted by the
+//! middle of the bounds. It respects everything that is proven, and does not depend on the order of
+//! the sources. What stands side by side in it may be of unknown order nevertheless: ask
+//! [`Timeline::order`].
+
+mod bounds;
+mod contacts;
+mod delta;
+mod list;
+mod sort_key;
+
+pub use contacts::{ContactFinding, ContactTrouble};
+pub use delta::{Delta, Order};
+pub use list::{Item, Items};
+
+use std::collections::BTreeMap;
+
+use crate::clock::model::{ClockModel, LifeClock};
+use crate::clock::{Finding, Nominal};
+use crate::history::{Held, History, LifeHistory, RecorderHistory};
+use crate::site::Site;
+use crate::time::{Bound, Moment, Utc};
+use bounds::LifeBounds;
+
+/// One entry of one life of one recorder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct EventId {
+    /// Index of the recorder in the history.
+    pub recorder: u32,
+    /// Index of the life among those of the recorder.
+    pub life: u32,
+    /// Index of the entry among those of the life.
+    pub place: u32,
+}
+
+/// One input that changed in one entry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ChangeId {
+    /// The entry.
+    pub event: EventId,
+    /// The input, from 1.
+    pub input: u8,
+}
+
+/// All entries with their bounds, in order.
+#[derive(Debug)]
+pub struct Timeline<'a> {
+    site: &'a Site,
+    history: &'a History,
+    model: ClockModel,
+    /// By recorder and life.
+    lives: Vec<Vec<LifeBounds>>,
+    findings: Vec<Finding>,
+    contact_findings: Vec<ContactFinding>,
+    out_of_order: Vec<(EventId, EventId)>,
+}
+
+impl<'a> Timeline<'a> {
+    /// From all that is known.
+    #[must_use]
+    pub fn new(site: &'a Site, history: &'a History) -> Timeline<'a> {
+        let model = ClockModel::new(site, history);
+        let mut timeline = Timeline {
+            site,
+            history,
+            model,
+            lives: Vec::new(),
+            findings: Vec::new(),
+            contact_findings: Vec::new(),
+            out_of_order: Vec::new(),
+        };
+        timeline.reckon();
+        let (links, trouble) = contacts::links(&timeline);
+        timeline.contact_findings = trouble;
+        if !links.is_empty() {
+            timeline.model.add_links(links);
+            timeline.reckon();
+        }
+        timeline.findings.clone_from(&timeline.model.findings);
+        timeline.findings.sort_unstable();
+        timeline
+    }
+
+    /// Bounds of all entries by what the clocks say now.
+    fn reckon(&mut self) {
+        let mut out_of_order = Vec::new();
+        let mut lives = Vec::new();
+        let recorders = self.history.recorders.iter().zip(&self.model.lives).enumerate();
+        for (recorder, (history, clocks)) in recorders {
+            let mut of_recorder = Vec::new();
+            for (life, (entries, clock)) in history.lives.iter().zip(clocks).enumerate() {
+                let mut bounds = LifeBounds::new(entries, clock, &self.model);
+                let id = |place: usize| event_id(recorder, life, place);
+                let pairs = bounds.tighten();
+                out_of_order.extend(pairs.into_iter().map(|(one, other)| (id(one), id(other))));
+                bounds.sort_keys(entries, history, clock, &self.model, self.site);
+                of_recorder.push(bounds);
+            }
+            lives.push(of_recorder);
+        }
+        self.lives = lives;
+        self.out_of_order = out_of_order;
+    }
+
+    /// The site by which it was made.
+    #[must_use]
+    pub fn site(&self) -> &'a Site {
+        self.site
+    }
+
+    /// What it was made from.
+    #[must_use]
+    pub fn history(&self) -> &'a History {
+        self.history
+    }
+
+    /// What people should know about the clocks.
+    #[must_use]
+    pub fn findings(&self) -> &[Finding] {
+        &self.findings
+    }
+
+    /// Contacts that two recorders should have seen alike, and have not.
+    #[must_use]
+    pub fn contact_findings(&self) -> &[ContactFinding] {
+        &self.contact_findings
+    }
+
+    /// Pairs of entries of one life whose bounds cannot both be true: the first came first, and
+    /// what is known says that it was later. An observation is wrong there.
+    #[must_use]
+    pub fn out_of_order(&self) -> &[(EventId, EventId)] {
+        &self.out_of_order
+    }
+
+    /// The recorder of an entry.
+    #[must_use]
+    pub fn recorder(&self, event: EventId) -> Option<&'a RecorderHistory> {
+        self.history.recorders.get(event.recorder as usize)
+    }
+
+    /// The life of an entry.
+    #[must_use]
+    pub fn life(&self, event: EventId) -> Option<&'a LifeHistory> {
+        self.recorder(event)?.lives.get(event.life as usize)
+    }
+
+    /// The entry itself.
+    #[must_use]
+    pub fn held(&self, event: EventId) -> Option<&'a Held> {
+        self.life(event)?.entries.get(event.place as usize)
+    }
+
+    /// When the contact moved, in UTC: of this input, or of the first and the last that changed.
+    #[must_use]
+    pub fn moved_utc(&self, event: EventId, input: Option<u8>) -> Bound<Utc> {
+        let (lo, hi) = self.delay_ends(event, input);
+        self.sample_utc(event).shifted(lo, hi)
+    }
+
+    /// When the contact moved, on each scale on which the recorder was observed.
+    #[must_use]
+    pub fn moved_on(
+        &self,
+        event: EventId,
+        input: Option<u8>,
+    ) -> BTreeMap<crate::clock::Home, (Option<i64>, Option<i64>)> {
+        let (lo, hi) = self.delay_ends(event, input);
+        let ends = |bound: (i64, i64)| {
+            let bound = Bound::<Utc>::from_us(bound.0, bound.1).shifted(lo, hi);
+            (bound.lo().map(Moment::us), bound.hi().map(Moment::us))
+        };
+        self.samples(event).into_iter().map(|(home, bound)| (home, ends(bound))).collect()
+    }
+
+    /// What the stamp is in UTC by what the site says about the clock, for a clock that nobody
+    /// observed.
+    #[must_use]
+    pub fn nominal(&self, event: EventId) -> Nominal {
+        let (Some(life), Some(bounds)) = (self.life(event), self.bounds(event)) else {
+            return Nominal::NotKnown;
+        };
+        bounds.nominal(event.place as usize, life, self.recorder(event), self.site)
+    }
+
+    /// Where the entry is in the list, in UTC as well as that is known; `None` if nothing is known
+    /// about its time.
+    #[must_use]
+    pub fn sort_key(&self, event: EventId) -> Option<i64> {
+        self.bounds(event)?.key(event.place as usize)
+    }
+
+    fn bounds(&self, event: EventId) -> Option<&LifeBounds> {
+        self.lives.get(event.recorder as usize)?.get(event.life as usize)
+    }
+
+    fn clock(&self, event: EventId) -> Option<&LifeClock> {
+        self.model.lives.get(event.recorder as usize)?.get(event.life as usize)
+    }
+}
+
+/// An entry by its indices. Nobody has four billion of anything here.
+pub(crate) fn event_id(recorder: usize, life: usize, place: usize) -> EventId {
+    let narrow = |index: usize| u32::try_from(index).unwrap_or(u32::MAX);
+    EventId { recorder: narrow(recorder), life: narrow(life), place: narrow(place) }
+}
