@@ -10,6 +10,7 @@
 //! - [`history`]: all records of a recorder put together, from any number of sources;
 //! - [`clock`]: from observations to the offset of a recorder's clock, with its doubt;
 //! - [`timeline`]: the entries of all recorders in one list, with what is proven of their order;
+//! - [`incident`]: the answer for one incident.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
@@ -17,6 +18,7 @@
 
 pub mod clock;
 pub mod history;
+pub mod incident;
 pub mod record;
 pub mod site;
 pub mod time;

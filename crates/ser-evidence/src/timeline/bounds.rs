@@ -165,6 +165,11 @@ impl LifeBounds {
         self.keys.get(place).copied().filter(|&key| key != NO_LO)
     }
 
+    /// The last place with a key below this one.
+    pub(super) fn place_before(&self, key: i64) -> Option<usize> {
+        self.keys.partition_point(|&known| known < key).checked_sub(1)
+    }
+
     pub(super) fn sample(&self, place: usize) -> Option<(Home, (i64, i64))> {
         Some((self.home(place)?, self.samples.get(place).copied()?))
     }

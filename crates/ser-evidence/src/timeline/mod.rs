@@ -193,6 +193,17 @@ impl<'a> Timeline<'a> {
         self.bounds(event)?.key(event.place as usize)
     }
 
+    /// The last entry of a recorder whose place in the list is before this key.
+    #[must_use]
+    pub fn last_before(&self, recorder: u32, key: i64) -> Option<EventId> {
+        let lives = self.lives.get(recorder as usize)?.iter().enumerate();
+        let last = lives.filter_map(|(life, bounds)| {
+            let event = event_id(recorder as usize, life, bounds.place_before(key)?);
+            Some((self.sort_key(event)?, event))
+        });
+        last.max().map(|(_, event)| event)
+    }
+
     fn bounds(&self, event: EventId) -> Option<&LifeBounds> {
         self.lives.get(event.recorder as usize)?.get(event.life as usize)
     }

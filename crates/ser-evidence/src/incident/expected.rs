@@ -1,0 +1,133 @@
+//! What was expected to follow, and whether it did.
+
+use std::collections::BTreeSet;
+
+use super::Row;
+use super::completeness::is_covered_until;
+use super::pick::Incident;
+use super::points::Points;
+use crate::site::{Edge, Expectation};
+use crate::timeline::{ChangeId, Delta, Timeline};
+
+/// One expectation, each time that its beginning happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StepResult {
+    /// Index of the expectation in the site.
+    pub expectation: usize,
+    /// What started it.
+    pub after: ChangeId,
+    /// What followed, if it did.
+    pub then: Option<ChangeId>,
+    /// The time between them.
+    pub delta: Option<Delta>,
+    /// Whether that is as expected.
+    pub verdict: Verdict,
+}
+
+/// Whether something happened as expected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// In the window.
+    InTime,
+    /// Before it.
+    Early,
+    /// After it.
+    Late,
+    /// It did not happen, and it would have been recorded.
+    Missing,
+    /// It cannot be said.
+    NotDecidable(Doubt),
+}
+
+/// Why a verdict cannot be given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Doubt {
+    /// What is known of the time reaches over an end of the window.
+    Straddles,
+    /// Nothing is known of the time between the two.
+    NoCommonTime,
+    /// Something is missing in the log that should show it.
+    Gap,
+    /// The log that should show it was not read later than this.
+    NotReadSince,
+}
+
+/// The results of all expectations whose beginning is in the incident.
+pub(super) fn results(
+    timeline: &Timeline<'_>,
+    points: &Points,
+    incident: &Incident,
+    rows: &[Row],
+) -> Vec<StepResult> {
+    let mut results = Vec::new();
+    for (index, expectation) in timeline.site().expectations.iter().enumerate() {
+        let mut taken = BTreeSet::new();
+        let beginnings: Vec<&Row> = rows.iter().filter(|row| is(row, expectation.after)).collect();
+        for (place, after) in beginnings.iter().enumerate() {
+            let next = beginnings.get(place + 1).map(|row| row.change);
+            let (after, mut followers) =
+                (after.change, rows.iter().filter(|row| is(row, expectation.then)));
+            let follows = |row: &&Row| {
+                !taken.contains(&row.change) && is_between(timeline, after, row.change, next)
+            };
+            let then = followers.find(follows).map(|row| row.change);
+            taken.extend(then);
+            let delta = then.map(|then| timeline.delta(after, then));
+            let verdict = match delta {
+                Some(delta) => in_window(delta, expectation.within_us),
+                None => absent(timeline, points, incident, expectation, after),
+            };
+            results.push(StepResult { expectation: index, after, then, delta, verdict });
+        }
+    }
+    results
+}
+
+fn is(row: &Row, edge: Edge) -> bool {
+    row.point == Some(edge.point) && row.on == edge.on
+}
+
+/// Whether a change may have followed one and not yet the next of its kind.
+fn is_between(
+    timeline: &Timeline<'_>,
+    after: ChangeId,
+    then: ChangeId,
+    next: Option<ChangeId>,
+) -> bool {
+    let is_not_before = |one: ChangeId, other: ChangeId| {
+        timeline.delta(one, other).hi_us.is_none_or(|most| most >= 0)
+    };
+    is_not_before(after, then) && next.is_none_or(|next| is_not_before(then, next))
+}
+
+fn in_window(delta: Delta, (earliest, latest): (i64, i64)) -> Verdict {
+    let (Some(lo), Some(hi)) = (delta.lo_us, delta.hi_us) else {
+        return Verdict::NotDecidable(Doubt::NoCommonTime);
+    };
+    match () {
+        () if lo >= earliest && hi <= latest => Verdict::InTime,
+        () if hi < earliest => Verdict::Early,
+        () if lo > latest => Verdict::Late,
+        () => Verdict::NotDecidable(Doubt::Straddles),
+    }
+}
+
+/// What did not follow is missing only if it would have been seen.
+fn absent(
+    timeline: &Timeline<'_>,
+    points: &Points,
+    incident: &Incident,
+    expectation: &Expectation,
+    after: ChangeId,
+) -> Verdict {
+    let point = timeline.site().points.get(expectation.then.point.0);
+    let recorder = point.and_then(|point| points.recorder(point.recorder));
+    let Some(recorder) = recorder else { return Verdict::NotDecidable(Doubt::NotReadSince) };
+    if incident.gaps.iter().any(|(event, _)| event.recorder == recorder) {
+        return Verdict::NotDecidable(Doubt::Gap);
+    }
+    match is_covered_until(timeline, recorder, after, expectation.within_us.1) {
+        true => Verdict::Missing,
+        false => Verdict::NotDecidable(Doubt::NotReadSince),
+    }
+}

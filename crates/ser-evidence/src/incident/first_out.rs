@@ -1,0 +1,91 @@
+//! What moved first: a set, because it may not be known.
+
+use std::collections::BTreeSet;
+
+use super::pick::Incident;
+use super::points::Points;
+use crate::site::GroupId;
+use crate::timeline::{ChangeId, EventId, Order, Timeline};
+
+/// Everything that may have moved first.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct FirstOut {
+    /// Changes, in the order of the timeline. With a single one, and no gap, it is known.
+    pub changes: Vec<ChangeId>,
+    /// What is missing may have been first, too: the entry after the gap, and the gap's index in
+    /// its life.
+    pub gaps: Vec<(EventId, usize)>,
+}
+
+impl FirstOut {
+    /// The change that was first, if that is known.
+    #[must_use]
+    pub fn known(&self) -> Option<ChangeId> {
+        match (self.changes.as_slice(), self.gaps.as_slice()) {
+            ([only], []) => Some(*only),
+            _ => None,
+        }
+    }
+}
+
+/// What moved first in the whole incident.
+pub(super) fn of_all(timeline: &Timeline<'_>, incident: &Incident) -> FirstOut {
+    of(timeline, incident, &|_| true)
+}
+
+/// What moved first in each group that wants to know.
+pub(super) fn of_groups(
+    timeline: &Timeline<'_>,
+    points: &Points,
+    incident: &Incident,
+) -> Vec<(GroupId, FirstOut)> {
+    let site = timeline.site();
+    let groups = site.groups.iter().enumerate().filter(|(_, group)| group.first_out);
+    let group_of =
+        |change: ChangeId| points.of(change).and_then(|point| site.points.get(point.0)?.group);
+    groups
+        .map(|(index, _)| {
+            let group = GroupId(index);
+            (group, of(timeline, incident, &|change| group_of(change) == Some(group)))
+        })
+        .filter(|(_, first_out)| !first_out.changes.is_empty())
+        .collect()
+}
+
+/// Candidates are the inputs of the first entry of each life. One is out if another one is proven
+/// to have been earlier.
+fn of(timeline: &Timeline<'_>, incident: &Incident, counts: &dyn Fn(ChangeId) -> bool) -> FirstOut {
+    let mut lives = BTreeSet::new();
+    let mut firsts: Vec<EventId> = Vec::new();
+    for &event in &incident.events {
+        let is_first = changes(timeline, event).any(counts);
+        if is_first && lives.insert((event.recorder, event.life)) {
+            firsts.push(event);
+        }
+    }
+    let is_candidate = |event: &EventId| {
+        !firsts.iter().any(|other| timeline.order(*other, *event) == Order::Before)
+    };
+    let candidates: Vec<EventId> = firsts.iter().copied().filter(is_candidate).collect();
+    let is_ahead = |gap: &(EventId, usize)| {
+        let (after, _) = *gap;
+        let first = firsts
+            .iter()
+            .find(|first| (first.recorder, first.life) == (after.recorder, after.life));
+        first.is_none_or(|first| after.place <= first.place)
+    };
+    FirstOut {
+        changes: candidates
+            .iter()
+            .flat_map(|&event| changes(timeline, event))
+            .filter(|change| counts(*change))
+            .collect(),
+        gaps: incident.gaps.iter().copied().filter(is_ahead).collect(),
+    }
+}
+
+fn changes<'t>(timeline: &'t Timeline<'_>, event: EventId) -> impl Iterator<Item = ChangeId> + 't {
+    let changed = timeline.held(event).map(|held| held.entry.changed);
+    let inputs = changed.into_iter().flat_map(ser_proto::Inputs::numbers);
+    inputs.map(move |input| ChangeId { event, input })
+}
