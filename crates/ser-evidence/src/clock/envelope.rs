@@ -42,6 +42,16 @@ impl Slope {
         Slope { rate_ppb: 0, doubt_ppb: ppb.into() }
     }
 
+    /// What two slopes have in common; `None` if that is nothing.
+    pub(crate) fn intersection(self, other: Slope) -> Option<Slope> {
+        let ends =
+            |slope: Slope| (slope.rate_ppb - slope.doubt_ppb, slope.rate_ppb + slope.doubt_ppb);
+        let ((lo, hi), (other_lo, other_hi)) = (ends(self), ends(other));
+        let (lo, hi) = (lo.max(other_lo), hi.min(other_hi));
+        let rate_ppb = lo.midpoint(hi);
+        (lo <= hi).then(|| Slope { rate_ppb, doubt_ppb: (hi - rate_ppb).max(rate_ppb - lo) })
+    }
+
     /// The least and the most that the value changes over `dx`, which may be negative.
     pub(crate) fn change(self, dx: i64) -> (i64, i64) {
         if dx == 0 {
@@ -100,6 +110,21 @@ impl Envelope {
             envelope.close();
         }
         (envelope, contradictions)
+    }
+
+    /// From what is known at some points, by a slope that is known already. Points that contradict
+    /// each other are widened.
+    pub(crate) fn with_slope(mut points: Vec<Known>, slope: Slope) -> Envelope {
+        points.sort_unstable();
+        widen_contradicting(&mut points, slope);
+        let mut envelope = Envelope { points, slope };
+        envelope.close();
+        envelope
+    }
+
+    /// The same with a slope that leaves less room.
+    pub(crate) fn narrowed(&self, slope: Slope) -> Envelope {
+        Envelope::with_slope(self.points.clone(), slope)
     }
 
     /// Whether nothing is known anywhere.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::envelope::{Envelope, Known, NO_HI, NO_LO};
+use super::envelope::{Envelope, Known, NO_HI, NO_LO, Slope};
 use crate::record::{Boot, HostReading};
 use crate::time::{Bound, Host, Moment, Utc};
 
@@ -48,6 +48,30 @@ impl Hosts {
         (Hosts { boots }, stepped)
     }
 
+    /// All boots, in order.
+    pub(crate) fn boots(&self) -> impl Iterator<Item = Boot> {
+        self.boots.keys().copied()
+    }
+
+    /// UTC less the monotonic clock. Where nothing is known of it, the host's own UTC is taken to
+    /// be right to `anything_us`.
+    pub(crate) fn placed(&self, boot: Boot, anything_us: i64) -> Envelope {
+        let slope = Slope::within(HOST_DRIFT_PPB);
+        let Some(clock) = self.boots.get(&boot) else {
+            return Envelope::with_slope(Vec::new(), slope);
+        };
+        if !clock.offset.is_empty() {
+            return clock.offset.clone();
+        }
+        let known = |&(x, offset): &(i64, i64)| Known {
+            x,
+            lo: offset - anything_us,
+            hi: offset + anything_us,
+            id: 0,
+        };
+        Envelope::with_slope(clock.readings.iter().map(known).collect(), slope)
+    }
+
     /// A bound on a boot's monotonic clock in UTC.
     pub(crate) fn utc(&self, boot: Boot, bound: Bound<Host>) -> Bound<Utc> {
         let Some(clock) = self.boots.get(&boot) else { return Bound::UNKNOWN };
@@ -62,12 +86,6 @@ impl Hosts {
         let lo = bound.lo().map_or(NO_LO, |lo| negated(clock.around(lo).1));
         let hi = bound.hi().map_or(NO_HI, |hi| negated(clock.around(hi).0));
         bound.moved_to(lo, hi)
-    }
-
-    /// What the host's own clocks say, without doubt: for people, and for sorting.
-    pub(crate) fn nominal_utc(&self, boot: Boot, moment: Moment<Host>) -> Moment<Utc> {
-        let offset = self.boots.get(&boot).map_or(0, |clock| clock.nominal(moment.us()));
-        Moment::from_us(moment.us().saturating_add(offset))
     }
 }
 
@@ -97,14 +115,6 @@ impl BootClock {
         readings.sort_unstable();
         readings.dedup();
         (BootClock { offset, readings }, contradictions.is_empty())
-    }
-
-    /// The middle of what is known of UTC less monotonic; else what the nearest reading says.
-    fn nominal(&self, monotonic: i64) -> i64 {
-        match self.offset.at(monotonic) {
-            (NO_LO, _) | (_, NO_HI) => self.nearest(monotonic),
-            (lo, hi) => lo.midpoint(hi),
-        }
     }
 
     /// As the reading nearest in time has it.
@@ -167,8 +177,6 @@ mod tests {
         assert_eq!(utc, Bound::from_us(4_981_000, 5_021_000));
         let (hosts, _) = Hosts::new([reading(1000, 5_001_000, None)], None);
         assert_eq!(hosts.utc(Boot(7), Bound::from_us(1000, 1000)), Bound::UNKNOWN);
-        let nominal = hosts.nominal_utc(Boot(7), Moment::from_us(2000));
-        assert_eq!(nominal, Moment::from_us(5_002_000));
     }
 
     #[test]

@@ -7,10 +7,11 @@
 //! `envelope` reckons with bounds that age; `hosts` knows the clocks of the observers; `runs` finds
 //! where clocks were set; `placing` says to which run an observation belongs; `offsets` makes bounds
 //! of them, and `links` lets recorders bound each other. `local` is for clocks that nobody observed.
-//! `model` puts all this together.
+//! `layout` finds a place in one list for everything, and `model` puts all this together.
 
 pub(crate) mod envelope;
 pub(crate) mod hosts;
+pub(crate) mod layout;
 pub(crate) mod links;
 pub(crate) mod local;
 pub(crate) mod model;

@@ -3,14 +3,16 @@
 use std::collections::BTreeMap;
 
 use super::hosts::Hosts;
+use super::layout::{Layout, RunFacts, Succession};
 use super::links::{self, Link, LinkReason, Links};
+use super::local::Nominal;
 use super::offsets::{Observed, RunClock};
-use super::placing::{self, Located};
-use super::runs::{LifeRuns, Step};
-use crate::history::{History, RecorderHistory};
-use crate::record::{Boot, ClockObservation, HostReading, Reference};
+use super::placing::{self, Located, Whereabouts};
+use super::runs::{LifeRuns, Step, When};
+use crate::history::{Held, History, RecorderHistory};
+use crate::record::{Boot, ClockObservation, HostReading, How, Reference};
 use crate::site::Site;
-use crate::time::{Moment, Shown, shown};
+use crate::time::{Bound, Moment, Shown, shown};
 
 /// A recorder receives a broadcast in this time, in microseconds: it looks once a millisecond.
 const PHASE_US: i64 = 1000;
@@ -55,7 +57,11 @@ pub(crate) struct ClockModel {
     pub(crate) recorder_of: Vec<usize>,
     links: Vec<Link>,
     pub(crate) by_pair: Links,
+    pub(crate) layout: Layout,
     untightened: Vec<RunClock>,
+    sorted: Sorted,
+    successions: Vec<Succession>,
+    nominal: Vec<Option<(i64, i64)>>,
     pub(crate) findings: Vec<Finding>,
 }
 
@@ -68,15 +74,15 @@ pub(crate) struct LifeClock {
 }
 
 impl LifeClock {
-    /// The clock of the entry of this sequence, if there is no doubt about its run.
-    pub(crate) fn sure_run(&self, sequence: u64) -> Option<usize> {
-        let possible = self.runs.of(sequence);
-        let first = self.ids.get(*possible.start())?;
-        (possible.start() == possible.end()).then_some(*first)
+    /// The clock of an entry, if there is no doubt about its run.
+    pub(crate) fn sure_run(&self, held: &Held) -> Option<usize> {
+        let run = self.runs.of(held.sequence, shown(&held.entry.time)).only()?;
+        self.ids.get(run).copied()
     }
 }
 
 /// The observations of each run.
+#[derive(Debug)]
 struct Sorted {
     by_run: Vec<Vec<Observed>>,
     first_stamps: Vec<Option<Moment<Shown>>>,
@@ -91,8 +97,11 @@ impl ClockModel {
         let (hosts, stepped) = Hosts::new(readings(history), site.utc_doubt_us);
         findings.extend(stepped.into_iter().map(Finding::HostStepped));
         let mut next_run = 0;
-        let lives: Vec<Vec<LifeClock>> =
-            history.recorders.iter().map(|recorder| life_clocks(recorder, &mut next_run)).collect();
+        let lives: Vec<Vec<LifeClock>> = history
+            .recorders
+            .iter()
+            .map(|recorder| life_clocks(recorder, &hosts, &mut next_run))
+            .collect();
         let mut sorted = Sorted {
             by_run: vec![Vec::new(); next_run],
             first_stamps: vec![None; next_run],
@@ -107,7 +116,7 @@ impl ClockModel {
                 }
             }
             sorted.first_stamps_of(recorder, lives);
-            let lost = sorted.sort(site, recorder, lives);
+            let lost = sorted.sort(site, recorder, lives, &hosts);
             findings.extend(
                 lost.into_iter().map(|shown| Finding::NotPlaced { recorder: index, shown }),
             );
@@ -115,9 +124,22 @@ impl ClockModel {
         let runs = sorted.clocks(history, &recorder_of, &hosts, &mut findings);
         let links = sorted.broadcast_links(&runs);
         let untightened = runs.clone();
-        let by_pair = Links::default();
-        let mut model =
-            ClockModel { hosts, runs, lives, recorder_of, links, by_pair, untightened, findings };
+        let successions = successions(history, &lives, &runs);
+        let nominal = sorted.nominal(site, history, &recorder_of, &runs);
+        let mut model = ClockModel {
+            hosts,
+            runs,
+            lives,
+            recorder_of,
+            links,
+            by_pair: Links::default(),
+            layout: Layout::default(),
+            untightened,
+            sorted,
+            successions,
+            nominal,
+            findings,
+        };
         model.tighten();
         model
     }
@@ -141,6 +163,18 @@ impl ClockModel {
             }
         }
         self.by_pair = Links::new(&self.links);
+        let sorted = &self.sorted;
+        let facts = self.runs.iter().zip(&sorted.by_run).zip(&sorted.first_stamps);
+        let facts: Vec<RunFacts<'_>> = facts
+            .zip(&self.nominal)
+            .map(|(((clock, observed), stamp), nominal)| RunFacts {
+                clock,
+                observed,
+                nominal: *nominal,
+                stamp: stamp.map(|stamp| clock.unwrapped(stamp)),
+            })
+            .collect();
+        self.layout = Layout::new(&self.hosts, &facts, &self.links, &self.successions);
     }
 }
 
@@ -161,25 +195,37 @@ fn readings(history: &History) -> Vec<HostReading> {
 }
 
 /// The runs of all lives of a recorder, each with the number of its clock.
-fn life_clocks(recorder: &RecorderHistory, next_run: &mut usize) -> Vec<LifeClock> {
+fn life_clocks(recorder: &RecorderHistory, hosts: &Hosts, next_run: &mut usize) -> Vec<LifeClock> {
     let mut steps: Vec<Vec<Step>> = vec![Vec::new(); recorder.lives.len()];
-    let mut add = |at: Located, step: Step| {
-        if let Some(steps) = steps.get_mut(at.life) {
-            steps.push(step);
+    let mut add = |whereabouts: Whereabouts, step: Step| {
+        let here = match whereabouts {
+            Whereabouts::Here(at) => Some(at),
+            Whereabouts::Anywhere => None,
+            Whereabouts::Elsewhere => return,
+        };
+        for (index, (life, steps)) in recorder.lives.iter().zip(&mut steps).enumerate() {
+            match here {
+                Some(Located { life, after, before }) if life == index => {
+                    steps.push(Step { after, before, is_sure: true, ..step });
+                }
+                // A life without a name may be the same one, read at another time.
+                Some(_) if life.life.is_some() => {}
+                _ => steps.push(step),
+            }
         }
     };
     for (index, set) in recorder.observations.iter().enumerate() {
-        if !set.how.is_set() {
-            continue;
-        }
-        if let Some(at) = placing::locate(recorder, &set.place, Some(set.shown)) {
-            add(at, Step::of_set(set, index, at));
+        if set.how.is_set() {
+            let (at, utc) = when(set.at, hosts);
+            let step = Step { at, utc, set: Some((index, set.shown)), ..ANYWHERE };
+            add(placing::locate(recorder, &set.place, Some(set.shown)), step);
         }
     }
     for step in &recorder.steps {
-        if let Some(at) = placing::locate(recorder, &step.place, None) {
-            add(at, Step::unconfirmed(step, at));
-        }
+        let moment = Bound::new(None, Some(step.reading.monotonic));
+        let boot = step.reading.boot;
+        let step_then = Step { at: Some((boot, moment)), utc: hosts.utc(boot, moment), ..ANYWHERE };
+        add(placing::locate(recorder, &step.place, None), step_then);
     }
     let mut lives: Vec<LifeClock> = Vec::new();
     for (life, steps) in recorder.lives.iter().zip(steps) {
@@ -192,6 +238,42 @@ fn life_clocks(recorder: &RecorderHistory, next_run: &mut usize) -> Vec<LifeCloc
     lives
 }
 
+/// Which run of a life comes right before which, by entries whose runs are sure.
+fn successions(history: &History, lives: &[Vec<LifeClock>], runs: &[RunClock]) -> Vec<Succession> {
+    let mut successions = Vec::new();
+    for (recorder, clocks) in history.recorders.iter().zip(lives) {
+        for (life, clock) in recorder.lives.iter().zip(clocks) {
+            let mut previous: Option<(usize, i64)> = None;
+            for held in &life.entries {
+                let Some(next) = clock.sure_run(held) else { continue };
+                let stamp = shown(&held.entry.time).zip(runs.get(next));
+                let Some(next_x) = stamp.map(|(stamp, run)| run.unwrapped(stamp)) else {
+                    continue;
+                };
+                if let Some((run, x)) = previous.filter(|(run, _)| *run != next) {
+                    successions.push(Succession { run, x, next, next_x });
+                }
+                previous = Some((next, next_x));
+            }
+        }
+    }
+    successions
+}
+
+/// A step that may be anywhere.
+const ANYWHERE: Step =
+    Step { after: 0, before: u64::MAX, is_sure: false, at: None, utc: Bound::UNKNOWN, set: None };
+
+/// When something was observed.
+fn when(at: Reference, hosts: &Hosts) -> When {
+    match at {
+        Reference::Host { bound, reading } => {
+            (Some((reading.boot, bound)), hosts.utc(reading.boot, bound))
+        }
+        Reference::Utc(bound) => (None, bound),
+    }
+}
+
 /// An erase by command leaves the clock alone: the first run after it is the last one before.
 fn continue_over_erases(recorder: &RecorderHistory, lives: &mut [LifeClock]) {
     // A life of one run may itself continue the one before, so once is not enough.
@@ -199,7 +281,13 @@ fn continue_over_erases(recorder: &RecorderHistory, lives: &mut [LifeClock]) {
         for (index, life) in recorder.lives.iter().enumerate() {
             let Some(erased) = life.erased else { continue };
             let before = recorder.lives.iter().position(|other| other.life == Some(erased));
-            let last = before.and_then(|before| lives.get(before)?.ids.last().copied());
+            let last = before.and_then(|before| {
+                let before = lives.get(before)?;
+                match before.runs.at_end() {
+                    [only] => before.ids.get(*only).copied(),
+                    _ => None,
+                }
+            });
             let first = lives.get_mut(index).and_then(|life| life.ids.first_mut());
             if let (Some(last), Some(first)) = (last, first)
                 && before != Some(index)
@@ -213,39 +301,47 @@ fn continue_over_erases(recorder: &RecorderHistory, lives: &mut [LifeClock]) {
 impl Sorted {
     fn first_stamps_of(&mut self, recorder: &RecorderHistory, lives: &[LifeClock]) {
         for (life, clock) in recorder.lives.iter().zip(lives) {
-            for (run, id) in clock.ids.iter().enumerate() {
-                let begins = match run.checked_sub(1).and_then(|step| clock.runs.steps.get(step)) {
-                    Some(step) => life.place_of(step.before.saturating_add(1)),
-                    None => 0,
-                };
-                let mut entries = life.entries.iter().skip(begins);
-                let stamp = entries.find_map(|held| shown(&held.entry.time));
-                if let Some(first) = self.first_stamps.get_mut(*id) {
-                    *first = first.or(stamp);
+            for held in &life.entries {
+                let stamp = shown(&held.entry.time);
+                for run in clock.runs.of(held.sequence, None).by_place() {
+                    let id = clock.ids.get(*run);
+                    if let Some(first) = id.and_then(|&id| self.first_stamps.get_mut(id)) {
+                        *first = first.or(stamp);
+                    }
                 }
             }
         }
     }
 
-    /// Gives each observation of a recorder to its run. Returns those that have none, by what the
+    /// Gives each observation of a recorder to its runs. Returns those that have none, by what the
     /// clock showed.
-    fn sort(&mut self, site: &Site, recorder: &RecorderHistory, lives: &[LifeClock]) -> Vec<i64> {
+    fn sort(
+        &mut self,
+        site: &Site,
+        recorder: &RecorderHistory,
+        lives: &[LifeClock],
+        hosts: &Hosts,
+    ) -> Vec<i64> {
         let mut lost = Vec::new();
         for (index, observation) in recorder.observations.iter().enumerate() {
-            match run_of(recorder, lives, observation, index) {
-                Some(run) => {
-                    self.add(run, observation.shown, observation.at);
-                    if let Some(broadcast) = observation.how.broadcast() {
-                        let heard = self.broadcasts.entry(broadcast).or_default();
-                        heard.push((run, observation.shown));
-                    }
-                }
-                None => lost.push(observation.shown.us()),
+            let runs = runs_of(recorder, lives, hosts, (index, observation));
+            if runs.is_empty() {
+                lost.push(observation.shown.us());
+            }
+            for &run in &runs {
+                self.add(run, observation.shown, observation.at);
+            }
+            // A set of which it is not known in which life it was links nobody.
+            let lives = if observation.how.is_set() { runs.len() / 2 } else { runs.len() };
+            if let (Some(broadcast), Some(&run), 1) =
+                (observation.how.broadcast(), runs.first(), lives)
+            {
+                self.broadcasts.entry(broadcast).or_default().push((run, observation.shown));
             }
         }
         let by_hand = site.observations.iter().filter(|seen| Some(seen.recorder) == recorder.site);
+        let runs: Vec<&LifeRuns> = lives.iter().map(|life| &life.runs).collect();
         for seen in by_hand {
-            let runs: Vec<LifeRuns> = lives.iter().map(|life| life.runs.clone()).collect();
             let found = placing::run_by_stamps(recorder, &runs, seen.unit_time);
             let run = found.and_then(|(life, run)| lives.get(life)?.ids.get(run).copied());
             match run {
@@ -296,6 +392,23 @@ impl Sorted {
         clocks
     }
 
+    /// What a stamp of each run is in UTC by what the site says about its clock.
+    fn nominal(
+        &self,
+        site: &Site,
+        history: &History,
+        recorder_of: &[usize],
+        runs: &[RunClock],
+    ) -> Vec<Option<(i64, i64)>> {
+        let each = self.first_stamps.iter().zip(recorder_of).zip(runs);
+        each.map(|((stamp, recorder), run)| {
+            let rule = history.recorders.get(*recorder)?.recorder.clock;
+            let nominal = Nominal::of((*stamp)?, rule, &site.time_zone).earliest()?;
+            Some((run.unwrapped((*stamp)?), nominal.us()))
+        })
+        .collect()
+    }
+
     /// How many runs each boot has observed.
     fn runs_of_boots(&self) -> BTreeMap<Boot, usize> {
         let mut counts = BTreeMap::new();
@@ -340,24 +453,41 @@ impl Sorted {
     }
 }
 
-/// The clock of the run to which an observation belongs.
-fn run_of(
+/// The clocks of the runs that an observation tells of: of one, or, for a set that may be in any of
+/// several lives, of the run that it begins in each. The run between two arrivals of a set is one
+/// more.
+fn runs_of(
     recorder: &RecorderHistory,
     lives: &[LifeClock],
-    observation: &ClockObservation,
-    index: usize,
-) -> Option<usize> {
-    let located = placing::locate(recorder, &observation.place, Some(observation.shown));
-    if let Some(at) = located {
-        let clock = lives.get(at.life)?;
-        let life = recorder.lives.get(at.life)?;
-        let run = placing::run_of(&clock.runs, life, observation, index, at)?;
-        return clock.ids.get(run).copied();
+    hosts: &Hosts,
+    (index, observation): (usize, &ClockObservation),
+) -> Vec<usize> {
+    let mut found = Vec::new();
+    for life in lives {
+        let is_this = |step: &Step| step.set.is_some_and(|(set, _)| set == index);
+        if let Some(step) = life.runs.steps.iter().position(is_this) {
+            let runs = [step + 1, life.runs.between_arrivals(step)];
+            found.extend(runs.iter().filter_map(|&run| life.ids.get(run).copied()));
+        }
     }
     if observation.how.is_set() {
-        return None;
+        return found;
     }
-    let runs: Vec<LifeRuns> = lives.iter().map(|life| life.runs.clone()).collect();
-    let (life, run) = placing::run_by_stamps(recorder, &runs, observation.shown)?;
-    lives.get(life)?.ids.get(run).copied()
+    let run = match placing::locate(recorder, &observation.place, Some(observation.shown)) {
+        Whereabouts::Here(at) => {
+            lives.get(at.life).zip(recorder.lives.get(at.life)).and_then(|(clock, life)| {
+                let when = when(observation.at, hosts);
+                let run = placing::run_of(&clock.runs, life, (index, observation), when, at)?;
+                clock.ids.get(run).copied()
+            })
+        }
+        Whereabouts::Anywhere if observation.how == How::Hand => {
+            let runs: Vec<&LifeRuns> = lives.iter().map(|life| &life.runs).collect();
+            placing::run_by_stamps(recorder, &runs, observation.shown)
+                .and_then(|(life, run)| lives.get(life)?.ids.get(run).copied())
+        }
+        Whereabouts::Anywhere | Whereabouts::Elsewhere => None,
+    };
+    found.extend(run);
+    found
 }

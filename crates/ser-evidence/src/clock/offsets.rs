@@ -63,7 +63,26 @@ impl RunClock {
         }
         contradictions.sort_unstable();
         contradictions.dedup();
+        clock.share_slope();
         (clock, contradictions)
+    }
+
+    /// Whatever one scale has taught about the rate holds on all.
+    fn share_slope(&mut self) {
+        let mut slopes = self.offsets.iter().map(|(_, envelope)| envelope.slope());
+        let common = slopes.try_fold(self.drift, Slope::intersection);
+        let Some(slope) = common else { return };
+        self.drift = slope;
+        for (_, envelope) in &mut self.offsets {
+            if envelope.slope() != slope {
+                *envelope = envelope.narrowed(slope);
+            }
+        }
+    }
+
+    /// How the clock's rate may change its offset.
+    pub(crate) fn slope(&self) -> Slope {
+        self.drift
     }
 
     /// What an observation says about the offset on this scale.
@@ -126,8 +145,7 @@ impl RunClock {
 
     /// The least and the most time that passes while the clock goes on by `dx`.
     pub(crate) fn elapsed(&self, dx: i64) -> (i64, i64) {
-        let slope = self.offsets.first().map_or(self.drift, |(_, envelope)| envelope.slope());
-        let (least, most) = slope.change(dx);
+        let (least, most) = self.drift.change(dx);
         (dx.saturating_add(least), dx.saturating_add(most))
     }
 }

@@ -2,9 +2,9 @@
 
 use ser_proto::Entry;
 
-use super::runs::{LifeRuns, Step};
+use super::runs::{LifeRuns, Side, Step, When, is_earlier};
 use crate::history::{LifeHistory, RecorderHistory};
-use crate::record::{ClockObservation, How, Place, Reference};
+use crate::record::{ClockObservation, How, Place};
 use crate::time::{Bound, Moment, Shown, Utc, shown};
 
 /// What a recorder counts modulo.
@@ -21,52 +21,54 @@ pub(crate) struct Located {
     pub(crate) before: u64,
 }
 
-/// Where a place is, if that can be said. `then` is what the clock showed.
+/// Where a place may be.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Whereabouts {
+    /// Here.
+    Here(Located),
+    /// In a life that no entry is known of.
+    Elsewhere,
+    /// Nobody can say in which life.
+    Anywhere,
+}
+
+/// Where a place is. `then` is what the clock showed.
 pub(crate) fn locate(
     history: &RecorderHistory,
     place: &Place,
     then: Option<Moment<Shown>>,
-) -> Option<Located> {
-    let located = |life: usize, after: u64| {
-        let span = match (place.after, place.before) {
-            (Some(after), Some(before)) => before.wrapping_sub(after) % WRAP,
-            _ => u64::MAX,
-        };
-        Located { life, after, before: after.saturating_add(span) }
-    };
+) -> Whereabouts {
     if place.life.is_known() {
         let is_it = |life: &LifeHistory| life.life == Some(place.life);
-        let life = history.lives.iter().position(is_it)?;
+        let life = history.lives.iter().position(is_it);
         let (after, before) = (place.after.unwrap_or(0), place.before.unwrap_or(u64::MAX));
-        return Some(Located { life, after, before });
+        return match life {
+            Some(life) => Whereabouts::Here(Located { life, after, before }),
+            None => Whereabouts::Elsewhere,
+        };
     }
-    let after = place.after?;
+    let Some(after) = place.after else { return Whereabouts::Anywhere };
+    let span = place.before.map_or(u64::MAX, |before| before.wrapping_sub(after) % WRAP);
+    let here = |life: usize, after: u64| {
+        Whereabouts::Here(Located { life, after, before: after.saturating_add(span) })
+    };
     if let Some(newest) = &place.newest {
         let found = history.lives.iter().enumerate().find_map(|(index, life)| {
             same_entry(life, after, newest).map(|sequence| (index, sequence))
         });
-        if let Some((life, sequence)) = found {
-            return Some(located(life, sequence));
-        }
+        return found.map_or(Whereabouts::Anywhere, |(life, sequence)| here(life, sequence));
     }
-    let may_be = |life: &LifeHistory| !life.is_by_number && !life.entries.is_empty();
-    let mut lives = history.lives.iter().enumerate().filter(|(_, life)| may_be(life));
-    if after == 0 {
-        // The log was empty then. It is the one that began soonest after that.
-        let began = |(_, life): &(usize, &LifeHistory)| {
-            let first = life.entries.first().filter(|held| held.sequence == 1)?;
-            shown(&first.entry.time)
-        };
-        let begins_later = |life: &(usize, &LifeHistory)| {
-            then.is_none_or(|then| began(life).is_some_and(|first| first >= then))
-        };
-        let (life, _) = lives.filter(begins_later).min_by_key(began)?;
-        return Some(located(life, 0));
+    // The log was empty then. A life that began later is it, if only one did.
+    let began_later = |life: &LifeHistory| {
+        let first = life.entries.first().filter(|_| !life.is_by_number);
+        let stamp = first.and_then(|held| shown(&held.entry.time));
+        stamp.is_some_and(|stamp| then.is_none_or(|then| stamp >= then))
+    };
+    let mut lives = history.lives.iter().enumerate();
+    match (after, lives.find(|(_, life)| began_later(life))) {
+        (0, Some((life, _))) if history.lives.len() == 1 => here(life, 0),
+        _ => Whereabouts::Anywhere,
     }
-    // Its newest entry then was not read since. With one life only there is no doubt.
-    let (life, only) = lives.next()?;
-    let is_exact = only.entries.last().is_some_and(|last| last.sequence < WRAP);
-    (lives.next().is_none() && is_exact && place.newest.is_none()).then(|| located(life, after))
 }
 
 /// The sequence of this entry in a life, given modulo 65536.
@@ -89,55 +91,60 @@ fn same_entry(life: &LifeHistory, sequence: u64, entry: &Entry) -> Option<u64> {
 pub(crate) fn run_of(
     runs: &LifeRuns,
     life: &LifeHistory,
-    observation: &ClockObservation,
-    index: usize,
+    (index, observation): (usize, &ClockObservation),
+    when: When,
     at: Located,
 ) -> Option<usize> {
-    if let Some(step) = runs.steps.iter().position(|step| step.set == Some(index)) {
+    let is_this = |step: &Step| step.set.is_some_and(|(set, _)| set == index);
+    if let Some(step) = runs.steps.iter().position(is_this) {
         return Some(step + 1);
     }
     if observation.how == How::Event {
-        let possible = runs.of(at.after);
-        return (possible.start() == possible.end()).then_some(*possible.start());
+        return runs.of(at.after, Some(observation.shown)).only();
     }
-    let sides: Vec<Option<bool>> =
-        runs.steps.iter().map(|step| is_after(step, life, observation, at)).collect();
-    let first = sides.iter().rposition(|side| *side == Some(true)).map_or(0, |step| step + 1);
-    let last = sides.iter().position(|side| *side == Some(false)).unwrap_or(sides.len());
-    (first == last).then_some(first)
+    let possible = runs.possible(&|_, step| side_of(step, when, at));
+    let fits = possible.iter().copied().filter(|&run| runs.may_show(run, observation.shown));
+    match fits.collect::<Vec<_>>().as_slice() {
+        [only] => Some(*only),
+        _ => by_neighbours(runs, life, observation, at),
+    }
 }
 
-/// Whether an observation was made after a step, if that can be said.
-fn is_after(
-    step: &Step,
+/// On which side of an observation a step was, if that is known.
+fn side_of(step: &Step, when: When, at: Located) -> Option<Side> {
+    match () {
+        () if step.before < at.after || is_earlier(step.when(), when) => Some(Side::Before),
+        () if step.after > at.before || is_earlier(when, step.when()) => Some(Side::After),
+        () => None,
+    }
+}
+
+/// Between two entries there is one step, and nothing says on which side of it the observation
+/// was. A clock never shows less than at the entry before, nor more than at the next.
+fn by_neighbours(
+    runs: &LifeRuns,
     life: &LifeHistory,
     observation: &ClockObservation,
     at: Located,
-) -> Option<bool> {
-    if let (Some((boot, step)), Reference::Host { bound, reading }) = (step.at, observation.at)
-        && boot == reading.boot
-    {
-        if step.is_before(bound) {
-            return Some(true);
-        }
-        if bound.is_before(step) {
-            return Some(false);
-        }
+) -> Option<usize> {
+    let mut meeting = runs
+        .steps
+        .iter()
+        .enumerate()
+        .filter(|(_, step)| step.after <= at.before && step.before >= at.after);
+    let (place, step) = meeting.next()?;
+    let is_alone = meeting.next().is_none() && step.is_sure;
+    let is_here = step.after == step.before && at.after == at.before && step.after == at.after;
+    if !is_alone || !is_here {
+        return None;
     }
-    if step.before < at.after {
-        return Some(true);
-    }
-    if step.after > at.before {
-        return Some(false);
-    }
-    // In the same place. A clock never shows less than the entry before, nor more than the next.
     let stamp = |sequence| life.entry(sequence).and_then(|held| shown(&held.entry.time));
-    let fits_before = stamp(step.after).is_none_or(|before| observation.shown >= before);
-    let next = step.before.saturating_add(1);
-    let fits_after = stamp(next).is_none_or(|after| observation.shown <= after);
+    let fits_before = stamp(at.after).is_none_or(|before| observation.shown >= before);
+    let fits_after = stamp(at.after + 1).is_none_or(|after| observation.shown <= after);
+    let run_before = || runs.of(at.after, None).only();
     match (fits_before, fits_after) {
-        (true, false) => Some(false),
-        (false, true) => Some(true),
+        (true, false) => run_before(),
+        (false, true) => Some(place + 1),
         _ => None,
     }
 }
@@ -145,37 +152,31 @@ fn is_after(
 /// The life and run of an observation by hand, which has no place: the one whose stamps it fits.
 pub(crate) fn run_by_stamps(
     history: &RecorderHistory,
-    runs: &[LifeRuns],
+    runs: &[&LifeRuns],
     seen: Moment<Shown>,
 ) -> Option<(usize, usize)> {
-    let mut found = Vec::new();
-    let mut nearest = Vec::new();
+    let mut all = Vec::new();
     for (index, (life, runs)) in history.lives.iter().zip(runs).enumerate() {
         let mut ends: Vec<Option<(Moment<Shown>, Moment<Shown>)>> = vec![None; runs.count()];
         for held in &life.entries {
-            let possible = runs.of(held.sequence);
-            let (Some(now), true) = (shown(&held.entry.time), possible.start() == possible.end())
-            else {
+            let stamp = shown(&held.entry.time);
+            let (Some(now), Some(run)) = (stamp, runs.of(held.sequence, stamp).only()) else {
                 continue;
             };
-            if let Some(ends) = ends.get_mut(*possible.start()) {
-                *ends =
-                    Some(ends.map_or((now, now), |(first, last)| (first.min(now), last.max(now))));
+            if let Some(ends) = ends.get_mut(run) {
+                let (first, last) = ends.unwrap_or((now, now));
+                *ends = Some((first.min(now), last.max(now)));
             }
         }
-        for (run, ends) in ends.iter().enumerate() {
-            let Some((first, last)) = ends else { continue };
-            if (*first..=*last).contains(&seen) {
-                found.push((index, run));
-            }
-            let distance = first.since(seen).max(seen.since(*last));
-            nearest.push((distance, index, run));
-        }
+        let known = ends.into_iter().enumerate();
+        all.extend(known.filter_map(|(run, ends)| Some((index, run, ends?))));
     }
-    match found.as_slice() {
-        [only] => Some(*only),
-        // Between two runs it may be of either, unless there is only one.
-        [] if nearest.len() == 1 => nearest.first().map(|&(_, life, run)| (life, run)),
+    let fits = |(_, _, (first, last)): &&(usize, usize, (Moment<Shown>, Moment<Shown>))| {
+        (*first..=*last).contains(&seen)
+    };
+    let found: Vec<_> = all.iter().filter(fits).collect();
+    match (found.as_slice(), all.as_slice()) {
+        ([(life, run, _)], _) | ([], [(life, run, _)]) => Some((*life, *run)),
         _ => None,
     }
 }

@@ -1,49 +1,46 @@
 //! Where a recorder's clock was set, and the runs between.
+//!
+//! A run is what the clock shows from one step on. Where exactly a step was among the entries, and
+//! in which order two steps were, is not always known. So an entry has a set of runs in which it
+//! may be, usually of one.
 
-use std::ops::RangeInclusive;
-
-use super::placing::Located;
 use crate::history::{Held, LifeHistory};
-use crate::record::{Boot, ClockObservation, ClockStep, Reference};
-use crate::time::{Bound, CENTURY_US, Host, Moment, Shown, shown};
+use crate::record::Boot;
+use crate::time::{Bound, CENTURY_US, Host, Moment, Shown, Utc, shown};
 
 /// The most that two stamps differ on either side of the end of 2069, where the two digits of the
 /// year begin again: ten years. With a larger difference, a clock was set.
 const AROUND_2069_US: i64 = 10 * 366 * 86_400_000_000;
 
-/// A place in a life where its clock was set.
+/// A place in a life where its clock was set, or may have been.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Step {
     /// Entries up to this sequence came before it.
     pub(crate) after: u64,
     /// Entries above this sequence came after it.
     pub(crate) before: u64,
-    /// When, if a host knows.
+    /// Whether it was in this life at all.
+    pub(crate) is_sure: bool,
+    /// When, on the clock of the host that knows.
     pub(crate) at: Option<(Boot, Bound<Host>)>,
-    /// In UTC by the host's own clock, for the order of steps in one place.
-    nominal_utc: i64,
-    /// The observation that tells what it was set to.
-    pub(crate) set: Option<usize>,
+    /// When, in UTC.
+    pub(crate) utc: Bound<Utc>,
+    /// What it was set to, and the index of the observation that says so.
+    pub(crate) set: Option<(usize, Moment<Shown>)>,
 }
 
-/// The runs of one life.
+/// The runs of one life: run 0 is from its beginning to the first step, run *n* + 1 from step *n*
+/// to the next. A command that sets the clock may arrive twice, so each step has one more run,
+/// between its arrivals.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LifeRuns {
-    /// By place.
+    /// In an order that depends on nothing but their content.
     pub(crate) steps: Vec<Step>,
-    /// By place: from here on, these runs are possible.
-    spans: Vec<Span>,
+    /// By place: from this sequence on, these runs are possible.
+    spans: Vec<(u64, Vec<usize>)>,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Span {
-    /// The first sequence.
-    first: u64,
-    /// Index of the first possible run in this life, and of the last.
-    runs: (usize, usize),
-}
-
-/// How a clock went from one stamp to the next.
+/// Whether a clock was set back between two stamps.
 pub(crate) fn went_back(earlier: Moment<Shown>, later: Moment<Shown>) -> bool {
     let straight = later.since(earlier);
     let around = straight - straight.signum() * CENTURY_US;
@@ -52,21 +49,26 @@ pub(crate) fn went_back(earlier: Moment<Shown>, later: Moment<Shown>) -> bool {
 }
 
 impl Step {
-    pub(crate) fn of_set(observation: &ClockObservation, index: usize, at: Located) -> Step {
-        let (host, nominal_utc) = match observation.at {
-            Reference::Host { bound, reading } => (Some((reading.boot, bound)), reading.utc.us()),
-            Reference::Utc(bound) => (None, bound.middle().map_or(0, Moment::us)),
-        };
-        let Located { after, before, .. } = at;
-        Step { after, before, at: host, nominal_utc, set: Some(index) }
+    /// Whether this step is known to have been before another one.
+    pub(crate) fn precedes(&self, other: &Step) -> bool {
+        self.before < other.after || is_earlier(self.when(), other.when())
     }
 
-    pub(crate) fn unconfirmed(step: &ClockStep, at: Located) -> Step {
-        let Located { after, before, .. } = at;
-        let moment = step.reading.monotonic;
-        let host = Some((step.reading.boot, Bound::new(None, Some(moment))));
-        Step { after, before, at: host, nominal_utc: step.reading.utc.us(), set: None }
+    /// When it was, on all scales.
+    pub(crate) fn when(&self) -> When {
+        (self.at, self.utc)
     }
+}
+
+/// When something was: on the clock of a host, and in UTC.
+pub(crate) type When = (Option<(Boot, Bound<Host>)>, Bound<Utc>);
+
+/// Whether one thing is known to have been earlier than another.
+pub(crate) fn is_earlier(one: When, other: When) -> bool {
+    let on_one_host = one.0.zip(other.0).is_some_and(|((boot, one), (other_boot, other))| {
+        boot == other_boot && one.is_before(other)
+    });
+    on_one_host || one.1.is_before(other.1)
 }
 
 impl LifeRuns {
@@ -74,21 +76,16 @@ impl LifeRuns {
     pub(crate) fn new(life: &LifeHistory, mut steps: Vec<Step>) -> LifeRuns {
         for back in backward_steps(&life.entries) {
             let meets = |step: &Step| step.after <= back.before && step.before >= back.after;
-            let told = steps.iter().filter(|step| meets(step)).count();
-            match told {
-                0 => steps.push(back),
-                // It is this one, so its place is known better now.
-                1 => {
-                    for step in steps.iter_mut().filter(|step| meets(step)) {
-                        step.after = step.after.max(back.after);
-                        step.before = step.before.min(back.before);
-                    }
-                }
-                // It is one of these. They are possible everywhere there anyway.
-                _ => {}
+            // It is one of those that were told, or one of the arrivals of one.
+            if !steps.iter().any(|step| step.is_sure && meets(step)) {
+                steps.push(back);
             }
         }
-        steps.sort_by_key(|step| (step.after, step.before, step.nominal_utc, step.set));
+        let key = |step: &Step| {
+            let ends = |bound: Bound<Utc>| (bound.lo().map(Moment::us), bound.hi().map(Moment::us));
+            (step.after, step.before, ends(step.utc), step.set.map(|(index, _)| index))
+        };
+        steps.sort_by_key(key);
         let mut cuts: Vec<u64> = vec![0];
         cuts.extend(
             steps
@@ -97,28 +94,145 @@ impl LifeRuns {
         );
         cuts.sort_unstable();
         cuts.dedup();
-        let span = |first: u64| Span { first, runs: possible_runs(&steps, first) };
-        LifeRuns { spans: cuts.into_iter().map(span).collect(), steps }
+        let mut runs = LifeRuns { steps, spans: Vec::new() };
+        runs.spans = cuts.into_iter().map(|first| (first, runs.possible_at(first))).collect();
+        runs
     }
 
-    /// How many runs there are.
+    /// How many runs there are, those between two arrivals included.
     pub(crate) fn count(&self) -> usize {
-        self.steps.len() + 1
+        2 * self.steps.len() + 1
     }
 
-    /// In which runs the entry of this sequence may be: usually one.
-    pub(crate) fn of(&self, sequence: u64) -> RangeInclusive<usize> {
-        let next = self.spans.partition_point(|span| span.first <= sequence);
+    /// The run between two arrivals of the command of this step.
+    pub(crate) fn between_arrivals(&self, step: usize) -> usize {
+        self.steps.len() + 1 + step
+    }
+
+    /// In which runs the entry with this sequence and stamp may be.
+    pub(crate) fn of(&self, sequence: u64, stamp: Option<Moment<Shown>>) -> Possible<'_> {
+        let next = self.spans.partition_point(|(first, _)| *first <= sequence);
         let span = next.checked_sub(1).and_then(|place| self.spans.get(place));
-        span.map_or(0..=0, |span| span.runs.0..=span.runs.1)
+        let runs = span.map_or(&[][..], |(_, runs)| runs.as_slice());
+        Possible { runs, stamp, steps: &self.steps }
+    }
+
+    /// In which runs something may be that came after some steps and before others: each step is on
+    /// one side of it for sure, or on neither.
+    pub(crate) fn possible(&self, side: &dyn Fn(usize, &Step) -> Option<Side>) -> Vec<usize> {
+        let sides: Vec<Option<Side>> =
+            self.steps.iter().enumerate().map(|(index, step)| side(index, step)).collect();
+        let passed = |place: usize| sides.get(place) == Some(&Some(Side::Before));
+        let sure_and_passed: Vec<&Step> = self
+            .steps
+            .iter()
+            .enumerate()
+            .filter(|(place, step)| step.is_sure && passed(*place))
+            .map(|(_, step)| step)
+            .collect();
+        // Most steps are long before this one, so it is asked first.
+        let latest = sure_and_passed.iter().max_by_key(|step| step.after).copied();
+        let is_over = |step: &Step| {
+            latest.is_some_and(|latest| step.precedes(latest))
+                || sure_and_passed.iter().any(|later| step.precedes(later))
+        };
+        let mut runs = Vec::new();
+        if sure_and_passed.is_empty() {
+            runs.push(0);
+        }
+        for (place, step) in self.steps.iter().enumerate() {
+            let side = sides.get(place).copied().flatten();
+            if side == Some(Side::After) || is_over(step) {
+                continue;
+            }
+            runs.push(place + 1);
+            if side.is_none() {
+                runs.push(self.between_arrivals(place));
+            }
+        }
+        runs
+    }
+
+    fn possible_at(&self, sequence: u64) -> Vec<usize> {
+        self.possible(&|_, step| match () {
+            () if step.after >= sequence => Some(Side::After),
+            () if step.before < sequence => Some(Side::Before),
+            () => None,
+        })
+    }
+
+    /// The runs in which the clock may be at the end of the life.
+    pub(crate) fn at_end(&self) -> &[usize] {
+        self.spans.last().map_or(&[], |(_, runs)| runs.as_slice())
+    }
+
+    /// The step that begins a run.
+    fn step_of(&self, run: usize) -> Option<&Step> {
+        step_of(&self.steps, run)
+    }
+
+    /// Whether a clock in this run may show this.
+    pub(crate) fn may_show(&self, run: usize, stamp: Moment<Shown>) -> bool {
+        may_show(self.step_of(run), stamp)
     }
 }
 
-/// Of a life with these steps, the runs in which an entry of this sequence may be.
-fn possible_runs(steps: &[Step], sequence: u64) -> (usize, usize) {
-    let first = steps.iter().rposition(|step| step.before < sequence).map_or(0, |step| step + 1);
-    let last = steps.iter().position(|step| step.after >= sequence).unwrap_or(steps.len());
-    (first.min(last), last.max(first))
+/// On which side of something a step was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    /// The step came first.
+    Before,
+    /// The step came later.
+    After,
+}
+
+/// The runs in which an entry may be.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Possible<'r> {
+    runs: &'r [usize],
+    stamp: Option<Moment<Shown>>,
+    steps: &'r [Step],
+}
+
+impl<'r> Possible<'r> {
+    /// Whether it depends on the place alone which runs these are.
+    pub(crate) fn is_one_by_place(&self) -> bool {
+        self.runs.len() <= 1
+    }
+
+    /// The runs by place alone.
+    pub(crate) fn by_place(&self) -> &'r [usize] {
+        self.runs
+    }
+
+    /// All of them. A clock never shows less than what it was set to, so the stamp excludes some.
+    pub(crate) fn runs(self) -> impl Iterator<Item = usize> {
+        let fits = move |run: &usize| {
+            let step = step_of(self.steps, *run);
+            self.stamp.is_none_or(|stamp| may_show(step, stamp))
+        };
+        let any = self.runs.iter().any(fits);
+        // If none fits, something is wrong, and nothing is excluded.
+        self.runs.iter().copied().filter(move |run| !any || fits(run))
+    }
+
+    /// The only one, if it is only one.
+    pub(crate) fn only(self) -> Option<usize> {
+        let mut runs = self.runs();
+        let first = runs.next()?;
+        runs.next().is_none().then_some(first)
+    }
+}
+
+/// The step that begins a run, or between whose arrivals it is.
+fn step_of(steps: &[Step], run: usize) -> Option<&Step> {
+    let place = run.checked_sub(1)?;
+    steps.get(if place < steps.len() { place } else { place - steps.len() })
+}
+
+fn may_show(step: Option<&Step>, stamp: Moment<Shown>) -> bool {
+    let set_to = step.and_then(|step| step.set).map(|(_, set_to)| set_to);
+    set_to.is_none_or(|set_to| !went_back(set_to, stamp))
 }
 
 /// Where the stamps go back, the clock was set.
@@ -128,8 +242,14 @@ fn backward_steps(entries: &[Held]) -> Vec<Step> {
     for held in entries {
         let Some(now) = shown(&held.entry.time) else { continue };
         if let Some((after, _)) = previous.filter(|&(_, earlier)| went_back(earlier, now)) {
-            let before = held.sequence - 1;
-            steps.push(Step { after, before, at: None, nominal_utc: i64::MIN, set: None });
+            steps.push(Step {
+                after,
+                before: held.sequence - 1,
+                is_sure: true,
+                at: None,
+                utc: Bound::UNKNOWN,
+                set: None,
+            });
         }
         previous = Some((held.sequence, now));
     }

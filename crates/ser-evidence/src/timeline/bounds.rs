@@ -1,12 +1,11 @@
 //! Bounds of the samples of one life.
 
-use super::sort_key;
 use super::{EventId, Timeline};
 use crate::clock::envelope::{NO_HI, NO_LO};
 use crate::clock::model::{ClockModel, LifeClock};
 use crate::clock::offsets::{RunClock, ends};
 use crate::clock::{Home, Nominal};
-use crate::history::{LifeHistory, RecorderHistory};
+use crate::history::{Held, LifeHistory, RecorderHistory};
 use crate::site::Site;
 use crate::time::{Bound, Moment, Shown, Utc, shown};
 
@@ -15,16 +14,28 @@ use crate::time::{Bound, Moment, Shown, Utc, shown};
 pub(super) struct LifeBounds {
     /// By place, each on the scale of its stretch.
     samples: Vec<(i64, i64)>,
-    /// By place: from here on, the samples are on this scale, and a clock shows UTC by rule.
+    /// By place: from here on, the samples are on this scale.
     stretches: Vec<Stretch>,
-    /// By place: where the entry is in the list. `NO_LO`: nowhere.
-    keys: Vec<i64>,
+    /// By place: where the entry is in the list.
+    keys: Vec<Key>,
 }
 
+/// Entries that follow each other and are known on the same scale.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stretch {
-    pub(super) first: usize,
-    pub(super) home: Option<Home>,
+struct Stretch {
+    first: usize,
+    home: Option<Home>,
+    /// Whether their run is sure.
+    is_sure: bool,
+}
+
+/// A place in the list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Key {
+    /// Whether nothing is known of the time.
+    pub(super) is_timeless: bool,
+    /// In UTC as well as that is known; else what the clock showed.
+    pub(super) at: i64,
 }
 
 impl LifeBounds {
@@ -32,20 +43,19 @@ impl LifeBounds {
     pub(super) fn new(life: &LifeHistory, clock: &LifeClock, model: &ClockModel) -> LifeBounds {
         let mut bounds = LifeBounds::default();
         bounds.samples.reserve_exact(life.entries.len());
-        let mut possible: Vec<&RunClock> = Vec::new();
-        let mut of = None;
+        let mut possible = PossibleRuns::new(clock, model);
         for (place, held) in life.entries.iter().enumerate() {
-            let range = clock.runs.of(held.sequence);
-            if of.as_ref() != Some(&range) {
-                let ids = clock.ids.get(range.clone()).unwrap_or_default();
-                possible = ids.iter().filter_map(|&id| model.runs.get(id)).collect();
-                bounds.stretches.push(Stretch { first: place, home: common_home(&possible) });
-                of = Some(range);
+            possible.turn_to(held);
+            let runs = &possible.clocks;
+            let home = common_home(runs);
+            let is_sure = runs.len() == 1;
+            let is_same = |last: &&Stretch| last.home == home && last.is_sure == is_sure;
+            if bounds.stretches.last().filter(is_same).is_none() {
+                bounds.stretches.push(Stretch { first: place, home, is_sure });
             }
-            let home = bounds.stretches.last().and_then(|stretch| stretch.home);
             let sample = shown(&held.entry.time)
                 .zip(home)
-                .map_or((NO_LO, NO_HI), |(shown, home)| hull(&possible, home, shown, model));
+                .map_or((NO_LO, NO_HI), |(shown, home)| hull(runs, home, shown, model));
             bounds.samples.push(sample);
         }
         bounds
@@ -58,81 +68,78 @@ impl LifeBounds {
             self.stretches.iter().filter_map(|stretch| stretch.home).collect();
         homes.sort_unstable();
         homes.dedup();
-        let mut wrong = Vec::new();
-        for home in homes {
-            wrong.extend(self.tighten_on(home));
-        }
-        wrong
+        homes.into_iter().filter_map(|home| self.tighten_on(home)).collect()
     }
 
     fn tighten_on(&mut self, home: Home) -> Option<(usize, usize)> {
         let places = self.places_on(home);
-        let mut after = vec![(NO_HI, 0); self.samples.len()];
+        let mut after = Vec::with_capacity(places.len());
         let mut to_come = (NO_HI, 0);
-        for &place in places.iter().rev() {
-            let (_, hi) = self.samples.get(place).copied().unwrap_or((NO_LO, NO_HI));
-            to_come = to_come.min((hi, place));
-            if let Some(after) = after.get_mut(place) {
-                *after = to_come;
-            }
+        for &(place, is_sure) in places.iter().rev() {
+            let hi = self.samples.get(place).map_or(NO_HI, |sample| sample.1);
+            // An entry of doubtful run is bounded by others, and bounds none.
+            let own = (hi, place).min(to_come);
+            after.push(own);
+            to_come = if is_sure { own } else { to_come };
         }
         let mut so_far = (NO_LO, 0);
         let mut wrong = None;
-        for &place in &places {
-            let (Some(sample), Some(&(hi, limits))) =
-                (self.samples.get_mut(place), after.get(place))
-            else {
-                continue;
-            };
-            if sample.0 > so_far.0 {
-                so_far = (sample.0, place);
-            }
-            if so_far.0 <= hi {
-                *sample = (so_far.0, hi);
+        for (&(place, is_sure), &(hi, limits)) in places.iter().zip(after.iter().rev()) {
+            let Some(sample) = self.samples.get_mut(place) else { continue };
+            let own = if sample.0 > so_far.0 { (sample.0, place) } else { so_far };
+            so_far = if is_sure { own } else { so_far };
+            if own.0 <= hi {
+                *sample = (own.0, hi);
             } else {
                 // One of the two is wrong. Either may be right.
-                wrong = wrong.or(Some((so_far.1, limits)));
-                *sample = (sample.0.min(hi), sample.1.max(so_far.0));
+                wrong = wrong.or(Some((own.1, limits)));
+                *sample = (sample.0.min(hi), sample.1.max(own.0));
             }
         }
         wrong
     }
 
-    fn places_on(&self, home: Home) -> Vec<usize> {
+    /// All places on this scale, and whether the run of each is sure.
+    fn places_on(&self, home: Home) -> Vec<(usize, bool)> {
         let mut places = Vec::new();
         for (index, stretch) in self.stretches.iter().enumerate() {
             let end = self.stretches.get(index + 1).map_or(self.samples.len(), |next| next.first);
             if stretch.home == Some(home) {
-                places.extend(stretch.first..end);
+                places.extend((stretch.first..end).map(|place| (place, stretch.is_sure)));
             }
         }
         places
     }
 
     /// Finds where each entry goes in the list.
-    pub(super) fn sort_keys(
-        &mut self,
-        life: &LifeHistory,
-        recorder: &RecorderHistory,
-        clock: &LifeClock,
-        model: &ClockModel,
-        site: &Site,
-    ) {
-        let _ = clock;
-        let known = |place: usize| {
-            let (lo, hi) = self.samples.get(place).copied()?;
-            let home = self.home(place)?;
-            let middle = (lo != NO_LO && hi != NO_HI).then(|| lo.midpoint(hi))?;
-            Some(match home {
-                Home::Utc => middle,
-                Home::Boot(boot) => model.hosts.nominal_utc(boot, Moment::from_us(middle)).us(),
-            })
+    pub(super) fn sort_keys(&mut self, life: &LifeHistory, clock: &LifeClock, model: &ClockModel) {
+        let mut possible = PossibleRuns::new(clock, model);
+        let mut places: Vec<(i64, i64)> = Vec::with_capacity(life.entries.len());
+        let mut timeless: Vec<bool> = Vec::with_capacity(life.entries.len());
+        for held in &life.entries {
+            possible.turn_to(held);
+            let instant = shown(&held.entry.time).and_then(|shown| possible.on_list(shown));
+            let (lo, hi, is_timeless) = instant.unwrap_or((NO_LO, NO_HI, false));
+            places.push((lo, hi));
+            timeless.push(is_timeless);
+        }
+        // What has no time of its own is between its neighbours.
+        let mut latest = NO_LO;
+        for (lo, _) in &mut places {
+            latest = latest.max(*lo);
+            *lo = latest;
+        }
+        let mut earliest = NO_HI;
+        for (_, hi) in places.iter_mut().rev() {
+            earliest = earliest.min(*hi);
+            *hi = earliest;
+        }
+        let key = |((lo, hi), is_timeless): ((i64, i64), bool)| match (lo, hi) {
+            (NO_LO, NO_HI) => Key { is_timeless: true, at: NO_LO },
+            (NO_LO, at) | (at, NO_HI) => Key { is_timeless, at },
+            (lo, hi) => Key { is_timeless, at: lo.midpoint(hi) },
         };
-        let nominal = |place: usize| {
-            let nominal = self.nominal(place, life, Some(recorder), site);
-            nominal.earliest().map(Moment::us)
-        };
-        self.keys = sort_key::keys(life.entries.len(), &known, &nominal);
+        self.keys = places.into_iter().zip(timeless).map(key).collect();
     }
 
     /// What a stamp is in UTC by what the site says about the clock.
@@ -161,12 +168,13 @@ impl LifeBounds {
         this.between(previous, next)
     }
 
-    pub(super) fn key(&self, place: usize) -> Option<i64> {
-        self.keys.get(place).copied().filter(|&key| key != NO_LO)
+    pub(super) fn key(&self, place: usize) -> Option<Key> {
+        self.keys.get(place).copied()
     }
 
-    /// The last place with a key below this one.
-    pub(super) fn place_before(&self, key: i64) -> Option<usize> {
+    /// The last place whose time is known to be below this key.
+    pub(super) fn place_before(&self, at: i64) -> Option<usize> {
+        let key = Key { is_timeless: false, at };
         self.keys.partition_point(|&known| known < key).checked_sub(1)
     }
 
@@ -177,6 +185,43 @@ impl LifeBounds {
     fn home(&self, place: usize) -> Option<Home> {
         let next = self.stretches.partition_point(|stretch| stretch.first <= place);
         self.stretches.get(next.checked_sub(1)?)?.home
+    }
+}
+
+/// The clocks of the runs in which an entry may be, one entry after the other.
+struct PossibleRuns<'m> {
+    clock: &'m LifeClock,
+    model: &'m ClockModel,
+    by_place: &'m [usize],
+    ids: Vec<usize>,
+    clocks: Vec<&'m RunClock>,
+}
+
+impl<'m> PossibleRuns<'m> {
+    fn new(clock: &'m LifeClock, model: &'m ClockModel) -> PossibleRuns<'m> {
+        PossibleRuns { clock, model, by_place: &[], ids: Vec::new(), clocks: Vec::new() }
+    }
+
+    /// Finds those of an entry. Most entries have the same as the one before.
+    fn turn_to(&mut self, held: &Held) {
+        let possible = self.clock.runs.of(held.sequence, shown(&held.entry.time));
+        if std::ptr::eq(possible.by_place(), self.by_place) && possible.is_one_by_place() {
+            return;
+        }
+        self.by_place = possible.by_place();
+        self.ids.clear();
+        let ids = possible.runs().filter_map(|run| self.clock.ids.get(run).copied());
+        self.ids.extend(ids);
+        self.clocks.clear();
+        self.clocks.extend(self.ids.iter().filter_map(|&id| self.model.runs.get(id)));
+    }
+
+    /// Between which instants of the list any of these clocks showed this.
+    fn on_list(&self, shown: Moment<Shown>) -> Option<(i64, i64, bool)> {
+        let each = self.ids.iter().zip(&self.clocks);
+        let instants =
+            each.filter_map(|(&id, run)| self.model.layout.instant(id, run.unwrapped(shown)));
+        instants.reduce(|one, other| (one.0.min(other.0), one.1.max(other.1), one.2 && other.2))
     }
 }
 
@@ -222,7 +267,7 @@ impl Timeline<'_> {
         samples.extend(self.bounds(event).and_then(|bounds| bounds.sample(place)));
         let others = || {
             let held = self.held(event)?;
-            let run = self.model.runs.get(self.clock(event)?.sure_run(held.sequence)?)?;
+            let run = self.model.runs.get(self.clock(event)?.sure_run(held)?)?;
             let x = run.unwrapped(shown(&held.entry.time)?);
             Some(run.homes().skip(1).map(move |home| (home, run.instant(home, x))))
         };

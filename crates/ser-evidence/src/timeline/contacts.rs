@@ -200,7 +200,7 @@ fn is_near(timeline: &Timeline<'_>, event: EventId, place: usize, change: &Seen)
 fn link(timeline: &Timeline<'_>, one: ChangeId, other: ChangeId, why: LinkReason) -> Option<Link> {
     let side = |change: ChangeId| {
         let held = timeline.held(change.event)?;
-        let run = timeline.clock(change.event)?.sure_run(held.sequence)?;
+        let run = timeline.clock(change.event)?.sure_run(held)?;
         let x = timeline.model.runs.get(run)?.unwrapped(shown(&held.entry.time)?);
         Some((run, x, timeline.delay_ends(change.event, Some(change.input))))
     };

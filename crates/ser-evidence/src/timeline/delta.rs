@@ -9,6 +9,10 @@ use crate::time::shown;
 /// How often a recorder looks at its inputs, in microseconds.
 const PERIOD_US: i64 = 1000;
 
+/// Bounds are rounded outwards here and there. So much is added at either end, in microseconds, that
+/// what is said of the order of two entries does not depend on it.
+const SLACK_US: i64 = 5;
+
 /// The time from one change to another, in microseconds; negative if the other came first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Delta {
@@ -103,7 +107,7 @@ impl Timeline<'_> {
         };
         // Where in its millisecond an original recorder looks is not known.
         let late = if recorder.recorder.is_original { PERIOD_US } else { 0 };
-        (-PERIOD_US - i64::from(longest), late - i64::from(shortest))
+        (-PERIOD_US - i64::from(longest) - SLACK_US, late - i64::from(shortest) + SLACK_US)
     }
 
     /// From one sample to another, by everything that is known about both.
@@ -125,7 +129,7 @@ impl Timeline<'_> {
 
     /// From one sample to another, by the clocks alone: in the same run, or in two that are linked.
     fn elapsed_between(&self, one: EventId, other: EventId) -> Option<(i64, i64)> {
-        let run = |event: EventId| self.clock(event)?.sure_run(self.held(event)?.sequence);
+        let run = |event: EventId| self.clock(event)?.sure_run(self.held(event)?);
         let x = |event: EventId, run: usize| {
             let stamp = shown(&self.held(event)?.entry.time)?;
             Some(self.model.runs.get(run)?.unwrapped(stamp))

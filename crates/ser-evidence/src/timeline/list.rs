@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use super::bounds::Key;
 use super::{EventId, Timeline, event_id};
 
 /// Something in the list.
@@ -28,9 +29,7 @@ pub struct Items<'t> {
 /// The next entry of a life. Ordered as the list is.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Head {
-    /// Whether nothing is known of its time.
-    is_timeless: bool,
-    key: i64,
+    key: Key,
     recorder: u32,
     life: u32,
     place: u32,
@@ -59,10 +58,9 @@ impl<'t> Timeline<'t> {
 
     fn head(&self, event: EventId) -> Option<Head> {
         self.held(event)?;
-        let key = self.sort_key(event);
+        let key = self.key(event)?;
         let EventId { recorder, life, place } = event;
-        let key_or_last = key.unwrap_or(i64::MAX);
-        Some(Head { is_timeless: key.is_none(), key: key_or_last, recorder, life, place })
+        Some(Head { key, recorder, life, place })
     }
 
     /// Gaps and clock sets that are shown ahead of an entry, the last one first.

@@ -10,7 +10,6 @@ mod bounds;
 mod contacts;
 mod delta;
 mod list;
-mod sort_key;
 
 pub use contacts::{ContactFinding, ContactTrouble};
 pub use delta::{Delta, Order};
@@ -23,7 +22,7 @@ use crate::clock::{Finding, Nominal};
 use crate::history::{Held, History, LifeHistory, RecorderHistory};
 use crate::site::Site;
 use crate::time::{Bound, Moment, Utc};
-use bounds::LifeBounds;
+use bounds::{Key, LifeBounds};
 
 /// One entry of one life of one recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -96,7 +95,7 @@ impl<'a> Timeline<'a> {
                 let id = |place: usize| event_id(recorder, life, place);
                 let pairs = bounds.tighten();
                 out_of_order.extend(pairs.into_iter().map(|(one, other)| (id(one), id(other))));
-                bounds.sort_keys(entries, history, clock, &self.model, self.site);
+                bounds.sort_keys(entries, clock, &self.model);
                 of_recorder.push(bounds);
             }
             lives.push(of_recorder);
@@ -190,6 +189,11 @@ impl<'a> Timeline<'a> {
     /// about its time.
     #[must_use]
     pub fn sort_key(&self, event: EventId) -> Option<i64> {
+        let key = self.key(event)?;
+        (!key.is_timeless).then_some(key.at)
+    }
+
+    fn key(&self, event: EventId) -> Option<Key> {
         self.bounds(event)?.key(event.place as usize)
     }
 

@@ -1,0 +1,217 @@
+//! Where everything goes in one list.
+//!
+//! What is proven about two entries may be proven on the clock of one host, in UTC, by a broadcast,
+//! or by the sequence. A list that respects all of it needs one scale on which all of that holds at
+//! once, even where nothing is known: there, clocks are taken to be right to a hundred years. On
+//! this scale each clock gets the latest and the earliest it may be. Either respects everything
+//! that is proven, and so does the middle.
+
+use super::envelope::{Envelope, Known, NO_HI, NO_LO};
+use super::hosts::Hosts;
+use super::links::Link;
+use super::offsets::{Observed, RunClock};
+use crate::record::{Boot, Reference};
+use crate::time::Moment;
+
+/// How wrong a clock may be of which nothing is known: a hundred years, in microseconds.
+const ANYTHING_US: i64 = 100 * 366 * 86_400_000_000;
+
+/// How often bounds are passed on. Each round passes them over one more link.
+const MOST_ROUNDS: usize = 200;
+
+/// All clocks on one scale: first those of the boots, then those of the runs.
+#[derive(Debug, Default)]
+pub(crate) struct Layout {
+    boots: Vec<Boot>,
+    clocks: Vec<Placed>,
+}
+
+/// A clock on the scale of the list.
+#[derive(Clone, Debug)]
+struct Placed {
+    /// The instant on the scale, less what the clock showed.
+    offset: Envelope,
+    /// Whether anything at all is known about it.
+    is_timeless: bool,
+}
+
+/// The clock `one` showed `x` between `lo` and `hi` after the clock `other` showed `other_x`.
+#[derive(Clone, Copy, Debug)]
+struct Tie {
+    one: usize,
+    x: i64,
+    other: usize,
+    other_x: i64,
+    lo: i64,
+    hi: i64,
+}
+
+/// A run, and what its entries say about where it may be.
+pub(crate) struct RunFacts<'m> {
+    pub(crate) clock: &'m RunClock,
+    pub(crate) observed: &'m [Observed],
+    /// A stamp of it and what that is in UTC by what the site says about the clock.
+    pub(crate) nominal: Option<(i64, i64)>,
+    /// Any stamp of it.
+    pub(crate) stamp: Option<i64>,
+}
+
+/// One run comes before another one in a life: the first shows `x` not after the second shows
+/// `next_x`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Succession {
+    pub(crate) run: usize,
+    pub(crate) x: i64,
+    pub(crate) next: usize,
+    pub(crate) next_x: i64,
+}
+
+impl Layout {
+    pub(crate) fn new(
+        hosts: &Hosts,
+        runs: &[RunFacts<'_>],
+        links: &[Link],
+        successions: &[Succession],
+    ) -> Layout {
+        let boots: Vec<Boot> = hosts.boots().collect();
+        let of_boot = |boot: Boot| boots.binary_search(&boot).ok();
+        let of_run = |run: usize| boots.len() + run;
+        let mut clocks: Vec<Placed> = boots
+            .iter()
+            .map(|&boot| Placed { offset: hosts.placed(boot, ANYTHING_US), is_timeless: false })
+            .collect();
+        let mut ties = Vec::new();
+        for (run, facts) in runs.iter().enumerate() {
+            clocks.push(Placed { offset: own_points(facts), is_timeless: false });
+            for observed in facts.observed {
+                let Reference::Host { bound, reading } = observed.at else { continue };
+                let Some(boot) = of_boot(reading.boot) else { continue };
+                let x = facts.clock.unwrapped(observed.shown);
+                let side = |lo, hi, at: Moment<_>| Tie {
+                    one: of_run(run),
+                    x,
+                    other: boot,
+                    other_x: at.us(),
+                    lo,
+                    hi,
+                };
+                ties.extend(bound.lo().map(|at| side(0, NO_HI, at)));
+                ties.extend(bound.hi().map(|at| side(NO_LO, 0, at)));
+            }
+        }
+        ties.extend(links.iter().map(|link| Tie {
+            one: of_run(link.one),
+            x: link.x,
+            other: of_run(link.other),
+            other_x: link.other_x,
+            lo: link.lo,
+            hi: link.hi,
+        }));
+        ties.extend(successions.iter().map(|succession| Tie {
+            one: of_run(succession.next),
+            x: succession.next_x,
+            other: of_run(succession.run),
+            other_x: succession.x,
+            lo: 0,
+            hi: NO_HI,
+        }));
+        let mut layout = Layout { boots, clocks };
+        layout.settle(&ties);
+        layout.place_the_rest(runs, &ties);
+        layout
+    }
+
+    /// Between which instants of the scale a run's clock showed `x`, and whether that is only by
+    /// what it showed itself.
+    pub(crate) fn instant(&self, run: usize, x: i64) -> Option<(i64, i64, bool)> {
+        let placed = self.clocks.get(self.boots.len() + run)?;
+        let (lo, hi) = placed.offset.at(x);
+        let is_placed = lo != NO_LO && hi != NO_HI;
+        is_placed.then(|| (lo.saturating_add(x), hi.saturating_add(x), placed.is_timeless))
+    }
+
+    /// Passes bounds on over all ties until nothing changes. A tie that contradicts the others is
+    /// passed over; that it does is told elsewhere.
+    fn settle(&mut self, ties: &[Tie]) {
+        for _ in 0..MOST_ROUNDS {
+            let mut is_news = false;
+            for tie in ties {
+                let back = Tie {
+                    one: tie.other,
+                    x: tie.other_x,
+                    other: tie.one,
+                    other_x: tie.x,
+                    lo: negated(tie.hi),
+                    hi: negated(tie.lo),
+                };
+                is_news |= self.pass_on(tie) | self.pass_on(&back);
+            }
+            if !is_news {
+                return;
+            }
+        }
+    }
+
+    fn pass_on(&mut self, tie: &Tie) -> bool {
+        let Some(other) = self.clocks.get(tie.other) else { return false };
+        let (lo, hi) = other.offset.at(tie.other_x);
+        let add = |end: i64, by: i64, none: i64| match (end, by) {
+            (NO_LO | NO_HI, _) | (_, NO_LO | NO_HI) => none,
+            (end, by) => end.saturating_add(by).saturating_add(tie.other_x - tie.x),
+        };
+        let (lo, hi) = (add(lo, tie.lo, NO_LO), add(hi, tie.hi, NO_HI));
+        if lo == NO_LO && hi == NO_HI {
+            return false;
+        }
+        let one = self.clocks.get_mut(tie.one);
+        one.and_then(|one| one.offset.learn(tie.x, lo, hi)).unwrap_or(false)
+    }
+
+    /// Gives a place to runs that have none: what is known on one side only is taken to be right
+    /// there, what is not known at all goes by what the clock showed.
+    fn place_the_rest(&mut self, runs: &[RunFacts<'_>], ties: &[Tie]) {
+        for (run, facts) in runs.iter().enumerate() {
+            let Some(x) = facts.stamp else { continue };
+            let Some(placed) = self.clocks.get_mut(self.boots.len() + run) else { continue };
+            let (lo, hi) = placed.offset.at(x);
+            let at = match (lo, hi) {
+                (NO_LO, NO_HI) => {
+                    placed.is_timeless = true;
+                    0
+                }
+                (lo, NO_HI) => lo,
+                (NO_LO, hi) => hi,
+                _ => continue,
+            };
+            placed.offset.learn(x, at, at);
+            self.settle(ties);
+        }
+    }
+}
+
+fn negated(end: i64) -> i64 {
+    match end {
+        NO_LO => NO_HI,
+        NO_HI => NO_LO,
+        end => -end,
+    }
+}
+
+/// What is known of a run without any other clock.
+fn own_points(facts: &RunFacts<'_>) -> Envelope {
+    let by_hand = facts.observed.iter().filter_map(|observed| {
+        let Reference::Utc(bound) = observed.at else { return None };
+        let x = facts.clock.unwrapped(observed.shown);
+        let lo = bound.lo().map_or(NO_LO, |lo| lo.us() - x);
+        let hi = bound.hi().map_or(NO_HI, |hi| hi.us() - x);
+        Some(Known { x, lo, hi, id: observed.id })
+    });
+    let mut points: Vec<Known> = by_hand.collect();
+    if facts.observed.is_empty() {
+        points.extend(facts.nominal.map(|(x, utc)| {
+            let offset = utc - x;
+            Known { x, lo: offset - ANYTHING_US, hi: offset + ANYTHING_US, id: 0 }
+        }));
+    }
+    Envelope::with_slope(points, facts.clock.slope())
+}
