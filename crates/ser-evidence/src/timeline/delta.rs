@@ -67,6 +67,8 @@ impl Timeline<'_> {
         }
         let (lo, hi) = self.moved_between((one, None), (other, None));
         match () {
+            // What contradicts itself proves nothing.
+            () if lo > hi => Order::Unknown,
             () if lo > 0 => Order::Before,
             () if hi < 0 => Order::After,
             () => Order::Unknown,
@@ -77,7 +79,9 @@ impl Timeline<'_> {
     #[must_use]
     pub fn delta(&self, one: ChangeId, other: ChangeId) -> Delta {
         let sides = ((one.event, Some(one.input)), (other.event, Some(other.input)));
-        Delta::of(self.moved_between(sides.0, sides.1))
+        let (lo, hi) = self.moved_between(sides.0, sides.1);
+        // Where a bound is wrong, either may be right.
+        Delta::of((lo.min(hi), hi.max(lo)))
     }
 
     /// From the movement of one contact to that of another.
