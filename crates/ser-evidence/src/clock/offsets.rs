@@ -3,7 +3,7 @@
 use super::envelope::{Envelope, Known, NO_HI, NO_LO, Slope};
 use super::hosts::Hosts;
 use crate::record::{Boot, Reference};
-use crate::time::{Bound, CENTURY_US, Moment, Scale, Shown};
+use crate::time::{AROUND_2069_US, Bound, CENTURY_US, Moment, Scale, Shown};
 
 /// A scale on which a recorder's clock is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -104,16 +104,13 @@ impl RunClock {
         (lo != NO_LO || hi != NO_HI).then_some(known)
     }
 
-    /// A stamp of this run in microseconds, in the century in which the others are.
+    /// A stamp of this run in microseconds. If it is on the other side of the end of 2069 than the
+    /// others, where the two digits of the year begin again, it is moved by a century.
     pub(crate) fn unwrapped(&self, shown: Moment<Shown>) -> i64 {
         let ahead = shown.us().saturating_sub(self.reference);
-        if ahead > CENTURY_US / 2 {
-            shown.us() - CENTURY_US
-        } else if ahead < -CENTURY_US / 2 {
-            shown.us() + CENTURY_US
-        } else {
-            shown.us()
-        }
+        let around = ahead - ahead.signum() * CENTURY_US;
+        let moved = if around.abs() <= AROUND_2069_US { around } else { ahead };
+        self.reference + moved
     }
 
     /// The scales on which something is known; the first is the one for comparisons.

@@ -6,11 +6,7 @@
 
 use crate::history::{Held, LifeHistory};
 use crate::record::Boot;
-use crate::time::{Bound, CENTURY_US, Host, Moment, Shown, Utc, shown};
-
-/// The most that two stamps differ on either side of the end of 2069, where the two digits of the
-/// year begin again: ten years. With a larger difference, a clock was set.
-const AROUND_2069_US: i64 = 10 * 366 * 86_400_000_000;
+use crate::time::{AROUND_2069_US, Bound, CENTURY_US, Host, Moment, Shown, Utc, shown};
 
 /// A place in a life where its clock was set, or may have been.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,6 +7,10 @@ use super::moment::{Moment, Shown};
 /// Microseconds of the hundred years that two digits can express, 1970–2069.
 pub const CENTURY_US: i64 = 36_525 * DAY_US;
 
+/// The most that two stamps differ on either side of the end of 2069, where the two digits of the
+/// year begin again: ten years. With a larger difference, a clock was set.
+pub const AROUND_2069_US: i64 = 10 * 366 * DAY_US;
+
 const DAY_US: i64 = 86_400_000_000;
 
 /// What the clock showed; `None` if the stamp holds an impossible date.
