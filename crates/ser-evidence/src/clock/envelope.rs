@@ -149,6 +149,20 @@ impl Envelope {
         is_consistent
     }
 
+    /// The points that say more than their neighbours do.
+    pub(crate) fn telling_points(&self) -> impl Iterator<Item = i64> {
+        let says_more = |(place, point): &(usize, &Known)| {
+            let neighbours = [place.checked_sub(1), place.checked_add(1)].into_iter().flatten();
+            let mut told = (NO_LO, NO_HI);
+            for neighbour in neighbours.filter_map(|place| self.points.get(place)) {
+                let (lo, hi) = grown(neighbour, self.slope.change(point.x - neighbour.x));
+                told = (told.0.max(lo), told.1.min(hi));
+            }
+            told.0 < point.lo || told.1 > point.hi
+        };
+        self.points.iter().enumerate().filter(says_more).map(|(_, point)| point.x)
+    }
+
     /// What is known at `x`: nothing is `(NO_LO, NO_HI)`.
     pub(crate) fn at(&self, x: i64) -> (i64, i64) {
         let next = self.points.partition_point(|point| point.x < x);

@@ -9,7 +9,7 @@
 use super::envelope::{Envelope, Known, NO_HI, NO_LO};
 use super::hosts::Hosts;
 use super::links::Link;
-use super::offsets::{Observed, RunClock};
+use super::offsets::{Home, Observed, RunClock};
 use crate::record::{Boot, Reference};
 use crate::time::Moment;
 
@@ -97,6 +97,15 @@ impl Layout {
                 };
                 ties.extend(bound.lo().map(|at| side(0, NO_HI, at)));
                 ties.extend(bound.hi().map(|at| side(NO_LO, 0, at)));
+            }
+            for home in facts.clock.homes() {
+                let Home::Boot(name) = home else { continue };
+                let Some(boot) = of_boot(name) else { continue };
+                let points =
+                    clocks.get(boot).into_iter().flat_map(|boot| boot.offset.telling_points());
+                for monotonic in points {
+                    ties.extend(ties_at(facts.clock, home, monotonic, (of_run(run), boot)));
+                }
             }
         }
         ties.extend(links.iter().map(|link| Tie {
@@ -187,6 +196,29 @@ impl Layout {
             self.settle(ties);
         }
     }
+}
+
+/// What is known of a run at about the moment at which something is known of a boot.
+fn ties_at(clock: &RunClock, home: Home, monotonic: i64, (one, other): (usize, usize)) -> Vec<Tie> {
+    // What the clock showed then, as well as that is known.
+    let mut x = monotonic;
+    for _ in 0..2 {
+        match clock.instant(home, x) {
+            (NO_LO, NO_HI) => return Vec::new(),
+            (lo, NO_HI) => x = x.saturating_add(monotonic.saturating_sub(lo)),
+            (NO_LO, hi) => x = x.saturating_add(monotonic.saturating_sub(hi)),
+            (lo, hi) => x = x.saturating_add(monotonic.saturating_sub(lo.midpoint(hi))),
+        }
+    }
+    let (lo, hi) = clock.instant(home, x);
+    let mut ties = Vec::new();
+    if lo != NO_LO {
+        ties.push(Tie { one, x, other, other_x: lo, lo: 0, hi: NO_HI });
+    }
+    if hi != NO_HI {
+        ties.push(Tie { one, x, other, other_x: hi, lo: NO_LO, hi: 0 });
+    }
+    ties
 }
 
 fn negated(end: i64) -> i64 {
