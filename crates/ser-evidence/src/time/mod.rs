@@ -9,5 +9,5 @@ mod calendar;
 mod moment;
 
 pub use bound::Bound;
-pub use calendar::{CENTURY_US, shown};
+pub use calendar::{CENTURY_US, shown, stamp};
 pub use moment::{Host, Moment, Scale, Shown, Utc};
