@@ -668,3 +668,48 @@ proptest! {
         prop_assert_eq!(outcome(&cuts), whole);
     }
 }
+
+#[test]
+fn it_is_known_when_a_request_was_sent_and_answered() {
+    let mut session = session(1);
+    assert_eq!(session.exchange(), None);
+    session.request(Command::QueryMode).unwrap();
+    sent(&mut session, ms(10)).unwrap();
+    let bytes = frame(&RUNNING);
+    session.process(ms(40), &bytes[..1]);
+    session.process(ms(50), &bytes[1..]);
+    assert_eq!(session.exchange(), None, "it has not been taken");
+    session.take_answer().unwrap().unwrap();
+    let exchange = session.exchange().unwrap();
+    assert_eq!((exchange.attempts, exchange.carried_out()), (1, (ms(10), ms(50))));
+}
+
+#[test]
+fn an_answer_may_be_to_any_attempt() {
+    let mut session = session(1);
+    session.request_set_clock().unwrap();
+    sent(&mut session, ms(10)).unwrap();
+    sent(&mut session, ms(1010)).unwrap();
+    session.process(ms(1020), &frame(&Reply::ClockSet));
+    session.take_answer().unwrap().unwrap();
+    let exchange = session.exchange().unwrap();
+    assert_eq!((exchange.attempts, exchange.last_sent), (2, ms(1010)));
+    assert_eq!(exchange.carried_out(), (ms(10), ms(1020)));
+}
+
+#[test]
+fn the_time_on_the_line_is_not_the_recorders() {
+    let line_rate = LineRate::BitsPerSecond(9600);
+    let mut session = Session::new(Timing { timeout: TIMEOUT, retries: 0, line_rate });
+    session.request(Command::QueryMode).unwrap();
+    let request = sent(&mut session, ms(0)).unwrap();
+    let reply = frame(&RUNNING);
+    session.process(ms(100), &reply);
+    session.take_answer().unwrap().unwrap();
+    // A line may be a little faster than it says.
+    let at_least = |bytes: &[u8]| line_rate.time_for(bytes.len()) * 19 / 20;
+    let (from, to) = session.exchange().unwrap().carried_out();
+    let is_near = |time: Duration, expected: Duration| time.abs_diff(expected) < ms(1);
+    assert!(is_near(from, at_least(&request)) && from <= line_rate.time_for(request.len()));
+    assert!(is_near(to, ms(100) - at_least(&reply)), "{to:?}");
+}

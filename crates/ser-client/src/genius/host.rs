@@ -267,8 +267,9 @@ impl GeniHost {
         }
     }
 
-    /// The time that this host goes by.
-    pub(crate) fn now(&self) -> Duration {
+    /// The time that this host goes by, from any start.
+    #[must_use]
+    pub fn now(&self) -> Duration {
         self.clock.now()
     }
 

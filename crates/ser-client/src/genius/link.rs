@@ -63,6 +63,10 @@ impl Link for GeniusLink {
         None
     }
 
+    fn keeps_rate(&self) -> bool {
+        false
+    }
+
     fn diagnose(&self, diagnosis: Diagnosis) -> Diagnosis {
         match diagnosis {
             Diagnosis::Silent if self.host.is_undelivered() => {

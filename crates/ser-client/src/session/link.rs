@@ -43,6 +43,9 @@ pub(crate) trait Link: Send {
     /// The rate, if the link has one.
     fn bits_per_second(&self) -> Option<u32>;
 
+    /// Whether bytes take as long as the rate says.
+    fn keeps_rate(&self) -> bool;
+
     /// What the lack of an answer means here.
     fn diagnose(&self, diagnosis: Diagnosis) -> Diagnosis;
 
@@ -103,6 +106,10 @@ impl Link for SerialLink {
 
     fn bits_per_second(&self) -> Option<u32> {
         self.transport.bits_per_second()
+    }
+
+    fn keeps_rate(&self) -> bool {
+        self.transport.keeps_rate()
     }
 
     fn diagnose(&self, diagnosis: Diagnosis) -> Diagnosis {

@@ -53,12 +53,13 @@
 //!
 //! # The files
 //!
-//! `request` knows what may be done with each command, `owed` the late answers, and `pace` whether
+//! `request` knows what may be done with each command, `exchange` when it was sent and answered, `owed` the late answers, and `pace` whether
 //! the recorder takes two reads at once. `text_line`, `unsolicited`, `counters` and `diagnosis`
 //! hold what else the line brings. A `link` is what a session needs of a line or a bus.
 
 pub(crate) mod counters;
 pub(crate) mod diagnosis;
+pub(crate) mod exchange;
 pub(crate) mod link;
 pub(crate) mod options;
 mod owed;
@@ -77,6 +78,7 @@ use ser_proto::{
 use crate::transport::line_rate::LineRate;
 use counters::Counters;
 use diagnosis::Diagnosis;
+use exchange::Exchange;
 use owed::Owed;
 use pace::Pace;
 pub use request::Attempt;
@@ -153,7 +155,9 @@ pub struct Session {
     requests: VecDeque<Request>,
     /// When the attempt of the first request under way ends.
     deadline: Duration,
-    answers: VecDeque<Result<Reply, NoReply>>,
+    answers: VecDeque<Result<(Reply, Exchange), NoReply>>,
+    /// When the answer that was taken last was asked for and given.
+    exchange: Option<Exchange>,
     pace: Pace,
     owed: Owed,
     unsolicited: UnsolicitedQueue,
@@ -173,6 +177,7 @@ impl Session {
             requests: VecDeque::new(),
             deadline: Duration::ZERO,
             answers: VecDeque::new(),
+            exchange: None,
             pace: Pace::default(),
             owed: Owed::default(),
             unsolicited: UnsolicitedQueue::default(),
@@ -252,7 +257,9 @@ impl Session {
         let request = self.requests.get_mut(place)?;
         if request.sent == 0 {
             request.before = self.counters;
+            request.first_sent = now;
         }
+        request.last_sent = now;
         request.sent += 1;
         request.under_way = true;
         request.behind = place > 0;
@@ -378,7 +385,8 @@ impl Session {
             self.unsolicited.drop_lines();
             self.lines.clear();
         }
-        self.answers.push_back(Ok(reply));
+        let exchange = request.exchange(now, &reply, self.timing.line_rate);
+        self.answers.push_back(Ok((reply, exchange)));
         self.unsolicited.mark();
         if place == 0 {
             self.pace.kept(request.behind);
@@ -456,7 +464,17 @@ impl Session {
     /// The outcome of a request, once. Of two reads, the start of the answer says which one it
     /// belongs to. When one is given up, so is the other.
     pub fn take_answer(&mut self) -> Option<Result<Reply, NoReply>> {
-        self.answers.pop_front()
+        let answer = self.answers.pop_front()?;
+        Some(answer.map(|(reply, exchange)| {
+            self.exchange = Some(exchange);
+            reply
+        }))
+    }
+
+    /// When the answer that was taken last was asked for and given.
+    #[must_use]
+    pub const fn exchange(&self) -> Option<Exchange> {
+        self.exchange
     }
 
     /// The oldest message that answers no request.

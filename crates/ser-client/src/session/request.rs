@@ -2,9 +2,12 @@
 
 use std::time::Duration;
 
-use ser_proto::{Command, FrameEncoder, MAX_ENTRIES, Model, ParseError, Reply, TimeStamp};
+use ser_proto::{
+    Command, FrameEncoder, MAX_ENTRIES, Model, ParseError, Reply, TimeStamp, encoded_len,
+};
 
 use super::counters::Counters;
+use super::exchange::Exchange;
 use crate::transport::line_rate::LineRate;
 
 /// A request whose answer has not come.
@@ -16,6 +19,10 @@ pub(super) struct Request {
     pub(super) repeat: bool,
     /// How often it was sent.
     pub(super) sent: u32,
+    /// Just before the first attempt was sent.
+    pub(super) first_sent: Duration,
+    /// Just before the last attempt was sent.
+    pub(super) last_sent: Duration,
     /// How many attempts have failed.
     pub(super) failed: u32,
     /// Whether an attempt is under way; otherwise one must be sent.
@@ -40,6 +47,8 @@ impl Request {
             wants_time,
             repeat,
             sent: 0,
+            first_sent: Duration::ZERO,
+            last_sent: Duration::ZERO,
             failed: 0,
             under_way: false,
             behind: false,
@@ -60,6 +69,13 @@ impl Request {
 
     pub(super) fn is_read(&self) -> bool {
         matches!(self.command, Command::Read { .. })
+    }
+
+    /// When it was asked and answered.
+    pub(super) fn exchange(&self, now: Duration, reply: &Reply, line_rate: LineRate) -> Exchange {
+        let lengths =
+            (encoded_len(self.command.to_body().len()), encoded_len(reply.to_body().len()));
+        Exchange::new(self.sent, (self.first_sent, self.last_sent, now), lengths, line_rate)
     }
 
     /// Marks the attempt under way as failed.

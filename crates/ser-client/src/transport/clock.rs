@@ -1,7 +1,7 @@
 //! How time passes for a host.
 
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How time passes for a host.
 ///
@@ -15,32 +15,51 @@ pub trait Clock: Send + Sync {
     fn wait(&self, time: Duration);
 }
 
-/// The time of this computer.
-#[derive(Clone, Copy, Debug)]
-pub struct RealTime {
-    epoch: Instant,
-}
+/// The time of this computer: its monotonic clock, the same for all that ask for it.
+///
+/// On Linux it counts from the start of the system and runs also while the computer sleeps, so that
+/// two programs can compare what they saw. Elsewhere it counts from some moment of this program.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RealTime;
 
 impl RealTime {
-    /// A clock that reads zero now.
+    /// The clock.
     #[must_use]
-    pub fn new() -> RealTime {
-        RealTime { epoch: Instant::now() }
-    }
-}
-
-impl Default for RealTime {
-    fn default() -> RealTime {
-        RealTime::new()
+    pub const fn new() -> RealTime {
+        RealTime
     }
 }
 
 impl Clock for RealTime {
     fn now(&self) -> Duration {
-        self.epoch.elapsed()
+        monotonic()
     }
 
     fn wait(&self, time: Duration) {
         thread::sleep(time);
+    }
+}
+
+#[cfg(target_os = "linux")]
+fn monotonic() -> Duration {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::Boottime);
+    // It is never negative.
+    Duration::try_from(now).unwrap_or_default()
+}
+
+#[cfg(not(target_os = "linux"))]
+fn monotonic() -> Duration {
+    static EPOCH: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+    EPOCH.get_or_init(std::time::Instant::now).elapsed()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_have_the_same_time() {
+        let (first, second, third) = (RealTime::new().now(), RealTime.now(), RealTime::new().now());
+        assert!(first <= second && second <= third);
     }
 }

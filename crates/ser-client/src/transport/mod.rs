@@ -6,6 +6,7 @@
 pub(crate) mod clock;
 pub(crate) mod endpoint;
 pub(crate) mod genius_error;
+pub(crate) mod host_time;
 pub(crate) mod line_rate;
 pub(crate) mod open;
 pub(crate) mod open_error;
@@ -42,6 +43,12 @@ pub trait Transport: Send {
 
     /// The rate of the line, if it has one.
     fn bits_per_second(&self) -> Option<u32>;
+
+    /// Whether bytes take as long as the rate says. Some ports have a rate only for the sake of
+    /// programs that set one.
+    fn keeps_rate(&self) -> bool {
+        true
+    }
 }
 
 /// The outcome of a blocking read. A read without bytes in time is not an error here. The end of

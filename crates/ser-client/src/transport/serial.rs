@@ -3,7 +3,6 @@
 //! The port is opened exclusively where the system can do that, with 8 data bits, no parity, one
 //! stop bit and no flow control. Bytes that arrived earlier stay in the buffer, because they may be
 //! lines that the recorder printed.
-//! lines that the recorder printed.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::Path;
@@ -22,6 +21,7 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 pub struct SerialTransport {
     port: Box<dyn SerialPort>,
     bits_per_second: u32,
+    keeps_rate: bool,
 }
 
 impl SerialTransport {
@@ -42,7 +42,7 @@ impl SerialTransport {
             .exclusive(true)
             .open()
             .map_err(|error| why_not_opened(path, baud, &error))?;
-        Ok(SerialTransport { port, bits_per_second: baud })
+        Ok(SerialTransport { port, bits_per_second: baud, keeps_rate: keeps_rate(Path::new(path)) })
     }
 }
 
@@ -63,6 +63,15 @@ fn why_not_opened(path: &str, baud: u32, error: &serialport::Error) -> OpenError
             }
         }
     }
+}
+
+/// Whether bytes take as long as the rate says. Behind a pseudo-terminal there may be anything, and a
+/// modem that is none (`ttyACM`) sends at the rate of USB.
+fn keeps_rate(path: &Path) -> bool {
+    let device = std::fs::canonicalize(path).unwrap_or(path.to_owned());
+    let is_modem =
+        device.file_name().is_some_and(|name| name.to_string_lossy().starts_with("ttyACM"));
+    !is_modem && !device.starts_with("/dev/pts")
 }
 
 fn exists(path: &str) -> bool {
@@ -117,5 +126,27 @@ impl Transport for SerialTransport {
 
     fn bits_per_second(&self) -> Option<u32> {
         Some(self.bits_per_second)
+    }
+
+    fn keeps_rate(&self) -> bool {
+        self.keeps_rate
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pseudo_terminal_and_a_modem_that_is_none_keep_no_rate() {
+        for (path, keeps) in [
+            ("/dev/ttyUSB0", true),
+            ("/dev/ttyS0", true),
+            ("COM3", true),
+            ("/dev/pts/7", false),
+            ("/dev/ttyACM0", false),
+        ] {
+            assert_eq!(keeps_rate(Path::new(path)), keeps, "{path}");
+        }
     }
 }

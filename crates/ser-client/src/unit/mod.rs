@@ -19,6 +19,7 @@ use crate::reading::log_position::LogPosition;
 use crate::reading::range_reader::RangeReader;
 use crate::reading::read_request::ReadRequest;
 use crate::session::counters::Counters;
+use crate::session::exchange::Exchange;
 use crate::session::link::{Link, SerialLink};
 use crate::session::options::Options;
 use crate::session::unsolicited::Unsolicited;
@@ -299,6 +300,16 @@ impl Unit {
     #[must_use]
     pub fn bits_per_second(&self) -> Option<u32> {
         self.link.bits_per_second()
+    }
+
+    /// When the last reply was asked for and came; `None` before the first.
+    #[must_use]
+    pub fn last_exchange(&self) -> Option<Exchange> {
+        let exchange = self.session.exchange();
+        exchange.map(|exchange| match self.link.keeps_rate() {
+            true => exchange,
+            false => exchange.without_rate(),
+        })
     }
 
     /// What has been seen on the line so far.

@@ -1,6 +1,6 @@
 //! Entries as they were read.
 
-use ser_proto::Entry;
+use ser_proto::{Entry, Inputs};
 
 use super::Life;
 
@@ -16,4 +16,13 @@ pub struct EntryRecord {
     pub number: u16,
     /// Changed inputs, state and stamp exactly as they were read.
     pub entry: Entry,
+    /// The inputs whose state in `entry` is known; the others are off there, and say nothing.
+    /// Recorders tell [all](Self::ALL_KNOWN). A file that shows only changes does not, so the same
+    /// entry read from there is no contradiction if it agrees in what is known.
+    pub known: Inputs,
+}
+
+impl EntryRecord {
+    /// The state of every input is known.
+    pub const ALL_KNOWN: Inputs = Inputs(u32::MAX);
 }

@@ -24,6 +24,28 @@ pub fn shown(stamp: &TimeStamp) -> Option<Moment<Shown>> {
     Some(Moment::from_us(days * DAY_US + us))
 }
 
+/// The stamp of a moment; `None` outside 1970–2069, or between two milliseconds.
+#[must_use]
+pub fn stamp(moment: Moment<Shown>) -> Option<TimeStamp> {
+    let us = Some(moment.us()).filter(|us| (0..CENTURY_US).contains(us) && us % 1000 == 0)?;
+    let days = us / DAY_US;
+    let begins_by = |year, month| days_since_1970(year, month, 1) <= days;
+    let year = (1970..=2069).rev().find(|&year| begins_by(year, 1))?;
+    let month = (1..=12).rev().find(|&month| begins_by(year, month))?;
+    let day = days - days_since_1970(year, month, 1) + 1;
+    let byte = |value: i64| u8::try_from(value).ok();
+    let second = us / 1_000_000;
+    Some(TimeStamp {
+        year: u8::try_from(year % 100).ok()?,
+        month,
+        day: byte(day)?,
+        hour: byte(second / 3600 % 24)?,
+        minute: byte(second / 60 % 60)?,
+        second: byte(second % 60)?,
+        millisecond: u16::try_from(us / 1000 % 1000).ok()?,
+    })
+}
+
 /// Days from the beginning of 1970 to a date of 1970–2069, where every fourth year is a leap year.
 fn days_since_1970(year: u16, month: u8, day: u8) -> i64 {
     const BEFORE_MONTH: [i64; 12] = [0, 31, 59, 90, 120, 151, 181, 212, 243, 273, 304, 334];
@@ -39,7 +61,7 @@ fn days_since_1970(year: u16, month: u8, day: u8) -> i64 {
 mod tests {
     use super::*;
 
-    fn stamp(text: &str) -> TimeStamp {
+    fn parsed(text: &str) -> TimeStamp {
         let number = |range: std::ops::Range<usize>| text[range].parse::<u16>().unwrap();
         let byte = |range| u8::try_from(number(range)).unwrap();
         TimeStamp {
@@ -60,20 +82,32 @@ mod tests {
         for days in 0..36_525_i64 {
             let date = first.checked_add(jiff::Span::new().days(days)).unwrap();
             let text = format!("{date}T00:00:00.000");
-            assert_eq!(shown(&stamp(&text)), Some(Moment::from_us(days * DAY_US)), "{text}");
+            let moment = Moment::from_us(days * DAY_US);
+            assert_eq!(shown(&parsed(&text)), Some(moment), "{text}");
+            assert_eq!(
+                stamp(moment.after(86_399_999_000)).unwrap().to_string(),
+                format!("{date}T23:59:59.999")
+            );
         }
     }
 
     #[test]
     fn the_time_of_day_counts_to_the_millisecond() {
-        let at = |text| shown(&stamp(text)).unwrap();
+        let at = |text| shown(&parsed(text)).unwrap();
         assert_eq!(at("2026-11-22T10:00:00.250").since(at("2026-11-22T09:59:59.999")), 251_000);
         assert_eq!(at("2000-01-01T00:00:00.000").since(at("1999-12-31T23:59:59.999")), 1000);
     }
 
     #[test]
     fn an_impossible_date_is_no_moment() {
-        let stamp = stamp("2026-02-29T10:00:00.000");
+        let stamp = parsed("2026-02-29T10:00:00.000");
         assert_eq!(shown(&stamp), None);
+    }
+
+    #[test]
+    fn a_moment_that_no_clock_shows_has_no_stamp() {
+        for us in [-1000, 1, CENTURY_US, i64::MAX, i64::MIN] {
+            assert_eq!(stamp(Moment::from_us(us)), None, "{us}");
+        }
     }
 }

@@ -9,5 +9,5 @@ mod calendar;
 mod moment;
 
 pub use bound::Bound;
-pub use calendar::{AROUND_2069_US, CENTURY_US, shown};
+pub use calendar::{AROUND_2069_US, CENTURY_US, shown, stamp};
 pub use moment::{Host, Moment, Scale, Shown, Utc};

@@ -1,0 +1,415 @@
+//! CSV as `ser-cli` writes it: a row for each input that changed, and one for each loss.
+//!
+//! The rows of one entry stand together and become one entry again. A row shows the state of its
+//! input only. The states of other inputs are carried on from earlier rows as far as these follow
+//! each other without a gap, and [`known`](EntryRecord::known) says which they are. A header, a
+//! loss, a damaged row or a jump in the numbers ends what is known.
+//!
+//! Files of earlier versions have only the first four columns. A header may come again, with other
+//! columns, where a file was continued. Every row is a line: a quote that is not closed damages its
+//! own row and not the next.
+
+use std::io::BufRead;
+
+use ser_evidence::record::{EntryRecord, Gap, Life, Lost, Record, Told, Why};
+use ser_proto::{Entry, Inputs, TimeStamp};
+
+use crate::error::{ReadError, quoted};
+use crate::lines::{Lines, MAX_LINE_LEN};
+use crate::stamp;
+
+/// The columns, in their order. Later versions may append more.
+const COLUMNS: [&str; 7] = ["entry", "time", "input", "state", "sequence", "life", "note"];
+
+/// How many columns the files of the first versions have.
+const FIRST_COLUMNS: usize = 4;
+
+/// The most fields of a row that are told apart.
+const MAX_FIELDS: usize = 64;
+
+/// Whether this is the first line of such a file.
+pub(crate) fn is_header(line: &[u8]) -> bool {
+    let line = line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line).trim_ascii_end();
+    let mut fields = line.split(|&byte| byte == b',');
+    COLUMNS.iter().take(FIRST_COLUMNS).all(|name| fields.next() == Some(name.as_bytes()))
+}
+
+/// Reads the records of a file. After an error in one line it goes on with the next.
+pub struct Reader<R> {
+    lines: Lines<R>,
+    recorder: String,
+    splitter: Splitter,
+    parser: Parser,
+    /// How many columns the rows have; `None` before the first header.
+    columns: Option<usize>,
+    gathering: Option<Gathering>,
+    states: States,
+    /// What comes after the entry that was handed out just now.
+    held: Option<Result<Record, ReadError>>,
+    is_over: bool,
+}
+
+impl<R: BufRead> Reader<R> {
+    /// Reads `input`, the file of this recorder.
+    pub fn new(input: R, recorder: &str) -> Reader<R> {
+        Reader {
+            lines: Lines::new(input),
+            recorder: recorder.to_owned(),
+            splitter: Splitter::new(),
+            parser: Parser::default(),
+            columns: None,
+            gathering: None,
+            states: States::default(),
+            held: None,
+            is_over: false,
+        }
+    }
+
+    fn read(&mut self) -> Option<Result<Record, ReadError>> {
+        if let Some(held) = self.held.take() {
+            return Some(held);
+        }
+        while !self.is_over {
+            let row = match self.lines.next() {
+                None => {
+                    self.is_over = true;
+                    break;
+                }
+                Some(Err(error)) => Err(error),
+                Some(Ok(line)) => row(line, self.columns, &mut self.splitter, &mut self.parser)
+                    .map_err(|why| ReadError::damaged(self.lines.number(), why)),
+            };
+            match row {
+                Ok(Row::Header { columns }) => self.columns = Some(columns),
+                Ok(Row::Change(change)) => match self.gather(&change) {
+                    Some(entry) => return Some(Ok(entry)),
+                    None => continue,
+                },
+                Ok(Row::Loss(gap)) => self.held = Some(Ok(Record::Gap(gap))),
+                Err(error) => {
+                    self.is_over = !error.is_of_one_line();
+                    self.held = Some(Err(error));
+                }
+            }
+            // Whatever it was, what was known of the states ends here.
+            let entry = self.finish();
+            self.states = States::default();
+            if let Some(next) = entry.map(Ok).or_else(|| self.held.take()) {
+                return Some(next);
+            }
+        }
+        self.finish().map(Ok)
+    }
+
+    /// Adds a row to the entry that it belongs to. Returns the entry before, if it has ended.
+    fn gather(&mut self, change: &Change) -> Option<Record> {
+        if let Some(gathering) = self.gathering.as_mut().filter(|entry| entry.goes_on_with(change))
+        {
+            gathering.add(change);
+            return None;
+        }
+        let finished = self.finish();
+        let mut gathering = Gathering { key: change.key, changed: 0, on: 0 };
+        gathering.add(change);
+        self.gathering = Some(gathering);
+        finished
+    }
+
+    fn finish(&mut self) -> Option<Record> {
+        let gathered = self.gathering.take()?;
+        Some(Record::Entry(self.states.entry(&gathered)))
+    }
+}
+
+impl<R: BufRead> Iterator for Reader<R> {
+    type Item = Result<Told, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let record = self.read()?;
+        Some(record.map(|record| Told { recorder: self.recorder.clone(), record }))
+    }
+}
+
+/// What a line is.
+enum Row {
+    Header { columns: usize },
+    Change(Change),
+    Loss(Gap),
+}
+
+/// A row of an entry.
+struct Change {
+    key: Key,
+    /// The input that changed, as a bit; 0 if none did.
+    input: u32,
+    is_on: bool,
+}
+
+/// What the rows of one entry have in common.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Key {
+    number: u16,
+    time: TimeStamp,
+    sequence: Option<u64>,
+    life: Life,
+}
+
+/// An entry whose rows are coming.
+struct Gathering {
+    key: Key,
+    changed: u32,
+    on: u32,
+}
+
+impl Gathering {
+    fn goes_on_with(&self, change: &Change) -> bool {
+        // An input changes once in an entry. If it comes again, so does the whole entry: it was
+        // read twice.
+        self.key == change.key && self.changed & change.input == 0 && change.input != 0
+    }
+
+    fn add(&mut self, change: &Change) {
+        self.changed |= change.input;
+        self.on |= if change.is_on { change.input } else { 0 };
+    }
+}
+
+/// The states of inputs, as far as rows have shown them.
+#[derive(Default)]
+struct States {
+    last: Option<Key>,
+    on: u32,
+    known: u32,
+}
+
+impl States {
+    fn entry(&mut self, gathered: &Gathering) -> EntryRecord {
+        let Gathering { key, changed, on } = *gathered;
+        if !self.last.is_some_and(|last| last.is_before(&key)) {
+            (self.on, self.known) = (0, 0);
+        }
+        self.on = self.on & !changed | on;
+        self.known |= changed;
+        self.last = Some(key);
+        let (changed, state) = (Inputs(changed), Inputs(self.on));
+        EntryRecord {
+            life: key.life,
+            sequence: key.sequence,
+            number: key.number,
+            entry: Entry { changed, state, time: key.time },
+            known: Inputs(self.known),
+        }
+    }
+}
+
+impl Key {
+    /// Whether the other entry is the next one.
+    fn is_before(&self, next: &Key) -> bool {
+        let follows = match (self.sequence, next.sequence) {
+            (Some(last), Some(next)) => last.checked_add(1) == Some(next),
+            (None, None) => self.number.checked_add(1) == Some(next.number),
+            _ => false,
+        };
+        follows && self.life == next.life
+    }
+}
+
+/// Takes rows apart.
+struct Splitter {
+    core: csv_core::Reader,
+    text: Vec<u8>,
+    ends: [usize; MAX_FIELDS],
+    count: usize,
+}
+
+impl Splitter {
+    fn new() -> Splitter {
+        let text = vec![0; MAX_LINE_LEN];
+        Splitter { core: csv_core::Reader::new(), text, ends: [0; MAX_FIELDS], count: 0 }
+    }
+
+    fn split(&mut self, line: &[u8]) -> Result<(), String> {
+        use csv_core::ReadRecordResult as Outcome;
+        self.core.reset();
+        self.count = 0;
+        let mut filled = 0;
+        for mut part in [line, b"\n"] {
+            while !part.is_empty() {
+                let text = self.text.get_mut(filled..).unwrap_or_default();
+                let ends = self.ends.get_mut(self.count..).unwrap_or_default();
+                let (outcome, taken, written, ended) = self.core.read_record(part, text, ends);
+                part = part.get(taken..).unwrap_or_default();
+                (filled, self.count) = (filled + written, self.count + ended);
+                match outcome {
+                    Outcome::Record => return Ok(()),
+                    Outcome::InputEmpty => {}
+                    Outcome::OutputFull | Outcome::OutputEndsFull | Outcome::End => {
+                        return Err("this row has too many fields".to_owned());
+                    }
+                }
+            }
+        }
+        Err(format!("a quote is not closed, in {}", quoted(line)))
+    }
+
+    /// A field of the row; empty if the row has fewer.
+    fn field(&self, place: usize) -> &[u8] {
+        let end = self.ends.get(place).copied().filter(|_| place < self.count).unwrap_or_default();
+        let start = place.checked_sub(1).and_then(|before| self.ends.get(before)).copied();
+        self.text.get(start.unwrap_or_default()..end).unwrap_or_default()
+    }
+}
+
+/// Understands fields. Neighbouring rows often have the same time, and nearly always the same life.
+struct Parser {
+    time: ([u8; 23], TimeStamp),
+    life: (Vec<u8>, Life),
+}
+
+impl Default for Parser {
+    fn default() -> Parser {
+        let time =
+            TimeStamp { year: 0, month: 0, day: 0, hour: 0, minute: 0, second: 0, millisecond: 0 };
+        Parser { time: ([0; 23], time), life: (Vec::new(), Life::UNKNOWN) }
+    }
+}
+
+impl Parser {
+    fn time(&mut self, text: &[u8]) -> Option<TimeStamp> {
+        let (known, time) = &self.time;
+        if text == known {
+            return Some(*time);
+        }
+        let time = stamp::parse(text, None)?;
+        if let Ok(text) = text.try_into() {
+            self.time = (text, time);
+        }
+        Some(time)
+    }
+
+    fn life(&mut self, text: &[u8]) -> Option<Life> {
+        let (known, life) = &self.life;
+        if text == known {
+            return Some(*life);
+        }
+        let life = Life::from_name(std::str::from_utf8(text).ok()?)?;
+        self.life = (text.to_vec(), life);
+        Some(life)
+    }
+}
+
+fn row(
+    line: &[u8],
+    columns: Option<usize>,
+    fields: &mut Splitter,
+    parser: &mut Parser,
+) -> Result<Row, String> {
+    fields.split(line)?;
+    if fields.field(0) == COLUMNS.first().map_or(&b""[..], |name| name.as_bytes()) {
+        return header(fields);
+    }
+    let columns = columns.ok_or("there is no header before this row")?;
+    if fields.count < columns {
+        return Err(format!("{} fields where {columns} have to be", fields.count));
+    }
+    let is_loss = (0..FIRST_COLUMNS).all(|place| fields.field(place).is_empty());
+    if is_loss {
+        loss(fields, parser).map(Row::Loss)
+    } else {
+        change(fields, parser).map(Row::Change)
+    }
+}
+
+fn header(fields: &Splitter) -> Result<Row, String> {
+    let known = fields.count.min(COLUMNS.len());
+    let is_ours = |place: usize, name: &str| fields.field(place) == name.as_bytes();
+    let all_ours = COLUMNS.iter().take(known).enumerate().all(|(place, name)| is_ours(place, name));
+    match known {
+        FIRST_COLUMNS | 7 if all_ours => Ok(Row::Header { columns: known }),
+        _ => Err("this header has other columns than entry,time,input,state,…".to_owned()),
+    }
+}
+
+fn change(fields: &Splitter, parser: &mut Parser) -> Result<Change, String> {
+    let wrong = |place: usize| {
+        let name = COLUMNS.get(place).copied().unwrap_or_default();
+        format!("{name} cannot be {}", quoted(fields.field(place)))
+    };
+    let number = number(fields.field(0)).ok_or_else(|| wrong(0))?;
+    let time = parser.time(fields.field(1)).ok_or_else(|| wrong(1))?;
+    let (sequence, life) = place(fields, parser)?;
+    let key = Key { number, time, sequence, life };
+    let (input, state) = (fields.field(2), fields.field(3));
+    if input.is_empty() && state.is_empty() {
+        return Ok(Change { key, input: 0, is_on: false });
+    }
+    let input = self::number::<u32>(input).filter(|input| (1..=32).contains(input));
+    let input = 1_u32 << (input.ok_or_else(|| wrong(2))? - 1);
+    let is_on = match state {
+        b"1" => true,
+        b"0" => false,
+        _ => return Err(wrong(3)),
+    };
+    Ok(Change { key, input, is_on })
+}
+
+/// The sequence and the life of a row.
+fn place(fields: &Splitter, parser: &mut Parser) -> Result<(Option<u64>, Life), String> {
+    let wrong = |name: &str, text: &[u8]| format!("{name} cannot be {}", quoted(text));
+    let (sequence, life) = (fields.field(4), fields.field(5));
+    let sequence = match sequence {
+        b"" => None,
+        text => Some(number(text).ok_or_else(|| wrong("sequence", text))?),
+    };
+    let life = match life {
+        b"" => Life::UNKNOWN,
+        text => parser.life(text).ok_or_else(|| wrong("life", text))?,
+    };
+    Ok((sequence, life))
+}
+
+fn loss(fields: &Splitter, parser: &mut Parser) -> Result<Gap, String> {
+    let note = fields.field(6);
+    let understood = std::str::from_utf8(note).ok().and_then(lost_and_why);
+    let (lost, why) = understood.ok_or_else(|| format!("this is no loss: {}", quoted(note)))?;
+    let (after, life) = place(fields, parser)?;
+    Ok(Gap { life, after, lost, why })
+}
+
+/// Understands `lost 37 (exactly) after 120: overwritten`.
+fn lost_and_why(note: &str) -> Option<(Lost, Why)> {
+    let (count, why) = note.strip_prefix("lost ")?.split_once(": ")?;
+    let count = count.split_once(" after ").map_or(count, |(count, _)| count);
+    let lost = if count == "an unknown number" {
+        Lost::Unknown
+    } else if let Some(count) = count.strip_suffix(" (exactly)") {
+        Lost::Exactly(number(count.as_bytes())?)
+    } else {
+        Lost::AtLeast(number(count.strip_suffix(" (at least)")?.as_bytes())?)
+    };
+    let why = match why {
+        "overwritten" => Why::Overwritten,
+        "log began anew" => Why::LogBeganAnew,
+        "not reached" => Why::NotReached,
+        _ => Why::not_recorded(inputs(why.strip_prefix("not recorded, inputs ")?)?),
+    };
+    Some((lost, why))
+}
+
+fn inputs(list: &str) -> Option<Inputs> {
+    list.split(' ').try_fold(Inputs(0), |Inputs(inputs), text| {
+        let place = number::<u32>(text.as_bytes())?.checked_sub(1)?;
+        Some(Inputs(inputs | 1_u32.checked_shl(place)?))
+    })
+}
+
+fn number<T: TryFrom<u64>>(digits: &[u8]) -> Option<T> {
+    if digits.is_empty() {
+        return None;
+    }
+    let number = digits.iter().try_fold(0_u64, |number, digit| {
+        let value = digit.is_ascii_digit().then(|| u64::from(digit - b'0'))?;
+        number.checked_mul(10)?.checked_add(value)
+    })?;
+    T::try_from(number).ok()
+}

@@ -1,0 +1,104 @@
+//! What is wrong with a file, and where.
+
+use std::error::Error;
+use std::fmt;
+use std::io;
+
+use crate::lines::MAX_LINE_LEN;
+
+/// How much of a file's text is quoted in an error, in characters.
+const QUOTED_LEN: usize = 40;
+
+/// Why a line of a file could not be read. Everything that was read before it stands.
+#[derive(Debug)]
+pub struct ReadError {
+    /// The line, from 1.
+    pub line: u64,
+    /// The byte in the line, from 1, if it is known.
+    pub byte: Option<usize>,
+    /// What is wrong.
+    pub problem: Problem,
+}
+
+/// What is wrong with a line.
+#[derive(Debug)]
+pub enum Problem {
+    /// The file cannot be read on.
+    Io(io::Error),
+    /// The file is neither JSON lines nor CSV of ours.
+    NotOurs,
+    /// The file was written by a later version, which may say things that this one does not
+    /// understand.
+    NewerSchema {
+        /// The version of its layout.
+        schema: u32,
+    },
+    /// The line is longer than any of ours.
+    TooLong,
+    /// The line holds something else than it has to, for this reason.
+    Damaged(String),
+}
+
+impl ReadError {
+    pub(crate) fn damaged(line: u64, why: impl Into<String>) -> ReadError {
+        ReadError { line, byte: None, problem: Problem::Damaged(why.into()) }
+    }
+
+    pub(crate) const fn at(line: u64, problem: Problem) -> ReadError {
+        ReadError { line, byte: None, problem }
+    }
+
+    /// Whether only this line is lost, and the lines after it can be read.
+    #[must_use]
+    pub const fn is_of_one_line(&self) -> bool {
+        matches!(self.problem, Problem::TooLong | Problem::Damaged(_))
+    }
+}
+
+/// As `line 17, byte 5: month 13 is out of range`.
+impl fmt::Display for ReadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}", self.line)?;
+        if let Some(byte) = self.byte {
+            write!(f, ", byte {byte}")?;
+        }
+        write!(f, ": {}", self.problem)
+    }
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Problem::Io(error) => write!(f, "cannot be read: {error}"),
+            Problem::NotOurs => {
+                f.write_str("this is neither JSON lines nor CSV as ser-cli writes them")
+            }
+            Problem::NewerSchema { schema } => write!(
+                f,
+                "written by a later version (schema {schema}; this one reads up to {})",
+                crate::jsonl::SCHEMA
+            ),
+            Problem::TooLong => write!(f, "longer than {MAX_LINE_LEN} bytes"),
+            Problem::Damaged(why) => f.write_str(why),
+        }
+    }
+}
+
+impl Error for ReadError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match &self.problem {
+            Problem::Io(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+/// A piece of a file, short enough for a message.
+pub(crate) fn quoted(text: &[u8]) -> String {
+    let text = String::from_utf8_lossy(text);
+    let mut short: String = text.chars().take(QUOTED_LEN).collect();
+    if text.chars().nth(QUOTED_LEN).is_some() {
+        short.push('…');
+    }
+    format!("`{short}`")
+}

@@ -1,0 +1,241 @@
+//! From lines to records.
+
+use std::io::BufRead;
+
+use ser_evidence::record::{
+    ClockObservation, ClockStep, EntryRecord, Gap, How, Life, LifeRecord, Lost, Place, Record,
+    Reference, Told, Watched, Why,
+};
+use ser_evidence::time::{Bound, Moment, shown};
+use ser_proto::Entry;
+
+use super::SCHEMA;
+use super::lines::{HostLine, Line, PlaceLine, Result, needed, stamp, understood, wrong};
+use super::texts::{Text, broadcast_named, life_named, model_named};
+use crate::error::{Problem, ReadError, quoted};
+use crate::lines::Lines;
+use crate::stamp as stamps;
+
+/// Reads the records of a file. After an error in one line it goes on with the next.
+pub struct Reader<R> {
+    lines: Lines<R>,
+    /// The recorder of lines that do not name theirs.
+    recorder: String,
+    program: Option<String>,
+    is_over: bool,
+}
+
+impl<R: BufRead> Reader<R> {
+    /// Reads `input`. `recorder` is the name for lines that name none, as earlier versions wrote
+    /// them.
+    pub fn new(input: R, recorder: &str) -> Reader<R> {
+        let lines = Lines::new(input);
+        Reader { lines, recorder: recorder.to_owned(), program: None, is_over: false }
+    }
+
+    /// The program that wrote the file, as it calls itself, if it has said so by now.
+    #[must_use]
+    pub fn program(&self) -> Option<&str> {
+        self.program.as_deref()
+    }
+
+    fn read(&mut self) -> Option<std::result::Result<Told, ReadError>> {
+        loop {
+            let line = match self.lines.next()? {
+                Ok(line) => line,
+                Err(error) => return Some(Err(error)),
+            };
+            let understood =
+                parse(line).and_then(|line| item(&line).map_err(|problem| (None, problem)));
+            let number = self.lines.number();
+            match understood {
+                Ok(Item::Record(recorder, record)) => {
+                    let recorder = recorder.unwrap_or_else(|| self.recorder.clone());
+                    return Some(Ok(Told { recorder, record }));
+                }
+                Ok(Item::File(program)) => self.program = program,
+                Err((byte, problem)) => {
+                    return Some(Err(ReadError { line: number, byte, problem }));
+                }
+            }
+        }
+    }
+}
+
+impl<R: BufRead> Iterator for Reader<R> {
+    type Item = std::result::Result<Told, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.is_over {
+            return None;
+        }
+        let told = self.read();
+        let goes_on = |told: &Self::Item| told.as_ref().err().is_none_or(ReadError::is_of_one_line);
+        self.is_over = !told.as_ref().is_some_and(goes_on);
+        told
+    }
+}
+
+/// What a line says.
+enum Item {
+    /// A record, and the name of its recorder if the line has it.
+    Record(Option<String>, Record),
+    /// A program begins to write.
+    File(Option<String>),
+}
+
+/// Why a line could not be understood, and at which byte.
+type Trouble = (Option<usize>, Problem);
+
+fn parse(line: &[u8]) -> std::result::Result<Line<'_>, Trouble> {
+    // A list would be taken for the fields in their order.
+    if line.trim_ascii_start().first() != Some(&b'{') {
+        return Err((None, Problem::Damaged(format!("this is no object: {}", quoted(line)))));
+    }
+    serde_json::from_slice(line).map_err(|error| not_json(&error, line))
+}
+
+fn not_json(error: &serde_json::Error, line: &[u8]) -> Trouble {
+    let text = error.to_string();
+    // The error counts lines and columns, but has seen one line only.
+    let what = text.rsplit_once(" at line ").map_or(&*text, |(what, _)| what);
+    let why = format!("{what}, in {}", quoted(line));
+    (Some(error.column()).filter(|&column| column > 0), Problem::Damaged(why))
+}
+
+fn item(line: &Line<'_>) -> std::result::Result<Item, Problem> {
+    let recorder = || line.recorder.as_ref().map(|Text(name)| name.to_string());
+    let record = match line.record.as_ref().map(|Text(kind)| &**kind) {
+        Some("file") => return file(line),
+        Some("entry") => entry(line),
+        Some("gap") => gap(line),
+        Some("clock") => clock(line),
+        Some("step") => step(line),
+        Some("life") => life(line),
+        Some("watched") => watched(line),
+        // Evidence that is passed over in silence would be lost.
+        Some(kind) => Err(format!("there is no record {}", quoted(kind.as_bytes()))),
+        None if line.entry.is_some() => entry(line),
+        None if line.count.is_some() => gap(line),
+        None => Err("neither `record` nor `entry` nor `lost` says what this is".to_owned()),
+    };
+    record.map(|record| Item::Record(recorder(), record)).map_err(Problem::Damaged)
+}
+
+fn file(line: &Line<'_>) -> std::result::Result<Item, Problem> {
+    match needed(line.schema, "schema").map_err(Problem::Damaged)? {
+        SCHEMA => Ok(Item::File(line.program.as_ref().map(|Text(program)| program.to_string()))),
+        0 => Err(Problem::Damaged("there is no schema 0".to_owned())),
+        schema => Err(Problem::NewerSchema { schema }),
+    }
+}
+
+fn life_of(line: &Line<'_>) -> Result<Life> {
+    let name = line.life.as_ref().map(|Text(life)| &**life);
+    life_named(name).ok_or_else(|| wrong("life", name.unwrap_or_default()))
+}
+
+fn entry(line: &Line<'_>) -> Result<Record> {
+    let time = needed(line.time.as_ref(), "time")?;
+    let entry = Entry {
+        changed: needed(line.changed, "changed")?.0,
+        state: needed(line.state, "state")?.0,
+        time: stamp(time, line.year)?,
+    };
+    Ok(Record::Entry(EntryRecord {
+        life: life_of(line)?,
+        sequence: line.sequence,
+        number: needed(line.entry, "entry")?,
+        entry,
+        known: line.known.map_or(EntryRecord::ALL_KNOWN, |known| known.0),
+    }))
+}
+
+fn gap(line: &Line<'_>) -> Result<Record> {
+    let Text(count) = needed(line.count.as_ref(), "count")?;
+    let lost = match (&**count, line.lost) {
+        ("exactly", Some(lost)) => Lost::Exactly(lost),
+        ("at least", Some(lost)) => Lost::AtLeast(lost),
+        ("unknown", _) => Lost::Unknown,
+        ("exactly" | "at least", None) => return Err("`lost` is missing".to_owned()),
+        (other, _) => return Err(wrong("count", other)),
+    };
+    let Text(why) = needed(line.why.as_ref(), "why")?;
+    let why = match &**why {
+        "overwritten" => Why::Overwritten,
+        "log began anew" => Why::LogBeganAnew,
+        "not recorded" => Why::not_recorded(needed(line.inputs, "inputs")?.0),
+        "not reached" => Why::NotReached,
+        other => return Err(wrong("why", other)),
+    };
+    Ok(Record::Gap(Gap { life: life_of(line)?, after: line.after, lost, why }))
+}
+
+fn life(line: &Line<'_>) -> Result<Record> {
+    Ok(Record::Life(LifeRecord {
+        life: life_of(line)?,
+        is_exact: needed(line.exact, "exact")?,
+        model: understood("model", line.model.as_ref(), model_named)?,
+        size: line.size,
+        erased: understood("erased", line.erased.as_ref(), Life::from_name)?,
+    }))
+}
+
+fn clock(line: &Line<'_>) -> Result<Record> {
+    let text = needed(line.shown.as_ref(), "shown")?;
+    let shown = stamps::parse(text.0.as_bytes(), None).and_then(|stamp| shown(&stamp));
+    Ok(Record::Clock(ClockObservation {
+        how: how(line)?,
+        shown: shown.ok_or_else(|| wrong("shown", &text.0))?,
+        at: reference(line)?,
+        place: place(line.place.as_ref())?,
+    }))
+}
+
+fn how(line: &Line<'_>) -> Result<How> {
+    let broadcast = understood("broadcast", line.broadcast.as_ref(), broadcast_named)?;
+    let Text(how) = needed(line.how.as_ref(), "how")?;
+    Ok(match &**how {
+        "set" => How::Set { broadcast },
+        "mark" => How::Mark { broadcast: needed(broadcast, "broadcast")? },
+        "query" => How::Query,
+        "event" => How::Event,
+        "hand" => How::Hand,
+        other => return Err(wrong("how", other)),
+    })
+}
+
+fn reference(line: &Line<'_>) -> Result<Reference> {
+    let Text(scale) = needed(line.scale.as_ref(), "scale")?;
+    match &**scale {
+        "host" => Ok(Reference::Host {
+            bound: Bound::new(line.lo_us.map(Moment::from_us), line.hi_us.map(Moment::from_us)),
+            reading: needed(line.host.as_ref().map(HostLine::reading).transpose()?, "host")?,
+        }),
+        "utc" => {
+            let (lo, hi) = (line.lo_us.map(Moment::from_us), line.hi_us.map(Moment::from_us));
+            Ok(Reference::Utc(Bound::new(lo, hi)))
+        }
+        other => Err(wrong("scale", other)),
+    }
+}
+
+fn place(line: Option<&PlaceLine<'_>>) -> Result<Place> {
+    line.map_or(Ok(Place::UNKNOWN), PlaceLine::place)
+}
+
+fn step(line: &Line<'_>) -> Result<Record> {
+    Ok(Record::Step(ClockStep {
+        place: place(line.place.as_ref())?,
+        reading: needed(line.host.as_ref(), "host")?.reading()?,
+    }))
+}
+
+fn watched(line: &Line<'_>) -> Result<Record> {
+    Ok(Record::Watched(Watched {
+        life: life_of(line)?,
+        from: needed(line.from.as_ref(), "from")?.reading()?,
+        to: needed(line.to.as_ref(), "to")?.reading()?,
+        through: needed(line.through, "through")?,
+    }))
+}

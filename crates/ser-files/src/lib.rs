@@ -1,0 +1,23 @@
+//! The records of evidence in files: what `ser-cli` writes, and what is made of it later.
+//!
+//! JSON lines ([`jsonl`]) hold every kind of record, and are written and read. CSV ([`csv`]) holds
+//! entries and gaps, and is read. A [`Source`] tells the two apart by their content and yields
+//! [`Told`](ser_evidence::record::Told) items, one after the other.
+//!
+//! Files come from outside. Whatever is in them, reading ends, and needs memory for one line. A
+//! damaged line is an error with its number, and the lines after it can still be read.
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
+)]
+
+pub mod csv;
+mod error;
+pub mod jsonl;
+mod lines;
+mod source;
+mod stamp;
+
+pub use error::{Problem, ReadError};
+pub use lines::MAX_LINE_LEN;
+pub use source::Source;

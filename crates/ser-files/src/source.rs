@@ -1,0 +1,78 @@
+//! A file of records, in whichever format.
+
+use std::io::{self, BufRead, Chain, Cursor, Read};
+
+use ser_evidence::record::Told;
+
+use crate::error::{Problem, ReadError};
+use crate::lines::MAX_LINE_LEN;
+use crate::{csv, jsonl};
+
+/// A file whose first bytes were looked at.
+type Input<R> = Chain<Cursor<Vec<u8>>, R>;
+
+/// Reads the records of a file, JSON lines or CSV. After an error in one line it goes on with the
+/// next.
+pub struct Source<R> {
+    reader: Reader<Input<R>>,
+}
+
+enum Reader<R> {
+    Jsonl(Box<jsonl::Reader<R>>),
+    Csv(Box<csv::Reader<R>>),
+    /// An empty file holds no records, and says so in any format.
+    Nothing,
+}
+
+impl<R: BufRead> Source<R> {
+    /// Looks at the beginning of `input`, whatever its name is. `recorder` is the name of the
+    /// recorder where the file does not say it: the stem of the file's name, if nobody knows
+    /// better.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or is neither JSON lines nor CSV of ours.
+    pub fn new(mut input: R, recorder: &str) -> Result<Source<R>, ReadError> {
+        let first = first_line(&mut input).map_err(|error| ReadError::at(1, Problem::Io(error)))?;
+        let line = first.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&first).trim_ascii_start();
+        let kind = line.first().copied();
+        let is_csv = csv::is_header(line);
+        let input = Cursor::new(first).chain(input);
+        let reader = match kind {
+            None => Reader::Nothing,
+            Some(b'{') => Reader::Jsonl(Box::new(jsonl::Reader::new(input, recorder))),
+            Some(_) if is_csv => Reader::Csv(Box::new(csv::Reader::new(input, recorder))),
+            Some(_) => return Err(ReadError::at(1, Problem::NotOurs)),
+        };
+        Ok(Source { reader })
+    }
+
+    /// The program that wrote the file, as it calls itself, if it has said so by now.
+    #[must_use]
+    pub fn program(&self) -> Option<&str> {
+        match &self.reader {
+            Reader::Jsonl(reader) => reader.program(),
+            Reader::Csv(_) | Reader::Nothing => None,
+        }
+    }
+}
+
+impl<R: BufRead> Iterator for Source<R> {
+    type Item = Result<Told, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match &mut self.reader {
+            Reader::Jsonl(reader) => reader.next(),
+            Reader::Csv(reader) => reader.next(),
+            Reader::Nothing => None,
+        }
+    }
+}
+
+/// The first line that is not empty, with the empty ones before it.
+fn first_line(input: &mut impl BufRead) -> io::Result<Vec<u8>> {
+    let limit = u64::try_from(MAX_LINE_LEN).unwrap_or(u64::MAX);
+    let mut input = input.take(limit);
+    let mut first = Vec::new();
+    while first.trim_ascii().is_empty() && input.read_until(b'\n', &mut first)? > 0 {}
+    Ok(first)
+}

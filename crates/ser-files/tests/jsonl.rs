@@ -1,0 +1,294 @@
+//! JSON lines: what is written is read again, and what is wrong is named where it is.
+
+use proptest::prelude::*;
+use ser_evidence::record::{
+    Boot, ClockObservation, ClockStep, EntryRecord, Gap, HostReading, How, Life, LifeRecord, Lost,
+    Place, Record, Reference, Told, Watched, Why,
+};
+use ser_evidence::time::{Bound, Moment, Scale};
+use ser_files::jsonl::{Reader, SCHEMA, Writer};
+use ser_files::{MAX_LINE_LEN, Problem, ReadError};
+use ser_proto::{Entry, Inputs, Model, TimeStamp};
+
+const TRIP: TimeStamp =
+    TimeStamp { year: 26, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 250 };
+
+fn any_entry() -> impl Strategy<Value = Entry> {
+    let fields = any::<(u8, u8, u8, u8, u8, u8, u16)>();
+    (any::<u32>(), any::<u32>(), fields).prop_map(|(changed, state, fields)| {
+        let (year, month, day, hour, minute, second, millisecond) = fields;
+        let time = TimeStamp { year, month, day, hour, minute, second, millisecond };
+        Entry { changed: Inputs(changed), state: Inputs(state), time }
+    })
+}
+
+fn any_life() -> impl Strategy<Value = Life> {
+    any::<u64>().prop_map(Life::from_bits)
+}
+
+fn any_reading() -> impl Strategy<Value = HostReading> {
+    any::<(u128, i64, i64, Option<u64>)>().prop_map(|(boot, monotonic, utc, utc_doubt_us)| {
+        let (monotonic, utc) = (Moment::from_us(monotonic), Moment::from_us(utc));
+        HostReading { boot: Boot(boot), monotonic, utc, utc_doubt_us }
+    })
+}
+
+fn any_bound<S: Scale>() -> impl Strategy<Value = Bound<S>> {
+    any::<(Option<i64>, Option<i64>)>()
+        .prop_map(|(lo, hi)| Bound::new(lo.map(Moment::from_us), hi.map(Moment::from_us)))
+}
+
+fn any_place() -> impl Strategy<Value = Place> {
+    let newest = proptest::option::of(any_entry());
+    (any_life(), any::<Option<u64>>(), any::<Option<u64>>(), newest)
+        .prop_map(|(life, after, before, newest)| Place { life, after, before, newest })
+}
+
+fn any_how() -> impl Strategy<Value = How> {
+    prop_oneof![
+        any::<Option<u64>>().prop_map(|broadcast| How::Set { broadcast }),
+        any::<u64>().prop_map(|broadcast| How::Mark { broadcast }),
+        Just(How::Query),
+        Just(How::Event),
+        Just(How::Hand),
+    ]
+}
+
+fn any_model() -> impl Strategy<Value = Option<Model>> {
+    prop_oneof![Just(None), Just(Some(Model::Ser160)), Just(Some(Model::Ser320))]
+}
+
+fn any_clock() -> impl Strategy<Value = Record> {
+    let at = prop_oneof![
+        (any_bound(), any_reading())
+            .prop_map(|(bound, reading)| Reference::Host { bound, reading }),
+        any_bound().prop_map(Reference::Utc),
+    ];
+    let shown_ms = 0..ser_evidence::time::CENTURY_US / 1000;
+    (any_how(), shown_ms, at, any_place()).prop_map(|(how, ms, at, place)| {
+        Record::Clock(ClockObservation { how, shown: Moment::from_us(ms * 1000), at, place })
+    })
+}
+
+fn any_gap() -> impl Strategy<Value = Record> {
+    let lost = prop_oneof![
+        any::<u32>().prop_map(Lost::Exactly),
+        any::<u32>().prop_map(Lost::AtLeast),
+        Just(Lost::Unknown),
+    ];
+    let why = prop_oneof![
+        Just(Why::Overwritten),
+        Just(Why::LogBeganAnew),
+        any::<u32>().prop_map(Why::NotRecorded),
+        Just(Why::NotReached),
+    ];
+    (any_life(), any::<Option<u64>>(), lost, why)
+        .prop_map(|(life, after, lost, why)| Record::Gap(Gap { life, after, lost, why }))
+}
+
+fn any_record() -> impl Strategy<Value = Record> {
+    let entry = (any_life(), any::<(Option<u64>, u16, u32)>(), any_entry());
+    let erased = proptest::option::of(any_life());
+    let life = (any_life(), any::<(bool, Option<u16>)>(), any_model(), erased);
+    prop_oneof![
+        entry.prop_map(|(life, (sequence, number, known), entry)| {
+            let known = Inputs(known);
+            Record::Entry(EntryRecord { life, sequence, number, entry, known })
+        }),
+        any_gap(),
+        any_clock(),
+        (any_place(), any_reading())
+            .prop_map(|(place, reading)| Record::Step(ClockStep { place, reading })),
+        life.prop_map(|(life, (is_exact, size), model, erased)| {
+            Record::Life(LifeRecord { life, is_exact, model, size, erased })
+        }),
+        (any_life(), any_reading(), any_reading(), any::<u64>()).prop_map(
+            |(life, from, to, through)| Record::Watched(Watched { life, from, to, through })
+        ),
+    ]
+}
+
+fn read(text: &str) -> Vec<Result<Told, ReadError>> {
+    Reader::new(text.as_bytes(), "the stem").collect()
+}
+
+proptest! {
+    #[test]
+    fn every_record_is_read_as_it_is_written(
+        all in proptest::collection::vec((any::<String>(), any_record()), 1..8),
+    ) {
+        let mut text = Vec::new();
+        let mut writer = Writer::new(&mut text);
+        writer.file("ser-cli 0.1.0").unwrap();
+        for (recorder, record) in &all {
+            writer.record(recorder, record).unwrap();
+        }
+        let text = String::from_utf8(text).unwrap();
+        prop_assert_eq!(text.lines().count(), 1 + all.len(), "a line each");
+        let told: Vec<_> = read(&text).into_iter().map(Result::unwrap).collect();
+        let all: Vec<_> =
+            all.into_iter().map(|(recorder, record)| Told { recorder, record }).collect();
+        prop_assert_eq!(told, all);
+    }
+
+    #[test]
+    fn nothing_that_is_in_a_file_is_too_much(
+        text in proptest::collection::vec(any::<u8>(), 0..300),
+    ) {
+        Reader::new(&text[..], "").for_each(drop);
+    }
+}
+
+fn entry_record() -> EntryRecord {
+    let entry = Entry { changed: Inputs(0b100), state: Inputs(0b1_0000_0100), time: TRIP };
+    EntryRecord {
+        life: Life::from_name("9f3c5a7e21b04d68").unwrap(),
+        sequence: Some(120),
+        number: 17,
+        entry,
+        known: EntryRecord::ALL_KNOWN,
+    }
+}
+
+fn problem(line: &str) -> String {
+    let read = read(line);
+    let [Err(error)] = &read[..] else { panic!("{read:?}") };
+    error.to_string()
+}
+
+#[test]
+fn the_lines_of_the_manual_are_written() {
+    let mut text = Vec::new();
+    let mut writer = Writer::new(&mut text);
+    writer.file("ser-cli 0.1.0").unwrap();
+    writer.entry("U1", &entry_record(), Some("the clock went back")).unwrap();
+    let life = entry_record().life;
+    let gap = Gap { life, after: Some(120), lost: Lost::Exactly(37), why: Why::Overwritten };
+    writer.record("U1", &Record::Gap(gap)).unwrap();
+    let text = String::from_utf8(text).unwrap();
+    let lines: Vec<_> = text.lines().collect();
+    assert_eq!(
+        lines,
+        [
+            r#"{"record":"file","schema":1,"program":"ser-cli 0.1.0"}"#,
+            r#"{"record":"entry","recorder":"U1","entry":17,"time":"2026-11-22T10:00:00.250","changed":[3],"state":[3,9],"sequence":120,"life":"9f3c5a7e21b04d68","note":"the clock went back"}"#,
+            r#"{"record":"gap","recorder":"U1","lost":37,"count":"exactly","after":120,"why":"overwritten","life":"9f3c5a7e21b04d68"}"#,
+        ]
+    );
+}
+
+#[test]
+fn lines_of_before_records_had_names_are_read() {
+    let text = concat!(
+        r#"{"entry":17,"time":"2026-11-22T10:00:00.250","changed":[3],"state":[3,9],"#,
+        r#""sequence":120,"life":"9f3c5a7e21b04d68"}"#,
+        "\n",
+        r#"{"lost":null,"count":"unknown","after":120,"why":"not recorded","inputs":[1,3],"#,
+        r#""life":"9f3c5a7e21b04d68"}"#,
+        "\n",
+    );
+    let told: Vec<_> = read(text).into_iter().map(Result::unwrap).collect();
+    let life = entry_record().life;
+    let why = Why::NotRecorded(0b101);
+    let records = [
+        Record::Entry(entry_record()),
+        Record::Gap(Gap { life, after: Some(120), lost: Lost::Unknown, why }),
+    ];
+    let recorder = || "the stem".to_owned();
+    assert_eq!(told, records.map(|record| Told { recorder: recorder(), record }));
+}
+
+#[test]
+fn what_a_later_program_adds_is_passed_over_and_what_it_changes_is_refused() {
+    let file =
+        |schema: u32| format!("{{\"record\":\"file\",\"schema\":{schema},\"more\":[{{}}]}}\n");
+    let entry = "{\"record\":\"entry\",\"recorder\":\"U1\",\"entry\":1,\
+                 \"time\":\"2026-11-22T10:00:00.250\",\"changed\":[3],\"state\":[3],\
+                 \"sequence\":1,\"life\":\"0\",\"colour\":\"red\"}\n";
+    assert!(read(&(file(SCHEMA) + entry)).iter().all(Result::is_ok));
+    let read = read(&(entry.to_owned() + &file(SCHEMA + 1) + entry));
+    let [Ok(_), Err(error)] = &read[..] else { panic!("{read:?}") };
+    assert!(matches!(error.problem, Problem::NewerSchema { schema } if schema == SCHEMA + 1));
+    assert!(!error.is_of_one_line());
+    assert_eq!(
+        error.to_string(),
+        "line 2: written by a later version (schema 2; this one reads up to 1)"
+    );
+}
+
+#[test]
+fn an_unknown_kind_of_record_is_an_error_because_it_may_be_evidence() {
+    assert_eq!(problem(r#"{"record":"trip"}"#), "line 1: there is no record `trip`");
+    assert_eq!(
+        problem(r#"{"recorder":"U1"}"#),
+        "line 1: neither `record` nor `entry` nor `lost` says what this is"
+    );
+}
+
+#[test]
+fn a_damaged_line_is_named_and_those_around_it_are_read() {
+    let mut text = Vec::new();
+    Writer::new(&mut text).record("U1", &Record::Entry(entry_record())).unwrap();
+    let good = String::from_utf8(text).unwrap();
+    let torn = &good[..60];
+    let read = read(&format!("{good}{torn}\n{good}"));
+    let [Ok(_), Err(error), Ok(_)] = &read[..] else { panic!("{read:?}") };
+    assert_eq!((error.line, error.byte), (2, Some(60)));
+    assert!(error.is_of_one_line());
+    assert!(error.to_string().starts_with("line 2, byte 60: EOF while parsing"), "{error}");
+}
+
+#[test]
+fn every_field_is_checked() {
+    let entry = |time: &str, changed: &str, life: &str| {
+        format!(
+            "{{\"entry\":1,\"time\":\"{time}\",\"changed\":{changed},\"state\":[],\
+             \"life\":\"{life}\"}}"
+        )
+    };
+    let noon = "2026-11-22T12:00:00.000";
+    for (line, what) in [
+        (entry("noon", "[]", "0"), "`time` cannot be `noon`"),
+        (entry(noon, "[33]", "0"), "there is no input 33"),
+        (entry(noon, "[0]", "0"), "there is no input 0"),
+        (entry(noon, "[]", "x"), "`life` cannot be `x`"),
+        (r#"{"entry":70000}"#.to_owned(), "invalid value: integer `70000`"),
+        (r#"{"entry":1}"#.to_owned(), "`time` is missing"),
+        (r#"{"entry":1,"entry":1}"#.to_owned(), "duplicate field `entry`"),
+        (r#"{"record":"file"}"#.to_owned(), "`schema` is missing"),
+        (r#"{"record":"gap","count":"some"}"#.to_owned(), "`count` cannot be `some`"),
+        (r#"{"record":"gap","count":"exactly"}"#.to_owned(), "`lost` is missing"),
+        (
+            r#"{"record":"gap","count":"unknown","why":"not recorded"}"#.to_owned(),
+            "`inputs` is missing",
+        ),
+        (
+            r#"{"record":"clock","how":"query","shown":"2026-02-29T00:00:00.000"}"#.to_owned(),
+            "`shown` cannot be",
+        ),
+        (r#"["entry","U1"]"#.to_owned(), "this is no object"),
+    ] {
+        assert!(problem(&line).contains(what), "{line}: {}", problem(&line));
+    }
+}
+
+#[test]
+fn what_is_quoted_of_a_file_is_short() {
+    let long = "x".repeat(MAX_LINE_LEN - 50);
+    assert!(problem(&format!("{{\"record\":\"{long}\"}}")).len() < 100);
+    assert!(problem(&format!("{{\"record\":\"{long}")).len() < 200);
+    assert!(problem(&"x".repeat(2 * MAX_LINE_LEN)).ends_with("longer than 65536 bytes"));
+}
+
+#[test]
+fn a_clock_that_shows_no_stamp_cannot_be_written() {
+    let clock = ClockObservation {
+        how: How::Query,
+        shown: Moment::from_us(1),
+        at: Reference::Utc(Bound::UNKNOWN),
+        place: Place::UNKNOWN,
+    };
+    let mut text = Vec::new();
+    assert!(Writer::new(&mut text).record("U1", &Record::Clock(clock)).is_err());
+    assert!(text.is_empty(), "no half of a line");
+}
