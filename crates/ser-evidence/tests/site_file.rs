@@ -185,10 +185,15 @@ fn hostile_names_are_refused_and_shown_harmlessly() {
             "{name:?}"
         );
     }
-    let unknown = with("[[point]]\nrecorder = \"x\"\n[[recorder]]\nname = \"A\"")
-        .replace("\"x\"", r#""\u001B[2J\u202E\n""#);
-    let all = format!("{:?}", inspect(&unknown).diagnostics);
-    assert!(all.contains(r"`\\u{1b}[2J\\u{202e}\\n`"), "{all}");
+    let unknown = with(r#""\u001B[2J\u202E\n" = 1"#);
+    assert_eq!(told(&unknown), [r"unknown-key: unknown key `\u{1b}[2J\u{202e}\n` in the site"]);
+    let reference = with(
+        "[[recorder]]\nname = \"A\"\n[[point]]\ninput = 1\nname = \"x\"\nrecorder = \"\\u001B\"",
+    );
+    assert_eq!(
+        told(&reference),
+        ["hidden-character: `recorder` has a character that is not shown"]
+    );
 }
 
 #[test]

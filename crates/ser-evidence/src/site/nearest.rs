@@ -8,6 +8,9 @@ const LONGEST: usize = 200;
 /// Words that differ more than this are not proposed.
 const SIMILAR: f64 = 0.7;
 
+/// So many letters are enough for the beginning of a name.
+const BEGINNING: usize = 4;
+
 /// The candidate that is most like `word`, if one is like it at all.
 pub(super) fn nearest<'c>(
     word: &str,
@@ -23,7 +26,11 @@ pub(super) fn nearest<'c>(
         if !findings.may_compare(1) {
             break;
         }
-        let likeness = strsim::normalized_damerau_levenshtein(&folded, &candidate.to_lowercase());
+        let candidate_folded = candidate.to_lowercase();
+        let mut likeness = strsim::normalized_damerau_levenshtein(&folded, &candidate_folded);
+        if word.len() >= BEGINNING && candidate_folded.starts_with(&folded) {
+            likeness = likeness.max(SIMILAR);
+        }
         let is_better = best.is_none_or(|(before, _)| likeness > before);
         if candidate.len() <= LONGEST && likeness >= SIMILAR && is_better {
             best = Some((likeness, candidate));
@@ -37,7 +44,11 @@ mod tests {
     use super::*;
 
     fn of(word: &str) -> Option<&'static str> {
-        nearest(word, ["input", "inverted", "52-1 closed", "name"], &mut Findings::default())
+        nearest(
+            word,
+            ["input", "inverted", "52-1 closed", "name", "Relay trip output"],
+            &mut Findings::default(),
+        )
     }
 
     #[test]
@@ -45,6 +56,7 @@ mod tests {
         assert_eq!(of("inptu"), Some("input"));
         assert_eq!(of("INPUT"), Some("input"));
         assert_eq!(of("52-1 close"), Some("52-1 closed"));
+        assert_eq!(of("Relay trip"), Some("Relay trip output"));
         assert_eq!(of("colour"), None);
         assert_eq!(of(&"input".repeat(100)), None);
     }

@@ -55,7 +55,7 @@ fn what_it_is(letter: char) -> &'static str {
         '\t' => ", a tab",
         '\u{1B}' => ", an escape",
         letter if letter.is_control() => ", a control character",
-        letter if is_invisible(letter) => ", without width",
-        _ => ", which sets the direction of text",
+        letter if is_obeyed(letter) => ", which sets the direction of text",
+        _ => ", without width",
     }
 }

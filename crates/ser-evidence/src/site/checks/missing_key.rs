@@ -27,5 +27,5 @@ pub(in crate::site) fn found(
     (key, example): (&str, &str),
 ) {
     let diagnostic = Diagnostic::error(NAME, span, format!("{table} lacks the key `{key}`"));
-    findings.add(diagnostic.help(format!("add a line such as `{key} = {example}`")));
+    findings.add(diagnostic.help(format!("add it, as in `{key} = {example}`")));
 }

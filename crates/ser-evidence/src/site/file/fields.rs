@@ -8,7 +8,9 @@ use toml::de::{DeTable, DeValue};
 
 use super::kind::{self, Kind};
 use super::number;
-use crate::site::checks::{missing_key, out_of_range, too_fine, unknown_key, wrong_type};
+use crate::site::checks::{
+    hidden_character, missing_key, out_of_range, too_fine, unknown_key, wrong_type,
+};
 use crate::site::diagnostic::{Findings, Span};
 
 /// The most characters of a name.
@@ -110,11 +112,24 @@ impl<'t, 'f> Fields<'t, 'f> {
         let value = self.get(key)?;
         match value.get_ref() {
             DeValue::String(text) => Some(Spanned::new(value.span(), text.clone().into_owned())),
+            // Roles such as 86 look like numbers.
+            DeValue::Integer(number) if number.as_str().len() < 10 => {
+                self.wrong(key, value, "a text", &format!("\"{number}\""));
+                None
+            }
             _ => {
                 self.wrong(key, value, "a text", example);
                 None
             }
         }
+    }
+
+    /// A text that names something else in the file. It is not looked for if it has a character
+    /// that no name has.
+    pub(super) fn reference(&mut self, key: &str, example: &str) -> Option<Spanned<String>> {
+        let text = self.text(key, example)?;
+        let is_visible = hidden_character::passes(self.findings, &text.span(), key, text.get_ref());
+        is_visible.then_some(text)
     }
 
     /// A text that people read: of visible characters, not empty, and not too long.

@@ -101,7 +101,7 @@ fn owner(fields: &mut Fields<'_, '_>) -> Owner {
         head: fields.head(),
         what: fields.what(),
         is_named: fields.has("recorder"),
-        name: fields.text("recorder", "\"U1-SER1\""),
+        name: fields.reference("recorder", "\"U1-SER1\""),
     }
 }
 
@@ -124,11 +124,11 @@ fn point(fields: &mut Fields<'_, '_>) -> PointTable {
         name: fields.name("name", NAME, "\"52-1 closed\""),
         role: word(fields, "role", "\"52a\"", ROLES).map(Spanned::into_inner),
         equipment: fields.name("equipment", NAME, "\"52-1\"").map(Spanned::into_inner),
-        group: fields.text("group", "\"Feeder 1\""),
+        group: fields.reference("group", "\"Feeder 1\""),
         on: on.map(Spanned::into_inner),
         off: off.map(Spanned::into_inner),
         normal: word(fields, "normal", "\"on\"", STATES).map(Spanned::into_inner),
-        same_as: fields.text("same_as", "\"U1-SER2/52-1 closed\""),
+        same_as: fields.reference("same_as", "\"U1-SER2/52-1 closed\""),
         inverted: fields.switch("inverted"),
     }
 }
@@ -147,7 +147,7 @@ fn expect(fields: &mut Fields<'_, '_>) -> ExpectTable {
     fields.require("then", "\"52-1 closed off\"");
     fields.require("within_ms", "[15, 50]");
     let mut edge = |key| {
-        let text = fields.text(key, "\"52-1 closed off\"")?;
+        let text = fields.reference(key, "\"52-1 closed off\"")?;
         Some(EdgeText { key, text })
     };
     let (after, then) = (edge("after"), edge("then"));

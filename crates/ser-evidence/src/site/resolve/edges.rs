@@ -41,7 +41,9 @@ fn expectation(
 ) -> Option<Expectation> {
     let mut edge_of =
         |text: &Option<EdgeText>| text.as_ref().and_then(|text| edge(text, table, names, findings));
-    let (after, then) = (edge_of(&expect.after)?, edge_of(&expect.then)?);
+    // Both are looked at before either is given up.
+    let (after, then) = (edge_of(&expect.after), edge_of(&expect.then));
+    let (after, then) = (after?, then?);
     if after == then {
         let span = |text: &Option<EdgeText>| {
             text.as_ref().map(|text| text.text.span()).unwrap_or_default()
