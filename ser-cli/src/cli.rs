@@ -53,6 +53,7 @@ enum Command {
     Decode(commands::decode::Args),
     Encode(commands::encode::Args),
     CommReq(commands::comm_req::Args),
+    Site(commands::site::Args),
     Sim(commands::sim::Args),
     Demo(commands::demo::Args),
     Completions(commands::completions::Args),
@@ -129,6 +130,7 @@ impl Cli {
             Command::Decode(args) => commands::decode::run(args),
             Command::Encode(args) => commands::encode::run(args),
             Command::CommReq(args) => commands::comm_req::run(args),
+            Command::Site(args) => commands::site::run(args, connection),
             Command::Sim(args) => commands::sim::run(args),
             Command::Demo(args) => commands::demo::run(args),
             Command::Completions(args) => commands::completions::run(args, &mut Cli::definition()),
@@ -210,6 +212,10 @@ mod tests {
             "genius forces --node 32 --table input-values",
             "genius forces --node 5",
             "genius broadcast",
+            "site",
+            "site check",
+            "site show a.toml --format xml",
+            "site new -o a.toml b.toml",
             "sim --model ser640",
             "sim --genius /tmp/host",
             "sim --node 5",
@@ -238,10 +244,7 @@ mod tests {
     fn the_port_may_stand_on_either_side() {
         for words in [["ser-cli", "-p", "COM3", "status"], ["ser-cli", "status", "--port", "COM3"]]
         {
-            assert_eq!(
-                Cli::try_from_words(words).unwrap().connection.port.as_deref(),
-                Some("COM3")
-            );
+            assert_eq!(Cli::try_from_words(words).unwrap().connection.port, ["COM3"]);
         }
     }
 

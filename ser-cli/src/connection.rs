@@ -17,7 +17,7 @@ use crate::unit_name::UnitName;
 use crate::values;
 
 /// How to reach the recorder. Accepted before and after the subcommand.
-#[derive(Clone, Debug, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Connection")]
 pub(crate) struct ConnectionArgs {
     /// Serial port of the recorder (/dev/ttyUSB0, COM3), tcp://HOST:PORT, or geni:FILE?node=N on a
@@ -34,7 +34,7 @@ pub(crate) struct ConnectionArgs {
         hide_env_values = true,
         value_name = "PORT"
     )]
-    pub(crate) port: Option<String>,
+    pub(crate) port: Vec<String>,
 
     /// Rate of the serial port, 9600 if not given. Over TCP: rate of the terminal server's port,
     /// for `clock set` to allow for.
@@ -52,10 +52,28 @@ pub(crate) struct ConnectionArgs {
 
 /// The user's name for the recorder.
 pub(crate) fn port_text(connection: &ConnectionArgs) -> Result<&str> {
-    connection.port.as_deref().map(str::trim).filter(|port| !port.is_empty()).ok_or_else(no_port)
+    match ports(connection).as_slice() {
+        [] => Err(no_port()),
+        [port] => Ok(port),
+        [first, second, ..] => Err(Failure::usage(format!(
+            "one recorder at a time: --port is given twice, as {first} and as {second}"
+        ))
+        .hint("leave one out; only ser-cli site new takes several")),
+    }
 }
 
-fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint> {
+/// All ports that the user names.
+pub(crate) fn ports(connection: &ConnectionArgs) -> Vec<&str> {
+    connection.port.iter().map(|port| port.trim()).filter(|port| !port.is_empty()).collect()
+}
+
+/// How to reach the recorder at another port in the same way.
+pub(crate) fn at_port(connection: &ConnectionArgs, port: &str) -> ConnectionArgs {
+    ConnectionArgs { port: vec![port.to_owned()], ..connection.clone() }
+}
+
+/// What the port is.
+pub(crate) fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint> {
     use ser_client::EndpointError::{GeniFile, GeniNode, GeniOffset, GeniQuery};
     port_text(connection)?.parse().map_err(|error| {
         Failure::usage(format!("--port: {error}")).hint(match error {
@@ -293,10 +311,9 @@ mod tests {
 
     fn opened(port: Option<&str>) -> Failure {
         let connection = ConnectionArgs {
-            port: port.map(str::to_string),
+            port: port.map(str::to_string).into_iter().collect(),
             baud: Some(Baud::B9600),
-            timeout: None,
-            retries: None,
+            ..ConnectionArgs::default()
         };
         open(&connection).err().expect("there is no such unit")
     }
@@ -311,6 +328,14 @@ mod tests {
                 "{text}"
             );
         }
+    }
+
+    #[test]
+    fn two_ports_are_one_too_many() {
+        let port = ["a", "b"].map(str::to_owned).to_vec();
+        let connection = ConnectionArgs { port, ..ConnectionArgs::default() };
+        let failure = open(&connection).err().expect("one at a time");
+        assert!(failure.is_usage() && failure.text().contains("as a and as b"));
     }
 
     #[test]

@@ -15,6 +15,7 @@ mod keeper;
 mod outage;
 mod output;
 mod progress;
+mod site_file;
 mod state;
 mod time;
 mod unit_name;

@@ -66,7 +66,8 @@ impl<W: Write> Write for Filter<W> {
 }
 
 /// Whether a terminal does something about this character instead of showing it.
-fn is_obeyed(letter: char) -> bool {
+#[must_use]
+pub fn is_obeyed(letter: char) -> bool {
     letter.is_control()
         || matches!(
             letter,

@@ -11,4 +11,4 @@ mod harmless;
 
 #[cfg(feature = "arguments")]
 pub use arguments::{explain, print, unwritten};
-pub use harmless::Harmless;
+pub use harmless::{Harmless, is_obeyed};

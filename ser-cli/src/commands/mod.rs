@@ -16,5 +16,6 @@ pub(crate) mod print;
 pub(crate) mod read;
 pub(crate) mod recording;
 pub(crate) mod sim;
+pub(crate) mod site;
 pub(crate) mod status;
 pub(crate) mod watch;

@@ -3,6 +3,7 @@
 use jiff::tz::TimeZone;
 use ser_proto::Model;
 
+use super::digest::SiteDigest;
 use crate::time::{Moment, Shown, Utc};
 
 /// A site. Everything in it is consistent: indices lead somewhere, ranges are the right way round.
@@ -10,6 +11,8 @@ use crate::time::{Moment, Shown, Utc};
 pub struct Site {
     /// Its name.
     pub name: String,
+    /// The digest of the file that it was read from.
+    pub digest: Option<SiteDigest>,
     /// The zone in which people read times.
     pub time_zone: TimeZone,
     /// How far this host's clock may be from UTC, where the operating system does not know:
@@ -250,6 +253,7 @@ impl Site {
     pub fn unknown() -> Site {
         Site {
             name: String::new(),
+            digest: None,
             time_zone: TimeZone::UTC,
             utc_doubt_us: None,
             recorders: Vec::new(),

@@ -1,0 +1,288 @@
+//! A site as tables for people.
+
+use std::io::{self, Write};
+
+use ser_console::Harmless;
+use ser_evidence::site::{
+    ClockRule, Delays, Edge, Point, PointId, Recorder, RecorderId, Role, Site,
+};
+use unicode_width::UnicodeWidthStr;
+
+use crate::output::Palette;
+use crate::site_file::{model_name, role_name};
+
+/// Writes all tables that have rows.
+pub(super) fn write(out: &mut dyn Write, site: &Site, palette: Palette) -> io::Result<()> {
+    let zone = site.time_zone.iana_name().unwrap_or("UTC");
+    writeln!(out, "{}, {zone}", harmless(&site.name))?;
+    if let Some(us) = site.utc_doubt_us {
+        writeln!(out, "this computer is within {} of UTC", milliseconds(us.into()))?;
+    }
+    let tables = [recorders(site)].into_iter().chain(points(site)).chain([
+        expectations(site),
+        observations(site),
+        shifts(site),
+    ]);
+    for table in tables.filter(|table| !table.rows.is_empty()) {
+        writeln!(out)?;
+        table.write(out, palette)?;
+    }
+    Ok(())
+}
+
+/// A table, whose first row are the titles of its columns.
+struct Table {
+    title: Option<String>,
+    columns: Vec<&'static str>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// Columns that are empty are left out.
+    fn write(&self, out: &mut dyn Write, palette: Palette) -> io::Result<()> {
+        if let Some(title) = &self.title {
+            writeln!(out, "{title}")?;
+        }
+        let cell = |row: &[String], column: usize| row.get(column).map_or(0, |cell| cell.width());
+        let widths: Vec<(usize, usize)> = (0..self.columns.len())
+            .filter_map(|column| {
+                let width = self.rows.iter().map(|row| cell(row, column)).max();
+                let width = width.filter(|&width| width > 0)?;
+                let title = self.columns.get(column).map_or(0, |title| title.width());
+                Some((column, width.max(title)))
+            })
+            .collect();
+        let titles: Vec<String> = self.columns.iter().map(|&title| title.to_owned()).collect();
+        let style = palette.title;
+        writeln!(out, "{style}{}{style:#}", line(&titles, &widths))?;
+        self.rows.iter().try_for_each(|row| writeln!(out, "{}", line(row, &widths)))
+    }
+}
+
+fn line(row: &[String], widths: &[(usize, usize)]) -> String {
+    let mut line = String::new();
+    for (column, width) in widths {
+        let cell = row.get(*column).map_or("", String::as_str);
+        line += cell;
+        line.extend(std::iter::repeat_n(' ', (width + 2).saturating_sub(cell.width())));
+    }
+    line.trim_end().to_owned()
+}
+
+fn recorders(site: &Site) -> Table {
+    let row = |recorder: &Recorder| {
+        let Recorder { name, port, model, log_size, is_original, clock, .. } = recorder;
+        vec![
+            harmless(name),
+            port.as_deref().map(harmless).unwrap_or_default(),
+            model.map_or("", model_name).to_owned(),
+            if *is_original { "original".to_owned() } else { String::new() },
+            log_size.map(|size| size.to_string()).unwrap_or_default(),
+            clock_name(*clock),
+            format!("{} ppm", thousandths(recorder.drift_ppb.into())),
+            delays(recorder.delays),
+        ]
+    };
+    Table {
+        title: None,
+        columns: vec!["recorder", "port", "model", "", "log", "clock", "drift", "delays"],
+        rows: site.recorders.iter().map(row).collect(),
+    }
+}
+
+/// A table for each recorder that has points.
+fn points(site: &Site) -> Vec<Table> {
+    let of = |index: usize, recorder: &Recorder| {
+        let here = site.points.iter().filter(|point| point.recorder == RecorderId(index));
+        let mut here: Vec<&Point> = here.collect();
+        here.sort_by_key(|point| point.input);
+        Table {
+            title: Some(format!("points of {}", harmless(&recorder.name))),
+            columns: vec![
+                "input",
+                "name",
+                "role",
+                "equipment",
+                "on",
+                "off",
+                "normal",
+                "group",
+                "same as",
+            ],
+            rows: here.into_iter().map(|point| point_row(site, point)).collect(),
+        }
+    };
+    site.recorders.iter().enumerate().map(|(index, recorder)| of(index, recorder)).collect()
+}
+
+fn point_row(site: &Site, point: &Point) -> Vec<String> {
+    let group = point.group.and_then(|group| site.groups.get(group.0));
+    let group = group.map(|group| match group.first_out {
+        true => format!("{}, first-out", harmless(&group.name)),
+        false => harmless(&group.name),
+    });
+    let same_as = point.same_as.map(|other| match point.inverted {
+        true => format!("{}, inverted", full_name(site, other)),
+        false => full_name(site, other),
+    });
+    let normal = point.normal.map(|on| if on { &point.on } else { &point.off });
+    vec![
+        format!("{:>5}", point.input),
+        harmless(&point.name),
+        point.role.map_or("", |role: Role| role_name(role)).to_owned(),
+        point.equipment.as_deref().map(harmless).unwrap_or_default(),
+        harmless(&point.on),
+        harmless(&point.off),
+        normal.map(|text| harmless(text)).unwrap_or_default(),
+        group.unwrap_or_default(),
+        same_as.unwrap_or_default(),
+    ]
+}
+
+fn expectations(site: &Site) -> Table {
+    let rows = site.expectations.iter().map(|expect| {
+        let (earliest, latest) = expect.within_us;
+        vec![
+            harmless(&expect.name),
+            edge(site, expect.after),
+            edge(site, expect.then),
+            format!("{} to {} ms", thousandths(earliest), thousandths(latest)),
+        ]
+    });
+    Table {
+        title: None,
+        columns: vec!["expected", "after", "then", "within"],
+        rows: rows.collect(),
+    }
+}
+
+fn observations(site: &Site) -> Table {
+    let rows = site.observations.iter().map(|seen| {
+        vec![
+            recorder_name(site, seen.recorder),
+            utc(seen.host_time.us()),
+            shown(seen.unit_time.us()),
+            milliseconds(seen.doubt_us.into()),
+        ]
+    });
+    let columns = vec!["clock of", "seen at", "showed", "within"];
+    Table { title: None, columns, rows: rows.collect() }
+}
+
+fn shifts(site: &Site) -> Table {
+    let rows = site.shifts.iter().map(|shift| {
+        vec![
+            recorder_name(site, shift.recorder),
+            milliseconds(shift.us.into()),
+            utc(shift.from.us()),
+            utc(shift.to.us()),
+            harmless(&shift.why),
+        ]
+    });
+    Table { title: None, columns: vec!["shifted", "by", "from", "to", "why"], rows: rows.collect() }
+}
+
+/// A change as the file has it, with the recorder, and with the text of the state.
+fn edge(site: &Site, Edge { point, on }: Edge) -> String {
+    let text = site.points.get(point.0).map(|point| if on { &point.on } else { &point.off });
+    format!("{} {}", full_name(site, point), text.map(|text| harmless(text)).unwrap_or_default())
+}
+
+fn full_name(site: &Site, point: PointId) -> String {
+    let Some(point) = site.points.get(point.0) else { return String::new() };
+    match site.recorders.len() {
+        1 => harmless(&point.name),
+        _ => format!("{}/{}", recorder_name(site, point.recorder), harmless(&point.name)),
+    }
+}
+
+fn recorder_name(site: &Site, recorder: RecorderId) -> String {
+    site.recorders.get(recorder.0).map(|recorder| harmless(&recorder.name)).unwrap_or_default()
+}
+
+fn clock_name(clock: ClockRule) -> String {
+    match clock {
+        ClockRule::Utc => "UTC".to_owned(),
+        ClockRule::Local => "local".to_owned(),
+        ClockRule::Offset(seconds) => {
+            let sign = if seconds < 0 { '-' } else { '+' };
+            let minutes = seconds.unsigned_abs() / 60;
+            format!("{sign}{:02}:{:02}", minutes / 60, minutes % 60)
+        }
+    }
+}
+
+fn delays(delays: Delays) -> String {
+    let range = |(shortest, longest): (u32, u32)| {
+        format!("{} to {}", thousandths(shortest.into()), thousandths(longest.into()))
+    };
+    let Delays { closing_us, opening_us } = delays;
+    format!("closing {}, opening {} ms", range(closing_us), range(opening_us))
+}
+
+fn milliseconds(us: i128) -> String {
+    match i64::try_from(us) {
+        Ok(us) => format!("{} ms", thousandths(us)),
+        Err(_) => String::new(),
+    }
+}
+
+/// A number in thousandths with its decimals, as few as there are.
+fn thousandths(number: i64) -> String {
+    let sign = if number < 0 { "-" } else { "" };
+    let number = number.unsigned_abs();
+    let text = format!("{sign}{}.{:03}", number / 1000, number % 1000);
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+fn utc(us: i64) -> String {
+    jiff::Timestamp::from_microsecond(us).map(|time| time.to_string()).unwrap_or_default()
+}
+
+/// What a clock showed: it has milliseconds and no zone.
+fn shown(us: i64) -> String {
+    let time = jiff::Timestamp::from_microsecond(us).map(|time| format!("{time:.3}"));
+    time.unwrap_or_default().trim_end_matches('Z').to_owned()
+}
+
+fn harmless(text: &str) -> String {
+    Harmless(text).line()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NORTHFIELD: &str =
+        include_str!("../../../../../crates/ser-evidence/tests/northfield.toml");
+
+    #[test]
+    fn a_site_is_shown_as_tables() {
+        let site = ser_evidence::site::read(NORTHFIELD).unwrap();
+        let mut out = Vec::new();
+        write(&mut out, &site, Palette::plain()).unwrap();
+        assert_eq!(String::from_utf8(out).unwrap(), include_str!("northfield.txt"));
+    }
+
+    #[test]
+    fn columns_are_as_wide_as_their_letters() {
+        let table = Table {
+            title: None,
+            columns: vec!["name", "empty", "on"],
+            rows: vec![
+                vec!["遮断器".to_owned(), String::new(), "入".to_owned()],
+                vec!["52-1".to_owned(), String::new(), "x".to_owned()],
+            ],
+        };
+        let mut out = Vec::new();
+        table.write(&mut out, Palette::plain()).unwrap();
+        assert_eq!(String::from_utf8(out).unwrap(), "name    on\n遮断器  入\n52-1    x\n");
+    }
+
+    #[test]
+    fn numbers_have_the_decimals_that_they_need() {
+        for (number, text) in [(0, "0"), (10, "0.01"), (50_500, "50.5"), (-250_000, "-250")] {
+            assert_eq!(thousandths(number), text);
+        }
+    }
+}
