@@ -106,17 +106,17 @@ impl Collector {
 
 impl Collected {
     fn add_entry(&mut self, record: &EntryRecord) {
-        let EntryRecord { life, sequence, number, entry } = *record;
+        let EntryRecord { life, sequence, number, entry, known } = *record;
         match sequence {
             Some(sequence) if life.is_known() => {
-                self.lives.entry(life).or_default().push(Held { sequence, entry, number });
+                self.lives.entry(life).or_default().push(Held { sequence, entry, number, known });
             }
             _ => self.add_unnamed(sequence, number, record),
         }
     }
 
     fn add_unnamed(&mut self, sequence: Option<u64>, number: u16, record: &EntryRecord) {
-        let entry = record.entry;
+        let EntryRecord { entry, known, .. } = *record;
         let is_by_number = sequence.is_none();
         let continues = |segment: &&mut Segment| {
             let last = segment.entries.last().map_or(0, |held| held.sequence);
@@ -131,11 +131,11 @@ impl Collected {
             Some(segment) => {
                 let next = segment.entries.last().map_or(1, |held| held.sequence + 1);
                 let sequence = sequence.unwrap_or(next);
-                segment.entries.push(Held { sequence, entry, number });
+                segment.entries.push(Held { sequence, entry, number, known });
             }
             None => {
                 let sequence = sequence.unwrap_or(1);
-                let entries = vec![Held { sequence, entry, number }];
+                let entries = vec![Held { sequence, entry, number, known }];
                 self.unnamed.push(Segment { entries, is_by_number });
             }
         }

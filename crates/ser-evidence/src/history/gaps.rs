@@ -76,7 +76,8 @@ pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps) -> Vec<LogGap> {
 
 /// Inputs that changed between neighbours without a record.
 fn unrecorded(before: &Held, after: &Held) -> Option<u32> {
-    let inputs = before.entry.state.0 ^ after.entry.changed.0 ^ after.entry.state.0;
+    let known = before.known.0 & after.known.0;
+    let inputs = (before.entry.state.0 ^ after.entry.changed.0 ^ after.entry.state.0) & known;
     (inputs != 0).then_some(inputs)
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use ser_proto::Entry;
+use ser_proto::{Inputs, TimeStamp};
 
 use super::{Conflict, Held, LifeHistory};
 use crate::record::Life;
@@ -59,10 +59,10 @@ pub(super) fn lives(
 }
 
 /// Everything that distinguishes entries, in an order.
-fn key(held: &Held) -> (u64, i64, u32, u32, u16) {
-    let Held { sequence, entry, number } = held;
+fn key(held: &Held) -> (u64, i64, u32, u32, u16, u32) {
+    let Held { sequence, entry, number, known } = held;
     let at = shown(&entry.time).map_or(i64::MIN, crate::time::Moment::us);
-    (*sequence, at, entry.changed.0, entry.state.0, *number)
+    (*sequence, at, entry.changed.0, entry.state.0, *number, known.0)
 }
 
 /// Sorts the entries and keeps one for each sequence: the same one whatever their order was.
@@ -73,12 +73,15 @@ fn tidy(life: &mut LifeHistory, conflicts: &mut Vec<Conflict>) {
     let name = life.name();
     life.entries.dedup_by(|later, kept| {
         let is_same_place = later.sequence == kept.sequence;
-        if is_same_place && later.entry != kept.entry {
+        if is_same_place && !later.agrees(kept) {
             let (sequence, shown, other) = (kept.sequence, kept.entry, later.entry);
             let conflict = Conflict { life: name, sequence, shown, other };
             if !conflicts.contains(&conflict) {
                 conflicts.push(conflict);
             }
+        } else if is_same_place && kept.known.0 & !later.known.0 == 0 {
+            // It knows at least as much.
+            *kept = *later;
         }
         is_same_place
     });
@@ -93,11 +96,7 @@ fn joins_any(
     if segment.is_by_number {
         return false;
     }
-    let contents: HashMap<(u64, Entry), u64> = segment
-        .entries
-        .iter()
-        .map(|held| ((held.sequence % WRAP, held.entry), held.sequence))
-        .collect();
+    let contents: Contents = segment.entries.iter().map(|held| (content(held), *held)).collect();
     for life in lives.iter_mut().filter(|life| !life.is_by_number) {
         let Some(shift) = common_shift(life, &contents) else { continue };
         let moved = |held: &Held| {
@@ -105,7 +104,7 @@ fn joins_any(
         };
         let contradicts = |held: &Held| {
             let moved = moved(held)?;
-            life.entry(moved.sequence).filter(|known| known.entry != moved.entry)
+            life.entry(moved.sequence).filter(|known| !known.agrees(&moved))
         };
         if segment.entries.iter().any(|held| contradicts(held).is_some()) {
             continue;
@@ -117,10 +116,17 @@ fn joins_any(
     false
 }
 
+/// Entries of a segment by what is always known of them.
+type Contents = HashMap<(u64, TimeStamp, Inputs), Held>;
+
+fn content(held: &Held) -> (u64, TimeStamp, Inputs) {
+    (held.sequence % WRAP, held.entry.time, held.entry.changed)
+}
+
 /// What has to be added to a segment's sequences so that an entry of it is one of the life's.
-fn common_shift(life: &LifeHistory, contents: &HashMap<(u64, Entry), u64>) -> Option<i64> {
+fn common_shift(life: &LifeHistory, contents: &Contents) -> Option<i64> {
     life.entries.iter().find_map(|held| {
-        let sequence = contents.get(&(held.sequence % WRAP, held.entry))?;
-        i64::try_from(i128::from(held.sequence) - i128::from(*sequence)).ok()
+        let same = contents.get(&content(held)).filter(|same| same.agrees(held))?;
+        i64::try_from(i128::from(held.sequence) - i128::from(same.sequence)).ok()
     })
 }

@@ -8,7 +8,7 @@ mod collector;
 mod gaps;
 mod join;
 
-use ser_proto::Entry;
+use ser_proto::{Entry, Inputs};
 
 pub use collector::Collector;
 pub use gaps::LogGap;
@@ -69,6 +69,19 @@ pub struct Held {
     pub entry: Entry,
     /// Its number in the ring.
     pub number: u16,
+    /// Inputs whose state is known: all, except in formats that show only what changed.
+    pub known: Inputs,
+}
+
+impl Held {
+    /// Whether two readings may be of the same entry: they agree in everything that both know.
+    #[must_use]
+    pub fn agrees(&self, other: &Held) -> bool {
+        let known = self.known.0 & other.known.0;
+        self.entry.time == other.entry.time
+            && self.entry.changed == other.entry.changed
+            && (self.entry.state.0 ^ other.entry.state.0) & known == 0
+    }
 }
 
 /// Two entries at one place.

@@ -48,12 +48,17 @@ pub(super) fn state_before(
     let recorder = points.recorder(described.recorder)?;
     let of_recorder = |event: &&EventId| event.recorder == recorder;
     if let Some(&first) = incident.events.iter().find(of_recorder) {
-        let entry = timeline.held(first)?.entry;
+        let held = timeline.held(first)?;
+        if !held.known.contains(described.input) {
+            return None;
+        }
+        let entry = held.entry;
         let changed = entry.changed.contains(described.input);
         return Some(entry.state.contains(described.input) != changed);
     }
     // Nothing happened there: it is as the last entry before left it.
     let begins = incident.events.first().and_then(|&first| timeline.sort_key(first))?;
     let last = timeline.last_before(recorder, begins)?;
-    Some(timeline.held(last)?.entry.state.contains(described.input))
+    let held = timeline.held(last)?;
+    held.known.contains(described.input).then(|| held.entry.state.contains(described.input))
 }
