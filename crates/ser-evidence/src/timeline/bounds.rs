@@ -3,10 +3,10 @@
 use super::{EventId, Timeline};
 use crate::clock::envelope::{NO_HI, NO_LO};
 use crate::clock::model::{ClockModel, LifeClock};
-use crate::clock::offsets::{RunClock, ends};
+use crate::clock::offsets::{RunClock, added, ends};
 use crate::clock::{Home, Nominal};
 use crate::history::{Held, LifeHistory, RecorderHistory};
-use crate::site::Site;
+use crate::site::{Shift, Site};
 use crate::time::{Bound, Moment, Shown, Utc, shown};
 
 /// What is known of the instants of all samples of a life.
@@ -18,6 +18,8 @@ pub(super) struct LifeBounds {
     stretches: Vec<Stretch>,
     /// By place: where the entry is in the list.
     keys: Vec<Key>,
+    /// By place: from here on, so many microseconds were added by hand.
+    shifts: Vec<(usize, i64)>,
 }
 
 /// Entries that follow each other and are known on the same scale.
@@ -140,6 +142,37 @@ impl LifeBounds {
             (lo, hi) => Key { is_timeless, at: lo.midpoint(hi) },
         };
         self.keys = places.into_iter().zip(timeless).map(key).collect();
+    }
+
+    /// Adds what people say has to be added.
+    pub(super) fn shift_by_hand(&mut self, shifts: &[&Shift]) {
+        if shifts.is_empty() {
+            return;
+        }
+        let of = |key: &Key| -> i64 {
+            let applies = |shift: &&&Shift| {
+                !key.is_timeless && (shift.from.us()..=shift.to.us()).contains(&key.at)
+            };
+            shifts.iter().filter(applies).map(|shift| shift.us).sum()
+        };
+        let mut latest: Option<Key> = None;
+        for (place, (key, sample)) in self.keys.iter_mut().zip(&mut self.samples).enumerate() {
+            let us = of(key);
+            if self.shifts.last().map_or(0, |&(_, last)| last) != us {
+                self.shifts.push((place, us));
+            }
+            *sample = added(*sample, us);
+            // The sequence decides nevertheless.
+            key.at = key.at.saturating_add(us);
+            *key = latest.map_or(*key, |latest| latest.max(*key));
+            latest = Some(*key);
+        }
+    }
+
+    /// What was added by hand, in microseconds.
+    pub(super) fn shift_us(&self, place: usize) -> i64 {
+        let next = self.shifts.partition_point(|&(first, _)| first <= place);
+        next.checked_sub(1).and_then(|last| self.shifts.get(last)).map_or(0, |&(_, us)| us)
     }
 
     /// What a stamp is in UTC by what the site says about the clock.
@@ -269,7 +302,9 @@ impl Timeline<'_> {
             let held = self.held(event)?;
             let run = self.model.runs.get(self.clock(event)?.sure_run(held)?)?;
             let x = run.unwrapped(shown(&held.entry.time)?);
-            Some(run.homes().skip(1).map(move |home| (home, run.instant(home, x))))
+            let shift_us = self.shift_us(event);
+            let on = move |home| (home, added(run.instant(home, x), shift_us));
+            Some(run.homes().skip(1).map(on))
         };
         samples.extend(others().into_iter().flatten());
         samples

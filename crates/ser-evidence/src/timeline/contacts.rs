@@ -204,6 +204,10 @@ fn link(timeline: &Timeline<'_>, one: ChangeId, other: ChangeId, why: LinkReason
         let x = timeline.model.runs.get(run)?.unwrapped(shown(&held.entry.time)?);
         Some((run, x, timeline.delay_ends(change.event, Some(change.input))))
     };
+    // What was added by hand says nothing about the clock.
+    if timeline.shift_us(one.event) != 0 || timeline.shift_us(other.event) != 0 {
+        return None;
+    }
     let (run, x, ends) = side(one)?;
     let (other_run, other_x, other_ends) = side(other)?;
     let (lo, hi) = (other_ends.0 - ends.1, other_ends.1 - ends.0);

@@ -2,7 +2,7 @@
 
 use super::{ChangeId, EventId, Timeline};
 use crate::clock::envelope::{NO_HI, NO_LO};
-use crate::clock::offsets::ends;
+use crate::clock::offsets::{added, ends};
 use crate::site::Delays;
 use crate::time::shown;
 
@@ -126,7 +126,7 @@ impl Timeline<'_> {
         }
         take(difference(ends(self.sample_utc(one)), ends(self.sample_utc(other))));
         if let Some(elapsed) = self.elapsed_between(one, other) {
-            take(elapsed);
+            take(added(elapsed, self.shift_us(other) - self.shift_us(one)));
         }
         known
     }

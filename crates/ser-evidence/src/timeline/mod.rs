@@ -96,6 +96,9 @@ impl<'a> Timeline<'a> {
                 let pairs = bounds.tighten();
                 out_of_order.extend(pairs.into_iter().map(|(one, other)| (id(one), id(other))));
                 bounds.sort_keys(entries, clock, &self.model);
+                let shifts = self.site.shifts.iter();
+                let shifts = shifts.filter(|shift| Some(shift.recorder) == history.site);
+                bounds.shift_by_hand(&shifts.collect::<Vec<_>>());
                 of_recorder.push(bounds);
             }
             lives.push(of_recorder);
@@ -173,6 +176,12 @@ impl<'a> Timeline<'a> {
             (bound.lo().map(Moment::us), bound.hi().map(Moment::us))
         };
         self.samples(event).into_iter().map(|(home, bound)| (home, ends(bound))).collect()
+    }
+
+    /// What the site file adds to the time of an entry by hand, in microseconds.
+    #[must_use]
+    pub fn shift_us(&self, event: EventId) -> i64 {
+        self.bounds(event).map_or(0, |bounds| bounds.shift_us(event.place as usize))
     }
 
     /// What the stamp is in UTC by what the site says about the clock, for a clock that nobody
