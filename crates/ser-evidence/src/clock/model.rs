@@ -198,18 +198,13 @@ fn readings(history: &History) -> Vec<HostReading> {
 fn life_clocks(recorder: &RecorderHistory, hosts: &Hosts, next_run: &mut usize) -> Vec<LifeClock> {
     let mut steps: Vec<Vec<Step>> = vec![Vec::new(); recorder.lives.len()];
     let mut add = |whereabouts: Whereabouts, step: Step| {
-        let here = match whereabouts {
-            Whereabouts::Here(at) => Some(at),
-            Whereabouts::Anywhere => None,
-            Whereabouts::Elsewhere => return,
-        };
         for (index, (life, steps)) in recorder.lives.iter().zip(&mut steps).enumerate() {
-            match here {
-                Some(Located { life, after, before }) if life == index => {
+            match whereabouts {
+                Whereabouts::Here(Located { life, after, before }) if life == index => {
                     steps.push(Step { after, before, is_sure: true, ..step });
                 }
                 // A life without a name may be the same one, read at another time.
-                Some(_) if life.life.is_some() => {}
+                Whereabouts::Here(_) | Whereabouts::Elsewhere if life.life.is_some() => {}
                 _ => steps.push(step),
             }
         }
@@ -218,14 +213,14 @@ fn life_clocks(recorder: &RecorderHistory, hosts: &Hosts, next_run: &mut usize) 
         if set.how.is_set() {
             let (at, utc) = when(set.at, hosts);
             let step = Step { at, utc, set: Some((index, set.shown)), ..ANYWHERE };
-            add(placing::locate(recorder, &set.place, Some(set.shown)), step);
+            add(placing::locate(recorder, &set.place), step);
         }
     }
     for step in &recorder.steps {
         let moment = Bound::new(None, Some(step.reading.monotonic));
         let boot = step.reading.boot;
         let step_then = Step { at: Some((boot, moment)), utc: hosts.utc(boot, moment), ..ANYWHERE };
-        add(placing::locate(recorder, &step.place, None), step_then);
+        add(placing::locate(recorder, &step.place), step_then);
     }
     let mut lives: Vec<LifeClock> = Vec::new();
     for (life, steps) in recorder.lives.iter().zip(steps) {
@@ -332,10 +327,11 @@ impl Sorted {
                 self.add(run, observation.shown, observation.at);
             }
             // A set of which it is not known in which life it was links nobody.
-            let lives = if observation.how.is_set() { runs.len() / 2 } else { runs.len() };
-            if let (Some(broadcast), Some(&run), 1) =
-                (observation.how.broadcast(), runs.first(), lives)
-            {
+            let sure = sure_run_of(lives, index, observation).or(match runs.as_slice() {
+                [only] if !observation.how.is_set() => Some(*only),
+                _ => None,
+            });
+            if let (Some(broadcast), Some(run)) = (observation.how.broadcast(), sure) {
                 self.broadcasts.entry(broadcast).or_default().push((run, observation.shown));
             }
         }
@@ -453,6 +449,16 @@ impl Sorted {
     }
 }
 
+/// The clock of the run that a set begins, if it is known in which life it was.
+fn sure_run_of(lives: &[LifeClock], index: usize, observation: &ClockObservation) -> Option<usize> {
+    let is_this = |step: &Step| step.is_sure && step.set.is_some_and(|(set, _)| set == index);
+    let mut runs = lives.iter().filter(|_| observation.how.is_set()).filter_map(|life| {
+        let step = life.runs.steps.iter().position(is_this)?;
+        life.ids.get(step + 1).copied()
+    });
+    runs.next()
+}
+
 /// The clocks of the runs that an observation tells of: of one, or, for a set that may be in any of
 /// several lives, of the run that it begins in each. The run between two arrivals of a set is one
 /// more.
@@ -473,7 +479,7 @@ fn runs_of(
     if observation.how.is_set() {
         return found;
     }
-    let run = match placing::locate(recorder, &observation.place, Some(observation.shown)) {
+    let run = match placing::locate(recorder, &observation.place) {
         Whereabouts::Here(at) => {
             lives.get(at.life).zip(recorder.lives.get(at.life)).and_then(|(clock, life)| {
                 let when = when(observation.at, hosts);

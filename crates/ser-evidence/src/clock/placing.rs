@@ -22,7 +22,7 @@ pub(crate) struct Located {
 }
 
 /// Where a place may be.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Whereabouts {
     /// Here.
     Here(Located),
@@ -32,12 +32,8 @@ pub(crate) enum Whereabouts {
     Anywhere,
 }
 
-/// Where a place is. `then` is what the clock showed.
-pub(crate) fn locate(
-    history: &RecorderHistory,
-    place: &Place,
-    then: Option<Moment<Shown>>,
-) -> Whereabouts {
+/// Where a place is.
+pub(crate) fn locate(history: &RecorderHistory, place: &Place) -> Whereabouts {
     if place.life.is_known() {
         let is_it = |life: &LifeHistory| life.life == Some(place.life);
         let life = history.lives.iter().position(is_it);
@@ -58,17 +54,8 @@ pub(crate) fn locate(
         });
         return found.map_or(Whereabouts::Anywhere, |(life, sequence)| here(life, sequence));
     }
-    // The log was empty then. A life that began later is it, if only one did.
-    let began_later = |life: &LifeHistory| {
-        let first = life.entries.first().filter(|_| !life.is_by_number);
-        let stamp = first.and_then(|held| shown(&held.entry.time));
-        stamp.is_some_and(|stamp| then.is_none_or(|then| stamp >= then))
-    };
-    let mut lives = history.lives.iter().enumerate();
-    match (after, lives.find(|(_, life)| began_later(life))) {
-        (0, Some((life, _))) if history.lives.len() == 1 => here(life, 0),
-        _ => Whereabouts::Anywhere,
-    }
+    // That only one life is known does not prove that there was only one.
+    Whereabouts::Anywhere
 }
 
 /// The sequence of this entry in a life, given modulo 65536.
