@@ -11,7 +11,6 @@ use super::hosts::Hosts;
 use super::links::Link;
 use super::offsets::{Home, Observed, RunClock};
 use crate::record::{Boot, Reference};
-use crate::time::Moment;
 
 /// How wrong a clock may be of which nothing is known: a hundred years, in microseconds.
 const ANYTHING_US: i64 = 100 * 366 * 86_400_000_000;
@@ -83,28 +82,20 @@ impl Layout {
         let mut ties = Vec::new();
         for (run, facts) in runs.iter().enumerate() {
             clocks.push(Placed { offset: own_points(facts), is_timeless: false });
-            for observed in facts.observed {
-                let Reference::Host { bound, reading } = observed.at else { continue };
-                let Some(boot) = of_boot(reading.boot) else { continue };
-                let x = facts.clock.unwrapped(observed.shown);
-                let side = |lo, hi, at: Moment<_>| Tie {
-                    one: of_run(run),
-                    x,
-                    other: boot,
-                    other_x: at.us(),
-                    lo,
-                    hi,
-                };
-                ties.extend(bound.lo().map(|at| side(0, NO_HI, at)));
-                ties.extend(bound.hi().map(|at| side(NO_LO, 0, at)));
-            }
             for home in facts.clock.homes() {
                 let Home::Boot(name) = home else { continue };
                 let Some(boot) = of_boot(name) else { continue };
                 let points =
                     clocks.get(boot).into_iter().flat_map(|boot| boot.offset.telling_points());
-                for monotonic in points {
-                    ties.extend(ties_at(facts.clock, home, monotonic, (of_run(run), boot)));
+                let then = points.filter_map(|monotonic| showed_at(facts.clock, home, monotonic));
+                // What one host observed bounds what others did, so all have to do with all.
+                let observed = facts.observed.iter().map(|observed| observed.shown);
+                let mut moments: Vec<i64> = then.collect();
+                moments.extend(observed.map(|shown| facts.clock.unwrapped(shown)));
+                moments.sort_unstable();
+                moments.dedup();
+                for x in moments {
+                    ties.extend(ties_at(facts.clock, home, x, (of_run(run), boot)));
                 }
             }
         }
@@ -198,27 +189,31 @@ impl Layout {
     }
 }
 
-/// What is known of a run at about the moment at which something is known of a boot.
-fn ties_at(clock: &RunClock, home: Home, monotonic: i64, (one, other): (usize, usize)) -> Vec<Tie> {
-    // What the clock showed then, as well as that is known.
+/// What a clock showed at a moment of a boot, as well as that is known.
+fn showed_at(clock: &RunClock, home: Home, monotonic: i64) -> Option<i64> {
     let mut x = monotonic;
     for _ in 0..2 {
-        match clock.instant(home, x) {
-            (NO_LO, NO_HI) => return Vec::new(),
-            (lo, NO_HI) => x = x.saturating_add(monotonic.saturating_sub(lo)),
-            (NO_LO, hi) => x = x.saturating_add(monotonic.saturating_sub(hi)),
-            (lo, hi) => x = x.saturating_add(monotonic.saturating_sub(lo.midpoint(hi))),
-        }
+        let about = match clock.instant(home, x) {
+            (NO_LO, NO_HI) => return None,
+            (end, NO_HI) | (NO_LO, end) => end,
+            (lo, hi) => lo.midpoint(hi),
+        };
+        x = x.saturating_add(monotonic.saturating_sub(about));
     }
+    Some(x)
+}
+
+/// What is known of a run, by the clock of a boot, at the moment when it showed `x`.
+fn ties_at(
+    clock: &RunClock,
+    home: Home,
+    x: i64,
+    (one, other): (usize, usize),
+) -> impl Iterator<Item = Tie> {
     let (lo, hi) = clock.instant(home, x);
-    let mut ties = Vec::new();
-    if lo != NO_LO {
-        ties.push(Tie { one, x, other, other_x: lo, lo: 0, hi: NO_HI });
-    }
-    if hi != NO_HI {
-        ties.push(Tie { one, x, other, other_x: hi, lo: NO_LO, hi: 0 });
-    }
-    ties
+    let late = (lo != NO_LO).then_some(Tie { one, x, other, other_x: lo, lo: 0, hi: NO_HI });
+    let early = (hi != NO_HI).then_some(Tie { one, x, other, other_x: hi, lo: NO_LO, hi: 0 });
+    late.into_iter().chain(early)
 }
 
 fn negated(end: i64) -> i64 {
