@@ -1,0 +1,259 @@
+//! The report as JSON.
+
+use std::io::{self, Write};
+
+use ser_console::is_obeyed;
+use ser_evidence::clock::Home;
+use ser_evidence::incident::{ClockState, FirstOut, Verdict};
+use ser_evidence::timeline::{ChangeId, Delta, EventId};
+use serde_json::{Value, json};
+
+use super::times::rfc3339;
+use super::verdict;
+use super::{Clock, Document};
+
+/// The version of the layout. A change that old readers would misread gets the next number.
+const SCHEMA: u32 = 1;
+
+/// Writes a report as one JSON object.
+///
+/// # Errors
+/// If `out` does not take it.
+pub fn write(out: &mut dyn Write, document: &Document<'_>) -> io::Result<()> {
+    let text = serde_json::to_string_pretty(&object(document))?;
+    // Inside of strings nothing is left that a terminal would obey.
+    let mut harmless = String::with_capacity(text.len());
+    for letter in text.chars() {
+        if letter != '\n' && is_obeyed(letter) {
+            harmless.push_str(&format!("\\u{:04x}", u32::from(letter)));
+        } else {
+            harmless.push(letter);
+        }
+    }
+    writeln!(out, "{harmless}")
+}
+
+fn object(document: &Document<'_>) -> Value {
+    let Document { timeline, report, .. } = *document;
+    let site = timeline.site();
+    let clock = Clock::in_zone(site.time_zone.clone());
+    let digest: String = report.digest.iter().map(|byte| format!("{byte:02x}")).collect();
+    json!({
+        "report": "incident",
+        "schema": SCHEMA,
+        "program": document.program,
+        "site": site.name,
+        "site_sha256": document.site_digest,
+        "entries_sha256": digest,
+        "is_incomplete": report.is_incomplete() || !document.not_reached.is_empty(),
+        "verdict": {
+            "first_out": verdict::first_out(timeline, report, &report.first_out, &clock),
+            "operated": report
+                .operations
+                .iter()
+                .map(|operation| verdict::operated(timeline, operation))
+                .collect::<Vec<_>>(),
+            "wrong": verdict::wrong(document),
+        },
+        "first_out": first_out(document, &report.first_out),
+        "groups": report.groups.iter().map(|(id, first)| json!({
+            "group": site.groups.get(id.0).map(|group| &group.name),
+            "first_out": first_out(document, first),
+        })).collect::<Vec<_>>(),
+        "recorders": recorders(document),
+        "not_reached": document.not_reached.iter().map(|missed| json!({
+            "recorder": missed.recorder,
+            "why": missed.why,
+        })).collect::<Vec<_>>(),
+        "shifts": site.shifts.iter().map(|shift| json!({
+            "recorder": site.recorders.get(shift.recorder.0).map(|found| &found.name),
+            "us": shift.us,
+            "from": rfc3339(shift.from.us()),
+            "to": rfc3339(shift.to.us()),
+            "why": shift.why,
+        })).collect::<Vec<_>>(),
+        "sequence": sequence(document),
+        "steps": steps(document),
+        "operations": operations(document),
+        "disagreements": disagreements(document),
+        "abnormal": report.abnormal.iter().map(|abnormal| json!({
+            "point": site.points.get(abnormal.point.0).map(|point| &point.name),
+            "on": abnormal.on,
+            "since": abnormal.since.map(|since| change(document, since)),
+        })).collect::<Vec<_>>(),
+    })
+}
+
+/// By what a change is found in the sequence.
+fn change(document: &Document<'_>, change: ChangeId) -> Value {
+    let timeline = document.timeline;
+    json!({
+        "recorder": recorder(document, change.event),
+        "life": timeline.life(change.event).map(|life| life.name().to_string()),
+        "sequence": timeline.held(change.event).map(|held| held.sequence),
+        "input": change.input,
+    })
+}
+
+fn recorder<'d>(document: &Document<'d>, event: EventId) -> Option<&'d str> {
+    Some(document.timeline.recorder(event)?.recorder.name.as_str())
+}
+
+fn first_out(document: &Document<'_>, first: &FirstOut) -> Value {
+    json!({
+        "is_known": first.known().is_some(),
+        "candidates": first
+            .changes
+            .iter()
+            .map(|&candidate| change(document, candidate))
+            .collect::<Vec<_>>(),
+        "missing_on": first
+            .gaps
+            .iter()
+            .map(|&(event, _)| recorder(document, event))
+            .collect::<Vec<_>>(),
+    })
+}
+
+fn recorders(document: &Document<'_>) -> Vec<Value> {
+    let timeline = document.timeline;
+    let each = document.report.completeness.iter();
+    each.map(|of| {
+        let history = timeline.history().recorders.get(of.recorder as usize);
+        let (home, order_doubt_us, utc_doubt_us) = match of.clock {
+            ClockState::NotObserved => (None, None, None),
+            ClockState::Observed { home, order_doubt_us, utc_doubt_us } => {
+                (Some(home), order_doubt_us, utc_doubt_us)
+            }
+        };
+        let at = |event: EventId| timeline.sort_key(event).and_then(rfc3339);
+        json!({
+            "recorder": history.map(|history| &history.recorder.name),
+            "entries": of.entries,
+            "is_complete": of.is_complete(),
+            "unbroken_from": of.unbroken.and_then(|(first, _)| at(first)),
+            "unbroken_to": of.unbroken.and_then(|(_, last)| at(last)),
+            "read_until": of.read_until.and_then(|reading| rfc3339(reading.utc.us())),
+            "missing": of.gaps.iter().map(|(gap, _)| json!({
+                "after": gap.after,
+                "what": verdict::missing(gap.lost, gap.why),
+            })).collect::<Vec<_>>(),
+            "conflicts": of.conflicts,
+            "clock": {
+                "scale": home.map(|home| match home {
+                    Home::Boot(boot) => boot.to_string(),
+                    Home::Utc => "UTC".to_owned(),
+                }),
+                "order_doubt_us": order_doubt_us,
+                "utc_doubt_us": utc_doubt_us,
+            },
+        })
+    })
+    .collect()
+}
+
+fn sequence(document: &Document<'_>) -> Vec<Value> {
+    let Document { timeline, report, .. } = *document;
+    let site = timeline.site();
+    let first = report.rows.first().map(|row| row.change);
+    let mut previous: Option<ChangeId> = None;
+    let mut rows = Vec::new();
+    for row in &report.rows {
+        let ChangeId { event, input } = row.change;
+        let Some(held) = timeline.held(event) else { continue };
+        let point = row.point.and_then(|point| site.points.get(point.0));
+        let utc = timeline.moved_utc(event, Some(input));
+        let since =
+            |from: Option<ChangeId>| from.map(|from| delta(timeline.delta(from, row.change)));
+        rows.push(json!({
+            "time": timeline.sort_key(event).and_then(rfc3339),
+            "earliest": utc.lo().and_then(|lo| rfc3339(lo.us())),
+            "latest": utc.hi().and_then(|hi| rfc3339(hi.us())),
+            "shown": held.entry.time.to_string(),
+            "since_first": since(first),
+            "since_previous": since(previous),
+            "order_to_previous": previous.map(|previous| {
+                format!("{:?}", timeline.order(previous.event, event)).to_lowercase()
+            }),
+            "recorder": recorder(document, event),
+            "life": timeline.life(event).map(|life| life.name().to_string()),
+            "sequence": held.sequence,
+            "entry": held.number,
+            "input": input,
+            "point": point.map(|point| &point.name),
+            "on": row.on,
+            "state": point.map(|point| if row.on { &point.on } else { &point.off }),
+            "chatter": row.chatter,
+            "shifted_us": timeline.shift_us(event),
+        }));
+        previous = Some(row.change);
+    }
+    rows
+}
+
+fn delta(delta: Delta) -> Value {
+    json!({ "least_us": delta.lo_us, "most_us": delta.hi_us })
+}
+
+fn steps(document: &Document<'_>) -> Vec<Value> {
+    let Document { timeline, report, .. } = *document;
+    let each = report.steps.iter();
+    each.map(|step| {
+        let expectation = timeline.site().expectations.get(step.expectation);
+        let why = match step.verdict {
+            Verdict::NotDecidable(why) => Some(verdict::why_undecidable(why)),
+            _ => None,
+        };
+        json!({
+            "name": expectation.map(|expectation| &expectation.name),
+            "verdict": match step.verdict {
+                Verdict::InTime => "in time",
+                Verdict::Early => "early",
+                Verdict::Late => "late",
+                Verdict::Missing => "missing",
+                Verdict::NotDecidable(_) => "not decidable",
+            },
+            "why": why,
+            "after": change(document, step.after),
+            "then": step.then.map(|then| change(document, then)),
+            "took": step.delta.map(delta),
+            "expected": expectation.map(|expectation| json!({
+                "least_us": expectation.within_us.0,
+                "most_us": expectation.within_us.1,
+            })),
+        })
+    })
+    .collect()
+}
+
+fn operations(document: &Document<'_>) -> Vec<Value> {
+    let each = document.report.operations.iter();
+    each.map(|operation| {
+        json!({
+            "equipment": operation.equipment,
+            "opened": operation.opened,
+            "command": operation.command.map(|command| change(document, command)),
+            "contact": change(document, operation.contact),
+            "took": operation.took.map(delta),
+            "bounce": operation.bounce.map(|bounce| json!({
+                "changes": bounce.changes,
+                "lasted": delta(bounce.lasted),
+            })),
+        })
+    })
+    .collect()
+}
+
+fn disagreements(document: &Document<'_>) -> Vec<Value> {
+    let each = document.report.disagreements.iter();
+    each.map(|disagreement| {
+        json!({
+            "equipment": disagreement.equipment,
+            "both_on": disagreement.both_on,
+            "since": disagreement.since.map(|since| change(document, since)),
+            "until": disagreement.until.map(|until| change(document, until)),
+            "lasted": disagreement.lasted.map(delta),
+        })
+    })
+    .collect()
+}

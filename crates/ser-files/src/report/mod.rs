@@ -1,0 +1,48 @@
+//! The report about one incident, as text for a terminal and as JSON.
+//!
+//! Both say the same in the same order: the verdict, what the report is made from, the sequence of
+//! changes, what was expected, what has not returned to normal, and what is missing. All answers
+//! come from [`Report`]; here they become words.
+
+mod json;
+mod names;
+mod span;
+mod style;
+mod table;
+mod text;
+mod times;
+mod verdict;
+
+pub use json::write as write_json;
+pub use style::Styles;
+pub use text::write as write_text;
+pub use times::Clock;
+
+use ser_evidence::incident::Report;
+use ser_evidence::timeline::Timeline;
+
+/// A report, and what is said about where it comes from.
+#[derive(Debug)]
+pub struct Document<'a> {
+    /// The timeline that it is made from.
+    pub timeline: &'a Timeline<'a>,
+    /// All answers.
+    pub report: &'a Report,
+    /// The program that makes it, with its version.
+    pub program: &'a str,
+    /// SHA-256 of the site file, if there is one.
+    pub site_digest: Option<String>,
+    /// Recorders that were to be read and were not, and why.
+    pub not_reached: &'a [NotReached],
+    /// Whether chatter is shown row by row.
+    pub unfold: bool,
+}
+
+/// A recorder that could not be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NotReached {
+    /// Its name.
+    pub recorder: String,
+    /// Why.
+    pub why: String,
+}

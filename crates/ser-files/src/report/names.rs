@@ -1,0 +1,60 @@
+//! The names of things, made fit for a line of text.
+
+use ser_console::Harmless;
+use ser_evidence::incident::Row;
+use ser_evidence::site::{Edge, Point, PointId};
+use ser_evidence::timeline::{ChangeId, EventId, Timeline};
+
+/// The name of a recorder.
+pub(super) fn recorder(timeline: &Timeline<'_>, event: EventId) -> String {
+    timeline.recorder(event).map_or(String::new(), |found| harmless(&found.recorder.name))
+}
+
+/// The name of a point; `input 7` if it has none.
+pub(super) fn point(timeline: &Timeline<'_>, id: Option<PointId>, input: u8) -> String {
+    let named = id.and_then(|id| point_of(timeline, id));
+    named.map_or_else(|| format!("input {input}"), |point| harmless(&point.name))
+}
+
+/// What a state is called.
+pub(super) fn state(timeline: &Timeline<'_>, id: Option<PointId>, on: bool) -> String {
+    match id.and_then(|id| point_of(timeline, id)) {
+        Some(point) => harmless(if on { &point.on } else { &point.off }),
+        None => (if on { "ON" } else { "OFF" }).to_owned(),
+    }
+}
+
+/// A change in a sentence: `52-1 closed OPEN (U1-SER1)`.
+pub(super) fn change(timeline: &Timeline<'_>, row: &Row) -> String {
+    let ChangeId { event, input } = row.change;
+    format!(
+        "{} {} ({})",
+        point(timeline, row.point, input),
+        state(timeline, row.point, row.on),
+        recorder(timeline, event)
+    )
+}
+
+/// An edge in a sentence: `52-1 closed OPEN`.
+pub(super) fn edge(timeline: &Timeline<'_>, edge: Edge) -> String {
+    format!(
+        "{} {}",
+        point(timeline, Some(edge.point), 0),
+        state(timeline, Some(edge.point), edge.on)
+    )
+}
+
+/// Whether this is not the normal state of a point; `None` if it has no normal one.
+pub(super) fn is_abnormal(timeline: &Timeline<'_>, id: Option<PointId>, on: bool) -> Option<bool> {
+    Some(point_of(timeline, id?)?.normal? != on)
+}
+
+/// A point of the site.
+pub(super) fn point_of<'t>(timeline: &Timeline<'t>, id: PointId) -> Option<&'t Point> {
+    timeline.site().points.get(id.0)
+}
+
+/// Text from outside on one line.
+pub(super) fn harmless(text: &str) -> String {
+    Harmless(text).line()
+}

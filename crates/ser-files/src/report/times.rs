@@ -1,0 +1,76 @@
+//! Times of the day and dates, in the zone of the site.
+
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+
+/// A zone in which times are shown.
+#[derive(Clone, Debug)]
+pub struct Clock {
+    zone: TimeZone,
+}
+
+impl Clock {
+    /// Shows times in this zone.
+    #[must_use]
+    pub const fn in_zone(zone: TimeZone) -> Clock {
+        Clock { zone }
+    }
+
+    /// As `2026-11-22 11:00:00.250`, to the nearest millisecond.
+    #[must_use]
+    pub fn date_and_time(&self, utc_us: i64) -> String {
+        self.format(utc_us, "%Y-%m-%d %H:%M:%S%.3f")
+    }
+
+    /// As `11:00:00.250`, to the nearest millisecond.
+    #[must_use]
+    pub fn time(&self, utc_us: i64) -> String {
+        self.format(utc_us, "%H:%M:%S%.3f")
+    }
+
+    /// As `2026-11-22`.
+    #[must_use]
+    pub fn date(&self, utc_us: i64) -> String {
+        self.format(utc_us, "%Y-%m-%d")
+    }
+
+    /// The zone as `Europe/Berlin, UTC+01:00`.
+    #[must_use]
+    pub fn zone(&self, utc_us: i64) -> String {
+        let offset = self.format(utc_us, "UTC%:z");
+        match self.zone.iana_name() {
+            Some("UTC") | None => offset.trim_end_matches("+00:00").to_owned(),
+            Some(name) => format!("{name}, {offset}"),
+        }
+    }
+
+    fn format(&self, utc_us: i64, format: &str) -> String {
+        // To the nearest millisecond, as the fraction is cut off.
+        let nearest = utc_us.saturating_add(500).div_euclid(1000).saturating_mul(1000);
+        let time =
+            Timestamp::from_microsecond(nearest).map(|at| at.to_zoned_datetime(self.zone.clone()));
+        time.map_or_else(|_| "-".to_owned(), |time| time.strftime(format).to_string())
+    }
+}
+
+/// As `2026-11-22T10:00:00.250000Z`; `None` if no calendar has it.
+pub(super) fn rfc3339(utc_us: i64) -> Option<String> {
+    let at = Timestamp::from_microsecond(utc_us).ok()?;
+    Some(at.strftime("%Y-%m-%dT%H:%M:%S.%6fZ").to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_those_of_the_site() {
+        let us = "2026-11-22T10:00:00.2496Z".parse::<Timestamp>().unwrap().as_microsecond();
+        let clock = Clock::in_zone(TimeZone::get("Europe/Berlin").unwrap());
+        assert_eq!(clock.date_and_time(us), "2026-11-22 11:00:00.250");
+        assert_eq!(clock.zone(us), "Europe/Berlin, UTC+01:00");
+        assert_eq!(Clock::in_zone(TimeZone::UTC).zone(us), "UTC");
+        assert_eq!(rfc3339(us).unwrap(), "2026-11-22T10:00:00.249600Z");
+        assert_eq!(clock.time(i64::MAX), "-");
+    }
+}

@@ -1,0 +1,230 @@
+//! The verdict: what was first, what operated, what is wrong.
+
+use ser_evidence::incident::{
+    Abnormal, Completeness, Disagreement, Doubt, FirstOut, Operation, Report, Row, StepResult,
+    Verdict,
+};
+use ser_evidence::record::{Lost, Why};
+use ser_evidence::timeline::{ChangeId, ContactTrouble, Timeline};
+
+use super::names::{self, harmless};
+use super::span::{doubt, duration};
+use super::{Clock, Document};
+
+/// What was first, in words.
+pub(super) fn first_out(
+    timeline: &Timeline<'_>,
+    report: &Report,
+    first: &FirstOut,
+    clock: &Clock,
+) -> String {
+    let named = |change: &ChangeId| {
+        let row = row_of(report, *change);
+        row.map_or_else(String::new, |row| names::change(timeline, row))
+    };
+    if let Some(only) = first.known() {
+        let at = timeline.sort_key(only.event).map(|at| clock.time(at)).unwrap_or_default();
+        return format!("{}, {at}", named(&only));
+    }
+    let mut text = match first.changes.as_slice() {
+        [] => "not known".to_owned(),
+        [only] => named(only),
+        [one, .., other] if one.event == other.event => {
+            format!("in the same millisecond: {}", list(first.changes.iter().map(named)))
+        }
+        several => format!(
+            "not certain{}, one of: {}",
+            within(timeline, several),
+            list(several.iter().map(named))
+        ),
+    };
+    if !first.gaps.is_empty() {
+        let of = |(event, _): &(_, usize)| names::recorder(timeline, *event);
+        let mut recorders: Vec<String> = first.gaps.iter().map(of).collect();
+        recorders.sort_unstable();
+        recorders.dedup();
+        text += &format!("; or one of the entries missing on {}", list(recorders.into_iter()));
+    }
+    text
+}
+
+/// Between which bounds nobody knows which of these was first.
+fn within(timeline: &Timeline<'_>, changes: &[ChangeId]) -> String {
+    let widest = changes
+        .iter()
+        .enumerate()
+        .flat_map(|(place, &one)| changes.iter().skip(place + 1).map(move |&other| (one, other)))
+        .filter(|(one, other)| one.event != other.event)
+        .map(|(one, other)| {
+            let delta = timeline.delta(one, other);
+            Some(delta.lo_us?.abs().max(delta.hi_us?.abs()))
+        })
+        .collect::<Option<Vec<i64>>>();
+    match widest.and_then(|widest| widest.into_iter().max()) {
+        Some(us) => format!(" within {}", doubt(us)),
+        None => String::new(),
+    }
+}
+
+/// What breakers did, in words.
+pub(super) fn operated(timeline: &Timeline<'_>, operation: &Operation) -> String {
+    let verb = if operation.opened { "opened" } else { "closed" };
+    let command = if operation.opened { "trip" } else { "close command" };
+    let mut text = format!("{} {verb}", harmless(&operation.equipment));
+    if let Some(us) = operation.took.and_then(ser_evidence::timeline::Delta::middle_us) {
+        text += &format!(" {} after its {command}", duration(us));
+    }
+    if let Some(bounce) = operation.bounce {
+        let lasted = bounce.lasted.middle_us().map(duration).unwrap_or_default();
+        text += &format!(" (bounced {} times in {lasted})", bounce.changes);
+    }
+    let _ = timeline;
+    text
+}
+
+/// Everything that is wrong, each in a few words, the worst first.
+pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
+    let Document { timeline, report, .. } = *document;
+    let mut wrong = Vec::new();
+    for step in &report.steps {
+        wrong.extend(step_trouble(timeline, step));
+    }
+    wrong.extend(
+        document
+            .not_reached
+            .iter()
+            .map(|missed| format!("{} not reached", harmless(&missed.recorder))),
+    );
+    for recorder in &report.completeness {
+        wrong.extend(incompleteness(timeline, recorder));
+    }
+    for disagreement in &report.disagreements {
+        wrong.extend(disagreement_trouble(disagreement));
+    }
+    for fold in &report.chatter {
+        if let Some(row) = row_of(report, fold.first) {
+            let point = names::point(timeline, row.point, row.change.input);
+            wrong.push(format!("{point} chattered ({} changes)", fold.changes.len()));
+        }
+    }
+    let moved = report.abnormal.iter().filter(|abnormal| abnormal.since.is_some());
+    let names: Vec<String> = moved.map(|abnormal| abnormal_name(timeline, abnormal)).collect();
+    if !names.is_empty() {
+        wrong.push(format!("not returned to normal: {}", list(names.into_iter())));
+    }
+    let clocks = timeline.findings().len() + timeline.out_of_order().len();
+    if clocks > 0 {
+        wrong.push("what is known of the clocks does not fit together".to_owned());
+    }
+    for finding in timeline.contact_findings() {
+        if !report.incident.events.contains(&finding.change.event) {
+            continue;
+        }
+        let point = names::point(timeline, Some(finding.point), finding.change.input);
+        let other = names::point(timeline, Some(finding.other), 0);
+        wrong.push(match finding.trouble {
+            ContactTrouble::Missing => format!("{point} moved and {other} did not"),
+            ContactTrouble::Apart(_) => {
+                format!("{point} and {other} are one contact and moved at different times")
+            }
+        });
+    }
+    wrong.dedup();
+    wrong
+}
+
+fn step_trouble(timeline: &Timeline<'_>, step: &StepResult) -> Option<String> {
+    let expectation = timeline.site().expectations.get(step.expectation)?;
+    let name = harmless(&expectation.name);
+    let took = step.delta.and_then(ser_evidence::timeline::Delta::middle_us).map(duration);
+    let took = took.map_or_else(String::new, |took| format!(" ({took})"));
+    match step.verdict {
+        Verdict::InTime => None,
+        Verdict::Early => Some(format!("{name}: early{took}")),
+        Verdict::Late => Some(format!("{name}: late{took}")),
+        Verdict::Missing => Some(format!("{name}: missing")),
+        Verdict::NotDecidable(_) => Some(format!("{name}: not decidable{took}")),
+    }
+}
+
+/// Why a step cannot be decided.
+pub(super) fn why_undecidable(why: Doubt) -> &'static str {
+    match why {
+        Doubt::Straddles => "the doubt reaches over an end of the window",
+        Doubt::NoCommonTime => "nothing is known of the time between the two",
+        Doubt::Gap => "an entry may be missing",
+        Doubt::NotReadSince => "its log was not read since",
+    }
+}
+
+/// What is missing of a recorder, if anything.
+pub(super) fn incompleteness(timeline: &Timeline<'_>, of: &Completeness) -> Option<String> {
+    let name = recorder_name(timeline, of.recorder);
+    let mut text: Vec<String> = of.gaps.iter().map(|(gap, _)| missing(gap.lost, gap.why)).collect();
+    if of.conflicts > 0 {
+        text.push(format!("{} entries contradict others", of.conflicts));
+    }
+    if text.is_empty() && !of.is_complete() {
+        text.push("not read since".to_owned());
+    }
+    (!text.is_empty()).then(|| format!("{name}: {}", text.join(", ")))
+}
+
+/// How many entries are missing, and why.
+pub(super) fn missing(lost: Lost, why: Why) -> String {
+    let why = match why {
+        Why::Overwritten => "overwritten",
+        Why::LogBeganAnew => "the log began anew",
+        Why::NotRecorded(inputs) => {
+            return format!("inputs changed without being recorded: {}", ser_proto::Inputs(inputs));
+        }
+        Why::NotReached => "in none of the sources",
+    };
+    match lost {
+        Lost::Exactly(1) => format!("1 entry missing ({why})"),
+        Lost::Exactly(count) => format!("{count} entries missing ({why})"),
+        Lost::AtLeast(count) => format!("at least {count} entries missing ({why})"),
+        Lost::Unknown => format!("an unknown number of entries missing ({why})"),
+    }
+}
+
+/// Contacts that disagree while the breaker travels are as they should be.
+fn disagreement_trouble(disagreement: &Disagreement) -> Option<String> {
+    let what = if disagreement.both_on { "both on" } else { "both off" };
+    let equipment = harmless(&disagreement.equipment);
+    match (disagreement.until, disagreement.lasted) {
+        (None, _) => Some(format!("52a and 52b of {equipment} disagree at the end ({what})")),
+        (Some(_), Some(lasted)) if disagreement.both_on => {
+            let lasted = lasted.middle_us().map(duration).unwrap_or_default();
+            Some(format!("52a and 52b of {equipment} were both on for {lasted}"))
+        }
+        _ => None,
+    }
+}
+
+/// A point and the state that is not its normal one.
+pub(super) fn abnormal_name(timeline: &Timeline<'_>, abnormal: &Abnormal) -> String {
+    let state = names::state(timeline, Some(abnormal.point), abnormal.on);
+    format!("{} {state}", names::point(timeline, Some(abnormal.point), 0))
+}
+
+/// The name of a recorder of the history.
+pub(super) fn recorder_name(timeline: &Timeline<'_>, index: u32) -> String {
+    let found = timeline.history().recorders.get(index as usize);
+    found.map_or_else(String::new, |found| harmless(&found.recorder.name))
+}
+
+/// The row of a change.
+pub(super) fn row_of(report: &Report, change: ChangeId) -> Option<&Row> {
+    report.rows.iter().find(|row| row.change == change)
+}
+
+/// `a, b and c`.
+pub(super) fn list(items: impl Iterator<Item = String>) -> String {
+    let items: Vec<String> = items.collect();
+    match items.split_last() {
+        Some((last, [])) => last.clone(),
+        Some((last, rest)) => format!("{} and {last}", rest.join(", ")),
+        None => String::new(),
+    }
+}
