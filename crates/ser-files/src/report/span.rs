@@ -7,8 +7,10 @@ pub(super) fn duration(us: i64) -> String {
     let us = us.unsigned_abs();
     let tenths = (us + 50) / 100;
     let text = match us {
-        ..999_950 if tenths.is_multiple_of(10) => format!("{} ms", tenths / 10),
-        ..999_950 => format!("{}.{} ms", tenths / 10, tenths % 10),
+        ..999_950 => match tenths % 10 {
+            0 => format!("{} ms", tenths / 10),
+            tenth => format!("{}.{tenth} ms", tenths / 10),
+        },
         ..60_000_000 => format!("{}.{:03} s", us / 1_000_000, us / 1000 % 1000),
         ..3_600_000_000 => format!("{} min {} s", us / 60_000_000, us / 1_000_000 % 60),
         ..86_400_000_000 => format!("{} h {} min", us / 3_600_000_000, us / 60_000_000 % 60),
