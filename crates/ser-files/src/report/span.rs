@@ -7,13 +7,15 @@ pub(super) fn duration(us: i64) -> String {
     let us = us.unsigned_abs();
     let tenths = (us + 50) / 100;
     let text = match us {
-        ..999_950 => match tenths % 10 {
+        0..999_950 => match tenths % 10 {
             0 => format!("{} ms", tenths / 10),
             tenth => format!("{}.{tenth} ms", tenths / 10),
         },
-        ..60_000_000 => format!("{}.{:03} s", us / 1_000_000, us / 1000 % 1000),
-        ..3_600_000_000 => format!("{} min {} s", us / 60_000_000, us / 1_000_000 % 60),
-        ..86_400_000_000 => format!("{} h {} min", us / 3_600_000_000, us / 60_000_000 % 60),
+        999_950..60_000_000 => format!("{}.{:03} s", us / 1_000_000, us / 1000 % 1000),
+        60_000_000..3_600_000_000 => format!("{} min {} s", us / 60_000_000, us / 1_000_000 % 60),
+        3_600_000_000..86_400_000_000 => {
+            format!("{} h {} min", us / 3_600_000_000, us / 60_000_000 % 60)
+        }
         _ => format!("{} d {} h", us / 86_400_000_000, us / 3_600_000_000 % 24),
     };
     format!("{sign}{text}")
@@ -24,9 +26,9 @@ pub(super) fn since(us: i64) -> String {
     let sign = if us < 0 { "-" } else { "+" };
     let us = us.unsigned_abs();
     match us {
-        ..999_950 => format!("{sign}{}.{} ms", (us + 50) / 1000, (us + 50) / 100 % 10),
-        ..60_000_000 => format!("{sign}{}.{:03} s", us / 1_000_000, us / 1000 % 1000),
-        ..3_600_000_000 => {
+        0..999_950 => format!("{sign}{}.{} ms", (us + 50) / 1000, (us + 50) / 100 % 10),
+        999_950..60_000_000 => format!("{sign}{}.{:03} s", us / 1_000_000, us / 1000 % 1000),
+        60_000_000..3_600_000_000 => {
             let seconds = us / 1_000_000 % 60;
             format!("{sign}{}m{seconds:02}.{} s", us / 60_000_000, us / 100_000 % 10)
         }
