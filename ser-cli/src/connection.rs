@@ -70,6 +70,11 @@ pub(crate) fn unit_name(connection: &ConnectionArgs) -> Result<UnitName> {
     Ok(UnitName::of(port_text(connection)?, &endpoint(connection)?))
 }
 
+/// The recorder's name in records.
+pub(crate) fn recorder_name(connection: &ConnectionArgs) -> Result<String> {
+    Ok(unit_name(connection)?.name)
+}
+
 /// Opens the line to the recorder. Nothing is sent yet.
 pub(crate) fn open(connection: &ConnectionArgs) -> Result<Unit> {
     let endpoint = endpoint(connection)?;
@@ -98,6 +103,16 @@ pub(crate) fn options(connection: &ConnectionArgs) -> Options {
     options.timeout = connection.timeout.unwrap_or(options.timeout);
     options.retries = connection.retries.unwrap_or(options.retries);
     options
+}
+
+/// The connection to a recorder on the bus of this connection.
+#[cfg(unix)]
+pub(crate) fn to_node(connection: &ConnectionArgs, node: u8) -> Result<ConnectionArgs> {
+    let mut connection = connection.clone();
+    if let Endpoint::Geni { window, .. } = endpoint(&connection)? {
+        connection.port = Some(Endpoint::Geni { window, node: Some(node) }.to_string());
+    }
+    Ok(connection)
 }
 
 /// Opens the Genius bus, whichever recorder on it is named.
