@@ -88,6 +88,11 @@ pub(crate) fn unit_name(connection: &ConnectionArgs) -> Result<UnitName> {
     Ok(UnitName::of(port_text(connection)?, &endpoint(connection)?))
 }
 
+/// The recorder's name in records.
+pub(crate) fn recorder_name(connection: &ConnectionArgs) -> Result<String> {
+    Ok(unit_name(connection)?.name)
+}
+
 /// Opens the line to the recorder. Nothing is sent yet.
 pub(crate) fn open(connection: &ConnectionArgs) -> Result<Unit> {
     let endpoint = endpoint(connection)?;
@@ -116,6 +121,15 @@ pub(crate) fn options(connection: &ConnectionArgs) -> Options {
     options.timeout = connection.timeout.unwrap_or(options.timeout);
     options.retries = connection.retries.unwrap_or(options.retries);
     options
+}
+
+/// The connection to a recorder on the bus of this connection.
+#[cfg(unix)]
+pub(crate) fn to_node(connection: &ConnectionArgs, node: u8) -> Result<ConnectionArgs> {
+    let Endpoint::Geni { window, .. } = endpoint(connection)? else {
+        return Ok(connection.clone());
+    };
+    Ok(at_port(connection, &Endpoint::Geni { window, node: Some(node) }.to_string()))
 }
 
 /// Opens the Genius bus, whichever recorder on it is named.

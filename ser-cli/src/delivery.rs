@@ -2,8 +2,11 @@
 //! error, and progress to the bar.
 
 use std::fmt::Display;
+use std::time::Duration;
 
-use ser_client::Delivery;
+use ser_client::{Clock, Delivery, RealTime};
+use ser_evidence::record::EntryRecord;
+use ser_proto::Model;
 
 use crate::error::{Failure, Result, warn};
 use crate::output::{self, Annotator, Before, EventWriter, Format, Life, Loss, Record};
@@ -19,22 +22,56 @@ pub(crate) struct Outlet {
     progress: Progress,
     gaps: u32,
     not_valid: u32,
+    new: NewEntries,
+}
+
+/// An entry and when it had arrived here, by this computer's monotonic clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Arrived {
+    pub(crate) record: EntryRecord,
+    pub(crate) at: Duration,
+}
+
+/// The entries since somebody asked for them the last time.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct NewEntries {
+    pub(crate) first: Option<Arrived>,
+    pub(crate) last: Option<Arrived>,
+    /// The recorder's model, as the entries show it.
+    pub(crate) model: Option<Model>,
 }
 
 impl Outlet {
     /// To standard output, with a bar if the download is long; for a log of this life.
-    pub(crate) fn new(format: Format, life: Life, before: Before) -> Outlet {
-        Outlet::with_progress(format, life, before, Progress::new())
+    pub(crate) fn new(format: Format, recorder: &str, life: Life, before: Before) -> Outlet {
+        Outlet::with_progress(format, recorder, life, before, Progress::new())
     }
 
     /// To standard output, without a bar, because there is no end.
-    pub(crate) fn endless(format: Format, life: Life, before: Before) -> Outlet {
-        Outlet::with_progress(format, life, before, Progress::none())
+    pub(crate) fn endless(format: Format, recorder: &str, life: Life, before: Before) -> Outlet {
+        Outlet::with_progress(format, recorder, life, before, Progress::none())
     }
 
-    fn with_progress(format: Format, life: Life, before: Before, progress: Progress) -> Outlet {
-        let (writer, annotator) = (output::to_stdout(format), Annotator::new(life, before));
-        Outlet { writer, annotator, progress, gaps: 0, not_valid: 0 }
+    fn with_progress(
+        format: Format,
+        recorder: &str,
+        life: Life,
+        before: Before,
+        progress: Progress,
+    ) -> Outlet {
+        let writer = output::to_stdout(format, recorder);
+        let (annotator, new) = (Annotator::new(life, before), NewEntries::default());
+        Outlet { writer, annotator, progress, gaps: 0, not_valid: 0, new }
+    }
+
+    /// The entries since the last call.
+    pub(crate) fn take_new(&mut self) -> NewEntries {
+        std::mem::take(&mut self.new)
+    }
+
+    /// Writes what else is known, where the format has a place for it.
+    pub(crate) fn evidence(&mut self, record: &ser_evidence::record::Record) -> Result<()> {
+        Ok(self.writer.evidence(record)?)
     }
 
     /// The life of the log that is being read.
@@ -50,11 +87,18 @@ impl Outlet {
         pending: u32,
         remember: &mut dyn FnMut(Life) -> Result<()>,
     ) -> Result<()> {
+        let at = RealTime.now();
         self.progress.advance(deliveries, pending);
-        let Outlet { writer, annotator, progress, gaps, not_valid } = self;
+        let Outlet { writer, annotator, progress, gaps, not_valid, new } = self;
+        new.model = deliveries.iter().find_map(model).or(new.model);
         progress.around(|| {
             for (position, delivery) in deliveries.iter().enumerate() {
                 for record in annotator.write(delivery, writer.as_mut())? {
+                    if let Record::Event(event) = &record {
+                        let arrived = Arrived { record: event.into(), at };
+                        new.first.get_or_insert(arrived);
+                        new.last = Some(arrived);
+                    }
                     match record {
                         Record::Event(event) if event.is_odd() => {
                             *not_valid += 1;
@@ -122,6 +166,13 @@ impl Outlet {
     /// Whether events are known to be missing in what was delivered.
     pub(crate) fn has_gaps(&self) -> bool {
         self.gaps > 0
+    }
+}
+
+fn model(delivery: &Delivery) -> Option<Model> {
+    match delivery {
+        Delivery::Event { model, .. } => Some(*model),
+        Delivery::Lost { .. } => None,
     }
 }
 

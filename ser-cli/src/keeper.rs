@@ -1,6 +1,6 @@
 //! Keeps the state file up to date while events are delivered.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use ser_client::Cursor;
@@ -29,6 +29,13 @@ pub(crate) struct StateArgs {
     state_dir: Option<PathBuf>,
 }
 
+impl StateArgs {
+    /// The directory, if the user wants another than the system's place for state.
+    pub(crate) fn directory(&self) -> Option<&Path> {
+        self.state_dir.as_deref()
+    }
+}
+
 /// The state file of a recorder, and what is to be written to it.
 pub(crate) struct Keeper {
     file: StateFile,
@@ -55,11 +62,17 @@ impl Keeper {
         self.saved.and_then(|delivered| delivered.cursor)
     }
 
+    /// The life of the log that was read, and how far.
+    pub(crate) fn place(&self) -> Option<(Life, Cursor)> {
+        let saved = self.saved?;
+        Some((saved.life?, saved.cursor?))
+    }
+
     /// The life of the log that was read; a new one if nothing is remembered.
     pub(crate) fn life(&self) -> Result<Life> {
         match self.saved.and_then(|delivered| delivered.life) {
             Some(life) => Ok(life),
-            None => Ok(Life::begin()?),
+            None => Ok(output::new_life()?),
         }
     }
 
@@ -122,7 +135,7 @@ impl Keeper {
         if self.unread(total) == 0 {
             let erased = cursor.anchor.or(self.saved.and_then(|saved| saved.erased));
             let cursor = Some(Cursor { sequence: 0, is_exact: true, anchor: None });
-            let (size, life) = (self.size().unwrap_or(0), Some(Life::begin()?));
+            let (size, life) = (self.size().unwrap_or(0), Some(output::new_life()?));
             self.unsaved = Some(Delivered { cursor, size, life, next_life: None, erased });
             self.save()?;
         }

@@ -10,16 +10,21 @@ mod connection;
 mod decoding;
 mod delivery;
 mod error;
+mod host_reading;
 mod interrupt;
 mod keeper;
+mod kept;
+mod log_look;
 mod outage;
 mod output;
 mod progress;
+mod setting;
 mod site_file;
 mod state;
 mod time;
 mod unit_name;
 mod values;
+mod witness;
 
 use std::process::ExitCode;
 

@@ -191,6 +191,12 @@ impl StateFile {
         Ok(StateFile { path, unit: unit.name.clone(), others, moves_from: None })
     }
 
+    /// A file of another kind beside it, and where that may be if the recorder had another name.
+    pub(crate) fn beside(&self, extension: &str) -> (PathBuf, Vec<PathBuf>) {
+        let beside = |path: &PathBuf| path.with_extension(extension);
+        (beside(&self.path), self.others.iter().map(beside).collect())
+    }
+
     /// Locks the file for this run alone.
     pub(crate) fn lock(&self) -> Result<StateLock> {
         // The state file itself is replaced whenever it is saved, so the lock is on a file that
@@ -257,11 +263,7 @@ impl StateFile {
         if read_ours(&self.path)?.is_some_and(|found| Delivered::from_text(&found).is_err()) {
             return Err(io::Error::new(ErrorKind::AlreadyExists, "it has been replaced meanwhile"));
         }
-        // Under an unpredictable name; removed if a later step fails.
-        let mut temporary = temporary_file(directory)?;
-        temporary.write_all(text.as_bytes())?;
-        temporary.as_file().sync_all()?;
-        temporary.persist(&self.path)?;
+        write_anew(&self.path, text.as_bytes())?;
         if let Some(other) =
             self.moves_from.take().filter(|other| matches!(load_from(other), Ok(Some(_))))
         {
@@ -305,8 +307,18 @@ fn read_ours(path: &Path) -> io::Result<Option<Vec<u8>>> {
     Ok(Some(text))
 }
 
+/// Replaces a file that is known to be ours as a whole.
+pub(crate) fn write_anew(path: &Path, text: &[u8]) -> io::Result<()> {
+    // Under an unpredictable name; removed if a later step fails.
+    let mut temporary = temporary_file(path.parent().unwrap_or(Path::new(".")))?;
+    temporary.write_all(text)?;
+    temporary.as_file().sync_all()?;
+    temporary.persist(path)?;
+    Ok(())
+}
+
 /// Opens a plain file. Links are not followed, because their targets are not ours.
-fn open_ours(path: &Path, options: &mut fs::OpenOptions) -> io::Result<File> {
+pub(crate) fn open_ours(path: &Path, options: &mut fs::OpenOptions) -> io::Result<File> {
     let no_file = || io::Error::new(ErrorKind::InvalidData, "it is a link, or not a plain file");
     match fs::symlink_metadata(path) {
         Ok(found) if !found.is_file() => return Err(no_file()),
@@ -440,7 +452,7 @@ mod tests {
         let mut last = entry("00.250", &[3, 32], &[32]);
         last.time.month = 200;
         let cursor = |sequence, is_exact, anchor| Some(Cursor { sequence, is_exact, anchor });
-        let drawn = || Some(Life::begin().unwrap());
+        let drawn = || Some(crate::output::new_life().unwrap());
         for delivered in [
             Delivered {
                 cursor: cursor(u64::MAX, false, Some(last)),

@@ -70,6 +70,12 @@ pub(crate) struct Delta {
 }
 
 impl Delta {
+    /// So many milliseconds.
+    #[cfg(unix)]
+    pub(crate) const fn of_ms(ms: i64) -> Delta {
+        Delta { ms }
+    }
+
     /// From `earlier` to `later`; `None` when one of them is no date.
     pub(crate) fn between(earlier: TimeStamp, later: TimeStamp) -> Option<Delta> {
         let straight_ms = straight_ms(earlier, later)?;

@@ -13,7 +13,7 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use common::bench::{Bench, text};
-use common::{Running, ser_cli, wait_until};
+use common::{Running, events, ser_cli, wait_until};
 use ser_sim::testing::{Kind, PATIENCE, image};
 use ser_sim::with_both_kinds;
 
@@ -45,10 +45,10 @@ fn contacts_are_recorded_and_read_back_in_every_format(kind: Kind) {
     let jsonl = bench.ok("read --format jsonl --from 2 --count 2");
     let expected = format!(
         "{{\"entry\":2,\"time\":\"{}\",\"changed\":[1,16],\"state\":[1,3,16],\"sequence\":null,\"life\":\"0\"}}\n\
-         {{\"entry\":3,\"time\":\"{}\",\"changed\":[3],\"state\":[1,16],\"sequence\":null,\"life\":\"0\"}}\n",
+         {{\"entry\":3,\"time\":\"{}\",\"changed\":[3],\"state\":[1,16],\"sequence\":null,\"life\":\"0\"}}",
         times[1], times[2]
     );
-    assert_eq!(jsonl, expected);
+    assert_eq!(events(&jsonl).join("\n"), expected);
 
     let table = bench.ok("read");
     for (line, time) in table.lines().skip(1).zip(&times) {
@@ -66,22 +66,22 @@ fn read_new_delivers_each_event_once_and_says_what_is_lost(kind: Kind) {
     let mut bench = Bench::start(kind, &[]);
     bench.ok("config --size 8");
     bench.contacts("0,1,1\n1,2,1\n2,3,1", 3);
-    assert_eq!(bench.ok("read --new --format jsonl").lines().count(), 3);
-    assert_eq!(bench.ok("read --new --format jsonl"), "");
+    assert_eq!(events(&bench.ok("read --new --format jsonl")).len(), 3);
+    assert!(events(&bench.ok("read --new --format jsonl")).is_empty());
     // Twenty more events into eight entries: twelve are overwritten.
     let steps: Vec<_> =
         (0..20).map(|index| format!("{},5,{}", 2 * index, (index + 1) % 2)).collect();
     bench.contacts(&steps.join("\n"), 5);
     wait_until("all have moved", || bench.ok("status").contains("23 since"));
     let output = bench.run("read --new --format jsonl");
-    let stdout = text(&output.stdout);
-    assert_eq!((output.status.code(), stdout.lines().count()), (Some(0), 1 + 8));
-    let first = stdout.lines().next().unwrap_or_default();
+    let events_read = events(&text(&output.stdout));
+    assert_eq!((output.status.code(), events_read.len()), (Some(0), 1 + 8));
+    let first = &events_read[0];
     let loss = "{\"lost\":12,\"count\":\"exactly\",\"after\":3,\"why\":\"overwritten\",";
     assert!(first.starts_with(loss), "{first}");
     let lost = "12 events were overwritten before they were read";
     assert!(text(&output.stderr).contains(lost), "{}", text(&output.stderr));
-    assert_eq!(bench.ok("read --new --format jsonl"), "");
+    assert!(events(&bench.ok("read --new --format jsonl")).is_empty());
 }
 
 fn every_other_command_does_what_it_says(kind: Kind) {
@@ -152,7 +152,7 @@ fn watch_shows_events_as_they_happen_and_puts_the_configuration_back(kind: Kind)
     assert_eq!(watch.interrupt(), Some(0));
     assert_eq!(bench.ok("config"), before);
     // What watch has shown is no longer new.
-    assert_eq!(bench.ok("read --new --format jsonl"), "");
+    assert!(events(&bench.ok("read --new --format jsonl")).is_empty());
 }
 
 #[test]
@@ -454,14 +454,14 @@ fn a_unit_is_the_same_however_its_port_is_spelled() {
         let output = bench.command("read --new --format jsonl").arg("--port").arg(port).output();
         let output = output.expect("ser-cli runs");
         assert!(output.status.success(), "{}", text(&output.stderr));
-        text(&output.stdout).lines().count()
+        events(&text(&output.stdout)).len()
     };
     assert_eq!(read(&bench.link()), 1);
     for spelled in ["sub/../unit", "./unit"] {
         assert_eq!(read(&bench.folder.path().join(spelled)), 0, "{spelled}");
     }
-    // One file and its lock.
-    assert_eq!(fs::read_dir(bench.folder.path().join("state")).expect("a folder").count(), 2);
+    // Two files, each with its lock: what was delivered, and what is kept for a report.
+    assert_eq!(fs::read_dir(bench.folder.path().join("state")).expect("a folder").count(), 4);
     // A name that no file can have changes nothing.
     let deep = bench.folder.path().join(format!("{}sub/../unit", "./".repeat(200)));
     assert_eq!(read(&deep), 0);
@@ -561,9 +561,10 @@ fn a_reading_that_is_interrupted_fails_and_the_next_goes_on_there() {
     let lines = read.lines();
     let first = lines.recv_timeout(PATIENCE).expect("a line");
     assert_eq!(read.interrupt(), Some(1));
-    let mut all: Vec<String> = std::iter::once(first).chain(lines).collect();
+    let lines: Vec<String> = std::iter::once(first).chain(lines).collect();
+    let mut all = events(&lines.join("\n"));
     assert!(all.len() < 300, "it was too fast to be interrupted");
-    all.extend(bench.ok("read --new --format jsonl").lines().map(str::to_owned));
+    all.extend(events(&bench.ok("read --new --format jsonl")));
     let numbers: Vec<_> = all.iter().filter_map(|line| line.split(',').next()).collect();
     let expected: Vec<_> = (1..=300).map(|number| format!("{{\"entry\":{number}")).collect();
     assert_eq!(numbers, expected);

@@ -5,12 +5,14 @@
 mod common;
 
 use std::fs;
-use std::io::Write;
+use std::io::{BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 use std::sync::mpsc::Receiver;
 
-use common::{Running, ser_cli, wait_until};
+use common::{Running, events, ser_cli, wait_until};
+use ser_evidence::record::{ClockObservation, How, Record, Reference};
+use ser_files::Source;
 use ser_sim::testing::{PATIENCE, image};
 use tempfile::TempDir;
 
@@ -97,7 +99,7 @@ impl Bench {
         let input = self.sim.0.stdin.as_mut().expect("piped");
         writeln!(input, "{csv}\n").expect("the simulator listens");
         wait_until("the recorder has seen it", || {
-            self.ok(node, "read --all --format jsonl").lines().count() == entries
+            events(&self.ok(node, "read --all --format jsonl")).len() == entries
         });
     }
 }
@@ -159,11 +161,11 @@ fn every_command_works_over_the_bus() {
         stderr(&printed)
     );
     // New events are delivered once, to each reader of its own recorder.
-    assert_eq!(bench.ok(9, "read --new --format jsonl").lines().count(), 25);
-    assert_eq!(bench.ok(9, "read --new --format jsonl"), "");
+    assert_eq!(events(&bench.ok(9, "read --new --format jsonl")).len(), 25);
+    assert!(events(&bench.ok(9, "read --new --format jsonl")).is_empty());
     bench.ok(5, "erase --yes");
-    assert_eq!(bench.ok(5, "read --all --format jsonl"), "");
-    assert_eq!(bench.ok(9, "read --all --format jsonl").lines().count(), 25);
+    assert!(events(&bench.ok(5, "read --all --format jsonl")).is_empty());
+    assert_eq!(events(&bench.ok(9, "read --all --format jsonl")).len(), 25);
 
     assert_eq!(bench.sim.interrupt(), Some(0));
     assert!(!bench.window().exists(), "the window goes with the simulator");
@@ -227,7 +229,58 @@ fn the_bus_is_seen_and_spoken_to_as_a_whole() {
     assert!(bench.ok(9, "status").contains("stopped"));
     assert!(bench.on_bus("genius broadcast start").matches("yes").count() == 2);
     assert!(bench.on_bus("genius broadcast erase --yes").matches("yes").count() == 2);
-    assert_eq!(bench.ok(9, "read --all --format jsonl"), "");
+    assert!(events(&bench.ok(9, "read --all --format jsonl")).is_empty());
+}
+
+/// What is kept of the recorders' clocks, each observation with its recorder's name.
+fn kept_clocks(bench: &Bench) -> Vec<(String, ClockObservation)> {
+    // The folder is made for the first thing that is kept.
+    let files = fs::read_dir(bench.folder.path().join("state")).into_iter().flatten();
+    let mut files: Vec<_> = files.map(|file| file.expect("a file").path()).collect();
+    files.retain(|path| path.extension().is_some_and(|end| end == "jsonl"));
+    files.sort();
+    let records = files.iter().flat_map(|path| {
+        let file = BufReader::new(fs::File::open(path).expect("opened"));
+        Source::new(file, "").expect("JSON lines").map(|told| told.expect("a record"))
+    });
+    let clocks = records.filter_map(|told| match told.record {
+        Record::Clock(clock) => Some((told.recorder, clock)),
+        _ => None,
+    });
+    clocks.collect()
+}
+
+#[test]
+fn clocks_of_a_bus_are_compared_without_being_set() {
+    let bench = Bench::start("--node 5 --node 9:ser160");
+    // Nothing tells the day.
+    let mark = bench.command(&bench.bus(), "genius broadcast mark").output().expect("it runs");
+    let (table, error) = (succeeded("mark", &mark), stderr(&mark));
+    assert_eq!(table.lines().count(), 3, "{table}");
+    assert!(table.lines().nth(2).is_some_and(|row| row.ends_with(" s ± 1 ms")), "{table}");
+    assert!(error.contains("device 9: the day is not known: the log is empty"), "{error}");
+    assert!(kept_clocks(&bench).is_empty());
+
+    bench.on_bus("genius broadcast clock --at 2026-11-22T10:00:00");
+    let table = bench.on_bus("genius broadcast mark");
+    let row = |row: usize| table.lines().nth(row).expect("a row");
+    assert!(row(1).starts_with("   5  2026-11-22T10:00:"), "{table}");
+    let apart = row(2).strip_prefix("   9  2026-11-22T10:00:").expect("the same minute");
+    assert!(["+0.000", "+0.001", "-0.001"].iter().any(|ms| apart.contains(ms)), "{table}");
+
+    // A setting and a mark of each, and both of one broadcast.
+    let clocks = kept_clocks(&bench);
+    let names: Vec<_> = clocks.iter().map(|(name, _)| name.as_str()).collect();
+    let (five, nine) = (bench.port(5), bench.port(9));
+    assert_eq!(names, [&*five, &*five, &*nine, &*nine]);
+    let hows: Vec<_> = clocks.iter().map(|(_, clock)| clock.how).collect();
+    assert!(matches!(hows[..2], [How::Set { broadcast: Some(_) }, How::Mark { .. }]), "{hows:?}");
+    assert_eq!(hows[..2], hows[2..]);
+    for (_, clock) in &clocks {
+        let Reference::Host { bound, .. } = clock.at else { panic!("{clock:?}") };
+        assert!(bound.width_us().is_some_and(|width_us| width_us >= 2_000), "{bound:?}");
+        assert_eq!((clock.place.after, clock.place.before), (Some(0), Some(0)));
+    }
 }
 
 /// Milliseconds of the hour in which a clock was set to ten o'clock.
@@ -470,7 +523,7 @@ fn the_image_is_spoken_to_over_the_bus() {
     assert!(bench.ok(5, "status").contains("recording"));
     let clock = bench.on_bus("genius broadcast clock --at 2026-11-22T10:00:00");
     assert_eq!(clock.matches("yes        set clock at 10:00:00.000").count(), 2, "{clock}");
-    assert_eq!(bench.ok(5, "read --all --format jsonl"), "");
+    assert!(events(&bench.ok(5, "read --all --format jsonl")).is_empty());
     bench.ok(5, "stop");
     assert!(
         bench.ok(5, "status").contains("stopped") && bench.ok(9, "status").contains("recording")

@@ -11,7 +11,7 @@ use std::process::{Command, Output};
 use std::thread;
 
 use common::bench::{Bench, text};
-use common::ser_cli;
+use common::{events, ser_cli};
 use ser_proto::{
     Configuration, Decoded, Entry, FrameDecoder, FrameEncoder, Inputs, MAX_BODY_LEN, Model,
     ReadReply, Reply, TimeStamp,
@@ -126,11 +126,11 @@ fn inputs_that_change_while_recording_is_stopped_are_named() {
     bench.ok("start");
     bench.contacts("0,1,0", 1);
     let output = bench.run("read --format jsonl --fail-on-loss");
-    let lines = text(&output.stdout);
+    let lines = events(&text(&output.stdout));
     let loss = "{\"lost\":null,\"count\":\"unknown\",\"after\":1,\"why\":\"not \
      recorded\",\"inputs\":[7,9],\"life\":\"0\"}";
-    assert_eq!(lines.lines().nth(1), Some(loss), "{lines}");
-    assert_eq!((lines.lines().count(), output.status.code()), (3, Some(3)));
+    assert_eq!((lines.len(), output.status.code()), (3, Some(3)));
+    assert_eq!(lines[1], loss);
     assert!(
         text(&output.stderr)
             .contains("lost ahead of entry 2: inputs 7 9 changed while nothing was recorded")
@@ -277,7 +277,7 @@ fn entries_that_cannot_be_are_delivered_and_marked_and_harm_no_others() {
     assert!(warnings[0].contains("entry 2") && warnings[3].contains("2 more entries"), "{told}");
 
     let jsonl = text(&read("jsonl").stdout);
-    assert_eq!((jsonl.lines().count(), jsonl.matches("\"note\":").count()), (7, 5), "{jsonl}");
+    assert_eq!((events(&jsonl).len(), jsonl.matches("\"note\":").count()), (7, 5), "{jsonl}");
     let table = text(&read("table").stdout);
     let marked = table.lines().filter(|line| line.ends_with(')')).count();
     assert_eq!((table.lines().count(), marked), (1 + 7, 5), "{table}");

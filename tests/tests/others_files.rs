@@ -40,7 +40,7 @@ const CALLS: [&str; 26] = [
 ];
 
 /// File, call, how often, and why that is right.
-const JUDGED: [(&str, &str, usize, &str); 29] = [
+const JUDGED: [(&str, &str, usize, &str); 31] = [
     (
         "crates/geni-board/src/mapped_ram.rs",
         "map_raw(",
@@ -50,12 +50,29 @@ const JUDGED: [(&str, &str, usize, &str); 29] = [
     ),
     ("ser-cli/src/closed_stdout.rs", "OFlags::RDWR", 1, "compared, and nothing is opened with it"),
     (
+        "ser-cli/src/kept.rs",
+        ".write(true)",
+        1,
+        "the lock, which is never written to; no link is followed",
+    ),
+    (
+        "ser-cli/src/kept.rs",
+        "append(true)",
+        1,
+        "makes the file, or opens one that was read as ours just before; no link is followed",
+    ),
+    (
         "ser-cli/src/output/rows.rs",
         "set_len(",
         1,
         "what was just written to standard output, if nobody has written after it",
     ),
-    ("ser-cli/src/state.rs", ".persist(", 1, "over a state file, which it was read as just before"),
+    (
+        "ser-cli/src/state.rs",
+        ".persist(",
+        1,
+        "over a state file, or records that are kept beside it, which it was read as just before",
+    ),
     (
         "ser-cli/src/state.rs",
         ".write(true)",

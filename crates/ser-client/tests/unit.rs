@@ -8,8 +8,8 @@ use std::time::Duration;
 use common::unit::Bench;
 use common::{Told, told};
 use ser_client::{
-    Cursor, Diagnosis, Disturbed, LogPosition, RequestError, Summary, TransportError, Unit,
-    Unsolicited,
+    Cursor, Diagnosis, Disturbed, LogFollower, LogPosition, RequestError, Summary, TransportError,
+    Unit, Unsolicited,
 };
 use ser_proto::{AutoReport, Baud, Command, Configure, Mode, Reply, TimeStamp};
 
@@ -390,4 +390,33 @@ fn a_line_that_breaks_says_how_and_can_be_used_again() {
     assert!(matches!(error, RequestError::Transport(TransportError::Closed)), "{error:?}");
     bench.fake().broken = None;
     assert!(bench.unit.mode().unwrap().recording);
+}
+
+#[test]
+fn a_reading_says_by_when_there_was_nothing_else() {
+    let mut bench = Bench::new(100);
+    bench.fake().recorder.append_many(25);
+    let mut follower = LogFollower::new(None, 100);
+    assert_eq!(follower.complete_at(), None);
+    let mut read = |bench: &mut Bench| {
+        let before = bench.unit.now();
+        let mut events = 0;
+        follower
+            .read_new(&mut bench.unit, &mut |step| -> Result<(), RequestError> {
+                events += step.deliveries.len();
+                Ok(())
+            })
+            .unwrap();
+        (before, events, follower.complete_at().unwrap())
+    };
+    let (before, events, complete_at) = read(&mut bench);
+    let last = bench.unit.last_exchange().unwrap();
+    assert_eq!((events, complete_at), (25, last.first_sent), "all that the last reply told of");
+    assert!(before <= complete_at);
+    // Events are added after each answer, so there is always more than the reading has passed.
+    bench.fake().meanwhile = Box::new(|recorder, _, _| recorder.append_many(1));
+    bench.fake().recorder.append_many(3);
+    let (before, _, complete_at) = read(&mut bench);
+    let last = bench.unit.last_exchange().unwrap();
+    assert!(before <= complete_at && complete_at <= last.answered);
 }

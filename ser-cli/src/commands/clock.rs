@@ -3,16 +3,26 @@
 use std::io::{self, Write};
 use std::time::Instant;
 
+use ser_client::{RequestError, Unit};
+use ser_evidence::record::{ClockObservation, How, Record};
+use ser_evidence::time::shown;
 use ser_proto::TimeStamp;
 
 use crate::connection::{self, ConnectionArgs};
-use crate::error::{Failure, Result};
+use crate::error::{Failure, Result, advise, inform, warn};
+use crate::keeper::StateArgs;
+use crate::kept::KeptRecords;
+use crate::log_look::LogLook;
+use crate::setting;
 use crate::time::{local_time_in, parse_time, time_after};
 
 const EXAMPLES: &str = "\
 Examples:
   ser-cli clock set                               to the time of this computer
-  ser-cli clock set --at 2026-11-22T10:00:00.250  to a given time";
+  ser-cli clock set --at 2026-11-22T10:00:00.250  to a given time
+
+What the clock showed, and when, is remembered in the state directory, so that a report can tell \
+how exact the recorder's times are. How exact the setting was is told on standard error.";
 
 /// Set the recorder's clock.
 #[derive(Debug, clap::Args)]
@@ -35,11 +45,14 @@ enum What {
         /// not given.
         #[arg(long, value_name = "TIME", value_parser = parse_time)]
         at: Option<TimeStamp>,
+
+        #[command(flatten)]
+        state: StateArgs,
     },
 }
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
-    let What::Set { at } = args.what;
+    let What::Set { at, state } = &args.what;
     // Checked before anything is sent. No download lasts from one century into the next.
     if at.is_none() {
         local_time_in(std::time::Duration::ZERO).map_err(|year| {
@@ -49,20 +62,52 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             .hint("set this computer's clock, or give the time with --at")
         })?;
     }
+    let kept = KeptRecords::of(state, connection)?;
     let mut unit = connection::open(connection)?;
+    let before = LogLook::take(&mut unit)?;
+    let sent = set(&mut unit, *at).inspect_err(|error| {
+        if matches!(error, RequestError::NoReply { may_have_been_done: true, .. }) {
+            kept.add(&[setting::step(before.place(None))]);
+        }
+    })?;
+    let mut out = io::stdout().lock();
+    writeln!(out, "{sent}")?;
+    out.flush()?;
+    remember(&kept, observed(&mut unit, sent, &before), &before);
+    Ok(())
+}
+
+fn set(unit: &mut Unit, at: Option<TimeStamp>) -> std::result::Result<TimeStamp, RequestError> {
     let mut asked_first = None;
-    let sent = unit.set_clock(|ahead| match at {
+    unit.set_clock(|ahead| match at {
         // A repeated attempt sets the time that has been reached since the first one.
         Some(at) => {
             let now = Instant::now();
             time_after(at, now.duration_since(*asked_first.get_or_insert(now)))
         }
         None => local_time_in(ahead).unwrap_or(NO_TIME),
-    })?;
-    let mut out = io::stdout().lock();
-    writeln!(out, "{sent}")?;
-    out.flush()?;
-    Ok(())
+    })
+}
+
+/// What the clock showed when it was set just now. `None` if it was sent again and again: then nobody
+/// knows which attempt set it last.
+fn observed(unit: &mut Unit, sent: TimeStamp, before: &LogLook) -> Option<ClockObservation> {
+    let exchange = unit.last_exchange().filter(|exchange| exchange.attempts == 1)?;
+    let after = unit.log_position().ok().map(|position| position.total);
+    let how = How::Set { broadcast: None };
+    Some(setting::observation(how, shown(&sent)?, exchange.carried_out(), before.place(after)))
+}
+
+fn remember(kept: &KeptRecords, observed: Option<ClockObservation>, before: &LogLook) {
+    let Some(observation) = observed else {
+        warn("the command was sent more than once, and it is not known which one set the clock");
+        advise("set it once more, so that a report can tell how exact the recorder's times are");
+        return kept.add(&[setting::step(before.place(None))]);
+    };
+    if let Some(doubt_ms) = setting::doubt_ms(&observation) {
+        inform(format_args!("exact to ± {doubt_ms} ms"));
+    }
+    kept.add(&[Record::Clock(observation)]);
 }
 
 /// Neither a recorder nor a client accepts this as a date.

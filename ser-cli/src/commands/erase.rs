@@ -1,8 +1,11 @@
 //! `erase`: erases all events.
 
+use ser_evidence::record::{LifeRecord, Record};
+
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
 use crate::keeper::{Keeper, StateArgs};
+use crate::kept::KeptRecords;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -48,7 +51,16 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
     unit.erase()?;
     inform(erased(total));
-    keeper.erased(total)
+    let before = keeper.place();
+    keeper.erased(total)?;
+    if let (Some((before, _)), Some((life, _))) = (before, keeper.place())
+        && before != life
+    {
+        let erased = Some(before);
+        let record = LifeRecord { life, is_exact: true, model: None, size: keeper.size(), erased };
+        KeptRecords::of(&args.state, connection)?.add(&[Record::Life(record)]);
+    }
+    Ok(())
 }
 
 fn erased(total: u16) -> String {

@@ -6,6 +6,7 @@ mod devices;
 mod dip;
 mod forces;
 mod globals;
+mod mark;
 
 use clap::ValueEnum;
 use ser_client::Recognition;
@@ -13,6 +14,7 @@ use ser_proto::genius::{BusAddress, DipSwitches, ForceTable};
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result};
+use crate::keeper::StateArgs;
 use crate::values::{self, BusRateName};
 
 const EXAMPLES: &str = "\
@@ -23,6 +25,7 @@ Examples:
   ser-cli genius globals --model-number 4
   ser-cli genius forces --node 5 --table input-values
   ser-cli genius broadcast clock
+  ser-cli genius broadcast mark
   ser-cli genius broadcast erase --yes
   ser-cli genius decode 20 1E 04 00 01 00
   ser-cli genius dip 10100111
@@ -46,7 +49,11 @@ const BROADCAST_EXAMPLES: &str = "\
 Examples:
   ser-cli genius broadcast clock
   ser-cli genius broadcast clock --at 2026-11-22T10:00:00.250
-  ser-cli genius broadcast erase --yes";
+  ser-cli genius broadcast mark
+  ser-cli genius broadcast erase --yes
+
+A clock that was set, and what the clocks showed at a mark, is remembered in the state directory, \
+so that a report can compare the times of the recorders of a bus to the millisecond.";
 
 const DECODE_EXAMPLES: &str = "\
 Examples:
@@ -113,6 +120,8 @@ enum What {
         what: broadcast::What,
         #[command(flatten)]
         who: Who,
+        #[command(flatten)]
+        state: StateArgs,
     },
     /// Explain what a datagram means. No bus is needed.
     #[command(after_help = DECODE_EXAMPLES)]
@@ -191,8 +200,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             globals::run(connection, follow, who.recognition(connection))
         }
         What::Forces { node, table } => forces::run(connection, node.number(), table.into()),
-        What::Broadcast { what, who } => {
-            broadcast::run(connection, what, who.recognition(connection))
+        What::Broadcast { what, who, ref state } => {
+            broadcast::run(connection, what, who.recognition(connection), state)
         }
     }
 }

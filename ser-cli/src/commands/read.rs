@@ -11,8 +11,10 @@ use crate::delivery::Outlet;
 use crate::error::{Failure, Result, advise, inform, warn};
 use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
+use crate::kept::KeptRecords;
 use crate::output::{Format, Life};
 use crate::values;
+use crate::witness::Witness;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -83,7 +85,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let mut unit = connection::open(connection)?;
     let life = keeper.as_ref().map_or(Ok(Life::UNKNOWN), Keeper::life)?;
     let before = keeper.as_ref().map(Keeper::before).unwrap_or_default();
-    let mut outlet = Outlet::new(args.format, life, before);
+    let recorder = connection::recorder_name(connection)?;
+    let mut outlet = Outlet::new(args.format, &recorder, life, before);
     let check_complete = |outlet: &Outlet| match args.fail_on_loss {
         true => outlet.require_complete(),
         false => Ok(()),
@@ -93,13 +96,16 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         return check_complete(&outlet);
     }
     let remembered = keeper.as_ref().and_then(Keeper::size);
+    let kept = args.new.then(|| KeptRecords::of(&args.state, connection)).transpose()?;
+    let mut witness = Witness::begin(kept, keeper.as_ref().and_then(Keeper::place));
     let size = connection::log_size(&mut unit, args.log_size, remembered)?;
-    let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), size, &stop);
+    let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), &mut witness, size, &stop);
     // Events that reached standard output are remembered even if the recorder fell silent in
     // between, or after Ctrl-C.
     let saved = keeper.as_mut().map_or(Ok(()), Keeper::save);
     let delivered = outlet.finish().and(result)?;
     saved?;
+    witness.keep();
     if delivered == 0 && !outlet.has_gaps() {
         inform(if args.new { "nothing new" } else { "the log is empty" });
     }
@@ -110,6 +116,7 @@ fn read_by_cursor(
     unit: &mut Unit,
     outlet: &mut Outlet,
     mut keeper: Option<&mut Keeper>,
+    witness: &mut Witness,
     size: u16,
     stop: &AtomicBool,
 ) -> Result<u32> {
@@ -124,6 +131,8 @@ fn read_by_cursor(
         }
         check_interrupt(stop)
     })?;
+    witness.read(outlet, follower.cursor(), follower.size(), follower.complete_at())?;
+    witness.vouch(outlet)?;
     Ok(summary.delivered)
 }
 

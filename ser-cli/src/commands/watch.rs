@@ -13,9 +13,11 @@ use crate::delivery::Outlet;
 use crate::error::{Failure, Result, inform};
 use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
+use crate::kept::KeptRecords;
 use crate::outage::Outage;
 use crate::output::Format;
 use crate::values;
+use crate::witness::Witness;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -87,11 +89,16 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         }
         None => LogWatcher::polling(follower, plan.interval, args.interval.is_none()),
     };
-    let outlet = Outlet::endless(args.format, keeper.life()?, keeper.before());
+    let recorder = connection::recorder_name(connection)?;
+    let outlet = Outlet::endless(args.format, &recorder, keeper.life()?, keeper.before());
     let outage = Outage::new(connection::options(connection).timeout);
-    let mut watch = Watch { unit, watcher, outlet, keeper, stop, outage };
+    let kept = KeptRecords::of(&args.state, connection)?;
+    let witness = Witness::begin(Some(kept), keeper.place());
+    let mut watch = Watch { unit, watcher, outlet, keeper, witness, stop, outage };
     let result = watch.run();
-    let saved = watch.outlet.finish().and_then(|()| watch.keeper.save());
+    let vouched = watch.witness.vouch(&mut watch.outlet);
+    let saved = vouched.and(watch.outlet.finish()).and_then(|()| watch.keeper.save());
+    watch.witness.keep();
     let found = plan.reports.map(|reports| reports.found).filter(|_| watch.watcher.has_switched());
     let restored = found.map_or(Ok(()), |found| restore(&mut watch.unit, found));
     interrupt::leaves_behind(None);
@@ -214,6 +221,7 @@ struct Watch {
     watcher: LogWatcher,
     outlet: Outlet,
     keeper: Keeper,
+    witness: Witness,
     stop: Arc<AtomicBool>,
     outage: Outage,
 }
@@ -237,14 +245,20 @@ impl Watch {
     }
 
     fn step(&mut self) -> Result<()> {
-        let Watch { unit, watcher, outlet, keeper, stop, .. } = self;
+        let Watch { unit, watcher, outlet, keeper, witness, stop, .. } = self;
         watcher.step(unit, HEARTBEAT, &mut |step| -> Result<()> {
             outlet.take(step.deliveries, 0, &mut |life| keeper.name(life, step.size))?;
             keeper.delivered(step.cursor, step.size, outlet.life())?;
             if stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
         })?;
+        witness.read(outlet, watcher.cursor(), watcher.log_size(), watcher.complete_at())?;
+        let has_vouched = witness.vouch_if_due(outlet)?;
         // A file gets its header even when there is nothing to deliver.
-        outlet.flush()
+        outlet.flush()?;
+        if has_vouched {
+            witness.keep();
+        }
+        Ok(())
     }
 
     fn check_interrupt(&self) -> Result<()> {

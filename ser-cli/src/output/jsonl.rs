@@ -1,134 +1,147 @@
-//! JSON lines: one object per event, and one per loss.
+//! JSON lines: one object per record.
 
 use std::io::{self, Write};
 
-use ser_client::Lost;
-use ser_proto::Inputs;
-use serde::Serialize;
+use ser_client::Lost as Missing;
+use ser_evidence::record::{EntryRecord, Gap, Lost, Record, Why};
+use ser_files::jsonl::Writer;
 
 use super::{EventWriter, Loss};
 
+/// How this program calls itself in files.
+pub(crate) const PROGRAM: &str = concat!("ser-cli ", env!("CARGO_PKG_VERSION"));
+
+/// The beginning of a line that says how a file is laid out.
+const FILE_LINE: &str = "{\"record\":\"file\",\"schema\":1,";
+
 /// Writes lines like
-/// `{"entry":17,"time":"2026-11-22T10:00:00.250","changed":[3,17],"state":[3],"sequence":120,
-/// "life":"9f3c5a7e21b04d68"}` and `{"lost":37,"count":"exactly","after":120,"why":"overwritten",
-/// "life":"9f3c5a7e21b04d68"}`.
+/// `{"record":"entry","recorder":"U1","entry":17,"time":"2026-11-22T10:00:00.250","changed":[3,17],
+/// "state":[3],"sequence":120,"life":"9f3c5a7e21b04d68"}`. What the file is comes first, even when
+/// nothing follows.
 pub(crate) struct JsonLines<W> {
-    out: W,
+    lines: Writer<W>,
+    recorder: String,
+    header_due: bool,
 }
 
-#[derive(Serialize)]
-struct EventLine {
-    /// The recorder's number for it.
-    entry: u16,
-    /// In the recorder's own time, as it was read.
-    time: String,
-    /// Numbers of the inputs that changed.
-    changed: Vec<u8>,
-    /// Numbers of the inputs that are on from now.
-    state: Vec<u8>,
-    /// The total after it in the life of its log; `null` if that is not known.
-    sequence: Option<u64>,
-    /// The life of its log; `0` if that is not known.
-    life: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    note: Option<String>,
-}
-
-#[derive(Serialize)]
-struct LossLine {
-    /// How many events; `null` if that is not known.
-    lost: Option<u32>,
-    /// `exactly`, `at least` or `unknown`.
-    count: &'static str,
-    /// The sequence of the last event before the loss.
-    after: Option<u64>,
-    /// `overwritten`, `log began anew` or `not recorded`.
-    why: &'static str,
-    /// The inputs that changed without being recorded.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    inputs: Option<Vec<u8>>,
-    /// The life of the last event before the loss.
-    life: String,
+/// Whether a file with this first line need not be told its layout again.
+pub(super) fn is_file_line(line: &str) -> bool {
+    line.starts_with(FILE_LINE)
 }
 
 impl<W: Write> JsonLines<W> {
-    pub(crate) fn new(out: W) -> JsonLines<W> {
-        JsonLines { out }
+    /// For the records of this recorder. `has_header` says whether the layout is already told.
+    pub(crate) fn new(out: W, recorder: &str, has_header: bool) -> JsonLines<W> {
+        let recorder = recorder.to_owned();
+        JsonLines { lines: Writer::new(out), recorder, header_due: !has_header }
     }
 
-    fn line(&mut self, line: &impl Serialize) -> io::Result<()> {
-        serde_json::to_writer(&mut self.out, line)?;
-        writeln!(self.out)
+    fn header(&mut self) -> io::Result<()> {
+        if std::mem::take(&mut self.header_due) { self.lines.file(PROGRAM) } else { Ok(()) }
     }
 }
 
-fn numbers(inputs: Inputs) -> Vec<u8> {
-    inputs.numbers().collect()
+impl From<&super::Event> for EntryRecord {
+    fn from(event: &super::Event) -> EntryRecord {
+        EntryRecord {
+            life: event.life,
+            sequence: event.sequence,
+            number: event.number,
+            entry: event.entry,
+            known: EntryRecord::ALL_KNOWN,
+        }
+    }
+}
+
+impl From<&Loss> for Gap {
+    fn from(loss: &Loss) -> Gap {
+        let (lost, why) = match loss.lost {
+            Missing::Overwritten { count } => (Lost::Exactly(count), Why::Overwritten),
+            Missing::OverwrittenAtLeast { count } => (Lost::AtLeast(count), Why::Overwritten),
+            Missing::LogRestarted => (Lost::Unknown, Why::LogBeganAnew),
+            Missing::Unrecorded { inputs } => (Lost::Unknown, Why::not_recorded(inputs)),
+        };
+        Gap { life: loss.life, after: loss.after, lost, why }
+    }
 }
 
 impl<W: Write> EventWriter for JsonLines<W> {
     fn event(&mut self, event: &super::Event) -> io::Result<()> {
-        self.line(&EventLine {
-            entry: event.number,
-            time: event.entry.time.to_string(),
-            changed: numbers(event.entry.changed),
-            state: numbers(event.entry.state),
-            sequence: event.sequence,
-            life: event.life.to_string(),
-            note: event.note(),
-        })
+        self.header()?;
+        self.lines.entry(&self.recorder, &EntryRecord::from(event), event.note().as_deref())
     }
 
     fn lost(&mut self, loss: &Loss) -> io::Result<()> {
-        let (lost, count) = loss.count();
-        let inputs = match loss.lost {
-            Lost::Unrecorded { inputs } => Some(numbers(inputs)),
-            _ => None,
-        };
-        let (after, why, life) = (loss.after, loss.why(), loss.life.to_string());
-        self.line(&LossLine { lost, count, after, why, inputs, life })
+        self.evidence(&Record::Gap(Gap::from(loss)))
+    }
+
+    fn evidence(&mut self, record: &Record) -> io::Result<()> {
+        self.header()?;
+        self.lines.record(&self.recorder, record)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.out.flush()
+        self.header()?;
+        self.lines.flush()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use ser_proto::Inputs;
+
     use super::*;
     use crate::output::testing::{entry, event, four_lost, odd};
 
+    fn written(has_header: bool, write: impl FnOnce(&mut dyn EventWriter)) -> Vec<String> {
+        let mut out = Vec::new();
+        let mut lines = JsonLines::new(&mut out, "U1", has_header);
+        write(&mut lines);
+        lines.flush().unwrap();
+        drop(lines);
+        String::from_utf8(out).unwrap().lines().map(str::to_owned).collect()
+    }
+
     #[test]
     fn every_event_is_a_line_and_every_loss() {
-        let mut out = Vec::new();
-        let mut lines = JsonLines::new(&mut out);
-        lines.event(&event(2048, entry("00.250", &[3, 17], &[1, 3]))).unwrap();
-        lines.lost(&four_lost()).unwrap();
         let inputs = Inputs(0b101);
-        lines.lost(&Loss { lost: Lost::Unrecorded { inputs }, ..four_lost() }).unwrap();
-        lines.event(&odd(event(1, entry("00.251", &[], &[])))).unwrap();
+        let lines = written(true, |lines| {
+            lines.event(&event(2048, entry("00.250", &[3, 17], &[1, 3]))).unwrap();
+            lines.lost(&four_lost()).unwrap();
+            let lost = Missing::Unrecorded { inputs };
+            lines.lost(&Loss { lost, ..four_lost() }).unwrap();
+            lines.event(&odd(event(1, entry("00.251", &[], &[])))).unwrap();
+        });
         let life = "\"life\":\"00000000000000ab\"";
+        let entry = "{\"record\":\"entry\",\"recorder\":\"U1\",\"entry\":";
+        let gap = "{\"record\":\"gap\",\"recorder\":\"U1\",\"lost\":";
         assert_eq!(
-            String::from_utf8(out).unwrap().lines().collect::<Vec<_>>(),
+            lines,
             [
                 format!(
-                    "{{\"entry\":2048,\"time\":\"2026-11-22T10:00:00.250\",\"changed\":[3,17],\"state\":[1,3],\
-                     \"sequence\":5000,{life}}}"
+                    "{entry}2048,\"time\":\"2026-11-22T10:00:00.250\",\"changed\":[3,17],\
+                     \"state\":[1,3],\"sequence\":5000,{life}}}"
                 ),
                 format!(
-                    "{{\"lost\":4,\"count\":\"exactly\",\"after\":4996,\"why\":\"overwritten\",{life}}}"
+                    "{gap}4,\"count\":\"exactly\",\"after\":4996,\"why\":\"overwritten\",{life}}}"
                 ),
                 format!(
-                    "{{\"lost\":null,\"count\":\"unknown\",\"after\":4996,\"why\":\"not recorded\",\
+                    "{gap}null,\"count\":\"unknown\",\"after\":4996,\"why\":\"not recorded\",\
                      \"inputs\":[1,3],{life}}}"
                 ),
                 format!(
-                    "{{\"entry\":1,\"time\":\"2026-11-22T10:00:00.251\",\"changed\":[],\"state\":[],\
+                    "{entry}1,\"time\":\"2026-11-22T10:00:00.251\",\"changed\":[],\"state\":[],\
                      \"sequence\":5000,{life},\"note\":\"month 13 is out of range; the clock \
                      went back\"}}"
                 ),
             ]
         );
+    }
+
+    #[test]
+    fn what_the_file_is_comes_first_and_only_once() {
+        let [line] = &written(false, |lines| lines.flush().unwrap())[..] else { panic!() };
+        assert!(is_file_line(line) && line.ends_with(&format!("\"{PROGRAM}\"}}")), "{line}");
+        assert!(written(true, |_| ()).is_empty());
     }
 }

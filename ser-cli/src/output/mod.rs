@@ -16,8 +16,9 @@ use clap::ValueEnum;
 
 pub(crate) use csv::Csv;
 pub(crate) use elapsed::Elapsed;
-pub(crate) use jsonl::JsonLines;
+pub(crate) use jsonl::{JsonLines, PROGRAM};
 pub use life::Life;
+pub(crate) use life::new_life;
 pub(crate) use palette::Palette;
 pub(crate) use record::{Annotator, Before, Event, Loss, Record};
 pub(crate) use rows::{Rows, sync_stdout};
@@ -32,7 +33,7 @@ pub(crate) enum Format {
     Table,
     /// One row per input that changed: entry,time,input,state,sequence,life,note.
     Csv,
-    /// One JSON object per event or loss.
+    /// One JSON object per record: events, losses, and what else the reading proves.
     Jsonl,
 }
 
@@ -44,22 +45,31 @@ pub(crate) trait EventWriter {
     /// Writes that events are missing here.
     fn lost(&mut self, loss: &Loss) -> io::Result<()>;
 
+    /// Writes what else is known. Formats for people and for spreadsheets have no place for it.
+    fn evidence(&mut self, _record: &ser_evidence::record::Record) -> io::Result<()> {
+        Ok(())
+    }
+
     /// Passes on what has been written so far, in whole rows.
     fn flush(&mut self) -> io::Result<()>;
 }
 
-/// The writer of `format` on standard output. A continued file gets no second header.
-pub(crate) fn to_stdout(format: Format) -> Box<dyn EventWriter> {
+/// The writer of `format` on standard output, for what this recorder tells. A continued file gets no
+/// second header.
+pub(crate) fn to_stdout(format: Format, recorder: &str) -> Box<dyn EventWriter> {
     match format {
         Format::Table => {
-            let (rows, has_header) = Rows::to_stdout(&table::header());
+            let (rows, has_header) = Rows::to_stdout(&|line| line == table::header());
             Box::new(Table::new(rows, Palette::of_stdout(), has_header))
         }
         Format::Csv => {
-            let (rows, has_header) = Rows::to_stdout(csv::HEADER);
+            let (rows, has_header) = Rows::to_stdout(&|line| line == csv::HEADER);
             Box::new(Csv::new(rows, has_header))
         }
-        Format::Jsonl => Box::new(JsonLines::new(Rows::to_stdout("").0)),
+        Format::Jsonl => {
+            let (rows, has_header) = Rows::to_stdout(&jsonl::is_file_line);
+            Box::new(JsonLines::new(rows, recorder, has_header))
+        }
     }
 }
 

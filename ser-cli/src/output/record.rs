@@ -6,7 +6,7 @@ use std::io;
 use ser_client::{Delivery, Lost};
 use ser_proto::{Entry, Model};
 
-use super::{EventWriter, Life};
+use super::{EventWriter, Life, new_life};
 use crate::time::ClockStep;
 
 /// An event, with its notes.
@@ -201,7 +201,7 @@ impl Annotator {
                 if lost == Lost::LogRestarted {
                     self.before.previous = None;
                     if life != Life::UNKNOWN {
-                        self.life = self.before.next_life.take().map_or_else(Life::begin, Ok)?;
+                        self.life = self.before.next_life.take().map_or_else(new_life, Ok)?;
                     }
                 }
                 vec![Record::Loss(Loss { after, life, lost })]
@@ -322,14 +322,14 @@ mod tests {
     #[test]
     fn a_log_that_begins_anew_gets_a_name_of_its_own_if_it_has_one() {
         let restart = Delivery::Lost { after: Some(7), lost: Lost::LogRestarted };
-        let life = Life::begin().unwrap();
+        let life = new_life().unwrap();
         let mut annotator = Annotator::new(life, Before::default());
         let records = annotator.records(&restart).unwrap();
         let [Record::Loss(loss)] = &records[..] else { panic!() };
         assert_eq!(loss.life, life, "the loss belongs to the log of before");
         assert!(![life, Life::UNKNOWN].contains(&annotator.life()));
         // A name that was drawn before a crash may already be in a file.
-        let next = Life::begin().unwrap();
+        let next = new_life().unwrap();
         let mut annotator =
             Annotator::new(life, Before { next_life: Some(next), ..Before::default() });
         annotator.records(&restart).unwrap();

@@ -88,6 +88,18 @@ impl Drop for Running {
     }
 }
 
+/// The entries and losses among JSON lines, each from its first field of its own on.
+pub(crate) fn events(jsonl: &str) -> Vec<String> {
+    let own_fields = |line: &str| {
+        let kinds = [("entry", "\"entry\":"), ("gap", "\"lost\":")];
+        kinds.iter().find_map(|(kind, first)| {
+            let rest = line.strip_prefix(&format!("{{\"record\":\"{kind}\","))?;
+            Some(format!("{{{}", &rest[rest.find(first)?..]))
+        })
+    };
+    jsonl.lines().filter_map(own_fields).collect()
+}
+
 /// Waits for a condition.
 pub(crate) fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     let deadline = Instant::now() + PATIENCE;

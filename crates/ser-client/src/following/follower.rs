@@ -6,6 +6,8 @@
 //! lost or were never sent. A reading begins with the last event that was delivered. It takes one
 //! request if no more than nine events have happened since.
 
+use std::time::Duration;
+
 use crate::reading::cursor::Cursor;
 use crate::reading::delivery::Delivery;
 use crate::reading::disturbed::Disturbed;
@@ -38,13 +40,14 @@ pub struct LogFollower {
     cursor: Option<Cursor>,
     position: Option<LogPosition>,
     keeps_up: bool,
+    complete_at: Option<Duration>,
 }
 
 impl LogFollower {
     /// Begins after `cursor`, or with the oldest event. `size` is how many entries the log holds.
     #[must_use]
     pub fn new(cursor: Option<Cursor>, size: u16) -> LogFollower {
-        LogFollower { size, cursor, position: None, keeps_up: false }
+        LogFollower { size, cursor, position: None, keeps_up: false, complete_at: None }
     }
 
     /// How many entries the log holds, as far as is known.
@@ -77,6 +80,14 @@ impl LogFollower {
     #[must_use]
     pub fn position(&self) -> Option<LogPosition> {
         self.position
+    }
+
+    /// A time, by the host's clock, at which the log held nothing that has not been delivered or told
+    /// as lost; the latest that the readings so far prove. An event that is delivered later had not
+    /// been written to the log by then.
+    #[must_use]
+    pub fn complete_at(&self) -> Option<Duration> {
+        self.complete_at
     }
 
     /// Reads what is new and hands it to `take`, reply by reply. Each event comes once and in
@@ -128,6 +139,7 @@ impl LogFollower {
         }
         let mut deliveries = Vec::new();
         let mut first = true;
+        let began = unit.now();
         unit.cancel();
         unit.ask(&mut || reader.request())?;
         while reader.is_waiting() {
@@ -151,6 +163,7 @@ impl LogFollower {
         }
         let summary = reader.summary();
         self.position = Some(summary.position);
+        self.complete_at = Some(complete_at(unit, began, self.cursor, summary.position));
         Ok((summary, Ok(())))
     }
 
@@ -162,5 +175,21 @@ impl LogFollower {
             Err(error) => return Err(error),
         }
         Ok(())
+    }
+}
+
+/// When the log held nothing beyond `cursor`, by a reading that began at `began` and ended with the
+/// log at `position`.
+fn complete_at(
+    unit: &Unit,
+    began: Duration,
+    cursor: Option<Cursor>,
+    position: LogPosition,
+) -> Duration {
+    let is_all = cursor.is_some_and(|cursor| cursor.total() == position.total);
+    match unit.last_exchange().filter(|_| is_all) {
+        Some(last) => last.carried_out().0,
+        // Events were added meanwhile. A reading passes everything that happened before it.
+        None => began,
     }
 }

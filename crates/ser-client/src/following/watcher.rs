@@ -127,6 +127,19 @@ impl LogWatcher {
         self.follower.cursor()
     }
 
+    /// How many entries the log holds, as far as is known.
+    #[must_use]
+    pub fn log_size(&self) -> u16 {
+        self.follower.size()
+    }
+
+    /// When the log was last known to hold nothing else, as
+    /// [`LogFollower::complete_at`].
+    #[must_use]
+    pub fn complete_at(&self) -> Option<Duration> {
+        self.follower.complete_at()
+    }
+
     /// Makes the next step read the log, for example after a failure.
     pub fn read_next(&mut self) {
         self.due = Duration::ZERO;

@@ -2,16 +2,23 @@
 
 use std::fmt;
 use std::io::{self, Write};
+use std::time::Duration;
 
-use ser_client::{GeniHost, Recognition};
+use ser_client::{GeniHost, Recognition, Unit};
+use ser_evidence::record::{How, Place, Record};
+use ser_evidence::time::{Moment, Shown, shown};
 use ser_proto::{Command, LastBroadcast, TimeStamp};
 
-use super::{no_recorder, silent_candidates};
+use super::{mark, no_recorder, silent_candidates};
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
+use crate::keeper::StateArgs;
+use crate::kept::KeptRecords;
+use crate::log_look::LogLook;
+use crate::setting;
 use crate::time::{local_time_in, parse_time};
 
-#[derive(Clone, Copy, Debug, clap::Subcommand)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::Subcommand)]
 pub(super) enum What {
     /// Set all clocks, to the time at which the broadcast arrives.
     Clock {
@@ -19,6 +26,11 @@ pub(super) enum What {
         #[arg(long, value_name = "TIME", value_parser = parse_time)]
         at: Option<TimeStamp>,
     },
+    /// Compare all clocks without setting any: what does each show at one moment?
+    ///
+    /// A command that does nothing is broadcast. Each recorder notes when it came, by its own
+    /// clock, and is asked for that. The times are exact to a millisecond.
+    Mark,
     /// Start recording everywhere.
     Start,
     /// Stop recording everywhere.
@@ -31,7 +43,19 @@ pub(super) enum What {
     },
 }
 
-pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> Result<()> {
+impl What {
+    /// Whether it tells what the clocks show.
+    const fn tells_time(self) -> bool {
+        matches!(self, What::Clock { .. } | What::Mark)
+    }
+}
+
+pub(super) fn run(
+    connection: &ConnectionArgs,
+    what: What,
+    how: Recognition,
+    state: &StateArgs,
+) -> Result<()> {
     if let What::Erase { yes: false } = what {
         return Err(Failure::usage("this erases all events of all recorders on the bus for good")
             .hint("keep them first: ser-cli read --all --format csv > events.csv, for each of them")
@@ -43,29 +67,25 @@ pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> 
     if let Some(silent) = silent_candidates(&found.silent) {
         warn(&silent);
     }
-    let nodes: Vec<u8> = found.recorders.into_iter().map(|(node, _)| node).collect();
-    if nodes.is_empty() {
+    let ask = |(node, _)| Asked::before(&host, node, connection, what.tells_time());
+    let mut asked: Vec<Asked> = found.recorders.into_iter().map(ask).collect();
+    if asked.is_empty() {
         return Err(no_recorder());
     }
-    let ask =
-        || nodes.iter().map(|&node| last_broadcast(&host, node, connection)).collect::<Vec<_>>();
-    // The same command may have been broadcast before.
-    let before = ask();
+    let began = host.now();
     let command = send(what, &host)?;
-    let checks: Vec<_> = nodes
-        .iter()
-        .zip(before)
-        .zip(ask())
-        .map(|((&node, before), after)| Check {
-            node,
-            heard: Heard::of(&command, &before, &after),
-            after,
-        })
-        .collect();
-    let mut out = io::stdout().lock();
-    writeln!(out, "node  received   last broadcast")?;
-    checks.iter().try_for_each(|check| writeln!(out, "{check}"))?;
-    out.flush()?;
+    let checks: Vec<Check> = asked.iter_mut().map(|asked| asked.check(&command, began)).collect();
+    if let What::Mark = what {
+        mark::run(connection, state, &checks)?;
+    } else {
+        let mut out = io::stdout().lock();
+        writeln!(out, "node  received   last broadcast")?;
+        checks.iter().try_for_each(|check| writeln!(out, "{check}"))?;
+        out.flush()?;
+    }
+    if let Command::SetClock(time) = command {
+        remember_set(connection, state, &checks, time)?;
+    }
     conclude(&checks)
 }
 
@@ -81,6 +101,8 @@ fn send(what: What, host: &GeniHost) -> Result<Command> {
                 .hint("set this computer's clock, or give the time with --at")
             })?)
         }
+        // Nobody answers a broadcast, so a read does nothing but being noted.
+        What::Mark => Command::Read { start: 1, count: 1 },
         What::Start => Command::SetMode { recording: true },
         What::Stop => Command::SetMode { recording: false },
         What::Erase { .. } => Command::Erase,
@@ -95,15 +117,62 @@ fn send(what: What, host: &GeniHost) -> Result<Command> {
 /// What a recorder last received as a broadcast, or why that is not known.
 type Answer = std::result::Result<Option<LastBroadcast>, String>;
 
-fn last_broadcast(host: &GeniHost, node: u8, connection: &ConnectionArgs) -> Answer {
-    host.unit(node, connection::options(connection))
-        .last_broadcast()
-        .map_err(|error| error.to_string())
+/// A recorder that was asked before the broadcast.
+struct Asked {
+    node: u8,
+    unit: Unit,
+    before: Answer,
+    /// Where its log stood, if that is wanted and known.
+    look: Option<LogLook>,
+}
+
+impl Asked {
+    fn before(host: &GeniHost, node: u8, connection: &ConnectionArgs, looks: bool) -> Asked {
+        let mut unit = host.unit(node, connection::options(connection));
+        // The same command may have been broadcast before.
+        let before = last_broadcast(&mut unit);
+        let look = (looks && before.is_ok()).then(|| LogLook::take(&mut unit).ok()).flatten();
+        Asked { node, unit, before, look }
+    }
+
+    /// Asks again, after a broadcast that was sent after `began`.
+    fn check(&mut self, command: &Command, began: Duration) -> Check {
+        let Asked { node, unit, before, look } = self;
+        let after = last_broadcast(unit);
+        let heard = Heard::of(command, before, &after);
+        let known_at = unit.last_exchange().map_or(began, |exchange| exchange.carried_out().1);
+        let total_after =
+            look.and_then(|_| unit.log_position().ok()).map(|position| position.total);
+        Check { node: *node, heard, after, look: *look, total_after, came: (began, known_at) }
+    }
+}
+
+fn last_broadcast(unit: &mut Unit) -> Answer {
+    unit.last_broadcast().map_err(|error| error.to_string())
+}
+
+/// Keeps that the clocks of these recorders were set, or may have been.
+fn remember_set(
+    connection: &ConnectionArgs,
+    state: &StateArgs,
+    checks: &[Check],
+    time: TimeStamp,
+) -> Result<()> {
+    let how = How::Set { broadcast: Some(getrandom::u64().map_err(io::Error::from)?) };
+    for check in checks {
+        let record = match (check.heard, shown(&time)) {
+            (Heard::Yes, Some(shown)) => check.observation(how, shown),
+            (Heard::No, _) => continue,
+            _ => setting::step(check.place()),
+        };
+        check.kept(connection, state)?.add(&[record]);
+    }
+    Ok(())
 }
 
 /// Whether a recorder has received a broadcast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Heard {
+pub(super) enum Heard {
     Yes,
     No,
     /// It did not say what it received, before or after, or it had received the very same before.
@@ -129,10 +198,34 @@ impl Heard {
 }
 
 /// The result of the broadcast at one recorder: a row of the table.
-struct Check {
-    node: u8,
-    heard: Heard,
-    after: Answer,
+pub(super) struct Check {
+    pub(super) node: u8,
+    pub(super) heard: Heard,
+    pub(super) after: Answer,
+    pub(super) look: Option<LogLook>,
+    total_after: Option<u16>,
+    /// Between which times of this computer the broadcast came, if it did.
+    came: (Duration, Duration),
+}
+
+impl Check {
+    /// The clock of the recorder showed this when the broadcast came.
+    pub(super) fn observation(&self, how: How, shown: Moment<Shown>) -> Record {
+        Record::Clock(setting::observation(how, shown, self.came, self.place()))
+    }
+
+    fn place(&self) -> Place {
+        self.look.map_or(Place::UNKNOWN, |look| look.place(self.total_after))
+    }
+
+    /// What is kept of the recorder.
+    pub(super) fn kept(
+        &self,
+        connection: &ConnectionArgs,
+        state: &StateArgs,
+    ) -> Result<KeptRecords> {
+        KeptRecords::of(state, &connection::to_node(connection, self.node)?)
+    }
 }
 
 impl fmt::Display for Check {
@@ -239,7 +332,14 @@ mod tests {
 
     #[test]
     fn who_is_not_known_to_have_heard_is_named() {
-        let check = |node, heard| Check { node, heard, after: last(0x45, 1) };
+        let check = |node, heard| Check {
+            node,
+            heard,
+            after: last(0x45, 1),
+            look: None,
+            total_after: None,
+            came: Default::default(),
+        };
         assert!(conclude(&[check(5, Heard::Yes), check(9, Heard::Yes)]).is_ok());
         let failure =
             conclude(&[check(5, Heard::No), check(7, Heard::Yes), check(9, Heard::NotKnown)]);

@@ -1,0 +1,52 @@
+//! Where a log stands, so that something that is not in it can be given its place.
+
+use ser_client::{RequestError, Unit};
+use ser_evidence::record::{Life, Place};
+use ser_proto::{Code, Command, Entry, Reply};
+
+/// How often the newest entry is asked for while events keep coming.
+const TRIES: u32 = 3;
+
+/// The log at one moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct LogLook {
+    /// Events since the log was erased, modulo 65536.
+    total: u16,
+    /// The newest entry, if there is one and it could be had.
+    pub(crate) newest: Option<Entry>,
+}
+
+impl LogLook {
+    /// Looks now.
+    pub(crate) fn take(unit: &mut Unit) -> Result<LogLook, RequestError> {
+        let mut position = unit.log_position()?;
+        for _ in 0..TRIES {
+            // The newest entry is before the next one. Before the first comes the last, and only
+            // recorders of ours say which that is.
+            if position.next_slot == 0 {
+                break;
+            }
+            let question = Command::Read { start: position.next_slot, count: 1 };
+            let Reply::Read(reply) = unit.request(&question)? else {
+                return Err(RequestError::UnexpectedReply { command: Code::Read });
+            };
+            let now = (&reply).into();
+            if now == position {
+                let newest = reply.entries.first().copied();
+                return Ok(LogLook { total: position.total, newest });
+            }
+            position = now;
+        }
+        Ok(LogLook { total: position.total, newest: None })
+    }
+
+    /// The place of something that happened after this look, and before the log had this total.
+    pub(crate) fn place(&self, total_after: Option<u16>) -> Place {
+        Place {
+            life: Life::UNKNOWN,
+            after: Some(self.total.into()),
+            before: total_after.map(u64::from),
+            newest: self.newest,
+        }
+    }
+}

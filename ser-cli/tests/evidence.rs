@@ -1,0 +1,127 @@
+//! What the command line writes down for a later report, held against the simulator's clock.
+#![cfg(unix)]
+
+mod common;
+
+use std::fs;
+use std::io::BufReader;
+
+use common::bench::{Bench, text};
+use common::events;
+use ser_evidence::record::{ClockObservation, How, LifeRecord, Record, Reference, Watched};
+use ser_evidence::time::{Host, Moment, shown};
+use ser_files::Source;
+use ser_sim::testing::Kind;
+
+/// The records in JSON lines, all of which must be ours.
+fn records(jsonl: &str) -> Vec<Record> {
+    let source = Source::new(jsonl.as_bytes(), "").expect("JSON lines");
+    source.map(|told| told.expect("a record").record).collect()
+}
+
+/// What was kept beside the state file.
+fn kept(bench: &Bench) -> Vec<Record> {
+    let folder = bench.folder.path().join("state");
+    let is_kept = |path: &std::path::PathBuf| path.extension().is_some_and(|end| end == "jsonl");
+    let files = fs::read_dir(folder).expect("a folder").map(|file| file.expect("a file").path());
+    let file = files.into_iter().find(is_kept).expect("what was kept");
+    let file = fs::File::open(file).expect("opened");
+    let source = Source::new(BufReader::new(file), "").expect("JSON lines");
+    source.map(|told| told.expect("a record").record).collect()
+}
+
+fn clocks(records: &[Record]) -> Vec<ClockObservation> {
+    let clock = |record: &Record| match record {
+        Record::Clock(clock) => Some(*clock),
+        _ => None,
+    };
+    records.iter().filter_map(clock).collect()
+}
+
+fn watched(records: &[Record]) -> Watched {
+    let watched = records.iter().find_map(|record| match record {
+        Record::Watched(watched) => Some(*watched),
+        _ => None,
+    });
+    watched.expect("for which time nothing is missing")
+}
+
+fn life(records: &[Record]) -> LifeRecord {
+    let life = records.iter().find_map(|record| match record {
+        Record::Life(life) => Some(*life),
+        _ => None,
+    });
+    life.expect("a life")
+}
+
+/// The least and the most that the recorder's clock is ahead of the host's, in microseconds.
+fn ahead_us(clock: &ClockObservation) -> (i64, i64) {
+    let Reference::Host { bound, .. } = clock.at else { panic!("{clock:?}") };
+    let ends = (bound.lo().expect("an end"), bound.hi().expect("an end"));
+    let us = |end: Moment<Host>| clock.shown.us() - end.us();
+    (us(ends.1), us(ends.0))
+}
+
+#[test]
+fn a_set_clock_and_the_entries_after_it_tell_of_the_same_clock() {
+    let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
+    bench.contacts("0,3,1", 1);
+    let set = bench.run("clock set --at 2026-11-22T10:00:00");
+    assert_eq!(text(&set.stdout), "2026-11-22T10:00:00.000\n");
+    assert!(text(&set.stderr).contains("exact to ± "), "{}", text(&set.stderr));
+    let [set] = clocks(&kept(&bench))[..] else { panic!("one observation") };
+    assert_eq!(set.how, How::Set { broadcast: None });
+    assert_eq!((set.place.after, set.place.before), (Some(1), Some(1)));
+    assert_eq!(set.place.newest.map(|entry| entry.changed.0), Some(0b100));
+
+    // The first reading has seen nothing before. The second has.
+    let first = records(&bench.ok("read --new --format jsonl"));
+    assert!(clocks(&first).is_empty());
+    let earlier = watched(&first);
+    assert_eq!((earlier.life, earlier.through), (life(&first).life, 1));
+    bench.contacts("0,3,0\n5,4,1\n9,4,0", 3);
+    let second = records(&bench.ok("read --new --format jsonl"));
+    let [began, ended] = clocks(&second)[..] else { panic!("the first and the last: {second:?}") };
+    assert_eq!((began.place.after, ended.place.after), (Some(2), Some(4)));
+    let (least, most) = ahead_us(&set);
+    for seen in [began, ended] {
+        assert_eq!((seen.how, seen.place.life), (How::Event, earlier.life));
+        let (at_least, at_most) = ahead_us(&seen);
+        assert!(at_least <= most && least <= at_most, "{set:?} {seen:?}");
+    }
+    assert!(watched(&second).from.monotonic >= earlier.to.monotonic);
+    assert_eq!(watched(&second).through, 4);
+    assert_eq!(clocks(&kept(&bench)).len(), 3);
+}
+
+#[test]
+fn a_log_that_was_erased_by_command_names_the_one_before() {
+    let mut bench = Bench::start(Kind::Native, &[]);
+    bench.contacts("0,3,1", 1);
+    let before = life(&records(&bench.ok("read --new --format jsonl")));
+    bench.ok("erase --yes");
+    bench.contacts("0,3,0", 1);
+    let after = life(&records(&bench.ok("read --new --format jsonl")));
+    assert_eq!((after.erased, before.erased), (Some(before.life), None));
+    assert!(after.is_exact);
+}
+
+#[test]
+fn every_line_of_a_continued_file_is_read_and_the_layout_is_told_once() {
+    let mut bench = Bench::start(Kind::Native, &["--model", "ser160"]);
+    bench.contacts("0,3,1\n1,4,1", 2);
+    let log = bench.folder.path().join("log");
+    for _ in 0..2 {
+        let file = fs::File::options().append(true).create(true).open(&log).expect("a file");
+        let run = bench.command("read --new --format jsonl").stdout(file).status();
+        assert!(run.expect("ser-cli runs").success());
+    }
+    let text = fs::read_to_string(&log).expect("text");
+    assert_eq!(text.matches("\"record\":\"file\"").count(), 1, "{text}");
+    assert_eq!((events(&text).len(), records(&text).len()), (2, 2 + 2 * 2));
+    let entries = records(&text).into_iter().filter_map(|record| match record {
+        Record::Entry(entry) => Some(entry),
+        _ => None,
+    });
+    assert!(entries.map(|entry| shown(&entry.entry.time)).all(|shown| shown.is_some()));
+}
