@@ -101,6 +101,15 @@ impl Failure {
         self
     }
 
+    /// What happened, without advice.
+    pub(crate) fn message(&self) -> String {
+        match self {
+            Failure::Told(report) => report.message.clone(),
+            Failure::OutputClosed => "nobody reads the output".to_owned(),
+            Failure::Interrupted => "interrupted".to_owned(),
+        }
+    }
+
     /// Whether waiting may help.
     pub(crate) fn may_pass(&self) -> bool {
         matches!(self, Failure::Told(report) if report.may_pass)

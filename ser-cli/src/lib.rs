@@ -10,6 +10,7 @@ mod connection;
 mod decoding;
 mod delivery;
 mod error;
+mod gather;
 mod host_reading;
 mod interrupt;
 mod keeper;

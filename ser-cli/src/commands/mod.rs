@@ -15,6 +15,7 @@ pub(crate) mod ports;
 pub(crate) mod print;
 pub(crate) mod read;
 pub(crate) mod recording;
+pub(crate) mod report;
 pub(crate) mod sim;
 pub(crate) mod site;
 pub(crate) mod status;

@@ -1,0 +1,125 @@
+//! `report`: the answer after a trip.
+
+use std::io::{self, Write};
+
+use clap::ValueEnum;
+use ser_evidence::incident::{Incident, Report, Which};
+use ser_evidence::timeline::Timeline;
+use ser_files::report::{self, Document, Styles};
+
+use crate::connection::ConnectionArgs;
+use crate::error::{Failure, Result};
+use crate::gather::{self, Gathered, GivenMoment, SourceArgs, parse_moment};
+use crate::output::{PROGRAM, Palette};
+
+const EXAMPLES: &str = "\
+Examples:
+  ser-cli report --site northfield.toml           read all recorders; the last trip
+  ser-cli report --site northfield.toml --last    the last incident, trip or not
+  ser-cli report --input u1.jsonl u2.jsonl --around 2026-11-22T11:00:00
+  ser-cli report --site northfield.toml --format json > report.json
+
+Without a choice the last incident is shown in which a point of role trip (or 86) went on; without \
+such a point, the last one. Times without an offset are in the time zone of the site.
+What is not known is said: an order that the clocks cannot decide is a bracket, a first-out that \
+is not certain is a set, and entries that are missing are a row of their own.";
+
+/// Say what happened in an incident: what moved first, what operated, what is wrong or missing.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    sources: SourceArgs,
+
+    /// The last incident, whether something tripped or not.
+    #[arg(long, conflicts_with_all = ["around", "since", "until"])]
+    last: bool,
+
+    /// The incident at this time, or nearest to it.
+    #[arg(long, value_name = "TIME", value_parser = parse_moment, conflicts_with_all = ["since", "until"])]
+    around: Option<GivenMoment>,
+
+    /// Everything from this time on.
+    #[arg(long, value_name = "TIME", value_parser = parse_moment)]
+    since: Option<GivenMoment>,
+
+    /// Everything until this time.
+    #[arg(long, value_name = "TIME", value_parser = parse_moment)]
+    until: Option<GivenMoment>,
+
+    /// The format of the report.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+
+    /// Show each change of a chattering contact.
+    #[arg(long)]
+    unfold: bool,
+
+    /// End with exit code 3 if something is known to be missing in the incident.
+    #[arg(long)]
+    fail_on_loss: bool,
+}
+
+/// The format of a report.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For people.
+    #[default]
+    Text,
+    /// One JSON object with everything.
+    Json,
+}
+
+pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
+    let gathered = gather::gather(&args.sources, connection)?;
+    let timeline = Timeline::new(&gathered.site, &gathered.history);
+    let incident = Incident::pick(&timeline, which(args, &gathered)?).ok_or_else(|| {
+        Failure::new("there is no entry in what was read")
+            .hint("ser-cli merge with the same sources lists everything, also without a time")
+    })?;
+    let report = Report::new(&timeline, incident);
+    let document = Document {
+        timeline: &timeline,
+        report: &report,
+        program: PROGRAM,
+        site_digest: gathered.site_digest.clone(),
+        not_reached: &gathered.not_reached,
+        unfold: args.unfold,
+    };
+    let mut out = io::BufWriter::new(io::stdout().lock());
+    match args.format {
+        Format::Text => report::write_text(&mut out, &document, styles(Palette::of_stdout()))?,
+        Format::Json => report::write_json(&mut out, &document)?,
+    }
+    out.flush()?;
+    if args.fail_on_loss {
+        gathered.require_complete()?;
+        if report.is_incomplete() {
+            return Err(Failure::incomplete("entries are missing in the incident"));
+        }
+    }
+    Ok(())
+}
+
+fn which(args: &Args, gathered: &Gathered) -> Result<Which> {
+    let zone = &gathered.site.time_zone;
+    let in_zone = |given: Option<GivenMoment>| given.map(|given| given.in_zone(zone)).transpose();
+    let (around, since, until) =
+        (in_zone(args.around)?, in_zone(args.since)?, in_zone(args.until)?);
+    Ok(match around {
+        Some(around) => Which::Around(around),
+        None if since.is_some() || until.is_some() => Which::Between(since, until),
+        None if args.last => Which::Last,
+        None => Which::LastTrip,
+    })
+}
+
+fn styles(palette: Palette) -> Styles {
+    Styles {
+        title: palette.title,
+        faint: palette.faint,
+        abnormal: palette.on,
+        alarm: palette.alarm,
+        first_out: palette.first_out,
+    }
+}

@@ -1,0 +1,84 @@
+//! From the sources that the user names to the history of all recorders: recorders of a site that
+//! are read now, and files that were written before.
+
+mod files;
+mod live;
+mod moment;
+
+use std::path::PathBuf;
+
+use ser_evidence::history::{Collector, History};
+use ser_evidence::site::Site;
+use ser_files::report::NotReached;
+
+use crate::connection::ConnectionArgs;
+use crate::error::{Failure, Result};
+use crate::keeper::StateArgs;
+use crate::site_file;
+
+pub(crate) use moment::{GivenMoment, parse_moment};
+
+/// Where entries come from.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Sources")]
+pub(crate) struct SourceArgs {
+    /// The site file. Its names are used, and all its recorders that have a port are read, unless
+    /// there are --input files. A recorder that cannot be reached is named in the result.
+    #[arg(long, env = "SER_SITE", hide_env_values = true, value_name = "FILE")]
+    site: Option<PathBuf>,
+
+    /// Files with entries, written by `read` or `watch` with --format jsonl or csv, in any order.
+    /// The recorder of a CSV file is the name of the file up to its last dot.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    input: Vec<PathBuf>,
+
+    /// Read the recorders of the site as well as the --input files.
+    #[arg(long, requires = "site", requires = "input")]
+    live: bool,
+
+    #[command(flatten)]
+    state: StateArgs,
+}
+
+/// Everything that the sources say.
+#[derive(Debug)]
+pub(crate) struct Gathered {
+    pub(crate) site: Site,
+    pub(crate) history: History,
+    /// SHA-256 of the site file.
+    pub(crate) site_digest: Option<String>,
+    pub(crate) not_reached: Vec<NotReached>,
+    /// Lines of files that could not be read.
+    pub(crate) damaged_lines: u64,
+}
+
+impl Gathered {
+    /// Fails if something is known to be missing.
+    pub(crate) fn require_complete(&self) -> Result<()> {
+        let is_complete = self.not_reached.is_empty() && self.damaged_lines == 0;
+        match is_complete {
+            true => Ok(()),
+            false => Err(Failure::incomplete("not everything could be read")),
+        }
+    }
+}
+
+/// Reads all sources.
+pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<Gathered> {
+    if args.site.is_none() && args.input.is_empty() {
+        return Err(Failure::usage("from where? There is neither --site nor --input")
+            .hint("ser-cli report --site FILE reads all recorders of a site")
+            .hint("ser-cli report --input FILE… takes what read --format jsonl has written"));
+    }
+    let site = args.site.as_deref().map(site_file::load).transpose()?;
+    let site_digest = site.as_ref().and_then(|site| Some(site.digest?.to_string()));
+    let site = site.unwrap_or_else(|| Site { time_zone: moment::here(), ..Site::unknown() });
+    let mut collector = Collector::new();
+    let damaged_lines = files::read(&args.input, &site, &mut collector)?;
+    let not_reached = match args.input.is_empty() || args.live {
+        true => live::read(&site, connection, &args.state, &mut collector)?,
+        false => Vec::new(),
+    };
+    let history = collector.finish(&site);
+    Ok(Gathered { site, history, site_digest, not_reached, damaged_lines })
+}

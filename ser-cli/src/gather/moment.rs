@@ -1,0 +1,74 @@
+//! Moments as the user gives them.
+
+use ser_evidence::time::{Moment, Utc};
+
+use crate::error::{Failure, Result};
+
+/// A moment of the command line: with an offset it is one, without it depends on the site's zone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum GivenMoment {
+    Absolute(jiff::Timestamp),
+    Local(jiff::civil::DateTime),
+}
+
+/// Understands `2026-11-22T10:00:00.250` (in the zone of the site), also with a blank, without a
+/// fraction or seconds, and the same with `Z` or an offset such as `+01:00`.
+pub(crate) fn parse_moment(text: &str) -> std::result::Result<GivenMoment, String> {
+    let text = text.trim();
+    if let Ok(absolute) = text.parse() {
+        return Ok(GivenMoment::Absolute(absolute));
+    }
+    let local = text.parse().map_err(
+        |_| "not a date and time like 2026-11-22T10:00:00.250, or with Z or +01:00 at the end",
+    )?;
+    Ok(GivenMoment::Local(local))
+}
+
+impl GivenMoment {
+    /// The moment, in the zone of a site.
+    pub(crate) fn in_zone(self, zone: &jiff::tz::TimeZone) -> Result<Moment<Utc>> {
+        let timestamp = match self {
+            GivenMoment::Absolute(timestamp) => timestamp,
+            GivenMoment::Local(local) => {
+                let ambiguous = zone.to_ambiguous_timestamp(local);
+                ambiguous.unambiguous().map_err(|_| {
+                    let zone = zone.iana_name().unwrap_or("this zone").to_owned();
+                    Failure::usage(format!("{local} is twice or never in {zone}"))
+                        .hint("add the offset from UTC, as in 2026-10-25T02:30:00+01:00")
+                })?
+            }
+        };
+        Ok(Moment::from_us(timestamp.as_microsecond()))
+    }
+}
+
+/// The zone of this computer.
+pub(crate) fn here() -> jiff::tz::TimeZone {
+    jiff::tz::TimeZone::try_system().unwrap_or(jiff::tz::TimeZone::UTC)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn us(text: &str, zone: &str) -> i64 {
+        let zone = jiff::tz::TimeZone::get(zone).unwrap();
+        parse_moment(text).unwrap().in_zone(&zone).unwrap().us()
+    }
+
+    #[test]
+    fn a_moment_is_in_the_zone_of_the_site_unless_it_has_an_offset() {
+        let expected = us("2026-11-22T10:00:00.250Z", "UTC");
+        assert_eq!(us("2026-11-22 11:00:00.250", "Europe/Berlin"), expected);
+        assert_eq!(us("2026-11-22T05:00:00.250-05:00", "Europe/Berlin"), expected);
+        assert_eq!(us("2026-11-22 11:00", "Europe/Berlin"), expected - 250_000);
+        assert!(parse_moment("yesterday").is_err());
+    }
+
+    #[test]
+    fn an_hour_that_comes_twice_needs_an_offset() {
+        let zone = jiff::tz::TimeZone::get("Europe/Berlin").unwrap();
+        let twice = parse_moment("2026-10-25T02:30:00").unwrap().in_zone(&zone);
+        assert!(twice.unwrap_err().is_usage());
+    }
+}
