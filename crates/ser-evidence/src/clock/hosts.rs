@@ -72,6 +72,13 @@ impl Hosts {
         Envelope::with_slope(clock.readings.iter().map(known).collect(), slope)
     }
 
+    /// A reading of a boot of whose UTC nothing is known but what the host said: monotonic and UTC.
+    pub(crate) fn nominal_only(&self, boot: Boot) -> Option<(i64, i64)> {
+        let clock = self.boots.get(&boot).filter(|clock| clock.offset.is_empty())?;
+        let &(x, offset) = clock.readings.last()?;
+        Some((x, x.saturating_add(offset)))
+    }
+
     /// A bound on a boot's monotonic clock in UTC.
     pub(crate) fn utc(&self, boot: Boot, bound: Bound<Host>) -> Bound<Utc> {
         let Some(clock) = self.boots.get(&boot) else { return Bound::UNKNOWN };

@@ -117,7 +117,7 @@ impl Layout {
         }));
         let mut layout = Layout { boots, clocks };
         layout.settle(&ties);
-        layout.place_the_rest(runs, &ties);
+        layout.place_the_rest(hosts, runs, &ties);
         layout
     }
 
@@ -167,25 +167,44 @@ impl Layout {
         one.and_then(|one| one.offset.learn(tie.x, lo, hi)).unwrap_or(false)
     }
 
-    /// Gives a place to runs that have none: what is known on one side only is taken to be right
-    /// there, what is not known at all goes by what the clock showed.
-    fn place_the_rest(&mut self, runs: &[RunFacts<'_>], ties: &[Tie]) {
-        for (run, facts) in runs.iter().enumerate() {
-            let Some(x) = facts.stamp else { continue };
-            let Some(placed) = self.clocks.get_mut(self.boots.len() + run) else { continue };
-            let (lo, hi) = placed.offset.at(x);
-            let at = match (lo, hi) {
-                (NO_LO, NO_HI) => {
-                    placed.is_timeless = true;
-                    0
-                }
-                (lo, NO_HI) => lo,
-                (NO_LO, hi) => hi,
-                _ => continue,
-            };
-            placed.offset.learn(x, at, at);
-            self.settle(ties);
+    /// Gives a place to clocks of which little is known. What a clock showed, or what the site says
+    /// that it shows, is taken to be right as far as that can be; what is known on one side only is
+    /// taken to be right there.
+    fn place_the_rest(&mut self, hosts: &Hosts, runs: &[RunFacts<'_>], ties: &[Tie]) {
+        let boots = self.boots.clone();
+        for (clock, boot) in boots.into_iter().enumerate() {
+            if let Some((x, utc)) = hosts.nominal_only(boot) {
+                self.place(clock, x, Some(utc), ties);
+            }
         }
+        for (run, facts) in runs.iter().enumerate() {
+            let clock = self.boots.len() + run;
+            let Some(x) = facts.stamp else { continue };
+            let is_observed = !facts.observed.is_empty();
+            let nominal = facts.nominal.filter(|_| !is_observed);
+            match nominal {
+                Some((x, utc)) => self.place(clock, x, Some(utc), ties),
+                None => self.place(clock, x, None, ties),
+            }
+        }
+    }
+
+    /// Gives a clock a place where it showed `x`, if it has none or is only said to have one.
+    fn place(&mut self, clock: usize, x: i64, said: Option<i64>, ties: &[Tie]) {
+        let Some(placed) = self.clocks.get_mut(clock) else { return };
+        let (lo, hi) = placed.offset.at(x);
+        let at = match (said, lo, hi) {
+            (Some(utc), lo, hi) if lo <= hi => utc.saturating_sub(x).clamp(lo, hi),
+            (None, NO_LO, NO_HI) => {
+                placed.is_timeless = true;
+                0
+            }
+            (None, lo, NO_HI) => lo,
+            (None, NO_LO, hi) => hi,
+            _ => return,
+        };
+        placed.offset.learn(x, at, at);
+        self.settle(ties);
     }
 }
 
