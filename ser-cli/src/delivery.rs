@@ -6,7 +6,7 @@ use std::fmt::Display;
 use ser_client::Delivery;
 
 use crate::error::{Failure, Result, warn};
-use crate::output::{self, Annotator, Before, EventWriter, Format, Life, Loss, Record};
+use crate::output::{self, Annotator, Before, EventWriter, Format, Life, Loss, Points, Record};
 use crate::progress::Progress;
 
 /// Gaps and invalid entries that are reported one by one; further ones are only counted.
@@ -35,6 +35,11 @@ impl Outlet {
     fn with_progress(format: Format, life: Life, before: Before, progress: Progress) -> Outlet {
         let (writer, annotator) = (output::to_stdout(format), Annotator::new(life, before));
         Outlet { writer, annotator, progress, gaps: 0, not_valid: 0 }
+    }
+
+    /// Gives inputs their names, where they are for people.
+    pub(crate) fn name_points(&mut self, points: Points) {
+        self.writer.name_points(points);
     }
 
     /// The life of the log that is being read.

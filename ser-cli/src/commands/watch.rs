@@ -73,7 +73,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let keeper = Keeper::load(&args.state, connection)?;
     let stop = interrupt::catch()?;
     let mut unit = connection::open(connection)?;
-    let plan = plan(args, &mut unit, keeper.size())?;
+    let log_size = args.log_size.or_else(|| connection.known_log_size());
+    let plan = plan(args, log_size, &mut unit, keeper.size())?;
     let follower = LogFollower::new(keeper.cursor(), plan.size);
     let watcher = match plan.reports {
         Some(Reports { switch, found }) => {
@@ -87,7 +88,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         }
         None => LogWatcher::polling(follower, plan.interval, args.interval.is_none()),
     };
-    let outlet = Outlet::endless(args.format, keeper.life()?, keeper.before());
+    let mut outlet = Outlet::endless(args.format, keeper.life()?, keeper.before());
+    outlet.name_points(connection.points());
     let outage = Outage::new(connection::options(connection).timeout);
     let mut watch = Watch { unit, watcher, outlet, keeper, stop, outage };
     let result = watch.run();
@@ -140,21 +142,26 @@ struct Reports {
     found: Configuration,
 }
 
-fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
+fn plan(
+    args: &Args,
+    log_size: Option<u16>,
+    unit: &mut Unit,
+    remembered: Option<u16>,
+) -> Result<Plan> {
     let polling =
         |size| Plan { size, reports: None, interval: args.interval.unwrap_or(POLL_EVERY) };
-    if let (true, Some(size)) = (args.poll, args.log_size) {
+    if let (true, Some(size)) = (args.poll, log_size) {
         return Ok(polling(size));
     }
     let Some(found) = connection::settings(unit)? else {
-        let size = args.log_size.or(remembered).ok_or_else(connection::log_size_unknown)?;
+        let size = log_size.or(remembered).ok_or_else(connection::log_size_unknown)?;
         inform(
             "the recorder does not report its settings (original recorders never do): it is asked \
              for events",
         );
         return Ok(polling(size));
     };
-    let size = args.log_size.unwrap_or(found.size);
+    let size = log_size.unwrap_or(found.size);
     let switch = |is_on| {
         let off = Configure { auto_report: AutoReport::Off, ..keep_size_and_rate(found) };
         ReportSwitch { on: reporting_here(unit, found), off, is_on }

@@ -5,6 +5,7 @@ mod elapsed;
 mod jsonl;
 mod life;
 mod palette;
+mod points;
 mod record;
 mod rows;
 mod sequence;
@@ -19,6 +20,7 @@ pub(crate) use elapsed::Elapsed;
 pub(crate) use jsonl::JsonLines;
 pub use life::Life;
 pub(crate) use palette::Palette;
+pub(crate) use points::Points;
 pub(crate) use record::{Annotator, Before, Event, Loss, Record};
 pub(crate) use rows::{Rows, sync_stdout};
 pub(crate) use sequence::{PointNames, Sequence};
@@ -46,6 +48,9 @@ pub(crate) trait EventWriter {
 
     /// Passes on what has been written so far, in whole rows.
     fn flush(&mut self) -> io::Result<()>;
+
+    /// Gives inputs their names, where they are for people.
+    fn name_points(&mut self, _points: Points) {}
 }
 
 /// The writer of `format` on standard output. A continued file gets no second header.
@@ -76,6 +81,7 @@ pub(crate) fn field(
 pub(crate) mod testing {
     //! Events that every writer is tested with.
 
+    pub(crate) use super::points::testing::points;
     use ser_client::Lost;
     use ser_proto::{Entry, Inputs};
 

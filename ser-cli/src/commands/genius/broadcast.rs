@@ -9,13 +9,14 @@ use ser_proto::{Command, LastBroadcast, TimeStamp};
 use super::{no_recorder, silent_candidates};
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
+use crate::site_file::ClockSetting;
 use crate::time::{local_time_in, parse_time};
 
 #[derive(Clone, Copy, Debug, clap::Subcommand)]
 pub(super) enum What {
     /// Set all clocks, to the time at which the broadcast arrives.
     Clock {
-        /// The time to set; this computer's local time if not given.
+        /// The time to set; if not given, what the site file says, or this computer's local time.
         #[arg(long, value_name = "TIME", value_parser = parse_time)]
         at: Option<TimeStamp>,
     },
@@ -37,6 +38,7 @@ pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> 
             .hint("keep them first: ser-cli read --all --format csv > events.csv, for each of them")
             .hint("then add --yes"));
     }
+    let setting = connection.clock_setting_of_bus()?;
     let host = connection::open_bus(connection)?;
     let found = host.recorders(how)?;
     // Such a device is not asked whether it has received the broadcast.
@@ -51,7 +53,7 @@ pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> 
         || nodes.iter().map(|&node| last_broadcast(&host, node, connection)).collect::<Vec<_>>();
     // The same command may have been broadcast before.
     let before = ask();
-    let command = send(what, &host)?;
+    let command = send(what, &host, setting.as_ref())?;
     let checks: Vec<_> = nodes
         .iter()
         .zip(before)
@@ -70,17 +72,19 @@ pub(super) fn run(connection: &ConnectionArgs, what: What, how: Recognition) -> 
 }
 
 /// Sends the command, and tells the user the time in it, if any.
-fn send(what: What, host: &GeniHost) -> Result<Command> {
+fn send(what: What, host: &GeniHost, setting: Option<&ClockSetting>) -> Result<Command> {
+    let time_in = |ahead| match setting {
+        Some(setting) => setting.time_in(ahead),
+        None => local_time_in(ahead),
+    };
     let command = match what {
         What::Clock { at: Some(time) } => Command::SetClock(time),
-        What::Clock { at: None } => {
-            Command::SetClock(local_time_in(host.delay()).map_err(|year| {
-                Failure::new(format!(
-                    "a recorder's clock runs from 1970 to 2069; this computer's says {year}"
-                ))
-                .hint("set this computer's clock, or give the time with --at")
-            })?)
-        }
+        What::Clock { at: None } => Command::SetClock(time_in(host.delay()).map_err(|year| {
+            Failure::new(format!(
+                "a recorder's clock runs from 1970 to 2069; this computer's says {year}"
+            ))
+            .hint("set this computer's clock, or give the time with --at")
+        })?),
         What::Start => Command::SetMode { recording: true },
         What::Stop => Command::SetMode { recording: false },
         What::Erase { .. } => Command::Erase,
