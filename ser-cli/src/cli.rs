@@ -88,6 +88,15 @@ impl Command {
             _ => true,
         }
     }
+
+    /// Whether the command is for all recorders of a bus.
+    fn reaches_a_bus(&self) -> bool {
+        #[cfg(unix)]
+        if let Command::Genius(_) = self {
+            return true;
+        }
+        false
+    }
 }
 
 impl Cli {
@@ -122,7 +131,7 @@ impl Cli {
     /// Does what the command line asks for.
     pub(crate) fn run(&self) -> error::Result<()> {
         let connection = match self.command.reaches_a_recorder() {
-            true => &site_file::choose(&self.connection)?,
+            true => &site_file::choose(&self.connection, self.command.reaches_a_bus())?,
             false => &self.connection,
         };
         self.run_command(connection).map_err(|failure| match self.command {
@@ -236,7 +245,6 @@ mod tests {
             "genius forces --node 5",
             "genius broadcast",
             "site",
-            "site check",
             "site show a.toml --format xml",
             "site new -o a.toml b.toml",
             "sim --model ser640",

@@ -5,11 +5,11 @@ mod common;
 
 use std::fs;
 use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use common::bench::{Bench, text};
-use common::ser_cli;
-use ser_sim::testing::Kind;
+use common::{Running, ser_cli};
+use ser_sim::testing::{Kind, PATIENCE};
 
 /// A bench with a site file, whose recorders are at these ports.
 fn site(bench: &Bench, clock: &str) -> PathBuf {
@@ -131,10 +131,7 @@ fn a_clock_is_set_to_what_the_site_file_says() {
         let now = || jiff::Timestamp::now().as_second() + offset_s;
         let before = now();
         let output = run(&bench, "clock set --recorder U1-SER1");
-        assert_eq!(
-            text(&output.stderr),
-            format!("set to the time of {zone}, as the site file says\n")
-        );
+        assert_eq!(text(&output.stderr), format!("set to {zone} time, as the site file says\n"));
         let set: jiff::civil::DateTime = text(&output.stdout).trim().parse().expect("a time");
         let set = jiff::tz::TimeZone::UTC.to_timestamp(set).expect("a time").as_second();
         assert!((before..=now() + 1).contains(&set), "{clock}: {output:?}");
@@ -161,4 +158,70 @@ fn a_new_site_file_has_what_the_recorder_says() {
     assert_eq!((&first["model"], &first["log_size"]), (&"ser160".into(), &512.into()));
     assert_eq!(first["original"], false);
     assert_eq!((&second["name"], &second["model"]), (&"SER2".into(), &serde_json::Value::Null));
+}
+
+#[test]
+fn all_recorders_of_a_site_are_watched_in_one_list() {
+    let (mut first, mut second) =
+        (Bench::start(Kind::Native, &[]), Bench::start(Kind::Native, &["--model", "ser160"]));
+    let file = first.folder.path().join("north.toml");
+    let recorder =
+        |name: &str, port: &str| format!("[[recorder]]\nname = \"{name}\"\nport = \"{port}\"\n");
+    let text_of_file = format!(
+        "site = \"Northfield\"\ntime_zone = \"UTC\"\n{}{}{}[[point]]\nrecorder = \"U1-SER2\"\n\
+         input = 3\nname = \"52-1 closed\"\n",
+        recorder("U1-SER1", first.link().to_str().unwrap()),
+        recorder("U1-SER2", second.link().to_str().unwrap()),
+        recorder("silent", "tcp://localhost:1"),
+    );
+    fs::write(&file, text_of_file).expect("a file");
+    first.contacts("0,3,1\n", 1);
+    second.contacts("0,3,1\n", 1);
+
+    let watch = || {
+        let mut command = command(&first, "watch --interval 100ms");
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        Running::start(&mut command)
+    };
+    let mut watching = watch();
+    let (lines, told) = (watching.lines(), watching.told());
+    let next = || lines.recv_timeout(PATIENCE).expect("a line");
+    assert_eq!(next(), "recorder  entry  time                     changes");
+    let mut rows = [next(), next()];
+    rows.sort();
+    assert!(rows[0].starts_with("U1-SER1       1  ") && rows[0].ends_with("  3 ON"), "{rows:?}");
+    assert!(rows[1].starts_with("U1-SER2       1  "), "{rows:?}");
+    assert!(rows[1].ends_with("  52-1 closed ON"), "{rows:?}");
+    assert_eq!(
+        told.recv_timeout(PATIENCE).expect("a line"),
+        "watching U1-SER1, U1-SER2, silent until Ctrl-C"
+    );
+    assert_eq!(
+        told.recv_timeout(PATIENCE).expect("a line"),
+        "warning: silent: nothing listens at tcp://localhost:1"
+    );
+    assert_eq!(watching.interrupt(), Some(0));
+
+    // What was shown is not shown again.
+    second.contacts("0,3,0\n", 1);
+    let mut watching = watch();
+    let lines = watching.lines();
+    let next = || lines.recv_timeout(PATIENCE).expect("a line");
+    assert!(next().starts_with("recorder"));
+    assert!(next().ends_with("  52-1 closed OFF"));
+    assert_eq!(watching.interrupt(), Some(0));
+}
+
+#[test]
+fn a_list_of_several_recorders_is_a_table() {
+    let bench = Bench::start(Kind::Native, &[]);
+    site(&bench, "local");
+    for (arguments, told) in [
+        ("watch --format csv", "files are of one recorder each"),
+        ("watch --log-size 7", "--log-size is of one recorder"),
+    ] {
+        let output = run(&bench, arguments);
+        assert_eq!(output.status.code(), Some(2), "{output:?}");
+        assert!(text(&output.stderr).contains(told), "{output:?}");
+    }
 }

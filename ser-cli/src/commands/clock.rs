@@ -67,7 +67,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         None => time_in(ahead).unwrap_or(NO_TIME),
     })?;
     if let (Some(setting), None) = (&setting, at) {
-        inform(format_args!("set to the time of {setting}, as the site file says"));
+        inform(format_args!("set to {setting} time, as the site file says"));
     }
     let mut out = io::stdout().lock();
     writeln!(out, "{sent}")?;

@@ -1,5 +1,7 @@
 //! `watch`: events as they happen.
 
+mod site;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -23,6 +25,7 @@ Examples:
   ser-cli watch --format jsonl >> log  run after run, no event twice
   ser-cli watch --poll --interval 5s   leaves the recorder's settings alone
   ser-cli watch --log-size 2048        an original recorder
+  ser-cli watch --site north.toml      all recorders of a site, with names
 
 Undelivered events come first (as with read --new), then every event as it happens. The command \
 makes the recorder report automatically (auto report on RS-232), and restores the setting at the \
@@ -32,6 +35,9 @@ then, so that a report lost on the line delays its event and does not lose it.
 While events come faster than the line can carry reports and readings together, the recorder is \
 told not to report and is read without a pause. Events that are overwritten nevertheless are \
 counted in the output, at their place.
+With --site and no port, all recorders of the site that have one are asked every second, and \
+shown in one list, by what their clocks show; their settings are left alone. A recorder that does \
+not answer is asked again later, and delays no other.
 On a Genius bus the command waits for a board or a recorder that fails, for a minute or as long \
 as --timeout says.";
 
@@ -70,6 +76,9 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
+    if let (Some(chosen), true) = (&connection.chosen, connection::ports(connection).is_empty()) {
+        return site::run(args, connection, chosen);
+    }
     let keeper = Keeper::load(&args.state, connection)?;
     let stop = interrupt::catch()?;
     let mut unit = connection::open(connection)?;

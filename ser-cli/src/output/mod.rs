@@ -9,6 +9,7 @@ mod points;
 mod record;
 mod rows;
 mod sequence;
+mod site_table;
 mod table;
 
 use std::io::{self, Write};
@@ -24,6 +25,7 @@ pub(crate) use points::Points;
 pub(crate) use record::{Annotator, Before, Event, Loss, Record};
 pub(crate) use rows::{Rows, sync_stdout};
 pub(crate) use sequence::{PointNames, Sequence};
+pub(crate) use site_table::{RecorderColumn, SiteTable, header as site_header};
 pub(crate) use table::Table;
 
 /// The format of events.

@@ -1,5 +1,6 @@
 //! Which recorder of the site is meant: the one that is named, or the one at the port.
 
+#[cfg(unix)]
 use std::collections::BTreeMap;
 
 use ser_client::{Endpoint, GeniWindow};
@@ -21,8 +22,9 @@ pub(crate) struct Chosen {
     recorder: Option<RecorderId>,
 }
 
-/// Reads the site file, if there is one, and finds the recorder in it. Fills in its port.
-pub(crate) fn choose(connection: &ConnectionArgs) -> Result<ConnectionArgs> {
+/// Reads the site file, if there is one, and finds the recorder in it. Fills in its port; if a bus
+/// is wanted, that of the only bus in the file.
+pub(crate) fn choose(connection: &ConnectionArgs, wants_bus: bool) -> Result<ConnectionArgs> {
     let Some(path) = &connection.site else {
         return match &connection.recorder {
             None => Ok(connection.clone()),
@@ -37,6 +39,10 @@ pub(crate) fn choose(connection: &ConnectionArgs) -> Result<ConnectionArgs> {
     let mut connection = connection.clone();
     chosen.recorder = match connection.recorder.clone() {
         Some(name) => Some(by_name(&chosen, &name, &mut connection)?),
+        None if wants_bus && connection::ports(&connection).is_empty() => {
+            connection.port.extend(chosen.only_bus());
+            None
+        }
         None => by_port(&chosen, &mut connection),
     };
     connection.chosen = Some(chosen.into());
@@ -97,6 +103,21 @@ impl Chosen {
         ports.enumerate().filter_map(|(index, port)| Some((RecorderId(index), port?)))
     }
 
+    /// How to reach one of several recorders.
+    pub(crate) fn reached(
+        &self,
+        connection: &ConnectionArgs,
+        recorder: RecorderId,
+    ) -> Option<ConnectionArgs> {
+        let port = self.site.recorders.get(recorder.0)?.port.as_deref()?;
+        let (site, file) = (self.site.clone(), self.file.clone());
+        let chosen = Chosen { site, file, recorder: Some(recorder) };
+        Some(ConnectionArgs {
+            chosen: Some(chosen.into()),
+            ..connection::at_port(connection, port)
+        })
+    }
+
     /// The failure of a command that needs one recorder and cannot tell which.
     pub(crate) fn which(&self) -> Failure {
         let failure =
@@ -138,12 +159,20 @@ impl Chosen {
         points.cloned().collect()
     }
 
-    /// The recorders on the bus at this window, by their bus addresses.
-    pub(crate) fn on_bus(&self, window: &GeniWindow) -> BTreeMap<u8, RecorderId> {
-        let bus_name = |window: &GeniWindow| {
-            let endpoint = Endpoint::Geni { window: window.clone(), node: None };
-            UnitName::of(&endpoint.to_string(), &endpoint).name
+    /// The port of the bus, if all recorders on a bus are on the same one.
+    fn only_bus(&self) -> Option<String> {
+        let bus = |port: &str| match port.parse().ok()? {
+            Endpoint::Geni { window, .. } => Some(bus_name(&window)),
+            _ => None,
         };
+        let mut buses = self.with_ports().filter_map(|(_, port)| bus(port));
+        let first = buses.next()?;
+        buses.all(|bus| bus == first).then_some(first)
+    }
+
+    /// The recorders on the bus at this window, by their bus addresses.
+    #[cfg(unix)]
+    pub(crate) fn on_bus(&self, window: &GeniWindow) -> BTreeMap<u8, RecorderId> {
         let this_bus = bus_name(window);
         let on_it = self.with_ports().filter_map(|(id, port)| match port.parse().ok()? {
             Endpoint::Geni { window, node: Some(node) } if bus_name(&window) == this_bus => {
@@ -153,6 +182,12 @@ impl Chosen {
         });
         on_it.collect()
     }
+}
+
+/// The same name for a bus, however its window is spelled.
+pub(crate) fn bus_name(window: &GeniWindow) -> String {
+    let endpoint = Endpoint::Geni { window: window.clone(), node: None };
+    UnitName::of(&endpoint.to_string(), &endpoint).name
 }
 
 /// What the site file says of the recorder that is meant.
@@ -182,6 +217,7 @@ impl ConnectionArgs {
     }
 
     /// What all clocks of a bus are set to at once, if the site file knows recorders on it.
+    #[cfg(unix)]
     pub(crate) fn clock_setting_of_bus(&self) -> Result<Option<ClockSetting>> {
         let (Some(chosen), Endpoint::Geni { window, .. }) =
             (self.chosen.as_deref(), connection::endpoint(self)?)

@@ -14,6 +14,8 @@ use ser_console::Harmless;
 use ser_evidence::site::{self, Diagnostic, Reading, Role, Site};
 use ser_proto::Model;
 
+#[cfg(unix)]
+pub(crate) use choice::bus_name;
 pub(crate) use choice::{Chosen, choose};
 pub(crate) use clock::ClockSetting;
 
