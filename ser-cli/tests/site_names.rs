@@ -225,3 +225,44 @@ fn a_list_of_several_recorders_is_a_table() {
         assert!(text(&output.stderr).contains(told), "{output:?}");
     }
 }
+
+#[test]
+fn the_recorders_of_a_bus_have_their_names_and_their_clocks_one_setting() {
+    let folder = tempfile::tempdir().unwrap();
+    let (window, file) = (folder.path().join("host"), folder.path().join("north.toml"));
+    let mut sim = ser_cli();
+    sim.args(["sim", "--node", "5", "--node", "9:ser160", "--genius"]).arg(&window);
+    let mut sim = Running::start(sim.stdout(Stdio::piped()).stderr(Stdio::null()));
+    assert!(sim.lines().recv_timeout(PATIENCE).expect("a port").starts_with("geni:"));
+    let write = |clock: &str| {
+        let recorder = |name: &str, node: u8, clock: &str| {
+            format!(
+                "[[recorder]]\nname = \"{name}\"\nport = \"geni:{}?node={node}\"\nclock = \"{clock}\"\n",
+                window.display()
+            )
+        };
+        let (first, second) = (recorder("U1-SER1", 5, "utc"), recorder("U1-SER2", 9, clock));
+        let text = format!("site = \"A\"\ntime_zone = \"UTC\"\n{first}{second}");
+        fs::write(&file, text).expect("a file");
+    };
+    // The only bus in the file is meant.
+    let genius = |arguments: &str| {
+        let mut command = ser_cli();
+        command.env("SER_SITE", &file).args(["--timeout", "20s", "genius"]);
+        command.args(arguments.split_whitespace()).output().expect("ser-cli runs")
+    };
+    write("+05:30");
+    assert_eq!(
+        text(&genius("globals").stdout),
+        "node  inputs  on\n   5      32  U1-SER1: none\n   9      16  U1-SER2: none\n"
+    );
+    let refused = genius("broadcast clock");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        text(&refused.stderr)
+            .contains("one broadcast cannot set U1-SER1 to UTC and U1-SER2 to +05:30"),
+        "{refused:?}"
+    );
+    write("+00:00");
+    assert_eq!(genius("broadcast clock").status.code(), Some(0));
+}

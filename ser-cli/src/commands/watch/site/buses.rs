@@ -1,6 +1,8 @@
 //! The Genius buses of a site: each window is opened once, for all recorders on its bus.
 
-use ser_client::{Endpoint, Unit};
+#[cfg(unix)]
+use ser_client::Endpoint;
+use ser_client::Unit;
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::Result;
@@ -19,19 +21,17 @@ type Bus = std::sync::Arc<std::sync::Mutex<Option<ser_client::GeniHost>>>;
 impl Buses {
     /// Opens the way to a recorder.
     pub(super) fn open(&self, connection: &ConnectionArgs) -> Result<Unit> {
-        match connection::endpoint(connection)? {
-            #[cfg(unix)]
-            Endpoint::Geni { window, node: Some(node) } => {
-                let bus = self.named(crate::site_file::bus_name(&window));
-                let mut open = bus.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                let host = match &*open {
-                    Some(host) => host.clone(),
-                    None => open.insert(connection::open_bus(connection)?).clone(),
-                };
-                Ok(host.unit(node, connection::options(connection)))
-            }
-            _ => connection::open(connection),
+        #[cfg(unix)]
+        if let Endpoint::Geni { window, node: Some(node) } = connection::endpoint(connection)? {
+            let bus = self.named(crate::site_file::bus_name(&window));
+            let mut open = bus.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let host = match &*open {
+                Some(host) => host.clone(),
+                None => open.insert(connection::open_bus(connection)?).clone(),
+            };
+            return Ok(host.unit(node, connection::options(connection)));
         }
+        connection::open(connection)
     }
 
     #[cfg(unix)]
