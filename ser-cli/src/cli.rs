@@ -1,11 +1,13 @@
 //! The arguments of the command line: those common to all subcommands, and the list of subcommands.
 
+use clap::parser::ValueSource;
 use clap::{Args as _, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::closed_stdout;
 use crate::commands;
 use crate::connection::{self, ConnectionArgs};
 use crate::error;
+use crate::site_file;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -75,6 +77,29 @@ impl Command {
     }
 }
 
+impl Command {
+    /// Whether the command talks to recorders that the site file may name.
+    fn reaches_a_recorder(&self) -> bool {
+        use Command::{CommReq, Completions, Decode, Demo, Encode, Ports, Sim, Site};
+        match self {
+            Ports(_) | Decode(_) | Encode(_) | CommReq(_) | Sim(_) | Demo(_) => false,
+            Completions(_) | Site(_) => false,
+            #[cfg(unix)]
+            Command::Genius(args) => !args.is_offline(),
+            _ => true,
+        }
+    }
+
+    /// Whether the command is for all recorders of a bus.
+    fn reaches_a_bus(&self) -> bool {
+        #[cfg(unix)]
+        if let Command::Genius(_) = self {
+            return true;
+        }
+        false
+    }
+}
+
 impl Cli {
     /// The definition of all arguments.
     pub(crate) fn definition() -> clap::Command {
@@ -97,20 +122,27 @@ impl Cli {
     {
         let mut definition = Cli::definition();
         let matches = definition.try_get_matches_from_mut(words)?;
-        Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut definition))
+        let cli = Cli::from_arg_matches(&matches);
+        let mut cli = cli.map_err(|error| error.format(&mut definition))?;
+        cli.connection.port_is_from_environment =
+            matches.value_source("port") == Some(ValueSource::EnvVariable);
+        Ok(cli)
     }
 
     /// Does what the command line asks for.
     pub(crate) fn run(&self) -> error::Result<()> {
-        self.run_command().map_err(|failure| match self.command {
+        let connection = match self.command.reaches_a_recorder() {
+            true => &site_file::choose(&self.connection, self.command.reaches_a_bus())?,
+            false => &self.connection,
+        };
+        self.run_command(connection).map_err(|failure| match self.command {
             // The demo's recorder is not the one behind `--port`.
             Command::Demo(_) => failure,
-            _ => connection::explain_silence(failure, &self.connection),
+            _ => connection::explain_silence(failure, connection),
         })
     }
 
-    fn run_command(&self) -> error::Result<()> {
-        let connection = &self.connection;
+    fn run_command(&self, connection: &ConnectionArgs) -> error::Result<()> {
         if self.command.is_for_its_output() {
             closed_stdout::check()?;
         }
@@ -215,7 +247,6 @@ mod tests {
             "genius forces --node 5",
             "genius broadcast",
             "site",
-            "site check",
             "site show a.toml --format xml",
             "site new -o a.toml b.toml",
             "sim --model ser640",

@@ -1,6 +1,7 @@
 //! From `--port` to an open connection to a recorder, and from the client's errors to messages for
 //! the user.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -13,6 +14,7 @@ use ser_proto::{Baud, Configuration};
 
 use crate::error::{Failure, Result, advise, inform, warn};
 use crate::interrupt::Caught;
+use crate::site_file::Chosen;
 use crate::unit_name::UnitName;
 use crate::values;
 
@@ -48,12 +50,31 @@ pub(crate) struct ConnectionArgs {
     /// How often a question is repeated when no valid answer comes.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100))]
     pub(crate) retries: Option<u32>,
+
+    /// The site file: names of recorders and inputs (ser-cli site --help).
+    ///
+    /// Tables then show names and the texts of states, and a recorder in it can be named with
+    /// --recorder.
+    #[arg(long, global = true, env = "SER_SITE", hide_env_values = true, value_name = "FILE")]
+    pub(crate) site: Option<PathBuf>,
+
+    /// The recorder, by its name in the site file; its port is there, too.
+    #[arg(long, global = true, value_name = "NAME")]
+    pub(crate) recorder: Option<String>,
+
+    /// What the site file says of the recorder, once it has been read.
+    #[arg(skip)]
+    pub(crate) chosen: Option<Arc<Chosen>>,
+
+    /// Whether the port is from the environment. A recorder that is named wins over it.
+    #[arg(skip)]
+    pub(crate) port_is_from_environment: bool,
 }
 
 /// The user's name for the recorder.
 pub(crate) fn port_text(connection: &ConnectionArgs) -> Result<&str> {
     match ports(connection).as_slice() {
-        [] => Err(no_port()),
+        [] => Err(connection.chosen.as_ref().map_or_else(no_port, |chosen| chosen.which())),
         [port] => Ok(port),
         [first, second, ..] => Err(Failure::usage(format!(
             "one recorder at a time: --port is given twice, as {first} and as {second}"

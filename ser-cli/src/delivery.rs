@@ -9,7 +9,7 @@ use ser_evidence::record::EntryRecord;
 use ser_proto::Model;
 
 use crate::error::{Failure, Result, warn};
-use crate::output::{self, Annotator, Before, EventWriter, Format, Life, Loss, Record};
+use crate::output::{self, Annotator, Before, EventWriter, Format, Life, Loss, Points, Record};
 use crate::progress::Progress;
 
 /// Gaps and invalid entries that are reported one by one; further ones are only counted.
@@ -72,6 +72,11 @@ impl Outlet {
     /// Writes what else is known, where the format has a place for it.
     pub(crate) fn evidence(&mut self, record: &ser_evidence::record::Record) -> Result<()> {
         Ok(self.writer.evidence(record)?)
+    }
+
+    /// Gives inputs their names, where they are for people.
+    pub(crate) fn name_points(&mut self, points: Points) {
+        self.writer.name_points(points);
     }
 
     /// The life of the log that is being read.

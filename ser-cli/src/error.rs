@@ -122,6 +122,14 @@ impl Failure {
         }
     }
 
+    /// The same for one of several recorders, with the advice.
+    pub(crate) fn warn_of(&self, recorder: &str) {
+        if let Failure::Told(report) = self {
+            warn(format_args!("{recorder}: {}", report.message));
+            report.hints.iter().for_each(advise);
+        }
+    }
+
     /// The failure to write to `what` (a file, standard output).
     pub(crate) fn writing(what: impl Display, error: &io::Error) -> Failure {
         match error.kind() {

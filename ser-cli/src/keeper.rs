@@ -122,6 +122,33 @@ impl Keeper {
         self.save_if_due()
     }
 
+    /// The name of the life of a log that is empty now. It is remembered for the entries to come.
+    pub(crate) fn life_of_empty_log(&mut self) -> Result<Life> {
+        let size = self.size().unwrap_or(0);
+        let known = self.unsaved.or(self.saved);
+        match known {
+            Some(Delivered {
+                cursor: Some(Cursor { sequence: 0, .. }), life: Some(life), ..
+            }) => Ok(life),
+            // There is another log now than the one that was read, and the next reading says so.
+            Some(Delivered { cursor: Some(_), next_life, .. }) => {
+                let life = next_life.map_or_else(output::new_life, Ok)?;
+                self.name(life, size)?;
+                Ok(life)
+            }
+            _ => {
+                let life = known.and_then(|known| known.life).map_or_else(output::new_life, Ok)?;
+                let cursor = Some(Cursor { sequence: 0, is_exact: true, anchor: None });
+                let next_life = None;
+                let erased = None;
+                self.unsaved =
+                    Some(Delivered { cursor, size, life: Some(life), next_life, erased });
+                self.save()?;
+                Ok(life)
+            }
+        }
+    }
+
     /// How many events of a log with this total have not been delivered. Also 0 if nobody reads new
     /// events.
     pub(crate) fn unread(&self, total: u16) -> u16 {

@@ -14,6 +14,8 @@ pub(crate) struct LogLook {
     total: u16,
     /// The newest entry, if there is one and it could be had.
     pub(crate) newest: Option<Entry>,
+    /// The life of the log, where somebody has named it.
+    life: Life,
 }
 
 impl LogLook {
@@ -33,17 +35,25 @@ impl LogLook {
             let now = (&reply).into();
             if now == position {
                 let newest = reply.entries.first().copied();
-                return Ok(LogLook { total: position.total, newest });
+                return Ok(LogLook { total: position.total, newest, life: Life::UNKNOWN });
             }
             position = now;
         }
-        Ok(LogLook { total: position.total, newest: None })
+        Ok(LogLook { total: position.total, newest: None, life: Life::UNKNOWN })
+    }
+
+    /// Names the life of an empty log. Of another one the newest entry tells which it is.
+    pub(crate) fn named(self, life_of_empty_log: impl FnOnce() -> Life) -> LogLook {
+        match self.total {
+            0 if self.newest.is_none() => LogLook { life: life_of_empty_log(), ..self },
+            _ => self,
+        }
     }
 
     /// The place of something that happened after this look, and before the log had this total.
     pub(crate) fn place(&self, total_after: Option<u16>) -> Place {
         Place {
-            life: Life::UNKNOWN,
+            life: self.life,
             after: Some(self.total.into()),
             before: total_after.map(u64::from),
             newest: self.newest,

@@ -267,7 +267,9 @@ fn a_file_of_mistakes_only_is_told_in_bounded_time_and_space() {
     for line in ["[[point]]\ninput=1\nname=\"x\"\n", "= 1\n", "[a]\n", "x.y=1\n", "[[expect]]\n"] {
         assert!(many(line) <= 201, "{line}");
     }
-    assert_eq!(told(&"[".repeat(4 << 20)).len(), 201.min(told(&"[".repeat(4 << 20)).len()));
+    // Of a very large text only the first place that is not TOML is told.
+    assert_eq!(many("["), 1);
+    assert_eq!(told(&"= 1\n".repeat(2000)).len(), 201);
     // Every name is compared with none of the others for ever.
     let points: String = (0..20_000)
         .map(|at| {

@@ -1,16 +1,16 @@
 //! `clock`: the recorder's clock.
 
 use std::io::{self, Write};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use ser_client::{RequestError, Unit};
-use ser_evidence::record::{ClockObservation, How, Record};
+use ser_evidence::record::{ClockObservation, How, Life, Record};
 use ser_evidence::time::shown;
 use ser_proto::TimeStamp;
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, advise, inform, warn};
-use crate::keeper::StateArgs;
+use crate::keeper::{Keeper, StateArgs};
 use crate::kept::KeptRecords;
 use crate::log_look::LogLook;
 use crate::setting;
@@ -20,6 +20,7 @@ const EXAMPLES: &str = "\
 Examples:
   ser-cli clock set                               to the time of this computer
   ser-cli clock set --at 2026-11-22T10:00:00.250  to a given time
+  ser-cli clock set --recorder U1-SER1            as the site file says
 
 What the clock showed, and when, is remembered in the state directory, so that a report can tell \
 how exact the recorder's times are. How exact the setting was is told on standard error.";
@@ -37,8 +38,9 @@ enum What {
     /// Set the clock; events that are already recorded keep their times.
     ///
     /// The time sent is the one at which the last byte arrives, so that the line adds no delay. The
-    /// recorder knows no time zone and no daylight saving time. The output shows the time that was
-    /// sent.
+    /// recorder knows no time zone and no daylight saving time. With --site it is set to what
+    /// `clock` says there: UTC, the local time of the site, or an offset. The output shows the time
+    /// that was sent.
     #[command(after_help = EXAMPLES)]
     Set {
         /// The time to set, as it will be when the last byte arrives; this computer's local time if
@@ -53,9 +55,14 @@ enum What {
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let What::Set { at, state } = &args.what;
+    let setting = connection.clock_setting();
+    let time_in = |ahead| match &setting {
+        Some(setting) => setting.time_in(ahead),
+        None => local_time_in(ahead),
+    };
     // Checked before anything is sent. No download lasts from one century into the next.
     if at.is_none() {
-        local_time_in(std::time::Duration::ZERO).map_err(|year| {
+        time_in(Duration::ZERO).map_err(|year| {
             Failure::new(format!(
                 "a recorder's clock runs from 1970 to 2069; this computer's says {year}"
             ))
@@ -64,12 +71,15 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
     let kept = KeptRecords::of(state, connection)?;
     let mut unit = connection::open(connection)?;
-    let before = LogLook::take(&mut unit)?;
-    let sent = set(&mut unit, *at).inspect_err(|error| {
+    let before = LogLook::take(&mut unit)?.named(|| life_of_empty_log(state, connection));
+    let sent = set(&mut unit, *at, &time_in).inspect_err(|error| {
         if matches!(error, RequestError::NoReply { may_have_been_done: true, .. }) {
             kept.add(&[setting::step(before.place(None))]);
         }
     })?;
+    if let (Some(setting), None) = (&setting, at) {
+        inform(format_args!("set to {setting} time, as the site file says"));
+    }
     let mut out = io::stdout().lock();
     writeln!(out, "{sent}")?;
     out.flush()?;
@@ -77,7 +87,18 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     Ok(())
 }
 
-fn set(unit: &mut Unit, at: Option<TimeStamp>) -> std::result::Result<TimeStamp, RequestError> {
+/// No entry tells which life of the log this is, so it gets its name now. Without one, as when a
+/// `watch` is running, a report cannot know that the clock was set in this life.
+fn life_of_empty_log(state: &StateArgs, connection: &ConnectionArgs) -> Life {
+    let life = Keeper::load(state, connection).and_then(|mut keeper| keeper.life_of_empty_log());
+    life.unwrap_or(Life::UNKNOWN)
+}
+
+fn set(
+    unit: &mut Unit,
+    at: Option<TimeStamp>,
+    time_in: &dyn Fn(Duration) -> std::result::Result<TimeStamp, i32>,
+) -> std::result::Result<TimeStamp, RequestError> {
     let mut asked_first = None;
     unit.set_clock(|ahead| match at {
         // A repeated attempt sets the time that has been reached since the first one.
@@ -85,7 +106,7 @@ fn set(unit: &mut Unit, at: Option<TimeStamp>) -> std::result::Result<TimeStamp,
             let now = Instant::now();
             time_after(at, now.duration_since(*asked_first.get_or_insert(now)))
         }
-        None => local_time_in(ahead).unwrap_or(NO_TIME),
+        None => time_in(ahead).unwrap_or(NO_TIME),
     })
 }
 

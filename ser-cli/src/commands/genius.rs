@@ -36,6 +36,7 @@ const GLOBALS_EXAMPLES: &str = "\
 Examples:
   ser-cli genius globals
   ser-cli genius globals --follow
+  ser-cli genius globals --site north.toml  names in place of numbers
 
 With --follow the bus is read ten times a second, and the times are this computer's. Changes that \
 come and go in between are not seen; ser-cli watch shows every event, stamped by the recorder.";

@@ -23,6 +23,7 @@ Examples:
   ser-cli read --new --format jsonl >> log  what has not been delivered yet
   ser-cli read --from 2040 --count 9        entries by their numbers
   ser-cli read --log-size 2048              an original recorder
+  ser-cli read --site north.toml            with names in place of numbers
 
 Formats:
   table   entry, time, time since previous and first event, changes
@@ -87,18 +88,20 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let before = keeper.as_ref().map(Keeper::before).unwrap_or_default();
     let recorder = connection::recorder_name(connection)?;
     let mut outlet = Outlet::new(args.format, &recorder, life, before);
+    outlet.name_points(connection.points());
+    let log_size = args.log_size.or_else(|| connection.known_log_size());
     let check_complete = |outlet: &Outlet| match args.fail_on_loss {
         true => outlet.require_complete(),
         false => Ok(()),
     };
     if let (Some(from), Some(count)) = (args.from, args.count) {
-        read_range(&mut unit, &mut outlet, (from, count), args.log_size, &stop)?;
+        read_range(&mut unit, &mut outlet, (from, count), log_size, &stop)?;
         return check_complete(&outlet);
     }
     let remembered = keeper.as_ref().and_then(Keeper::size);
     let kept = args.new.then(|| KeptRecords::of(&args.state, connection)).transpose()?;
     let mut witness = Witness::begin(kept, keeper.as_ref().and_then(Keeper::place));
-    let size = connection::log_size(&mut unit, args.log_size, remembered)?;
+    let size = connection::log_size(&mut unit, log_size, remembered)?;
     let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), &mut witness, size, &stop);
     // Events that reached standard output are remembered even if the recorder fell silent in
     // between, or after Ctrl-C.

@@ -5,10 +5,10 @@ mod new;
 mod show;
 mod template;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::connection::ConnectionArgs;
-use crate::error::Result;
+use crate::error::{Failure, Result};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -62,16 +62,16 @@ enum What {
     /// Look for mistakes in a site file.
     #[command(after_help = CHECK_EXAMPLES)]
     Check {
-        /// The site file.
+        /// The site file; that of --site if not given.
         #[arg(value_name = "FILE")]
-        file: PathBuf,
+        file: Option<PathBuf>,
     },
     /// Show what a site file says, as tables.
     #[command(after_help = SHOW_EXAMPLES)]
     Show {
-        /// The site file.
+        /// The site file; that of --site if not given.
         #[arg(value_name = "FILE")]
-        file: PathBuf,
+        file: Option<PathBuf>,
         /// For people or for programs.
         #[arg(long, value_enum, default_value_t)]
         format: show::Format,
@@ -81,7 +81,15 @@ enum What {
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     match &args.what {
         What::New { output } => new::run(output.as_deref(), connection),
-        What::Check { file } => check::run(file),
-        What::Show { file, format } => show::run(file, *format),
+        What::Check { file } => check::run(given(file.as_deref(), connection)?),
+        What::Show { file, format } => show::run(given(file.as_deref(), connection)?, *format),
     }
+}
+
+fn given<'a>(file: Option<&'a Path>, connection: &'a ConnectionArgs) -> Result<&'a Path> {
+    file.or(connection.site.as_deref()).ok_or_else(|| {
+        Failure::usage("which site file? None is given, and SER_SITE is not set")
+            .hint("name it, as in ser-cli site check north.toml")
+            .hint("no site file yet? ser-cli site new -o north.toml")
+    })
 }

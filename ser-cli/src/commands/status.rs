@@ -3,11 +3,13 @@
 use std::io::{self, Write};
 
 use ser_client::{Delivery, LogPosition, Unit};
+use ser_console::Harmless;
 use ser_proto::{Configuration, Entry, Mode, Model};
 
 use crate::connection::{self, ConnectionArgs, unless_unanswered};
 use crate::error::{Result, advise};
-use crate::output::field;
+use crate::output::{Points, field};
+use crate::site_file::Chosen;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -33,7 +35,12 @@ pub(crate) fn run(_args: &Args, connection: &ConnectionArgs) -> Result<()> {
     };
     let size = configuration.map(|configuration| configuration.size);
     let latest = latest_event(&mut unit, position, size)?;
-    write(&mut io::stdout().lock(), mode, position, configuration, latest)?;
+    let mut out = io::stdout().lock();
+    let points = connection.points();
+    if let Some(chosen) = &connection.chosen {
+        write_names(&mut out, chosen)?;
+    }
+    write(&mut out, mode, position, configuration, latest, &points)?;
     if mode.is_none() {
         advise(
             "mode and settings are not known: an original recorder does not answer the queries \
@@ -64,12 +71,20 @@ fn latest_event(
     Ok(latest)
 }
 
+/// The names of site and recorder.
+fn write_names(out: &mut dyn Write, chosen: &Chosen) -> io::Result<()> {
+    let Some(recorder) = chosen.recorder() else { return Ok(()) };
+    field(out, "site", Harmless(&chosen.site.name).line())?;
+    field(out, "recorder", Harmless(&recorder.name).line())
+}
+
 fn write(
     out: &mut dyn Write,
     mode: Option<Mode>,
     position: LogPosition,
     configuration: Option<Configuration>,
     latest: Option<(u16, Entry, Model)>,
+    points: &Points,
 ) -> io::Result<()> {
     if let Some((_, _, model)) = latest {
         field(out, "inputs", model.inputs())?;
@@ -89,10 +104,7 @@ fn write(
     match latest {
         Some((number, entry, _)) => {
             field(out, "latest event", format_args!("{} (entry {number})", entry.time))?;
-            match entry.state.is_empty() {
-                true => field(out, "inputs on", "none")?,
-                false => field(out, "inputs on", entry.state)?,
-            }
+            field(out, "inputs on", points.on(entry.state))?;
         }
         None => field(out, "latest event", "none")?,
     }
@@ -113,8 +125,15 @@ mod tests {
         let mode = Mode { recording: true, version: 105 };
         let latest = (7, entry("00.250", &[3], &[1, 3]), Model::Ser160);
         let position = LogPosition { total: 7, next_slot: 7 };
-        write(&mut out, Some(mode), position, Some(Configuration::default()), Some(latest))
-            .unwrap();
+        write(
+            &mut out,
+            Some(mode),
+            position,
+            Some(Configuration::default()),
+            Some(latest),
+            &Points::default(),
+        )
+        .unwrap();
         assert_eq!(
             String::from_utf8(out).unwrap(),
             "inputs          16\n\
@@ -130,7 +149,15 @@ mod tests {
              auto print      off\n"
         );
         let mut out = Vec::new();
-        write(&mut out, None, LogPosition { total: 0, next_slot: 0 }, None, None).unwrap();
+        write(
+            &mut out,
+            None,
+            LogPosition { total: 0, next_slot: 0 },
+            None,
+            None,
+            &Points::default(),
+        )
+        .unwrap();
         assert_eq!(
             String::from_utf8(out).unwrap(),
             "events          0 since the last erase (modulo 65536)\n\

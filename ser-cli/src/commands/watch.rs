@@ -1,5 +1,7 @@
 //! `watch`: events as they happen.
 
+mod site;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -25,6 +27,7 @@ Examples:
   ser-cli watch --format jsonl >> log  run after run, no event twice
   ser-cli watch --poll --interval 5s   leaves the recorder's settings alone
   ser-cli watch --log-size 2048        an original recorder
+  ser-cli watch --site north.toml      all recorders of a site, with names
 
 Undelivered events come first (as with read --new), then every event as it happens. The command \
 makes the recorder report automatically (auto report on RS-232), and restores the setting at the \
@@ -34,6 +37,9 @@ then, so that a report lost on the line delays its event and does not lose it.
 While events come faster than the line can carry reports and readings together, the recorder is \
 told not to report and is read without a pause. Events that are overwritten nevertheless are \
 counted in the output, at their place.
+With --site and no port, all recorders of the site that have one are asked every second, and \
+shown in one list, by what their clocks show; their settings are left alone. A recorder that does \
+not answer is asked again later, and delays no other.
 On a Genius bus the command waits for a board or a recorder that fails, for a minute or as long \
 as --timeout says.";
 
@@ -72,10 +78,14 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
+    if let (Some(chosen), true) = (&connection.chosen, connection::ports(connection).is_empty()) {
+        return site::run(args, connection, chosen);
+    }
     let keeper = Keeper::load(&args.state, connection)?;
     let stop = interrupt::catch()?;
     let mut unit = connection::open(connection)?;
-    let plan = plan(args, &mut unit, keeper.size())?;
+    let log_size = args.log_size.or_else(|| connection.known_log_size());
+    let plan = plan(args, log_size, &mut unit, keeper.size())?;
     let follower = LogFollower::new(keeper.cursor(), plan.size);
     let watcher = match plan.reports {
         Some(Reports { switch, found }) => {
@@ -90,7 +100,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         None => LogWatcher::polling(follower, plan.interval, args.interval.is_none()),
     };
     let recorder = connection::recorder_name(connection)?;
-    let outlet = Outlet::endless(args.format, &recorder, keeper.life()?, keeper.before());
+    let mut outlet = Outlet::endless(args.format, &recorder, keeper.life()?, keeper.before());
+    outlet.name_points(connection.points());
     let outage = Outage::new(connection::options(connection).timeout);
     let kept = KeptRecords::of(&args.state, connection)?;
     let witness = Witness::begin(Some(kept), keeper.place());
@@ -147,21 +158,26 @@ struct Reports {
     found: Configuration,
 }
 
-fn plan(args: &Args, unit: &mut Unit, remembered: Option<u16>) -> Result<Plan> {
+fn plan(
+    args: &Args,
+    log_size: Option<u16>,
+    unit: &mut Unit,
+    remembered: Option<u16>,
+) -> Result<Plan> {
     let polling =
         |size| Plan { size, reports: None, interval: args.interval.unwrap_or(POLL_EVERY) };
-    if let (true, Some(size)) = (args.poll, args.log_size) {
+    if let (true, Some(size)) = (args.poll, log_size) {
         return Ok(polling(size));
     }
     let Some(found) = connection::settings(unit)? else {
-        let size = args.log_size.or(remembered).ok_or_else(connection::log_size_unknown)?;
+        let size = log_size.or(remembered).ok_or_else(connection::log_size_unknown)?;
         inform(
             "the recorder does not report its settings (original recorders never do): it is asked \
              for events",
         );
         return Ok(polling(size));
     };
-    let size = args.log_size.unwrap_or(found.size);
+    let size = log_size.unwrap_or(found.size);
     let switch = |is_on| {
         let off = Configure { auto_report: AutoReport::Off, ..keep_size_and_rate(found) };
         ReportSwitch { on: reporting_here(unit, found), off, is_on }

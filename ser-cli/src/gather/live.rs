@@ -188,6 +188,12 @@ impl Named {
             }
             // The log was empty when somebody looked, and has begun since.
             _ if cursor.sequence == 0 && cursor.anchor.is_none() => named(0),
+            // The log that was read is gone, and the next one had a name before it had an entry.
+            _ if begins(deliveries) => delivered.next_life.map_or(Named::NOBODY, |life| Named {
+                life,
+                shift: 0,
+                is_exact: true,
+            }),
             _ => Named::NOBODY,
         }
     }
@@ -211,6 +217,11 @@ impl Named {
             }
         }
     }
+}
+
+/// Whether these are all entries of a log from its beginning.
+fn begins(deliveries: &[Delivery]) -> bool {
+    matches!(deliveries.first(), Some(Delivery::Event { sequence: Some(1), .. }))
 }
 
 fn same_total(sequence: u64, cursor: Cursor) -> bool {

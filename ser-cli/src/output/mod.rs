@@ -5,9 +5,11 @@ mod elapsed;
 mod jsonl;
 mod life;
 mod palette;
+mod points;
 mod record;
 mod rows;
 mod sequence;
+mod site_table;
 mod table;
 
 use std::io::{self, Write};
@@ -20,9 +22,11 @@ pub(crate) use jsonl::{JsonLines, PROGRAM};
 pub use life::Life;
 pub(crate) use life::new_life;
 pub(crate) use palette::Palette;
+pub(crate) use points::Points;
 pub(crate) use record::{Annotator, Before, Event, Loss, Record};
 pub(crate) use rows::{Rows, sync_stdout};
 pub(crate) use sequence::{PointNames, Sequence};
+pub(crate) use site_table::{RecorderColumn, SiteTable, header as site_header};
 pub(crate) use table::Table;
 
 /// The format of events.
@@ -52,6 +56,9 @@ pub(crate) trait EventWriter {
 
     /// Passes on what has been written so far, in whole rows.
     fn flush(&mut self) -> io::Result<()>;
+
+    /// Gives inputs their names, where they are for people.
+    fn name_points(&mut self, _points: Points) {}
 }
 
 /// The writer of `format` on standard output, for what this recorder tells. A continued file gets no
@@ -86,6 +93,7 @@ pub(crate) fn field(
 pub(crate) mod testing {
     //! Events that every writer is tested with.
 
+    pub(crate) use super::points::testing::points;
     use ser_client::Lost;
     use ser_proto::{Entry, Inputs};
 

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use ser_proto::Entry;
 
-use super::{Elapsed, Event, EventWriter, Loss, Palette};
+use super::{Elapsed, Event, EventWriter, Loss, Palette, Points};
 
 /// Wide enough for a time of less than an hour, and for the shorter text of a longer one.
 const WIDTH: usize = "+59m59.999 s".len();
@@ -14,6 +14,7 @@ const WIDTH: usize = "+59m59.999 s".len();
 pub(crate) struct Table<W> {
     out: W,
     palette: Palette,
+    points: Points,
     header_due: bool,
     elapsed: Elapsed,
 }
@@ -21,7 +22,8 @@ pub(crate) struct Table<W> {
 impl<W: Write> Table<W> {
     /// `has_header` says whether the header is already there.
     pub(crate) fn new(out: W, palette: Palette, has_header: bool) -> Table<W> {
-        Table { out, palette, header_due: !has_header, elapsed: Elapsed::default() }
+        let (points, elapsed) = (Points::default(), Elapsed::default());
+        Table { out, palette, points, header_due: !has_header, elapsed }
     }
 
     fn header(&mut self) -> io::Result<()> {
@@ -36,9 +38,11 @@ impl<W: Write> Table<W> {
         let on = self.palette.on;
         for (position, input) in entry.changed.numbers().enumerate() {
             let gap = if position == 0 { "" } else { "  " };
-            match entry.state.contains(input) {
-                true => write!(self.out, "{gap}{on}{input} ON{on:#}")?,
-                false => write!(self.out, "{gap}{input} OFF")?,
+            let is_on = entry.state.contains(input);
+            let change = self.points.state(input, is_on);
+            match is_on {
+                true => write!(self.out, "{gap}{on}{change}{on:#}")?,
+                false => write!(self.out, "{gap}{change}")?,
             }
         }
         Ok(())
@@ -81,12 +85,16 @@ impl<W: Write> EventWriter for Table<W> {
     fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
+
+    fn name_points(&mut self, points: Points) {
+        self.points = points;
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::testing::{entry, event, four_lost, odd};
+    use crate::output::testing::{entry, event, four_lost, odd, points};
 
     fn written(write: impl FnOnce(&mut Table<&mut Vec<u8>>) -> io::Result<()>) -> String {
         let mut out = Vec::new();
@@ -111,6 +119,20 @@ mod tests {
                 "    -  4 events were overwritten before they were read",
                 " 2048  2026-11-22T10:00:59.250     +58.988 s     +59.000 s  3 OFF",
             ]
+        );
+    }
+
+    #[test]
+    fn inputs_with_a_point_have_its_name_and_texts() {
+        let text = written(|table| {
+            table.name_points(points());
+            table.event(&event(9, entry("00.250", &[3, 17], &[17])))?;
+            table.event(&event(10, entry("00.262", &[3], &[3, 17])))
+        });
+        let changes = |line: &str| line.chars().skip(60).collect::<String>();
+        assert_eq!(
+            text.lines().map(changes).collect::<Vec<_>>(),
+            ["changes", "52-1 closed OPEN  17 ON", "52-1 closed CLOSED"]
         );
     }
 

@@ -60,8 +60,9 @@ fn harmless(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
     use ser_console::is_obeyed;
-    use ser_evidence::site::inspect;
+    use ser_evidence::site::{Related, inspect};
 
     use super::*;
 
@@ -93,5 +94,70 @@ mod tests {
         let drawn = plain(&"[[expect]]\n".repeat(300));
         assert_eq!(drawn.matches("error[").count(), DRAWN);
         assert!(drawn.ends_with(" more are not shown\n\n"), "{drawn}");
+    }
+
+    /// Pieces of site files and what does not belong into one.
+    fn piece() -> impl Strategy<Value = String> {
+        let pieces = [
+            "[[point]]\n",
+            "[[recorder]]\r\n",
+            "name = ",
+            "\"52-1 closed\"",
+            "input = 7\n",
+            "\n",
+            "\r",
+            "\"",
+            "\"\"\"",
+            "[",
+            "{",
+            "=",
+            "\t",
+            "# ",
+            "\u{1B}[2J",
+            "\u{202E}",
+            "\u{200D}",
+            "\u{0}",
+            "遮断器",
+            "e\u{301}",
+            "\u{1F468}\u{200D}\u{1F469}",
+            "\u{FEFF}",
+            "\u{2028}",
+            "xxxxxxxxxxxxxxxxxxxx",
+        ];
+        prop_oneof![
+            4 => proptest::sample::select(pieces.to_vec()).prop_map(str::to_owned),
+            1 => any::<String>(),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig {
+            cases: 500,
+            failure_persistence: None,
+            ..ProptestConfig::default()
+        })]
+
+        #[test]
+        fn whatever_the_file_it_can_be_drawn_and_is_harmless(
+            pieces in proptest::collection::vec(piece(), 0..40)
+        ) {
+            let drawn = plain(&pieces.concat());
+            prop_assert!(drawn.chars().all(|letter| letter == '\n' || !is_obeyed(letter)));
+        }
+
+        #[test]
+        fn wherever_a_diagnostic_points_it_can_be_drawn(
+            pieces in proptest::collection::vec(piece(), 0..20),
+            places in proptest::collection::vec(0_usize..400, 4),
+        ) {
+            let text = pieces.concat();
+            let mut diagnostic = inspect("").diagnostics.remove(0);
+            let span = |from: usize, to: usize| places[from].min(places[to])..places[from].max(places[to]);
+            diagnostic.span = span(0, 1);
+            diagnostic.related = vec![Related { span: span(2, 3), label: "here".to_owned() }];
+            let drawn = drawn("a.toml", &text, &[diagnostic]);
+            let plain = anstream::adapter::strip_str(&drawn).to_string();
+            prop_assert!(plain.chars().all(|letter| letter == '\n' || !is_obeyed(letter)));
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! Site files: from a path to the site, and what is wrong with it drawn for people.
 
+mod choice;
+mod clock;
 mod draw;
 mod ports;
 mod source;
@@ -11,6 +13,11 @@ use std::path::Path;
 use ser_console::Harmless;
 use ser_evidence::site::{self, Diagnostic, Reading, Role, Site};
 use ser_proto::Model;
+
+#[cfg(unix)]
+pub(crate) use choice::bus_name;
+pub(crate) use choice::{Chosen, choose};
+pub(crate) use clock::ClockSetting;
 
 use crate::error::{Failure, Result};
 

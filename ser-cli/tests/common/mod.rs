@@ -15,7 +15,11 @@ use ser_sim::testing::PATIENCE;
 /// The program as it was built, without the user's settings.
 pub(crate) fn ser_cli() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ser-cli"));
-    command.env_remove("SER_PORT").env_remove("SER_STATE_DIR").env("NO_COLOR", "1");
+    command
+        .env_remove("SER_PORT")
+        .env_remove("SER_SITE")
+        .env_remove("SER_STATE_DIR")
+        .env("NO_COLOR", "1");
     command
 }
 

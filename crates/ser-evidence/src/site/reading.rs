@@ -61,12 +61,25 @@ pub fn inspect(text: &str) -> Reading {
     if !too_large::passes(&mut findings, text) {
         return Reading { site: None, diagnostics: findings.into_list(), ports: Vec::new() };
     }
-    let (document, errors): (Spanned<DeTable<'_>>, Vec<Error>) = DeTable::parse_recoverable(text);
+    let (document, errors) = parse(text);
     let table = SiteTable::read(&document, &mut findings);
     let site = resolve(&table, SiteDigest::of(text), &mut findings);
     tell_syntax(text, &errors, &mut findings);
     let site = site.filter(|_| errors.is_empty());
     Reading { site, diagnostics: findings.into_list(), ports: ports(&table) }
+}
+
+/// The document, and what is not TOML. Each such place takes memory, so of a very large text only
+/// the first is told.
+fn parse(text: &str) -> (Spanned<DeTable<'_>>, Vec<Error>) {
+    const LARGE: usize = 1 << 20;
+    if text.len() <= LARGE {
+        return DeTable::parse_recoverable(text);
+    }
+    match DeTable::parse(text) {
+        Ok(document) => (document, Vec::new()),
+        Err(error) => (Spanned::new(0..0, DeTable::new()), vec![error]),
+    }
 }
 
 fn ports(table: &SiteTable) -> Vec<PortPlace> {

@@ -16,13 +16,14 @@ use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
 use crate::log_look::LogLook;
 use crate::setting;
+use crate::site_file::ClockSetting;
 use crate::time::{local_time_in, parse_time};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::Subcommand)]
 pub(super) enum What {
     /// Set all clocks, to the time at which the broadcast arrives.
     Clock {
-        /// The time to set; this computer's local time if not given.
+        /// The time to set; if not given, what the site file says, or this computer's local time.
         #[arg(long, value_name = "TIME", value_parser = parse_time)]
         at: Option<TimeStamp>,
     },
@@ -61,6 +62,7 @@ pub(super) fn run(
             .hint("keep them first: ser-cli read --all --format csv > events.csv, for each of them")
             .hint("then add --yes"));
     }
+    let setting = connection.clock_setting_of_bus()?;
     let host = connection::open_bus(connection)?;
     let found = host.recorders(how)?;
     // Such a device is not asked whether it has received the broadcast.
@@ -73,7 +75,7 @@ pub(super) fn run(
         return Err(no_recorder());
     }
     let began = host.now();
-    let command = send(what, &host)?;
+    let command = send(what, &host, setting.as_ref())?;
     let checks: Vec<Check> = asked.iter_mut().map(|asked| asked.check(&command, began)).collect();
     if let What::Mark = what {
         mark::run(connection, state, &checks)?;
@@ -90,17 +92,19 @@ pub(super) fn run(
 }
 
 /// Sends the command, and tells the user the time in it, if any.
-fn send(what: What, host: &GeniHost) -> Result<Command> {
+fn send(what: What, host: &GeniHost, setting: Option<&ClockSetting>) -> Result<Command> {
+    let time_in = |ahead| match setting {
+        Some(setting) => setting.time_in(ahead),
+        None => local_time_in(ahead),
+    };
     let command = match what {
         What::Clock { at: Some(time) } => Command::SetClock(time),
-        What::Clock { at: None } => {
-            Command::SetClock(local_time_in(host.delay()).map_err(|year| {
-                Failure::new(format!(
-                    "a recorder's clock runs from 1970 to 2069; this computer's says {year}"
-                ))
-                .hint("set this computer's clock, or give the time with --at")
-            })?)
-        }
+        What::Clock { at: None } => Command::SetClock(time_in(host.delay()).map_err(|year| {
+            Failure::new(format!(
+                "a recorder's clock runs from 1970 to 2069; this computer's says {year}"
+            ))
+            .hint("set this computer's clock, or give the time with --at")
+        })?),
         // Nobody answers a broadcast, so a read does nothing but being noted.
         What::Mark => Command::Read { start: 1, count: 1 },
         What::Start => Command::SetMode { recording: true },

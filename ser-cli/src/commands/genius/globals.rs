@@ -7,7 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ser_client::{BusRecorders, GeniHost, Recognition};
+use ser_client::{BusRecorders, Endpoint, GeniHost, Recognition};
+use ser_console::Harmless;
+use ser_evidence::site::RecorderId;
 use ser_proto::genius::GlobalData;
 
 use super::{no_recorder, silent_candidates};
@@ -15,6 +17,7 @@ use crate::connection::{self, ConnectionArgs};
 use crate::error::{Result, advise, inform};
 use crate::interrupt;
 use crate::outage::Outage;
+use crate::output::Points;
 use crate::time::local_now;
 
 /// How often the bus is looked at.
@@ -31,6 +34,7 @@ pub(super) fn run(connection: &ConnectionArgs, follow: bool, how: Recognition) -
         inform(&silent);
     }
     let globals: Globals = recorders.into_iter().collect();
+    let names = Names::on_bus(connection);
     let mut out = io::stdout().lock();
     match stop {
         Some(stop) => {
@@ -42,14 +46,14 @@ pub(super) fn run(connection: &ConnectionArgs, follow: bool, how: Recognition) -
             }
             inform("the bus is followed until Ctrl-C");
             let outage = Outage::new(connection::options(connection).timeout);
-            Follow { host, how, stop, outage }.run(globals, &mut out)
+            Follow { host, how, stop, outage, names }.run(globals, &mut out)
         }
         None if globals.is_empty() => Err(no_recorder()),
         None => {
             writeln!(out, "{HEADER}")?;
-            globals
-                .iter()
-                .try_for_each(|(&node, global)| writeln!(out, "{}", row(node, Some(global))))?;
+            globals.iter().try_for_each(|(&node, global)| {
+                writeln!(out, "{}", names.row(node, Some(global)))
+            })?;
             Ok(out.flush()?)
         }
     }
@@ -61,6 +65,7 @@ struct Follow {
     how: Recognition,
     stop: Arc<AtomicBool>,
     outage: Outage,
+    names: Names,
 }
 
 impl Follow {
@@ -70,7 +75,7 @@ impl Follow {
         let mut shown = Globals::new();
         loop {
             let time = local_now();
-            for row in changes(&shown, &now) {
+            for row in changes(&shown, &now, &self.names) {
                 writeln!(out, "{time}  {row}")?;
             }
             out.flush()?;
@@ -98,23 +103,46 @@ impl Follow {
     }
 }
 
-fn changes(before: &Globals, now: &Globals) -> Vec<String> {
+fn changes(before: &Globals, now: &Globals, names: &Names) -> Vec<String> {
     let mut numbers: Vec<u8> = before.keys().chain(now.keys()).copied().collect();
     numbers.sort_unstable();
     numbers.dedup();
     let changed = numbers.into_iter().filter(|number| before.get(number) != now.get(number));
-    changed.map(|number| row(number, now.get(&number))).collect()
+    changed.map(|number| names.row(number, now.get(&number))).collect()
 }
 
 const HEADER: &str = "node  inputs  on";
 
-/// A recorder as a row of the table; without inputs if it has left the bus.
-fn row(node: u8, global: Option<&GlobalData>) -> String {
-    match global {
-        None => format!("{node:>4}       -  no longer on the bus"),
-        Some(global) => {
-            let on = if global.state.is_empty() { "none".to_string() } else { global.to_string() };
-            format!("{node:>4}  {:>6}  {on}", global.model.inputs())
+/// The names of recorders and inputs, by bus address, where the site file has them.
+#[derive(Default)]
+struct Names(BTreeMap<u8, (String, Points)>);
+
+impl Names {
+    fn on_bus(connection: &ConnectionArgs) -> Names {
+        let (Some(chosen), Ok(Endpoint::Geni { window, .. })) =
+            (&connection.chosen, connection::endpoint(connection))
+        else {
+            return Names::default();
+        };
+        let name = |id: RecorderId| {
+            let recorder = chosen.site.recorders.get(id.0)?;
+            Some((Harmless(&recorder.name).line(), chosen.points_of(id)))
+        };
+        let recorders = chosen.on_bus(&window).into_iter();
+        Names(recorders.filter_map(|(node, id)| Some((node, name(id)?))).collect())
+    }
+
+    /// A recorder as a row of the table; without inputs if it has left the bus.
+    fn row(&self, node: u8, global: Option<&GlobalData>) -> String {
+        let name = self.0.get(&node);
+        let before = name.map_or(String::new(), |(name, _)| format!("{name}: "));
+        match global {
+            None => format!("{node:>4}       -  {before}no longer on the bus"),
+            Some(global) => {
+                let on = name.map(|(_, points)| points.on(global.state));
+                let on = on.unwrap_or_else(|| Points::default().on(global.state));
+                format!("{node:>4}  {:>6}  {before}{on}", global.model.inputs())
+            }
         }
     }
 }
@@ -124,6 +152,7 @@ mod tests {
     use ser_proto::{Inputs, Model};
 
     use super::*;
+    use crate::output::testing::points;
 
     #[test]
     fn only_what_has_changed_is_shown_again() {
@@ -131,9 +160,23 @@ mod tests {
         let before = Globals::from([(5, global(1)), (6, global(0)), (7, global(2))]);
         let now = Globals::from([(5, global(5)), (6, global(0)), (9, global(0))]);
         assert_eq!(
-            changes(&before, &now),
+            changes(&before, &now, &Names::default()),
             ["   5      16  1 3", "   7       -  no longer on the bus", "   9      16  none"]
         );
-        assert_eq!(changes(&now, &now), Vec::<String>::new());
+        assert_eq!(changes(&now, &now, &Names::default()), Vec::<String>::new());
+    }
+
+    #[test]
+    fn recorders_and_inputs_of_the_site_have_their_names() {
+        let names = Names(BTreeMap::from([(5, ("U1-SER1".to_owned(), points()))]));
+        let global = GlobalData { model: Model::Ser160, state: Inputs(0b1100) };
+        assert_eq!(
+            [names.row(5, Some(&global)), names.row(6, Some(&global)), names.row(5, None)],
+            [
+                "   5      16  U1-SER1: 52-1 closed CLOSED, 4",
+                "   6      16  3 4",
+                "   5       -  U1-SER1: no longer on the bus"
+            ]
+        );
     }
 }

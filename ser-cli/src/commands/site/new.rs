@@ -50,7 +50,10 @@ fn zone() -> String {
     let zone = jiff::tz::TimeZone::try_system().ok();
     let name = zone.as_ref().and_then(jiff::tz::TimeZone::iana_name);
     let is_known = |name: &&str| jiff::tz::TimeZone::get(name).is_ok();
-    name.filter(is_known).unwrap_or("UTC").to_owned()
+    match name.filter(is_known) {
+        None | Some("Etc/UTC") => "UTC".to_owned(),
+        Some(name) => name.to_owned(),
+    }
 }
 
 /// What a recorder says of itself. One that cannot be reached is known by its port only.

@@ -59,6 +59,8 @@ pub(in crate::site) fn shown(
     key: &str,
 ) -> Option<Moment<Shown>> {
     let wrong = match text.parse::<DateTime>() {
+        // jiff takes a date for its midnight.
+        Ok(_) if !text.contains(':') => "the time of day is missing",
         // jiff ignores an offset here, and this must not be.
         Ok(_) if has_offset(text) => "a recorder's clock has no zone",
         Ok(time) if time.subsec_nanosecond() % 1_000_000 != 0 => {
@@ -121,6 +123,7 @@ mod tests {
             "2070-01-01T00:00:00",
             "1970-01-01T00:00:00.0001",
             "2026-02-29T00:00:00",
+            "2026-02-28",
         ] {
             assert_eq!(of(text), None, "{text}");
         }

@@ -27,14 +27,15 @@ use crate::site::nearest::nearest;
 /// The name of this check.
 pub(in crate::site) const NAME: &str = "unknown-word";
 
-/// `word` is none of `words`.
+/// `word` is none of `words`; perhaps `meant` would be right.
 pub(in crate::site) fn found(
     findings: &mut Findings,
     (span, word): (Span, &str),
     key: &str,
     words: &[&str],
+    meant: Option<&str>,
 ) {
-    let near = nearest(word, words.iter().copied(), findings);
+    let near = meant.or_else(|| nearest(word, words.iter().copied(), findings));
     let phrase = format!("`{key}` does not know {}", quoted(word));
     let diagnostic = Diagnostic::error(NAME, span, phrase)
         .label(format!("one of {}", quoted_list(words.iter().copied(), "or")));

@@ -70,7 +70,7 @@ fn recorder(fields: &mut Fields<'_, '_>) -> RecorderTable {
     RecorderTable {
         name,
         port: fields.name("port", LONG, "\"/dev/ttyUSB0\""),
-        model: word(fields, "model", "\"ser320\"", MODELS),
+        model: word(fields, "model", "\"ser320\"", MODELS, |_| None),
         is_original: fields.switch("original").map(Spanned::into_inner),
         log_size: unsigned(fields.whole("log_size", ENTRIES, "2048")),
         clock: clock
@@ -115,6 +115,16 @@ fn point(fields: &mut Fields<'_, '_>) -> PointTable {
     {
         same_texts::found(fields.findings, off.span(), on.span());
     }
+    // Somebody wrote the text of the state in place of the state.
+    let says = |text: &Option<Spanned<String>>, word: &str| {
+        text.as_ref().is_some_and(|text| text.get_ref().eq_ignore_ascii_case(word))
+    };
+    let state_of = |word: &str| match (says(&on, word), says(&off, word)) {
+        (true, _) => Some("on"),
+        (_, true) => Some("off"),
+        _ => None,
+    };
+    let normal = word(fields, "normal", "\"on\"", STATES, state_of).map(Spanned::into_inner);
     let input = fields.whole("input", INPUT, "7");
     PointTable {
         recorder: owner(fields),
@@ -122,12 +132,12 @@ fn point(fields: &mut Fields<'_, '_>) -> PointTable {
             Some(Spanned::new(input.span(), u8::try_from(input.into_inner()).ok()?))
         }),
         name: fields.name("name", NAME, "\"52-1 closed\""),
-        role: word(fields, "role", "\"52a\"", ROLES).map(Spanned::into_inner),
+        role: word(fields, "role", "\"52a\"", ROLES, |_| None).map(Spanned::into_inner),
         equipment: fields.name("equipment", NAME, "\"52-1\"").map(Spanned::into_inner),
         group: fields.reference("group", "\"Feeder 1\""),
         on: on.map(Spanned::into_inner),
         off: off.map(Spanned::into_inner),
-        normal: word(fields, "normal", "\"on\"", STATES).map(Spanned::into_inner),
+        normal,
         same_as: fields.reference("same_as", "\"U1-SER2/52-1 closed\""),
         inverted: fields.switch("inverted"),
     }

@@ -24,18 +24,21 @@ pub(super) const ROLES: Words<Role> = &[
     ("alarm", Role::Alarm),
 ];
 
-/// The meaning of the word of a key. A word that is none of them is told.
+/// The meaning of the word of a key. A word that is none of them is told; `meant` may know better
+/// than its letters what it should be.
 pub(super) fn word<T: Copy>(
     fields: &mut Fields<'_, '_>,
     key: &str,
     example: &str,
     words: Words<T>,
+    meant: impl Fn(&str) -> Option<&'static str>,
 ) -> Option<Spanned<T>> {
     let text = fields.text(key, example)?;
     let found = words.iter().find(|(word, _)| word == text.get_ref());
     if found.is_none() {
         let words: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
-        unknown_word::found(fields.findings, (text.span(), text.get_ref()), key, &words);
+        let meant = meant(text.get_ref());
+        unknown_word::found(fields.findings, (text.span(), text.get_ref()), key, &words, meant);
     }
     found.map(|&(_, meaning)| Spanned::new(text.span(), meaning))
 }
