@@ -57,6 +57,7 @@ enum Command {
     CommReq(commands::comm_req::Args),
     Site(commands::site::Args),
     Report(commands::report::Args),
+    Merge(commands::merge::Args),
     Sim(commands::sim::Args),
     Demo(commands::demo::Args),
     Completions(commands::completions::Args),
@@ -65,9 +66,9 @@ enum Command {
 impl Command {
     /// Whether the command only prints.
     fn is_for_its_output(&self) -> bool {
-        use Command::{CommReq, Completions, Decode, Encode, Print, Read, Watch};
+        use Command::{CommReq, Completions, Decode, Encode, Merge, Print, Read, Report, Watch};
         match self {
-            Read(_) | Print(_) | Watch(_) => true,
+            Read(_) | Print(_) | Watch(_) | Report(_) | Merge(_) => true,
             Decode(_) | Encode(_) | CommReq(_) | Completions(_) => true,
             #[cfg(unix)]
             Command::Genius(args) => args.is_offline(),
@@ -165,6 +166,7 @@ impl Cli {
             Command::CommReq(args) => commands::comm_req::run(args),
             Command::Site(args) => commands::site::run(args, connection),
             Command::Report(args) => commands::report::run(args, connection),
+            Command::Merge(args) => commands::merge::run(args, connection),
             Command::Sim(args) => commands::sim::run(args),
             Command::Demo(args) => commands::demo::run(args),
             Command::Completions(args) => commands::completions::run(args, &mut Cli::definition()),

@@ -111,7 +111,11 @@ pub(crate) fn unit_name(connection: &ConnectionArgs) -> Result<UnitName> {
 
 /// The recorder's name in records.
 pub(crate) fn recorder_name(connection: &ConnectionArgs) -> Result<String> {
-    Ok(unit_name(connection)?.name)
+    let chosen = connection.chosen.as_deref().and_then(|chosen| chosen.recorder());
+    match chosen {
+        Some(recorder) => Ok(recorder.name.clone()),
+        None => Ok(unit_name(connection)?.name),
+    }
 }
 
 /// Opens the line to the recorder. Nothing is sent yet.

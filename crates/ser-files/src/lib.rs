@@ -15,6 +15,7 @@ pub mod csv;
 mod error;
 pub mod jsonl;
 mod lines;
+pub mod merged;
 pub mod report;
 mod source;
 mod stamp;

@@ -11,6 +11,7 @@ pub(crate) mod erase;
 #[cfg(unix)]
 pub(crate) mod genius;
 pub(crate) mod last_broadcast;
+pub(crate) mod merge;
 pub(crate) mod ports;
 pub(crate) mod print;
 pub(crate) mod read;

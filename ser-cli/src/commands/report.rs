@@ -14,10 +14,10 @@ use crate::output::{PROGRAM, Palette};
 
 const EXAMPLES: &str = "\
 Examples:
-  ser-cli report --site northfield.toml           read all recorders; the last trip
-  ser-cli report --site northfield.toml --last    the last incident, trip or not
+  ser-cli report --site plant.toml              the last trip
+  ser-cli report --site plant.toml --last       the last incident, trip or not
+  ser-cli report --site plant.toml --format json > report.json
   ser-cli report --input u1.jsonl u2.jsonl --around 2026-11-22T11:00:00
-  ser-cli report --site northfield.toml --format json > report.json
 
 Without a choice the last incident is shown in which a point of role trip (or 86) went on; without \
 such a point, the last one. Times without an offset are in the time zone of the site.
@@ -114,7 +114,7 @@ fn which(args: &Args, gathered: &Gathered) -> Result<Which> {
     })
 }
 
-fn styles(palette: Palette) -> Styles {
+pub(super) fn styles(palette: Palette) -> Styles {
     Styles {
         title: palette.title,
         faint: palette.faint,

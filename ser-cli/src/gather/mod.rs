@@ -14,7 +14,6 @@ use ser_files::report::NotReached;
 use crate::connection::ConnectionArgs;
 use crate::error::{Failure, Result};
 use crate::keeper::StateArgs;
-use crate::site_file;
 
 pub(crate) use moment::{GivenMoment, parse_moment};
 
@@ -22,18 +21,16 @@ pub(crate) use moment::{GivenMoment, parse_moment};
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Sources")]
 pub(crate) struct SourceArgs {
-    /// The site file. Its names are used, and all its recorders that have a port are read, unless
-    /// there are --input files. A recorder that cannot be reached is named in the result.
-    #[arg(long, env = "SER_SITE", hide_env_values = true, value_name = "FILE")]
-    site: Option<PathBuf>,
-
     /// Files with entries, written by `read` or `watch` with --format jsonl or csv, in any order.
-    /// The recorder of a CSV file is the name of the file up to its last dot.
+    ///
+    /// The recorder of a CSV file is the name of the file up to its last dot. Without this option
+    /// all recorders of the site file that have a port are read; those that cannot be reached are
+    /// named in the result.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     input: Vec<PathBuf>,
 
     /// Read the recorders of the site as well as the --input files.
-    #[arg(long, requires = "site", requires = "input")]
+    #[arg(long, requires = "input")]
     live: bool,
 
     #[command(flatten)]
@@ -65,17 +62,18 @@ impl Gathered {
 
 /// Reads all sources.
 pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<Gathered> {
-    if args.site.is_none() && args.input.is_empty() {
+    let site = connection.chosen.as_deref().map(|chosen| chosen.site.clone());
+    let reads_recorders = args.input.is_empty() || args.live;
+    if site.is_none() && reads_recorders {
         return Err(Failure::usage("from where? There is neither --site nor --input")
-            .hint("ser-cli report --site FILE reads all recorders of a site")
-            .hint("ser-cli report --input FILE… takes what read --format jsonl has written"));
+            .hint("with --site FILE all recorders of a site are read; see ser-cli site --help")
+            .hint("--input FILE… takes what ser-cli read --format jsonl has written"));
     }
-    let site = args.site.as_deref().map(site_file::load).transpose()?;
     let site_digest = site.as_ref().and_then(|site| Some(site.digest?.to_string()));
     let site = site.unwrap_or_else(|| Site { time_zone: moment::here(), ..Site::unknown() });
     let mut collector = Collector::new();
     let damaged_lines = files::read(&args.input, &site, &mut collector)?;
-    let not_reached = match args.input.is_empty() || args.live {
+    let not_reached = match reads_recorders {
         true => live::read(&site, connection, &args.state, &mut collector)?,
         false => Vec::new(),
     };

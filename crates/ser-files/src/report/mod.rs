@@ -5,8 +5,8 @@
 //! come from [`Report`]; here they become words.
 
 mod json;
-mod names;
-mod span;
+pub(crate) mod names;
+pub(crate) mod span;
 mod style;
 mod table;
 mod text;
@@ -17,6 +17,9 @@ pub use json::write as write_json;
 pub use style::Styles;
 pub use text::write as write_text;
 pub use times::Clock;
+
+pub(crate) use times::rfc3339;
+pub(crate) use verdict::missing;
 
 use ser_evidence::incident::Report;
 use ser_evidence::timeline::Timeline;

@@ -6,18 +6,18 @@ use ser_evidence::site::{Edge, Point, PointId};
 use ser_evidence::timeline::{ChangeId, EventId, Timeline};
 
 /// The name of a recorder.
-pub(super) fn recorder(timeline: &Timeline<'_>, event: EventId) -> String {
+pub(crate) fn recorder(timeline: &Timeline<'_>, event: EventId) -> String {
     timeline.recorder(event).map_or(String::new(), |found| harmless(&found.recorder.name))
 }
 
 /// The name of a point; `input 7` if it has none.
-pub(super) fn point(timeline: &Timeline<'_>, id: Option<PointId>, input: u8) -> String {
+pub(crate) fn point(timeline: &Timeline<'_>, id: Option<PointId>, input: u8) -> String {
     let named = id.and_then(|id| point_of(timeline, id));
     named.map_or_else(|| format!("input {input}"), |point| harmless(&point.name))
 }
 
 /// What a state is called.
-pub(super) fn state(timeline: &Timeline<'_>, id: Option<PointId>, on: bool) -> String {
+pub(crate) fn state(timeline: &Timeline<'_>, id: Option<PointId>, on: bool) -> String {
     match id.and_then(|id| point_of(timeline, id)) {
         Some(point) => harmless(if on { &point.on } else { &point.off }),
         None => (if on { "ON" } else { "OFF" }).to_owned(),
@@ -45,7 +45,7 @@ pub(super) fn edge(timeline: &Timeline<'_>, edge: Edge) -> String {
 }
 
 /// Whether this is not the normal state of a point; `None` if it has no normal one.
-pub(super) fn is_abnormal(timeline: &Timeline<'_>, id: Option<PointId>, on: bool) -> Option<bool> {
+pub(crate) fn is_abnormal(timeline: &Timeline<'_>, id: Option<PointId>, on: bool) -> Option<bool> {
     Some(point_of(timeline, id?)?.normal? != on)
 }
 
@@ -55,6 +55,6 @@ pub(super) fn point_of<'t>(timeline: &Timeline<'t>, id: PointId) -> Option<&'t P
 }
 
 /// Text from outside on one line.
-pub(super) fn harmless(text: &str) -> String {
+pub(crate) fn harmless(text: &str) -> String {
     Harmless(text).line()
 }

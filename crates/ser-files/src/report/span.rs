@@ -40,7 +40,7 @@ pub(super) fn since(us: i64) -> String {
 }
 
 /// How far the truth may be away, either way: `1.1 ms`; rounded up, never to nothing.
-pub(super) fn doubt(us: i64) -> String {
+pub(crate) fn doubt(us: i64) -> String {
     let tenths = us.unsigned_abs().div_ceil(100).max(1);
     match tenths {
         0..1000 => format!("{}.{} ms", tenths / 10, tenths % 10),

@@ -54,7 +54,7 @@ impl Clock {
 }
 
 /// As `2026-11-22T10:00:00.250000Z`; `None` if no calendar has it.
-pub(super) fn rfc3339(utc_us: i64) -> Option<String> {
+pub(crate) fn rfc3339(utc_us: i64) -> Option<String> {
     let at = Timestamp::from_microsecond(utc_us).ok()?;
     Some(at.strftime("%Y-%m-%dT%H:%M:%S.%6fZ").to_string())
 }

@@ -171,7 +171,7 @@ pub(super) fn incompleteness(timeline: &Timeline<'_>, of: &Completeness) -> Opti
 }
 
 /// How many entries are missing, and why.
-pub(super) fn missing(lost: Lost, why: Why) -> String {
+pub(crate) fn missing(lost: Lost, why: Why) -> String {
     let why = match why {
         Why::Overwritten => "overwritten",
         Why::LogBeganAnew => "the log began anew",

@@ -1,0 +1,65 @@
+//! The timeline as JSON lines: all records of all recorders, the entries in order.
+
+use std::io::{self, Write};
+
+use ser_evidence::record::{EntryRecord, Gap, LifeRecord, Record};
+use ser_evidence::timeline::{Item, Timeline};
+
+use crate::jsonl::Writer;
+
+/// Writes all records: first what is known of lives and clocks, then entries and gaps in the order
+/// of the timeline. Read again, they give the same timeline.
+///
+/// # Errors
+/// If `out` does not take it.
+pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>, program: &str) -> io::Result<()> {
+    let mut lines = Writer::new(out);
+    lines.file(program)?;
+    for history in &timeline.history().recorders {
+        let name = &history.recorder.name;
+        for life in history.lives.iter().filter(|life| life.name().is_known()) {
+            let record = LifeRecord {
+                life: life.name(),
+                is_exact: life.is_exact,
+                model: history.recorder.model,
+                size: history.recorder.log_size,
+                erased: life.erased,
+            };
+            lines.record(name, &Record::Life(record))?;
+        }
+        let observations = history.observations.iter().map(|found| Record::Clock(*found));
+        let steps = history.steps.iter().map(|found| Record::Step(*found));
+        let watched = history.watched.iter().map(|found| Record::Watched(*found));
+        for record in observations.chain(steps).chain(watched) {
+            lines.record(name, &record)?;
+        }
+    }
+    for item in timeline.items() {
+        let (Item::Entry(event) | Item::Gap(event, _) | Item::ClockSet(event)) = item;
+        let (Some(history), Some(life)) = (timeline.recorder(event), timeline.life(event)) else {
+            continue;
+        };
+        let name = &history.recorder.name;
+        match item {
+            Item::Entry(event) => {
+                let Some(held) = timeline.held(event) else { continue };
+                let record = EntryRecord {
+                    life: life.name(),
+                    sequence: (!life.is_by_number).then_some(held.sequence),
+                    number: held.number,
+                    entry: held.entry,
+                    known: held.known,
+                };
+                lines.entry(name, &record, None)?;
+            }
+            Item::Gap(_, index) => {
+                let Some(gap) = life.gaps.get(index) else { continue };
+                let (life, after) = (life.name(), Some(gap.after));
+                let gap = Gap { life, after, lost: gap.lost, why: gap.why };
+                lines.record(name, &Record::Gap(gap))?;
+            }
+            Item::ClockSet(_) => {}
+        }
+    }
+    lines.flush()
+}
