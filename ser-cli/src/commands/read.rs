@@ -27,8 +27,9 @@ Examples:
 Formats:
   table   entry, time, time since previous and first event, changes
   csv     a row per change: entry,time,input,state,sequence,life,note
-  jsonl   an object per event: entry, time, changed, state (inputs on), sequence, life, note;
-          and per loss: lost, count, after, why, inputs, life
+  jsonl   an object per record; an event (record \"entry\"): entry, time, changed, state (inputs
+          on), sequence, life, note; a loss (record \"gap\"): lost, count, after, why, inputs,
+          life; and what else the reading proves, such as the time for which nothing is missing
 
 A sequence number counts the events of a log since it was erased. The life names that log; \
 it is 0 where nothing is remembered (without --new). A file that is continued (>>) gets no \
