@@ -98,7 +98,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
     let remembered = keeper.as_ref().and_then(Keeper::size);
     let kept = args.new.then(|| KeptRecords::of(&args.state, connection)).transpose()?;
-    let mut witness = Witness::begin(kept, keeper.as_ref().and_then(Keeper::place));
+    let mut witness = Witness::begin(&unit, kept, keeper.as_ref().and_then(Keeper::place));
     let size = connection::log_size(&mut unit, args.log_size, remembered)?;
     let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), &mut witness, size, &stop);
     // Events that reached standard output are remembered even if the recorder fell silent in

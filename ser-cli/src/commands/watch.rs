@@ -93,7 +93,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let outlet = Outlet::endless(args.format, &recorder, keeper.life()?, keeper.before());
     let outage = Outage::new(connection::options(connection).timeout);
     let kept = KeptRecords::of(&args.state, connection)?;
-    let witness = Witness::begin(Some(kept), keeper.place());
+    let witness = Witness::begin(&unit, Some(kept), keeper.place());
     let mut watch = Watch { unit, watcher, outlet, keeper, witness, stop, outage };
     let result = watch.run();
     let vouched = watch.witness.vouch(&mut watch.outlet);
