@@ -7,7 +7,7 @@
 
 use std::time::Duration;
 
-use ser_client::Cursor;
+use ser_client::{Cursor, Unit};
 use ser_evidence::record::{
     ClockObservation, EntryRecord, HostReading, How, Life, LifeRecord, Place, Record, Reference,
     Watched,
@@ -52,10 +52,15 @@ pub(crate) struct Witness {
 }
 
 impl Witness {
-    /// Begins now. `kept` is what earlier runs have left, if this one remembers; `before` is how far
-    /// they had read.
-    pub(crate) fn begin(kept: Option<KeptRecords>, before: Option<(Life, Cursor)>) -> Witness {
-        let began = host_reading::now();
+    /// Begins now to watch over readings of this recorder. `kept` is what earlier runs have left, if
+    /// this one remembers; `before` is how far they had read.
+    pub(crate) fn begin(
+        unit: &Unit,
+        kept: Option<KeptRecords>,
+        before: Option<(Life, Cursor)>,
+    ) -> Witness {
+        // The times of looks at the log are earlier by as much.
+        let began = host_reading::at(unit.now().saturating_sub(unit.report_delay()));
         let records = kept.as_ref().map(KeptRecords::load).unwrap_or_default();
         let life_kept = records.iter().rev().find_map(life);
         Witness {

@@ -4,14 +4,19 @@
 mod common;
 
 use std::fs;
-use std::io::BufReader;
+use std::io::{BufReader, Read, Write};
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::{Output, Stdio};
+use std::thread;
 
 use common::bench::{Bench, text};
-use common::events;
+use common::{Running, events, ser_cli};
 use ser_evidence::record::{ClockObservation, How, LifeRecord, Record, Reference, Watched};
 use ser_evidence::time::{Host, Moment, shown};
 use ser_files::Source;
-use ser_sim::testing::Kind;
+use ser_proto::{Command, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, ReadReply, Reply};
+use ser_sim::testing::{Kind, PATIENCE};
 
 /// The records in JSON lines, all of which must be ours.
 fn records(jsonl: &str) -> Vec<Record> {
@@ -21,7 +26,10 @@ fn records(jsonl: &str) -> Vec<Record> {
 
 /// What was kept beside the state file.
 fn kept(bench: &Bench) -> Vec<Record> {
-    let folder = bench.folder.path().join("state");
+    kept_in(&bench.folder.path().join("state"))
+}
+
+fn kept_in(folder: &Path) -> Vec<Record> {
     let is_kept = |path: &std::path::PathBuf| path.extension().is_some_and(|end| end == "jsonl");
     let files = fs::read_dir(folder).expect("a folder").map(|file| file.expect("a file").path());
     let file = files.into_iter().find(is_kept).expect("what was kept");
@@ -124,4 +132,86 @@ fn every_line_of_a_continued_file_is_read_and_the_layout_is_told_once() {
         _ => None,
     });
     assert!(entries.map(|entry| shown(&entry.entry.time)).all(|shown| shown.is_some()));
+}
+
+#[test]
+fn watch_says_at_its_end_for_which_time_nothing_is_missing() {
+    let mut bench = Bench::start(Kind::Native, &[]);
+    bench.contacts("0,3,1", 1);
+    let mut command = bench.command("watch --poll --interval 50ms --format jsonl");
+    let mut watch = Running::start(command.stdout(Stdio::piped()).stderr(Stdio::null()));
+    let lines = watch.lines();
+    let next = |kind: &str| {
+        let is_it = |line: &String| line.starts_with(&format!("{{\"record\":\"{kind}\""));
+        std::iter::from_fn(|| lines.recv_timeout(PATIENCE).ok()).find(is_it).expect(kind)
+    };
+    next("file");
+    next("entry");
+    // It is seen between two looks, and the clock with it.
+    let input = bench.sim.0.stdin.as_mut().expect("piped");
+    input.write_all(b"ms,input,state\n0,2,1\n\n").expect("the simulator reads");
+    next("entry");
+    let seen = next("clock");
+    assert!(matches!(clocks(&records(&seen))[..], [ClockObservation { how: How::Event, .. }]));
+    assert_eq!(watch.interrupt(), Some(0));
+    let told = watched(&records(&next("watched")));
+    assert_eq!((told.through, watched(&kept(&bench))), (2, told));
+    assert!(told.from.monotonic < told.to.monotonic);
+}
+
+/// A recorder with an empty log whose answers to the first `swallowed` settings of its clock are
+/// lost. Returns its port.
+fn unit_that_swallows(mut swallowed: u32) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = format!("tcp://{}", listener.local_addr().expect("an address"));
+    thread::spawn(move || {
+        let (mut client, _) = listener.accept().expect("a client");
+        let (mut decoder, mut bytes) = (FrameDecoder::<MAX_BODY_LEN>::new(), [0; 256]);
+        while let Ok(count @ 1..) = client.read(&mut bytes) {
+            for &byte in &bytes[..count] {
+                let Some(Decoded::Frame(body)) = decoder.push(byte) else { continue };
+                let reply = match Command::parse(body) {
+                    Ok(Command::SetClock(_)) if swallowed > 0 => {
+                        swallowed -= 1;
+                        continue;
+                    }
+                    Ok(Command::SetClock(_)) => Reply::ClockSet,
+                    Ok(Command::Read { start, .. }) => Reply::Read(ReadReply {
+                        start,
+                        total: 0,
+                        next_slot: 0,
+                        model: None,
+                        entries: heapless::Vec::new(),
+                    }),
+                    _ => continue,
+                };
+                let frame: Vec<u8> = FrameEncoder::new(reply.to_body()).collect();
+                client.write_all(&frame).expect("the client reads");
+            }
+        }
+    });
+    port
+}
+
+fn set_clock(port: &str, folder: &Path) -> Output {
+    let mut command = ser_cli();
+    command.env("SER_PORT", port).env("SER_STATE_DIR", folder);
+    command.args(["--timeout", "200ms", "--retries", "1", "clock", "set"]);
+    command.output().expect("ser-cli runs")
+}
+
+#[test]
+fn a_setting_that_is_not_certain_is_a_place_where_the_clock_may_have_been_set() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Answered the second time: either attempt may be the one that counts.
+    let repeated = set_clock(&unit_that_swallows(1), &folder.path().join("repeated"));
+    assert_eq!(repeated.status.code(), Some(0), "{}", text(&repeated.stderr));
+    assert!(text(&repeated.stderr).contains("more than once"), "{}", text(&repeated.stderr));
+    let silent = set_clock(&unit_that_swallows(u32::MAX), &folder.path().join("silent"));
+    assert_eq!(silent.status.code(), Some(1));
+    for name in ["repeated", "silent"] {
+        let kept = kept_in(&folder.path().join(name));
+        let [Record::Step(step)] = &kept[..] else { panic!("{name}: {kept:?}") };
+        assert_eq!((step.place.after, step.place.newest), (Some(0), None));
+    }
 }

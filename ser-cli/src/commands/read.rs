@@ -28,8 +28,9 @@ Examples:
 Formats:
   table   entry, time, time since previous and first event, changes
   csv     a row per change: entry,time,input,state,sequence,life,note
-  jsonl   an object per event: entry, time, changed, state (inputs on), sequence, life, note;
-          and per loss: lost, count, after, why, inputs, life
+  jsonl   an object per record; an event (record \"entry\"): entry, time, changed, state (inputs
+          on), sequence, life, note; a loss (record \"gap\"): lost, count, after, why, inputs,
+          life; and what else the reading proves, such as the time for which nothing is missing
 
 A sequence number counts the events of a log since it was erased. The life names that log; \
 it is 0 where nothing is remembered (without --new). A file that is continued (>>) gets no \
@@ -100,7 +101,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
     let remembered = keeper.as_ref().and_then(Keeper::size);
     let kept = args.new.then(|| KeptRecords::of(&args.state, connection)).transpose()?;
-    let mut witness = Witness::begin(kept, keeper.as_ref().and_then(Keeper::place));
+    let mut witness = Witness::begin(&unit, kept, keeper.as_ref().and_then(Keeper::place));
     let size = connection::log_size(&mut unit, log_size, remembered)?;
     let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), &mut witness, size, &stop);
     // Events that reached standard output are remembered even if the recorder fell silent in

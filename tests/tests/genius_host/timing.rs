@@ -3,7 +3,7 @@
 
 use ser_client::GeniHost;
 use ser_proto::genius::GlobalData;
-use ser_proto::{Command, Inputs, Model, Reply, TimeStamp};
+use ser_proto::{Command, Inputs, LastBroadcast, Model, Reply, TimeStamp};
 
 use crate::desk::{Desk, unit};
 
@@ -105,6 +105,46 @@ fn a_broadcast_sets_all_clocks_alike_at_every_phase_of_the_scan() {
         assert!(most - least <= 1, "{off_ms:?}");
         let limit_ms = half_and_some(scan_ms);
         assert!(-limit_ms <= *least && *most <= limit_ms, "{limit_ms} ms at most: {off_ms:?}");
+    }
+}
+
+#[test]
+fn a_mark_compares_clocks_and_comes_between_the_two_times_that_the_host_tells() {
+    const COUNT: u8 = 12;
+    let desk = Desk::new(&crowd(COUNT));
+    let host = desk.host();
+    let scan_ms = desk.with(|bench| bench.scan_ms());
+    // Each clock shows something else.
+    for number in 1..=COUNT {
+        let ahead_ms = u64::from(number) * 777;
+        unit(&host, number).set_clock(|_| at(desk.now_ms() + ahead_ms)).expect("the clock is set");
+    }
+    let now_ms = || i64::try_from(host.now().as_millis()).expect("short");
+    for round in 0..2 * scan_ms {
+        desk.run(3 * scan_ms + round % (scan_ms + 1));
+        let began_ms = now_ms();
+        host.broadcast(&Command::Read { start: 1, count: 1 }).expect("it is on the bus");
+        let mut came_ms = Vec::new();
+        for number in 1..=COUNT {
+            let mut unit = unit(&host, number);
+            let last = unit.last_broadcast().expect("a reply").expect("a broadcast");
+            assert_eq!(last.code, b'R');
+            let (_, to) = unit.last_exchange().expect("a reply").carried_out();
+            // A change says how far the clock is ahead.
+            let on = round % 2 == 0;
+            let moved_ms = desk.contact(usize::from(number) - 1, on);
+            desk.run(2);
+            let entry = u16::try_from(round + 1).expect("few");
+            let ahead_ms = stamp_ms(&host, number, entry) - ms(at(moved_ms));
+            let LastBroadcast { hour, minute, second, millisecond, .. } = last;
+            let showed = TimeStamp { hour, minute, second, millisecond, ..at(0) };
+            let came = ms(showed) - ahead_ms;
+            let to_ms = i64::try_from(to.as_millis()).expect("short");
+            assert!((began_ms - 1..=to_ms + 1).contains(&came), "{began_ms} {came} {to_ms}");
+            came_ms.push(came);
+        }
+        let (least, most) = (came_ms.iter().min().expect("12"), came_ms.iter().max().expect("12"));
+        assert!(most - least <= 1, "one instant: {came_ms:?}");
     }
 }
 

@@ -187,9 +187,11 @@ fn complete_at(
     position: LogPosition,
 ) -> Duration {
     let is_all = cursor.is_some_and(|cursor| cursor.total() == position.total);
-    match unit.last_exchange().filter(|_| is_all) {
+    let asked_at = match unit.last_exchange().filter(|_| is_all) {
         Some(last) => last.carried_out().0,
         // Events were added meanwhile. A reading passes everything that happened before it.
         None => began,
-    }
+    };
+    // The answer may have been a report from a moment before.
+    asked_at.saturating_sub(unit.report_delay())
 }

@@ -92,7 +92,7 @@ const MAX_READS: usize = 2;
 /// How much longer than its timeout an attempt may last because a frame is just arriving: the
 /// longest frame at the lowest rate. It matters where the rate of the line is unknown, as with a
 /// terminal server.
-const LONGEST_FRAME: Duration = Duration::from_millis(11_400);
+pub(crate) const LONGEST_FRAME: Duration = Duration::from_millis(11_400);
 
 /// A time that no recorder accepts; it stands in until the attempt gets its own.
 const NO_TIME: TimeStamp =

@@ -10,8 +10,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ser_proto::{
-    Baud, Code, Command, Configuration, Configure, LastBroadcast, Mode, Model, ReadReply, Reply,
-    TimeStamp, encoded_len,
+    Baud, Code, Command, Configuration, Configure, LastBroadcast, MAX_BODY_LEN, Mode, Model,
+    ReadReply, Reply, TimeStamp, encoded_len,
 };
 
 use crate::reading::delivery::Delivery;
@@ -23,7 +23,7 @@ use crate::session::exchange::Exchange;
 use crate::session::link::{Link, SerialLink};
 use crate::session::options::Options;
 use crate::session::unsolicited::Unsolicited;
-use crate::session::{NoReply, Session, Timing};
+use crate::session::{LONGEST_FRAME, NoReply, Session, Timing};
 use crate::transport::Transport;
 use crate::transport::clock::{Clock, RealTime};
 use crate::transport::line_rate::LineRate;
@@ -32,6 +32,9 @@ use request_error::RequestError;
 /// A recorder changes its rate after the reply. It would not understand what arrives at that
 /// moment.
 const BAUD_SETTLING: Duration = Duration::from_millis(20);
+
+/// On a bus a report may wait behind those of others. Longer than that no datagram waits.
+const REPORT_ON_BUS: Duration = Duration::from_secs(20);
 
 /// How long a recorder may take to answer while its rate is being searched for, on top of the time
 /// that the bytes are on the line.
@@ -300,6 +303,17 @@ impl Unit {
     #[must_use]
     pub fn bits_per_second(&self) -> Option<u32> {
         self.link.bits_per_second()
+    }
+
+    /// How old an auto report may be that was already on its way when a question was asked. If it
+    /// begins at the same entry, it passes for the answer.
+    #[must_use]
+    pub fn report_delay(&self) -> Duration {
+        match self.session.timing().line_rate {
+            _ if self.bus_address().is_some() => REPORT_ON_BUS,
+            LineRate::Instant => LONGEST_FRAME,
+            rate => rate.time_for(encoded_len(MAX_BODY_LEN)),
+        }
     }
 
     /// When the last reply was asked for and came; `None` before the first.

@@ -89,7 +89,8 @@ pub enum How {
     },
     /// It was asked.
     Query,
-    /// The entry of this sequence, stamped with this time, was first there between two readings.
+    /// The entry whose sequence is [`Place::after`], stamped with this time, was first there between
+    /// two readings.
     Event,
     /// A person read it.
     Hand,

@@ -18,6 +18,7 @@ mod frames;
 mod framing;
 mod geni_driver;
 mod node;
+mod records;
 mod replies;
 mod script;
 pub mod seeds;
@@ -32,6 +33,7 @@ pub use datagrams::datagrams;
 pub use frames::frames;
 pub use geni_driver::geni_driver;
 pub use node::node;
+pub use records::records;
 pub use replies::replies;
 pub use state_files::state_files;
 
@@ -45,7 +47,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 11] = [
+pub const TARGETS: [Target; 12] = [
     Target { name: "frames", run: frames },
     Target { name: "commands", run: commands },
     Target { name: "replies", run: replies },
@@ -57,4 +59,5 @@ pub const TARGETS: [Target; 11] = [
     Target { name: "cli_files", run: cli_files },
     Target { name: "captures", run: captures },
     Target { name: "state_files", run: state_files },
+    Target { name: "records", run: records },
 ];
