@@ -69,6 +69,11 @@ impl Outlet {
         std::mem::take(&mut self.new)
     }
 
+    /// Whether the format has a place for what is known besides entries and losses.
+    pub(crate) fn holds_evidence(&self) -> bool {
+        self.writer.holds_evidence()
+    }
+
     /// Writes what else is known, where the format has a place for it.
     pub(crate) fn evidence(&mut self, record: &ser_evidence::record::Record) -> Result<()> {
         Ok(self.writer.evidence(record)?)

@@ -1,6 +1,8 @@
 //! Where a log stands, so that something that is not in it can be given its place.
 
-use ser_client::{RequestError, Unit};
+use std::time::Duration;
+
+use ser_client::{Clock, Cursor, RealTime, RequestError, Unit};
 use ser_evidence::record::{Life, Place};
 use ser_proto::{Code, Command, Entry, Reply};
 
@@ -16,6 +18,19 @@ pub(crate) struct LogLook {
     pub(crate) newest: Option<Entry>,
     /// The life of the log, where somebody has named it.
     life: Life,
+}
+
+/// By when the log is known to have held nothing after `cursor`; `None` if it holds more.
+///
+/// A report that was on its way may pass for the answer to one look. It has a total of its own, so
+/// of two looks at the same total at least one was answered.
+pub(crate) fn nothing_after(
+    unit: &mut Unit,
+    cursor: Cursor,
+) -> Result<Option<Duration>, RequestError> {
+    let asked_at = RealTime.now();
+    let looks = [unit.log_position()?.total, unit.log_position()?.total];
+    Ok((looks == [cursor.total(); 2]).then_some(asked_at))
 }
 
 impl LogLook {

@@ -78,6 +78,11 @@ impl Witness {
         }
     }
 
+    /// Whether what it says is written or kept.
+    pub(crate) fn is_wanted(&self, outlet: &Outlet) -> bool {
+        self.kept.is_some() || outlet.holds_evidence()
+    }
+
     /// Takes note of a reading, or a part of one, that has just ended. `complete_at` is by when the
     /// log is known to have held nothing else.
     pub(crate) fn read(

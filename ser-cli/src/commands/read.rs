@@ -12,6 +12,7 @@ use crate::error::{Failure, Result, advise, inform, warn};
 use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
 use crate::kept::KeptRecords;
+use crate::log_look;
 use crate::output::{Format, Life};
 use crate::values;
 use crate::witness::Witness;
@@ -135,7 +136,12 @@ fn read_by_cursor(
         }
         check_interrupt(stop)
     })?;
-    witness.read(outlet, follower.cursor(), follower.size(), follower.complete_at())?;
+    let cursor = follower.cursor();
+    let looked_at = match cursor.filter(|_| witness.is_wanted(outlet)) {
+        Some(cursor) => log_look::nothing_after(unit, cursor)?,
+        None => None,
+    };
+    witness.read(outlet, cursor, follower.size(), looked_at.max(follower.complete_at()))?;
     witness.vouch(outlet)?;
     Ok(summary.delivered)
 }

@@ -18,6 +18,7 @@ use crate::host_reading;
 use crate::interrupt;
 use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
+use crate::log_look;
 use crate::output::Loss;
 use crate::state::{Delivered, StateFile};
 
@@ -122,7 +123,8 @@ fn read_one(
         };
         records.push(Record::Life(life));
         let through = named.sequence(cursor.sequence);
-        if let Some(complete_at) = follower.complete_at() {
+        let looked_at = log_look::nothing_after(&mut unit, cursor)?;
+        if let Some(complete_at) = looked_at.max(follower.complete_at()) {
             let to = host_reading::at(complete_at);
             records.push(Record::Watched(Watched { life: named.life, from, to, through }));
         }

@@ -80,6 +80,10 @@ impl<W: Write> EventWriter for JsonLines<W> {
         self.lines.record(&self.recorder, record)
     }
 
+    fn holds_evidence(&self) -> bool {
+        true
+    }
+
     fn flush(&mut self) -> io::Result<()> {
         self.header()?;
         self.lines.flush()

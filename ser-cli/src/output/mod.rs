@@ -54,6 +54,11 @@ pub(crate) trait EventWriter {
         Ok(())
     }
 
+    /// Whether [`evidence`](Self::evidence) is written.
+    fn holds_evidence(&self) -> bool {
+        false
+    }
+
     /// Passes on what has been written so far, in whole rows.
     fn flush(&mut self) -> io::Result<()>;
 
