@@ -114,34 +114,25 @@ impl LifeBounds {
     }
 
     /// Finds where each entry goes in the list.
+    ///
+    /// An entry of a sure run goes where its clock says. Others go between the neighbours of which
+    /// that is known, and as near as that allows to where any of their clocks would have them.
     pub(super) fn sort_keys(&mut self, life: &LifeHistory, clock: &LifeClock, model: &ClockModel) {
         let mut possible = PossibleRuns::new(clock, model);
-        let mut places: Vec<(i64, i64)> = Vec::with_capacity(life.entries.len());
-        let mut timeless: Vec<bool> = Vec::with_capacity(life.entries.len());
+        let mut wanted: Vec<Wanted> = Vec::with_capacity(life.entries.len());
         for held in &life.entries {
             possible.turn_to(held);
             let instant = shown(&held.entry.time).and_then(|shown| possible.on_list(shown));
-            let (lo, hi, is_timeless) = instant.unwrap_or((NO_LO, NO_HI, false));
-            places.push((lo, hi));
-            timeless.push(is_timeless);
+            wanted.push(match instant {
+                Some((lo, hi, is_timeless)) => Wanted {
+                    at: Some(lo.midpoint(hi)),
+                    is_sure: possible.clocks.len() == 1 && !is_timeless,
+                    is_timeless,
+                },
+                None => Wanted { at: None, is_sure: false, is_timeless: true },
+            });
         }
-        // What has no time of its own is between its neighbours.
-        let mut latest = NO_LO;
-        for (lo, _) in &mut places {
-            latest = latest.max(*lo);
-            *lo = latest;
-        }
-        let mut earliest = NO_HI;
-        for (_, hi) in places.iter_mut().rev() {
-            earliest = earliest.min(*hi);
-            *hi = earliest;
-        }
-        let key = |((lo, hi), is_timeless): ((i64, i64), bool)| match (lo, hi) {
-            (NO_LO, NO_HI) => Key { is_timeless: true, at: NO_LO },
-            (NO_LO, at) | (at, NO_HI) => Key { is_timeless, at },
-            (lo, hi) => Key { is_timeless, at: lo.midpoint(hi) },
-        };
-        self.keys = places.into_iter().zip(timeless).map(key).collect();
+        self.keys = keys(&wanted);
     }
 
     /// Adds what people say has to be added.
@@ -219,6 +210,47 @@ impl LifeBounds {
         let next = self.stretches.partition_point(|stretch| stretch.first <= place);
         self.stretches.get(next.checked_sub(1)?)?.home
     }
+}
+
+/// Where an entry would go by its own clock.
+#[derive(Clone, Copy, Debug)]
+struct Wanted {
+    at: Option<i64>,
+    is_sure: bool,
+    is_timeless: bool,
+}
+
+/// A key for each entry of a life, never falling.
+fn keys(wanted: &[Wanted]) -> Vec<Key> {
+    let has_time = wanted.iter().any(|wanted| !wanted.is_timeless);
+    // What comes next for sure, from the end.
+    let mut next_sure = Vec::with_capacity(wanted.len());
+    let mut next = NO_HI;
+    for wanted in wanted.iter().rev() {
+        if let (true, Some(at)) = (wanted.is_sure, wanted.at) {
+            next = next.min(at);
+        }
+        next_sure.push(next);
+    }
+    let mut last = NO_LO;
+    let mut keys = Vec::with_capacity(wanted.len());
+    for (wanted, next) in wanted.iter().zip(next_sure.into_iter().rev()) {
+        // The time of a clock that was never set says nothing among others that were.
+        let at = wanted.at.filter(|_| wanted.is_timeless != has_time);
+        let at = match at {
+            Some(at) => at.clamp(last.min(next), next),
+            None if last == NO_LO && next != NO_HI => next,
+            None => last,
+        };
+        last = last.max(at);
+        keys.push(Key { is_timeless: !has_time, at: last });
+    }
+    // What comes first and has no time joins what comes next.
+    let first = keys.iter().find(|key| key.at != NO_LO).copied();
+    for key in keys.iter_mut().take_while(|key| key.at == NO_LO) {
+        *key = first.unwrap_or(*key);
+    }
+    keys
 }
 
 /// The clocks of the runs in which an entry may be, one entry after the other.
@@ -318,5 +350,47 @@ impl Timeline<'_> {
         };
         let samples = self.samples(event);
         samples.into_iter().map(in_utc).fold(Bound::UNKNOWN, Bound::intersection)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn keys_of(wanted: &[(Option<i64>, bool)]) -> Vec<i64> {
+        let wanted: Vec<Wanted> = wanted
+            .iter()
+            .map(|&(at, is_sure)| Wanted { at, is_sure, is_timeless: at.is_none() })
+            .collect();
+        keys(&wanted).into_iter().map(|key| key.at).collect()
+    }
+
+    #[test]
+    fn sure_times_are_kept_and_others_fit_in_between() {
+        let entries = [(Some(10), true), (Some(5), false), (Some(99), false), (Some(20), true)];
+        assert_eq!(keys_of(&entries), [10, 10, 20, 20]);
+        assert_eq!(keys_of(&[(Some(10), true), (Some(15), false), (Some(20), true)]), [10, 15, 20]);
+    }
+
+    #[test]
+    fn what_has_no_time_joins_its_neighbours() {
+        assert_eq!(keys_of(&[(None, false), (Some(10), true), (None, false)]), [10, 10, 10]);
+        assert_eq!(keys_of(&[(None, false), (Some(7), false), (Some(3), false)]), [7, 7, 7]);
+    }
+
+    #[test]
+    fn clocks_that_were_never_set_are_among_themselves() {
+        let never = |at| Wanted { at: Some(at), is_sure: false, is_timeless: true };
+        let of = keys(&[never(1), never(2)]);
+        assert_eq!(
+            of.iter().map(|key| (key.is_timeless, key.at)).collect::<Vec<_>>(),
+            [(true, 1), (true, 2)]
+        );
+        let set = Wanted { at: Some(500), is_sure: true, is_timeless: false };
+        let of = keys(&[never(1), set]);
+        assert_eq!(
+            of.iter().map(|key| (key.is_timeless, key.at)).collect::<Vec<_>>(),
+            [(false, 500), (false, 500)]
+        );
     }
 }
