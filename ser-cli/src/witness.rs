@@ -7,7 +7,7 @@
 
 use std::time::Duration;
 
-use ser_client::{Cursor, Unit};
+use ser_client::Cursor;
 use ser_evidence::record::{
     ClockObservation, EntryRecord, HostReading, How, Life, LifeRecord, Place, Record, Reference,
     Watched,
@@ -52,21 +52,26 @@ pub(crate) struct Witness {
 }
 
 impl Witness {
-    /// Begins now to watch over readings of this recorder. `kept` is what earlier runs have left, if
-    /// this one remembers; `before` is how far they had read.
+    /// Begins now. `kept` is what earlier runs have left, if this one remembers; `before` is how far
+    /// they had read. What is seen may be as old as `delay` says.
     pub(crate) fn begin(
-        unit: &Unit,
         kept: Option<KeptRecords>,
         before: Option<(Life, Cursor)>,
+        delay: Duration,
     ) -> Witness {
-        // The times of looks at the log are earlier by as much.
-        let began = host_reading::at(unit.now().saturating_sub(unit.report_delay()));
+        let now = host_reading::now();
+        let delay_us = i64::try_from(delay.as_micros()).unwrap_or(i64::MAX);
+        let began = HostReading {
+            monotonic: now.monotonic.after(-delay_us),
+            utc: now.utc.after(-delay_us),
+            ..now
+        };
         let records = kept.as_ref().map(KeptRecords::load).unwrap_or_default();
         let life_kept = records.iter().rev().find_map(life);
         Witness {
             kept,
             began,
-            complete_at: last_look(&records, &began, before),
+            complete_at: last_look(&records, &now, before),
             through: None,
             model: life_kept.and_then(|life| life.model),
             erased: records.iter().filter_map(erased).collect(),

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use ser_client::{Cursor, Delivery, LogFollower, RangeReader, RequestError, Unit};
 use ser_proto::{Code, Command, MAX_SIZE, Reply};
@@ -102,7 +103,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
     let remembered = keeper.as_ref().and_then(Keeper::size);
     let kept = args.new.then(|| KeptRecords::of(&args.state, connection)).transpose()?;
-    let mut witness = Witness::begin(&unit, kept, keeper.as_ref().and_then(Keeper::place));
+    let place = keeper.as_ref().and_then(Keeper::place);
+    let mut witness = Witness::begin(kept, place, Duration::ZERO);
     let size = connection::log_size(&mut unit, log_size, remembered)?;
     let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), &mut witness, size, &stop);
     // Events that reached standard output are remembered even if the recorder fell silent in

@@ -104,7 +104,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     outlet.name_points(connection.points());
     let outage = Outage::new(connection::options(connection).timeout);
     let kept = KeptRecords::of(&args.state, connection)?;
-    let witness = Witness::begin(&unit, Some(kept), keeper.place());
+    let witness = Witness::begin(Some(kept), keeper.place(), unit.report_delay());
     let mut watch = Watch { unit, watcher, outlet, keeper, witness, stop, outage };
     let result = watch.run();
     let vouched = watch.witness.vouch(&mut watch.outlet);
