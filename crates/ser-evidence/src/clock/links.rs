@@ -56,14 +56,19 @@ impl Link {
 }
 
 impl Links {
-    pub(crate) fn new(links: &[Link]) -> Links {
+    pub(crate) fn new(links: &[Link], runs: &[RunClock]) -> Links {
         let mut by_pair: BTreeMap<(usize, usize), Vec<Link>> = BTreeMap::new();
         for &link in links {
             for link in [link, link.reversed()] {
                 by_pair.entry((link.one, link.other)).or_default().push(link);
             }
         }
-        by_pair.values_mut().for_each(|links| links.sort_by_key(|link| (link.x, *link)));
+        for (&(one, other), links) in &mut by_pair {
+            links.sort_by_key(|link| (link.x, *link));
+            if let (Some(one), Some(other)) = (runs.get(one), runs.get(other)) {
+                narrow(links, one, other);
+            }
+        }
         Links { by_pair }
     }
 
@@ -90,6 +95,26 @@ impl Links {
         }
         known
     }
+}
+
+/// One pass forward and one back: afterwards each link of a pair knows what the others know.
+fn narrow(links: &mut [Link], one: &RunClock, other: &RunClock) {
+    let mut told: Option<Link> = None;
+    let mut take = |link: &mut Link| {
+        if let Some(neighbour) = told {
+            let (least, most) = one.elapsed(link.x - neighbour.x);
+            let (other_least, other_most) = other.elapsed(link.other_x - neighbour.other_x);
+            let lo = neighbour.lo.saturating_add(least).saturating_sub(other_most);
+            let hi = neighbour.hi.saturating_add(most).saturating_sub(other_least);
+            // What contradicts is told elsewhere, and says nothing here.
+            if lo <= link.hi && link.lo <= hi {
+                (link.lo, link.hi) = (link.lo.max(lo), link.hi.min(hi));
+            }
+        }
+        told = Some(*link);
+    };
+    links.iter_mut().for_each(&mut take);
+    links.iter_mut().rev().for_each(&mut take);
 }
 
 /// Lets the clocks bound each other until nothing changes any more. Links that contradict what is

@@ -162,7 +162,7 @@ impl ClockModel {
                 self.findings.push(finding);
             }
         }
-        self.by_pair = Links::new(&self.links);
+        self.by_pair = Links::new(&self.links, &self.runs);
         let sorted = &self.sorted;
         let facts = self.runs.iter().zip(&sorted.by_run).zip(&sorted.first_stamps);
         let facts: Vec<RunFacts<'_>> = facts

@@ -39,7 +39,8 @@ pub(super) fn lives(
     // By content, so that the order of the sources does not matter. The longest first: it is most
     // likely to hold what the others share.
     unnamed.sort_by_cached_key(|segment| {
-        (usize::MAX - segment.entries.len(), segment.entries.iter().map(key).collect::<Vec<_>>())
+        let entries: Vec<_> = segment.entries.iter().map(key).collect();
+        (usize::MAX - entries.len(), segment.is_by_number, entries)
     });
     let mut left = unnamed;
     // A segment may be joined only after another one has been.

@@ -52,21 +52,33 @@ pub(super) fn of_groups(
         .collect()
 }
 
-/// Candidates are the inputs of the first entry of each life. One is out if another one is proven
-/// to have been earlier.
+/// Candidates are the inputs of the first entry of each life. One is out if something of another
+/// life is proven to have been earlier, and with it that life's first entry.
 fn of(timeline: &Timeline<'_>, incident: &Incident, counts: &dyn Fn(ChangeId) -> bool) -> FirstOut {
     let mut lives = BTreeSet::new();
     let mut firsts: Vec<EventId> = Vec::new();
-    for &event in &incident.events {
+    let mut candidates: Vec<EventId> = Vec::new();
+    for (place, &event) in incident.events.iter().enumerate() {
         let is_first = changes(timeline, event).any(counts);
-        if is_first && lives.insert((event.recorder, event.life)) {
-            firsts.push(event);
+        if !is_first || !lives.insert((event.recorder, event.life)) {
+            continue;
+        }
+        // The list respects what is proven, so what is earlier is before it there.
+        let mut earlier = incident.events.iter().take(place);
+        let has_begun = |other: &EventId| {
+            let is_first = |first: &EventId| {
+                (first.recorder, first.life) == (other.recorder, other.life)
+                    && first.place <= other.place
+            };
+            firsts.iter().any(is_first)
+        };
+        let is_out =
+            earlier.any(|other| has_begun(other) && timeline.order(*other, event) == Order::Before);
+        firsts.push(event);
+        if !is_out {
+            candidates.push(event);
         }
     }
-    let is_candidate = |event: &EventId| {
-        !firsts.iter().any(|other| timeline.order(*other, *event) == Order::Before)
-    };
-    let candidates: Vec<EventId> = firsts.iter().copied().filter(is_candidate).collect();
     let is_ahead = |gap: &(EventId, usize)| {
         let (after, _) = *gap;
         let first = firsts
