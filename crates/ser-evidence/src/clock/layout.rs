@@ -30,8 +30,21 @@ pub(crate) struct Layout {
 struct Placed {
     /// The instant on the scale, less what the clock showed.
     offset: Envelope,
-    /// Whether anything at all is known about it.
+    /// Whether nothing at all is known about it.
     is_timeless: bool,
+    /// Whether it got its place because it had to have one.
+    is_guessed: bool,
+}
+
+/// An instant on the scale of the list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Instant {
+    pub(crate) lo: i64,
+    pub(crate) hi: i64,
+    /// Whether nothing is known about it but what the clock showed.
+    pub(crate) is_timeless: bool,
+    /// Whether the bounds are not proven.
+    pub(crate) is_guessed: bool,
 }
 
 /// The clock `one` showed `x` between `lo` and `hi` after the clock `other` showed `other_x`.
@@ -75,13 +88,11 @@ impl Layout {
         let boots: Vec<Boot> = hosts.boots().collect();
         let of_boot = |boot: Boot| boots.binary_search(&boot).ok();
         let of_run = |run: usize| boots.len() + run;
-        let mut clocks: Vec<Placed> = boots
-            .iter()
-            .map(|&boot| Placed { offset: hosts.placed(boot, ANYTHING_US), is_timeless: false })
-            .collect();
+        let mut clocks: Vec<Placed> =
+            boots.iter().map(|&boot| placed(hosts.placed(boot, ANYTHING_US))).collect();
         let mut ties = Vec::new();
         for (run, facts) in runs.iter().enumerate() {
-            clocks.push(Placed { offset: own_points(facts), is_timeless: false });
+            clocks.push(placed(own_points(facts)));
             for home in facts.clock.homes() {
                 let Home::Boot(name) = home else { continue };
                 let Some(boot) = of_boot(name) else { continue };
@@ -121,13 +132,14 @@ impl Layout {
         layout
     }
 
-    /// Between which instants of the scale a run's clock showed `x`, and whether that is only by
-    /// what it showed itself.
-    pub(crate) fn instant(&self, run: usize, x: i64) -> Option<(i64, i64, bool)> {
+    /// Between which instants of the scale a run's clock showed `x`.
+    pub(crate) fn instant(&self, run: usize, x: i64) -> Option<Instant> {
         let placed = self.clocks.get(self.boots.len() + run)?;
         let (lo, hi) = placed.offset.at(x);
-        let is_placed = lo != NO_LO && hi != NO_HI;
-        is_placed.then(|| (lo.saturating_add(x), hi.saturating_add(x), placed.is_timeless))
+        let (is_timeless, is_guessed) = (placed.is_timeless, placed.is_guessed);
+        let (lo, hi) = (lo.saturating_add(x), hi.saturating_add(x));
+        let is_placed = placed.offset.is_known_at(x);
+        is_placed.then_some(Instant { lo, hi, is_timeless, is_guessed })
     }
 
     /// Passes bounds on over all ties until nothing changes. A tie that contradicts the others is
@@ -203,9 +215,14 @@ impl Layout {
             (None, NO_LO, hi) => hi,
             _ => return,
         };
+        placed.is_guessed = true;
         placed.offset.learn(x, at, at);
         self.settle(ties);
     }
+}
+
+fn placed(offset: Envelope) -> Placed {
+    Placed { offset, is_timeless: false, is_guessed: false }
 }
 
 /// What a clock showed at a moment of a boot, as well as that is known.

@@ -2,6 +2,7 @@
 
 use super::{EventId, Timeline};
 use crate::clock::envelope::{NO_HI, NO_LO};
+use crate::clock::layout::Instant;
 use crate::clock::model::{ClockModel, LifeClock};
 use crate::clock::offsets::{RunClock, added, ends};
 use crate::clock::{Home, Nominal};
@@ -115,24 +116,15 @@ impl LifeBounds {
 
     /// Finds where each entry goes in the list.
     ///
-    /// An entry of a sure run goes where its clock says. Others go between the neighbours of which
-    /// that is known, and as near as that allows to where any of their clocks would have them.
+    /// Each entry goes where its clock says, as far as the proven bounds of those before and after
+    /// it allow that.
     pub(super) fn sort_keys(&mut self, life: &LifeHistory, clock: &LifeClock, model: &ClockModel) {
         let mut possible = PossibleRuns::new(clock, model);
-        let mut wanted: Vec<Wanted> = Vec::with_capacity(life.entries.len());
-        for held in &life.entries {
+        let wanted = life.entries.iter().map(|held| {
             possible.turn_to(held);
-            let instant = shown(&held.entry.time).and_then(|shown| possible.on_list(shown));
-            wanted.push(match instant {
-                Some((lo, hi, is_timeless)) => Wanted {
-                    at: Some(lo.midpoint(hi)),
-                    is_sure: possible.clocks.len() == 1 && !is_timeless,
-                    is_timeless,
-                },
-                None => Wanted { at: None, is_sure: false, is_timeless: true },
-            });
-        }
-        self.keys = keys(&wanted);
+            shown(&held.entry.time).map_or(Wanted::NOWHERE, |shown| possible.on_list(shown))
+        });
+        self.keys = keys(wanted.collect());
     }
 
     /// Adds what people say has to be added.
@@ -212,37 +204,58 @@ impl LifeBounds {
     }
 }
 
-/// Where an entry would go by its own clock.
+/// Where an entry would go by its own clock, and what is proven about that.
 #[derive(Clone, Copy, Debug)]
 struct Wanted {
     at: Option<i64>,
-    is_sure: bool,
+    lo: i64,
+    hi: i64,
     is_timeless: bool,
 }
 
-/// A key for each entry of a life, never falling.
-fn keys(wanted: &[Wanted]) -> Vec<Key> {
-    let has_time = wanted.iter().any(|wanted| !wanted.is_timeless);
-    // What comes next for sure, from the end.
-    let mut next_sure = Vec::with_capacity(wanted.len());
-    let mut next = NO_HI;
-    for wanted in wanted.iter().rev() {
-        if let (true, Some(at)) = (wanted.is_sure, wanted.at) {
-            next = next.min(at);
+impl Wanted {
+    const NOWHERE: Wanted = Wanted { at: None, lo: NO_LO, hi: NO_HI, is_timeless: true };
+
+    fn of(instant: Instant) -> Wanted {
+        let Instant { lo, hi, is_timeless, is_guessed } = instant;
+        let at = Some(lo.midpoint(hi));
+        match is_guessed {
+            true => Wanted { at, lo: NO_LO, hi: NO_HI, is_timeless },
+            false => Wanted { at, lo, hi, is_timeless },
         }
-        next_sure.push(next);
     }
-    let mut last = NO_LO;
+
+    /// Where an entry goes that is either of these.
+    fn or(self, other: Wanted) -> Wanted {
+        let middle = |(one, other): (i64, i64)| one.midpoint(other);
+        Wanted {
+            at: self.at.zip(other.at).map(middle).or(self.at).or(other.at),
+            lo: self.lo.min(other.lo),
+            hi: self.hi.max(other.hi),
+            is_timeless: self.is_timeless && other.is_timeless,
+        }
+    }
+}
+
+/// A key for each entry of a life, never falling.
+fn keys(mut wanted: Vec<Wanted>) -> Vec<Key> {
+    let has_time = wanted.iter().any(|wanted| !wanted.is_timeless);
+    let mut earliest = NO_HI;
+    for wanted in wanted.iter_mut().rev() {
+        earliest = earliest.min(wanted.hi);
+        wanted.hi = earliest;
+    }
+    let (mut latest, mut last) = (NO_LO, NO_LO);
     let mut keys = Vec::with_capacity(wanted.len());
-    for (wanted, next) in wanted.iter().zip(next_sure.into_iter().rev()) {
+    for wanted in &wanted {
+        latest = latest.max(wanted.lo).min(wanted.hi);
         // The time of a clock that was never set says nothing among others that were.
         let at = wanted.at.filter(|_| wanted.is_timeless != has_time);
-        let at = match at {
-            Some(at) => at.clamp(last.min(next), next),
-            None if last == NO_LO && next != NO_HI => next,
-            None => last,
+        let lo = latest.max(last).min(wanted.hi);
+        last = match at {
+            Some(at) => at.clamp(lo, wanted.hi),
+            None => lo,
         };
-        last = last.max(at);
         keys.push(Key { is_timeless: !has_time, at: last });
     }
     // What comes first and has no time joins what comes next.
@@ -281,12 +294,14 @@ impl<'m> PossibleRuns<'m> {
         self.clocks.extend(self.ids.iter().filter_map(|&id| self.model.runs.get(id)));
     }
 
-    /// Between which instants of the list any of these clocks showed this.
-    fn on_list(&self, shown: Moment<Shown>) -> Option<(i64, i64, bool)> {
+    /// Where an entry with this stamp goes in the list.
+    fn on_list(&self, shown: Moment<Shown>) -> Wanted {
         let each = self.ids.iter().zip(&self.clocks);
-        let instants =
-            each.filter_map(|(&id, run)| self.model.layout.instant(id, run.unwrapped(shown)));
-        instants.reduce(|one, other| (one.0.min(other.0), one.1.max(other.1), one.2 && other.2))
+        let wanted = each.map(|(&id, run)| {
+            let instant = self.model.layout.instant(id, run.unwrapped(shown));
+            instant.map_or(Wanted::NOWHERE, Wanted::of)
+        });
+        wanted.reduce(Wanted::or).unwrap_or(Wanted::NOWHERE)
     }
 }
 
@@ -357,16 +372,21 @@ impl Timeline<'_> {
 mod tests {
     use super::*;
 
-    fn keys_of(wanted: &[(Option<i64>, bool)]) -> Vec<i64> {
-        let wanted: Vec<Wanted> = wanted
-            .iter()
-            .map(|&(at, is_sure)| Wanted { at, is_sure, is_timeless: at.is_none() })
-            .collect();
-        keys(&wanted).into_iter().map(|key| key.at).collect()
+    /// Where an entry would go, and whether that is proven.
+    fn wanted(at: Option<i64>, is_proven: bool) -> Wanted {
+        match at {
+            Some(at) if is_proven => Wanted { at: Some(at), lo: at, hi: at, is_timeless: false },
+            _ => Wanted { at, is_timeless: at.is_none(), ..Wanted::NOWHERE },
+        }
+    }
+
+    fn keys_of(entries: &[(Option<i64>, bool)]) -> Vec<i64> {
+        let entries = entries.iter().map(|&(at, is_proven)| wanted(at, is_proven));
+        keys(entries.collect()).into_iter().map(|key| key.at).collect()
     }
 
     #[test]
-    fn sure_times_are_kept_and_others_fit_in_between() {
+    fn proven_times_are_kept_and_others_fit_in_between() {
         let entries = [(Some(10), true), (Some(5), false), (Some(99), false), (Some(20), true)];
         assert_eq!(keys_of(&entries), [10, 10, 20, 20]);
         assert_eq!(keys_of(&[(Some(10), true), (Some(15), false), (Some(20), true)]), [10, 15, 20]);
@@ -379,18 +399,22 @@ mod tests {
     }
 
     #[test]
+    fn wide_bounds_are_narrowed_by_those_before_and_after() {
+        let wide =
+            |lo: i64, hi: i64| Wanted { at: Some(lo.midpoint(hi)), lo, hi, is_timeless: false };
+        let of = keys(vec![wide(0, 100), wide(2, 8)]);
+        assert_eq!(of.iter().map(|key| key.at).collect::<Vec<_>>(), [8, 8]);
+        let of = keys(vec![wide(40, 48), wide(0, 60)]);
+        assert_eq!(of.iter().map(|key| key.at).collect::<Vec<_>>(), [44, 44]);
+    }
+
+    #[test]
     fn clocks_that_were_never_set_are_among_themselves() {
-        let never = |at| Wanted { at: Some(at), is_sure: false, is_timeless: true };
-        let of = keys(&[never(1), never(2)]);
-        assert_eq!(
-            of.iter().map(|key| (key.is_timeless, key.at)).collect::<Vec<_>>(),
-            [(true, 1), (true, 2)]
-        );
-        let set = Wanted { at: Some(500), is_sure: true, is_timeless: false };
-        let of = keys(&[never(1), set]);
-        assert_eq!(
-            of.iter().map(|key| (key.is_timeless, key.at)).collect::<Vec<_>>(),
-            [(false, 500), (false, 500)]
-        );
+        let never = |at| Wanted { at: Some(at), ..Wanted::NOWHERE };
+        let of = |wanted: Vec<Wanted>| -> Vec<(bool, i64)> {
+            keys(wanted).into_iter().map(|key| (key.is_timeless, key.at)).collect()
+        };
+        assert_eq!(of(vec![never(1), never(2)]), [(true, 1), (true, 2)]);
+        assert_eq!(of(vec![never(1), wanted(Some(500), true)]), [(false, 500), (false, 500)]);
     }
 }
