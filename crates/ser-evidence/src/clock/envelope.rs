@@ -175,12 +175,6 @@ impl Envelope {
         known
     }
 
-    /// Whether both ends are known at `x`.
-    pub(crate) fn is_known_at(&self, x: i64) -> bool {
-        let (lo, hi) = self.at(x);
-        lo != NO_LO && hi != NO_HI
-    }
-
     /// Adds that the value at `x` lies in `[lo, hi]`. Returns whether that was news; `None` if it
     /// contradicts what is known, and then nothing changes.
     pub(crate) fn learn(&mut self, x: i64, lo: i64, hi: i64) -> Option<bool> {

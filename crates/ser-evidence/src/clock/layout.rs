@@ -9,7 +9,7 @@
 use super::envelope::{Envelope, Known, NO_HI, NO_LO};
 use super::hosts::Hosts;
 use super::links::Link;
-use super::offsets::{Home, Observed, RunClock};
+use super::offsets::{Home, Observed, RunClock, added};
 use crate::record::{Boot, Reference};
 
 /// How wrong a clock may be of which nothing is known: a hundred years, in microseconds.
@@ -32,19 +32,19 @@ struct Placed {
     offset: Envelope,
     /// Whether nothing at all is known about it.
     is_timeless: bool,
-    /// Whether it got its place because it had to have one.
-    is_guessed: bool,
+    /// What was proven before it got its place, if it got one because it had to have one.
+    proven: Option<Envelope>,
 }
 
 /// An instant on the scale of the list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Instant {
-    pub(crate) lo: i64,
-    pub(crate) hi: i64,
+    /// Where it goes.
+    pub(crate) at: i64,
+    /// Between which instants it is proven to be.
+    pub(crate) proven: (i64, i64),
     /// Whether nothing is known about it but what the clock showed.
     pub(crate) is_timeless: bool,
-    /// Whether the bounds are not proven.
-    pub(crate) is_guessed: bool,
 }
 
 /// The clock `one` showed `x` between `lo` and `hi` after the clock `other` showed `other_x`.
@@ -136,10 +136,13 @@ impl Layout {
     pub(crate) fn instant(&self, run: usize, x: i64) -> Option<Instant> {
         let placed = self.clocks.get(self.boots.len() + run)?;
         let (lo, hi) = placed.offset.at(x);
-        let (is_timeless, is_guessed) = (placed.is_timeless, placed.is_guessed);
-        let (lo, hi) = (lo.saturating_add(x), hi.saturating_add(x));
-        let is_placed = placed.offset.is_known_at(x);
-        is_placed.then_some(Instant { lo, hi, is_timeless, is_guessed })
+        let proven = placed.proven.as_ref().map_or((lo, hi), |proven| proven.at(x));
+        let is_placed = lo != NO_LO && hi != NO_HI;
+        is_placed.then(|| Instant {
+            at: lo.midpoint(hi).saturating_add(x),
+            proven: added(proven, x),
+            is_timeless: placed.is_timeless,
+        })
     }
 
     /// Passes bounds on over all ties until nothing changes. A tie that contradicts the others is
@@ -215,14 +218,14 @@ impl Layout {
             (None, NO_LO, hi) => hi,
             _ => return,
         };
-        placed.is_guessed = true;
+        placed.proven = Some(placed.offset.clone());
         placed.offset.learn(x, at, at);
         self.settle(ties);
     }
 }
 
 fn placed(offset: Envelope) -> Placed {
-    Placed { offset, is_timeless: false, is_guessed: false }
+    Placed { offset, is_timeless: false, proven: None }
 }
 
 /// What a clock showed at a moment of a boot, as well as that is known.

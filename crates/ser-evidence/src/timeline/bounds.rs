@@ -217,12 +217,8 @@ impl Wanted {
     const NOWHERE: Wanted = Wanted { at: None, lo: NO_LO, hi: NO_HI, is_timeless: true };
 
     fn of(instant: Instant) -> Wanted {
-        let Instant { lo, hi, is_timeless, is_guessed } = instant;
-        let at = Some(lo.midpoint(hi));
-        match is_guessed {
-            true => Wanted { at, lo: NO_LO, hi: NO_HI, is_timeless },
-            false => Wanted { at, lo, hi, is_timeless },
-        }
+        let Instant { at, proven: (lo, hi), is_timeless } = instant;
+        Wanted { at: Some(at), lo, hi, is_timeless }
     }
 
     /// Where an entry goes that is either of these.
