@@ -32,8 +32,8 @@ struct Placed {
     offset: Envelope,
     /// Whether nothing at all is known about it.
     is_timeless: bool,
-    /// What was proven before it got its place, if it got one because it had to have one.
-    proven: Option<Envelope>,
+    /// The same before any clock got a place because it had to have one.
+    proven: Envelope,
 }
 
 /// An instant on the scale of the list.
@@ -128,6 +128,9 @@ impl Layout {
         }));
         let mut layout = Layout { boots, clocks };
         layout.settle(&ties);
+        for placed in &mut layout.clocks {
+            placed.proven.clone_from(&placed.offset);
+        }
         layout.place_the_rest(hosts, runs, &ties);
         layout
     }
@@ -136,11 +139,10 @@ impl Layout {
     pub(crate) fn instant(&self, run: usize, x: i64) -> Option<Instant> {
         let placed = self.clocks.get(self.boots.len() + run)?;
         let (lo, hi) = placed.offset.at(x);
-        let proven = placed.proven.as_ref().map_or((lo, hi), |proven| proven.at(x));
         let is_placed = lo != NO_LO && hi != NO_HI;
         is_placed.then(|| Instant {
             at: lo.midpoint(hi).saturating_add(x),
-            proven: added(proven, x),
+            proven: added(placed.proven.at(x), x),
             is_timeless: placed.is_timeless,
         })
     }
@@ -218,14 +220,13 @@ impl Layout {
             (None, NO_LO, hi) => hi,
             _ => return,
         };
-        placed.proven = Some(placed.offset.clone());
         placed.offset.learn(x, at, at);
         self.settle(ties);
     }
 }
 
 fn placed(offset: Envelope) -> Placed {
-    Placed { offset, is_timeless: false, proven: None }
+    Placed { proven: offset.clone(), offset, is_timeless: false }
 }
 
 /// What a clock showed at a moment of a boot, as well as that is known.
