@@ -293,11 +293,17 @@ impl<'m> PossibleRuns<'m> {
     /// Where an entry with this stamp goes in the list.
     fn on_list(&self, shown: Moment<Shown>) -> Wanted {
         let each = self.ids.iter().zip(&self.clocks);
-        let wanted = each.map(|(&id, run)| {
+        let mut wanted = each.map(|(&id, run)| {
             let instant = self.model.layout.instant(id, run.unwrapped(shown));
             instant.map_or(Wanted::NOWHERE, Wanted::of)
         });
-        wanted.reduce(Wanted::or).unwrap_or(Wanted::NOWHERE)
+        let first = wanted.next().unwrap_or(Wanted::NOWHERE);
+        match (wanted.next(), first.at) {
+            (Some(second), _) => wanted.fold(first.or(second), Wanted::or),
+            // All sure entries of all recorders are where they can be at once, so there they stay.
+            (None, Some(at)) if !first.is_timeless => Wanted { lo: at, hi: at, ..first },
+            (None, _) => first,
+        }
     }
 }
 
