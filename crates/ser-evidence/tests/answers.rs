@@ -1,0 +1,344 @@
+//! What a report says about incidents that people know.
+
+mod common;
+
+use common::{Log, history, monotonic_us, site};
+use ser_evidence::incident::{Doubt, Incident, Report, Verdict, Which};
+use ser_evidence::record::How;
+use ser_evidence::timeline::{ChangeId, ContactTrouble, Order, Timeline};
+
+const TWO_RECORDERS: &str = "
+[[recorder]]
+name = \"U1\"
+clock = \"utc\"
+[[recorder]]
+name = \"U2\"
+clock = \"utc\"
+";
+
+/// The changes of a report as `U1/3 on`.
+fn rows(timeline: &Timeline<'_>, report: &Report) -> Vec<String> {
+    let name = |change: ChangeId| timeline.recorder(change.event).unwrap().recorder.name.clone();
+    let on = |on| if on { "on" } else { "off" };
+    let text = |row: &ser_evidence::incident::Row| {
+        format!("{}/{} {}", name(row.change), row.change.input, on(row.on))
+    };
+    report.rows.iter().map(text).collect()
+}
+
+fn report(timeline: &Timeline<'_>, which: Which) -> Report {
+    Report::new(timeline, Incident::pick(timeline, which).expect("an incident"))
+}
+
+#[test]
+fn two_recorders_on_one_broadcast_are_ordered_to_two_milliseconds_by_a_host_that_is_wrong() {
+    let site = site(TWO_RECORDERS);
+    let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
+    // The broadcast took up to 80 ms, and the host says that it may be 50 ms off.
+    let at = monotonic_us("2026-11-22T09:59:00.000");
+    let bound = (at, at + 80_000);
+    let how = How::Set { broadcast: Some(7) };
+    u1.observed(how, "2026-11-22T10:00:00.000", bound, Some(50_000));
+    u2.observed(how, "2026-11-22T10:00:00.000", bound, Some(50_000));
+    u1.changes("2026-11-22T10:00:05.000", &[1]);
+    u2.changes("2026-11-22T10:00:05.004", &[1]);
+    u2.changes("2026-11-22T10:00:05.010", &[2]);
+    u1.changes("2026-11-22T10:00:05.011", &[2]);
+    let history = history(&site, &[&u2, &u1]);
+    let timeline = Timeline::new(&site, &history);
+    let events: Vec<_> = timeline.entries().collect();
+    assert_eq!(timeline.order(events[0], events[1]), Order::Before, "4 ms apart");
+    assert_eq!(timeline.order(events[2], events[3]), Order::Unknown, "1 ms apart");
+    let delta = timeline
+        .delta(ChangeId { event: events[0], input: 1 }, ChangeId { event: events[1], input: 1 });
+    // A millisecond of phase, one of the samples, and the drift and the delays of both.
+    assert!(delta.doubt_us().unwrap() < 2_600, "{delta:?}");
+    let utc = timeline.moved_utc(events[0], Some(1)).width_us().unwrap();
+    assert!(utc > 180_000, "UTC is as doubtful as the host and the way: {utc}");
+}
+
+#[test]
+fn the_time_between_two_entries_of_a_clock_that_nobody_knows_is_exact_to_a_millisecond() {
+    let site = site(TWO_RECORDERS);
+    let mut u1 = Log::of("U1", 1);
+    u1.changes("1970-01-01T00:12:05.000", &[1]).changes("1970-01-01T00:12:05.041", &[2]);
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let events: Vec<_> = timeline.entries().collect();
+    let change = |place: usize, input| ChangeId { event: events[place], input };
+    let delta = timeline.delta(change(0, 1), change(1, 2));
+    assert_eq!(delta.middle_us(), Some(41_000));
+    // And the drift and the spread of the delays.
+    assert!(delta.doubt_us().unwrap() <= 1_060, "{delta:?}");
+    assert_eq!(timeline.sort_key(events[0]), None, "its time is not known, and not 1970");
+}
+
+#[test]
+fn a_contact_that_chatters_two_hundred_times_is_one_row_and_hides_nothing() {
+    let site = site(TWO_RECORDERS);
+    let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    for log in [&mut u1, &mut u2] {
+        log.observed(
+            How::Set { broadcast: None },
+            "2026-11-22T10:00:00.000",
+            (at, at + 2_000),
+            Some(1_000),
+        );
+    }
+    u1.changes("2026-11-22T10:00:10.000", &[1]).changes("2026-11-22T10:00:10.020", &[2]);
+    for number in 0..200 {
+        let ms = 30 + 5 * number;
+        let time = format!("2026-11-22T10:00:{:02}.{:03}", 10 + ms / 1000, ms % 1000);
+        u1.changes(&time, &[9]);
+    }
+    u2.changes("2026-11-22T10:00:10.007", &[1]).changes("2026-11-22T10:00:10.500", &[2]);
+    u2.changes("2026-11-22T10:00:10.600", &[3]).changes("2026-11-22T10:00:10.700", &[1]);
+    let history = history(&site, &[&u1, &u2]);
+    let timeline = Timeline::new(&site, &history);
+    let report = report(&timeline, Which::LastTrip);
+    assert_eq!(report.rows.len(), 206, "nothing is left out");
+    let [fold] = &report.chatter[..] else { panic!("{:?}", report.chatter) };
+    assert_eq!((fold.first.input, fold.changes.len()), (9, 200));
+    let is_shown = |row: &&ser_evidence::incident::Row| {
+        !fold.changes.iter().skip(1).any(|folded| *folded == row.change)
+    };
+    assert_eq!(report.rows.iter().filter(is_shown).count(), 7);
+    assert_eq!(report.first_out.known().map(|change| change.input), Some(1));
+    assert_eq!(rows(&timeline, &report)[..3], ["U1/1 on", "U2/1 on", "U1/2 on"]);
+}
+
+#[test]
+fn first_out_is_a_set_where_the_clocks_do_not_decide() {
+    let site = site(TWO_RECORDERS);
+    let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    for (log, doubt) in [(&mut u1, 1_000), (&mut u2, 20_000)] {
+        let bound = (at - doubt, at + doubt);
+        log.observed(How::Set { broadcast: None }, "2026-11-22T10:00:00.000", bound, Some(0));
+    }
+    u1.changes("2026-11-22T10:00:01.000", &[1, 4]).changes("2026-11-22T10:00:01.050", &[2]);
+    u2.changes("2026-11-22T10:00:01.010", &[1]);
+    let history = history(&site, &[&u1, &u2]);
+    let timeline = Timeline::new(&site, &history);
+    let first = report(&timeline, Which::Last).first_out;
+    assert_eq!(first.known(), None);
+    let inputs: Vec<u8> = first.changes.iter().map(|change| change.input).collect();
+    assert_eq!(
+        inputs,
+        [1, 4, 1],
+        "both of the same millisecond, and the one of the other recorder"
+    );
+}
+
+#[test]
+fn what_was_overwritten_may_have_been_first() {
+    let site = site(TWO_RECORDERS);
+    let mut u1 = Log::of("U1", 1);
+    u1.changes("2026-11-22T09:00:00.000", &[5]).loses(1);
+    u1.changes("2026-11-22T10:00:01.000", &[1]).changes("2026-11-22T10:00:01.050", &[2]);
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let report = report(&timeline, Which::Last);
+    assert_eq!(report.first_out.known(), None);
+    assert_eq!((report.first_out.changes.len(), report.first_out.gaps.len()), (1, 1));
+    assert!(report.is_incomplete());
+}
+
+const BREAKER: &str = "
+[[recorder]]
+name = \"U1\"
+clock = \"utc\"
+[[point]]
+input = 5
+name = \"Relay trip\"
+role = \"trip\"
+equipment = \"52-1\"
+normal = \"off\"
+[[point]]
+input = 7
+name = \"52-1 closed\"
+role = \"52a\"
+equipment = \"52-1\"
+normal = \"on\"
+[[point]]
+input = 8
+name = \"52-1 open\"
+role = \"52b\"
+equipment = \"52-1\"
+[[expect]]
+name = \"opens\"
+after = \"Relay trip on\"
+then = \"52-1 closed off\"
+within_ms = [15, 50]
+[[expect]]
+name = \"trip resets\"
+after = \"Relay trip on\"
+then = \"Relay trip off\"
+within_ms = [50, 500]
+";
+
+/// A trip after which the breaker opens so many milliseconds later, seen on a clock that was set.
+fn trip(opens_ms: u32, later: Option<&str>) -> Log {
+    let mut u1 = Log::of("U1", 1);
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    let how = How::Set { broadcast: None };
+    u1.observed(how, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(1_000));
+    u1.changes("2026-11-22T10:00:01.000", &[7]).changes("2026-11-22T10:00:10.000", &[5]);
+    u1.changes(&format!("2026-11-22T10:00:10.{opens_ms:03}"), &[7]);
+    u1.changes(&format!("2026-11-22T10:00:10.{:03}", opens_ms + 3), &[8]);
+    if let Some(later) = later {
+        u1.changes(later, &[20]);
+    }
+    u1
+}
+
+#[test]
+fn expected_steps_are_judged_by_the_whole_doubt() {
+    let site = site(BREAKER);
+    for (opens_ms, verdict) in [
+        (12, Verdict::Early),
+        (15, Verdict::NotDecidable(Doubt::Straddles)),
+        (40, Verdict::InTime),
+        (50, Verdict::NotDecidable(Doubt::Straddles)),
+        (61, Verdict::Late),
+    ] {
+        let u1 = trip(opens_ms, None);
+        let history = history(&site, &[&u1]);
+        let timeline = Timeline::new(&site, &history);
+        let report = report(&timeline, Which::LastTrip);
+        assert_eq!(report.steps[0].verdict, verdict, "{opens_ms} ms");
+    }
+}
+
+#[test]
+fn what_did_not_follow_is_missing_only_if_it_would_have_been_seen() {
+    let site = site(BREAKER);
+    for (later, verdict) in [
+        (None, Verdict::NotDecidable(Doubt::NotReadSince)),
+        (Some("2026-11-22T10:00:10.400"), Verdict::NotDecidable(Doubt::NotReadSince)),
+        (Some("2026-11-22T10:00:10.600"), Verdict::Missing),
+    ] {
+        let u1 = trip(40, later);
+        let history = history(&site, &[&u1]);
+        let timeline = Timeline::new(&site, &history);
+        let report = report(&timeline, Which::LastTrip);
+        assert_eq!(report.steps[1].verdict, verdict, "{later:?}");
+    }
+}
+
+#[test]
+fn a_breaker_says_how_long_it_took_and_its_contacts_how_long_they_disagreed() {
+    let site = site(BREAKER);
+    let u1 = trip(40, None);
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let report = report(&timeline, Which::LastTrip);
+    let [operation] = &report.operations[..] else { panic!("{:?}", report.operations) };
+    assert!(operation.opened);
+    // The delays of closing and of opening contacts differ by some tenths.
+    let took = operation.took.unwrap().middle_us().unwrap();
+    assert!((39_700..=40_000).contains(&took), "{took}");
+    let [off] = &report.disagreements[..] else { panic!("{:?}", report.disagreements) };
+    assert!(!off.both_on && off.until.is_some());
+    let abnormal: Vec<usize> = report.abnormal.iter().map(|abnormal| abnormal.point.0).collect();
+    assert_eq!(abnormal, [0, 1], "the trip has not reset, and the breaker is open");
+}
+
+const SHARED: &str = "
+[[recorder]]
+name = \"U1\"
+clock = \"utc\"
+[[recorder]]
+name = \"U2\"
+clock = \"utc\"
+[[point]]
+recorder = \"U1\"
+input = 1
+name = \"52-1 closed\"
+same_as = \"U2/52-1 closed\"
+[[point]]
+recorder = \"U2\"
+input = 9
+name = \"52-1 closed\"
+inverted = true
+";
+
+#[test]
+fn a_contact_on_two_recorders_ties_their_clocks_together() {
+    let site = site(SHARED);
+    let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    let how = How::Set { broadcast: None };
+    u1.observed(how, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(0));
+    u2.observed(how, "2026-11-22T10:00:00.000", (at - 90_000, at + 90_000), Some(0));
+    u1.changes("2026-11-22T10:00:10.000", &[1]);
+    // Normally on there: inverted, so it goes on first.
+    u2.changes("2026-11-22T09:59:59.000", &[9]);
+    u2.changes("2026-11-22T10:00:10.050", &[9]).changes("2026-11-22T10:00:10.056", &[3]);
+    u1.changes("2026-11-22T10:00:10.002", &[2]);
+    let history = history(&site, &[&u1, &u2]);
+    let timeline = Timeline::new(&site, &history);
+    let find = |recorder: u32, sequence: u64| {
+        timeline
+            .entries()
+            .find(|event| {
+                event.recorder == recorder
+                    && timeline.held(*event).is_some_and(|held| held.sequence == sequence)
+            })
+            .expect("an entry")
+    };
+    assert_eq!(timeline.contact_findings(), []);
+    // Without the shared contact 180 ms would be unknown between them.
+    assert_eq!(timeline.order(find(0, 2), find(1, 3)), Order::Before);
+}
+
+#[test]
+fn a_shared_contact_that_only_one_recorder_saw_is_told() {
+    let site = site(SHARED);
+    let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    let how = How::Set { broadcast: None };
+    for log in [&mut u1, &mut u2] {
+        log.observed(how, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(0));
+    }
+    u1.changes("2026-11-22T10:00:20.000", &[1]);
+    u2.changes("2026-11-22T10:00:10.000", &[3]).changes("2026-11-22T10:00:30.000", &[3]);
+    let history = history(&site, &[&u1, &u2]);
+    let timeline = Timeline::new(&site, &history);
+    let [finding] = timeline.contact_findings() else { panic!("one") };
+    assert_eq!((finding.point.0, finding.trouble), (0, ContactTrouble::Missing));
+}
+
+#[test]
+fn a_shift_by_hand_moves_times_and_nothing_else() {
+    let text = format!(
+        "{TWO_RECORDERS}
+[[shift]]
+recorder = \"U1\"
+ms = -250
+from = \"2026-11-22T09:00:00Z\"
+to = \"2026-11-22T12:00:00Z\"
+why = \"found 250 ms fast\"
+"
+    );
+    let site = site(&text);
+    let mut u1 = Log::of("U1", 1);
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    u1.observed(
+        How::Set { broadcast: None },
+        "2026-11-22T10:00:00.000",
+        (at, at + 2_000),
+        Some(1_000),
+    );
+    u1.changes("2026-11-22T10:00:10.000", &[1]).changes("2026-11-22T10:00:10.020", &[2]);
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let events: Vec<_> = timeline.entries().collect();
+    assert_eq!(timeline.shift_us(events[0]), -250_000);
+    let middle = timeline.moved_utc(events[0], None).middle().unwrap().us();
+    let expected = common::seen("2026-11-22T10:00:09.750").us();
+    assert!(middle.abs_diff(expected) < 2_000, "{middle} {expected}");
+    let change = |place: usize, input| ChangeId { event: events[place], input };
+    assert_eq!(timeline.delta(change(0, 1), change(1, 2)).middle_us(), Some(20_000));
+}

@@ -1,0 +1,123 @@
+//! Sites and logs in a few words.
+#![allow(dead_code, reason = "each test uses some of it")]
+
+use ser_evidence::history::{Collector, History};
+use ser_evidence::record::{
+    Boot, ClockObservation, EntryRecord, HostReading, How, Life, Place, Record, Reference,
+};
+use ser_evidence::site::{self, Site};
+use ser_evidence::time::{Bound, Moment, Shown, shown};
+use ser_proto::{Entry, Inputs, TimeStamp};
+
+/// A stamp as it is written: `2026-11-22T10:00:00.250`.
+pub(crate) fn stamp(text: &str) -> TimeStamp {
+    let number = |range: std::ops::Range<usize>| text[range].parse::<u16>().expect("a number");
+    let byte = |range| u8::try_from(number(range)).expect("a byte");
+    TimeStamp {
+        year: u8::try_from(number(0..4) % 100).expect("two digits"),
+        month: byte(5..7),
+        day: byte(8..10),
+        hour: byte(11..13),
+        minute: byte(14..16),
+        second: byte(17..19),
+        millisecond: number(20..23),
+    }
+}
+
+/// What a clock showed.
+pub(crate) fn seen(text: &str) -> Moment<Shown> {
+    shown(&stamp(text)).expect("a date")
+}
+
+/// The site that a text describes.
+pub(crate) fn site(text: &str) -> Site {
+    let head = "site = \"Northfield\"\ntime_zone = \"Europe/Berlin\"\n";
+    site::read(&format!("{head}{text}")).unwrap_or_else(|errors| panic!("{errors:#?}"))
+}
+
+/// The log of one recorder.
+pub(crate) struct Log {
+    recorder: &'static str,
+    life: Life,
+    state: u32,
+    records: Vec<Record>,
+    sequence: u64,
+}
+
+impl Log {
+    /// An empty one.
+    pub(crate) fn of(recorder: &'static str, life: u64) -> Log {
+        let life = Life::from_bits(life);
+        Log { recorder, life, state: 0, records: Vec::new(), sequence: 0 }
+    }
+
+    /// These inputs change.
+    pub(crate) fn changes(&mut self, time: &str, inputs: &[u8]) -> &mut Log {
+        let changed = inputs.iter().fold(0, |bits, input| bits | 1 << (input - 1));
+        self.state ^= changed;
+        self.sequence += 1;
+        let entry =
+            Entry { changed: Inputs(changed), state: Inputs(self.state), time: stamp(time) };
+        self.records.push(Record::Entry(EntryRecord {
+            life: self.life,
+            sequence: Some(self.sequence),
+            number: u16::try_from(self.sequence).expect("a small log"),
+            entry,
+            known: EntryRecord::ALL_KNOWN,
+        }));
+        self
+    }
+
+    /// So many entries are overwritten before they are read.
+    pub(crate) fn loses(&mut self, count: u64) -> &mut Log {
+        self.sequence += count;
+        self
+    }
+
+    /// The clock began to show this between these two moments of a host that was booted at the
+    /// beginning of 2026, and is as wrong as it says.
+    pub(crate) fn observed(
+        &mut self,
+        how: How,
+        showed: &str,
+        bound_us: (i64, i64),
+        utc_doubt_us: Option<u64>,
+    ) -> &mut Log {
+        let at = bound_us.1;
+        let reading = HostReading {
+            boot: Boot(1),
+            monotonic: Moment::from_us(at),
+            utc: Moment::from_us(booted_us() + at),
+            utc_doubt_us,
+        };
+        let place = Place {
+            life: self.life,
+            after: Some(self.sequence),
+            before: Some(self.sequence),
+            newest: None,
+        };
+        let at = Reference::Host { bound: Bound::from_us(bound_us.0, bound_us.1), reading };
+        self.records.push(Record::Clock(ClockObservation { how, shown: seen(showed), at, place }));
+        self
+    }
+}
+
+/// When the host was booted, by its own UTC.
+pub(crate) fn booted_us() -> i64 {
+    seen("2026-01-01T00:00:00.000").us()
+}
+
+/// The monotonic clock of the host when its UTC shows this.
+pub(crate) fn monotonic_us(utc: &str) -> i64 {
+    seen(utc).us() - booted_us()
+}
+
+/// Everything that these logs say.
+pub(crate) fn history(site: &Site, logs: &[&Log]) -> History {
+    let mut collector = Collector::new();
+    for log in logs {
+        collector.begin_source();
+        log.records.iter().for_each(|record| collector.add(log.recorder, record));
+    }
+    collector.finish(site)
+}
