@@ -24,6 +24,9 @@ pub struct Completeness {
     pub is_known_past_end: bool,
     /// Entries that contradict each other.
     pub conflicts: usize,
+    /// Entries of which not even the day is known, because the clock was never set: they may belong
+    /// to the incident.
+    pub timeless: usize,
     /// What is known of its clock.
     pub clock: ClockState,
 }
@@ -87,8 +90,18 @@ fn of(
         read_until: readings.max_by_key(|(_, _, reading)| reading.utc).map(|(_, _, at)| at),
         is_known_past_end: last.is_some_and(|last| is_covered_until(timeline, recorder, last, 0)),
         conflicts: history.conflicts.len(),
+        timeless: timeless(timeline, history, recorder),
         clock: near.map_or(ClockState::NotObserved, |event| clock(timeline, event)),
     }
+}
+
+/// Entries without a time. A life has times for all or for none.
+fn timeless(timeline: &Timeline<'_>, history: &RecorderHistory, recorder: u32) -> usize {
+    let lives = (0_u32..).zip(&history.lives);
+    let without = lives.filter(|(life, _)| {
+        timeline.sort_key(EventId { recorder, life: *life, place: 0 }).is_none()
+    });
+    without.map(|(_, life)| life.entries.len()).sum()
 }
 
 /// The last entry of a recorder before the incident.

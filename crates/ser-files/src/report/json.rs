@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use ser_console::is_obeyed;
-use ser_evidence::clock::Home;
+use ser_evidence::clock::{Home, Nominal};
 use ser_evidence::incident::{ClockState, FirstOut, Verdict};
 use ser_evidence::timeline::{ChangeId, Delta, EventId};
 use serde_json::{Value, json};
@@ -139,6 +139,7 @@ fn recorders(document: &Document<'_>) -> Vec<Value> {
                 "what": verdict::missing(gap.lost, gap.why),
             })).collect::<Vec<_>>(),
             "conflicts": of.conflicts,
+            "without_time": of.timeless,
             "clock": {
                 "scale": home.map(|home| match home {
                     Home::Boot(boot) => boot.to_string(),
@@ -170,6 +171,10 @@ fn sequence(document: &Document<'_>) -> Vec<Value> {
             "earliest": utc.lo().and_then(|lo| rfc3339(lo.us())),
             "latest": utc.hi().and_then(|hi| rfc3339(hi.us())),
             "shown": held.entry.time.to_string(),
+            "may_also_be": match timeline.nominal(event) {
+                Nominal::Ambiguous(_, late) if !utc.is_known() => rfc3339(late.us()),
+                _ => None,
+            },
             "since_first": since(first),
             "since_previous": since(previous),
             "order_to_previous": previous.map(|previous| {

@@ -22,6 +22,12 @@ impl Clock {
         self.format(utc_us, "%Y-%m-%d %H:%M:%S%.3f")
     }
 
+    /// As `2026-11-22 11:00:00.250+01:00`, to the nearest millisecond.
+    #[must_use]
+    pub fn date_and_time_with_offset(&self, utc_us: i64) -> String {
+        self.format(utc_us, "%Y-%m-%d %H:%M:%S%.3f%:z")
+    }
+
     /// As `11:00:00.250`, to the nearest millisecond.
     #[must_use]
     pub fn time(&self, utc_us: i64) -> String {

@@ -164,6 +164,9 @@ pub(super) fn incompleteness(timeline: &Timeline<'_>, of: &Completeness) -> Opti
     if of.conflicts > 0 {
         text.push(format!("{} entries contradict others", of.conflicts));
     }
+    if of.timeless > 0 {
+        text.push(format!("{} entries without a time (the clock was never set)", of.timeless));
+    }
     if text.is_empty() && !of.is_complete() {
         text.push("not read since".to_owned());
     }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::io::{self, Write};
 
 use anstyle::Style;
+use ser_evidence::clock::Nominal;
 use ser_evidence::incident::Row;
 use ser_evidence::timeline::{ChangeId, EventId, Order, Timeline};
 
@@ -161,7 +162,7 @@ fn cells(
         Cell::from(names::point(timeline, row.point, input)),
         Cell::styled(names::state(timeline, row.point, row.on), state_style),
         Cell::from(timeline.held(event).map_or(String::new(), |held| held.sequence.to_string())),
-        Cell::from(notes(document, row, previous, bracket, is_first)),
+        Cell::from(notes(document, row, previous, bracket, is_first, clock)),
     ]
 }
 
@@ -172,6 +173,7 @@ fn notes(
     previous: Option<ChangeId>,
     bracket: &Bracket,
     is_first: bool,
+    clock: &Clock,
 ) -> String {
     let Document { timeline, report, .. } = *document;
     let mut notes = Vec::new();
@@ -192,12 +194,29 @@ fn notes(
     if report.incident.clock_sets.contains(&row.change.event) {
         notes.push("clock was set before this".to_owned());
     }
+    notes.extend(local_time_note(timeline, row.change.event, clock));
     let shift = timeline.shift_us(row.change.event);
     if shift != 0 {
         notes.push(format!("shifted by hand {}", since(shift)));
     }
     notes.extend(bracket.note.clone());
     notes.join("; ")
+}
+
+/// What is to be said of a local time that nobody observed.
+fn local_time_note(timeline: &Timeline<'_>, event: EventId, clock: &Clock) -> Option<String> {
+    if timeline.moved_utc(event, None).is_known() {
+        return None;
+    }
+    match timeline.nominal(event) {
+        Nominal::Ambiguous(early, late) => Some(format!(
+            "this hour came twice: {} or {}",
+            clock.date_and_time_with_offset(early.us()),
+            clock.date_and_time_with_offset(late.us())
+        )),
+        Nominal::Missing(_) => Some("this hour was left out".to_owned()),
+        Nominal::Time(_) | Nominal::NotKnown => None,
+    }
 }
 
 /// What is missing ahead of a row, a row for each.
