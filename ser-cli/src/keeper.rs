@@ -36,6 +36,13 @@ impl StateArgs {
     }
 }
 
+/// No entry tells which life of the log this is, so it gets its name now. Without one, as when a
+/// `watch` is running, a report cannot know that the clock was set in this life.
+pub(crate) fn life_of_empty_log(state: &StateArgs, connection: &ConnectionArgs) -> Life {
+    let life = Keeper::load(state, connection).and_then(|mut keeper| keeper.life_of_empty_log());
+    life.unwrap_or(Life::UNKNOWN)
+}
+
 /// The state file of a recorder, and what is to be written to it.
 pub(crate) struct Keeper {
     file: StateFile,

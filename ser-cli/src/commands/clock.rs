@@ -4,13 +4,13 @@ use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use ser_client::{RequestError, Unit};
-use ser_evidence::record::{ClockObservation, How, Life, Record};
+use ser_evidence::record::{ClockObservation, How, Record};
 use ser_evidence::time::shown;
 use ser_proto::TimeStamp;
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, advise, inform, warn};
-use crate::keeper::{Keeper, StateArgs};
+use crate::keeper::{self, StateArgs};
 use crate::kept::KeptRecords;
 use crate::log_look::LogLook;
 use crate::setting;
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
     let kept = KeptRecords::of(state, connection)?;
     let mut unit = connection::open(connection)?;
-    let before = LogLook::take(&mut unit)?.named(|| life_of_empty_log(state, connection));
+    let before = LogLook::take(&mut unit)?.named(|| keeper::life_of_empty_log(state, connection));
     let sent = set(&mut unit, *at, &time_in).inspect_err(|error| {
         if matches!(error, RequestError::NoReply { may_have_been_done: true, .. }) {
             kept.add(&[setting::step(before.place(None))]);
@@ -85,13 +85,6 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     out.flush()?;
     remember(&kept, observed(&mut unit, sent, &before), &before);
     Ok(())
-}
-
-/// No entry tells which life of the log this is, so it gets its name now. Without one, as when a
-/// `watch` is running, a report cannot know that the clock was set in this life.
-fn life_of_empty_log(state: &StateArgs, connection: &ConnectionArgs) -> Life {
-    let life = Keeper::load(state, connection).and_then(|mut keeper| keeper.life_of_empty_log());
-    life.unwrap_or(Life::UNKNOWN)
 }
 
 fn set(

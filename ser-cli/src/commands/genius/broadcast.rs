@@ -12,7 +12,7 @@ use ser_proto::{Command, LastBroadcast, TimeStamp};
 use super::{mark, no_recorder, silent_candidates};
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
-use crate::keeper::StateArgs;
+use crate::keeper::{self, StateArgs};
 use crate::kept::KeptRecords;
 use crate::log_look::LogLook;
 use crate::setting;
@@ -69,7 +69,8 @@ pub(super) fn run(
     if let Some(silent) = silent_candidates(&found.silent) {
         warn(&silent);
     }
-    let ask = |(node, _)| Asked::before(&host, node, connection, what.tells_time());
+    let looks = what.tells_time().then_some(state);
+    let ask = |(node, _)| Asked::before(&host, node, connection, looks);
     let mut asked: Vec<Asked> = found.recorders.into_iter().map(ask).collect();
     if asked.is_empty() {
         return Err(no_recorder());
@@ -131,11 +132,21 @@ struct Asked {
 }
 
 impl Asked {
-    fn before(host: &GeniHost, node: u8, connection: &ConnectionArgs, looks: bool) -> Asked {
+    /// `looks` is where to remember what was seen in the log, if a look is wanted.
+    fn before(
+        host: &GeniHost,
+        node: u8,
+        connection: &ConnectionArgs,
+        looks: Option<&StateArgs>,
+    ) -> Asked {
         let mut unit = host.unit(node, connection::options(connection));
         // The same command may have been broadcast before.
         let before = last_broadcast(&mut unit);
-        let look = (looks && before.is_ok()).then(|| LogLook::take(&mut unit).ok()).flatten();
+        let look = looks.filter(|_| before.is_ok()).and_then(|state| {
+            let look = LogLook::take(&mut unit).ok()?;
+            let connection = connection::to_node(connection, node).ok()?;
+            Some(look.named(|| keeper::life_of_empty_log(state, &connection)))
+        });
         Asked { node, unit, before, look }
     }
 
