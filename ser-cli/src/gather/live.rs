@@ -40,7 +40,9 @@ pub(super) fn read(
     inform(format_args!("reading {} …", names.join(", ")));
     let one = |recorder: &Recorder| {
         let port = recorder.port.as_deref().unwrap_or_default();
-        read_one(recorder, &connection::at_port(connection, port), state, &stop)
+        let baud = connection.baud.or(recorder.baud);
+        let connection = ConnectionArgs { baud, ..connection::at_port(connection, port) };
+        read_one(recorder, &connection, state, &stop)
     };
     let results: Vec<(&Recorder, Result<Vec<Record>>)> = thread::scope(|scope| {
         let running: Vec<_> =

@@ -45,8 +45,14 @@ pub(crate) fn choose(connection: &ConnectionArgs, wants_bus: bool) -> Result<Con
         }
         None => by_port(&chosen, &mut connection),
     };
+    take_baud(&mut connection, chosen.recorder());
     connection.chosen = Some(chosen.into());
     Ok(connection)
+}
+
+/// The rate of the file counts where none is on the command line.
+fn take_baud(connection: &mut ConnectionArgs, recorder: Option<&Recorder>) {
+    connection.baud = connection.baud.or_else(|| recorder?.baud);
 }
 
 /// The recorder that is named. Its port is taken if none is given on the command line.
@@ -112,10 +118,9 @@ impl Chosen {
         let port = self.site.recorders.get(recorder.0)?.port.as_deref()?;
         let (site, file) = (self.site.clone(), self.file.clone());
         let chosen = Chosen { site, file, recorder: Some(recorder) };
-        Some(ConnectionArgs {
-            chosen: Some(chosen.into()),
-            ..connection::at_port(connection, port)
-        })
+        let mut connection = connection::at_port(connection, port);
+        take_baud(&mut connection, chosen.recorder());
+        Some(ConnectionArgs { chosen: Some(chosen.into()), ..connection })
     }
 
     /// The failure of a command that needs one recorder and cannot tell which.

@@ -1,7 +1,7 @@
 //! The resolved site: plain structs, in which names have become indices.
 
 use jiff::tz::TimeZone;
-use ser_proto::Model;
+use ser_proto::{Baud, Model};
 
 use super::digest::SiteDigest;
 use crate::time::{Moment, Shown, Utc};
@@ -53,6 +53,9 @@ pub struct Recorder {
     pub name: String,
     /// How it is reached, as for `--port`.
     pub port: Option<String>,
+    /// The rate of its serial port, if it is not the one that recorders are delivered with; also
+    /// that behind a terminal server.
+    pub baud: Option<Baud>,
     /// Its model.
     pub model: Option<Model>,
     /// How many entries its log holds, for original recorders, which do not say.
@@ -236,6 +239,7 @@ impl Recorder {
         Recorder {
             name: name.into(),
             port: None,
+            baud: None,
             model: None,
             log_size: None,
             is_original: false,

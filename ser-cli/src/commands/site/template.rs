@@ -87,6 +87,7 @@ const EXAMPLE_RECORDER: &str = "
 [[recorder]]
 name = \"SER1\"
 # port = \"/dev/ttyUSB0\"  # or \"tcp://10.0.0.7:4000\", \"geni:/dev/shm/host?node=5\"
+# baud = 9600            # of its serial port, also behind a terminal server
 # model = \"ser320\"       # or \"ser160\"
 # original = true         # by the original manufacturer; it does not say its log's size:
 # log_size = 2048

@@ -6,6 +6,7 @@
 
 pub(super) mod ambiguous_point;
 pub(super) mod backward_shift;
+pub(super) mod bad_baud;
 pub(super) mod bad_clock;
 pub(super) mod bad_edge;
 pub(super) mod bad_time;

@@ -8,6 +8,7 @@ use crate::site::{inspect, read};
 const CHECKS: &[(&str, &str)] = &[
     ("ambiguous_point", include_str!("ambiguous_point.rs")),
     ("backward_shift", include_str!("backward_shift.rs")),
+    ("bad_baud", include_str!("bad_baud.rs")),
     ("bad_clock", include_str!("bad_clock.rs")),
     ("bad_edge", include_str!("bad_edge.rs")),
     ("bad_time", include_str!("bad_time.rs")),

@@ -36,6 +36,7 @@ pub(super) const RECORDER: Kind = Kind {
     keys: &[
         "name",
         "port",
+        "baud",
         "model",
         "original",
         "log_size",

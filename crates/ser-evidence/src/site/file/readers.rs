@@ -13,7 +13,8 @@ use super::tables::{
 };
 use super::words::{MODELS, ROLES, STATES, word};
 use crate::site::checks::{
-    bad_clock, bad_time, few_changes, same_texts, slash_in_recorder, unknown_zone, upside_down,
+    bad_baud, bad_clock, bad_time, few_changes, same_texts, slash_in_recorder, unknown_zone,
+    upside_down,
 };
 use crate::site::diagnostic::Findings;
 use crate::site::model::{Chatter, Delays, IncidentRules};
@@ -60,6 +61,7 @@ fn zone(fields: &mut Fields<'_, '_>) -> Option<TimeZone> {
 
 fn recorder(fields: &mut Fields<'_, '_>) -> RecorderTable {
     const PPM: Range = Range { least: 0, most: 1_000_000, words: "0 to 1000 ppm" };
+    const BITS: Range = Range { least: 1, most: 1_000_000, words: "1 to 1000000 bits per second" };
     const ENTRIES: Range = Range { least: 1, most: MAX_SIZE as i64, words: "1 to 2048 entries" };
     fields.require("name", "\"U1-SER1\"");
     let name = fields.name("name", NAME, "\"U1-SER1\"");
@@ -67,9 +69,11 @@ fn recorder(fields: &mut Fields<'_, '_>) -> RecorderTable {
         slash_in_recorder::passes(fields.findings, &name.span(), name.get_ref());
     }
     let clock = fields.text("clock", "\"utc\"");
+    let baud = fields.whole("baud", BITS, "19200");
     RecorderTable {
         name,
         port: fields.name("port", LONG, "\"/dev/ttyUSB0\""),
+        baud: baud.and_then(|baud| bad_baud::rate(fields.findings, &baud.span(), *baud.get_ref())),
         model: word(fields, "model", "\"ser320\"", MODELS, |_| None),
         is_original: fields.switch("original").map(Spanned::into_inner),
         log_size: unsigned(fields.whole("log_size", ENTRIES, "2048")),

@@ -1,7 +1,7 @@
 //! One struct for each kind of table.
 
 use jiff::tz::TimeZone;
-use ser_proto::Model;
+use ser_proto::{Baud, Model};
 use toml::Spanned;
 
 use crate::site::diagnostic::Span;
@@ -28,6 +28,7 @@ pub(in crate::site) struct SiteTable {
 pub(in crate::site) struct RecorderTable {
     pub(in crate::site) name: Option<Spanned<String>>,
     pub(in crate::site) port: Option<Spanned<String>>,
+    pub(in crate::site) baud: Option<Baud>,
     pub(in crate::site) model: Option<Spanned<Model>>,
     pub(in crate::site) is_original: Option<bool>,
     pub(in crate::site) log_size: Option<u16>,

@@ -37,6 +37,7 @@ pub(super) fn recorders(table: &SiteTable) -> Vec<Recorder> {
         let default = Recorder::named(table.name.as_ref()?.get_ref());
         Some(Recorder {
             port: table.port.as_ref().map(|port| port.get_ref().clone()),
+            baud: table.baud,
             model: table.model.as_ref().map(|model| *model.get_ref()),
             log_size: table.log_size,
             is_original: table.is_original.unwrap_or(default.is_original),

@@ -51,6 +51,7 @@ fn recorder(recorder: &Recorder) -> Value {
         "name": recorder.name,
         "port": recorder.port,
         "model": recorder.model.map(model_name),
+        "baud": recorder.baud.map(ser_proto::Baud::bits_per_second),
         "log_size": recorder.log_size,
         "original": recorder.is_original,
         "clock": match recorder.clock {
