@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use ser_client::Cursor;
+use ser_evidence::record::EntryRecord;
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::Result;
@@ -41,6 +42,21 @@ impl StateArgs {
 pub(crate) fn life_of_empty_log(state: &StateArgs, connection: &ConnectionArgs) -> Life {
     let life = Keeper::load(state, connection).and_then(|mut keeper| keeper.life_of_empty_log());
     life.unwrap_or(Life::UNKNOWN)
+}
+
+/// The entry of a recorder that was delivered last, if its life has a name.
+pub(crate) fn last_delivered(args: &StateArgs, connection: &ConnectionArgs) -> Option<EntryRecord> {
+    let name = connection::unit_name(connection).ok()?;
+    let delivered = StateFile::of_unit(&name, args.directory()).ok()?.load().ok()??;
+    let cursor = delivered.cursor?;
+    Some(EntryRecord {
+        life: delivered.life?,
+        sequence: Some(cursor.sequence),
+        // Its place in the ring is not remembered.
+        number: 0,
+        entry: cursor.anchor?,
+        known: EntryRecord::ALL_KNOWN,
+    })
 }
 
 /// The state file of a recorder, and what is to be written to it.

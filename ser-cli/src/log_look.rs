@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ser_client::{Clock, Cursor, RealTime, RequestError, Unit};
-use ser_evidence::record::{Life, Place};
+use ser_evidence::record::{EntryRecord, Life, Place};
 use ser_proto::{Code, Command, Entry, Reply};
 
 /// How often the newest entry is asked for while events keep coming.
@@ -18,7 +18,12 @@ pub(crate) struct LogLook {
     pub(crate) newest: Option<Entry>,
     /// The life of the log, where somebody has named it.
     life: Life,
+    /// The sequence of the newest entry in that life, if it is known beyond 65536.
+    sequence: Option<u64>,
 }
+
+/// What recorders count modulo.
+const WRAP: u64 = 1 << 16;
 
 /// By when the log is known to have held nothing after `cursor`; `None` if it holds more.
 ///
@@ -50,28 +55,46 @@ impl LogLook {
             let now = (&reply).into();
             if now == position {
                 let newest = reply.entries.first().copied();
-                return Ok(LogLook { total: position.total, newest, life: Life::UNKNOWN });
+                return Ok(LogLook {
+                    total: position.total,
+                    newest,
+                    life: Life::UNKNOWN,
+                    sequence: None,
+                });
             }
             position = now;
         }
-        Ok(LogLook { total: position.total, newest: None, life: Life::UNKNOWN })
+        Ok(LogLook { total: position.total, newest: None, life: Life::UNKNOWN, sequence: None })
     }
 
-    /// Names the life of an empty log. Of another one the newest entry tells which it is.
-    pub(crate) fn named(self, life_of_empty_log: impl FnOnce() -> Life) -> LogLook {
-        match self.total {
-            0 if self.newest.is_none() => LogLook { life: life_of_empty_log(), ..self },
-            _ => self,
+    /// Names the life of an empty log. Of another one the newest entry tells which it is, and if
+    /// that is the one that was delivered last, its life has a name.
+    pub(crate) fn named(
+        self,
+        life_of_empty_log: impl FnOnce() -> Life,
+        last_delivered: impl FnOnce() -> Option<EntryRecord>,
+    ) -> LogLook {
+        if self.total == 0 && self.newest.is_none() {
+            return LogLook { life: life_of_empty_log(), ..self };
+        }
+        let is_newest = |last: &EntryRecord| {
+            let total = last.sequence.map(|sequence| sequence % WRAP);
+            total == Some(u64::from(self.total)) && Some(last.entry) == self.newest
+        };
+        match last_delivered().filter(is_newest) {
+            Some(EntryRecord { life, sequence, .. }) => LogLook { life, sequence, ..self },
+            None => self,
         }
     }
 
     /// The place of something that happened after this look, and before the log had this total.
     pub(crate) fn place(&self, total_after: Option<u16>) -> Place {
-        Place {
-            life: self.life,
-            after: Some(self.total.into()),
-            before: total_after.map(u64::from),
-            newest: self.newest,
-        }
+        let after = self.sequence.unwrap_or(self.total.into());
+        let before = total_after.map(|total| {
+            let more = u64::from(total.wrapping_sub(self.total));
+            // Where the life has no name, totals are counted modulo 65536.
+            self.sequence.map_or(total.into(), |_| after.saturating_add(more))
+        });
+        Place { life: self.life, after: Some(after), before, newest: self.newest }
     }
 }

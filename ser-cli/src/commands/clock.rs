@@ -71,7 +71,10 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
     let kept = KeptRecords::of(state, connection)?;
     let mut unit = connection::open(connection)?;
-    let before = LogLook::take(&mut unit)?.named(|| keeper::life_of_empty_log(state, connection));
+    let before = LogLook::take(&mut unit)?.named(
+        || keeper::life_of_empty_log(state, connection),
+        || keeper::last_delivered(state, connection),
+    );
     let sent = set(&mut unit, *at, &time_in).inspect_err(|error| {
         if matches!(error, RequestError::NoReply { may_have_been_done: true, .. }) {
             kept.add(&[setting::step(before.place(None))]);

@@ -118,9 +118,14 @@ pub(crate) mod testing {
         }
     }
 
+    /// A life that is known.
+    pub(crate) fn life() -> Life {
+        Life::from_name("00000000000000ab").expect("a name")
+    }
+
     /// The same as event 5000 of a log whose life is known.
     pub(crate) fn event(number: u16, entry: Entry) -> Event {
-        let life = Life::from_name("00000000000000ab").expect("a name");
+        let life = life();
         Event { number, sequence: Some(5000), life, entry, notes: Vec::new() }
     }
 

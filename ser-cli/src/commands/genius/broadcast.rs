@@ -145,7 +145,10 @@ impl Asked {
         let look = looks.filter(|_| before.is_ok()).and_then(|state| {
             let look = LogLook::take(&mut unit).ok()?;
             let connection = connection::to_node(connection, node).ok()?;
-            Some(look.named(|| keeper::life_of_empty_log(state, &connection)))
+            Some(look.named(
+                || keeper::life_of_empty_log(state, &connection),
+                || keeper::last_delivered(state, &connection),
+            ))
         });
         Asked { node, unit, before, look }
     }

@@ -22,6 +22,7 @@ use crate::output::{Format, Palette, Record, RecorderColumn, Rows, SiteTable, si
 use crate::site_file::Chosen;
 use buses::Buses;
 use follower::Follower;
+use order::Evidence;
 
 /// What arrives this close together is put in order.
 const GATHERED: Duration = Duration::from_millis(300);
@@ -41,7 +42,9 @@ pub(super) fn run(args: &Args, connection: &ConnectionArgs, chosen: &Chosen) -> 
     let buses = Buses::default();
     let followers = followers(args, connection, chosen, &stop, &buses);
     let columns = followers.iter().map(|follower| follower.column.clone()).collect();
-    let mut list = List::new(columns);
+    let remembered = followers.iter().map(Follower::remembered);
+    let evidence = Evidence::new(chosen.site.clone(), remembered.collect::<Vec<_>>());
+    let mut list = List::new(columns, evidence);
     let (sender, batches) = sync_channel(followers.len());
     inform(format_args!("watching {} until Ctrl-C", list.names()));
     thread::scope(|scope| {
@@ -97,16 +100,17 @@ fn followers<'a>(
 /// The list on standard output.
 struct List {
     columns: Vec<RecorderColumn>,
+    evidence: Evidence,
     table: SiteTable<Rows>,
     losses: usize,
 }
 
 impl List {
-    fn new(columns: Vec<RecorderColumn>) -> List {
+    fn new(columns: Vec<RecorderColumn>, evidence: Evidence) -> List {
         let header = site_header(&columns);
         let (rows, has_header) = Rows::to_stdout(&|line| line == header);
         let table = SiteTable::new(rows, Palette::of_stdout(), columns.clone(), has_header);
-        List { columns, table, losses: 0 }
+        List { columns, evidence, table, losses: 0 }
     }
 
     fn names(&self) -> String {
@@ -127,7 +131,7 @@ impl List {
                 }
                 waiting.push(written);
             }
-            for (recorder, record) in order::by_shown_time(by_recorder) {
+            for (recorder, record) in self.evidence.ordered(by_recorder) {
                 self.losses += usize::from(matches!(record, Record::Loss(_)));
                 self.table.record(recorder, &record)?;
             }

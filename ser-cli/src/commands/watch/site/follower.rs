@@ -13,8 +13,10 @@ use super::Batch;
 use super::buses::Buses;
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::error::{Failure, Result, inform};
-use crate::keeper::Keeper;
+use crate::keeper::{self, Keeper};
+use crate::kept::KeptRecords;
 use crate::output::{Annotator, Event, EventWriter, Loss, Record, RecorderColumn};
+use ser_evidence::record::EntryRecord;
 
 /// How long a recorder that has failed is left alone.
 const ASK_AGAIN: Duration = Duration::from_secs(10);
@@ -29,6 +31,13 @@ pub(super) struct Follower<'a> {
 }
 
 impl Follower<'_> {
+    /// Its name, what is kept of its clock, and the entry that was delivered last.
+    pub(super) fn remembered(&self) -> (String, Option<KeptRecords>, Option<EntryRecord>) {
+        let kept = KeptRecords::of(&self.args.state, &self.connection).ok();
+        let last = keeper::last_delivered(&self.args.state, &self.connection);
+        (self.column.name.clone(), kept, last)
+    }
+
     /// Hands over what the recorder records, until an interrupt or until nobody listens.
     pub(super) fn run(&self, place: usize, batches: &SyncSender<Batch>) {
         let mut has_failed = false;

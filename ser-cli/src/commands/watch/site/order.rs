@@ -1,92 +1,229 @@
-//! The order of what several recorders have recorded.
+//! The order of what several recorders have recorded, by what is known of their clocks.
 
+use std::collections::HashMap;
+use std::time::{Duration, Instant};
+
+use ser_evidence::history::Collector;
+use ser_evidence::record::{self, EntryRecord, Life};
+use ser_evidence::site::Site;
+use ser_evidence::timeline::Timeline;
+
+use crate::kept::KeptRecords;
 use crate::output::Record;
 
-/// A date and time as its fields, the largest first.
-type Shown = (u16, [u8; 5], u16);
+/// How often what is remembered of clocks is read anew: somebody may have set one.
+const RELOAD_EVERY: Duration = Duration::from_secs(30);
 
-/// Puts records in order by what the clocks showed. Those of one recorder stay in their order,
-/// also where its clock went back; a loss stays before the event that follows it.
-pub(super) fn by_shown_time(of_recorders: Vec<Vec<Record>>) -> Vec<(usize, Record)> {
-    let mut all: Vec<(Shown, usize, Record)> = Vec::new();
-    for (recorder, records) in of_recorders.into_iter().enumerate() {
-        let times = times(&records);
-        all.extend(times.into_iter().zip(records).map(|(time, record)| (time, recorder, record)));
-    }
-    // A stable sort: what shows the same time stays together by recorder.
-    all.sort_by_key(|(time, ..)| *time);
-    all.into_iter().map(|(_, recorder, record)| (recorder, record)).collect()
+/// How many of the last entries of a recorder are kept in mind. A clock that was set is placed by
+/// the entry right before.
+const RECENT: usize = 64;
+
+/// What is known of the clocks while events come.
+pub(super) struct Evidence {
+    site: Site,
+    recorders: Vec<Known>,
+    loaded_at: Option<Instant>,
 }
 
-/// A time for each record, which never goes back.
-fn times(records: &[Record]) -> Vec<Shown> {
-    let mut times: Vec<Shown> = Vec::with_capacity(records.len());
-    let mut latest = Shown::default();
-    for record in records {
-        latest = latest.max(shown(record).unwrap_or(latest));
-        times.push(latest);
+/// What is known of one recorder.
+struct Known {
+    name: String,
+    kept: Option<KeptRecords>,
+    records: Vec<record::Record>,
+    recent: Vec<EntryRecord>,
+}
+
+impl Evidence {
+    /// Of these recorders, in this order, each with what is remembered of it and the entry that was
+    /// delivered last.
+    pub(super) fn new(
+        site: Site,
+        recorders: impl IntoIterator<Item = (String, Option<KeptRecords>, Option<EntryRecord>)>,
+    ) -> Evidence {
+        let known = |(name, kept, last): (String, Option<KeptRecords>, Option<EntryRecord>)| {
+            Known { name, kept, records: Vec::new(), recent: last.into_iter().collect() }
+        };
+        Evidence { site, recorders: recorders.into_iter().map(known).collect(), loaded_at: None }
     }
-    // A loss has the time of what follows it.
-    let mut next = latest;
-    for (time, record) in times.iter_mut().zip(records).rev() {
-        if matches!(record, Record::Loss(_)) {
-            *time = next;
+
+    /// Puts records in order. Those of one recorder stay in theirs, and a loss stays ahead of the
+    /// event that follows it.
+    pub(super) fn ordered(&mut self, of_recorders: Vec<Vec<Record>>) -> Vec<(usize, Record)> {
+        self.load_if_due();
+        let ranks = self.ranks(&of_recorders);
+        let mut all: Vec<(usize, usize, Record)> = Vec::new();
+        for (recorder, records) in of_recorders.into_iter().enumerate() {
+            let of_records = self.places(&ranks, recorder, &records);
+            all.extend(
+                of_records.into_iter().zip(records).map(|(at, record)| (at, recorder, record)),
+            );
         }
-        next = *time;
+        // A stable sort: what stands together stays together by recorder.
+        all.sort_by_key(|(at, ..)| *at);
+        all.into_iter().map(|(_, recorder, record)| (recorder, record)).collect()
     }
-    times
+
+    fn load_if_due(&mut self) {
+        if self.loaded_at.is_some_and(|at| at.elapsed() < RELOAD_EVERY) {
+            return;
+        }
+        for known in &mut self.recorders {
+            known.records = known.kept.as_ref().map(KeptRecords::load).unwrap_or_default();
+        }
+        self.loaded_at = Some(Instant::now());
+    }
+
+    /// Where each entry is in the timeline of all that is known.
+    fn ranks(&mut self, of_recorders: &[Vec<Record>]) -> HashMap<(String, Life, u64), usize> {
+        let mut collector = Collector::new();
+        for (known, records) in self.recorders.iter_mut().zip(of_recorders) {
+            collector.begin_source();
+            for record in &known.records {
+                collector.add(&known.name, record);
+            }
+            known.recent.extend(records.iter().filter_map(entry));
+            for entry in &known.recent {
+                collector.add(&known.name, &record::Record::Entry(*entry));
+            }
+            let too_many = known.recent.len().saturating_sub(RECENT);
+            known.recent.drain(..too_many);
+        }
+        let history = collector.finish(&self.site);
+        let timeline = Timeline::new(&self.site, &history);
+        let rank = |(rank, event)| {
+            let name = timeline.recorder(event)?.recorder.name.clone();
+            let life = timeline.life(event)?.name();
+            Some(((name, life, timeline.held(event)?.sequence), rank))
+        };
+        timeline.entries().enumerate().filter_map(rank).collect()
+    }
+
+    /// A place for each record of a recorder, which never goes back.
+    fn places(
+        &self,
+        ranks: &HashMap<(String, Life, u64), usize>,
+        recorder: usize,
+        records: &[Record],
+    ) -> Vec<usize> {
+        let name = self.recorders.get(recorder).map(|known| known.name.clone()).unwrap_or_default();
+        let rank = |record: &Record| {
+            let entry = entry(record)?;
+            ranks.get(&(name.clone(), entry.life, entry.sequence?)).copied()
+        };
+        let mut places: Vec<usize> = Vec::with_capacity(records.len());
+        let mut latest = 0;
+        for record in records {
+            latest = latest.max(rank(record).unwrap_or(latest));
+            places.push(latest);
+        }
+        // A loss is where the event after it is.
+        let mut next = latest;
+        for (place, record) in places.iter_mut().zip(records).rev() {
+            if matches!(record, Record::Loss(_)) {
+                *place = next;
+            }
+            next = *place;
+        }
+        places
+    }
 }
 
-fn shown(record: &Record) -> Option<Shown> {
-    let Record::Event(event) = record else { return None };
-    let time = event.entry.time;
-    time.check().ok()?;
-    let fields = [time.month, time.day, time.hour, time.minute, time.second];
-    Some((time.full_year(), fields, time.millisecond))
+fn entry(record: &Record) -> Option<EntryRecord> {
+    match record {
+        Record::Event(event) => Some(event.into()),
+        Record::Loss(_) => None,
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use ser_evidence::record::{ClockObservation, How, Place, Reference};
+    use ser_evidence::time::{Bound, Moment, shown};
+
     use super::*;
+    use crate::host_reading;
     use crate::output::testing::{entry, event, four_lost};
 
     fn at(number: u16, time: &str) -> Record {
-        Record::Event(event(number, entry(time, &[1], &[1])))
+        let mut event = event(number, entry(time, &[1], &[1]));
+        event.sequence = Some(number.into());
+        Record::Event(event)
+    }
+
+    fn evidence() -> Evidence {
+        let names = ["U1", "U2"].map(|name| (name.to_owned(), None, None));
+        Evidence::new(Site::unknown(), names)
     }
 
     /// The numbers of the events in their order; 0 for a loss.
-    fn ordered(of_recorders: Vec<Vec<Record>>) -> Vec<(usize, u16)> {
+    fn ordered(evidence: &mut Evidence, of_recorders: Vec<Vec<Record>>) -> Vec<(usize, u16)> {
         let number = |record: &Record| match record {
             Record::Event(event) => event.number,
             Record::Loss(_) => 0,
         };
-        let ordered = by_shown_time(of_recorders);
+        let ordered = evidence.ordered(of_recorders);
         ordered.iter().map(|(recorder, record)| (*recorder, number(record))).collect()
     }
 
     #[test]
-    fn recorders_are_merged_by_time() {
+    fn without_anything_known_the_clocks_are_believed() {
         assert_eq!(
-            ordered(vec![vec![at(1, "00.250"), at(2, "00.300")], vec![at(1, "00.260")]]),
+            ordered(
+                &mut evidence(),
+                vec![vec![at(1, "00.250"), at(2, "00.300")], vec![at(1, "00.260")]]
+            ),
             [(0, 1), (1, 1), (0, 2)]
         );
     }
 
     #[test]
-    fn one_recorder_stays_in_its_order_where_its_clock_goes_back() {
+    fn a_clock_that_is_known_to_be_late_is_put_right() {
+        let mut evidence = evidence();
+        // U2 shows ten seconds less than U1 at the same moment.
+        for (known, time) in evidence.recorders.iter_mut().zip(["10.000", "00.000"]) {
+            let shown = shown(&entry(time, &[], &[]).time).expect("a date");
+            let reading = host_reading::now();
+            let bound = Bound::new(
+                Some(reading.monotonic),
+                Some(Moment::from_us(reading.monotonic.us() + 1000)),
+            );
+            let life = crate::output::testing::life();
+            let place = Place { life, after: Some(0), before: Some(0), newest: None };
+            let at = Reference::Host { bound, reading };
+            let how = How::Set { broadcast: None };
+            let observation = ClockObservation { how, shown, at, place };
+            known.records.push(record::Record::Clock(observation));
+        }
+        evidence.loaded_at = Some(Instant::now());
         assert_eq!(
-            ordered(vec![vec![at(1, "05.000"), at(2, "01.000")], vec![at(1, "03.000")]]),
-            [(1, 1), (0, 1), (0, 2)]
+            ordered(
+                &mut evidence,
+                vec![vec![at(1, "15.000")], vec![at(1, "04.000"), at(2, "06.000")]]
+            ),
+            [(1, 1), (0, 1), (1, 2)]
         );
+    }
+
+    #[test]
+    fn one_recorder_stays_in_its_order_where_its_clock_goes_back() {
+        let of = ordered(
+            &mut evidence(),
+            vec![vec![at(1, "05.000"), at(2, "01.000")], vec![at(1, "03.000")]],
+        );
+        let first = of.iter().position(|row| *row == (0, 1));
+        assert!(first < of.iter().position(|row| *row == (0, 2)), "{of:?}");
     }
 
     #[test]
     fn a_loss_stays_before_what_follows_it() {
         assert_eq!(
-            ordered(vec![
-                vec![at(1, "01.000"), Record::Loss(four_lost()), at(6, "05.000")],
-                vec![at(1, "03.000"), Record::Loss(four_lost())],
-            ]),
+            ordered(
+                &mut evidence(),
+                vec![
+                    vec![at(1, "01.000"), Record::Loss(four_lost()), at(6, "05.000")],
+                    vec![at(1, "03.000"), Record::Loss(four_lost())],
+                ]
+            ),
             [(0, 1), (1, 1), (1, 0), (0, 0), (0, 6)]
         );
     }
