@@ -7,6 +7,7 @@
 
 mod boards;
 mod demo;
+mod evidence_mistakes;
 mod firmware;
 mod flash;
 mod fuzz;
@@ -44,6 +45,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Demo(demo::Arguments),
+    EvidenceMistakes(evidence_mistakes::Arguments),
     Qemu(qemu::Arguments),
     Test(test::Arguments),
     Firmware(firmware::Arguments),
@@ -63,6 +65,7 @@ fn main() -> ExitCode {
     let installing = if offline { Installing::Forbidden } else { Installing::Allowed };
     let done = match verb {
         Verb::Demo(arguments) => demo::run(&arguments, installing),
+        Verb::EvidenceMistakes(arguments) => evidence_mistakes::run(&arguments),
         Verb::Qemu(arguments) => qemu::run(&arguments, installing),
         Verb::Test(arguments) => test::run(&arguments, installing),
         Verb::Firmware(arguments) => firmware::run(&arguments, installing),

@@ -21,6 +21,11 @@ pub(crate) fn host_target() -> PathBuf {
     }
 }
 
+/// Where a copy of `ser-evidence` is made wrong.
+pub(crate) fn evidence_mistakes() -> PathBuf {
+    host_target().join("evidence-mistakes")
+}
+
 /// Where the firmware is built. The folder is separate because the compiler may be another one.
 pub(crate) fn firmware_target() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {

@@ -8,7 +8,7 @@ use crate::boards::{BOARDS, MPS2_AN385};
 use crate::setup::demand::{self, Demand, Installing, Kind};
 use crate::setup::{self, emulator, programs};
 use crate::steps::{self, Failure, Result, heading, note};
-use crate::{images, lint, plugin};
+use crate::{evidence_mistakes, images, lint, plugin};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -55,7 +55,8 @@ fn everything(demand: Demand) -> Result<()> {
     if let Some(missing) = missing.into_iter().next().filter(|_| demand.is_strict()) {
         return Err(missing);
     }
-    tests(demand, &checked)
+    tests(demand, &checked)?;
+    evidence_mistakes::all("")
 }
 
 /// Builds and runs the tests. Those in the emulator run only if it is installed and its image was
@@ -125,7 +126,9 @@ fn ignored_tests(images: &[Checked]) -> Result<()> {
     steps::run(&mut over_images)?;
     heading("Tests that take minutes");
     let long = ["test", "--package", "ser-tests", "--test", "simulation", "--", "--ignored"];
-    steps::run(steps::cargo().args(long))
+    steps::run(steps::cargo().args(long))?;
+    let worlds = ["test", "--package", "ser-evidence", "--test", "rules", "--", "--ignored"];
+    steps::run(steps::cargo().args(worlds))
 }
 
 #[cfg(test)]

@@ -1,0 +1,150 @@
+//! A whole world in truth: hosts, contacts, recorders, and what was done with their clocks.
+//!
+//! Nothing here knows how the crate reckons. The judge compares what the crate says of the records
+//! with what is drawn here.
+
+use ser_evidence::site::{ClockRule, Site};
+
+use crate::chance::Chance;
+use crate::contact;
+use crate::host::TrueHost;
+use crate::operation::{Operation, What};
+use crate::plant;
+use crate::recorder::{Build, SetTakesEffect, TrueRecorder};
+use crate::true_time::{MS, Ps, S};
+
+/// What is amiss in a world besides what happens in every plant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Trouble {
+    /// Nothing.
+    None,
+    /// One observation of a clock is wrong: the truth is not in its bound.
+    WrongObservation,
+    /// One entry was read twice, with other content each time.
+    Conflict,
+    /// Somebody set a clock, and no record tells.
+    SecretSet,
+}
+
+/// Everything that is true.
+pub(crate) struct World {
+    pub(crate) seed: u64,
+    pub(crate) trouble: Trouble,
+    pub(crate) start_utc_us: i64,
+    pub(crate) until: Ps,
+    pub(crate) site: Site,
+    pub(crate) hosts: Vec<TrueHost>,
+    pub(crate) recorders: Vec<TrueRecorder>,
+    pub(crate) operations: Vec<Operation>,
+    pub(crate) set_takes_effect: SetTakesEffect,
+}
+
+impl World {
+    /// The world of a seed.
+    pub(crate) fn draw(seed: u64, chance: &mut Chance) -> World {
+        let trouble = match chance.below(20) {
+            0 => Trouble::WrongObservation,
+            1 => Trouble::Conflict,
+            2 => Trouble::SecretSet,
+            _ => Trouble::None,
+        };
+        let start_utc_us = chance.between(1_600_000_000, 1_900_000_000) * 1_000_000;
+        let length = chance.of(&[60 * S, 600 * S, 3600 * S, 86_400 * S, 30 * 86_400 * S]);
+        let until = chance.between(length / 2, length);
+        let mut moments: Vec<Ps> =
+            (0..chance.between(2, 8)).map(|_| chance.between(S, until)).collect();
+        moments.sort_unstable();
+        let (mut site, builds) = plant::draw(start_utc_us / 1000, &moments, until, chance);
+        if chance.one_in(2) {
+            site.utc_doubt_us =
+                Some(u64::try_from(chance.between(1000, 50_000)).expect("positive"));
+        }
+        let hosts: Vec<TrueHost> = (0..chance.between(1, 4))
+            .map(|_| TrueHost::draw(start_utc_us, site.utc_doubt_us, chance))
+            .collect();
+        let count = 1 + builds.iter().flat_map(|b| &b.wires).map(|w| w.contact).max().unwrap_or(0);
+        let contacts = contact::draw(count, &moments, until, chance);
+        let builds = plant::with_first_states(builds, &contacts);
+        let set_takes_effect = builds[0].set_takes_effect;
+        let operations = operations(&builds, &hosts, &moments, until, chance);
+        let secret = (trouble == Trouble::SecretSet)
+            .then(|| (chance.below(builds.len()), chance.between(0, until)));
+        let live = |(recorder, build): (usize, Build)| {
+            let mut sets = sets_of(recorder, &operations);
+            if let Some((_, at)) = secret.filter(|&(whose, _)| whose == recorder) {
+                sets.push((at, start_utc_us / 1000 + chance.between(-5000, 5000)));
+            }
+            sets.sort_unstable();
+            TrueRecorder::live(build, &contacts, &sets, until, chance)
+        };
+        let recorders = builds.into_iter().enumerate().map(live).collect();
+        World {
+            seed,
+            trouble,
+            start_utc_us,
+            until,
+            site,
+            hosts,
+            recorders,
+            operations,
+            set_takes_effect,
+        }
+    }
+}
+
+/// What is done with clocks, in order.
+fn operations(
+    builds: &[Build],
+    hosts: &[TrueHost],
+    moments: &[Ps],
+    until: Ps,
+    chance: &mut Chance,
+) -> Vec<Operation> {
+    let mut operations = Vec::new();
+    let mut add = |whose: Vec<usize>, is_broadcast: bool, chance: &mut Chance| {
+        let sent = if chance.one_in(2) {
+            chance.of(moments) + chance.between(-30 * S, 5 * S)
+        } else {
+            chance.between(0, until)
+        };
+        let mut operation = Operation::draw(sent.max(0), is_broadcast, chance);
+        operation.host = chance.below(hosts.len());
+        let is_steady = |&recorder: &usize| {
+            let schedule = &builds[recorder].schedule;
+            schedule.is_one_life(operation.before - 10 * MS, operation.after + 10 * MS)
+        };
+        operation.recorders = whose.into_iter().filter(is_steady).collect();
+        let sets = if is_broadcast { chance.one_in(2) } else { chance.one_in(3) };
+        if sets && let Some(&recorder) = operation.recorders.first() {
+            let reading = hosts[operation.host].reading(operation.sent, chance);
+            let east_us = match builds[recorder].site.clock {
+                ClockRule::Offset(seconds) => i64::from(seconds) * 1_000_000,
+                ClockRule::Utc | ClockRule::Local => 0,
+            };
+            operation.what = What::Set((reading.utc.us() + east_us) / 1000);
+        }
+        operations.push(operation);
+    };
+    for recorder in 0..builds.len() {
+        for _ in 0..chance.between(0, 6) {
+            add(vec![recorder], false, chance);
+        }
+    }
+    let bus: Vec<usize> = (0..builds.len()).filter(|_| !chance.one_in(4)).collect();
+    for _ in 0..chance.between(0, 3) {
+        add(bus.clone(), true, chance);
+    }
+    operations.sort_by_key(|operation| operation.sent);
+    operations
+}
+
+/// The arrivals that set the clock of a recorder, with what they set it to.
+fn sets_of(recorder: usize, operations: &[Operation]) -> Vec<(Ps, i64)> {
+    let mut sets = Vec::new();
+    for operation in operations.iter().filter(|o| o.recorders.contains(&recorder)) {
+        if let What::Set(shown_ms) = operation.what {
+            sets.extend(operation.arrivals.iter().map(|&arrival| (arrival, shown_ms)));
+        }
+    }
+    sets
+}
