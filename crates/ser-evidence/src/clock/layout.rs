@@ -9,7 +9,7 @@
 use super::envelope::{Envelope, Known, NO_HI, NO_LO};
 use super::hosts::Hosts;
 use super::links::Link;
-use super::offsets::{Home, Observed, RunClock, added};
+use super::offsets::{Home, Observed, RunClock};
 use crate::record::{Boot, Reference};
 
 /// How wrong a clock may be of which nothing is known: a hundred years, in microseconds.
@@ -32,8 +32,6 @@ struct Placed {
     offset: Envelope,
     /// Whether nothing at all is known about it.
     is_timeless: bool,
-    /// The same before any clock got a place because it had to have one.
-    proven: Envelope,
 }
 
 /// An instant on the scale of the list.
@@ -41,8 +39,6 @@ struct Placed {
 pub(crate) struct Instant {
     /// Where it goes.
     pub(crate) at: i64,
-    /// Between which instants it is proven to be.
-    pub(crate) proven: (i64, i64),
     /// Whether nothing is known about it but what the clock showed.
     pub(crate) is_timeless: bool,
 }
@@ -128,21 +124,17 @@ impl Layout {
         }));
         let mut layout = Layout { boots, clocks };
         layout.settle(&ties);
-        for placed in &mut layout.clocks {
-            placed.proven.clone_from(&placed.offset);
-        }
         layout.place_the_rest(hosts, runs, &ties);
         layout
     }
 
-    /// Between which instants of the scale a run's clock showed `x`.
+    /// At which instant of the scale a run's clock showed `x`.
     pub(crate) fn instant(&self, run: usize, x: i64) -> Option<Instant> {
         let placed = self.clocks.get(self.boots.len() + run)?;
         let (lo, hi) = placed.offset.at(x);
         let is_placed = lo != NO_LO && hi != NO_HI;
         is_placed.then(|| Instant {
             at: lo.midpoint(hi).saturating_add(x),
-            proven: added(placed.proven.at(x), x),
             is_timeless: placed.is_timeless,
         })
     }
@@ -226,7 +218,7 @@ impl Layout {
 }
 
 fn placed(offset: Envelope) -> Placed {
-    Placed { proven: offset.clone(), offset, is_timeless: false }
+    Placed { offset, is_timeless: false }
 }
 
 /// What a clock showed at a moment of a boot, as well as that is known.

@@ -116,15 +116,24 @@ impl LifeBounds {
 
     /// Finds where each entry goes in the list.
     ///
-    /// Each entry goes where its clock says, as far as the proven bounds of those before and after
-    /// it allow that.
-    pub(super) fn sort_keys(&mut self, life: &LifeHistory, clock: &LifeClock, model: &ClockModel) {
+    /// Each entry goes where its clock says, as far as those before and after it allow that.
+    /// `delay_us` is how long before its sample a contact of this recorder moves, in the middle.
+    pub(super) fn sort_keys(
+        &mut self,
+        life: &LifeHistory,
+        clock: &LifeClock,
+        model: &ClockModel,
+        delay_us: i64,
+    ) {
         let mut possible = PossibleRuns::new(clock, model);
         let wanted = life.entries.iter().map(|held| {
             possible.turn_to(held);
             shown(&held.entry.time).map_or(Wanted::NOWHERE, |shown| possible.on_list(shown))
         });
         self.keys = keys(wanted.collect());
+        for key in self.keys.iter_mut().filter(|key| key.at != NO_LO) {
+            key.at = key.at.saturating_sub(delay_us);
+        }
     }
 
     /// Adds what people say has to be added.
@@ -204,7 +213,7 @@ impl LifeBounds {
     }
 }
 
-/// Where an entry would go by its own clock, and what is proven about that.
+/// Where an entry goes by its own clock; if that may be any of several, between these.
 #[derive(Clone, Copy, Debug)]
 struct Wanted {
     at: Option<i64>,
@@ -216,9 +225,11 @@ struct Wanted {
 impl Wanted {
     const NOWHERE: Wanted = Wanted { at: None, lo: NO_LO, hi: NO_HI, is_timeless: true };
 
-    fn of(instant: Instant) -> Wanted {
-        let Instant { at, proven: (lo, hi), is_timeless } = instant;
-        Wanted { at: Some(at), lo, hi, is_timeless }
+    fn of(Instant { at, is_timeless }: Instant) -> Wanted {
+        match is_timeless {
+            true => Wanted { at: Some(at), ..Wanted::NOWHERE },
+            false => Wanted { at: Some(at), lo: at, hi: at, is_timeless },
+        }
     }
 
     /// Where an entry goes that is either of these.
@@ -293,17 +304,11 @@ impl<'m> PossibleRuns<'m> {
     /// Where an entry with this stamp goes in the list.
     fn on_list(&self, shown: Moment<Shown>) -> Wanted {
         let each = self.ids.iter().zip(&self.clocks);
-        let mut wanted = each.map(|(&id, run)| {
+        let wanted = each.map(|(&id, run)| {
             let instant = self.model.layout.instant(id, run.unwrapped(shown));
             instant.map_or(Wanted::NOWHERE, Wanted::of)
         });
-        let first = wanted.next().unwrap_or(Wanted::NOWHERE);
-        match (wanted.next(), first.at) {
-            (Some(second), _) => wanted.fold(first.or(second), Wanted::or),
-            // All sure entries of all recorders are where they can be at once, so there they stay.
-            (None, Some(at)) if !first.is_timeless => Wanted { lo: at, hi: at, ..first },
-            (None, _) => first,
-        }
+        wanted.reduce(Wanted::or).unwrap_or(Wanted::NOWHERE)
     }
 }
 

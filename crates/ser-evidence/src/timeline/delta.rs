@@ -3,7 +3,7 @@
 use super::{ChangeId, EventId, Timeline};
 use crate::clock::envelope::{NO_HI, NO_LO};
 use crate::clock::offsets::{added, ends};
-use crate::site::Delays;
+use crate::site::{Delays, Recorder};
 use crate::time::shown;
 
 /// How often a recorder looks at its inputs, in microseconds.
@@ -98,20 +98,12 @@ impl Timeline<'_> {
         (lo, hi)
     }
 
-    /// How long after its contact moved the sample was taken, negated: the earliest and the latest
-    /// movement, from the sample. Of one input, or of any change of this recorder.
+    /// The earliest and the latest movement, from the sample: of one input, or of any change of this
+    /// recorder.
     pub(super) fn delay_ends(&self, event: EventId, input: Option<u8>) -> (i64, i64) {
         let Some(recorder) = self.recorder(event) else { return (0, 0) };
-        let Delays { closing_us, opening_us } = recorder.recorder.delays;
         let is_on = input.and_then(|input| Some(self.held(event)?.entry.state.contains(input)));
-        let (shortest, longest) = match is_on {
-            Some(true) => closing_us,
-            Some(false) => opening_us,
-            None => (closing_us.0.min(opening_us.0), closing_us.1.max(opening_us.1)),
-        };
-        // Where in its millisecond an original recorder looks is not known.
-        let late = if recorder.recorder.is_original { PERIOD_US } else { 0 };
-        (-PERIOD_US - i64::from(longest) - SLACK_US, late - i64::from(shortest) + SLACK_US)
+        delay_ends_of(&recorder.recorder, is_on)
     }
 
     /// From one sample to another, by everything that is known about both.
@@ -146,6 +138,20 @@ impl Timeline<'_> {
         let links = &self.model.by_pair;
         links.difference(&self.model.runs, (other_run, other_x), (one_run, one_x))
     }
+}
+
+/// The earliest and the latest movement, from the sample: of a contact that closes or opens, or of
+/// any.
+pub(super) fn delay_ends_of(recorder: &Recorder, is_on: Option<bool>) -> (i64, i64) {
+    let Delays { closing_us, opening_us } = recorder.delays;
+    let (shortest, longest) = match is_on {
+        Some(true) => closing_us,
+        Some(false) => opening_us,
+        None => (closing_us.0.min(opening_us.0), closing_us.1.max(opening_us.1)),
+    };
+    // Where in its millisecond an original recorder looks is not known.
+    let late = if recorder.is_original { PERIOD_US } else { 0 };
+    (-PERIOD_US - i64::from(longest) - SLACK_US, late - i64::from(shortest) + SLACK_US)
 }
 
 /// From somewhere in one bound to somewhere in the other.

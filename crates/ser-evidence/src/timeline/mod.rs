@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use crate::clock::model::{ClockModel, LifeClock};
 use crate::clock::{Finding, Nominal};
 use crate::history::{Held, History, LifeHistory, RecorderHistory};
-use crate::site::Site;
+use crate::site::{Recorder, Site};
 use crate::time::{Bound, Moment, Utc};
 use bounds::{Key, LifeBounds};
 
@@ -95,7 +95,7 @@ impl<'a> Timeline<'a> {
                 let id = |place: usize| event_id(recorder, life, place);
                 let pairs = bounds.tighten();
                 out_of_order.extend(pairs.into_iter().map(|(one, other)| (id(one), id(other))));
-                bounds.sort_keys(entries, clock, &self.model);
+                bounds.sort_keys(entries, clock, &self.model, middle_delay_us(&history.recorder));
                 let shifts = self.site.shifts.iter();
                 let shifts = shifts.filter(|shift| Some(shift.recorder) == history.site);
                 bounds.shift_by_hand(&shifts.collect::<Vec<_>>());
@@ -194,8 +194,15 @@ impl<'a> Timeline<'a> {
         bounds.nominal(event.place as usize, life, self.recorder(event), self.site)
     }
 
-    /// Where the entry is in the list, in UTC as well as that is known; `None` if nothing is known
-    /// about its time.
+    /// When the sample was taken, in UTC as well as that is known: for people, and without doubt.
+    /// `None` if nothing is known about its time.
+    #[must_use]
+    pub fn time(&self, event: EventId) -> Option<Moment<Utc>> {
+        let delay_us = middle_delay_us(&self.recorder(event)?.recorder);
+        Some(Moment::from_us(self.sort_key(event)?.saturating_add(delay_us)))
+    }
+
+    /// Where the entry is in the list; `None` if nothing is known about its time.
     #[must_use]
     pub fn sort_key(&self, event: EventId) -> Option<i64> {
         let key = self.key(event)?;
@@ -224,6 +231,12 @@ impl<'a> Timeline<'a> {
     fn clock(&self, event: EventId) -> Option<&LifeClock> {
         self.model.lives.get(event.recorder as usize)?.get(event.life as usize)
     }
+}
+
+/// How long before its sample a contact of this recorder moved, in the middle.
+fn middle_delay_us(recorder: &Recorder) -> i64 {
+    let (earliest, latest) = delta::delay_ends_of(recorder, None);
+    -earliest.midpoint(latest)
 }
 
 /// An entry by its indices. Nobody has four billion of anything here.
