@@ -66,7 +66,11 @@ impl Row {
             held.sequence,
             life.name(),
             self.quoted,
-            timeline.sort_key(event).and_then(rfc3339).unwrap_or_default(),
+            timeline
+                .time(event)
+                .map(ser_evidence::time::Moment::us)
+                .and_then(rfc3339)
+                .unwrap_or_default(),
             end(bound.lo()),
             end(bound.hi()),
         );

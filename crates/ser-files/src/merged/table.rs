@@ -68,7 +68,7 @@ impl<'t> Table<'t> {
 
     fn entry(&mut self, out: &mut dyn Write, event: EventId) -> io::Result<()> {
         let Some(held) = self.timeline.held(event) else { return Ok(()) };
-        let key = self.timeline.sort_key(event);
+        let key = self.timeline.time(event).map(ser_evidence::time::Moment::us);
         if key.is_none() && !std::mem::replace(&mut self.is_timeless, true) {
             let style = self.styles.alarm;
             writeln!(out, "{style}  time not known: the clock was never set{style:#}")?;

@@ -126,7 +126,9 @@ fn recorders(document: &Document<'_>) -> Vec<Value> {
                 (Some(home), order_doubt_us, utc_doubt_us)
             }
         };
-        let at = |event: EventId| timeline.sort_key(event).and_then(rfc3339);
+        let at = |event: EventId| {
+            timeline.time(event).map(ser_evidence::time::Moment::us).and_then(rfc3339)
+        };
         json!({
             "recorder": history.map(|history| &history.recorder.name),
             "entries": of.entries,
@@ -167,7 +169,7 @@ fn sequence(document: &Document<'_>) -> Vec<Value> {
         let since =
             |from: Option<ChangeId>| from.map(|from| delta(timeline.delta(from, row.change)));
         rows.push(json!({
-            "time": timeline.sort_key(event).and_then(rfc3339),
+            "time": timeline.time(event).map(ser_evidence::time::Moment::us).and_then(rfc3339),
             "earliest": utc.lo().and_then(|lo| rfc3339(lo.us())),
             "latest": utc.hi().and_then(|hi| rfc3339(hi.us())),
             "shown": held.entry.time.to_string(),

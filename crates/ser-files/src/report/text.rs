@@ -42,7 +42,9 @@ fn headline(
 ) -> io::Result<()> {
     let Document { timeline, report, .. } = *document;
     let events = &report.incident.events;
-    let at = |event: Option<&_>| event.and_then(|&event| timeline.sort_key(event));
+    let at = |event: Option<&_>| {
+        event.and_then(|&event| timeline.time(event).map(ser_evidence::time::Moment::us))
+    };
     let name = names::harmless(&timeline.site().name);
     let title = if name.is_empty() { "Incident".to_owned() } else { name };
     let span = match (at(events.first()), at(events.last())) {

@@ -23,7 +23,11 @@ pub(super) fn first_out(
         row.map_or_else(String::new, |row| names::change(timeline, row))
     };
     if let Some(only) = first.known() {
-        let at = timeline.sort_key(only.event).map(|at| clock.time(at)).unwrap_or_default();
+        let at = timeline
+            .time(only.event)
+            .map(ser_evidence::time::Moment::us)
+            .map(|at| clock.time(at))
+            .unwrap_or_default();
         return format!("{}, {at}", named(&only));
     }
     let mut text = match first.changes.as_slice() {

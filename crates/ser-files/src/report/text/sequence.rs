@@ -141,7 +141,10 @@ fn cells(
         let us = from.and_then(|from| timeline.delta(from, row.change).middle_us());
         Cell::from(us.map(since).unwrap_or_default())
     };
-    let time = timeline.sort_key(event).map_or("not known".to_owned(), |at| clock.time(at));
+    let time = timeline
+        .time(event)
+        .map(ser_evidence::time::Moment::us)
+        .map_or("not known".to_owned(), |at| clock.time(at));
     let off = timeline
         .moved_on(event, Some(input))
         .values()

@@ -71,7 +71,9 @@ fn row(document: &Document<'_>, of: &Completeness, styles: Styles, clock: &Clock
 
 /// From when to when nothing is missing.
 fn complete(timeline: &Timeline<'_>, of: &Completeness, clock: &Clock) -> String {
-    let at = |event: EventId| timeline.sort_key(event).map(|at| clock.date_and_time(at));
+    let at = |event: EventId| {
+        timeline.time(event).map(ser_evidence::time::Moment::us).map(|at| clock.date_and_time(at))
+    };
     let read = of.read_until.map(|reading| clock.date_and_time(reading.utc.us()));
     let Some((first, last)) = of.unbroken else {
         return read.map_or_else(
