@@ -57,6 +57,9 @@ impl Slope {
         if dx == 0 {
             return (0, 0);
         }
+        if self == (Slope { rate_ppb: 0, doubt_ppb: 0 }) {
+            return (0, 0);
+        }
         let growth = parts(dx.saturating_abs(), self.doubt_ppb).saturating_add(1);
         match self.rate_ppb {
             0 => (-growth, growth),
@@ -120,6 +123,13 @@ impl Envelope {
         let mut envelope = Envelope { points, slope };
         envelope.close();
         envelope
+    }
+
+    /// Whether the slope leaves something between any two points, without any widening.
+    pub(crate) fn allows(&self, slope: Slope) -> bool {
+        let mut points = self.points.clone();
+        narrow(&mut points, slope);
+        points.iter().all(|point| point.lo <= point.hi)
     }
 
     /// The same with a slope that leaves less room.

@@ -53,15 +53,17 @@ impl Hosts {
         self.boots.keys().copied()
     }
 
-    /// UTC less the monotonic clock. Where nothing is known of it, the host's own UTC is taken to
-    /// be right to `anything_us`.
+    /// UTC less the monotonic clock, for the list. Where nothing is known of it, the host's own UTC is
+    /// taken to be right to `anything_us`. If its readings allow it, the host's monotonic clock is
+    /// taken to run as UTC does: then all recorders that it has observed stay together.
     pub(crate) fn placed(&self, boot: Boot, anything_us: i64) -> Envelope {
-        let slope = Slope::within(HOST_DRIFT_PPB);
+        let steady = Slope::within(0);
         let Some(clock) = self.boots.get(&boot) else {
-            return Envelope::with_slope(Vec::new(), slope);
+            return Envelope::with_slope(Vec::new(), steady);
         };
         if !clock.offset.is_empty() {
-            return clock.offset.clone();
+            let is_steady = clock.offset.allows(steady);
+            return if is_steady { clock.offset.narrowed(steady) } else { clock.offset.clone() };
         }
         let known = |&(x, offset): &(i64, i64)| Known {
             x,
@@ -69,7 +71,7 @@ impl Hosts {
             hi: offset + anything_us,
             id: 0,
         };
-        Envelope::with_slope(clock.readings.iter().map(known).collect(), slope)
+        Envelope::with_slope(clock.readings.iter().map(known).collect(), steady)
     }
 
     /// A reading of a boot of whose UTC nothing is known but what the host said: monotonic and UTC.
