@@ -232,6 +232,11 @@ impl Wanted {
         }
     }
 
+    /// Whether it can be in one place only.
+    fn is_sure(&self) -> bool {
+        self.lo == self.hi && !self.is_timeless
+    }
+
     /// Where an entry goes that is either of these.
     fn or(self, other: Wanted) -> Wanted {
         let middle = |(one, other): (i64, i64)| one.midpoint(other);
@@ -247,20 +252,20 @@ impl Wanted {
 /// A key for each entry of a life, never falling.
 fn keys(mut wanted: Vec<Wanted>) -> Vec<Key> {
     let has_time = wanted.iter().any(|wanted| !wanted.is_timeless);
+    stay_between_sure_ones(&mut wanted);
     let mut earliest = NO_HI;
     for wanted in wanted.iter_mut().rev() {
         earliest = earliest.min(wanted.hi);
         wanted.hi = earliest;
     }
-    let (mut latest, mut last) = (NO_LO, NO_LO);
+    let mut last = NO_LO;
     let mut keys = Vec::with_capacity(wanted.len());
     for wanted in &wanted {
-        latest = latest.max(wanted.lo).min(wanted.hi);
         // The time of a clock that was never set says nothing among others that were.
         let at = wanted.at.filter(|_| wanted.is_timeless != has_time);
-        let lo = latest.max(last).min(wanted.hi);
+        let lo = last.max(wanted.lo.min(wanted.hi));
         last = match at {
-            Some(at) => at.clamp(lo, wanted.hi),
+            Some(at) => at.clamp(lo, wanted.hi.max(lo)),
             None => lo,
         };
         keys.push(Key { is_timeless: !has_time, at: last });
@@ -271,6 +276,20 @@ fn keys(mut wanted: Vec<Wanted>) -> Vec<Key> {
         *key = first.unwrap_or(*key);
     }
     keys
+}
+
+/// Sure entries are where they are, and others between them.
+fn stay_between_sure_ones(wanted: &mut [Wanted]) {
+    let mut last = NO_LO;
+    for wanted in wanted.iter_mut() {
+        (wanted.lo, wanted.hi) = (wanted.lo.max(last), wanted.hi.max(last));
+        last = if wanted.is_sure() { wanted.hi } else { last };
+    }
+    let mut next = NO_HI;
+    for wanted in wanted.iter_mut().rev() {
+        (wanted.lo, wanted.hi) = (wanted.lo.min(next), wanted.hi.min(next));
+        next = if wanted.is_sure() { wanted.lo } else { next };
+    }
 }
 
 /// The clocks of the runs in which an entry may be, one entry after the other.
