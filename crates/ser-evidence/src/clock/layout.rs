@@ -9,7 +9,7 @@
 use super::envelope::{Envelope, Known, NO_HI, NO_LO};
 use super::hosts::Hosts;
 use super::links::Link;
-use super::offsets::{Home, Observed, RunClock};
+use super::offsets::{Home, Observed, RunClock, added};
 use crate::record::{Boot, Reference};
 
 /// How wrong a clock may be of which nothing is known: a hundred years, in microseconds.
@@ -32,6 +32,8 @@ struct Placed {
     offset: Envelope,
     /// Whether nothing at all is known about it.
     is_timeless: bool,
+    /// What was known before it got its place, if it got one because it had to have one.
+    before: Option<Envelope>,
 }
 
 /// An instant on the scale of the list.
@@ -39,6 +41,8 @@ struct Placed {
 pub(crate) struct Instant {
     /// Where it goes.
     pub(crate) at: i64,
+    /// Between which instants it may go: there alone, unless its place is a guess.
+    pub(crate) within: (i64, i64),
     /// Whether nothing is known about it but what the clock showed.
     pub(crate) is_timeless: bool,
 }
@@ -135,6 +139,10 @@ impl Layout {
         let is_placed = lo != NO_LO && hi != NO_HI;
         is_placed.then(|| Instant {
             at: lo.midpoint(hi).saturating_add(x),
+            within: match &placed.before {
+                Some(before) => added(before.at(x), x),
+                None => added((lo.midpoint(hi), lo.midpoint(hi)), x),
+            },
             is_timeless: placed.is_timeless,
         })
     }
@@ -212,13 +220,14 @@ impl Layout {
             (None, NO_LO, hi) => hi,
             _ => return,
         };
+        placed.before = Some(placed.offset.clone());
         placed.offset.learn(x, at, at);
         self.settle(ties);
     }
 }
 
 fn placed(offset: Envelope) -> Placed {
-    Placed { offset, is_timeless: false }
+    Placed { offset, is_timeless: false, before: None }
 }
 
 /// What a clock showed at a moment of a boot, as well as that is known.

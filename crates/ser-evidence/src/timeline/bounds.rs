@@ -225,11 +225,8 @@ struct Wanted {
 impl Wanted {
     const NOWHERE: Wanted = Wanted { at: None, lo: NO_LO, hi: NO_HI, is_timeless: true };
 
-    fn of(Instant { at, is_timeless }: Instant) -> Wanted {
-        match is_timeless {
-            true => Wanted { at: Some(at), ..Wanted::NOWHERE },
-            false => Wanted { at: Some(at), lo: at, hi: at, is_timeless },
-        }
+    fn of(Instant { at, within: (lo, hi), is_timeless }: Instant) -> Wanted {
+        Wanted { at: Some(at), lo, hi, is_timeless }
     }
 
     /// Whether it can be in one place only.
