@@ -68,14 +68,12 @@ pub(crate) struct RunFacts<'m> {
     pub(crate) stamp: Option<i64>,
 }
 
-/// One run comes before another one in a life: the first shows `x` not after the second shows
-/// `next_x`.
-#[derive(Clone, Copy, Debug)]
+/// One entry comes right before another one in a life. Each is given by the runs in which it may
+/// be, and what the clock showed in each.
+#[derive(Clone, Debug)]
 pub(crate) struct Succession {
-    pub(crate) run: usize,
-    pub(crate) x: i64,
-    pub(crate) next: usize,
-    pub(crate) next_x: i64,
+    pub(crate) earlier: Vec<(usize, i64)>,
+    pub(crate) later: Vec<(usize, i64)>,
 }
 
 impl Layout {
@@ -118,16 +116,16 @@ impl Layout {
             lo: link.lo,
             hi: link.hi,
         }));
-        ties.extend(successions.iter().map(|succession| Tie {
-            one: of_run(succession.next),
-            x: succession.next_x,
-            other: of_run(succession.run),
-            other_x: succession.x,
-            lo: 0,
-            hi: NO_HI,
-        }));
+        for succession in successions {
+            if let ([(run, x)], [(next, next_x)]) = (&succession.earlier[..], &succession.later[..])
+            {
+                let (one, other) = (of_run(*next), of_run(*run));
+                ties.push(Tie { one, x: *next_x, other, other_x: *x, lo: 0, hi: NO_HI });
+            }
+        }
         let mut layout = Layout { boots, clocks };
         layout.settle(&ties);
+        layout.heed_doubtful(successions, &ties);
         layout.place_the_rest(hosts, runs, &ties);
         layout
     }
@@ -182,6 +180,49 @@ impl Layout {
         }
         let one = self.clocks.get_mut(tie.one);
         one.and_then(|one| one.offset.learn(tie.x, lo, hi)).unwrap_or(false)
+    }
+
+    /// An entry that may be in any of several runs bounds its neighbours, too: by the earliest, or by
+    /// the latest, that it may be.
+    fn heed_doubtful(&mut self, successions: &[Succession], ties: &[Tie]) {
+        for _ in 0..MOST_ROUNDS {
+            let mut is_news = false;
+            for Succession { earlier, later } in successions {
+                is_news |= match (&earlier[..], &later[..]) {
+                    ([_], [_]) => false,
+                    (several, [(run, x)]) => {
+                        let (lo, _) = self.hull(several);
+                        self.learn(*run, *x, (lo, NO_HI))
+                    }
+                    ([(run, x)], several) => {
+                        let (_, hi) = self.hull(several);
+                        self.learn(*run, *x, (NO_LO, hi))
+                    }
+                    _ => false,
+                };
+            }
+            if !is_news {
+                return;
+            }
+            self.settle(ties);
+        }
+    }
+
+    /// The instants at which any of these runs showed what it did.
+    fn hull(&self, several: &[(usize, i64)]) -> (i64, i64) {
+        let each = several.iter().map(|&(run, x)| {
+            let placed = self.clocks.get(self.boots.len() + run);
+            placed.map_or((NO_LO, NO_HI), |placed| added(placed.offset.at(x), x))
+        });
+        let hull = each.reduce(|one, other| (one.0.min(other.0), one.1.max(other.1)));
+        hull.unwrap_or((NO_LO, NO_HI))
+    }
+
+    /// Adds that a run showed `x` between these instants. Returns whether that was news.
+    fn learn(&mut self, run: usize, x: i64, bound: (i64, i64)) -> bool {
+        let (lo, hi) = added(bound, -x);
+        let placed = self.clocks.get_mut(self.boots.len() + run);
+        placed.and_then(|placed| placed.offset.learn(x, lo, hi)).unwrap_or(false)
     }
 
     /// Gives a place to clocks of which little is known. What a clock showed, or what the site says

@@ -238,21 +238,33 @@ fn successions(history: &History, lives: &[Vec<LifeClock>], runs: &[RunClock]) -
     let mut successions = Vec::new();
     for (recorder, clocks) in history.recorders.iter().zip(lives) {
         for (life, clock) in recorder.lives.iter().zip(clocks) {
-            let mut previous: Option<(usize, i64)> = None;
+            let mut previous: Option<Vec<(usize, i64)>> = None;
             for held in &life.entries {
-                let Some(next) = clock.sure_run(held) else { continue };
-                let stamp = shown(&held.entry.time).zip(runs.get(next));
-                let Some(next_x) = stamp.map(|(stamp, run)| run.unwrapped(stamp)) else {
-                    continue;
-                };
-                if let Some((run, x)) = previous.filter(|(run, _)| *run != next) {
-                    successions.push(Succession { run, x, next, next_x });
+                let Some(stamp) = shown(&held.entry.time) else { continue };
+                let possible = clock.runs.of(held.sequence, Some(stamp)).runs();
+                let ids = possible.filter_map(|run| clock.ids.get(run).copied());
+                let x = |run: usize| runs.get(run).map(|clock| (run, clock.unwrapped(stamp)));
+                let next: Vec<(usize, i64)> = ids.filter_map(x).collect();
+                if let Some(previous) = &previous
+                    && says_something(previous, &next)
+                {
+                    let (earlier, later) = (previous.clone(), next.clone());
+                    successions.push(Succession { earlier, later });
                 }
-                previous = Some((next, next_x));
+                previous = Some(next);
             }
         }
     }
     successions
+}
+
+/// Whether the order of two entries says anything that their stamps do not. Of two entries that
+/// may both be in several runs it says nothing that could be used.
+fn says_something(earlier: &[(usize, i64)], later: &[(usize, i64)]) -> bool {
+    match (earlier, later) {
+        ([(one, _)], [(other, _)]) => one != other,
+        (one, other) => one.len() == 1 || other.len() == 1,
+    }
 }
 
 /// A step that may be anywhere.

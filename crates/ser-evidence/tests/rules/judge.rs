@@ -59,8 +59,10 @@ pub(crate) fn faults_of(seed: u64) -> Vec<Fault> {
         Trouble::WrongObservation => judge.wrong_observation_is_told(),
         Trouble::SecretSet => {}
     }
-    // Where it is told that something is wrong, proofs may contradict each other.
-    if said.contradictions().is_empty() {
+    // Where what is told is wrong, or nobody told that a clock was set, proofs may contradict each
+    // other, whether that is noticed or not.
+    let is_believable = matches!(story.world.trouble, Trouble::None | Trouble::Conflict);
+    if is_believable && said.contradictions().is_empty() {
         judge.list_respects_order();
     }
     judge.faults
