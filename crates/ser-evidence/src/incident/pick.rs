@@ -46,8 +46,8 @@ impl Incident {
 
     /// Adds what is missing over the whole incident: the entries on both sides are outside of it.
     fn add_spanning_gaps(&mut self, timeline: &Timeline<'_>) {
-        let end = |event: Option<&EventId>| event.and_then(|&event| timeline.sort_key(event));
-        let (Some(first), Some(last)) = (end(self.events.first()), end(self.events.last())) else {
+        let (Some(&first), Some(&last)) = (self.events.first(), self.events.last()) else { return };
+        let (Some(first), Some(last)) = (earliest(timeline, first), latest(timeline, last)) else {
             return;
         };
         for (recorder, history) in timeline.history().recorders.iter().enumerate() {
@@ -64,13 +64,25 @@ impl Incident {
     }
 }
 
+/// How early an entry may be in the list, by all that is known of its time.
+fn earliest(timeline: &Timeline<'_>, event: EventId) -> Option<i64> {
+    let lo = timeline.moved_utc(event, None).lo().map(Moment::us);
+    timeline.sort_key(event).map(|key| lo.map_or(key, |lo| lo.min(key)))
+}
+
+/// How late an entry may be in the list.
+fn latest(timeline: &Timeline<'_>, event: EventId) -> Option<i64> {
+    let hi = timeline.moved_utc(event, None).hi().map(Moment::us);
+    timeline.sort_key(event).map(|key| hi.map_or(key, |hi| hi.max(key)))
+}
+
 /// Between which places in the list something is missing ahead of this entry, or at the end of its
 /// life.
 fn gap_keys(timeline: &Timeline<'_>, ahead_of: EventId) -> (i64, i64) {
     let before = ahead_of.place.checked_sub(1).map(|place| EventId { place, ..ahead_of });
-    let begins = before.and_then(|before| timeline.sort_key(before)).unwrap_or(i64::MIN);
+    let begins = before.and_then(|before| earliest(timeline, before)).unwrap_or(i64::MIN);
     if timeline.held(ahead_of).is_some() {
-        return (begins, timeline.sort_key(ahead_of).unwrap_or(i64::MAX));
+        return (begins, latest(timeline, ahead_of).unwrap_or(i64::MAX));
     }
     // Another life came after this one.
     let lives = timeline.recorder(ahead_of).map_or(0, |recorder| recorder.lives.len());
