@@ -31,6 +31,11 @@ pub(crate) struct StateArgs {
 }
 
 impl StateArgs {
+    /// Remembers in this directory.
+    pub(crate) const fn in_directory(directory: PathBuf) -> StateArgs {
+        StateArgs { state_dir: Some(directory) }
+    }
+
     /// The directory, if the user wants another than the system's place for state.
     pub(crate) fn directory(&self) -> Option<&Path> {
         self.state_dir.as_deref()

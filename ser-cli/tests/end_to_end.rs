@@ -621,8 +621,9 @@ fn a_damaged_capture_is_decoded_with_the_damage_named() {
 }
 
 #[test]
-fn the_demo_finds_the_first_out_and_loses_nothing() {
-    demo(&[]);
+fn the_demo_tells_the_whole_story() {
+    let shown = demo(&[]);
+    assert!(shown.contains("the same contact on both\n"), "{shown}");
 }
 
 #[test]
@@ -631,12 +632,45 @@ fn the_demo_does_the_same_with_the_image() {
     demo(&["--image", image().to_str().expect("UTF-8")]);
 }
 
-fn demo(options: &[&str]) {
-    let output = ser_cli().arg("demo").args(options).output().expect("ser-cli runs");
+/// Runs the demo, and looks for everything that it promises to show.
+fn demo(options: &[&str]) -> String {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (home, temporary) = (folder.path().join("home"), folder.path().join("tmp"));
+    for path in [&home, &temporary] {
+        fs::create_dir(path).expect("a folder");
+    }
+    let mut demo = ser_cli();
+    demo.arg("demo").args(options);
+    let homes = ["HOME", "XDG_STATE_HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME"];
+    demo.envs(homes.map(|name| (name, &home))).env("TMPDIR", &temporary);
+    let output = demo.output().expect("ser-cli runs");
     let shown = text(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    assert!(shown.contains("first-out"), "{shown}");
-    assert!(shown.contains("63 events, complete"), "{shown}");
+    for told in [
+        "first-out  51 phase A PICKUP (SER1), ",
+        "operated   52-1 opened 7",
+        "\nwrong      52-1 opens: late (7",
+        "\nlate    52-1 opens  7",
+        "SER2: 1 entry missing (overwritten)",
+        "  SER2      1 entry missing (overwritten)\n",
+        "chatter ×15, last +144.0 ms\n",
+        "same_as = \"SER2/52-1 closed\"\n",
+        "52-1: 52a and 52b both off for 9",
+        "Not normal at the end\n52-1 closed OPEN\n",
+    ] {
+        assert!(shown.contains(told), "{told}: {shown}");
+    }
+    for recorder in ["SER1", "SER2"] {
+        let opened = format!("  {recorder}      52-1 closed  OPEN  ");
+        assert_eq!(shown.matches(&opened).count(), 1, "{recorder}: {shown}");
+    }
+    // Every contact of both is there: 8 entries of one, 20 of the other.
+    assert!(shown.contains("\n28 entries, sha256 "), "{shown}");
+    assert!(shown.lines().all(|line| line.chars().count() <= 100), "{shown}");
+    for path in [home, temporary] {
+        assert_eq!(fs::read_dir(&path).expect("a folder").count(), 0, "{}", path.display());
+    }
+    shown
 }
 
 #[test]

@@ -40,7 +40,7 @@ const CALLS: [&str; 26] = [
 ];
 
 /// File, call, how often, and why that is right.
-const JUDGED: [(&str, &str, usize, &str); 34] = [
+const JUDGED: [(&str, &str, usize, &str); 36] = [
     (
         "crates/geni-board/src/mapped_ram.rs",
         "map_raw(",
@@ -49,6 +49,18 @@ const JUDGED: [(&str, &str, usize, &str); 34] = [
          answers",
     ),
     ("ser-cli/src/closed_stdout.rs", "OFlags::RDWR", 1, "compared, and nothing is opened with it"),
+    (
+        "ser-cli/src/commands/demo/bench.rs",
+        "File::create(",
+        1,
+        "in a folder that it has just made for itself",
+    ),
+    (
+        "ser-cli/src/commands/demo/bench.rs",
+        "fs::write(",
+        1,
+        "in a folder that it has just made for itself",
+    ),
     (
         "ser-cli/src/kept.rs",
         ".write(true)",

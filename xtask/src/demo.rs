@@ -8,14 +8,14 @@ use crate::{images, ser_cli};
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask demo           with the simulated recorder: needs Rust only
+  cargo xtask demo           with simulated recorders: needs Rust only
   cargo xtask demo --qemu    with the ARM image in QEMU; installs what is missing";
 
-/// Play a breaker trip to a recorder and read the sequence of events from it.
+/// Play a breaker trip to two recorders, and report what happened.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
-    /// Use the ARM image in QEMU as the recorder.
+    /// Use the ARM image in QEMU as the first recorder.
     #[arg(long)]
     qemu: bool,
 

@@ -4,7 +4,7 @@ mod common;
 
 use common::{Log, history, monotonic_us, site};
 use ser_evidence::incident::{Doubt, Incident, Report, Verdict, Which};
-use ser_evidence::record::How;
+use ser_evidence::record::{How, Lost, Why};
 use ser_evidence::timeline::{ChangeId, ContactTrouble, Order, Timeline};
 
 const TWO_RECORDERS: &str = "
@@ -106,6 +106,18 @@ fn a_contact_that_chatters_two_hundred_times_is_one_row_and_hides_nothing() {
     assert_eq!(report.rows.iter().filter(is_shown).count(), 7);
     assert_eq!(report.first_out.known().map(|change| change.input), Some(1));
     assert_eq!(rows(&timeline, &report)[..3], ["U1/1 on", "U2/1 on", "U1/2 on"]);
+}
+
+#[test]
+fn what_another_source_has_is_not_missing_and_the_rest_keeps_its_reason() {
+    let site = site("[[recorder]]\nname = \"U1\"\n");
+    let (mut early, mut late) = (Log::of("U1", 7), Log::of("U1", 7));
+    early.changes("2026-11-22T10:00:00.100", &[1]).changes("2026-11-22T10:00:00.200", &[1]);
+    late.tells_overwritten(0, 3).loses(3).changes("2026-11-22T10:00:00.400", &[2]);
+    let history = history(&site, &[&late, &early]);
+    let gaps: Vec<_> = history.recorders[0].lives[0].gaps.iter().collect();
+    let [gap] = gaps[..] else { panic!("{gaps:?}") };
+    assert_eq!((gap.after, gap.lost, gap.why), (2, Lost::Exactly(1), Why::Overwritten));
 }
 
 #[test]

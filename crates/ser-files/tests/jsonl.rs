@@ -292,3 +292,25 @@ fn a_clock_that_shows_no_stamp_cannot_be_written() {
     assert!(Writer::new(&mut text).record("U1", &Record::Clock(clock)).is_err());
     assert!(text.is_empty(), "no half of a line");
 }
+
+#[test]
+fn a_name_that_a_terminal_would_obey_is_escaped_and_read_back_as_it_was() {
+    let names = ["A\u{1b}[2J\u{7f}", "B\u{202e}\u{2066}\u{9b}é", "C\r\n\"\\", "plain"];
+    let life = LifeRecord {
+        life: Life::from_bits(7),
+        is_exact: true,
+        model: None,
+        size: None,
+        erased: None,
+    };
+    let mut lines = Vec::new();
+    let mut writer = Writer::new(&mut lines);
+    for name in names {
+        writer.record(name, &Record::Life(life)).unwrap();
+    }
+    let text = std::str::from_utf8(&lines).unwrap();
+    assert!(!text.contains(|letter| letter != '\n' && ser_console::is_obeyed(letter)), "{text:?}");
+    assert!(text.contains("\"B\\u202e\\u2066\\u009bé\""), "{text}");
+    let read = Reader::new(lines.as_slice(), "").map(|told| told.unwrap().recorder.to_string());
+    assert_eq!(read.collect::<Vec<_>>(), names);
+}

@@ -27,8 +27,8 @@ const MAX_WAITING_STEPS: usize = 65_536;
 
 /// What the owner of a simulator wants from it.
 pub(crate) enum Request {
-    /// Play this. The answer is the millisecond in which it begins.
-    Play(Scenario, Sender<u64>),
+    /// Play this, at once or from a moment on. The answer is the millisecond in which it begins.
+    Play(Scenario, Option<Instant>, Sender<u64>),
     /// Switch the recorder off and on. The answer comes when the recorder answers again.
     PowerCycle(Sender<()>),
 }
@@ -136,8 +136,9 @@ impl Service {
     fn answer_requests(&mut self, machine: &mut dyn Machine) -> Option<Outcome> {
         while let Ok(request) = self.requests.try_recv() {
             match request {
-                Request::Play(scenario, reply) => {
-                    let start_ms = machine.play(&scenario);
+                Request::Play(scenario, at, reply) => {
+                    let wait_ms = at.map_or(0, |at| machine.ms_until(at).saturating_sub(1));
+                    let start_ms = machine.play(&scenario.later(wait_ms));
                     self.report(machine);
                     // The owner who asked may have gone away.
                     let _ = reply.send(start_ms);
@@ -183,7 +184,8 @@ impl Service {
                 let stale = machine.output().len();
                 machine.taken(stale);
             }
-            self.wire.send(Instant::now(), received, host_rate);
+            let rate = host_rate.or_else(|| machine.paced_rate());
+            self.wire.send(Instant::now(), received, rate);
         }
         self.deliver(machine);
         loop {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ser_node::Debounce;
 use ser_proto::Model;
@@ -162,7 +162,16 @@ impl Simulator {
     /// # Errors
     /// When the simulator has ended.
     pub fn play(&self, scenario: Scenario) -> Result<u64, SimError> {
-        self.ask(|reply| Request::Play(scenario, reply))
+        self.ask(|reply| Request::Play(scenario, None, reply))
+    }
+
+    /// The same from the millisecond on in which this moment lies, so that several recorders see
+    /// one incident at the same time.
+    ///
+    /// # Errors
+    /// When the simulator has ended.
+    pub fn play_at(&self, at: Instant, scenario: Scenario) -> Result<(), SimError> {
+        self.ask(|reply| Request::Play(scenario, Some(at), reply)).map(drop)
     }
 
     /// Waits until all contacts have moved and the recorder has sampled them.

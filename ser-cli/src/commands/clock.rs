@@ -55,6 +55,32 @@ enum What {
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let What::Set { at, state } = &args.what;
+    let Set { sent, observed } = set_and_remember(*at, state, connection)?;
+    if let (Some(setting), None) = (connection.clock_setting(), at) {
+        inform(format_args!("set to {setting} time, as the site file says"));
+    }
+    let mut out = io::stdout().lock();
+    writeln!(out, "{sent}")?;
+    out.flush()?;
+    tell(observed.as_ref());
+    Ok(())
+}
+
+/// A clock that was set.
+pub(super) struct Set {
+    /// The time that was sent.
+    pub(super) sent: TimeStamp,
+    /// What the clock showed when. `None` if the command was sent again and again: then nobody knows
+    /// which attempt set it last.
+    pub(super) observed: Option<ClockObservation>,
+}
+
+/// Sets the clock to a given time or to the present, and remembers what that says of it.
+pub(super) fn set_and_remember(
+    at: Option<TimeStamp>,
+    state: &StateArgs,
+    connection: &ConnectionArgs,
+) -> Result<Set> {
     let setting = connection.clock_setting();
     let time_in = |ahead| match &setting {
         Some(setting) => setting.time_in(ahead),
@@ -75,19 +101,14 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         || keeper::life_of_empty_log(state, connection),
         || keeper::last_delivered(state, connection),
     );
-    let sent = set(&mut unit, *at, &time_in).inspect_err(|error| {
+    let sent = set(&mut unit, at, &time_in).inspect_err(|error| {
         if matches!(error, RequestError::NoReply { may_have_been_done: true, .. }) {
             kept.add(&[setting::step(before.place(None))]);
         }
     })?;
-    if let (Some(setting), None) = (&setting, at) {
-        inform(format_args!("set to {setting} time, as the site file says"));
-    }
-    let mut out = io::stdout().lock();
-    writeln!(out, "{sent}")?;
-    out.flush()?;
-    remember(&kept, observed(&mut unit, sent, &before), &before);
-    Ok(())
+    let observed = observed(&mut unit, sent, &before);
+    kept.add(&[observed.map_or_else(|| setting::step(before.place(None)), Record::Clock)]);
+    Ok(Set { sent, observed })
 }
 
 fn set(
@@ -106,8 +127,7 @@ fn set(
     })
 }
 
-/// What the clock showed when it was set just now. `None` if it was sent again and again: then nobody
-/// knows which attempt set it last.
+/// What the clock showed when it was set just now.
 fn observed(unit: &mut Unit, sent: TimeStamp, before: &LogLook) -> Option<ClockObservation> {
     let exchange = unit.last_exchange().filter(|exchange| exchange.attempts == 1)?;
     let after = unit.log_position().ok().map(|position| position.total);
@@ -115,16 +135,20 @@ fn observed(unit: &mut Unit, sent: TimeStamp, before: &LogLook) -> Option<ClockO
     Some(setting::observation(how, shown(&sent)?, exchange.carried_out(), before.place(after)))
 }
 
-fn remember(kept: &KeptRecords, observed: Option<ClockObservation>, before: &LogLook) {
-    let Some(observation) = observed else {
-        warn("the command was sent more than once, and it is not known which one set the clock");
-        advise("set it once more, so that a report can tell how exact the recorder's times are");
-        return kept.add(&[setting::step(before.place(None))]);
-    };
-    if let Some(doubt_ms) = setting::doubt_ms(&observation) {
-        inform(format_args!("exact to ± {doubt_ms} ms"));
+/// Says how exact the setting was.
+fn tell(observed: Option<&ClockObservation>) {
+    match observed.map(setting::doubt_ms) {
+        Some(Some(doubt_ms)) => inform(format_args!("exact to ± {doubt_ms} ms")),
+        Some(None) => {}
+        None => {
+            warn(
+                "the command was sent more than once, and it is not known which one set the clock",
+            );
+            advise(
+                "set it once more, so that a report can tell how exact the recorder's times are",
+            );
+        }
     }
-    kept.add(&[Record::Clock(observation)]);
 }
 
 /// Neither a recorder nor a client accepts this as a date.

@@ -72,11 +72,28 @@ enum Format {
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let gathered = gather::gather(&args.sources, connection)?;
+    let shown = Shown { format: args.format, unfold: args.unfold };
+    let is_complete = show(&gathered, which(args, &gathered)?, shown)?;
+    if args.fail_on_loss {
+        gathered.require_complete()?;
+        if !is_complete {
+            return Err(Failure::incomplete("entries are missing in the incident"));
+        }
+    }
+    Ok(())
+}
+
+/// How a report is shown; by default as text for people, with chatter folded.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Shown {
+    format: Format,
+    unfold: bool,
+}
+
+/// Writes the report about an incident to standard output. Returns whether nothing is missing in it.
+pub(super) fn show(gathered: &Gathered, which: Which, shown: Shown) -> Result<bool> {
     let timeline = Timeline::new(&gathered.site, &gathered.history);
-    let incident = Incident::pick(&timeline, which(args, &gathered)?).ok_or_else(|| {
-        Failure::new("there is no entry in what was read")
-            .hint("ser-cli merge with the same sources lists everything, also without a time")
-    })?;
+    let incident = Incident::pick(&timeline, which).ok_or_else(|| no_entry(which))?;
     let report = Report::new(&timeline, incident);
     let document = Document {
         timeline: &timeline,
@@ -84,21 +101,23 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         program: PROGRAM,
         site_digest: gathered.site_digest.clone(),
         not_reached: &gathered.not_reached,
-        unfold: args.unfold,
+        unfold: shown.unfold,
     };
     let mut out = io::BufWriter::new(io::stdout().lock());
-    match args.format {
+    match shown.format {
         Format::Text => report::write_text(&mut out, &document, styles(Palette::of_stdout()))?,
         Format::Json => report::write_json(&mut out, &document)?,
     }
     out.flush()?;
-    if args.fail_on_loss {
-        gathered.require_complete()?;
-        if report.is_incomplete() {
-            return Err(Failure::incomplete("entries are missing in the incident"));
-        }
-    }
-    Ok(())
+    Ok(!report.is_incomplete())
+}
+
+fn no_entry(which: Which) -> Failure {
+    let failure = match which {
+        Which::Between(..) => Failure::new("there is no entry in this time"),
+        _ => Failure::new("there is no entry in what was read"),
+    };
+    failure.hint("ser-cli merge with the same sources lists everything, also without a time")
 }
 
 fn which(args: &Args, gathered: &Gathered) -> Result<Which> {
@@ -106,6 +125,12 @@ fn which(args: &Args, gathered: &Gathered) -> Result<Which> {
     let in_zone = |given: Option<GivenMoment>| given.map(|given| given.in_zone(zone)).transpose();
     let (around, since, until) =
         (in_zone(args.around)?, in_zone(args.since)?, in_zone(args.until)?);
+    if let (Some(since), Some(until)) = (since, until)
+        && until < since
+    {
+        return Err(Failure::usage("--until is before --since")
+            .hint("exchange the two, or leave one out: it is then open at that end"));
+    }
     Ok(match around {
         Some(around) => Which::Around(around),
         None if since.is_some() || until.is_some() => Which::Between(since, until),

@@ -122,8 +122,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "MS", default_value_t = 0)]
     debounce: u8,
 
-    /// Send only as fast as the line's rate, as a real recorder does; without it, answers come at
-    /// once.
+    /// Send only as fast as the line's rate, as a real recorder does, and over TCP take no byte
+    /// sooner, as behind a terminal server; without it, answers come at once.
     #[arg(long, conflicts_with = "image")]
     paced: bool,
 

@@ -56,6 +56,10 @@ fn read_one(path: &Path, site: &Site, collector: &mut Collector) -> Result<u64> 
             .hint("--input takes what ser-cli read or watch wrote with --format jsonl or csv")
     };
     let file = File::open(path).map_err(|error| Failure::reading(path.display(), &error))?;
+    if file.metadata().is_ok_and(|about| about.is_dir()) {
+        return Err(Failure::new(format!("{} is a folder", path.display()))
+            .hint(format!("name the files in it, as in {}", path.join("*.jsonl").display())));
+    }
     let input = BufReader::with_capacity(BUFFER, file);
     let source = Source::new(input, &recorder_of(path, site)).map_err(|error| failed(&error))?;
     collector.begin_source();

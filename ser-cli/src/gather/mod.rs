@@ -37,6 +37,13 @@ pub(crate) struct SourceArgs {
     state: StateArgs,
 }
 
+impl SourceArgs {
+    /// The recorders of the site, and these files as well.
+    pub(crate) const fn live_and(input: Vec<PathBuf>, state: StateArgs) -> SourceArgs {
+        SourceArgs { input, live: true, state }
+    }
+}
+
 /// Everything that the sources say.
 #[derive(Debug)]
 pub(crate) struct Gathered {

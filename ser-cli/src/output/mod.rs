@@ -8,7 +8,6 @@ mod palette;
 mod points;
 mod record;
 mod rows;
-mod sequence;
 mod site_table;
 mod table;
 
@@ -25,7 +24,6 @@ pub(crate) use palette::Palette;
 pub(crate) use points::Points;
 pub(crate) use record::{Annotator, Before, Event, Loss, Record};
 pub(crate) use rows::{Rows, sync_stdout};
-pub(crate) use sequence::{PointNames, Sequence};
 pub(crate) use site_table::{RecorderColumn, SiteTable, header as site_header};
 pub(crate) use table::Table;
 

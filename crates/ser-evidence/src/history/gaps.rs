@@ -43,6 +43,20 @@ impl ToldGaps {
     fn at(&self, life: Life, after: u64) -> &[Gap] {
         self.by_place.get(&(life, after)).map_or(&[], Vec::as_slice)
     }
+
+    /// Why entries are missing after this one. Another source may hold the first entries of what was
+    /// missing to the one that told it, so that its gap begins earlier.
+    fn why(&self, life: Life, after: u64) -> Option<Why> {
+        let earlier = self.by_place.range((life, 0)..=(life, after)).rev();
+        let mut gaps =
+            earlier.flat_map(|(&(_, from), gaps)| gaps.iter().map(move |gap| (from, gap)));
+        let covers = |&(from, gap): &(u64, &Gap)| match gap.lost {
+            _ if from == after => true,
+            Lost::Exactly(count) | Lost::AtLeast(count) => from + u64::from(count) > after,
+            Lost::Unknown => false,
+        };
+        gaps.find(covers).map(|(_, gap)| gap.why)
+    }
 }
 
 /// Everything that is missing in a life.
@@ -84,13 +98,12 @@ fn unrecorded(before: &Held, after: &Held) -> Option<u32> {
 /// Entries that are missing between two that are held. What was told about the place says why.
 fn hole(life: &LifeHistory, told: &ToldGaps, place: usize, after: u64, missing: u64) -> LogGap {
     let missing = u32::try_from(missing).unwrap_or(u32::MAX);
-    let told = told.at(life.name(), after).first();
     // Before the first reading nobody counted how often the total had wrapped.
     let is_counted = after > 0 || life.is_exact;
     LogGap {
         place,
         after,
         lost: if is_counted { Lost::Exactly(missing) } else { Lost::AtLeast(missing) },
-        why: told.map_or(Why::NotReached, |gap| gap.why),
+        why: told.why(life.name(), after).unwrap_or(Why::NotReached),
     }
 }

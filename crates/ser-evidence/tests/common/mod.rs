@@ -3,7 +3,8 @@
 
 use ser_evidence::history::{Collector, History};
 use ser_evidence::record::{
-    Boot, ClockObservation, EntryRecord, HostReading, How, Life, Place, Record, Reference,
+    Boot, ClockObservation, EntryRecord, Gap, HostReading, How, Life, Lost, Place, Record,
+    Reference, Why,
 };
 use ser_evidence::site::{self, Site};
 use ser_evidence::time::{Bound, Moment, Shown, shown};
@@ -71,6 +72,13 @@ impl Log {
     /// So many entries are overwritten before they are read.
     pub(crate) fn loses(&mut self, count: u64) -> &mut Log {
         self.sequence += count;
+        self
+    }
+
+    /// Somebody who had read up to this entry has found so many overwritten.
+    pub(crate) fn tells_overwritten(&mut self, after: u64, count: u32) -> &mut Log {
+        let (life, after, lost) = (self.life, Some(after), Lost::Exactly(count));
+        self.records.push(Record::Gap(Gap { life, after, lost, why: Why::Overwritten }));
         self
     }
 

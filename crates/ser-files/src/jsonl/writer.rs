@@ -3,6 +3,7 @@
 use std::fmt::Display;
 use std::io::{self, Write};
 
+use ser_console::is_obeyed;
 use ser_evidence::record::{
     Boot, ClockObservation, ClockStep, EntryRecord, Gap, HostReading, Life, LifeRecord, Lost,
     Place, Record, Reference, Watched, Why,
@@ -10,6 +11,7 @@ use ser_evidence::record::{
 use ser_evidence::time::{Moment, stamp};
 use ser_proto::{Entry, Inputs, TimeStamp};
 use serde::{Serialize, Serializer};
+use serde_json::ser::Formatter;
 
 use super::SCHEMA;
 use super::texts::{Numbers, how_name, model_name, why_name};
@@ -71,7 +73,7 @@ impl<W: Write> Writer<W> {
     }
 
     fn line(&mut self, line: &impl Serialize) -> io::Result<()> {
-        serde_json::to_writer(&mut self.out, line)?;
+        line.serialize(&mut serde_json::Serializer::with_formatter(&mut self.out, Harmless))?;
         self.out.write_all(b"\n")
     }
 }
@@ -303,5 +305,28 @@ impl<'a> WatchedLine<'a> {
         let (from, to) = (HostFields::from(&watched.from), HostFields::from(&watched.to));
         let (life, through) = (AsText(watched.life), watched.through);
         WatchedLine { record: "watched", recorder, life, from, to, through }
+    }
+}
+
+/// Writes JSON in which nothing is left that a terminal would obey: it is escaped, and read back as
+/// it was.
+struct Harmless;
+
+impl Formatter for Harmless {
+    fn write_string_fragment<W>(&mut self, out: &mut W, fragment: &str) -> io::Result<()>
+    where
+        W: ?Sized + Write,
+    {
+        if fragment.is_ascii() && !fragment.contains('\u{7f}') {
+            return out.write_all(fragment.as_bytes());
+        }
+        for letter in fragment.chars() {
+            // All of them are in the first plane.
+            match is_obeyed(letter) {
+                true => write!(out, "\\u{:04x}", u32::from(letter))?,
+                false => write!(out, "{letter}")?,
+            }
+        }
+        Ok(())
     }
 }

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use ser_evidence::time::Moment;
 use ser_evidence::timeline::{EventId, Item, Timeline};
 
-use super::super::report::{missing, rfc3339};
+use super::super::report::{missing, names, rfc3339};
 
 /// The columns. The first seven are those of a reading.
 pub const HEADER: &str =
@@ -101,7 +101,8 @@ impl Row {
 
     fn turn_to(&mut self, timeline: &Timeline<'_>, event: EventId) {
         if self.recorder != Some(event.recorder) {
-            let name = timeline.recorder(event).map(|found| quoted(&found.recorder.name));
+            let name = timeline.recorder(event);
+            let name = name.map(|found| quoted(&names::harmless(&found.recorder.name)));
             self.quoted = name.unwrap_or_default();
             self.recorder = Some(event.recorder);
         }

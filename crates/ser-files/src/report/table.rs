@@ -17,17 +17,24 @@ pub(super) enum Align {
 pub(super) struct Cell {
     pub(super) text: String,
     pub(super) style: Style,
+    /// Whether it may reach over the cells to its right, which are empty.
+    pub(super) reaches: bool,
 }
 
 impl From<String> for Cell {
     fn from(text: String) -> Cell {
-        Cell { text, style: Style::new() }
+        Cell { text, ..Cell::default() }
     }
 }
 
 impl Cell {
     pub(super) fn styled(text: impl Into<String>, style: Style) -> Cell {
-        Cell { text: text.into(), style }
+        Cell { text: text.into(), style, reaches: false }
+    }
+
+    /// A remark that reaches over the cells to its right.
+    pub(super) fn remark(text: impl Into<String>, style: Style) -> Cell {
+        Cell { text: text.into(), style, reaches: true }
     }
 }
 
@@ -57,6 +64,7 @@ impl Table {
     /// 0 if no row has anything there.
     fn width(&self, column: usize) -> usize {
         let cells = self.rows.iter().filter_map(|row| row.get(column));
+        let cells = cells.filter(|cell| !cell.reaches);
         match cells.map(|cell| cell.text.width()).max() {
             Some(0) | None => 0,
             Some(width) => width.max(self.titles.get(column).map_or(0, |(title, _)| title.width())),
@@ -67,7 +75,7 @@ impl Table {
         let mut gap = 0;
         let shown = cells.iter().zip(&self.titles).zip(widths).filter(|(_, width)| **width > 0);
         for (number, ((cell, (_, align)), width)) in shown.enumerate() {
-            let Cell { text, style } = cell;
+            let Cell { text, style, .. } = cell;
             let pad = width - text.width().min(*width);
             let before = if *align == Align::Right { pad } else { 0 };
             let between = if number == 0 { 0 } else { 2 };
@@ -93,8 +101,9 @@ mod tests {
             Table::new(vec![("a", Align::Left), ("none", Align::Left), ("number", Align::Right)]);
         table.row(vec![Cell::from("é".to_owned()), Cell::default(), Cell::from("1".to_owned())]);
         table.row(vec![Cell::from("long".to_owned()), Cell::default(), Cell::default()]);
+        table.row(vec![Cell::remark("a remark", Style::new()), Cell::default(), Cell::default()]);
         let mut out = Vec::new();
         table.write(&mut out, Style::new()).unwrap();
-        assert_eq!(String::from_utf8(out).unwrap(), "a     number\né          1\nlong\n");
+        assert_eq!(String::from_utf8(out).unwrap(), "a     number\né          1\nlong\na remark\n");
     }
 }

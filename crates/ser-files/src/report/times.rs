@@ -45,7 +45,7 @@ impl Clock {
     pub fn zone(&self, utc_us: i64) -> String {
         let offset = self.format(utc_us, "UTC%:z");
         match self.zone.iana_name() {
-            Some("UTC") | None => offset.trim_end_matches("+00:00").to_owned(),
+            Some("UTC" | "Etc/UTC") | None => offset.trim_end_matches("+00:00").to_owned(),
             Some(name) => format!("{name}, {offset}"),
         }
     }

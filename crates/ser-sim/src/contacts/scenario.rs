@@ -31,6 +31,15 @@ impl Scenario {
         Scenario { steps, ..Scenario::default() }
     }
 
+    /// The same, that much later.
+    #[must_use]
+    pub(crate) fn later(mut self, by_ms: u64) -> Scenario {
+        for step in &mut self.steps {
+            step.at_ms = step.at_ms.saturating_add(by_ms);
+        }
+        self
+    }
+
     pub(crate) fn with_names(mut self, names: &[(u8, &'static str)]) -> Scenario {
         self.names = names.to_vec();
         self

@@ -8,7 +8,7 @@ pub(crate) mod sim_node;
 
 #[cfg(unix)]
 use std::os::fd::BorrowedFd;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ser_proto::Baud;
 
@@ -36,6 +36,18 @@ pub(crate) trait Machine {
 
     /// The rate at which its line runs.
     fn baud(&self) -> Baud;
+
+    /// The rate that bytes from the host keep where the line itself has none, as behind a terminal
+    /// server. `None` if they take no time.
+    fn paced_rate(&self) -> Option<u32> {
+        None
+    }
+
+    /// How many milliseconds of its own time are left until a moment of this computer's.
+    fn ms_until(&self, at: Instant) -> u64 {
+        let left = at.saturating_duration_since(Instant::now());
+        u64::try_from(left.as_millis()).unwrap_or(u64::MAX)
+    }
 
     /// Plays a scenario. Returns the millisecond in which it begins.
     fn play(&mut self, scenario: &Scenario) -> u64;

@@ -2,7 +2,7 @@
 
 #[cfg(unix)]
 use std::os::fd::BorrowedFd;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ser_proto::Baud;
 
@@ -35,6 +35,9 @@ impl Machine for Native<'_> {
     }
 
     fn receive(&mut self, bytes: &[u8]) {
+        // This thread may have been held up since time last passed, and a command counts from when
+        // it arrives.
+        self.node.advance_to(self.pace.now_ms());
         self.node.receive(bytes);
     }
 
@@ -48,6 +51,15 @@ impl Machine for Native<'_> {
 
     fn baud(&self) -> Baud {
         self.node.baud()
+    }
+
+    fn paced_rate(&self) -> Option<u32> {
+        self.node.is_paced().then(|| self.node.baud().bits_per_second())
+    }
+
+    fn ms_until(&self, at: Instant) -> u64 {
+        // Reckoned from the pace, so that no delay of this thread moves a contact.
+        self.pace.ms_at(at).saturating_sub(self.node.now_ms())
     }
 
     fn play(&mut self, scenario: &Scenario) -> u64 {
@@ -82,5 +94,34 @@ impl Machine for Native<'_> {
     #[cfg(unix)]
     fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
         Vec::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::sim_node::{LineRate, Ram, SimNode, SimNodeOptions};
+    use ser_proto::Model;
+
+    #[test]
+    fn a_moment_is_a_millisecond_of_its_pace_however_late_it_is_asked_for() {
+        let began = Instant::now();
+        let mut ram = Ram::new();
+        let node = SimNode::new(SimNodeOptions::new(Model::Ser160), &mut ram);
+        let mut native = Native { node, pace: Pace::from(began, 0) };
+        assert_eq!(native.ms_until(began + Duration::from_micros(250_999)), 250);
+        native.node.advance_to(240);
+        assert_eq!(native.ms_until(began + Duration::from_millis(250)), 10);
+        assert_eq!(native.ms_until(began), 0);
+    }
+
+    #[test]
+    fn bytes_from_the_host_take_as_long_as_those_to_it() {
+        for (line_rate, rate) in [(LineRate::Real, Some(9600)), (LineRate::Unlimited, None)] {
+            let mut ram = Ram::new();
+            let options = SimNodeOptions { line_rate, ..SimNodeOptions::new(Model::Ser160) };
+            let native = Native { node: SimNode::new(options, &mut ram), pace: Pace::new() };
+            assert_eq!(native.paced_rate(), rate);
+        }
     }
 }

@@ -23,7 +23,12 @@ impl Pace {
 
     /// The millisecond that a recorder should have reached.
     pub(crate) fn now_ms(&self) -> u64 {
-        self.ahead_ms
-            .saturating_add(u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX))
+        self.ms_at(Instant::now())
+    }
+
+    /// The millisecond at a moment.
+    pub(crate) fn ms_at(&self, at: Instant) -> u64 {
+        let since = at.saturating_duration_since(self.began).as_millis();
+        self.ahead_ms.saturating_add(u64::try_from(since).unwrap_or(u64::MAX))
     }
 }

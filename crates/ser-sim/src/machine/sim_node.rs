@@ -33,7 +33,7 @@ const BYTE_AT_1_BAUD_NS: u64 = 10 * 1_000_000_000;
 /// are less than 24.8 days apart.
 const LONGEST_LEAP_MS: u64 = 1 << 30;
 
-/// How fast the recorder's bytes leave it.
+/// How fast the recorder's bytes leave it. Over TCP, those of the host take as long.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LineRate {
     /// At once.
@@ -355,6 +355,11 @@ impl<'a> SimNode<'a> {
     #[must_use]
     pub fn baud(&self) -> Baud {
         self.baud
+    }
+
+    /// Whether bytes on its line take their time.
+    pub(crate) fn is_paced(&self) -> bool {
+        self.options.line_rate == LineRate::Real
     }
 
     /// What the recorder dropped, refused or lost since power-up. Milliseconds that were passed

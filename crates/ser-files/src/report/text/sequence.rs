@@ -6,6 +6,7 @@ use std::io::{self, Write};
 use anstyle::Style;
 use ser_evidence::clock::Nominal;
 use ser_evidence::incident::Row;
+use ser_evidence::site::PointId;
 use ser_evidence::timeline::{ChangeId, EventId, Order, Timeline};
 
 use super::{heading, names};
@@ -14,6 +15,15 @@ use crate::report::style::Styles;
 use crate::report::table::{Align, Cell, Table};
 use crate::report::verdict;
 use crate::report::{Clock, Document};
+
+/// Columns of the table, from 0.
+const TIME: usize = 1;
+const RECORDER: usize = 5;
+const POINT: usize = 6;
+const COLUMNS: usize = 10;
+
+/// Notes that are longer go below their row, so that rows fit a terminal.
+const NOTE_WIDTH: usize = "maybe first-out".len();
 
 pub(super) fn write(
     out: &mut dyn Write,
@@ -39,7 +49,17 @@ pub(super) fn write(
     let mut previous = None;
     for (row, bracket) in rows.iter().zip(&brackets) {
         gaps_ahead(document, row, previous, &mut table, styles);
-        table.row(cells(document, row, previous, bracket, styles, clock));
+        let notes = notes(document, row, previous, bracket, clock);
+        let is_short = notes.chars().count() <= NOTE_WIDTH;
+        let (beside, below) = if is_short { (notes, None) } else { (String::new(), Some(notes)) };
+        table.row(cells(document, row, previous, (bracket.sign, beside), styles, clock));
+        if let Some(notes) = below {
+            let sign = if matches!(bracket.sign, "┌" | "│") { "│" } else { "" };
+            table.row(sparse([
+                (0, Cell::styled(sign, styles.alarm)),
+                (POINT, Cell::remark(notes, styles.faint)),
+            ]));
+        }
         previous = Some(row.change);
     }
     let last = document.report.incident.gaps.iter().filter(|(event, _)| {
@@ -109,6 +129,11 @@ fn brackets(timeline: &Timeline<'_>, rows: &[&Row]) -> Vec<Bracket> {
 
 /// How far apart the truth of neighbours of unknown order may be.
 fn unknown_within(timeline: &Timeline<'_>, rows: &[&Row]) -> String {
+    if let [one, other] = rows
+        && is_one_contact(timeline, one, other)
+    {
+        return "the same contact on both".to_owned();
+    }
     let mut widest = 0;
     for (place, one) in rows.iter().enumerate() {
         for other in rows.iter().skip(place + 1) {
@@ -125,11 +150,20 @@ fn unknown_within(timeline: &Timeline<'_>, rows: &[&Row]) -> String {
     format!("order unknown within {}", doubt(widest))
 }
 
+/// Whether two changes are those of one contact that is wired to two recorders.
+fn is_one_contact(timeline: &Timeline<'_>, one: &Row, other: &Row) -> bool {
+    let (Some(one), Some(other)) = (one.point, other.point) else { return false };
+    let is_same = |one: PointId, other: PointId| {
+        names::point_of(timeline, one).is_some_and(|point| point.same_as == Some(other))
+    };
+    is_same(one, other) || is_same(other, one)
+}
+
 fn cells(
     document: &Document<'_>,
     row: &Row,
     previous: Option<ChangeId>,
-    bracket: &Bracket,
+    (sign, notes): (&str, String),
     styles: Styles,
     clock: &Clock,
 ) -> Vec<Cell> {
@@ -156,7 +190,7 @@ fn cells(
     };
     let since_first = if first == Some(row.change) { Cell::default() } else { delta(first) };
     vec![
-        Cell::styled(bracket.sign, styles.alarm),
+        Cell::styled(sign, styles.alarm),
         Cell::styled(time, if is_first { styles.first_out } else { Style::new() }),
         since_first,
         delta(previous),
@@ -165,7 +199,7 @@ fn cells(
         Cell::from(names::point(timeline, row.point, input)),
         Cell::styled(names::state(timeline, row.point, row.on), state_style),
         Cell::from(timeline.held(event).map_or(String::new(), |held| held.sequence.to_string())),
-        Cell::from(notes(document, row, previous, bracket, is_first, clock)),
+        Cell::from(notes),
     ]
 }
 
@@ -175,10 +209,10 @@ fn notes(
     row: &Row,
     previous: Option<ChangeId>,
     bracket: &Bracket,
-    is_first: bool,
     clock: &Clock,
 ) -> String {
     let Document { timeline, report, .. } = *document;
+    let is_first = report.first_out.changes.contains(&row.change);
     let mut notes = Vec::new();
     if is_first {
         let is_alone = report.first_out.changes.len() == 1 && report.first_out.gaps.is_empty();
@@ -194,7 +228,9 @@ fn notes(
         let lasted = lasted.map_or(String::new(), |us| format!(", last {}", since(us)));
         notes.push(format!("chatter ×{}{lasted}", fold.changes.len()));
     }
-    if report.incident.clock_sets.contains(&row.change.event) {
+    // Ahead of the first entry of a log, nothing was stamped by the clock as it was before.
+    let is_first_of_log = row.change.event.place == 0;
+    if !is_first_of_log && report.incident.clock_sets.contains(&row.change.event) {
         notes.push("clock was set before this".to_owned());
     }
     notes.extend(local_time_note(timeline, row.change.event, clock));
@@ -248,16 +284,21 @@ fn gap_row(
     styles: Styles,
 ) {
     let Some(gap) = timeline.life(event).and_then(|life| life.gaps.get(index)) else { return };
-    let mut cells = vec![Cell::default(); 10];
-    let texts = [
-        (1, "- - -".to_owned()),
-        (5, names::recorder(timeline, event)),
-        (9, verdict::missing(gap.lost, gap.why)),
-    ];
-    for (column, text) in texts {
-        if let Some(cell) = cells.get_mut(column) {
-            *cell = Cell::styled(text, styles.alarm);
+    let style = styles.alarm;
+    table.row(sparse([
+        (TIME, Cell::styled("- - -", style)),
+        (RECORDER, Cell::styled(names::recorder(timeline, event), style)),
+        (POINT, Cell::remark(verdict::missing(gap.lost, gap.why), style)),
+    ]));
+}
+
+/// A row in which most cells are empty.
+fn sparse<const N: usize>(filled: [(usize, Cell); N]) -> Vec<Cell> {
+    let mut cells = vec![Cell::default(); COLUMNS];
+    for (column, cell) in filled {
+        if let Some(place) = cells.get_mut(column) {
+            *place = cell;
         }
     }
-    table.row(cells);
+    cells
 }

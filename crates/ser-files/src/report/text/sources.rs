@@ -82,10 +82,10 @@ fn complete(timeline: &Timeline<'_>, of: &Completeness, clock: &Clock) -> String
         );
     };
     let until = read.or_else(|| at(last)).unwrap_or_else(|| "?".to_owned());
-    match at(first) {
-        Some(from) => format!("from {from} to {until}"),
-        None => "time not known".to_owned(),
-    }
+    let Some(from) = at(first) else { return "time not known".to_owned() };
+    // The date once, if it is the same.
+    let date = from.split_inclusive(' ').next().unwrap_or_default();
+    format!("{from} to {}", until.strip_prefix(date).unwrap_or(&until))
 }
 
 fn clock_text(state: ClockState) -> String {
