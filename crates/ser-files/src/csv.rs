@@ -65,7 +65,14 @@ impl<R: BufRead> Reader<R> {
         }
     }
 
-    fn read(&mut self) -> Option<Result<Record, ReadError>> {
+    /// The name of the recorder whose records these are.
+    #[must_use]
+    pub fn recorder(&self) -> &str {
+        &self.recorder
+    }
+
+    /// The next record, without the name of its recorder.
+    pub fn read(&mut self) -> Option<Result<Record, ReadError>> {
         if let Some(held) = self.held.take() {
             return Some(held);
         }
