@@ -15,7 +15,8 @@ use ser_evidence::record::{EntryRecord, Gap, Life, Lost, Record, Told, Why};
 use ser_proto::{Entry, Inputs, TimeStamp};
 
 use crate::error::{ReadError, quoted};
-use crate::lines::{Lines, MAX_LINE_LEN};
+use crate::fields::Fields;
+use crate::lines::Lines;
 use crate::stamp;
 
 /// The columns, in their order. Later versions may append more.
@@ -23,9 +24,6 @@ const COLUMNS: [&str; 7] = ["entry", "time", "input", "state", "sequence", "life
 
 /// How many columns the files of the first versions have.
 const FIRST_COLUMNS: usize = 4;
-
-/// The most fields of a row that are told apart.
-const MAX_FIELDS: usize = 64;
 
 /// Whether this is the first line of such a file.
 pub(crate) fn is_header(line: &[u8]) -> bool {
@@ -38,7 +36,7 @@ pub(crate) fn is_header(line: &[u8]) -> bool {
 pub struct Reader<R> {
     lines: Lines<R>,
     recorder: String,
-    splitter: Splitter,
+    fields: Fields,
     parser: Parser,
     /// How many columns the rows have; `None` before the first header.
     columns: Option<usize>,
@@ -55,7 +53,7 @@ impl<R: BufRead> Reader<R> {
         Reader {
             lines: Lines::new(input),
             recorder: recorder.to_owned(),
-            splitter: Splitter::new(),
+            fields: Fields::new(),
             parser: Parser::default(),
             columns: None,
             gathering: None,
@@ -65,7 +63,14 @@ impl<R: BufRead> Reader<R> {
         }
     }
 
-    fn read(&mut self) -> Option<Result<Record, ReadError>> {
+    /// The name of the recorder whose records these are.
+    #[must_use]
+    pub fn recorder(&self) -> &str {
+        &self.recorder
+    }
+
+    /// The next record, without the name of its recorder.
+    pub fn read(&mut self) -> Option<Result<Record, ReadError>> {
         if let Some(held) = self.held.take() {
             return Some(held);
         }
@@ -76,7 +81,7 @@ impl<R: BufRead> Reader<R> {
                     break;
                 }
                 Some(Err(error)) => Err(error),
-                Some(Ok(line)) => row(line, self.columns, &mut self.splitter, &mut self.parser)
+                Some(Ok(line)) => row(line, self.columns, &mut self.fields, &mut self.parser)
                     .map_err(|why| ReadError::damaged(self.lines.number(), why)),
             };
             match row {
@@ -214,52 +219,6 @@ impl Key {
     }
 }
 
-/// Takes rows apart.
-struct Splitter {
-    core: csv_core::Reader,
-    text: Vec<u8>,
-    ends: [usize; MAX_FIELDS],
-    count: usize,
-}
-
-impl Splitter {
-    fn new() -> Splitter {
-        let text = vec![0; MAX_LINE_LEN];
-        Splitter { core: csv_core::Reader::new(), text, ends: [0; MAX_FIELDS], count: 0 }
-    }
-
-    fn split(&mut self, line: &[u8]) -> Result<(), String> {
-        use csv_core::ReadRecordResult as Outcome;
-        self.core.reset();
-        self.count = 0;
-        let mut filled = 0;
-        for mut part in [line, b"\n"] {
-            while !part.is_empty() {
-                let text = self.text.get_mut(filled..).unwrap_or_default();
-                let ends = self.ends.get_mut(self.count..).unwrap_or_default();
-                let (outcome, taken, written, ended) = self.core.read_record(part, text, ends);
-                part = part.get(taken..).unwrap_or_default();
-                (filled, self.count) = (filled + written, self.count + ended);
-                match outcome {
-                    Outcome::Record => return Ok(()),
-                    Outcome::InputEmpty => {}
-                    Outcome::OutputFull | Outcome::OutputEndsFull | Outcome::End => {
-                        return Err("this row has too many fields".to_owned());
-                    }
-                }
-            }
-        }
-        Err(format!("a quote is not closed, in {}", quoted(line)))
-    }
-
-    /// A field of the row; empty if the row has fewer.
-    fn field(&self, place: usize) -> &[u8] {
-        let end = self.ends.get(place).copied().filter(|_| place < self.count).unwrap_or_default();
-        let start = place.checked_sub(1).and_then(|before| self.ends.get(before)).copied();
-        self.text.get(start.unwrap_or_default()..end).unwrap_or_default()
-    }
-}
-
 /// Understands fields. Neighbouring rows often have the same time, and nearly always the same life.
 struct Parser {
     time: ([u8; 23], TimeStamp),
@@ -301,7 +260,7 @@ impl Parser {
 fn row(
     line: &[u8],
     columns: Option<usize>,
-    fields: &mut Splitter,
+    fields: &mut Fields,
     parser: &mut Parser,
 ) -> Result<Row, String> {
     fields.split(line)?;
@@ -309,8 +268,8 @@ fn row(
         return header(fields);
     }
     let columns = columns.ok_or("there is no header before this row")?;
-    if fields.count < columns {
-        return Err(format!("{} fields where {columns} have to be", fields.count));
+    if fields.count() < columns {
+        return Err(format!("{} fields where {columns} have to be", fields.count()));
     }
     let is_loss = (0..FIRST_COLUMNS).all(|place| fields.field(place).is_empty());
     if is_loss {
@@ -320,8 +279,8 @@ fn row(
     }
 }
 
-fn header(fields: &Splitter) -> Result<Row, String> {
-    let known = fields.count.min(COLUMNS.len());
+fn header(fields: &Fields) -> Result<Row, String> {
+    let known = fields.count().min(COLUMNS.len());
     let is_ours = |place: usize, name: &str| fields.field(place) == name.as_bytes();
     let all_ours = COLUMNS.iter().take(known).enumerate().all(|(place, name)| is_ours(place, name));
     match known {
@@ -330,7 +289,7 @@ fn header(fields: &Splitter) -> Result<Row, String> {
     }
 }
 
-fn change(fields: &Splitter, parser: &mut Parser) -> Result<Change, String> {
+fn change(fields: &Fields, parser: &mut Parser) -> Result<Change, String> {
     let wrong = |place: usize| {
         let name = COLUMNS.get(place).copied().unwrap_or_default();
         format!("{name} cannot be {}", quoted(fields.field(place)))
@@ -354,7 +313,7 @@ fn change(fields: &Splitter, parser: &mut Parser) -> Result<Change, String> {
 }
 
 /// The sequence and the life of a row.
-fn place(fields: &Splitter, parser: &mut Parser) -> Result<(Option<u64>, Life), String> {
+fn place(fields: &Fields, parser: &mut Parser) -> Result<(Option<u64>, Life), String> {
     let wrong = |name: &str, text: &[u8]| format!("{name} cannot be {}", quoted(text));
     let (sequence, life) = (fields.field(4), fields.field(5));
     let sequence = match sequence {
@@ -368,7 +327,7 @@ fn place(fields: &Splitter, parser: &mut Parser) -> Result<(Option<u64>, Life), 
     Ok((sequence, life))
 }
 
-fn loss(fields: &Splitter, parser: &mut Parser) -> Result<Gap, String> {
+fn loss(fields: &Fields, parser: &mut Parser) -> Result<Gap, String> {
     let note = fields.field(6);
     let understood = std::str::from_utf8(note).ok().and_then(lost_and_why);
     let (lost, why) = understood.ok_or_else(|| format!("this is no loss: {}", quoted(note)))?;

@@ -12,7 +12,9 @@
 )]
 
 pub mod csv;
+mod digits;
 mod error;
+mod fields;
 pub mod jsonl;
 mod lines;
 pub mod merged;

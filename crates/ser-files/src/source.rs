@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, Chain, Cursor, Read};
 
-use ser_evidence::record::Told;
+use ser_evidence::record::{Record, Told};
 
 use crate::error::{Problem, ReadError};
 use crate::lines::MAX_LINE_LEN;
@@ -46,6 +46,26 @@ impl<R: BufRead> Source<R> {
         Ok(Source { reader })
     }
 
+    /// The next record. Whose it is, [`recorder`](Self::recorder) says: where there are millions,
+    /// a name for each takes time.
+    pub fn read(&mut self) -> Option<Result<Record, ReadError>> {
+        match &mut self.reader {
+            Reader::Jsonl(reader) => reader.read(),
+            Reader::Csv(reader) => reader.read(),
+            Reader::Nothing => None,
+        }
+    }
+
+    /// The name of the recorder of the record that was [read](Self::read) last.
+    #[must_use]
+    pub fn recorder(&self) -> &str {
+        match &self.reader {
+            Reader::Jsonl(reader) => reader.recorder(),
+            Reader::Csv(reader) => reader.recorder(),
+            Reader::Nothing => "",
+        }
+    }
+
     /// The program that wrote the file, as it calls itself, if it has said so by now.
     #[must_use]
     pub fn program(&self) -> Option<&str> {
@@ -60,11 +80,8 @@ impl<R: BufRead> Iterator for Source<R> {
     type Item = Result<Told, ReadError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        match &mut self.reader {
-            Reader::Jsonl(reader) => reader.next(),
-            Reader::Csv(reader) => reader.next(),
-            Reader::Nothing => None,
-        }
+        let record = self.read()?;
+        Some(record.map(|record| Told { recorder: self.recorder().to_owned(), record }))
     }
 }
 

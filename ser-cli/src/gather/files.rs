@@ -61,12 +61,13 @@ fn read_one(path: &Path, site: &Site, collector: &mut Collector) -> Result<u64> 
             .hint(format!("name the files in it, as in {}", path.join("*.jsonl").display())));
     }
     let input = BufReader::with_capacity(BUFFER, file);
-    let source = Source::new(input, &recorder_of(path, site)).map_err(|error| failed(&error))?;
+    let mut source =
+        Source::new(input, &recorder_of(path, site)).map_err(|error| failed(&error))?;
     collector.begin_source();
     let mut damaged = 0;
-    for told in source {
-        match told {
-            Ok(told) => collector.add(&told.recorder, &told.record),
+    while let Some(record) = source.read() {
+        match record {
+            Ok(record) => collector.add(source.recorder(), &record),
             Err(error) if error.is_of_one_line() => {
                 damaged += 1;
                 if damaged <= TOLD {

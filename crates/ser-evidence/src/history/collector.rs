@@ -1,6 +1,7 @@
 //! Takes records one by one, from many sources, in any order.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use super::gaps::{self, ToldGaps};
 use super::join::{self, Segment};
@@ -16,12 +17,17 @@ use crate::site::{Recorder, Site};
 /// a source, so say where the next one [begins](Self::begin_source).
 #[derive(Debug, Default)]
 pub struct Collector {
-    recorders: BTreeMap<String, Collected>,
+    recorders: Vec<Collected>,
+    /// Where each is in that list.
+    by_name: BTreeMap<String, usize>,
+    /// Where the recorder of the last record is.
+    current: usize,
 }
 
 /// What was collected of one recorder.
 #[derive(Debug, Default)]
 struct Collected {
+    name: String,
     lives: BTreeMap<Life, Vec<Held>>,
     /// Readings that do not know their life.
     unnamed: Vec<Segment>,
@@ -43,38 +49,26 @@ impl Collector {
 
     /// Says that what follows is from another source.
     pub fn begin_source(&mut self) {
-        for collected in self.recorders.values_mut() {
+        for collected in &mut self.recorders {
             collected.begins_segment = true;
         }
     }
 
     /// Takes a record of the recorder of this name.
     pub fn add(&mut self, recorder: &str, record: &Record) {
-        let collected = self.recorder(recorder);
-        match *record {
-            Record::Entry(ref entry) => collected.add_entry(entry),
-            Record::Gap(gap) => collected.gaps.push(gap),
-            Record::Clock(observation) => collected.observations.push(observation),
-            Record::Step(step) => collected.steps.push(step),
-            Record::Life(life) => collected.life_records.push(life),
-            Record::Watched(watched) => collected.watched.push(watched),
+        self.turn_to(recorder);
+        if let Some(collected) = self.recorders.get_mut(self.current) {
+            collected.add(record);
         }
     }
 
     /// Takes everything of another collector, whose sources are other ones.
     pub fn merge(&mut self, other: Collector) {
-        for (name, other) in other.recorders {
-            let collected = self.recorder(&name);
-            for (life, entries) in other.lives {
-                collected.lives.entry(life).or_default().extend(entries);
+        for other in other.recorders {
+            self.turn_to(&other.name);
+            if let Some(collected) = self.recorders.get_mut(self.current) {
+                collected.merge(other);
             }
-            collected.unnamed.extend(other.unnamed);
-            collected.begins_segment = true;
-            collected.life_records.extend(other.life_records);
-            collected.gaps.extend(other.gaps);
-            collected.observations.extend(other.observations);
-            collected.steps.extend(other.steps);
-            collected.watched.extend(other.watched);
         }
     }
 
@@ -82,29 +76,62 @@ impl Collector {
     /// too, without a life.
     #[must_use]
     pub fn finish(mut self, site: &Site) -> History {
-        let names: BTreeSet<String> = self
-            .recorders
-            .keys()
-            .cloned()
-            .chain(site.recorders.iter().map(|recorder| recorder.name.clone()))
-            .collect();
-        let recorders = names.into_iter().map(|name| {
-            let collected = self.recorders.remove(&name).unwrap_or_default();
-            collected.finish(&name, site)
-        });
+        for recorder in &site.recorders {
+            self.turn_to(&recorder.name);
+        }
+        self.recorders.sort_by(|one, other| one.name.cmp(&other.name));
+        let recorders = self.recorders.into_iter().map(|collected| collected.finish(site));
         History { recorders: recorders.collect() }
     }
 
-    fn recorder(&mut self, name: &str) -> &mut Collected {
-        // Most records follow one of the same recorder, and need no name of their own.
-        if !self.recorders.contains_key(name) {
-            self.recorders.insert(name.to_owned(), Collected::default());
+    /// Makes the recorder of this name the current one. Most records follow one of the same
+    /// recorder, so that is asked first.
+    fn turn_to(&mut self, name: &str) {
+        if self.recorders.get(self.current).is_some_and(|current| current.name == name) {
+            return;
         }
-        self.recorders.entry(name.to_owned()).or_default()
+        self.current = match self.by_name.get(name) {
+            Some(&known) => known,
+            None => {
+                let place = self.recorders.len();
+                self.by_name.insert(name.to_owned(), place);
+                self.recorders.push(Collected { name: name.to_owned(), ..Collected::default() });
+                place
+            }
+        };
     }
 }
 
 impl Collected {
+    fn add(&mut self, record: &Record) {
+        match *record {
+            Record::Entry(ref entry) => self.add_entry(entry),
+            Record::Gap(gap) => self.gaps.push(gap),
+            Record::Clock(observation) => self.observations.push(observation),
+            Record::Step(step) => self.steps.push(step),
+            Record::Life(life) => self.life_records.push(life),
+            Record::Watched(watched) => self.watched.push(watched),
+        }
+    }
+
+    /// Takes everything that was collected of the same recorder elsewhere.
+    fn merge(&mut self, other: Collected) {
+        for (life, entries) in other.lives {
+            match self.lives.entry(life) {
+                // Usually a life is in one place, and is not copied.
+                Entry::Vacant(vacant) => _ = vacant.insert(entries),
+                Entry::Occupied(mut known) => known.get_mut().extend(entries),
+            }
+        }
+        self.unnamed.extend(other.unnamed);
+        self.begins_segment = true;
+        self.life_records.extend(other.life_records);
+        self.gaps.extend(other.gaps);
+        self.observations.extend(other.observations);
+        self.steps.extend(other.steps);
+        self.watched.extend(other.watched);
+    }
+
     fn add_entry(&mut self, record: &EntryRecord) {
         let EntryRecord { life, sequence, number, entry, known } = *record;
         match sequence {
@@ -141,8 +168,8 @@ impl Collected {
         }
     }
 
-    fn finish(mut self, name: &str, site: &Site) -> RecorderHistory {
-        let id = site.recorder(name);
+    fn finish(mut self, site: &Site) -> RecorderHistory {
+        let id = site.recorder(&self.name);
         let described = id.and_then(|id| site.recorders.get(id.0)).cloned();
         let mut conflicts = Vec::new();
         let unnamed = std::mem::take(&mut self.unnamed);
@@ -158,7 +185,7 @@ impl Collected {
         }
         conflicts.sort_unstable_by_key(|conflict| (conflict.life, conflict.sequence));
         RecorderHistory {
-            recorder: described.unwrap_or_else(|| Recorder::named(name)),
+            recorder: described.unwrap_or_else(|| Recorder::named(&self.name)),
             site: id,
             lives,
             observations: sorted(self.observations),

@@ -96,9 +96,9 @@ fn best(timeline: &Timeline<'_>, which: Which) -> Option<Incident> {
     let points = Points::new(timeline);
     let mut best: Option<(Rank, Incident)> = None;
     for_each(timeline, |incident, keys| {
-        let rank = Rank::of(timeline, &points, incident, keys, which);
+        let rank = Rank::of(timeline, &points, &incident, keys, which);
         if best.as_ref().is_none_or(|(known, _)| rank >= *known) {
-            best = Some((rank, incident.clone()));
+            best = Some((rank, incident));
         }
     });
     best.map(|(_, incident)| incident)
@@ -109,7 +109,7 @@ impl Incident {
     #[must_use]
     pub fn all(timeline: &Timeline<'_>) -> Vec<Incident> {
         let mut all = Vec::new();
-        for_each(timeline, |incident, _| all.push(incident.clone()));
+        for_each(timeline, |incident, _| all.push(incident));
         all
     }
 }
@@ -154,7 +154,7 @@ fn has_trip(timeline: &Timeline<'_>, points: &Points, incident: &Incident) -> bo
 
 /// Hands out each incident, with the keys of its first and last entry. Entries without any time
 /// belong to none.
-fn for_each(timeline: &Timeline<'_>, mut take: impl FnMut(&Incident, (i64, i64))) {
+fn for_each(timeline: &Timeline<'_>, mut take: impl FnMut(Incident, (i64, i64))) {
     let quiet = timeline.site().incident.quiet_us;
     let mut incident = Incident::default();
     let mut keys = (0, 0);
@@ -171,8 +171,7 @@ fn for_each(timeline: &Timeline<'_>, mut take: impl FnMut(&Incident, (i64, i64))
             continue;
         };
         if !incident.events.is_empty() && key.saturating_sub(keys.1) > quiet {
-            take(&incident, keys);
-            incident = Incident::default();
+            take(std::mem::take(&mut incident), keys);
         }
         match item {
             Item::Entry(event) => {
@@ -187,7 +186,7 @@ fn for_each(timeline: &Timeline<'_>, mut take: impl FnMut(&Incident, (i64, i64))
         }
     }
     if !incident.events.is_empty() {
-        take(&incident, keys);
+        take(incident, keys);
     }
 }
 

@@ -364,11 +364,10 @@ fn instant(run: &RunClock, home: Home, shown: Moment<Shown>, model: &ClockModel)
 
 impl Timeline<'_> {
     /// The instant of the sample on every scale on which it is known.
-    pub(super) fn samples(&self, event: EventId) -> Vec<(Home, (i64, i64))> {
-        let mut samples: Vec<(Home, (i64, i64))> = Vec::new();
+    pub(super) fn samples(&self, event: EventId) -> impl Iterator<Item = (Home, (i64, i64))> {
         let place = event.place as usize;
-        samples.extend(self.bounds(event).and_then(|bounds| bounds.sample(place)));
-        let others = || {
+        let sample = self.bounds(event).and_then(|bounds| bounds.sample(place));
+        let others = move || {
             let held = self.held(event)?;
             let run = self.model.runs.get(self.clock(event)?.sure_run(held)?)?;
             let x = run.unwrapped(shown(&held.entry.time)?);
@@ -376,8 +375,7 @@ impl Timeline<'_> {
             let on = move |home| (home, added(run.instant(home, x), shift_us));
             Some(run.homes().skip(1).map(on))
         };
-        samples.extend(others().into_iter().flatten());
-        samples
+        sample.into_iter().chain(others().into_iter().flatten())
     }
 
     /// The instant of the sample in UTC.
@@ -386,8 +384,7 @@ impl Timeline<'_> {
             Home::Utc => Bound::from_us(lo, hi),
             Home::Boot(boot) => self.model.hosts.utc(boot, Bound::from_us(lo, hi)),
         };
-        let samples = self.samples(event);
-        samples.into_iter().map(in_utc).fold(Bound::UNKNOWN, Bound::intersection)
+        self.samples(event).map(in_utc).fold(Bound::UNKNOWN, Bound::intersection)
     }
 }
 

@@ -137,7 +137,7 @@ fn changes_of(timeline: &Timeline<'_>, point: &Point, is_inverted: bool) -> Vec<
 
 /// How wide the narrowest bound of an entry is.
 fn narrowest(timeline: &Timeline<'_>, event: EventId) -> Option<i64> {
-    let bounds = timeline.samples(event).into_iter().map(|(_, bound)| bound);
+    let bounds = timeline.samples(event).map(|(_, bound)| bound);
     let known = bounds.filter(|&(lo, hi)| lo != i64::MIN && hi != i64::MAX);
     known.map(|(lo, hi)| hi.saturating_sub(lo)).min()
 }

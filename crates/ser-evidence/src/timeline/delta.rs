@@ -111,7 +111,7 @@ impl Timeline<'_> {
         let mut known = (NO_LO, NO_HI);
         let mut take = |(lo, hi): (i64, i64)| known = (known.0.max(lo), known.1.min(hi));
         for (home, bound) in self.samples(one) {
-            let same = self.samples(other).into_iter().filter(|(other, _)| *other == home);
+            let same = self.samples(other).filter(|(other, _)| *other == home);
             for (_, other) in same {
                 take(difference(bound, other));
             }

@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::collections::binary_heap::PeekMut;
 
 use super::bounds::Key;
 use super::{EventId, Timeline, event_id};
@@ -63,16 +64,10 @@ impl<'t> Timeline<'t> {
         Some(Head { key, recorder, life, place })
     }
 
-    /// Gaps and clock sets that are shown ahead of an entry, the last one first.
-    fn ahead_of(&self, event: EventId) -> Vec<Item> {
-        let (Some(life), Some(clock)) = (self.life(event), self.clock(event)) else {
-            return Vec::new();
-        };
+    /// Adds gaps and clock sets that are shown ahead of an entry, the last one first.
+    fn add_ahead_of(&self, event: EventId, items: &mut Vec<Item>) {
+        let (Some(life), Some(clock)) = (self.life(event), self.clock(event)) else { return };
         let place = event.place as usize;
-        let first = life.gaps.partition_point(|gap| gap.place < place);
-        let gaps =
-            life.gaps.iter().enumerate().skip(first).take_while(|(_, gap)| gap.place == place);
-        let mut items: Vec<Item> = gaps.map(|(index, _)| Item::Gap(event, index)).collect();
         let sequence = |place: usize| life.entries.get(place).map(|held| held.sequence);
         let previous = place.checked_sub(1).and_then(sequence);
         // A step is shown where it was at the latest, and once.
@@ -83,8 +78,9 @@ impl<'t> Timeline<'t> {
         if clock.runs.steps.iter().any(|step| is_here(step.before)) {
             items.push(Item::ClockSet(event));
         }
-        items.reverse();
-        items
+        let first = life.gaps.partition_point(|gap| gap.place < place);
+        let end = life.gaps.partition_point(|gap| gap.place <= place);
+        items.extend((first..end).rev().map(|index| Item::Gap(event, index)));
     }
 }
 
@@ -95,20 +91,22 @@ impl Iterator for Items<'_> {
         if let Some(item) = self.pending.pop() {
             return Some(item);
         }
-        let Reverse(head) = self.heads.pop()?;
+        // The next entry takes the place of this one: that is less work than to take one away and
+        // to put another one in.
+        let mut first = self.heads.peek_mut()?;
+        let Reverse(head) = *first;
         let event = EventId { recorder: head.recorder, life: head.life, place: head.place };
         let next = EventId { place: head.place + 1, ..event };
-        self.pending.push(Item::Entry(event));
         match self.timeline.head(next) {
-            Some(head) => self.heads.push(Reverse(head)),
-            // What is missing at the end of a life.
+            Some(head) => *first = Reverse(head),
             None => {
-                let mut at_end = self.timeline.ahead_of(next);
-                at_end.append(&mut self.pending);
-                self.pending = at_end;
+                PeekMut::pop(first);
+                // What is missing at the end of a life.
+                self.timeline.add_ahead_of(next, &mut self.pending);
             }
         }
-        self.pending.extend(self.timeline.ahead_of(event));
+        self.pending.push(Item::Entry(event));
+        self.timeline.add_ahead_of(event, &mut self.pending);
         self.pending.pop()
     }
 }

@@ -175,7 +175,7 @@ impl<'a> Timeline<'a> {
             let bound = Bound::<Utc>::from_us(bound.0, bound.1).shifted(lo, hi);
             (bound.lo().map(Moment::us), bound.hi().map(Moment::us))
         };
-        self.samples(event).into_iter().map(|(home, bound)| (home, ends(bound))).collect()
+        self.samples(event).map(|(home, bound)| (home, ends(bound))).collect()
     }
 
     /// What the site file adds to the time of an entry by hand, in microseconds.

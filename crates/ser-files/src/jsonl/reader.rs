@@ -20,6 +20,8 @@ use crate::stamp as stamps;
 pub struct Reader<R> {
     lines: Lines<R>,
     /// The recorder of lines that do not name theirs.
+    unnamed: String,
+    /// The recorder of the record that was read last.
     recorder: String,
     program: Option<String>,
     is_over: bool,
@@ -30,7 +32,27 @@ impl<R: BufRead> Reader<R> {
     /// them.
     pub fn new(input: R, recorder: &str) -> Reader<R> {
         let lines = Lines::new(input);
-        Reader { lines, recorder: recorder.to_owned(), program: None, is_over: false }
+        let (unnamed, recorder) = (recorder.to_owned(), recorder.to_owned());
+        Reader { lines, unnamed, recorder, program: None, is_over: false }
+    }
+
+    /// The name of the recorder of the record that was [read](Self::read) last.
+    #[must_use]
+    pub fn recorder(&self) -> &str {
+        &self.recorder
+    }
+
+    /// The next record, without the name of its recorder.
+    pub fn read(&mut self) -> Option<std::result::Result<Record, ReadError>> {
+        if self.is_over {
+            return None;
+        }
+        let record = self.next_record();
+        let goes_on = |record: &std::result::Result<Record, ReadError>| {
+            record.as_ref().err().is_none_or(ReadError::is_of_one_line)
+        };
+        self.is_over = !record.as_ref().is_some_and(goes_on);
+        record
     }
 
     /// The program that wrote the file, as it calls itself, if it has said so by now.
@@ -39,20 +61,24 @@ impl<R: BufRead> Reader<R> {
         self.program.as_deref()
     }
 
-    fn read(&mut self) -> Option<std::result::Result<Told, ReadError>> {
+    fn next_record(&mut self) -> Option<std::result::Result<Record, ReadError>> {
         loop {
             let line = match self.lines.next()? {
                 Ok(line) => line,
                 Err(error) => return Some(Err(error)),
             };
-            let understood =
-                parse(line).and_then(|line| item(&line).map_err(|problem| (None, problem)));
+            let understood = parse(line).and_then(|line| {
+                let item = item(&line).map_err(|problem| (None, problem))?;
+                let name = line.recorder.as_ref().map_or(&*self.unnamed, |Text(name)| name);
+                // Neighbouring lines often have the same one.
+                if self.recorder != name {
+                    name.clone_into(&mut self.recorder);
+                }
+                Ok(item)
+            });
             let number = self.lines.number();
             match understood {
-                Ok(Item::Record(recorder, record)) => {
-                    let recorder = recorder.unwrap_or_else(|| self.recorder.clone());
-                    return Some(Ok(Told { recorder, record }));
-                }
+                Ok(Item::Record(record)) => return Some(Ok(record)),
                 Ok(Item::File(program)) => self.program = program,
                 Err((byte, problem)) => {
                     return Some(Err(ReadError { line: number, byte, problem }));
@@ -66,20 +92,15 @@ impl<R: BufRead> Iterator for Reader<R> {
     type Item = std::result::Result<Told, ReadError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.is_over {
-            return None;
-        }
-        let told = self.read();
-        let goes_on = |told: &Self::Item| told.as_ref().err().is_none_or(ReadError::is_of_one_line);
-        self.is_over = !told.as_ref().is_some_and(goes_on);
-        told
+        let record = self.read()?;
+        Some(record.map(|record| Told { recorder: self.recorder.clone(), record }))
     }
 }
 
 /// What a line says.
 enum Item {
-    /// A record, and the name of its recorder if the line has it.
-    Record(Option<String>, Record),
+    /// A record.
+    Record(Record),
     /// A program begins to write.
     File(Option<String>),
 }
@@ -104,7 +125,6 @@ fn not_json(error: &serde_json::Error, line: &[u8]) -> Trouble {
 }
 
 fn item(line: &Line<'_>) -> std::result::Result<Item, Problem> {
-    let recorder = || line.recorder.as_ref().map(|Text(name)| name.to_string());
     let record = match line.record.as_ref().map(|Text(kind)| &**kind) {
         Some("file") => return file(line),
         Some("entry") => entry(line),
@@ -119,7 +139,7 @@ fn item(line: &Line<'_>) -> std::result::Result<Item, Problem> {
         None if line.count.is_some() => gap(line),
         None => Err("neither `record` nor `entry` nor `lost` says what this is".to_owned()),
     };
-    record.map(|record| Item::Record(recorder(), record)).map_err(Problem::Damaged)
+    record.map(Item::Record).map_err(Problem::Damaged)
 }
 
 fn file(line: &Line<'_>) -> std::result::Result<Item, Problem> {

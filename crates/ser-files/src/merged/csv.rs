@@ -2,10 +2,12 @@
 
 use std::io::{self, Write};
 
+use ser_evidence::history::Held;
 use ser_evidence::time::Moment;
 use ser_evidence::timeline::{EventId, Item, Timeline};
 
-use super::super::report::{missing, names, rfc3339};
+use super::super::report::{missing, names};
+use crate::digits::{UtcTexts, push_number, push_stamp};
 
 /// The columns. The first seven are those of a reading.
 pub const HEADER: &str =
@@ -17,96 +19,116 @@ pub const HEADER: &str =
 /// If `out` does not take it.
 pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>) -> io::Result<()> {
     writeln!(out, "{HEADER}")?;
-    let mut row = Row::default();
+    let mut rows = Rows::of(timeline);
     let mut is_after_set = false;
     for item in timeline.items() {
         match item {
             Item::Entry(event) => {
-                row.entry(out, timeline, event, std::mem::take(&mut is_after_set))?;
+                let is_after_set = std::mem::take(&mut is_after_set);
+                out.write_all(rows.entry(timeline, event, is_after_set))?;
             }
-            Item::Gap(event, index) => row.gap(out, timeline, event, index)?,
+            Item::Gap(event, index) => rows.gap(out, timeline, event, index)?,
             Item::ClockSet(_) => is_after_set = true,
         }
     }
     Ok(())
 }
 
-/// What is used again and again while rows are written.
-#[derive(Default)]
-struct Row {
-    /// The end of the rows of an entry, which they share.
-    tail: String,
-    /// The name of the recorder that `quoted` is of.
-    recorder: Option<u32>,
-    quoted: String,
+/// What rows are made of, and where they are made.
+struct Rows {
+    /// By recorder: its name as a field, and the names of its lives.
+    names: Vec<(String, Vec<String>)>,
+    utc: UtcTexts,
+    /// What the rows of an entry begin and end with.
+    head: Vec<u8>,
+    tail: Vec<u8>,
+    /// All rows of an entry.
+    rows: Vec<u8>,
 }
 
-impl Row {
-    fn entry(
-        &mut self,
-        out: &mut dyn Write,
-        timeline: &Timeline<'_>,
-        event: EventId,
-        is_after_set: bool,
-    ) -> io::Result<()> {
-        let (Some(held), Some(life)) = (timeline.held(event), timeline.life(event)) else {
-            return Ok(());
+impl Rows {
+    fn of(timeline: &Timeline<'_>) -> Rows {
+        let names = timeline.history().recorders.iter().map(|history| {
+            let lives = history.lives.iter().map(|life| life.name().to_string());
+            (quoted(&names::harmless(&history.recorder.name)), lives.collect())
+        });
+        Rows {
+            names: names.collect(),
+            utc: UtcTexts::default(),
+            head: Vec::new(),
+            tail: Vec::new(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// The rows of an entry.
+    fn entry(&mut self, timeline: &Timeline<'_>, event: EventId, is_after_set: bool) -> &[u8] {
+        self.rows.clear();
+        let Some(&Held { sequence, entry, number, .. }) = timeline.held(event) else {
+            return &self.rows;
         };
-        self.turn_to(timeline, event);
+        self.head.clear();
+        push_number(&mut self.head, number.into());
+        self.head.push(b',');
+        push_stamp(&mut self.head, &entry.time);
+        self.head.push(b',');
         let note = if is_after_set { "clock was set before this" } else { "" };
-        let bound = timeline.moved_utc(event, None);
-        let end =
-            |end: Option<Moment<_>>| end.and_then(|end| rfc3339(end.us())).unwrap_or_default();
-        self.tail.clear();
-        use std::fmt::Write as _;
-        // Writing to a string does not fail.
-        let _ = write!(
-            self.tail,
-            ",{},{},{note},{},{},{},{}",
-            held.sequence,
-            life.name(),
-            self.quoted,
-            timeline
-                .time(event)
-                .map(ser_evidence::time::Moment::us)
-                .and_then(rfc3339)
-                .unwrap_or_default(),
-            end(bound.lo()),
-            end(bound.hi()),
-        );
-        let (number, time, entry) = (held.number, held.entry.time, held.entry);
+        self.make_tail(timeline, event, sequence, note);
         if entry.changed.is_empty() {
-            return writeln!(out, "{number},{time},,{}", self.tail);
+            [&*self.head, b",", &*self.tail].iter().for_each(|part| self.rows.extend(*part));
         }
         for input in entry.changed.numbers() {
-            let state = u8::from(entry.state.contains(input));
-            writeln!(out, "{number},{time},{input},{state}{}", self.tail)?;
+            self.rows.extend_from_slice(&self.head);
+            push_number(&mut self.rows, input.into());
+            let state: &[u8] = if entry.state.contains(input) { b",1" } else { b",0" };
+            self.rows.extend_from_slice(state);
+            self.rows.extend_from_slice(&self.tail);
         }
-        Ok(())
+        &self.rows
+    }
+
+    /// What comes after the state.
+    fn make_tail(&mut self, timeline: &Timeline<'_>, event: EventId, sequence: u64, note: &str) {
+        let tail = &mut self.tail;
+        let bound = timeline.moved_utc(event, None);
+        let ends = [bound.lo(), bound.hi()].map(|end| end.map(Moment::us));
+        tail.clear();
+        tail.push(b',');
+        push_number(tail, sequence);
+        let (life, recorder) = names(&self.names, event);
+        for text in [life, note, recorder] {
+            tail.push(b',');
+            tail.extend_from_slice(text.as_bytes());
+        }
+        for us in [timeline.time(event).map(Moment::us)].into_iter().chain(ends) {
+            tail.push(b',');
+            if let Some(us) = us {
+                self.utc.push(tail, us);
+            }
+        }
+        tail.push(b'\n');
     }
 
     fn gap(
-        &mut self,
+        &self,
         out: &mut dyn Write,
         timeline: &Timeline<'_>,
         event: EventId,
         index: usize,
     ) -> io::Result<()> {
-        self.turn_to(timeline, event);
-        let Some(life) = timeline.life(event) else { return Ok(()) };
-        let Some(gap) = life.gaps.get(index) else { return Ok(()) };
+        let Some(gap) = timeline.life(event).and_then(|life| life.gaps.get(index)) else {
+            return Ok(());
+        };
+        let (life, recorder) = names(&self.names, event);
         let note = missing(gap.lost, gap.why);
-        writeln!(out, ",,,,{},{},{},{},,,", gap.after, life.name(), quoted(&note), self.quoted)
+        writeln!(out, ",,,,{},{life},{},{recorder},,,", gap.after, quoted(&note))
     }
+}
 
-    fn turn_to(&mut self, timeline: &Timeline<'_>, event: EventId) {
-        if self.recorder != Some(event.recorder) {
-            let name = timeline.recorder(event);
-            let name = name.map(|found| quoted(&names::harmless(&found.recorder.name)));
-            self.quoted = name.unwrap_or_default();
-            self.recorder = Some(event.recorder);
-        }
-    }
+/// The names of the life and the recorder of an entry.
+fn names(names: &[(String, Vec<String>)], event: EventId) -> (&str, &str) {
+    let Some((recorder, lives)) = names.get(event.recorder as usize) else { return ("", "") };
+    (lives.get(event.life as usize).map_or("", String::as_str), recorder)
 }
 
 /// A text as a field.
