@@ -20,8 +20,8 @@ pub struct Completeness {
     pub unbroken: Option<(EventId, EventId)>,
     /// When it was last read, by the host that did; `None` if no source says.
     pub read_until: Option<HostReading>,
-    /// Whether it was read, or has an entry, after the end of the incident.
-    pub is_known_past_end: bool,
+    /// Whether it was read, or has an entry, after the end of the incident; or the end is its own.
+    pub is_known_to_end: bool,
     /// Entries that contradict each other.
     pub conflicts: usize,
     /// Entries of which not even the day is known, because the clock was never set: they may belong
@@ -52,8 +52,7 @@ impl Completeness {
     /// Whether nothing is missing in the incident, as far as anybody can say.
     #[must_use]
     pub fn is_complete(&self) -> bool {
-        let is_there = self.is_known_past_end || self.entries > 0;
-        self.gaps.is_empty() && self.conflicts == 0 && is_there
+        self.gaps.is_empty() && self.conflicts == 0 && self.is_known_to_end
     }
 }
 
@@ -88,7 +87,9 @@ fn of(
         gaps,
         unbroken: near.and_then(|event| unbroken(timeline, event)),
         read_until: readings.max_by_key(|(_, _, reading)| reading.utc).map(|(_, _, at)| at),
-        is_known_past_end: last.is_some_and(|last| is_covered_until(timeline, recorder, last, 0)),
+        is_known_to_end: last.is_some_and(|last| {
+            last.event.recorder == recorder || is_covered_until(timeline, recorder, last, 0)
+        }),
         conflicts: history.conflicts.len(),
         timeless: timeless(timeline, history, recorder),
         clock: near.map_or(ClockState::NotObserved, |event| clock(timeline, event)),

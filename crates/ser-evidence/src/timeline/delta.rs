@@ -65,6 +65,11 @@ impl Timeline<'_> {
                 std::cmp::Ordering::Greater => Order::After,
             };
         }
+        // A clock that was never set says nothing among others that were, and is listed apart.
+        let is_timeless = |event| self.key(event).is_none_or(|key| key.is_timeless);
+        if is_timeless(one) != is_timeless(other) {
+            return Order::Unknown;
+        }
         let (lo, hi) = self.moved_between((one, None), (other, None));
         match () {
             // What contradicts itself proves nothing.

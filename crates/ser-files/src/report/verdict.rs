@@ -172,7 +172,7 @@ pub(super) fn incompleteness(timeline: &Timeline<'_>, of: &Completeness) -> Opti
         text.push(format!("{} entries without a time (the clock was never set)", of.timeless));
     }
     if text.is_empty() && !of.is_complete() {
-        text.push("not read since".to_owned());
+        text.push("not read after the end of the incident".to_owned());
     }
     (!text.is_empty()).then(|| format!("{name}: {}", text.join(", ")))
 }
