@@ -68,7 +68,7 @@ pub(crate) struct RunFacts<'m> {
     pub(crate) stamp: Option<i64>,
 }
 
-/// One entry comes right before another one in a life. Each is given by the runs in which it may
+/// One entry comes before another one in a life. Each is given by the runs in which it may
 /// be, and what the clock showed in each.
 #[derive(Clone, Debug)]
 pub(crate) struct Succession {
