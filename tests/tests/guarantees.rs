@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use ser_tests::pages::{self, Row};
 
 /// What the numbers of promises begin with: order, stamps, losses, recovery.
-const PARTS: [&str; 4] = ["O", "S", "L", "R"];
+const PARTS: [&str; 5] = ["O", "S", "L", "R", "E"];
 
 fn wrong_with_promise(row: &Row<'_>) -> Vec<String> {
     let [number, promise] = row.cells[..] else {
