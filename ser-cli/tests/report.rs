@@ -322,6 +322,15 @@ fn csv_and_json_lines_of_one_reading_give_the_same_sequence() {
     assert_eq!(of("U1.csv"), of("other.jsonl"));
 }
 
+#[test]
+fn a_file_that_was_read_without_the_site_gets_its_names() {
+    let desk = Desk::new();
+    let early = entry("tcp://localhost:4001", 1, "2026-11-22T10:00:00.100", 1, "1");
+    desk.site(&[("U1", "tcp://127.0.0.1:4001")]).file("a.jsonl", &format!("{HEAD}{early}"));
+    let report = desk.json("report --site north.toml --input a.jsonl");
+    assert_eq!(rows(&report)[0].0, "U1");
+}
+
 /// Whether a terminal shows all of this and obeys none of it.
 fn is_harmless(shown: &str) -> bool {
     !shown.contains(|letter| letter != '\n' && is_obeyed(letter))

@@ -28,9 +28,6 @@ records, so that report and merge take it for the sources themselves.";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    #[command(flatten)]
-    sources: SourceArgs,
-
     /// The format of the list.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -38,6 +35,9 @@ pub(crate) struct Args {
     /// End with exit code 3 if entries are known to be missing in the list.
     #[arg(long)]
     fail_on_loss: bool,
+
+    #[command(flatten)]
+    sources: SourceArgs,
 }
 
 /// The format of a list.

@@ -28,9 +28,6 @@ is not certain is a set, and entries that are missing are a row of their own.";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    #[command(flatten)]
-    sources: SourceArgs,
-
     /// The last incident, whether something tripped or not.
     #[arg(long, conflicts_with_all = ["around", "since", "until"])]
     last: bool,
@@ -58,6 +55,9 @@ pub(crate) struct Args {
     /// End with exit code 3 if something is known to be missing in the incident.
     #[arg(long)]
     fail_on_loss: bool,
+
+    #[command(flatten)]
+    sources: SourceArgs,
 }
 
 /// The format of a report.

@@ -1,5 +1,6 @@
 //! Reads files that were written before.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -7,10 +8,11 @@ use std::sync::Mutex;
 use std::thread;
 
 use ser_evidence::history::Collector;
-use ser_evidence::site::Site;
+use ser_evidence::site::{Recorder, Site};
 use ser_files::Source;
 
 use crate::error::{Failure, Result, advise, warn};
+use crate::unit_name::UnitName;
 
 /// How many files are read at a time.
 const AT_ONCE: usize = 4;
@@ -22,14 +24,18 @@ const TOLD: u64 = 3;
 const BUFFER: usize = 1 << 18;
 
 /// Reads all files. Damaged lines are told and passed over; returns how many there were.
+///
+/// A file that was read without the site file calls its recorder by the port. Where the site has that
+/// port, the recorder gets its name.
 pub(super) fn read(files: &[PathBuf], site: &Site, collector: &mut Collector) -> Result<u64> {
+    let names = names_by_port(site);
     let waiting = Mutex::new(files.iter());
     let next = || waiting.lock().map_or(None, |mut waiting| waiting.next());
     let work = || -> Result<(Collector, u64)> {
         let mut own = Collector::new();
         let mut damaged = 0;
         while let Some(path) = next() {
-            damaged += read_one(path, site, &mut own)?;
+            damaged += read_one(path, &names, &mut own)?;
         }
         Ok((own, damaged))
     };
@@ -50,7 +56,7 @@ pub(super) fn read(files: &[PathBuf], site: &Site, collector: &mut Collector) ->
     Ok(damaged)
 }
 
-fn read_one(path: &Path, site: &Site, collector: &mut Collector) -> Result<u64> {
+fn read_one(path: &Path, names: &Names, collector: &mut Collector) -> Result<u64> {
     let failed = |error: &dyn std::fmt::Display| {
         Failure::new(format!("{}: {error}", path.display()))
             .hint("--input takes what ser-cli read or watch wrote with --format jsonl or csv")
@@ -61,13 +67,15 @@ fn read_one(path: &Path, site: &Site, collector: &mut Collector) -> Result<u64> 
             .hint(format!("name the files in it, as in {}", path.join("*.jsonl").display())));
     }
     let input = BufReader::with_capacity(BUFFER, file);
-    let mut source =
-        Source::new(input, &recorder_of(path, site)).map_err(|error| failed(&error))?;
+    let mut source = Source::new(input, &recorder_of(path)).map_err(|error| failed(&error))?;
     collector.begin_source();
     let mut damaged = 0;
     while let Some(record) = source.read() {
         match record {
-            Ok(record) => collector.add(source.recorder(), &record),
+            Ok(record) => {
+                let told = source.recorder();
+                collector.add(names.get(told).map_or(told, String::as_str), &record);
+            }
             Err(error) if error.is_of_one_line() => {
                 damaged += 1;
                 if damaged <= TOLD {
@@ -88,8 +96,20 @@ fn read_one(path: &Path, site: &Site, collector: &mut Collector) -> Result<u64> 
     Ok(damaged)
 }
 
+/// The names of recorders in the site, by the names of their ports.
+type Names = HashMap<String, String>;
+
+fn names_by_port(site: &Site) -> Names {
+    let of_recorder = |recorder: &Recorder| {
+        let port = recorder.port.as_deref()?;
+        let unit = UnitName::of(port, &port.parse().ok()?);
+        Some((unit.name, recorder.name.clone()))
+    };
+    site.recorders.iter().filter_map(of_recorder).collect()
+}
+
 /// Whose entries a file holds that does not say it: by its name.
-fn recorder_of(path: &Path, _site: &Site) -> String {
+fn recorder_of(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or(path.as_os_str());
     stem.to_string_lossy().into_owned()
 }
