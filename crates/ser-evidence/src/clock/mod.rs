@@ -5,21 +5,27 @@
 //! recorders that heard one broadcast, or that watch one contact, bound each other's.
 //!
 //! `envelope` reckons with bounds that age; `hosts` knows the clocks of the observers; `runs` finds
-//! where clocks were set; `placing` says to which run an observation belongs; `offsets` makes bounds
-//! of them, and `links` lets recorders bound each other. `local` is for clocks that nobody observed.
-//! `layout` finds a place in one list for everything, and `model` puts all this together.
+//! where clocks were set, and `lives` does so for all that is told of a recorder; `placing` says to
+//! which run an observation belongs, and `sorting` gives it to that; `offsets` makes bounds of them,
+//! and `links` lets recorders bound each other. `local` is for clocks that nobody observed.
+//! `successions` and `layout` find a place in one list for everything, and `model` puts all this
+//! together.
 
 pub(crate) mod envelope;
+mod finding;
 pub(crate) mod hosts;
 pub(crate) mod layout;
 pub(crate) mod links;
+pub(crate) mod lives;
 pub(crate) mod local;
 pub(crate) mod model;
 pub(crate) mod offsets;
 pub(crate) mod placing;
 pub(crate) mod runs;
+mod sorting;
+mod successions;
 
+pub use finding::Finding;
 pub use links::LinkReason;
 pub use local::Nominal;
-pub use model::Finding;
 pub use offsets::Home;

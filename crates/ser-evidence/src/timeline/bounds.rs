@@ -3,7 +3,8 @@
 use super::{EventId, Timeline};
 use crate::clock::envelope::{NO_HI, NO_LO};
 use crate::clock::layout::Instant;
-use crate::clock::model::{ClockModel, LifeClock};
+use crate::clock::lives::LifeClock;
+use crate::clock::model::ClockModel;
 use crate::clock::offsets::{RunClock, added, ends};
 use crate::clock::{Home, Nominal};
 use crate::history::{Held, LifeHistory, RecorderHistory};

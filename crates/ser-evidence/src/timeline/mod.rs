@@ -17,7 +17,8 @@ pub use list::{Item, Items};
 
 use std::collections::BTreeMap;
 
-use crate::clock::model::{ClockModel, LifeClock};
+use crate::clock::lives::LifeClock;
+use crate::clock::model::ClockModel;
 use crate::clock::{Finding, Nominal};
 use crate::history::{Held, History, LifeHistory, RecorderHistory};
 use crate::site::{Recorder, Site};
