@@ -4,7 +4,8 @@ use std::error::Error;
 use std::fmt;
 use std::io;
 
-use crate::lines::MAX_LINE_LEN;
+/// The longest line that is read, in bytes. Ours have a few hundred.
+pub const MAX_LINE_LEN: usize = 65_536;
 
 /// How much of a file's text is quoted in an error, in characters.
 const QUOTED_LEN: usize = 40;

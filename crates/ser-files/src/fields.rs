@@ -1,7 +1,7 @@
 //! The fields of a row of CSV.
 
+use crate::error::MAX_LINE_LEN;
 use crate::error::quoted;
-use crate::lines::MAX_LINE_LEN;
 
 /// The most fields of a row that are told apart.
 const MAX_FIELDS: usize = 64;

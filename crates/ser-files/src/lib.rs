@@ -22,6 +22,5 @@ pub mod report;
 mod source;
 mod stamp;
 
-pub use error::{Problem, ReadError};
-pub use lines::MAX_LINE_LEN;
+pub use error::{MAX_LINE_LEN, Problem, ReadError};
 pub use source::Source;

@@ -2,10 +2,7 @@
 
 use std::io::{self, BufRead, Read};
 
-use crate::error::{Problem, ReadError};
-
-/// The longest line that is read, in bytes. Ours have a few hundred.
-pub const MAX_LINE_LEN: usize = 65_536;
+use crate::error::{MAX_LINE_LEN, Problem, ReadError};
 
 const LIMIT: u64 = MAX_LINE_LEN as u64 + 1;
 

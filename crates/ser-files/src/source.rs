@@ -4,8 +4,7 @@ use std::io::{self, BufRead, Chain, Cursor, Read};
 
 use ser_evidence::record::{Record, Told};
 
-use crate::error::{Problem, ReadError};
-use crate::lines::MAX_LINE_LEN;
+use crate::error::{MAX_LINE_LEN, Problem, ReadError};
 use crate::{csv, jsonl};
 
 /// A file whose first bytes were looked at.

@@ -1,6 +1,7 @@
 //! `genius`: the bus as a whole.
 
 mod broadcast;
+mod check;
 mod decode;
 mod devices;
 mod dip;

@@ -10,7 +10,7 @@ use ser_evidence::record::{ClockObservation, How, Record, Reference};
 use ser_evidence::time::{Moment, Shown, shown, stamp};
 use ser_proto::{LastBroadcast, TimeStamp};
 
-use super::broadcast::{Check, Heard};
+use super::check::{Check, Heard};
 use crate::connection::ConnectionArgs;
 use crate::error::{Result, advise, inform};
 use crate::host_reading;
