@@ -192,6 +192,7 @@ fn sequence(document: &Document<'_>) -> Vec<Value> {
             "state": point.map(|point| if row.on { &point.on } else { &point.off }),
             "chatter": row.chatter,
             "shifted_us": timeline.shift_us(event),
+            "clock_was_set_before": report.incident.clock_sets.contains(&event),
         }));
         previous = Some(row.change);
     }

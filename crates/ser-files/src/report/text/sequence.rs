@@ -228,11 +228,6 @@ fn notes(
         let lasted = lasted.map_or(String::new(), |us| format!(", last {}", since(us)));
         notes.push(format!("chatter ×{}{lasted}", fold.changes.len()));
     }
-    // Ahead of the first entry of a log, nothing was stamped by the clock as it was before.
-    let is_first_of_log = row.change.event.place == 0;
-    if !is_first_of_log && report.incident.clock_sets.contains(&row.change.event) {
-        notes.push("clock was set before this".to_owned());
-    }
     notes.extend(local_time_note(timeline, row.change.event, clock));
     let shift = timeline.shift_us(row.change.event);
     if shift != 0 {
@@ -274,6 +269,21 @@ fn gaps_ahead(
             gap_row(document.timeline, event, index, table, styles);
         }
     }
+    // Ahead of the first entry of a log, nothing was stamped by the clock as it was before.
+    let is_first_of_log = row.change.event.place == 0;
+    if !is_first_of_log && document.report.incident.clock_sets.contains(&row.change.event) {
+        let recorder = names::recorder(document.timeline, row.change.event);
+        remark_row("the clock was set here", recorder, table, styles.faint);
+    }
+}
+
+/// A row of its own for what is no change.
+fn remark_row(text: &str, recorder: String, table: &mut Table, style: Style) {
+    table.row(sparse([
+        (TIME, Cell::styled("- - -", style)),
+        (RECORDER, Cell::styled(recorder, style)),
+        (POINT, Cell::remark(text.to_owned(), style)),
+    ]));
 }
 
 fn gap_row(
@@ -284,12 +294,8 @@ fn gap_row(
     styles: Styles,
 ) {
     let Some(gap) = timeline.life(event).and_then(|life| life.gaps.get(index)) else { return };
-    let style = styles.alarm;
-    table.row(sparse([
-        (TIME, Cell::styled("- - -", style)),
-        (RECORDER, Cell::styled(names::recorder(timeline, event), style)),
-        (POINT, Cell::remark(verdict::missing(gap.lost, gap.why), style)),
-    ]));
+    let recorder = names::recorder(timeline, event);
+    remark_row(&verdict::missing(gap.lost, gap.why), recorder, table, styles.alarm);
 }
 
 /// A row in which most cells are empty.
