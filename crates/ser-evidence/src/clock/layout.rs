@@ -172,7 +172,7 @@ impl Layout {
         let (lo, hi) = other.offset.at(tie.other_x);
         let add = |end: i64, by: i64, none: i64| match (end, by) {
             (NO_LO | NO_HI, _) | (_, NO_LO | NO_HI) => none,
-            (end, by) => end.saturating_add(by).saturating_add(tie.other_x - tie.x),
+            (end, by) => end.saturating_add(by).saturating_add(tie.other_x.saturating_sub(tie.x)),
         };
         let (lo, hi) = (add(lo, tie.lo, NO_LO), add(hi, tie.hi, NO_HI));
         if lo == NO_LO && hi == NO_HI {
@@ -235,16 +235,23 @@ impl Layout {
                 self.place(clock, x, Some(utc), ties);
             }
         }
+        // What a clock is said to show counts where it is not bounded on both sides, and comes first.
         for (run, facts) in runs.iter().enumerate() {
             let clock = self.boots.len() + run;
-            let Some(x) = facts.stamp else { continue };
-            let is_observed = !facts.observed.is_empty();
-            let nominal = facts.nominal.filter(|_| !is_observed);
-            match nominal {
-                Some((x, utc)) => self.place(clock, x, Some(utc), ties),
-                None => self.place(clock, x, None, ties),
+            let Some((x, utc)) = facts.nominal else { continue };
+            if facts.observed.is_empty() || !self.is_bounded(clock, x) {
+                self.place(clock, x, Some(utc), ties);
             }
         }
+        for (run, facts) in runs.iter().enumerate() {
+            let Some(x) = facts.stamp else { continue };
+            self.place(self.boots.len() + run, x, None, ties);
+        }
+    }
+
+    fn is_bounded(&self, clock: usize, x: i64) -> bool {
+        let at = self.clocks.get(clock).map_or((NO_LO, NO_HI), |placed| placed.offset.at(x));
+        at.0 != NO_LO && at.1 != NO_HI
     }
 
     /// Gives a clock a place where it showed `x`, if it has none or is only said to have one.

@@ -7,9 +7,9 @@ use jiff::tz::{AmbiguousOffset, TimeZone};
 use crate::site::ClockRule;
 use crate::time::{Moment, Shown, Utc};
 
-/// A clock that shows an earlier time than the beginning of this year was never set: recorders of
-/// this kind are younger, and begin to count at 1970.
-const FIRST_YEAR: i16 = 1990;
+/// The beginning of 1990. A clock that shows an earlier time was never set: recorders of this kind are
+/// younger, and begin to count at 1970.
+const FIRST_US: i64 = 7305 * 86_400_000_000;
 
 /// What a clock's time is in UTC if it shows what it is said to show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +27,7 @@ pub enum Nominal {
 impl Nominal {
     /// By what the site says about a clock.
     pub(crate) fn of(shown: Moment<Shown>, rule: ClockRule, zone: &TimeZone) -> Nominal {
-        if shown < first_moment() {
+        if is_unset(shown) {
             return Nominal::NotKnown;
         }
         let at = |seconds: i64| Moment::from_us(shown.us() - seconds * 1_000_000);
@@ -90,10 +90,9 @@ impl Nominal {
     }
 }
 
-fn first_moment() -> Moment<Shown> {
-    let date = jiff::civil::date(FIRST_YEAR, 1, 1).at(0, 0, 0, 0);
-    let us = TimeZone::UTC.to_timestamp(date).map_or(0, Timestamp::as_microsecond);
-    Moment::from_us(us)
+/// Whether a clock that shows this was never set.
+pub(crate) fn is_unset(shown: Moment<Shown>) -> bool {
+    shown.us() < FIRST_US
 }
 
 /// What the clock showed as a civil date and time.

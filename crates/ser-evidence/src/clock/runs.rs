@@ -4,6 +4,7 @@
 //! in which order two steps were, is not always known. So an entry has a set of runs in which it
 //! may be, usually of one.
 
+use super::local::is_unset;
 use crate::history::{Held, LifeHistory};
 use crate::record::Boot;
 use crate::time::{AROUND_2069_US, Bound, CENTURY_US, Host, Moment, Shown, Utc, shown};
@@ -231,13 +232,18 @@ fn may_show(step: Option<&Step>, stamp: Moment<Shown>) -> bool {
     set_to.is_none_or(|set_to| !went_back(set_to, stamp))
 }
 
-/// Where the stamps go back, the clock was set.
+/// Whether a clock was set between two stamps: it went back, or it had never been set before.
+fn was_set(earlier: Moment<Shown>, later: Moment<Shown>) -> bool {
+    went_back(earlier, later) || (is_unset(earlier) && !is_unset(later))
+}
+
+/// Where the stamps tell it, the clock was set.
 fn backward_steps(entries: &[Held]) -> Vec<Step> {
     let mut steps = Vec::new();
     let mut previous: Option<(u64, Moment<Shown>)> = None;
     for held in entries {
         let Some(now) = shown(&held.entry.time) else { continue };
-        if let Some((after, _)) = previous.filter(|&(_, earlier)| went_back(earlier, now)) {
+        if let Some((after, _)) = previous.filter(|&(_, earlier)| was_set(earlier, now)) {
             steps.push(Step {
                 after,
                 before: held.sequence - 1,

@@ -13,7 +13,7 @@ use super::runs::{LifeRuns, Step};
 use crate::history::{History, RecorderHistory};
 use crate::record::{Boot, ClockObservation, How, Reference};
 use crate::site::Site;
-use crate::time::{Moment, Shown, shown};
+use crate::time::{Bound, Moment, Shown, shown};
 
 /// A recorder receives a broadcast in this time, in microseconds: it looks once a millisecond.
 const PHASE_US: i64 = 1000;
@@ -58,6 +58,7 @@ impl Sorted {
             if runs.is_empty() {
                 lost.push(observation.shown.us());
             }
+            self.add_entry_before(recorder, lives, observation);
             for &run in &runs {
                 self.add(run, observation.shown, observation.at);
             }
@@ -84,6 +85,29 @@ impl Sorted {
             }
         }
         lost
+    }
+
+    /// The newest entry in the log had happened when the clock was observed.
+    fn add_entry_before(
+        &mut self,
+        recorder: &RecorderHistory,
+        lives: &[LifeClock],
+        observation: &ClockObservation,
+    ) {
+        let Reference::Host { bound, reading } = observation.at else { return };
+        let Whereabouts::Here(at) = placing::locate(recorder, &observation.place) else { return };
+        if observation.how == How::Event {
+            return;
+        }
+        let life = recorder.lives.get(at.life).zip(lives.get(at.life));
+        let found = life.and_then(|(life, clock)| {
+            let held = life.entry(at.after)?;
+            Some((clock.sure_run(held)?, shown(&held.entry.time)?))
+        });
+        if let Some((run, stamp)) = found {
+            let bound = Bound::new(None, bound.hi());
+            self.add(run, stamp, Reference::Host { bound, reading });
+        }
     }
 
     fn add(&mut self, run: usize, shown: Moment<Shown>, at: Reference) {
