@@ -30,7 +30,11 @@ pub(super) fn read(
     collector: &mut Collector,
 ) -> Result<Vec<NotReached>> {
     let stop = interrupt::catch()?;
-    let with_port = site.recorders.iter().filter(|recorder| recorder.port.is_some());
+    let is_meant = |recorder: &&Recorder| {
+        connection.recorder.as_ref().is_none_or(|name| *name == recorder.name)
+    };
+    let recorders = site.recorders.iter().filter(is_meant);
+    let with_port = recorders.filter(|recorder| recorder.port.is_some());
     let names: Vec<&str> = with_port.clone().map(|recorder| recorder.name.as_str()).collect();
     if names.is_empty() {
         return Err(Failure::usage("no recorder of the site has a port, so none can be read")

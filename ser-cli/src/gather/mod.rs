@@ -84,6 +84,15 @@ pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<G
         true => live::read(&site, connection, &args.state, &mut collector)?,
         false => Vec::new(),
     };
+    let reached = site.recorders.iter().filter(|recorder| {
+        recorder.port.is_some()
+            && !not_reached.iter().any(|missed| missed.recorder == recorder.name)
+    });
+    if args.input.is_empty() && reached.count() == 0 {
+        return Err(Failure::new("none of the recorders could be reached")
+            .hint("is a ser-cli watch running, or another program on the line? End it meanwhile")
+            .hint("files that were written before can be given with --input FILE…"));
+    }
     let history = collector.finish(&site);
     Ok(Gathered { site, history, site_digest, not_reached, damaged_lines })
 }

@@ -7,7 +7,7 @@ use super::completeness::is_covered_until;
 use super::pick::Incident;
 use super::points::Points;
 use crate::site::{Edge, Expectation};
-use crate::timeline::{ChangeId, Delta, Timeline};
+use crate::timeline::{ChangeId, Delta, EventId, Timeline};
 
 /// One expectation, each time that its beginning happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,6 +71,7 @@ pub(super) fn results(
                 !taken.contains(&row.change) && is_between(timeline, after, row.change, next)
             };
             let then = followers.find(follows).map(|row| row.change);
+            let then = then.or_else(|| outside(timeline, points, expectation, after, next));
             taken.extend(then);
             let delta = then.map(|then| timeline.delta(after, then));
             let verdict = match delta {
@@ -99,6 +100,38 @@ fn is_between(
     };
     is_not_before(after, then) && next.is_none_or(|next| is_not_before(then, next))
 }
+
+/// What followed and is not among the rows of the incident: after a quiet time, or after its end.
+fn outside(
+    timeline: &Timeline<'_>,
+    points: &Points,
+    expectation: &Expectation,
+    after: ChangeId,
+    next: Option<ChangeId>,
+) -> Option<ChangeId> {
+    let Edge { point, on } = expectation.then;
+    let point = timeline.site().points.get(point.0)?;
+    let recorder = points.recorder(point.recorder)?;
+    let begins = timeline.sort_key(after.event)?;
+    let until = begins.saturating_add(expectation.within_us.1).saturating_add(SLACK_US);
+    let lives = (0_u32..).zip(&timeline.history().recorders.get(recorder as usize)?.lives);
+    let mut found: Vec<(i64, ChangeId)> = Vec::new();
+    for (life, of_life) in lives {
+        for (place, held) in (0_u32..).zip(&of_life.entries) {
+            let is_it = held.entry.changed.contains(point.input)
+                && held.entry.state.contains(point.input) == on;
+            let change = ChangeId { event: EventId { recorder, life, place }, input: point.input };
+            let key = is_it.then(|| timeline.sort_key(change.event)).flatten();
+            found.extend(key.filter(|key| (begins..=until).contains(key)).map(|key| (key, change)));
+        }
+    }
+    found.sort_unstable();
+    let mut changes = found.into_iter().map(|(_, change)| change);
+    changes.find(|&change| is_between(timeline, after, change, next))
+}
+
+/// Clocks may be so far apart that what followed in time seems to be later, in microseconds.
+const SLACK_US: i64 = 1_000_000;
 
 fn in_window(delta: Delta, (earliest, latest): (i64, i64)) -> Verdict {
     let (Some(lo), Some(hi)) = (delta.lo_us, delta.hi_us) else {

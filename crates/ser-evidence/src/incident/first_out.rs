@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::completeness::is_covered_until;
 use super::pick::Incident;
 use super::points::Points;
 use crate::site::GroupId;
@@ -15,14 +16,17 @@ pub struct FirstOut {
     /// What is missing may have been first, too: the entry after the gap, and the gap's index in
     /// its life.
     pub gaps: Vec<(EventId, usize)>,
+    /// Recorders, by their indices in the history, that have nothing in the incident and are not
+    /// known to have been read since it began.
+    pub unread: Vec<u32>,
 }
 
 impl FirstOut {
     /// The change that was first, if that is known.
     #[must_use]
     pub fn known(&self) -> Option<ChangeId> {
-        match (self.changes.as_slice(), self.gaps.as_slice()) {
-            ([only], []) => Some(*only),
+        match (&self.changes[..], &self.gaps[..], &self.unread[..]) {
+            ([only], [], []) => Some(*only),
             _ => None,
         }
     }
@@ -93,7 +97,21 @@ fn of(timeline: &Timeline<'_>, incident: &Incident, counts: &dyn Fn(ChangeId) ->
             .filter(|change| counts(*change))
             .collect(),
         gaps: incident.gaps.iter().copied().filter(is_ahead).collect(),
+        unread: unread(timeline, incident, &candidates),
     }
+}
+
+/// Recorders of which nothing is known at the time of the candidates.
+fn unread(timeline: &Timeline<'_>, incident: &Incident, candidates: &[EventId]) -> Vec<u32> {
+    let first = candidates.first().and_then(|&first| changes(timeline, first).next());
+    let Some(first) = first else { return Vec::new() };
+    let recorders = 0..u32::try_from(timeline.history().recorders.len()).unwrap_or(u32::MAX);
+    let is_there = |recorder: u32| {
+        incident.events.iter().any(|event| event.recorder == recorder)
+            || incident.gaps.iter().any(|(event, _)| event.recorder == recorder)
+            || is_covered_until(timeline, recorder, first, 0)
+    };
+    recorders.filter(|&recorder| !is_there(recorder)).collect()
 }
 
 fn changes<'t>(timeline: &'t Timeline<'_>, event: EventId) -> impl Iterator<Item = ChangeId> + 't {

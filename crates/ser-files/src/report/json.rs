@@ -112,6 +112,11 @@ fn first_out(document: &Document<'_>, first: &FirstOut) -> Value {
             .iter()
             .map(|&(event, _)| recorder(document, event))
             .collect::<Vec<_>>(),
+        "not_read_since": first
+            .unread
+            .iter()
+            .map(|&recorder| verdict::recorder_name(document.timeline, recorder))
+            .collect::<Vec<_>>(),
     })
 }
 

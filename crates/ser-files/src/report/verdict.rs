@@ -1,5 +1,6 @@
 //! The verdict: what was first, what operated, what is wrong.
 
+use ser_evidence::clock::Finding;
 use ser_evidence::incident::{
     Abnormal, Completeness, Disagreement, Doubt, FirstOut, Operation, Report, Row, StepResult,
     Verdict,
@@ -42,6 +43,10 @@ pub(super) fn first_out(
             list(several.iter().map(named))
         ),
     };
+    if !first.unread.is_empty() {
+        let names = first.unread.iter().map(|&recorder| recorder_name(timeline, recorder));
+        text += &format!("; or something on {}, which was not read since", list(names));
+    }
     if !first.gaps.is_empty() {
         let of = |(event, _): &(_, usize)| names::recorder(timeline, *event);
         let mut recorders: Vec<String> = first.gaps.iter().map(of).collect();
@@ -116,8 +121,9 @@ pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
     if !names.is_empty() {
         wrong.push(format!("not returned to normal: {}", list(names.into_iter())));
     }
-    let clocks = timeline.findings().len() + timeline.out_of_order().len();
-    if clocks > 0 {
+    let contradicts = |finding: &&Finding| !matches!(finding, Finding::NotPlaced { .. });
+    let clocks = timeline.findings().iter().filter(contradicts).count();
+    if clocks + timeline.out_of_order().len() > 0 {
         wrong.push("what is known of the clocks does not fit together".to_owned());
     }
     for finding in timeline.contact_findings() {
@@ -172,7 +178,7 @@ pub(super) fn incompleteness(timeline: &Timeline<'_>, of: &Completeness) -> Opti
         text.push(format!("{} entries without a time (the clock was never set)", of.timeless));
     }
     if text.is_empty() && !of.is_complete() {
-        text.push("not read after the end of the incident".to_owned());
+        text.push("not known to be read after the end of the incident".to_owned());
     }
     (!text.is_empty()).then(|| format!("{name}: {}", text.join(", ")))
 }
