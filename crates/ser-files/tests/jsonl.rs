@@ -26,15 +26,22 @@ fn any_life() -> impl Strategy<Value = Life> {
     any::<u64>().prop_map(Life::from_bits)
 }
 
+/// Microseconds of a moment that a file may hold.
+fn us() -> impl Strategy<Value = i64> {
+    -(1_i64 << 60)..=1 << 60
+}
+
 fn any_reading() -> impl Strategy<Value = HostReading> {
-    any::<(u128, i64, i64, Option<u64>)>().prop_map(|(boot, monotonic, utc, utc_doubt_us)| {
-        let (monotonic, utc) = (Moment::from_us(monotonic), Moment::from_us(utc));
-        HostReading { boot: Boot(boot), monotonic, utc, utc_doubt_us }
-    })
+    (any::<u128>(), us(), us(), any::<Option<u64>>()).prop_map(
+        |(boot, monotonic, utc, utc_doubt_us)| {
+            let (monotonic, utc) = (Moment::from_us(monotonic), Moment::from_us(utc));
+            HostReading { boot: Boot(boot), monotonic, utc, utc_doubt_us }
+        },
+    )
 }
 
 fn any_bound<S: Scale>() -> impl Strategy<Value = Bound<S>> {
-    any::<(Option<i64>, Option<i64>)>()
+    (proptest::option::of(us()), proptest::option::of(us()))
         .prop_map(|(lo, hi)| Bound::new(lo.map(Moment::from_us), hi.map(Moment::from_us)))
 }
 
@@ -313,4 +320,21 @@ fn a_name_that_a_terminal_would_obey_is_escaped_and_read_back_as_it_was() {
     assert!(text.contains("\"B\\u202e\\u2066\\u009bé\""), "{text}");
     let read = Reader::new(lines.as_slice(), "").map(|told| told.unwrap().recorder.to_string());
     assert_eq!(read.collect::<Vec<_>>(), names);
+}
+
+#[test]
+fn a_moment_that_cannot_be_reckoned_with_is_refused() {
+    let host = "\"host\":{\"boot\":\"00000000000000000000000000000001\",\"monotonic_us\":1,\
+                \"utc_us\":1}";
+    let line = |lo: &str| {
+        format!(
+            "{{\"record\":\"clock\",\"recorder\":\"U1\",\"how\":\"query\",\
+             \"shown\":\"2026-11-22T10:00:00.000\",\"scale\":\"host\",\"lo_us\":{lo},{host}}}\n"
+        )
+    };
+    let read = |text: String| Reader::new(text.as_bytes(), "U1").next().expect("a line").is_ok();
+    assert!(read(line("0")));
+    for beyond in ["9223372036854775807", "-9223372036854775808"] {
+        assert!(!read(line(beyond)), "{beyond}");
+    }
 }

@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use clap::ValueEnum;
+use ser_evidence::history::History;
 use ser_evidence::incident::{Incident, Report, Which};
 use ser_evidence::timeline::Timeline;
 use ser_files::report::{self, Document, Styles};
@@ -93,7 +94,8 @@ pub(super) struct Shown {
 /// Writes the report about an incident to standard output. Returns whether nothing is missing in it.
 pub(super) fn show(gathered: &Gathered, which: Which, shown: Shown) -> Result<bool> {
     let timeline = Timeline::new(&gathered.site, &gathered.history);
-    let incident = Incident::pick(&timeline, which).ok_or_else(|| no_entry(which))?;
+    let incident =
+        Incident::pick(&timeline, which).ok_or_else(|| no_entry(which, &gathered.history))?;
     let report = Report::new(&timeline, incident);
     let document = Document {
         timeline: &timeline,
@@ -112,9 +114,12 @@ pub(super) fn show(gathered: &Gathered, which: Which, shown: Shown) -> Result<bo
     Ok(!report.is_incomplete())
 }
 
-fn no_entry(which: Which) -> Failure {
+fn no_entry(which: Which, history: &History) -> Failure {
+    let mut lives = history.recorders.iter().flat_map(|recorder| &recorder.lives);
+    let is_empty = !lives.any(|life| !life.entries.is_empty());
     let failure = match which {
         Which::Between(..) => Failure::new("there is no entry in this time"),
+        _ if !is_empty => Failure::new("no entry has a time: the clock was never set"),
         _ => Failure::new("there is no entry in what was read"),
     };
     failure.hint("ser-cli merge with the same sources lists everything, also without a time")

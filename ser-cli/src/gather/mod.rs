@@ -85,7 +85,9 @@ pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<G
         false => Vec::new(),
     };
     let reached = site.recorders.iter().filter(|recorder| {
-        recorder.port.is_some()
+        let is_meant = connection.recorder.as_ref().is_none_or(|name| *name == recorder.name);
+        is_meant
+            && recorder.port.is_some()
             && !not_reached.iter().any(|missed| missed.recorder == recorder.name)
     });
     if args.input.is_empty() && reached.count() == 0 {

@@ -3,7 +3,7 @@
 use ser_proto::Entry;
 
 use super::runs::{LifeRuns, Side, Step, When, is_earlier};
-use crate::history::{LifeHistory, RecorderHistory};
+use crate::history::{Held, LifeHistory, RecorderHistory};
 use crate::record::{ClockObservation, How, Place};
 use crate::time::{Bound, Moment, Shown, Utc, shown};
 
@@ -63,15 +63,17 @@ fn same_entry(life: &LifeHistory, sequence: u64, entry: &Entry) -> Option<u64> {
     if life.is_by_number {
         return None;
     }
-    let last = life.entries.last()?.sequence;
-    let mut candidate = sequence % WRAP;
-    while candidate <= last {
-        if life.entry(candidate).is_some_and(|held| held.entry == *entry) {
-            return Some(candidate);
-        }
-        candidate += WRAP;
+    let is_it = |held: &&Held| held.sequence % WRAP == sequence % WRAP && held.entry == *entry;
+    let (first, last) = (life.entries.first()?.sequence, life.entries.last()?.sequence);
+    let wraps = (last - first) / WRAP + 1;
+    // With fewer entries than wraps, it is quicker to look at each of them.
+    if wraps > life.entries.len() as u64 {
+        return life.entries.iter().find(is_it).map(|held| held.sequence);
     }
-    None
+    let behind = sequence.wrapping_sub(first) % WRAP;
+    let candidates =
+        (0..=wraps).filter_map(|wrap| first.checked_add(behind)?.checked_add(wrap * WRAP));
+    candidates.filter_map(|candidate| life.entry(candidate)).find(is_it).map(|held| held.sequence)
 }
 
 /// The run of a located observation, by its index in the life; `None` if it cannot be said.
@@ -127,7 +129,8 @@ fn by_neighbours(
     }
     let stamp = |sequence| life.entry(sequence).and_then(|held| shown(&held.entry.time));
     let fits_before = stamp(at.after).is_none_or(|before| observation.shown >= before);
-    let fits_after = stamp(at.after + 1).is_none_or(|after| observation.shown <= after);
+    let fits_after =
+        stamp(at.after.saturating_add(1)).is_none_or(|after| observation.shown <= after);
     let run_before = || runs.of(at.after, None).only();
     match (fits_before, fits_after) {
         (true, false) => run_before(),

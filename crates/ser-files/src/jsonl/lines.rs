@@ -1,7 +1,7 @@
 //! Lines as they are read: one flat struct for all kinds, so that a line is gone over once.
 
 use ser_evidence::record::{Boot, HostReading, Place};
-use ser_evidence::time::Moment;
+use ser_evidence::time::{Moment, Scale};
 use ser_proto::{Entry, TimeStamp};
 use serde::Deserialize;
 
@@ -121,13 +121,24 @@ pub(super) fn stamp(text: &Text<'_>, year: Option<u8>) -> Result<TimeStamp> {
     stamp::parse(text.0.as_bytes(), year).ok_or_else(|| wrong("time", &text.0))
 }
 
+/// The furthest that a moment may be from the beginning of its scale, in microseconds: 36,000 years.
+/// Beyond that, nothing could be reckoned with it.
+const FURTHEST_US: i64 = 1 << 60;
+
+pub(super) fn moment<S: Scale>(name: &str, us: i64) -> Result<Moment<S>> {
+    match us.checked_abs() {
+        Some(distance) if distance <= FURTHEST_US => Ok(Moment::from_us(us)),
+        _ => Err(wrong(name, &us.to_string())),
+    }
+}
+
 impl HostLine<'_> {
     pub(super) fn reading(&self) -> Result<HostReading> {
         let boot = Boot::from_name(&self.boot.0).ok_or_else(|| wrong("boot", &self.boot.0))?;
         Ok(HostReading {
             boot,
-            monotonic: Moment::from_us(self.monotonic_us),
-            utc: Moment::from_us(self.utc_us),
+            monotonic: moment("monotonic_us", self.monotonic_us)?,
+            utc: moment("utc_us", self.utc_us)?,
             utc_doubt_us: self.utc_doubt_us,
         })
     }

@@ -6,11 +6,11 @@ use ser_evidence::record::{
     ClockObservation, ClockStep, EntryRecord, Gap, How, Life, LifeRecord, Lost, Place, Record,
     Reference, Told, Watched, Why,
 };
-use ser_evidence::time::{Bound, Moment, shown};
+use ser_evidence::time::{Bound, Scale, shown};
 use ser_proto::Entry;
 
 use super::SCHEMA;
-use super::lines::{HostLine, Line, PlaceLine, Result, needed, stamp, understood, wrong};
+use super::lines::{HostLine, Line, PlaceLine, Result, moment, needed, stamp, understood, wrong};
 use super::texts::{Text, broadcast_named, life_named, model_named};
 use crate::error::{Problem, ReadError, quoted};
 use crate::lines::Lines;
@@ -229,15 +229,17 @@ fn reference(line: &Line<'_>) -> Result<Reference> {
     let Text(scale) = needed(line.scale.as_ref(), "scale")?;
     match &**scale {
         "host" => Ok(Reference::Host {
-            bound: Bound::new(line.lo_us.map(Moment::from_us), line.hi_us.map(Moment::from_us)),
+            bound: bound(line)?,
             reading: needed(line.host.as_ref().map(HostLine::reading).transpose()?, "host")?,
         }),
-        "utc" => {
-            let (lo, hi) = (line.lo_us.map(Moment::from_us), line.hi_us.map(Moment::from_us));
-            Ok(Reference::Utc(Bound::new(lo, hi)))
-        }
+        "utc" => Ok(Reference::Utc(bound(line)?)),
         other => Err(wrong("scale", other)),
     }
+}
+
+fn bound<S: Scale>(line: &Line<'_>) -> Result<Bound<S>> {
+    let end = |name, us: Option<i64>| us.map(|us| moment(name, us)).transpose();
+    Ok(Bound::new(end("lo_us", line.lo_us)?, end("hi_us", line.hi_us)?))
 }
 
 fn place(line: Option<&PlaceLine<'_>>) -> Result<Place> {
