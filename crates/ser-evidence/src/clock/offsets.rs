@@ -166,8 +166,8 @@ fn in_utc(at: Reference, hosts: &Hosts) -> Bound<crate::time::Utc> {
     }
 }
 
-/// The scales of these observations, the most common first.
-fn homes(observed: &[Observed], preference: Preference<'_>) -> Vec<Home> {
+/// The boots that made these observations, each once.
+pub(super) fn boots_of(observed: &[Observed]) -> Vec<Boot> {
     let mut boots: Vec<Boot> = observed
         .iter()
         .filter_map(|observed| match observed.at {
@@ -177,6 +177,12 @@ fn homes(observed: &[Observed], preference: Preference<'_>) -> Vec<Home> {
         .collect();
     boots.sort_unstable();
     boots.dedup();
+    boots
+}
+
+/// The scales of these observations, the most common first.
+fn homes(observed: &[Observed], preference: Preference<'_>) -> Vec<Home> {
+    let mut boots = boots_of(observed);
     boots.sort_by_key(|&boot| (usize::MAX - preference(boot), boot));
     let by_hand = observed.iter().any(|observed| matches!(observed.at, Reference::Utc(_)));
     boots.into_iter().map(Home::Boot).chain(by_hand.then_some(Home::Utc)).collect()

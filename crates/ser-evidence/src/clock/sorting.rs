@@ -7,7 +7,7 @@ use super::hosts::Hosts;
 use super::links::{Link, LinkReason};
 use super::lives::{LifeClock, when};
 use super::local::Nominal;
-use super::offsets::{Observed, RunClock};
+use super::offsets::{Observed, RunClock, boots_of};
 use super::placing::{self, Whereabouts};
 use super::runs::{LifeRuns, Step};
 use crate::history::{History, RecorderHistory};
@@ -168,16 +168,7 @@ impl Sorted {
     fn runs_of_boots(&self) -> BTreeMap<Boot, usize> {
         let mut counts = BTreeMap::new();
         for observed in &self.by_run {
-            let mut boots: Vec<Boot> = observed
-                .iter()
-                .filter_map(|observed| match observed.at {
-                    Reference::Host { reading, .. } => Some(reading.boot),
-                    Reference::Utc(_) => None,
-                })
-                .collect();
-            boots.sort_unstable();
-            boots.dedup();
-            for boot in boots {
+            for boot in boots_of(observed) {
                 *counts.entry(boot).or_default() += 1;
             }
         }
