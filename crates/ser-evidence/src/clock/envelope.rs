@@ -206,11 +206,17 @@ impl Envelope {
     }
 }
 
-/// A point's ends somewhere else, after a change between these two.
-fn grown(point: &Known, (least, most): (i64, i64)) -> (i64, i64) {
-    let lo = if point.lo == NO_LO { NO_LO } else { point.lo.saturating_add(least) };
-    let hi = if point.hi == NO_HI { NO_HI } else { point.hi.saturating_add(most) };
+/// Everything between `least` and `most` after what is between `lo` and `hi`. An end that is not
+/// known stays so.
+pub(crate) fn added((lo, hi): (i64, i64), (least, most): (i64, i64)) -> (i64, i64) {
+    let lo = if lo == NO_LO { NO_LO } else { lo.saturating_add(least) };
+    let hi = if hi == NO_HI { NO_HI } else { hi.saturating_add(most) };
     (lo, hi)
+}
+
+/// A point's ends somewhere else, after a change between these two.
+fn grown(point: &Known, change: (i64, i64)) -> (i64, i64) {
+    added((point.lo, point.hi), change)
 }
 
 /// One pass forward and one back: afterwards each point knows all that the others know.

@@ -9,7 +9,7 @@
 use super::envelope::{Envelope, Known, NO_HI, NO_LO};
 use super::hosts::Hosts;
 use super::links::Link;
-use super::offsets::{Home, Observed, RunClock, added};
+use super::offsets::{Home, Observed, RunClock, moved};
 use crate::record::{Boot, Reference};
 
 /// How wrong a clock may be of which nothing is known: a hundred years, in microseconds.
@@ -138,8 +138,8 @@ impl Layout {
         is_placed.then(|| Instant {
             at: lo.midpoint(hi).saturating_add(x),
             within: match &placed.before {
-                Some(before) => added(before.at(x), x),
-                None => added((lo.midpoint(hi), lo.midpoint(hi)), x),
+                Some(before) => moved(before.at(x), x),
+                None => moved((lo.midpoint(hi), lo.midpoint(hi)), x),
             },
             is_timeless: placed.is_timeless,
         })
@@ -212,7 +212,7 @@ impl Layout {
     fn hull(&self, several: &[(usize, i64)]) -> (i64, i64) {
         let each = several.iter().map(|&(run, x)| {
             let placed = self.clocks.get(self.boots.len() + run);
-            placed.map_or((NO_LO, NO_HI), |placed| added(placed.offset.at(x), x))
+            placed.map_or((NO_LO, NO_HI), |placed| moved(placed.offset.at(x), x))
         });
         let hull = each.reduce(|one, other| (one.0.min(other.0), one.1.max(other.1)));
         hull.unwrap_or((NO_LO, NO_HI))
@@ -220,7 +220,7 @@ impl Layout {
 
     /// Adds that a run showed `x` between these instants. Returns whether that was news.
     fn learn(&mut self, run: usize, x: i64, bound: (i64, i64)) -> bool {
-        let (lo, hi) = added(bound, -x);
+        let (lo, hi) = moved(bound, -x);
         let placed = self.clocks.get_mut(self.boots.len() + run);
         placed.and_then(|placed| placed.offset.learn(x, lo, hi)).unwrap_or(false)
     }

@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 
+use super::envelope::added;
 use super::offsets::{Home, RunClock};
 
 /// How often bounds are passed on over all links. Each round passes them one link further.
@@ -139,8 +140,8 @@ fn pass_on(runs: &mut [RunClock], links: &[Link]) -> Option<Link> {
         for link in links {
             for home in common_homes(runs, link) {
                 for link in [*link, link.reversed()] {
-                    let (lo, hi) = runs.get(link.other)?.instant(home, link.other_x);
-                    let known = (plus(lo, link.lo), plus(hi, link.hi));
+                    let other = runs.get(link.other)?.instant(home, link.other_x);
+                    let known = added(other, (link.lo, link.hi));
                     match runs.get_mut(link.one)?.learn(home, link.x, known) {
                         None => return Some(link_as_given(link, links)),
                         Some(news) => is_news |= news,
@@ -158,10 +159,6 @@ fn pass_on(runs: &mut [RunClock], links: &[Link]) -> Option<Link> {
 /// The link as it is in the list, whichever end it was seen from.
 fn link_as_given(link: Link, links: &[Link]) -> Link {
     if links.contains(&link) { link } else { link.reversed() }
-}
-
-fn plus(end: i64, us: i64) -> i64 {
-    if end == i64::MIN || end == i64::MAX { end } else { end.saturating_add(us) }
 }
 
 fn common_homes(runs: &[RunClock], link: &Link) -> Vec<Home> {

@@ -1,6 +1,6 @@
 //! The offset of a recorder's clock in one run.
 
-use super::envelope::{Envelope, Known, NO_HI, NO_LO, Slope};
+use super::envelope::{Envelope, Known, NO_HI, NO_LO, Slope, added};
 use super::hosts::Hosts;
 use crate::record::{Boot, Reference};
 use crate::time::{AROUND_2069_US, Bound, CENTURY_US, Moment, Scale, Shown};
@@ -128,7 +128,7 @@ impl RunClock {
         let Some((_, envelope)) = self.offsets.iter().find(|(known, _)| *known == home) else {
             return (NO_LO, NO_HI);
         };
-        added(envelope.at(x), x)
+        moved(envelope.at(x), x)
     }
 
     /// Adds that the clock began to show `x` in `[lo, hi]`. Returns whether that was news; `None`
@@ -136,7 +136,7 @@ impl RunClock {
     pub(crate) fn learn(&mut self, home: Home, x: i64, (lo, hi): (i64, i64)) -> Option<bool> {
         let known = self.offsets.iter_mut().find(|(known, _)| *known == home);
         let Some((_, envelope)) = known else { return Some(false) };
-        let (lo, hi) = added((lo, hi), -x);
+        let (lo, hi) = moved((lo, hi), -x);
         envelope.learn(x, lo, hi)
     }
 
@@ -148,10 +148,8 @@ impl RunClock {
 }
 
 /// Both ends moved by `us`; unknown ends stay.
-pub(crate) fn added((lo, hi): (i64, i64), us: i64) -> (i64, i64) {
-    let lo = if lo == NO_LO { NO_LO } else { lo.saturating_add(us) };
-    let hi = if hi == NO_HI { NO_HI } else { hi.saturating_add(us) };
-    (lo, hi)
+pub(crate) fn moved(ends: (i64, i64), us: i64) -> (i64, i64) {
+    added(ends, (us, us))
 }
 
 /// Both ends of a bound, in microseconds.

@@ -5,7 +5,7 @@ use crate::clock::envelope::{NO_HI, NO_LO};
 use crate::clock::layout::Instant;
 use crate::clock::lives::LifeClock;
 use crate::clock::model::ClockModel;
-use crate::clock::offsets::{RunClock, added, ends};
+use crate::clock::offsets::{RunClock, ends, moved};
 use crate::clock::{Home, Nominal};
 use crate::history::{Held, LifeHistory, RecorderHistory};
 use crate::site::{Shift, Site};
@@ -20,7 +20,7 @@ pub(super) struct LifeBounds {
     stretches: Vec<Stretch>,
     /// By place: where the entry is in the list.
     keys: Vec<Key>,
-    /// By place: from here on, so many microseconds were added by hand.
+    /// By place: from here on, so many microseconds were moved by hand.
     shifts: Vec<(usize, i64)>,
 }
 
@@ -137,7 +137,7 @@ impl LifeBounds {
         }
     }
 
-    /// Adds what people say has to be added.
+    /// Adds what people say has to be moved.
     pub(super) fn shift_by_hand(&mut self, shifts: &[&Shift]) {
         if shifts.is_empty() {
             return;
@@ -154,7 +154,7 @@ impl LifeBounds {
             if self.shifts.last().map_or(0, |&(_, last)| last) != us {
                 self.shifts.push((place, us));
             }
-            *sample = added(*sample, us);
+            *sample = moved(*sample, us);
             // The sequence decides nevertheless.
             key.at = key.at.saturating_add(us);
             *key = latest.map_or(*key, |latest| latest.max(*key));
@@ -162,7 +162,7 @@ impl LifeBounds {
         }
     }
 
-    /// What was added by hand, in microseconds.
+    /// What was moved by hand, in microseconds.
     pub(super) fn shift_us(&self, place: usize) -> i64 {
         let next = self.shifts.partition_point(|&(first, _)| first <= place);
         next.checked_sub(1).and_then(|last| self.shifts.get(last)).map_or(0, |&(_, us)| us)
@@ -373,7 +373,7 @@ impl Timeline<'_> {
             let run = self.model.runs.get(self.clock(event)?.sure_run(held)?)?;
             let x = run.unwrapped(shown(&held.entry.time)?);
             let shift_us = self.shift_us(event);
-            let on = move |home| (home, added(run.instant(home, x), shift_us));
+            let on = move |home| (home, moved(run.instant(home, x), shift_us));
             Some(run.homes().skip(1).map(on))
         };
         sample.into_iter().chain(others().into_iter().flatten())

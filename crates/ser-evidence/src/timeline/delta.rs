@@ -1,15 +1,15 @@
 //! The time between two changes, and their order.
 
 use super::{ChangeId, EventId, Timeline};
-use crate::clock::envelope::{NO_HI, NO_LO};
-use crate::clock::offsets::{added, ends};
+use crate::clock::envelope::{NO_HI, NO_LO, added};
+use crate::clock::offsets::{ends, moved};
 use crate::site::{Delays, Recorder};
 use crate::time::shown;
 
 /// How often a recorder looks at its inputs, in microseconds.
 const PERIOD_US: i64 = 1000;
 
-/// Bounds are rounded outwards here and there. So much is added at either end, in microseconds, that
+/// Bounds are rounded outwards here and there. So much is moved at either end, in microseconds, that
 /// what is said of the order of two entries does not depend on it.
 const SLACK_US: i64 = 5;
 
@@ -95,12 +95,10 @@ impl Timeline<'_> {
         one: (EventId, Option<u8>),
         other: (EventId, Option<u8>),
     ) -> (i64, i64) {
-        let (lo, hi) = self.samples_between(one.0, other.0);
+        let samples = self.samples_between(one.0, other.0);
         let (one_lo, one_hi) = self.delay_ends(one.0, one.1);
         let (other_lo, other_hi) = self.delay_ends(other.0, other.1);
-        let lo = if lo == NO_LO { NO_LO } else { lo.saturating_add(other_lo - one_hi) };
-        let hi = if hi == NO_HI { NO_HI } else { hi.saturating_add(other_hi - one_lo) };
-        (lo, hi)
+        added(samples, (other_lo - one_hi, other_hi - one_lo))
     }
 
     /// The earliest and the latest movement, from the sample: of one input, or of any change of this
@@ -123,7 +121,7 @@ impl Timeline<'_> {
         }
         take(difference(ends(self.sample_utc(one)), ends(self.sample_utc(other))));
         if let Some(elapsed) = self.elapsed_between(one, other) {
-            take(added(elapsed, self.shift_us(other) - self.shift_us(one)));
+            take(moved(elapsed, self.shift_us(other) - self.shift_us(one)));
         }
         known
     }
