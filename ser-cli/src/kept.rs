@@ -51,6 +51,13 @@ pub(crate) struct KeptRecords {
     recorder: String,
 }
 
+/// From when on records are wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Since {
+    Ever,
+    LastReading,
+}
+
 impl KeptRecords {
     /// Those of the recorder of a connection.
     pub(crate) fn of(args: &StateArgs, connection: &ConnectionArgs) -> Result<KeptRecords> {
@@ -79,6 +86,18 @@ impl KeptRecords {
             }
         }
         all
+    }
+
+    /// What was seen of the clock and of lives apart from routine readings: all of it, or what has
+    /// come since somebody last read.
+    pub(crate) fn settings(&self, since: Since) -> Vec<Record> {
+        let all = self.load();
+        let is_reading = |record: &Record| matches!(record, Record::Watched(_));
+        let first = match since {
+            Since::Ever => 0,
+            Since::LastReading => all.iter().rposition(is_reading).map_or(0, |last| last + 1),
+        };
+        all.into_iter().skip(first).filter(|record| !is_routine(record)).collect()
     }
 
     /// Adds records. They are worth less than the command that they come from, so a failure is only
@@ -236,6 +255,15 @@ mod tests {
         let text = fs::read_to_string(&kept_in(&folder).path).unwrap();
         assert!(text.starts_with("{\"record\":\"file\","), "{text}");
         assert_eq!(text.matches("\"recorder\":\"U1\"").count(), 3);
+    }
+
+    #[test]
+    fn what_a_reading_has_told_is_not_told_again() {
+        let directory = tempfile::tempdir().unwrap();
+        let kept = kept_in(directory.path());
+        kept.add(&[life(1), watched(1), life(2)]);
+        assert_eq!(kept.settings(Since::Ever), [life(1), life(2)]);
+        assert_eq!(kept.settings(Since::LastReading), [life(2)]);
     }
 
     #[test]

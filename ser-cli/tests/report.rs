@@ -243,6 +243,63 @@ fn a_recorder_that_cannot_be_reached_is_named_and_the_report_is_made_from_the_ot
         assert_eq!(strict.status.code(), Some(3), "{strict:?}");
         assert!(!strict.stdout.is_empty(), "what could be read is delivered");
     }
+    // Files remember it.
+    let list = desk.ok("merge --site north.toml --timeout 20s");
+    assert!(
+        list.lines().last().is_some_and(|row| row.contains("U2") && row.ends_with("not reached"))
+    );
+    for format in ["csv", "jsonl"] {
+        let file = format!("all.{format}");
+        let all = desk.ok(&format!("merge --site north.toml --timeout 20s --format {format}"));
+        let report = desk.file(&file, &all).ok(&format!("report --site north.toml --input {file}"));
+        assert!(report.contains("\nnot reached U2: not reached when the file was"), "{report}");
+        let strict = desk.run(&format!("report --site north.toml --fail-on-loss --input {file}"));
+        assert_eq!(strict.status.code(), Some(3), "{strict:?}");
+    }
+    desk.file("U2.jsonl", &format!("{HEAD}{}", entry("U2", 1, "2026-11-22T10:00:00.100", 1, "1")));
+    let report = desk.ok("report --site north.toml --input all.jsonl U2.jsonl");
+    assert!(!report.contains("not reached"), "another file has read it: {report}");
+}
+
+#[test]
+fn a_list_as_csv_is_read_as_what_it_was_made_from() {
+    let desk = Desk::new();
+    three_files(&desk);
+    let list = desk.ok("merge --site north.toml --input a.jsonl b.jsonl U2.csv --format csv");
+    desk.file("all.csv", &list);
+    assert_eq!(desk.ok("merge --site north.toml --input all.csv --format csv"), list);
+    let of = |files: &str| rows(&desk.json(&format!("report --site north.toml --input {files}")));
+    assert_eq!(of("all.csv"), of("a.jsonl b.jsonl U2.csv"));
+}
+
+#[test]
+fn readings_that_nobody_can_put_together_are_told() {
+    let desk = Desk::new();
+    let header = "entry,time,input,state,sequence,life,note\n";
+    let row = |at: u32| format!("{at},2026-11-22T10:00:0{at}.000,1,1,{at},0,\n");
+    desk.site(&[("U1", "")]);
+    for (files, told) in [
+        ("early/U1.csv late/U1.csv", "U1: 2 readings have no entry in common"),
+        (
+            "early/U1.csv old/U1.csv",
+            "U1: a file without sequence numbers stands beside other files",
+        ),
+        ("early/U1.csv both/U1.csv", ""),
+    ] {
+        for (folder, text) in [
+            ("early", format!("{header}{}", row(1))),
+            ("late", format!("{header}{}", row(2))),
+            ("both", format!("{header}{}{}", row(1), row(2))),
+            ("old", "entry,time,input,state\n1,2026-11-22T10:00:01.000,1,1\n".to_owned()),
+        ] {
+            fs::create_dir_all(desk.path(folder)).expect("a folder");
+            desk.file(&format!("{folder}/U1.csv"), &text);
+        }
+        let output = desk.run(&format!("merge --site north.toml --input {files}"));
+        let warnings = text(&output.stderr);
+        assert_eq!(warnings.contains("warning: "), !told.is_empty(), "{warnings}");
+        assert!(warnings.contains(told), "{warnings}");
+    }
 }
 
 /// An entry of a life as JSON lines have it.

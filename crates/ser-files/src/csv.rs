@@ -5,10 +5,14 @@
 //! each other without a gap, and [`known`](EntryRecord::known) says which they are. A header, a
 //! loss, a damaged row or a jump in the numbers ends what is known.
 //!
+//! A file of several recorders names the recorder of each row in a column of its own, after the
+//! first seven.
+//!
 //! Files of earlier versions have only the first four columns. A header may come again, with other
 //! columns, where a file was continued. Every row is a line: a quote that is not closed damages its
 //! own row and not the next.
 
+use std::collections::HashMap;
 use std::io::BufRead;
 
 use ser_evidence::record::{EntryRecord, Gap, Life, Lost, Record, Told, Why};
@@ -25,6 +29,12 @@ const COLUMNS: [&str; 7] = ["entry", "time", "input", "state", "sequence", "life
 /// How many columns the files of the first versions have.
 const FIRST_COLUMNS: usize = 4;
 
+/// The column that follows in a file of several recorders.
+const RECORDER_COLUMN: &str = "recorder";
+
+/// Of how many recorders a file may hold entries. Each needs memory.
+const MAX_RECORDERS: usize = 4096;
+
 /// Whether this is the first line of such a file.
 pub(crate) fn is_header(line: &[u8]) -> bool {
     let line = line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line).trim_ascii_end();
@@ -35,15 +45,16 @@ pub(crate) fn is_header(line: &[u8]) -> bool {
 /// Reads the records of a file. After an error in one line it goes on with the next.
 pub struct Reader<R> {
     lines: Lines<R>,
-    recorder: String,
+    recorders: Recorders,
+    /// Whose record was handed out last.
+    told: usize,
     fields: Fields,
     parser: Parser,
-    /// How many columns the rows have; `None` before the first header.
-    columns: Option<usize>,
+    /// What the rows have; `None` before the first header.
+    columns: Option<Columns>,
     gathering: Option<Gathering>,
-    states: States,
-    /// What comes after the entry that was handed out just now.
-    held: Option<Result<Record, ReadError>>,
+    /// What comes after the entry that was handed out just now, and whose it is.
+    held: Option<(usize, Result<Record, ReadError>)>,
     is_over: bool,
 }
 
@@ -52,25 +63,31 @@ impl<R: BufRead> Reader<R> {
     pub fn new(input: R, recorder: &str) -> Reader<R> {
         Reader {
             lines: Lines::new(input),
-            recorder: recorder.to_owned(),
+            recorders: Recorders::new(recorder),
+            told: 0,
             fields: Fields::new(),
             parser: Parser::default(),
             columns: None,
             gathering: None,
-            states: States::default(),
             held: None,
             is_over: false,
         }
     }
 
-    /// The name of the recorder whose records these are.
+    /// The name of the recorder of the record that was read last.
     #[must_use]
     pub fn recorder(&self) -> &str {
-        &self.recorder
+        self.recorders.name(self.told)
     }
 
     /// The next record, without the name of its recorder.
     pub fn read(&mut self) -> Option<Result<Record, ReadError>> {
+        let (recorder, record) = self.next_record()?;
+        self.told = recorder;
+        Some(record)
+    }
+
+    fn next_record(&mut self) -> Option<(usize, Result<Record, ReadError>)> {
         if let Some(held) = self.held.take() {
             return Some(held);
         }
@@ -81,33 +98,41 @@ impl<R: BufRead> Reader<R> {
                     break;
                 }
                 Some(Err(error)) => Err(error),
-                Some(Ok(line)) => row(line, self.columns, &mut self.fields, &mut self.parser)
-                    .map_err(|why| ReadError::damaged(self.lines.number(), why)),
+                Some(Ok(line)) => {
+                    row(line, self.columns, &mut self.fields, &mut self.parser, &mut self.recorders)
+                        .map_err(|why| ReadError::damaged(self.lines.number(), why))
+                }
             };
             match row {
-                Ok(Row::Header { columns }) => self.columns = Some(columns),
                 Ok(Row::Change(change)) => match self.gather(&change) {
-                    Some(entry) => return Some(Ok(entry)),
+                    Some(entry) => return Some(entry),
                     None => continue,
                 },
-                Ok(Row::Loss(gap)) => self.held = Some(Ok(Record::Gap(gap))),
+                // What was known of the states of this recorder ends here.
+                Ok(Row::Loss(recorder, gap)) => {
+                    self.held = Some((recorder, Ok(Record::Gap(gap))));
+                    let entry = self.finish();
+                    self.recorders.forget(recorder);
+                    return entry.or_else(|| self.held.take());
+                }
+                Ok(Row::Header(columns)) => self.columns = Some(columns),
                 Err(error) => {
                     self.is_over = !error.is_of_one_line();
-                    self.held = Some(Err(error));
+                    self.held = Some((0, Err(error)));
                 }
             }
-            // Whatever it was, what was known of the states ends here.
+            // Whatever else it was, it may have been of any recorder.
             let entry = self.finish();
-            self.states = States::default();
-            if let Some(next) = entry.map(Ok).or_else(|| self.held.take()) {
+            self.recorders.forget_all();
+            if let Some(next) = entry.or_else(|| self.held.take()) {
                 return Some(next);
             }
         }
-        self.finish().map(Ok)
+        self.finish()
     }
 
     /// Adds a row to the entry that it belongs to. Returns the entry before, if it has ended.
-    fn gather(&mut self, change: &Change) -> Option<Record> {
+    fn gather(&mut self, change: &Change) -> Option<(usize, Result<Record, ReadError>)> {
         if let Some(gathering) = self.gathering.as_mut().filter(|entry| entry.goes_on_with(change))
         {
             gathering.add(change);
@@ -120,9 +145,11 @@ impl<R: BufRead> Reader<R> {
         finished
     }
 
-    fn finish(&mut self) -> Option<Record> {
+    fn finish(&mut self) -> Option<(usize, Result<Record, ReadError>)> {
         let gathered = self.gathering.take()?;
-        Some(Record::Entry(self.states.entry(&gathered)))
+        let recorder = gathered.key.recorder;
+        let states = self.recorders.states.get_mut(recorder)?;
+        Some((recorder, Ok(Record::Entry(states.entry(&gathered)))))
     }
 }
 
@@ -131,15 +158,82 @@ impl<R: BufRead> Iterator for Reader<R> {
 
     fn next(&mut self) -> Option<Self::Item> {
         let record = self.read()?;
-        Some(record.map(|record| Told { recorder: self.recorder.clone(), record }))
+        Some(record.map(|record| Told { recorder: self.recorder().to_owned(), record }))
     }
 }
 
 /// What a line is.
 enum Row {
-    Header { columns: usize },
+    Header(Columns),
     Change(Change),
-    Loss(Gap),
+    Loss(usize, Gap),
+}
+
+/// The columns of a file.
+#[derive(Clone, Copy)]
+struct Columns {
+    /// How many of those that every recorder's file has.
+    count: usize,
+    has_recorder: bool,
+}
+
+/// The recorders of a file, with the states of their inputs. The first is the one that the file is
+/// named after.
+struct Recorders {
+    names: Vec<String>,
+    states: Vec<States>,
+    by_name: HashMap<String, usize>,
+    /// The one of the row before.
+    last: usize,
+}
+
+impl Recorders {
+    fn new(first: &str) -> Recorders {
+        Recorders {
+            names: vec![first.to_owned()],
+            states: vec![States::default()],
+            by_name: HashMap::from([(first.to_owned(), 0)]),
+            last: 0,
+        }
+    }
+
+    fn name(&self, place: usize) -> &str {
+        self.names.get(place).map_or("", String::as_str)
+    }
+
+    /// The place of the recorder with this name; the first one's if there is none.
+    fn place(&mut self, name: &[u8]) -> Result<usize, String> {
+        if name.is_empty() {
+            return Ok(0);
+        }
+        if self.name(self.last).as_bytes() == name {
+            return Ok(self.last);
+        }
+        let text = std::str::from_utf8(name);
+        let text = text.map_err(|_| format!("recorder cannot be {}", quoted(name)))?;
+        self.last = match self.by_name.get(text) {
+            Some(&known) => known,
+            None if self.names.len() < MAX_RECORDERS => {
+                let place = self.names.len();
+                self.names.push(text.to_owned());
+                self.states.push(States::default());
+                self.by_name.insert(text.to_owned(), place);
+                place
+            }
+            None => return Err(format!("a file holds no more than {MAX_RECORDERS} recorders")),
+        };
+        Ok(self.last)
+    }
+
+    fn forget(&mut self, place: usize) {
+        if let Some(states) = self.states.get_mut(place) {
+            *states = States::default();
+        }
+    }
+
+    fn forget_all(&mut self) {
+        self.states.iter_mut().for_each(|states| *states = States::default());
+    }
 }
 
 /// A row of an entry.
@@ -153,6 +247,7 @@ struct Change {
 /// What the rows of one entry have in common.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Key {
+    recorder: usize,
     number: u16,
     time: TimeStamp,
     sequence: Option<u64>,
@@ -259,37 +354,44 @@ impl Parser {
 
 fn row(
     line: &[u8],
-    columns: Option<usize>,
+    columns: Option<Columns>,
     fields: &mut Fields,
     parser: &mut Parser,
+    recorders: &mut Recorders,
 ) -> Result<Row, String> {
     fields.split(line)?;
     if fields.field(0) == COLUMNS.first().map_or(&b""[..], |name| name.as_bytes()) {
         return header(fields);
     }
-    let columns = columns.ok_or("there is no header before this row")?;
-    if fields.count() < columns {
-        return Err(format!("{} fields where {columns} have to be", fields.count()));
+    let Columns { count, has_recorder } = columns.ok_or("there is no header before this row")?;
+    let wanted = count + usize::from(has_recorder);
+    if fields.count() < wanted {
+        return Err(format!("{} fields where {wanted} have to be", fields.count()));
     }
+    let recorder = match has_recorder {
+        true => recorders.place(fields.field(COLUMNS.len()))?,
+        false => 0,
+    };
     let is_loss = (0..FIRST_COLUMNS).all(|place| fields.field(place).is_empty());
     if is_loss {
-        loss(fields, parser).map(Row::Loss)
+        loss(fields, parser).map(|gap| Row::Loss(recorder, gap))
     } else {
-        change(fields, parser).map(Row::Change)
+        change(recorder, fields, parser).map(Row::Change)
     }
 }
 
 fn header(fields: &Fields) -> Result<Row, String> {
-    let known = fields.count().min(COLUMNS.len());
+    let count = fields.count().min(COLUMNS.len());
     let is_ours = |place: usize, name: &str| fields.field(place) == name.as_bytes();
-    let all_ours = COLUMNS.iter().take(known).enumerate().all(|(place, name)| is_ours(place, name));
-    match known {
-        FIRST_COLUMNS | 7 if all_ours => Ok(Row::Header { columns: known }),
+    let all_ours = COLUMNS.iter().take(count).enumerate().all(|(place, name)| is_ours(place, name));
+    let has_recorder = is_ours(COLUMNS.len(), RECORDER_COLUMN);
+    match count {
+        FIRST_COLUMNS | 7 if all_ours => Ok(Row::Header(Columns { count, has_recorder })),
         _ => Err("this header has other columns than entry,time,input,state,…".to_owned()),
     }
 }
 
-fn change(fields: &Fields, parser: &mut Parser) -> Result<Change, String> {
+fn change(recorder: usize, fields: &Fields, parser: &mut Parser) -> Result<Change, String> {
     let wrong = |place: usize| {
         let name = COLUMNS.get(place).copied().unwrap_or_default();
         format!("{name} cannot be {}", quoted(fields.field(place)))
@@ -297,7 +399,7 @@ fn change(fields: &Fields, parser: &mut Parser) -> Result<Change, String> {
     let number = number(fields.field(0)).ok_or_else(|| wrong(0))?;
     let time = parser.time(fields.field(1)).ok_or_else(|| wrong(1))?;
     let (sequence, life) = place(fields, parser)?;
-    let key = Key { number, time, sequence, life };
+    let key = Key { recorder, number, time, sequence, life };
     let (input, state) = (fields.field(2), fields.field(3));
     if input.is_empty() && state.is_empty() {
         return Ok(Change { key, input: 0, is_on: false });
@@ -335,7 +437,25 @@ fn loss(fields: &Fields, parser: &mut Parser) -> Result<Gap, String> {
     Ok(Gap { life, after, lost, why })
 }
 
-/// Understands `lost 37 (exactly) after 120: overwritten`.
+/// A loss as the note of its row: `lost 37 (exactly) after 120: overwritten`.
+#[must_use]
+pub fn loss_note(gap: &Gap) -> String {
+    let lost = match gap.lost {
+        Lost::Exactly(count) => format!("lost {count} (exactly)"),
+        Lost::AtLeast(count) => format!("lost {count} (at least)"),
+        Lost::Unknown => "lost an unknown number".to_owned(),
+    };
+    let after = gap.after.map(|after| format!(" after {after}")).unwrap_or_default();
+    let why = match gap.why {
+        Why::Overwritten => "overwritten".to_owned(),
+        Why::LogBeganAnew => "log began anew".to_owned(),
+        Why::NotReached => "not reached".to_owned(),
+        Why::NotRecorded(inputs) => format!("not recorded, inputs {}", Inputs(inputs)),
+    };
+    format!("{lost}{after}: {why}")
+}
+
+/// Understands [`loss_note`].
 fn lost_and_why(note: &str) -> Option<(Lost, Why)> {
     let (count, why) = note.strip_prefix("lost ")?.split_once(": ")?;
     let count = count.split_once(" after ").map_or(count, |(count, _)| count);

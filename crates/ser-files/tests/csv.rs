@@ -71,6 +71,48 @@ fn a_state_is_known_until_something_may_be_missing() {
 }
 
 #[test]
+fn a_file_of_several_recorders_says_whose_each_row_is() {
+    let header = HEADER.replace('\n', ",recorder,utc,utc_earliest,utc_latest\n");
+    let of = |row: String, recorder: &str| row.replace('\n', &format!(",{recorder},,,\n"));
+    let lost = ",,,,2,0,lost 1 (exactly) after 2: overwritten,U2,,,\n";
+    let missed = ",,,,,,lost an unknown number: not reached,\"U3, new\",,,\n";
+    let rows = [
+        of(row(1, 1, 1), "U1"),
+        of(row(1, 9, 1), "U2"),
+        of(row(2, 2, 1), "U1"),
+        of(row(2, 9, 0), "U2"),
+        lost.to_owned(),
+        of(row(3, 3, 1), "U1"),
+        of(row(4, 4, 1), "U2"),
+        missed.to_owned(),
+    ];
+    let told = |told: Result<Told, ReadError>| {
+        let Told { recorder, record } = told.expect("no error");
+        match record {
+            Record::Entry(entry) => (recorder, gist(&entry)),
+            Record::Gap(gap) => (recorder, (gap.after, 0, 0, 0)),
+            other => panic!("{other:?}"),
+        }
+    };
+    let read: Vec<_> = read(&format!("{header}{}", rows.concat())).into_iter().map(told).collect();
+    let of = |name: &str| name.to_owned();
+    assert_eq!(
+        read,
+        [
+            (of("U1"), (Some(1), 1, 1, 1)),
+            (of("U2"), (Some(1), 1 << 8, 1 << 8, 1 << 8)),
+            (of("U1"), (Some(2), 0b10, 0b11, 0b11)),
+            (of("U2"), (Some(2), 1 << 8, 0, 1 << 8)),
+            (of("U2"), (Some(2), 0, 0, 0)),
+            (of("U1"), (Some(3), 0b100, 0b111, 0b111)),
+            (of("U2"), (Some(4), 0b1000, 0b1000, 0b1000)),
+            (of("U3, new"), (None, 0, 0, 0)),
+        ],
+        "what is known of a recorder ends where something is missing of it, and only there"
+    );
+}
+
+#[test]
 fn every_loss_is_read() {
     let after = |after, lost, why| Gap { life: Life::from_bits(0xAB), after, lost, why };
     for (row, gap) in [
@@ -98,6 +140,8 @@ fn every_loss_is_read() {
         let read = read(&format!("{HEADER}{row}\n"));
         let [Ok(Told { record, .. })] = &read[..] else { panic!("{read:?}") };
         assert_eq!(*record, Record::Gap(gap), "{row}");
+        let note = row.splitn(7, ',').last().map(|note| note.trim_matches('"'));
+        assert_eq!(Some(ser_files::csv::loss_note(&gap).as_str()), note);
     }
 }
 

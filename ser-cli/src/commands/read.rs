@@ -12,7 +12,7 @@ use crate::delivery::Outlet;
 use crate::error::{Failure, Result, advise, inform, warn};
 use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
-use crate::kept::KeptRecords;
+use crate::kept::{KeptRecords, Since};
 use crate::log_look;
 use crate::output::{Format, Life};
 use crate::values;
@@ -32,7 +32,8 @@ Formats:
   csv     a row per change: entry,time,input,state,sequence,life,note
   jsonl   an object per record; an event (record \"entry\"): entry, time, changed, state (inputs
           on), sequence, life, note; a loss (record \"gap\"): lost, count, after, why, inputs,
-          life; and what else the reading proves, such as the time for which nothing is missing
+          life; and what else is known: when the clock was set from here, for which time nothing
+          is missing
 
 A sequence number counts the events of a log since it was erased. The life names that log; \
 it is 0 where nothing is remembered (without --new). A file that is continued (>>) gets no \
@@ -102,7 +103,12 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         return check_complete(&outlet);
     }
     let remembered = keeper.as_ref().and_then(Keeper::size);
-    let kept = args.new.then(|| KeptRecords::of(&args.state, connection)).transpose()?;
+    let kept = KeptRecords::of(&args.state, connection)?;
+    if outlet.holds_evidence() {
+        let since = if args.new { Since::LastReading } else { Since::Ever };
+        kept.settings(since).iter().try_for_each(|record| outlet.evidence(record))?;
+    }
+    let kept = args.new.then_some(kept);
     let place = keeper.as_ref().and_then(Keeper::place);
     let mut witness = Witness::begin(kept, place, Duration::ZERO);
     let size = connection::log_size(&mut unit, log_size, remembered)?;

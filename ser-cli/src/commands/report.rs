@@ -5,11 +5,12 @@ use std::io::{self, Write};
 use clap::ValueEnum;
 use ser_evidence::history::History;
 use ser_evidence::incident::{Incident, Report, Which};
+use ser_evidence::time::{Moment, Utc};
 use ser_evidence::timeline::Timeline;
 use ser_files::report::{self, Document, Styles};
 
 use crate::connection::ConnectionArgs;
-use crate::error::{Failure, Result};
+use crate::error::{Failure, Result, inform};
 use crate::gather::{self, Gathered, GivenMoment, SourceArgs, parse_moment};
 use crate::output::{PROGRAM, Palette};
 
@@ -21,7 +22,8 @@ Examples:
   ser-cli report --input u1.jsonl u2.jsonl --around 2026-11-22T11:00:00
 
 Without a choice the last incident is shown in which a point of role trip (or 86) went on; without \
-such a point, the last one. Times without an offset are in the time zone of the site.
+such a point, the last one. Times without an offset are in the time zone of the site; a date alone \
+is its midnight, and a time alone is today's.
 What is not known is said: an order that the clocks cannot decide is a bracket, a first-out that \
 is not certain is a set, and entries that are missing are a row of their own.";
 
@@ -96,6 +98,9 @@ pub(super) fn show(gathered: &Gathered, which: Which, shown: Shown) -> Result<bo
     let timeline = Timeline::new(&gathered.site, &gathered.history);
     let incident =
         Incident::pick(&timeline, which).ok_or_else(|| no_entry(which, &gathered.history))?;
+    if let Which::Around(at) = which {
+        tell_if_elsewhere(&timeline, &incident, at);
+    }
     let report = Report::new(&timeline, incident);
     let document = Document {
         timeline: &timeline,
@@ -112,6 +117,22 @@ pub(super) fn show(gathered: &Gathered, which: Which, shown: Shown) -> Result<bo
     }
     out.flush()?;
     Ok(!report.is_incomplete())
+}
+
+/// The nearest incident may be days away from the time that was asked for.
+fn tell_if_elsewhere(timeline: &Timeline<'_>, incident: &Incident, asked: Moment<Utc>) {
+    let times = || incident.events.iter().filter_map(|&event| timeline.time(event));
+    let (Some(first), Some(last)) = (times().min(), times().max()) else { return };
+    let quiet_us = timeline.site().incident.quiet_us;
+    let (away_us, where_) = match (first.since(asked), asked.since(last)) {
+        (later, _) if later > quiet_us => (later, "later"),
+        (_, earlier) if earlier > quiet_us => (earlier, "earlier"),
+        _ => return,
+    };
+    let away = jiff::SignedDuration::from_secs(away_us / 1_000_000);
+    inform(format_args!(
+        "nothing happened at that time; the nearest incident was {away:#} {where_}"
+    ));
 }
 
 fn no_entry(which: Which, history: &History) -> Failure {

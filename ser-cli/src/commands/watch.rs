@@ -37,9 +37,10 @@ then, so that a report lost on the line delays its event and does not lose it.
 While events come faster than the line can carry reports and readings together, the recorder is \
 told not to report and is read without a pause. Events that are overwritten nevertheless are \
 counted in the output, at their place.
-With --site and no port, all recorders of the site that have one are asked every second, and \
-shown in one list, by what their clocks show; their settings are left alone. A recorder that does \
-not answer is asked again later, and delays no other.
+With --site and no port, several recorders are asked every second and shown in one list, in the \
+order of what is known of their clocks; their settings are left alone. A ~ is in front of a row \
+whose order to the one before is not known. A recorder that does not answer is asked again later, \
+and delays no other. If the site has one recorder with a port, it is watched as with --port.
 On a Genius bus the command waits for a board or a recorder that fails, for a minute or as long \
 as --timeout says.";
 

@@ -7,12 +7,12 @@ mod moment;
 
 use std::path::PathBuf;
 
-use ser_evidence::history::{Collector, History};
+use ser_evidence::history::{Collector, History, LifeHistory};
 use ser_evidence::site::Site;
 use ser_files::report::NotReached;
 
-use crate::connection::ConnectionArgs;
-use crate::error::{Failure, Result};
+use crate::connection::{ConnectionArgs, ports};
+use crate::error::{Failure, Result, advise, warn};
 use crate::keeper::StateArgs;
 
 pub(crate) use moment::{GivenMoment, parse_moment};
@@ -23,9 +23,10 @@ pub(crate) use moment::{GivenMoment, parse_moment};
 pub(crate) struct SourceArgs {
     /// Files with entries, written by `read` or `watch` with --format jsonl or csv, in any order.
     ///
-    /// The recorder of a CSV file is the name of the file up to its last dot. Without this option
-    /// all recorders of the site file that have a port are read; those that cannot be reached are
-    /// named in the result.
+    /// The recorder of a CSV file is the name of the file up to its last dot. Files speak for
+    /// themselves: what this computer remembers of a recorder's clock is used where the recorder is
+    /// read. Without this option all recorders of the site file that have a port are read; those
+    /// that cannot be reached are named in the result.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     input: Vec<PathBuf>,
 
@@ -67,20 +68,29 @@ impl Gathered {
     }
 }
 
+/// Neither a site nor files; a port alone does not say which recorder it is.
+fn no_source(connection: &ConnectionArgs) -> Failure {
+    let failure = match ports(connection).first() {
+        None => Failure::usage("from where? There is neither --site nor --input")
+            .hint("with --site FILE all recorders of a site are read; see ser-cli site --help"),
+        Some(port) => Failure::usage("recorders are read by their names in a site file")
+            .hint(format!("ser-cli site new --port {port} > plant.toml writes one")),
+    };
+    failure.hint("--input FILE… takes what ser-cli read --format jsonl has written")
+}
+
 /// Reads all sources.
 pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<Gathered> {
     let site = connection.chosen.as_deref().map(|chosen| chosen.site.clone());
     let reads_recorders = args.input.is_empty() || args.live;
     if site.is_none() && reads_recorders {
-        return Err(Failure::usage("from where? There is neither --site nor --input")
-            .hint("with --site FILE all recorders of a site are read; see ser-cli site --help")
-            .hint("--input FILE… takes what ser-cli read --format jsonl has written"));
+        return Err(no_source(connection));
     }
     let site_digest = site.as_ref().and_then(|site| Some(site.digest?.to_string()));
     let site = site.unwrap_or_else(|| Site { time_zone: moment::here(), ..Site::unknown() });
     let mut collector = Collector::new();
     let damaged_lines = files::read(&args.input, &site, &mut collector)?;
-    let not_reached = match reads_recorders {
+    let missed_now = match reads_recorders {
         true => live::read(&site, connection, &args.state, &mut collector)?,
         false => Vec::new(),
     };
@@ -88,13 +98,57 @@ pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<G
         let is_meant = connection.recorder.as_ref().is_none_or(|name| *name == recorder.name);
         is_meant
             && recorder.port.is_some()
-            && !not_reached.iter().any(|missed| missed.recorder == recorder.name)
+            && !missed_now.iter().any(|missed| missed.recorder == recorder.name)
     });
     if args.input.is_empty() && reached.count() == 0 {
         return Err(Failure::new("none of the recorders could be reached")
             .hint("is a ser-cli watch running, or another program on the line? End it meanwhile")
             .hint("files that were written before can be given with --input FILE…"));
     }
-    let history = collector.finish(&site);
+    let mut history = collector.finish(&site);
+    let not_reached = with_those_of_files(missed_now, &mut history);
+    tell_of_readings(&history);
     Ok(Gathered { site, history, site_digest, not_reached, damaged_lines })
+}
+
+/// Recorders that could not be reached now, and those of which the files say so.
+fn with_those_of_files(mut missed: Vec<NotReached>, history: &mut History) -> Vec<NotReached> {
+    for history in &mut history.recorders {
+        let name = &history.recorder.name;
+        let is_missed_now = missed.iter().any(|missed| missed.recorder == *name);
+        if history.is_not_reached && !is_missed_now {
+            let why = "not reached when the file was made".to_owned();
+            missed.push(NotReached { recorder: name.clone(), why });
+        }
+        history.is_not_reached |= is_missed_now;
+    }
+    missed
+}
+
+/// Says where nobody can know which readings are of the same log.
+fn tell_of_readings(history: &History) {
+    for history in &history.recorders {
+        let name = &history.recorder.name;
+        let is_by_number = |life: &&LifeHistory| life.is_by_number;
+        let by_number = history.lives.iter().filter(is_by_number).count();
+        if by_number > 0 && by_number < history.lives.len() {
+            warn(format_args!(
+                "{name}: a file without sequence numbers stands beside other files; entries that \
+                 are in both come twice"
+            ));
+            advise("leave out the file whose header is only entry,time,input,state");
+        }
+        let nameless = |life: &&LifeHistory| life.life.is_none() && !life.is_by_number;
+        let nameless: Vec<&LifeHistory> = history.lives.iter().filter(nameless).collect();
+        let is_later =
+            |life: &&&LifeHistory| life.entries.first().is_some_and(|held| held.sequence > 1);
+        if nameless.len() > 1 && nameless.iter().any(|life| is_later(&life)) {
+            warn(format_args!(
+                "{name}: {} readings have no entry in common, so nobody knows whether they are of \
+                 one log; each is taken for a log of its own",
+                nameless.len()
+            ));
+            advise("ser-cli read --new and watch remember which log they read; their files fit");
+        }
+    }
 }

@@ -9,35 +9,46 @@ use crate::error::{Failure, Result};
 pub(crate) enum GivenMoment {
     Absolute(jiff::Timestamp),
     Local(jiff::civil::DateTime),
+    /// A time of the day that it is now.
+    Today(jiff::civil::Time),
 }
 
 /// Understands `2026-11-22T10:00:00.250` (in the zone of the site), also with a blank, without a
-/// fraction or seconds, and the same with `Z` or an offset such as `+01:00`.
+/// fraction or seconds, and the same with `Z` or an offset such as `+01:00`. A date alone is its
+/// midnight, a time alone is today's.
 pub(crate) fn parse_moment(text: &str) -> std::result::Result<GivenMoment, String> {
     let text = text.trim();
     if let Ok(absolute) = text.parse() {
         return Ok(GivenMoment::Absolute(absolute));
     }
-    let local = text.parse().map_err(
-        |_| "not a date and time like 2026-11-22T10:00:00.250, or with Z or +01:00 at the end",
-    )?;
-    Ok(GivenMoment::Local(local))
+    if let Ok(local) = text.parse() {
+        return Ok(GivenMoment::Local(local));
+    }
+    let time = text.parse().map_err(|_| {
+        "not a date and time like 2026-11-22T10:00:00.250, or with Z or +01:00 at the end; a date \
+         alone is its midnight, a time alone is today's"
+    })?;
+    Ok(GivenMoment::Today(time))
 }
 
 impl GivenMoment {
     /// The moment, in the zone of a site.
     pub(crate) fn in_zone(self, zone: &jiff::tz::TimeZone) -> Result<Moment<Utc>> {
-        let timestamp = match self {
-            GivenMoment::Absolute(timestamp) => timestamp,
-            GivenMoment::Local(local) => {
-                let ambiguous = zone.to_ambiguous_timestamp(local);
-                ambiguous.unambiguous().map_err(|_| {
-                    let zone = zone.iana_name().unwrap_or("this zone").to_owned();
-                    Failure::usage(format!("{local} is twice or never in {zone}"))
-                        .hint("add the offset from UTC, as in 2026-10-25T02:30:00+01:00")
-                })?
+        let local = match self {
+            GivenMoment::Absolute(timestamp) => {
+                return Ok(Moment::from_us(timestamp.as_microsecond()));
+            }
+            GivenMoment::Local(local) => local,
+            GivenMoment::Today(time) => {
+                jiff::Timestamp::now().to_zoned_datetime(zone.clone()).date().to_datetime(time)
             }
         };
+        let ambiguous = zone.to_ambiguous_timestamp(local);
+        let timestamp = ambiguous.unambiguous().map_err(|_| {
+            let zone = zone.iana_name().unwrap_or("this zone").to_owned();
+            Failure::usage(format!("{local} is twice or never in {zone}"))
+                .hint("add the offset from UTC, as in 2026-10-25T02:30:00+01:00")
+        })?;
         Ok(Moment::from_us(timestamp.as_microsecond()))
     }
 }
@@ -62,7 +73,17 @@ mod tests {
         assert_eq!(us("2026-11-22 11:00:00.250", "Europe/Berlin"), expected);
         assert_eq!(us("2026-11-22T05:00:00.250-05:00", "Europe/Berlin"), expected);
         assert_eq!(us("2026-11-22 11:00", "Europe/Berlin"), expected - 250_000);
+        assert_eq!(us("2026-11-22", "UTC"), expected - 36_000_250_000, "midnight");
         assert!(parse_moment("yesterday").is_err());
+    }
+
+    #[test]
+    fn a_time_alone_is_todays() {
+        let today =
+            || jiff::Timestamp::now().to_zoned_datetime(jiff::tz::TimeZone::UTC).date().to_string();
+        let (before, given, after) = (today(), us("12:07", "UTC"), today());
+        let of = |date: &str| us(&format!("{date}T12:07:00Z"), "UTC");
+        assert!([of(&before), of(&after)].contains(&given));
     }
 
     #[test]

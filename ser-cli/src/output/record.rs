@@ -4,6 +4,8 @@ use std::fmt;
 use std::io;
 
 use ser_client::{Delivery, Lost};
+use ser_evidence::record::Gap;
+use ser_files::csv::loss_note;
 use ser_proto::{Entry, Model};
 
 use super::{EventWriter, Life, new_life};
@@ -44,24 +46,6 @@ pub(crate) struct Loss {
 }
 
 impl Loss {
-    /// How many events: a number and its certainty.
-    pub(crate) fn count(&self) -> (Option<u32>, &'static str) {
-        match self.lost {
-            Lost::Overwritten { count } => (Some(count), "exactly"),
-            Lost::OverwrittenAtLeast { count } => (Some(count), "at least"),
-            Lost::LogRestarted | Lost::Unrecorded { .. } => (None, "unknown"),
-        }
-    }
-
-    /// Why they are missing.
-    pub(crate) fn why(&self) -> &'static str {
-        match self.lost {
-            Lost::Overwritten { .. } | Lost::OverwrittenAtLeast { .. } => "overwritten",
-            Lost::LogRestarted => "log began anew",
-            Lost::Unrecorded { .. } => "not recorded",
-        }
-    }
-
     /// The loss in a sentence for people.
     pub(crate) fn sentence(&self) -> String {
         let events = |count: u32| match count {
@@ -94,18 +78,7 @@ impl Loss {
 /// As `lost 37 (exactly) after 120: overwritten`, for a column of notes.
 impl fmt::Display for Loss {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.count() {
-            (Some(count), sure) => write!(f, "lost {count} ({sure})")?,
-            (None, _) => write!(f, "lost an unknown number")?,
-        }
-        if let Some(after) = self.after {
-            write!(f, " after {after}")?;
-        }
-        write!(f, ": {}", self.why())?;
-        match self.lost {
-            Lost::Unrecorded { inputs } => write!(f, ", inputs {inputs}"),
-            _ => Ok(()),
-        }
+        f.write_str(&loss_note(&Gap::from(self)))
     }
 }
 

@@ -14,7 +14,8 @@ pub(crate) struct RecorderColumn {
     pub(crate) points: Points,
 }
 
-/// Writes lines like `U1-SER1     17  2026-11-22T10:00:00.250  52-1 closed OPEN`.
+/// Writes lines like `  U1-SER1     17  2026-11-22T10:00:00.250  52-1 closed OPEN`, with a `~` in
+/// front where the order of this row and the one before is not known.
 pub(crate) struct SiteTable<W> {
     out: W,
     palette: Palette,
@@ -36,7 +37,12 @@ impl<W: Write> SiteTable<W> {
     }
 
     /// Writes what happened in the log of a recorder, named by its place in the list.
-    pub(crate) fn record(&mut self, recorder: usize, record: &Record) -> io::Result<()> {
+    pub(crate) fn record(
+        &mut self,
+        recorder: usize,
+        record: &Record,
+        is_order_unknown: bool,
+    ) -> io::Result<()> {
         if std::mem::take(&mut self.header_due) {
             let title = self.palette.title;
             writeln!(self.out, "{title}{}{title:#}", header(&self.recorders))?;
@@ -46,7 +52,8 @@ impl<W: Write> SiteTable<W> {
         };
         let name = Harmless(name).line();
         let blanks = self.width.saturating_sub(name.width());
-        write!(self.out, "{name}{:blanks$}  ", "")?;
+        let (alarm, mark) = (self.palette.alarm, if is_order_unknown { "~" } else { " " });
+        write!(self.out, "{alarm}{mark}{alarm:#} {name}{:blanks$}  ", "")?;
         match record {
             Record::Event(event) => event_cells(&mut self.out, self.palette, points, event),
             Record::Loss(loss) => loss_cells(&mut self.out, self.palette, loss),
@@ -62,7 +69,7 @@ impl<W: Write> SiteTable<W> {
 /// The titles of the columns.
 pub(crate) fn header(recorders: &[RecorderColumn]) -> String {
     let width = width(recorders);
-    format!("{:<width$}  entry  {:<23}  changes", "recorder", "time")
+    format!("  {:<width$}  entry  {:<23}  changes", "recorder", "time")
 }
 
 fn width(recorders: &[RecorderColumn]) -> usize {
@@ -111,16 +118,16 @@ mod tests {
         let mut out = Vec::new();
         let mut table = SiteTable::new(&mut out, Palette::plain(), recorders, false);
         let first = event(9, entry("00.250", &[3, 17], &[17]));
-        table.record(0, &Record::Event(first)).unwrap();
-        table.record(1, &Record::Event(event(2048, entry("00.262", &[3], &[3])))).unwrap();
-        table.record(0, &Record::Loss(four_lost())).unwrap();
+        table.record(0, &Record::Event(first), false).unwrap();
+        table.record(1, &Record::Event(event(2048, entry("00.262", &[3], &[3]))), true).unwrap();
+        table.record(0, &Record::Loss(four_lost()), false).unwrap();
         assert_eq!(
             String::from_utf8(out).unwrap().lines().collect::<Vec<_>>(),
             [
-                "recorder       entry  time                     changes",
-                "U1-SER1            9  2026-11-22T10:00:00.250  52-1 closed OPEN  17 ON",
-                "遮断器 記録 2   2048  2026-11-22T10:00:00.262  3 ON",
-                "U1-SER1            -  4 events were overwritten before they were read",
+                "  recorder       entry  time                     changes",
+                "  U1-SER1            9  2026-11-22T10:00:00.250  52-1 closed OPEN  17 ON",
+                "~ 遮断器 記録 2   2048  2026-11-22T10:00:00.262  3 ON",
+                "  U1-SER1            -  4 events were overwritten before they were read",
             ]
         );
     }

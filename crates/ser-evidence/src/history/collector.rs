@@ -7,7 +7,7 @@ use super::gaps::{self, ToldGaps};
 use super::join::{self, Segment};
 use super::{Held, History, LifeHistory, RecorderHistory};
 use crate::record::{
-    ClockObservation, ClockStep, EntryRecord, Gap, Life, LifeRecord, Record, Watched,
+    ClockObservation, ClockStep, EntryRecord, Gap, Life, LifeRecord, Record, Watched, Why,
 };
 use crate::site::{Recorder, Site};
 
@@ -38,6 +38,30 @@ struct Collected {
     observations: Vec<ClockObservation>,
     steps: Vec<ClockStep>,
     watched: Vec<Watched>,
+    reach: Reach,
+}
+
+/// Whether the recorder was read.
+#[derive(Clone, Copy, Debug, Default)]
+struct Reach {
+    /// What the current source says: that it was not reached, and that it was read.
+    missed_here: bool,
+    read_here: bool,
+    /// Whether a source could not reach it.
+    missed: bool,
+    /// Whether another source has read it.
+    read: bool,
+}
+
+impl Reach {
+    /// Says that another source comes.
+    fn end_source(&mut self) {
+        match (self.missed_here, self.read_here) {
+            (true, _) => self.missed = true,
+            (false, read) => self.read |= read,
+        }
+        (self.missed_here, self.read_here) = (false, false);
+    }
 }
 
 impl Collector {
@@ -51,6 +75,7 @@ impl Collector {
     pub fn begin_source(&mut self) {
         for collected in &mut self.recorders {
             collected.begins_segment = true;
+            collected.reach.end_source();
         }
     }
 
@@ -105,17 +130,30 @@ impl Collector {
 impl Collected {
     fn add(&mut self, record: &Record) {
         match *record {
-            Record::Entry(ref entry) => self.add_entry(entry),
+            Record::Entry(ref entry) => {
+                self.reach.read_here = true;
+                self.add_entry(entry);
+            }
+            Record::Gap(Gap { after: None, why: Why::NotReached, .. }) => {
+                self.reach.missed_here = true;
+            }
             Record::Gap(gap) => self.gaps.push(gap),
             Record::Clock(observation) => self.observations.push(observation),
             Record::Step(step) => self.steps.push(step),
             Record::Life(life) => self.life_records.push(life),
-            Record::Watched(watched) => self.watched.push(watched),
+            Record::Watched(watched) => {
+                self.reach.read_here = true;
+                self.watched.push(watched);
+            }
         }
     }
 
     /// Takes everything that was collected of the same recorder elsewhere.
-    fn merge(&mut self, other: Collected) {
+    fn merge(&mut self, mut other: Collected) {
+        self.reach.end_source();
+        other.reach.end_source();
+        self.reach.missed |= other.reach.missed;
+        self.reach.read |= other.reach.read;
         for (life, entries) in other.lives {
             match self.lives.entry(life) {
                 // Usually a life is in one place, and is not copied.
@@ -184,6 +222,7 @@ impl Collected {
             life.gaps = gaps::of_life(life, &told);
         }
         conflicts.sort_unstable_by_key(|conflict| (conflict.life, conflict.sequence));
+        self.reach.end_source();
         RecorderHistory {
             recorder: described.unwrap_or_else(|| Recorder::named(&self.name)),
             site: id,
@@ -191,6 +230,7 @@ impl Collected {
             observations: sorted(self.observations),
             steps: sorted(self.steps),
             watched: sorted(self.watched),
+            is_not_reached: self.reach.missed && !self.reach.read,
             conflicts,
         }
     }

@@ -38,6 +38,8 @@ pub struct RecorderHistory {
     pub steps: Vec<ClockStep>,
     /// When nothing was missed.
     pub watched: Vec<Watched>,
+    /// Whether a source could not reach it, and no other source has read it.
+    pub is_not_reached: bool,
     /// Entries that cannot both be true, each with the sequence that they share.
     pub conflicts: Vec<Conflict>,
 }

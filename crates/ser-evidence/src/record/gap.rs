@@ -17,6 +17,12 @@ pub struct Gap {
     pub why: Why,
 }
 
+impl Gap {
+    /// A reading did not get to the recorder.
+    pub const NOT_REACHED: Gap =
+        Gap { life: Life::UNKNOWN, after: None, lost: Lost::Unknown, why: Why::NotReached };
+}
+
 /// How many entries are missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Lost {
@@ -37,7 +43,8 @@ pub enum Why {
     LogBeganAnew,
     /// These inputs (bit 0 is input 1) changed and no entry says when.
     NotRecorded(u32),
-    /// The recorder, or the host that reads it, could not be reached.
+    /// The recorder, or the host that reads it, could not be reached. Without a sequence to come
+    /// [after](Gap::after): the reading that these records are from did not get to this recorder.
     NotReached,
 }
 

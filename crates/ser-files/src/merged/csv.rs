@@ -3,10 +3,12 @@
 use std::io::{self, Write};
 
 use ser_evidence::history::Held;
+use ser_evidence::record::{Gap, Life};
 use ser_evidence::time::Moment;
 use ser_evidence::timeline::{EventId, Item, Timeline};
 
-use super::super::report::{missing, names};
+use super::super::report::names;
+use crate::csv::loss_note;
 use crate::digits::{UtcTexts, push_number, push_stamp};
 
 /// The columns. The first seven are those of a reading.
@@ -30,6 +32,11 @@ pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>) -> io::Result<()> {
             Item::Gap(event, index) => rows.gap(out, timeline, event, index)?,
             Item::ClockSet(_) => is_after_set = true,
         }
+    }
+    let missed = timeline.history().recorders.iter().filter(|recorder| recorder.is_not_reached);
+    for history in missed {
+        let recorder = quoted(&names::harmless(&history.recorder.name));
+        writeln!(out, ",,,,,,{},{recorder},,,", quoted(&loss_note(&Gap::NOT_REACHED)))?;
     }
     Ok(())
 }
@@ -73,7 +80,9 @@ impl Rows {
         push_stamp(&mut self.head, &entry.time);
         self.head.push(b',');
         let note = if is_after_set { "clock was set before this" } else { "" };
-        self.make_tail(timeline, event, sequence, note);
+        // A reading by number tells no sequence.
+        let is_by_number = timeline.life(event).is_some_and(|life| life.is_by_number);
+        self.make_tail(timeline, event, (!is_by_number).then_some(sequence), note);
         if entry.changed.is_empty() {
             [&*self.head, b",", &*self.tail].iter().for_each(|part| self.rows.extend(*part));
         }
@@ -88,13 +97,21 @@ impl Rows {
     }
 
     /// What comes after the state.
-    fn make_tail(&mut self, timeline: &Timeline<'_>, event: EventId, sequence: u64, note: &str) {
+    fn make_tail(
+        &mut self,
+        timeline: &Timeline<'_>,
+        event: EventId,
+        sequence: Option<u64>,
+        note: &str,
+    ) {
         let tail = &mut self.tail;
         let bound = timeline.moved_utc(event, None);
         let ends = [bound.lo(), bound.hi()].map(|end| end.map(Moment::us));
         tail.clear();
         tail.push(b',');
-        push_number(tail, sequence);
+        if let Some(sequence) = sequence {
+            push_number(tail, sequence);
+        }
         let (life, recorder) = names(&self.names, event);
         for text in [life, note, recorder] {
             tail.push(b',');
@@ -120,7 +137,8 @@ impl Rows {
             return Ok(());
         };
         let (life, recorder) = names(&self.names, event);
-        let note = missing(gap.lost, gap.why);
+        let (lost, why) = (gap.lost, gap.why);
+        let note = loss_note(&Gap { life: Life::UNKNOWN, after: Some(gap.after), lost, why });
         writeln!(out, ",,,,{},{life},{},{recorder},,,", gap.after, quoted(&note))
     }
 }

@@ -30,7 +30,8 @@ pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>, program: &str) -> io:
         let observations = history.observations.iter().map(|found| Record::Clock(*found));
         let steps = history.steps.iter().map(|found| Record::Step(*found));
         let watched = history.watched.iter().map(|found| Record::Watched(*found));
-        for record in observations.chain(steps).chain(watched) {
+        let missed = history.is_not_reached.then_some(Record::Gap(Gap::NOT_REACHED));
+        for record in observations.chain(steps).chain(watched).chain(missed) {
             lines.record(name, &record)?;
         }
     }

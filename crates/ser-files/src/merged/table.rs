@@ -20,8 +20,14 @@ pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>, styles: Styles) -> io
         match item {
             Item::Entry(event) => table.entry(out, event)?,
             Item::Gap(event, index) => table.gap(out, event, index)?,
-            Item::ClockSet(event) => table.remark(out, event, "the clock was set here")?,
+            Item::ClockSet(event) => {
+                table.remark(out, &names::recorder(timeline, event), "the clock was set here")?;
+            }
         }
+    }
+    let missed = timeline.history().recorders.iter().filter(|recorder| recorder.is_not_reached);
+    for history in missed {
+        table.remark(out, &names::harmless(&history.recorder.name), "not reached")?;
     }
     Ok(())
 }
@@ -113,11 +119,12 @@ impl<'t> Table<'t> {
     fn gap(&self, out: &mut dyn Write, event: EventId, index: usize) -> io::Result<()> {
         let gap = self.timeline.life(event).and_then(|life| life.gaps.get(index));
         let Some(gap) = gap else { return Ok(()) };
-        self.remark(out, event, &missing(gap.lost, gap.why))
+        let recorder = names::recorder(self.timeline, event);
+        self.remark(out, &recorder, &missing(gap.lost, gap.why))
     }
 
-    fn remark(&self, out: &mut dyn Write, event: EventId, text: &str) -> io::Result<()> {
-        let recorder = padded(&names::recorder(self.timeline, event), self.recorder_width);
+    fn remark(&self, out: &mut dyn Write, recorder: &str, text: &str) -> io::Result<()> {
+        let recorder = padded(recorder, self.recorder_width);
         let (style, indent) = (self.styles.alarm, 2 + TIME_WIDTH + 1 + DOUBT_WIDTH);
         writeln!(out, "{:indent$}  {style}{recorder}  {:>8}  {text}{style:#}", "", "-")
     }

@@ -22,7 +22,7 @@ use crate::output::{Format, Palette, Record, RecorderColumn, Rows, SiteTable, si
 use crate::site_file::Chosen;
 use buses::Buses;
 use follower::Follower;
-use order::Evidence;
+use order::{Evidence, Row};
 
 /// What arrives this close together is put in order.
 const GATHERED: Duration = Duration::from_millis(300);
@@ -131,9 +131,9 @@ impl List {
                 }
                 waiting.push(written);
             }
-            for (recorder, record) in self.evidence.ordered(by_recorder) {
+            for Row { recorder, record, is_order_unknown } in self.evidence.ordered(by_recorder) {
                 self.losses += usize::from(matches!(record, Record::Loss(_)));
-                self.table.record(recorder, &record)?;
+                self.table.record(recorder, &record, is_order_unknown)?;
             }
             self.table.flush()?;
             // A thread that has ended does not wait any more.

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use ser_evidence::history::Collector;
 use ser_evidence::record::{self, EntryRecord, Life};
 use ser_evidence::site::Site;
-use ser_evidence::timeline::Timeline;
+use ser_evidence::timeline::{EventId, Order, Timeline};
 
 use crate::kept::KeptRecords;
 use crate::output::Record;
@@ -23,7 +23,21 @@ pub(super) struct Evidence {
     site: Site,
     recorders: Vec<Known>,
     loaded_at: Option<Instant>,
+    /// The event in the last row so far.
+    last: Option<Key>,
 }
+
+/// A record at its place in the list.
+pub(super) struct Row {
+    /// The recorder's place among the recorders.
+    pub(super) recorder: usize,
+    pub(super) record: Record,
+    /// Whether nobody knows if the event in the row before came first.
+    pub(super) is_order_unknown: bool,
+}
+
+/// What an entry is: the name of its recorder, its life and its sequence.
+type Key = (String, Life, u64);
 
 /// What is known of one recorder.
 struct Known {
@@ -43,14 +57,17 @@ impl Evidence {
         let known = |(name, kept, last): (String, Option<KeptRecords>, Option<EntryRecord>)| {
             Known { name, kept, records: Vec::new(), recent: last.into_iter().collect() }
         };
-        Evidence { site, recorders: recorders.into_iter().map(known).collect(), loaded_at: None }
+        let recorders = recorders.into_iter().map(known).collect();
+        Evidence { site, recorders, loaded_at: None, last: None }
     }
 
     /// Puts records in order. Those of one recorder stay in theirs, and a loss stays ahead of the
     /// event that follows it.
-    pub(super) fn ordered(&mut self, of_recorders: Vec<Vec<Record>>) -> Vec<(usize, Record)> {
+    pub(super) fn ordered(&mut self, of_recorders: Vec<Vec<Record>>) -> Vec<Row> {
         self.load_if_due();
-        let ranks = self.ranks(&of_recorders);
+        let history = self.collect(&of_recorders).finish(&self.site);
+        let timeline = Timeline::new(&self.site, &history);
+        let ranks = ranks(&timeline);
         let mut all: Vec<(usize, usize, Record)> = Vec::new();
         for (recorder, records) in of_recorders.into_iter().enumerate() {
             let of_records = self.places(&ranks, recorder, &records);
@@ -60,7 +77,20 @@ impl Evidence {
         }
         // A stable sort: what stands together stays together by recorder.
         all.sort_by_key(|(at, ..)| *at);
-        all.into_iter().map(|(_, recorder, record)| (recorder, record)).collect()
+        let mut rows = Vec::with_capacity(all.len());
+        for (_, recorder, record) in all {
+            let key = self.key(recorder, &record);
+            let of = |key: &Option<Key>| Some(ranks.get(key.as_ref()?)?.1);
+            let is_order_unknown = match (of(&self.last), of(&key)) {
+                (Some(last), Some(this)) if last.recorder != this.recorder => {
+                    timeline.order(last, this) == Order::Unknown
+                }
+                _ => false,
+            };
+            self.last = key.or_else(|| self.last.take());
+            rows.push(Row { recorder, record, is_order_unknown });
+        }
+        rows
     }
 
     fn load_if_due(&mut self) {
@@ -73,8 +103,8 @@ impl Evidence {
         self.loaded_at = Some(Instant::now());
     }
 
-    /// Where each entry is in the timeline of all that is known.
-    fn ranks(&mut self, of_recorders: &[Vec<Record>]) -> HashMap<(String, Life, u64), usize> {
+    /// All that is known, and these records.
+    fn collect(&mut self, of_recorders: &[Vec<Record>]) -> Collector {
         let mut collector = Collector::new();
         for (known, records) in self.recorders.iter_mut().zip(of_recorders) {
             collector.begin_source();
@@ -88,28 +118,17 @@ impl Evidence {
             let too_many = known.recent.len().saturating_sub(RECENT);
             known.recent.drain(..too_many);
         }
-        let history = collector.finish(&self.site);
-        let timeline = Timeline::new(&self.site, &history);
-        let rank = |(rank, event)| {
-            let name = timeline.recorder(event)?.recorder.name.clone();
-            let life = timeline.life(event)?.name();
-            Some(((name, life, timeline.held(event)?.sequence), rank))
-        };
-        timeline.entries().enumerate().filter_map(rank).collect()
+        collector
+    }
+
+    fn key(&self, recorder: usize, record: &Record) -> Option<Key> {
+        let entry = entry(record)?;
+        Some((self.recorders.get(recorder)?.name.clone(), entry.life, entry.sequence?))
     }
 
     /// A place for each record of a recorder, which never goes back.
-    fn places(
-        &self,
-        ranks: &HashMap<(String, Life, u64), usize>,
-        recorder: usize,
-        records: &[Record],
-    ) -> Vec<usize> {
-        let name = self.recorders.get(recorder).map(|known| known.name.clone()).unwrap_or_default();
-        let rank = |record: &Record| {
-            let entry = entry(record)?;
-            ranks.get(&(name.clone(), entry.life, entry.sequence?)).copied()
-        };
+    fn places(&self, ranks: &Ranks, recorder: usize, records: &[Record]) -> Vec<usize> {
+        let rank = |record: &Record| Some(ranks.get(&self.key(recorder, record)?)?.0);
         let mut places: Vec<usize> = Vec::with_capacity(records.len());
         let mut latest = 0;
         for record in records {
@@ -126,6 +145,18 @@ impl Evidence {
         }
         places
     }
+}
+
+/// Where each entry is in a timeline, and what it is called there.
+type Ranks = HashMap<Key, (usize, EventId)>;
+
+fn ranks(timeline: &Timeline<'_>) -> Ranks {
+    let rank = |(rank, event)| {
+        let name = timeline.recorder(event)?.recorder.name.clone();
+        let life = timeline.life(event)?.name();
+        Some(((name, life, timeline.held(event)?.sequence), (rank, event)))
+    };
+    timeline.entries().enumerate().filter_map(rank).collect()
 }
 
 fn entry(record: &Record) -> Option<EntryRecord> {
@@ -162,7 +193,7 @@ mod tests {
             Record::Loss(_) => 0,
         };
         let ordered = evidence.ordered(of_recorders);
-        ordered.iter().map(|(recorder, record)| (*recorder, number(record))).collect()
+        ordered.iter().map(|row| (row.recorder, number(&row.record))).collect()
     }
 
     #[test]
@@ -176,10 +207,9 @@ mod tests {
         );
     }
 
-    #[test]
-    fn a_clock_that_is_known_to_be_late_is_put_right() {
+    /// What is known of two clocks: U2 shows ten seconds less than U1 at the same moment.
+    fn evidence_of_clocks() -> Evidence {
         let mut evidence = evidence();
-        // U2 shows ten seconds less than U1 at the same moment.
         for (known, time) in evidence.recorders.iter_mut().zip(["10.000", "00.000"]) {
             let shown = shown(&entry(time, &[], &[]).time).expect("a date");
             let reading = host_reading::now();
@@ -195,13 +225,32 @@ mod tests {
             known.records.push(record::Record::Clock(observation));
         }
         evidence.loaded_at = Some(Instant::now());
+        evidence
+    }
+
+    #[test]
+    fn a_clock_that_is_known_to_be_late_is_put_right() {
         assert_eq!(
             ordered(
-                &mut evidence,
+                &mut evidence_of_clocks(),
                 vec![vec![at(1, "15.000")], vec![at(1, "04.000"), at(2, "06.000")]]
             ),
             [(1, 1), (0, 1), (1, 2)]
         );
+    }
+
+    #[test]
+    fn a_row_that_may_have_come_before_the_one_ahead_of_it_is_marked() {
+        let marks = |evidence: &mut Evidence, of_recorders| -> Vec<bool> {
+            evidence.ordered(of_recorders).iter().map(|row| row.is_order_unknown).collect()
+        };
+        let mut known = evidence_of_clocks();
+        let first = vec![vec![at(1, "15.000")], vec![at(1, "05.001"), at(2, "06.000")]];
+        assert_eq!(marks(&mut known, first), [false, true, false]);
+        let later = vec![vec![at(2, "16.001"), at(3, "19.000")], vec![at(3, "09.500")]];
+        assert_eq!(marks(&mut known, later), [true, false, false], "of the row shown before");
+        let without = vec![vec![at(1, "00.250")], vec![at(1, "50.000")]];
+        assert_eq!(marks(&mut evidence(), without), [false, true]);
     }
 
     #[test]
