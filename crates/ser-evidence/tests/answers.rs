@@ -257,6 +257,8 @@ fn a_breaker_says_how_long_it_took_and_its_contacts_how_long_they_disagreed() {
     assert_eq!(abnormal, [0, 1], "the trip has not reset, and the breaker is open");
 }
 
+const SET: How = How::Set { broadcast: None };
+
 const SHARED: &str = "
 [[recorder]]
 name = \"U1\"
@@ -303,6 +305,48 @@ fn a_contact_on_two_recorders_ties_their_clocks_together() {
     assert_eq!(timeline.contact_findings(), []);
     // Without the shared contact 180 ms would be unknown between them.
     assert_eq!(timeline.order(find(0, 2), find(1, 3)), Order::Before);
+}
+
+#[test]
+fn a_contact_on_two_recorders_is_one_candidate_for_first_out() {
+    let site = site(SHARED);
+    let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    for log in [&mut u1, &mut u2] {
+        log.observed(SET, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(0));
+    }
+    // Normally on there, as it is inverted.
+    u2.changes("2026-11-22T10:00:01.000", &[9]).changes("2026-11-22T10:00:20.001", &[9]);
+    u1.changes("2026-11-22T10:00:01.000", &[4]).changes("2026-11-22T10:00:20.000", &[1]);
+    u1.changes("2026-11-22T10:00:20.040", &[2]);
+    u2.changes("2026-11-22T10:00:20.050", &[3]);
+    let history = history(&site, &[&u1, &u2]);
+    let timeline = Timeline::new(&site, &history);
+    let report = report(&timeline, Which::Last);
+    let first = report.first_out.known().expect("one contact moved first");
+    let same = timeline.same_movement(first).expect("both saw it");
+    let of = |change: ChangeId| (change.event.recorder, change.input);
+    assert_eq!([of(first), of(same)], [(0, 1), (1, 9)]);
+    assert!(report.first_out.includes(&timeline, same));
+    assert_eq!(timeline.same_movement(same), Some(first));
+}
+
+#[test]
+fn a_contact_that_one_of_its_recorders_saw_later_than_something_else_was_not_first() {
+    let site = site(SHARED);
+    let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    u1.observed(SET, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(0));
+    u2.observed(SET, "2026-11-22T10:00:00.000", (at - 90_000, at + 90_000), Some(0));
+    u2.changes("2026-11-22T10:00:01.000", &[9]).changes("2026-11-22T10:00:20.000", &[9]);
+    u1.changes("2026-11-22T10:00:20.000", &[4]);
+    // Two milliseconds prove that it came after input 4 here, but not there.
+    u1.changes("2026-11-22T10:00:20.002", &[1]).changes("2026-11-22T10:00:20.040", &[2]);
+    u2.changes("2026-11-22T10:00:20.050", &[3]);
+    let history = history(&site, &[&u1, &u2]);
+    let timeline = Timeline::new(&site, &history);
+    let report = report(&timeline, Which::Last);
+    assert_eq!(report.first_out.known().map(|change| change.input), Some(4));
 }
 
 #[test]

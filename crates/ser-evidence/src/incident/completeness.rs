@@ -16,8 +16,9 @@ pub struct Completeness {
     pub entries: usize,
     /// What is missing in the incident, or right before it: the gap, and the entry after it.
     pub gaps: Vec<(LogGap, EventId)>,
-    /// The first and the last entry of the stretch without a gap that the incident is in.
-    pub unbroken: Option<(EventId, EventId)>,
+    /// The first and the last entry of the stretch without a gap that the incident is in. Their
+    /// clocks may be known differently well, so each end has what is known of its own.
+    pub unbroken: Option<(StretchEnd, StretchEnd)>,
     /// When it was last read, by the host that did; `None` if no source says.
     pub read_until: Option<HostReading>,
     /// Whether it was read, or has an entry, after the end of the incident; or the end is its own.
@@ -27,13 +28,24 @@ pub struct Completeness {
     /// Entries of which not even the day is known, because the clock was never set: they may belong
     /// to the incident.
     pub timeless: usize,
-    /// What is known of its clock.
+    /// What is known of its clock at its last entry in the incident, or before.
     pub clock: ClockState,
 }
 
-/// What is known of a recorder's clock during the incident.
+/// The first or the last entry of a stretch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StretchEnd {
+    /// The entry.
+    pub event: EventId,
+    /// What is known of the clock that stamped it.
+    pub clock: ClockState,
+}
+
+/// What is known of a recorder's clock at an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClockState {
+    /// The recorder has no entry in the incident nor before, so there is no time to be known.
+    NoEntry,
     /// Nobody observed it.
     NotObserved,
     /// It was observed: how far its times may be off, either way, on the scale on which recorders
@@ -92,7 +104,7 @@ fn of(
         }),
         conflicts: history.conflicts.len(),
         timeless: timeless(timeline, history, recorder),
-        clock: near.map_or(ClockState::NotObserved, |event| clock(timeline, event)),
+        clock: near.map_or(ClockState::NoEntry, |event| clock(timeline, event)),
     }
 }
 
@@ -112,13 +124,16 @@ fn last_before(timeline: &Timeline<'_>, incident: &Incident, recorder: u32) -> O
 }
 
 /// The stretch without a gap around an entry.
-fn unbroken(timeline: &Timeline<'_>, event: EventId) -> Option<(EventId, EventId)> {
+fn unbroken(timeline: &Timeline<'_>, event: EventId) -> Option<(StretchEnd, StretchEnd)> {
     let life = timeline.life(event)?;
     let place = event.place as usize;
     let next = life.gaps.partition_point(|gap| gap.place <= place);
     let first = next.checked_sub(1).and_then(|gap| life.gaps.get(gap)).map_or(0, |gap| gap.place);
     let end = life.gaps.get(next).map_or(life.entries.len(), |gap| gap.place);
-    let at = |place: usize| Some(EventId { place: u32::try_from(place).ok()?, ..event });
+    let at = |place: usize| {
+        let event = EventId { place: u32::try_from(place).ok()?, ..event };
+        Some(StretchEnd { event, clock: clock(timeline, event) })
+    };
     Some((at(first)?, at(end.checked_sub(1)?)?))
 }
 

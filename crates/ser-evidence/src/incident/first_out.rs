@@ -11,7 +11,8 @@ use crate::timeline::{ChangeId, EventId, Order, Timeline};
 /// Everything that may have moved first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FirstOut {
-    /// Changes, in the order of the timeline. With a single one, and no gap, it is known.
+    /// Changes, in the order of the timeline. With a single one, and no gap, it is known. A movement
+    /// that two recorders saw is here once, by the change that comes first in the timeline.
     pub changes: Vec<ChangeId>,
     /// What is missing may have been first, too: the entry after the gap, and the gap's index in
     /// its life.
@@ -29,6 +30,13 @@ impl FirstOut {
             ([only], [], []) => Some(*only),
             _ => None,
         }
+    }
+
+    /// Whether this change is one of them, or the same movement as one of them.
+    #[must_use]
+    pub fn includes(&self, timeline: &Timeline<'_>, change: ChangeId) -> bool {
+        let is_here = |change| self.changes.contains(&change);
+        is_here(change) || timeline.same_movement(change).is_some_and(is_here)
     }
 }
 
@@ -57,7 +65,8 @@ pub(super) fn of_groups(
 }
 
 /// Candidates are the inputs of the first entry of each life. One is out if something of another
-/// life is proven to have been earlier, and with it that life's first entry.
+/// life is proven to have been earlier, and with it that life's first entry. A contact that two
+/// recorders watch moves once, so both its changes are one candidate.
 fn of(timeline: &Timeline<'_>, incident: &Incident, counts: &dyn Fn(ChangeId) -> bool) -> FirstOut {
     let mut lives = BTreeSet::new();
     let mut firsts: Vec<EventId> = Vec::new();
@@ -91,14 +100,42 @@ fn of(timeline: &Timeline<'_>, incident: &Incident, counts: &dyn Fn(ChangeId) ->
         first.is_none_or(|first| after.place <= first.place)
     };
     FirstOut {
-        changes: candidates
-            .iter()
-            .flat_map(|&event| changes(timeline, event))
-            .filter(|change| counts(*change))
-            .collect(),
+        changes: movements(timeline, &firsts, &candidates, counts),
         gaps: incident.gaps.iter().copied().filter(is_ahead).collect(),
         unread: unread(timeline, incident, &candidates),
     }
+}
+
+/// The changes of these candidates, each movement once. One is out if another recorder saw the same
+/// movement, and there something else is proven to have been earlier.
+fn movements(
+    timeline: &Timeline<'_>,
+    firsts: &[EventId],
+    candidates: &[EventId],
+    counts: &dyn Fn(ChangeId) -> bool,
+) -> Vec<ChangeId> {
+    let firsts: Vec<ChangeId> = counted(timeline, firsts, counts).collect();
+    let mut movements: Vec<ChangeId> = Vec::new();
+    for change in counted(timeline, candidates, counts) {
+        let same = timeline.same_movement(change);
+        let is_before =
+            |first: &ChangeId| timeline.delta(*first, change).lo_us.is_some_and(|least| least > 0);
+        let is_later = same.is_some() && firsts.iter().any(is_before);
+        if !is_later && same.is_none_or(|same| !movements.contains(&same)) {
+            movements.push(change);
+        }
+    }
+    movements
+}
+
+/// The changes of some entries that count.
+fn counted<'t>(
+    timeline: &'t Timeline<'_>,
+    events: &'t [EventId],
+    counts: &'t dyn Fn(ChangeId) -> bool,
+) -> impl Iterator<Item = ChangeId> + 't {
+    let all = events.iter().flat_map(|&event| changes(timeline, event));
+    all.filter(|change| counts(*change))
 }
 
 /// Recorders of which nothing is known at the time of the candidates.

@@ -17,7 +17,7 @@ mod returns;
 
 pub use breakers::{Bounce, Operation};
 pub use chatter::Fold;
-pub use completeness::{ClockState, Completeness};
+pub use completeness::{ClockState, Completeness, StretchEnd};
 pub use contact_pairs::Disagreement;
 pub use expected::{Doubt, StepResult, Verdict};
 pub use first_out::FirstOut;

@@ -4,6 +4,8 @@
 //! other, the two clocks bound each other. A change without its partner is told: a wire, an input
 //! or a clock is not as the site file has it.
 
+use std::collections::BTreeMap;
+
 use super::{ChangeId, EventId, Timeline, event_id};
 use crate::clock::LinkReason;
 use crate::clock::links::Link;
@@ -47,27 +49,32 @@ struct Seen {
     width: i64,
 }
 
+/// What all contacts say that are wired to two recorders.
+#[derive(Debug, Default)]
+pub(super) struct Shared {
+    /// What single movements that both saw say about their clocks.
+    pub(super) links: Vec<Link>,
+    /// Changes that are one movement for certain, from either side.
+    pub(super) pairs: BTreeMap<ChangeId, ChangeId>,
+    /// What is wrong with them.
+    pub(super) findings: Vec<ContactFinding>,
+}
+
 /// What all contacts say that are wired to two recorders, and what is wrong with them.
-pub(super) fn links(timeline: &Timeline<'_>) -> (Vec<Link>, Vec<ContactFinding>) {
-    let (mut links, mut findings) = (Vec::new(), Vec::new());
+pub(super) fn shared(timeline: &Timeline<'_>) -> Shared {
+    let mut shared = Shared::default();
     let points = timeline.site.points.iter().enumerate();
     let pairs = points.filter_map(|(index, point)| {
         point.same_as.filter(|other| index < other.0).map(|other| (PointId(index), other))
     });
     for (one, other) in pairs {
-        pair(timeline, one, other, &mut links, &mut findings);
+        pair(timeline, one, other, &mut shared);
     }
-    findings.sort_unstable();
-    (links, findings)
+    shared.findings.sort_unstable();
+    shared
 }
 
-fn pair(
-    timeline: &Timeline<'_>,
-    one: PointId,
-    other: PointId,
-    links: &mut Vec<Link>,
-    findings: &mut Vec<ContactFinding>,
-) {
+fn pair(timeline: &Timeline<'_>, one: PointId, other: PointId, shared: &mut Shared) {
     let points = &timeline.site.points;
     let (Some(point), Some(other_point)) = (points.get(one.0), points.get(other.0)) else {
         return;
@@ -89,18 +96,17 @@ fn pair(
                         && !is_chatter(timeline, those, partner)
                         && is_covered(timeline, change, partner.change.event)
                     {
+                        let (change, partner) = (change.change, partner.change);
+                        shared.pairs.extend([(change, partner), (partner, change)]);
                         let why = LinkReason::Contact(one.0, other.0);
-                        links.extend(link(timeline, change.change, partner.change, why));
+                        shared.links.extend(link(timeline, change, partner, why));
                     }
                 }
                 [] => {
                     if let Some(trouble) = trouble(timeline, change, those, to) {
-                        findings.push(ContactFinding {
-                            change: change.change,
-                            point: from,
-                            other: to,
-                            trouble,
-                        });
+                        let change = change.change;
+                        let (point, other) = (from, to);
+                        shared.findings.push(ContactFinding { change, point, other, trouble });
                     }
                 }
                 _ => {}

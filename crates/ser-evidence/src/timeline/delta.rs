@@ -80,11 +80,22 @@ impl Timeline<'_> {
         }
     }
 
-    /// The time from one change to another.
+    /// The time from one change to another. From a change to itself it is 0, and so it is between two
+    /// that are [one movement](Self::same_movement).
     #[must_use]
     pub fn delta(&self, one: ChangeId, other: ChangeId) -> Delta {
-        let sides = ((one.event, Some(one.input)), (other.event, Some(other.input)));
-        let (lo, hi) = self.moved_between(sides.0, sides.1);
+        if one == other || self.same_movement(one) == Some(other) {
+            return Delta { lo_us: Some(0), hi_us: Some(0) };
+        }
+        let seen = |change: ChangeId| [Some(change), self.same_movement(change)];
+        let (mut lo, mut hi) = (NO_LO, NO_HI);
+        for one in seen(one).into_iter().flatten() {
+            for other in seen(other).into_iter().flatten() {
+                let sides = ((one.event, Some(one.input)), (other.event, Some(other.input)));
+                let between = self.moved_between(sides.0, sides.1);
+                (lo, hi) = (lo.max(between.0), hi.min(between.1));
+            }
+        }
         // Where a bound is wrong, either may be right.
         Delta::of((lo.min(hi), hi.max(lo)))
     }

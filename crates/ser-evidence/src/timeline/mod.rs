@@ -55,6 +55,8 @@ pub struct Timeline<'a> {
     lives: Vec<Vec<LifeBounds>>,
     findings: Vec<Finding>,
     contact_findings: Vec<ContactFinding>,
+    /// Changes of two recorders that are one movement.
+    pairs: BTreeMap<ChangeId, ChangeId>,
     out_of_order: Vec<(EventId, EventId)>,
 }
 
@@ -70,11 +72,13 @@ impl<'a> Timeline<'a> {
             lives: Vec::new(),
             findings: Vec::new(),
             contact_findings: Vec::new(),
+            pairs: BTreeMap::new(),
             out_of_order: Vec::new(),
         };
         timeline.reckon();
-        let (links, trouble) = contacts::links(&timeline);
-        timeline.contact_findings = trouble;
+        let contacts::Shared { links, pairs, findings } = contacts::shared(&timeline);
+        timeline.contact_findings = findings;
+        timeline.pairs = pairs;
         if !links.is_empty() {
             timeline.model.add_links(links);
             timeline.reckon();
@@ -130,6 +134,13 @@ impl<'a> Timeline<'a> {
     #[must_use]
     pub fn contact_findings(&self) -> &[ContactFinding] {
         &self.contact_findings
+    }
+
+    /// The change of another recorder that is the same movement of the same contact, if it is beyond
+    /// doubt which one that is.
+    #[must_use]
+    pub fn same_movement(&self, change: ChangeId) -> Option<ChangeId> {
+        self.pairs.get(&change).copied()
     }
 
     /// Pairs of entries of one life whose bounds cannot both be true: the first came first, and

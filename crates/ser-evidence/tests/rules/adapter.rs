@@ -120,6 +120,12 @@ impl<'a> Sayings<'a> {
         all.map(|f| ((f.change.event, f.change.input), is_missing(f.trouble))).collect()
     }
 
+    /// The change of another recorder that is said to be the same movement.
+    pub(crate) fn same_movement(&self, (event, input): Change) -> Option<Change> {
+        let same = self.timeline.same_movement(ChangeId { event, input })?;
+        Some((same.event, same.input))
+    }
+
     /// What was shown at observations that are told to be of no use.
     pub(crate) fn not_placed_us(&self) -> Vec<i64> {
         let shown_us = |finding: &Finding| match finding {
@@ -165,6 +171,7 @@ pub(crate) struct IncidentSaid {
     pub(crate) changes: Vec<Change>,
     /// What may have moved first of all: entries, and recorders of which something is missing.
     pub(crate) first: Vec<EventId>,
+    pub(crate) first_changes: Vec<Change>,
     pub(crate) first_may_be_missing_of: Vec<usize>,
     /// The same for each group, with the group's index.
     pub(crate) groups: Vec<(usize, Vec<Change>)>,
@@ -204,15 +211,17 @@ impl Sayings<'_> {
             histories[index].site.expect("it is in the site").0
         };
         let complete = report.completeness.iter().filter(|recorder| recorder.is_complete());
+        let unbroken = report.completeness.iter().filter_map(|one| one.unbroken);
         let group = |(group, first): &(GroupId, FirstOut)| {
             (group.0, first.changes.iter().map(|&one| change(one)).collect())
         };
         IncidentSaid {
             groups: report.groups.iter().map(group).collect(),
             complete: complete.map(|recorder| site_index(&recorder)).collect(),
-            unbroken: report.completeness.iter().filter_map(|one| one.unbroken).collect(),
+            unbroken: unbroken.map(|(first, last)| (first.event, last.event)).collect(),
             events: report.incident.events,
             changes: report.rows.iter().map(|row| change(row.change)).collect(),
+            first_changes: report.first_out.changes.iter().map(|&one| change(one)).collect(),
             first: report.first_out.changes.iter().map(|change| change.event).collect(),
             first_may_be_missing_of: report.first_out.gaps.iter().map(recorder).collect(),
             folds: report.chatter.iter().map(fold).collect(),

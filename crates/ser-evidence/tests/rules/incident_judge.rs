@@ -82,6 +82,12 @@ impl<'a> Judge<'a> {
                 self.fault("first out", format!("{earlier:?} was before {first:?}"));
             }
         }
+        for change in &incident.first_changes {
+            let same = self.said.same_movement(*change);
+            if same.is_some_and(|same| incident.first_changes.contains(&same)) {
+                self.fault("first out", format!("{change:?} is a candidate twice"));
+            }
+        }
     }
 
     /// The same for the inputs of each group.

@@ -54,6 +54,7 @@ pub(crate) fn faults_of(seed: u64) -> Vec<Fault> {
             judge.enough_is_said();
             judge.incidents_are_true();
             judge.no_partner_is_overlooked();
+            judge.one_movement_is_one();
         }
         Trouble::Conflict => judge.conflict_is_told(),
         Trouble::WrongObservation => judge.wrong_observation_is_told(),
@@ -184,6 +185,30 @@ impl<'a> Judge<'a> {
                 let what = if is_missing { "missing" } else { "apart" };
                 let text = format!("{:?} is {what} of {:?} {input}", partner.row, judged.row);
                 self.fault("contact on two recorders", text);
+            }
+        }
+    }
+
+    /// Changes of two recorders that are said to be one movement are one.
+    fn one_movement_is_one(&mut self) {
+        for judged in self.rows.clone() {
+            for seen in &judged.truth.moves {
+                let Some((event, input)) = self.said.same_movement((judged.row.event, seen.input))
+                else {
+                    continue;
+                };
+                let other =
+                    *self.rows.iter().find(|other| other.row.event == event).expect("a row");
+                let mut theirs = other.truth.moves.iter().filter(|theirs| theirs.input == input);
+                if !theirs.any(|theirs| (theirs.contact, theirs.at) == (seen.contact, seen.at)) {
+                    let text = format!("{seen:?} is not input {input}: {}", show(judged, other));
+                    self.fault("contact on two recorders", text);
+                }
+                if self.said.delta((judged.row.event, seen.input), (event, input))
+                    != (Some(0), Some(0))
+                {
+                    self.fault("contact on two recorders", format!("{seen:?} moved twice"));
+                }
             }
         }
     }

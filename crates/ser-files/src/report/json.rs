@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use ser_console::is_obeyed;
 use ser_evidence::clock::{Home, Nominal};
-use ser_evidence::incident::{ClockState, FirstOut, Verdict};
+use ser_evidence::incident::{ClockState, FirstOut, StretchEnd, Verdict};
 use ser_evidence::timeline::{ChangeId, Delta, EventId};
 use serde_json::{Value, json};
 
@@ -86,13 +86,20 @@ fn object(document: &Document<'_>) -> Value {
 
 /// By what a change is found in the sequence.
 fn change(document: &Document<'_>, change: ChangeId) -> Value {
-    let timeline = document.timeline;
     json!({
         "recorder": recorder(document, change.event),
-        "life": timeline.life(change.event).map(|life| life.name().to_string()),
-        "sequence": timeline.held(change.event).map(|held| held.sequence),
+        "life": life(document, change.event),
+        "sequence": sequence_of(document, change.event),
         "input": change.input,
     })
+}
+
+fn life(document: &Document<'_>, event: EventId) -> Option<String> {
+    document.timeline.life(event).map(|life| life.name().to_string())
+}
+
+fn sequence_of(document: &Document<'_>, event: EventId) -> Option<u64> {
+    document.timeline.held(event).map(|held| held.sequence)
 }
 
 fn recorder<'d>(document: &Document<'d>, event: EventId) -> Option<&'d str> {
@@ -105,7 +112,14 @@ fn first_out(document: &Document<'_>, first: &FirstOut) -> Value {
         "candidates": first
             .changes
             .iter()
-            .map(|&candidate| change(document, candidate))
+            .map(|&candidate| json!({
+                "recorder": recorder(document, candidate.event),
+                "life": life(document, candidate.event),
+                "sequence": sequence_of(document, candidate.event),
+                "input": candidate.input,
+                "same_movement": document.timeline.same_movement(candidate)
+                    .map(|same| change(document, same)),
+            }))
             .collect::<Vec<_>>(),
         "missing_on": first
             .gaps
@@ -125,21 +139,12 @@ fn recorders(document: &Document<'_>) -> Vec<Value> {
     let each = document.report.completeness.iter();
     each.map(|of| {
         let history = timeline.history().recorders.get(of.recorder as usize);
-        let (home, order_doubt_us, utc_doubt_us) = match of.clock {
-            ClockState::NotObserved => (None, None, None),
-            ClockState::Observed { home, order_doubt_us, utc_doubt_us } => {
-                (Some(home), order_doubt_us, utc_doubt_us)
-            }
-        };
-        let at = |event: EventId| {
-            timeline.time(event).map(ser_evidence::time::Moment::us).and_then(rfc3339)
-        };
         json!({
             "recorder": history.map(|history| &history.recorder.name),
             "entries": of.entries,
             "is_complete": of.is_complete(),
-            "unbroken_from": of.unbroken.and_then(|(first, _)| at(first)),
-            "unbroken_to": of.unbroken.and_then(|(_, last)| at(last)),
+            "unbroken_from": of.unbroken.map(|(first, _)| stretch_end(document, first)),
+            "unbroken_to": of.unbroken.map(|(_, last)| stretch_end(document, last)),
             "read_until": of.read_until.and_then(|reading| rfc3339(reading.utc.us())),
             "missing": of.gaps.iter().map(|(gap, _)| json!({
                 "after": gap.after,
@@ -147,17 +152,38 @@ fn recorders(document: &Document<'_>) -> Vec<Value> {
             })).collect::<Vec<_>>(),
             "conflicts": of.conflicts,
             "without_time": of.timeless,
-            "clock": {
-                "scale": home.map(|home| match home {
-                    Home::Boot(boot) => boot.to_string(),
-                    Home::Utc => "UTC".to_owned(),
-                }),
-                "order_doubt_us": order_doubt_us,
-                "utc_doubt_us": utc_doubt_us,
-            },
+            "clock": clock_of(of.clock),
         })
     })
     .collect()
+}
+
+/// An end of what is complete, with what is known of the clock there.
+fn stretch_end(document: &Document<'_>, end: StretchEnd) -> Value {
+    let time = document.timeline.time(end.event).map(ser_evidence::time::Moment::us);
+    json!({
+        "life": life(document, end.event),
+        "sequence": sequence_of(document, end.event),
+        "time": time.and_then(rfc3339),
+        "clock": clock_of(end.clock),
+    })
+}
+
+fn clock_of(clock: ClockState) -> Value {
+    match clock {
+        ClockState::NoEntry => Value::Null,
+        ClockState::NotObserved => json!({
+            "scale": Value::Null, "order_doubt_us": Value::Null, "utc_doubt_us": Value::Null,
+        }),
+        ClockState::Observed { home, order_doubt_us, utc_doubt_us } => json!({
+            "scale": match home {
+                Home::Boot(boot) => boot.to_string(),
+                Home::Utc => "UTC".to_owned(),
+            },
+            "order_doubt_us": order_doubt_us,
+            "utc_doubt_us": utc_doubt_us,
+        }),
+    }
 }
 
 fn sequence(document: &Document<'_>) -> Vec<Value> {

@@ -16,6 +16,14 @@ pub(crate) fn point(timeline: &Timeline<'_>, id: Option<PointId>, input: u8) -> 
     named.map_or_else(|| format!("input {input}"), |point| harmless(&point.name))
 }
 
+/// The name of a point, with that of its recorder: `U1-SER1/52-1 closed`.
+pub(super) fn full_point(timeline: &Timeline<'_>, id: PointId) -> String {
+    let named = point_of(timeline, id);
+    let recorder = named.and_then(|point| timeline.site().recorders.get(point.recorder.0));
+    let recorder = recorder.map_or(String::new(), |found| harmless(&found.name));
+    format!("{recorder}/{}", point(timeline, Some(id), 0))
+}
+
 /// What a state is called.
 pub(crate) fn state(timeline: &Timeline<'_>, id: Option<PointId>, on: bool) -> String {
     match id.and_then(|id| point_of(timeline, id)) {
@@ -24,11 +32,14 @@ pub(crate) fn state(timeline: &Timeline<'_>, id: Option<PointId>, on: bool) -> S
     }
 }
 
-/// A change in a sentence: `52-1 closed OPEN (U1-SER1)`.
+/// A change in a sentence: `52-1 closed OPEN (U1-SER1)`. If two recorders saw it, both are named.
 pub(super) fn change(timeline: &Timeline<'_>, row: &Row) -> String {
     let ChangeId { event, input } = row.change;
+    let same = timeline.same_movement(row.change);
+    let also =
+        same.map_or(String::new(), |same| format!(" and {}", recorder(timeline, same.event)));
     format!(
-        "{} {} ({})",
+        "{} {} ({}{also})",
         point(timeline, row.point, input),
         state(timeline, row.point, row.on),
         recorder(timeline, event)

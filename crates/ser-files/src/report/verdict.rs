@@ -130,8 +130,8 @@ pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
         if !report.incident.events.contains(&finding.change.event) {
             continue;
         }
-        let point = names::point(timeline, Some(finding.point), finding.change.input);
-        let other = names::point(timeline, Some(finding.other), 0);
+        let point = names::full_point(timeline, finding.point);
+        let other = names::full_point(timeline, finding.other);
         wrong.push(match finding.trouble {
             ContactTrouble::Missing => format!("{point} moved and {other} did not"),
             ContactTrouble::Apart(_) => {

@@ -6,7 +6,6 @@ use std::io::{self, Write};
 use anstyle::Style;
 use ser_evidence::clock::Nominal;
 use ser_evidence::incident::Row;
-use ser_evidence::site::PointId;
 use ser_evidence::timeline::{ChangeId, EventId, Order, Timeline};
 
 use super::{heading, names};
@@ -130,7 +129,7 @@ fn brackets(timeline: &Timeline<'_>, rows: &[&Row]) -> Vec<Bracket> {
 /// How far apart the truth of neighbours of unknown order may be.
 fn unknown_within(timeline: &Timeline<'_>, rows: &[&Row]) -> String {
     if let [one, other] = rows
-        && is_one_contact(timeline, one, other)
+        && timeline.same_movement(one.change) == Some(other.change)
     {
         return "the same contact on both".to_owned();
     }
@@ -150,15 +149,6 @@ fn unknown_within(timeline: &Timeline<'_>, rows: &[&Row]) -> String {
     format!("order unknown within {}", doubt(widest))
 }
 
-/// Whether two changes are those of one contact that is wired to two recorders.
-fn is_one_contact(timeline: &Timeline<'_>, one: &Row, other: &Row) -> bool {
-    let (Some(one), Some(other)) = (one.point, other.point) else { return false };
-    let is_same = |one: PointId, other: PointId| {
-        names::point_of(timeline, one).is_some_and(|point| point.same_as == Some(other))
-    };
-    is_same(one, other) || is_same(other, one)
-}
-
 fn cells(
     document: &Document<'_>,
     row: &Row,
@@ -170,7 +160,7 @@ fn cells(
     let Document { timeline, report, .. } = *document;
     let ChangeId { event, input } = row.change;
     let first = report.rows.first().map(|row| row.change);
-    let is_first = report.first_out.changes.contains(&row.change);
+    let is_first = report.first_out.includes(timeline, row.change);
     let delta = |from: Option<ChangeId>| {
         let us = from.and_then(|from| timeline.delta(from, row.change).middle_us());
         Cell::from(us.map(since).unwrap_or_default())
@@ -212,11 +202,11 @@ fn notes(
     clock: &Clock,
 ) -> String {
     let Document { timeline, report, .. } = *document;
-    let is_first = report.first_out.changes.contains(&row.change);
+    let is_first = report.first_out.includes(timeline, row.change);
     let mut notes = Vec::new();
     if is_first {
-        let is_alone = report.first_out.changes.len() == 1 && report.first_out.gaps.is_empty();
-        notes.push(if is_alone { "first-out" } else { "maybe first-out" }.to_owned());
+        let is_known = report.first_out.known().is_some();
+        notes.push(if is_known { "first-out" } else { "maybe first-out" }.to_owned());
     }
     if previous.is_some_and(|previous| previous.event == row.change.event) {
         notes.push("same millisecond".to_owned());

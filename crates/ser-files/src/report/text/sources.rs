@@ -2,8 +2,9 @@
 
 use std::io::{self, Write};
 
-use ser_evidence::clock::{Finding, LinkReason};
-use ser_evidence::incident::{ClockState, Completeness};
+use ser_evidence::clock::{Finding, Home, LinkReason};
+use ser_evidence::incident::{ClockState, Completeness, StretchEnd};
+use ser_evidence::record::HostReading;
 use ser_evidence::timeline::{EventId, Timeline};
 
 use super::{heading, names};
@@ -69,27 +70,70 @@ fn row(document: &Document<'_>, of: &Completeness, styles: Styles, clock: &Clock
     ]
 }
 
-/// From when to when nothing is missing.
+/// From when to when nothing is missing: in times if both ends are known on one scale, else by the
+/// numbers of the entries.
 fn complete(timeline: &Timeline<'_>, of: &Completeness, clock: &Clock) -> String {
-    let at = |event: EventId| {
-        timeline.time(event).map(ser_evidence::time::Moment::us).map(|at| clock.date_and_time(at))
-    };
     let read = of.read_until.map(|reading| clock.date_and_time(reading.utc.us()));
     let Some((first, last)) = of.unbroken else {
         return read.map_or_else(
-            || "no entries".to_owned(),
-            |read| format!("no entries, read until {read}"),
+            || "no entries until then".to_owned(),
+            |read| format!("no entries until then, read until {read}"),
         );
     };
-    let until = read.or_else(|| at(last)).unwrap_or_else(|| "?".to_owned());
-    let Some(from) = at(first) else { return "time not known".to_owned() };
+    let (from, until) = (entry_end(timeline, first), entry_end(timeline, last));
+    let until = of.read_until.map(|reading| read_end(timeline, reading)).or(until);
+    if let Some((from, until)) = from.zip(until).filter(|(from, until)| from.1 == until.1) {
+        return span(&from, &until, clock);
+    }
+    let sequence =
+        |end: StretchEnd| timeline.held(end.event).map_or(0, |held| held.sequence).to_string();
+    let entries = match first.event == last.event {
+        true => format!("entry {}", sequence(first)),
+        false => format!("entries {} to {}", sequence(first), sequence(last)),
+    };
+    read.map_or_else(|| entries.clone(), |read| format!("{entries}, read until {read}"))
+}
+
+/// A moment in UTC with its doubt, and the scale on which that holds.
+type End = ((i64, Option<i64>), Home);
+
+/// When an entry was recorded, if its clock was observed.
+fn entry_end(timeline: &Timeline<'_>, end: StretchEnd) -> Option<End> {
+    let at = timeline.time(end.event)?.us();
+    match end.clock {
+        ClockState::Observed { utc_doubt_us: Some(us), .. } => Some(((at, Some(us)), Home::Utc)),
+        ClockState::Observed { home, order_doubt_us, .. } => {
+            Some(((at, order_doubt_us?.into()), home))
+        }
+        ClockState::NotObserved | ClockState::NoEntry => None,
+    }
+}
+
+/// When a recorder was read last, by the host that did.
+fn read_end(timeline: &Timeline<'_>, reading: HostReading) -> End {
+    let doubt = reading.utc_doubt_us.or(timeline.site().utc_doubt_us);
+    let doubt = doubt.and_then(|us| i64::try_from(us).ok());
+    let scale = doubt.map_or(Home::Boot(reading.boot), |_| Home::Utc);
+    ((reading.utc.us(), doubt), scale)
+}
+
+/// As `2026-11-22 11:00:00.250 ± 2.1 ms to 11:05:00.000 ± 1 ms`.
+fn span((from, scale): &End, (until, _): &End, clock: &Clock) -> String {
+    let with_doubt = |text: &str, us: Option<i64>| match us {
+        Some(us) => format!("{text} ± {}", doubt(us)),
+        None => text.to_owned(),
+    };
+    let (begins, ends) = (clock.date_and_time(from.0), clock.date_and_time(until.0));
     // The date once, if it is the same.
-    let date = from.split_inclusive(' ').next().unwrap_or_default();
-    format!("{from} to {}", until.strip_prefix(date).unwrap_or(&until))
+    let date = begins.split_inclusive(' ').next().unwrap_or_default();
+    let ends = with_doubt(ends.strip_prefix(date).unwrap_or(&ends), until.1);
+    let by = if *scale == Home::Utc { "" } else { " by the clock of the host" };
+    format!("{} to {ends}{by}", with_doubt(&begins, from.1))
 }
 
 fn clock_text(state: ClockState) -> String {
     match state {
+        ClockState::NoEntry => "no entries until then, so no times".to_owned(),
         ClockState::NotObserved => "never observed: its times are as it showed them".to_owned(),
         ClockState::Observed { order_doubt_us, utc_doubt_us, .. } => {
             let order = order_doubt_us.map_or("order not known".to_owned(), |us| {

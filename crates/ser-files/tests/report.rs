@@ -1,0 +1,232 @@
+//! What a report says in words and as JSON.
+
+use jiff::Timestamp;
+use ser_evidence::history::{Collector, History};
+use ser_evidence::incident::{Incident, Report, Which};
+use ser_evidence::record::{
+    Boot, ClockObservation, EntryRecord, HostReading, How, Life, Place, Record, Reference, Watched,
+};
+use ser_evidence::site::{self, Site};
+use ser_evidence::time::{Bound, Moment, shown};
+use ser_evidence::timeline::Timeline;
+use ser_files::report::{Document, Styles, write_json, write_text};
+use ser_proto::{Entry, Inputs, TimeStamp};
+use serde_json::Value;
+
+/// Entries and observations of recorders, as one computer read them that was booted at midnight and
+/// whose clock may be a millisecond off.
+struct Readings {
+    site: Site,
+    collector: Collector,
+}
+
+impl Readings {
+    fn of(site: &str) -> Readings {
+        let head = "site = \"Northfield\"\ntime_zone = \"UTC\"\n";
+        let site = site::read(&format!("{head}{site}")).expect("a site");
+        let mut collector = Collector::new();
+        collector.begin_source();
+        Readings { site, collector }
+    }
+
+    /// Inputs change in the entry with this number.
+    fn entry(&mut self, recorder: &str, number: u16, time: &str, (changed, state): (u32, u32)) {
+        let time = stamp(time);
+        let entry = Entry { changed: Inputs(changed), state: Inputs(state), time };
+        let (life, sequence) = (life(recorder), Some(number.into()));
+        let known = EntryRecord::ALL_KNOWN;
+        let record = EntryRecord { life, sequence, number, entry, known };
+        self.collector.add(recorder, &Record::Entry(record));
+    }
+
+    /// The clock was set right after this entry, to within two milliseconds.
+    fn set(&mut self, recorder: &str, after: u64, time: &str) {
+        let reading = reading(time);
+        let us = reading.monotonic.us();
+        let place =
+            Place { life: life(recorder), after: Some(after), before: Some(after), newest: None };
+        self.collector.add(
+            recorder,
+            &Record::Clock(ClockObservation {
+                how: How::Set { broadcast: None },
+                shown: shown(&stamp(time)).expect("a date"),
+                at: Reference::Host { bound: Bound::from_us(us, us + 2_000), reading },
+                place,
+            }),
+        );
+    }
+
+    /// Nothing was missed until then.
+    fn watched(&mut self, recorder: &str, through: u64, until: &str) {
+        let (life, to) = (life(recorder), reading(until));
+        let from = reading("2026-11-22T00:00:01.000");
+        self.collector.add(recorder, &Record::Watched(Watched { life, from, to, through }));
+    }
+
+    fn told(self) -> Told {
+        let history = self.collector.finish(&self.site);
+        Told { site: self.site, history }
+    }
+}
+
+/// What was read, put together.
+struct Told {
+    site: Site,
+    history: History,
+}
+
+impl Told {
+    /// The report about the last incident.
+    fn write(&self, write: impl Fn(&mut Vec<u8>, &Document<'_>)) -> String {
+        let timeline = Timeline::new(&self.site, &self.history);
+        let incident = Incident::pick(&timeline, Which::Last).expect("an incident");
+        let report = Report::new(&timeline, incident);
+        let document = Document {
+            timeline: &timeline,
+            report: &report,
+            program: "ser-files",
+            site_digest: None,
+            not_reached: &[],
+            unfold: false,
+        };
+        let mut out = Vec::new();
+        write(&mut out, &document);
+        String::from_utf8(out).expect("text")
+    }
+
+    /// Its text in one line, blanks in a row as one.
+    fn text(&self) -> String {
+        let text = self.write(|out, document| {
+            write_text(out, document, Styles::default()).expect("it takes it");
+        });
+        text.split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+
+    fn json(&self) -> Value {
+        let text = self.write(|out, document| write_json(out, document).expect("it takes it"));
+        serde_json::from_str(&text).expect("JSON")
+    }
+}
+
+fn life(recorder: &str) -> Life {
+    Life::from_bits(recorder.bytes().fold(1, |bits, byte| bits * 31 + u64::from(byte)))
+}
+
+fn utc_us(text: &str) -> i64 {
+    format!("{text}Z").parse::<Timestamp>().expect("a time").as_microsecond()
+}
+
+fn reading(text: &str) -> HostReading {
+    HostReading {
+        boot: Boot(7),
+        monotonic: Moment::from_us(utc_us(text) - utc_us("2026-11-22T00:00:00.000")),
+        utc: Moment::from_us(utc_us(text)),
+        utc_doubt_us: Some(1_000),
+    }
+}
+
+fn stamp(text: &str) -> TimeStamp {
+    ser_evidence::time::stamp(Moment::from_us(utc_us(text))).expect("a stamp")
+}
+
+const SHARED: &str = "
+[[recorder]]
+name = \"U1-SER1\"
+clock = \"utc\"
+[[recorder]]
+name = \"U1-SER2\"
+clock = \"utc\"
+[[point]]
+recorder = \"U1-SER1\"
+input = 1
+name = \"Trip\"
+same_as = \"U1-SER2/Trip\"
+[[point]]
+recorder = \"U1-SER2\"
+input = 1
+name = \"Trip\"
+";
+
+#[test]
+fn one_contact_on_two_recorders_is_named_once_with_both() {
+    let mut readings = Readings::of(SHARED);
+    for recorder in ["U1-SER1", "U1-SER2"] {
+        readings.entry(recorder, 1, "2026-11-22T09:00:00.000", (4, 4));
+        readings.set(recorder, 1, "2026-11-22T10:00:00.000");
+        readings.entry(recorder, 2, "2026-11-22T10:00:01.000", (1, 5));
+        readings.entry(recorder, 3, "2026-11-22T10:00:01.500", (4, 1));
+    }
+    let told = readings.told();
+    let text = told.text();
+    assert!(text.contains("first-out Trip ON (U1-SER1 and U1-SER2), 10:00:01"), "{text}");
+    assert!(text.contains("U1-SER1 Trip ON 2 first-out"), "{text}");
+    assert!(text.contains("U1-SER2 Trip ON 2 first-out; the same contact on both"), "{text}");
+    let json = told.json();
+    assert_eq!(json["first_out"]["is_known"], true);
+    let [candidate] = &json["first_out"]["candidates"].as_array().expect("a list")[..] else {
+        panic!("{json:#}")
+    };
+    assert_eq!(candidate["recorder"], "U1-SER1");
+    assert_eq!(candidate["same_movement"]["recorder"], "U1-SER2");
+}
+
+#[test]
+fn a_contact_that_one_recorder_missed_is_told_with_both_recorders() {
+    let mut readings = Readings::of(SHARED);
+    for recorder in ["U1-SER1", "U1-SER2"] {
+        readings.set(recorder, 0, "2026-11-22T10:00:00.000");
+        readings.entry(recorder, 1, "2026-11-22T10:00:01.000", (4, 4));
+    }
+    readings.entry("U1-SER1", 2, "2026-11-22T10:00:02.000", (1, 5));
+    readings.entry("U1-SER2", 2, "2026-11-22T10:00:03.000", (4, 0));
+    let text = readings.told().text();
+    assert!(text.contains("U1-SER1/Trip moved and U1-SER2/Trip did not"), "{text}");
+}
+
+#[test]
+fn a_stretch_that_begins_on_another_scale_is_told_by_its_entries() {
+    let mut readings = Readings::of(SHARED);
+    // The clock was ahead by hours before it was set.
+    readings.entry("U1-SER1", 1, "2026-11-22T23:00:00.000", (4, 4));
+    readings.set("U1-SER1", 1, "2026-11-22T10:00:00.000");
+    readings.entry("U1-SER1", 2, "2026-11-22T10:00:01.000", (1, 5));
+    readings.watched("U1-SER1", 2, "2026-11-22T10:30:00.000");
+    readings.set("U1-SER2", 0, "2026-11-22T10:00:00.000");
+    readings.entry("U1-SER2", 1, "2026-11-22T10:00:01.000", (1, 1));
+    readings.watched("U1-SER2", 1, "2026-11-22T10:30:00.000");
+    let told = readings.told();
+    let text = told.text();
+    assert!(text.contains("entries 1 to 2, read until 2026-11-22 10:30:00.000"), "{text}");
+    let whole = "2026-11-22 10:00:01.002 ± 3.3 ms to 10:30:00.000 ± 1.0 ms";
+    assert!(text.contains(whole), "{text}");
+    let recorders = told.json()["recorders"].clone();
+    assert_eq!(recorders[0]["unbroken_from"]["sequence"], 1);
+    assert_eq!(recorders[0]["unbroken_from"]["clock"]["utc_doubt_us"], Value::Null);
+    assert!(recorders[0]["unbroken_to"]["clock"]["utc_doubt_us"].is_u64(), "{recorders:#}");
+}
+
+#[test]
+fn a_recorder_without_entries_has_no_times_that_could_be_doubtful() {
+    let mut readings = Readings::of(SHARED);
+    readings.set("U1-SER1", 0, "2026-11-22T10:00:00.000");
+    readings.entry("U1-SER1", 1, "2026-11-22T10:00:01.000", (4, 4));
+    readings.watched("U1-SER2", 0, "2026-11-22T10:30:00.000");
+    let told = readings.told();
+    let text = told.text();
+    assert!(!text.contains("as it showed them"), "{text}");
+    assert!(text.contains("no entries until then, so no times"), "{text}");
+    assert_eq!(told.json()["recorders"][1]["clock"], Value::Null);
+}
+
+#[test]
+fn the_first_row_is_at_no_distance_from_itself() {
+    let mut readings = Readings::of(SHARED);
+    readings.entry("U1-SER1", 1, "2026-11-22T10:00:01.000", (6, 6));
+    let rows = readings.told().json()["sequence"].clone();
+    let zero = serde_json::json!({ "least_us": 0, "most_us": 0 });
+    assert_eq!(rows[0]["since_first"], zero);
+    assert_eq!(rows[0]["since_previous"], Value::Null);
+    // Another input of the same sample moved somewhere in the same millisecond.
+    assert!(rows[1]["since_first"]["least_us"].as_i64() < Some(0), "{rows:#}");
+    assert_eq!(rows[1]["since_previous"], rows[1]["since_first"]);
+}
