@@ -4,6 +4,7 @@
 mod files;
 mod live;
 mod moment;
+mod names;
 
 use std::path::PathBuf;
 
@@ -77,7 +78,7 @@ pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<G
             .hint("--input FILE… takes what ser-cli read --format jsonl has written"));
     }
     let site_digest = site.as_ref().and_then(|site| Some(site.digest?.to_string()));
-    let site = site.unwrap_or_else(|| Site { time_zone: moment::here(), ..Site::unknown() });
+    let mut site = site.unwrap_or_else(|| Site { time_zone: moment::here(), ..Site::unknown() });
     let mut collector = Collector::new();
     let damaged_lines = files::read(&args.input, &site, &mut collector)?;
     let not_reached = match reads_recorders {
@@ -95,6 +96,7 @@ pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<G
             .hint("is a ser-cli watch running, or another program on the line? End it meanwhile")
             .hint("files that were written before can be given with --input FILE…"));
     }
+    names::take_over(&collector, &mut site);
     let history = collector.finish(&site);
     Ok(Gathered { site, history, site_digest, not_reached, damaged_lines })
 }
