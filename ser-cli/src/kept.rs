@@ -199,7 +199,7 @@ fn is_routine(record: &Record) -> bool {
     match record {
         Record::Clock(ClockObservation { how, .. }) => matches!(how, How::Event),
         Record::Watched(_) | Record::Entry(_) | Record::Gap(_) => true,
-        Record::Step(_) | Record::Life(_) => false,
+        Record::Step(_) | Record::Life(_) | Record::Point(_) | Record::Recorder(_) => false,
     }
 }
 

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use ser_evidence::record::{
     Boot, ClockObservation, ClockStep, EntryRecord, Gap, HostReading, How, Life, LifeRecord, Lost,
-    Place, Record, Reference, Told, Watched, Why,
+    Place, PointRecord, Record, RecorderRecord, Reference, Told, Watched, Why,
 };
 use ser_evidence::time::{Bound, Moment, Scale};
 use ser_files::jsonl::{Reader, SCHEMA, Writer};
@@ -112,7 +112,17 @@ fn any_record() -> impl Strategy<Value = Record> {
         (any_life(), any_reading(), any_reading(), any::<u64>()).prop_map(
             |(life, from, to, through)| Record::Watched(Watched { life, from, to, through })
         ),
+        (1_u8..=32, any_name(), any_name(), any_name()).prop_map(|(input, name, on, off)| {
+            Record::Point(PointRecord { input, name, on, off })
+        }),
+        (-86_399..=86_399)
+            .prop_map(|utc_offset_s| { Record::Recorder(RecorderRecord { utc_offset_s }) }),
     ]
+}
+
+/// What a person can see, in any script.
+fn any_name() -> impl Strategy<Value = String> {
+    "[^\\p{C}\\p{Z}]([^\\p{C}\\p{Z}]| ){0,99}[^\\p{C}\\p{Z}]"
 }
 
 fn read(text: &str) -> Vec<Result<Told, ReadError>> {
@@ -337,4 +347,32 @@ fn a_moment_that_cannot_be_reckoned_with_is_refused() {
     for beyond in ["9223372036854775807", "-9223372036854775808"] {
         assert!(!read(line(beyond)), "{beyond}");
     }
+}
+
+#[test]
+fn a_name_that_cannot_be_shown_is_refused() {
+    let line = |input: u8, name: &str, off: &str| {
+        format!(
+            "{{\"record\":\"point\",\"recorder\":\"F3\",\"input\":{input},\"name\":\"{name}\",\
+             \"on\":\"ON\",\"off\":\"{off}\"}}\n"
+        )
+    };
+    assert!(read(&line(32, "87T", "OFF"))[0].is_ok());
+    let long = "x".repeat(201);
+    for (input, name, off) in [
+        (0, "87T", "OFF"),
+        (33, "87T", "OFF"),
+        (1, "", "OFF"),
+        (1, " 87T", "OFF"),
+        (1, "87T", "\\u001b[2J"),
+        (1, "\\u202e", "OFF"),
+        (1, &long, "OFF"),
+    ] {
+        assert!(read(&line(input, name, off))[0].is_err(), "{input} {name} {off}");
+    }
+    let offset = |seconds: &str| {
+        format!("{{\"record\":\"recorder\",\"recorder\":\"F3\",\"utc_offset_s\":{seconds}}}")
+    };
+    assert!(read(&offset("-86399"))[0].is_ok());
+    assert_eq!(problem(&offset("86400")), "line 1: `utc_offset_s` cannot be `86400`");
 }

@@ -4,15 +4,17 @@
 mod files;
 mod live;
 mod moment;
+mod names;
+mod readings;
 
 use std::path::PathBuf;
 
-use ser_evidence::history::{Collector, History, LifeHistory};
+use ser_evidence::history::{Collector, History};
 use ser_evidence::site::Site;
 use ser_files::report::NotReached;
 
 use crate::connection::{ConnectionArgs, ports};
-use crate::error::{Failure, Result, advise, warn};
+use crate::error::{Failure, Result};
 use crate::keeper::StateArgs;
 
 pub(crate) use moment::{GivenMoment, parse_moment};
@@ -87,7 +89,7 @@ pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<G
         return Err(no_source(connection));
     }
     let site_digest = site.as_ref().and_then(|site| Some(site.digest?.to_string()));
-    let site = site.unwrap_or_else(|| Site { time_zone: moment::here(), ..Site::unknown() });
+    let mut site = site.unwrap_or_else(|| Site { time_zone: moment::here(), ..Site::unknown() });
     let mut collector = Collector::new();
     let damaged_lines = files::read(&args.input, &site, &mut collector)?;
     let missed_now = match reads_recorders {
@@ -105,50 +107,9 @@ pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<G
             .hint("is a ser-cli watch running, or another program on the line? End it meanwhile")
             .hint("files that were written before can be given with --input FILE…"));
     }
+    names::take_over(&collector, &mut site);
     let mut history = collector.finish(&site);
-    let not_reached = with_those_of_files(missed_now, &mut history);
-    tell_of_readings(&history);
+    let not_reached = readings::not_reached(missed_now, &mut history);
+    readings::tell(&history);
     Ok(Gathered { site, history, site_digest, not_reached, damaged_lines })
-}
-
-/// Recorders that could not be reached now, and those of which the files say so.
-fn with_those_of_files(mut missed: Vec<NotReached>, history: &mut History) -> Vec<NotReached> {
-    for history in &mut history.recorders {
-        let name = &history.recorder.name;
-        let is_missed_now = missed.iter().any(|missed| missed.recorder == *name);
-        if history.is_not_reached && !is_missed_now {
-            let why = "not reached when the file was made".to_owned();
-            missed.push(NotReached { recorder: name.clone(), why });
-        }
-        history.is_not_reached |= is_missed_now;
-    }
-    missed
-}
-
-/// Says where nobody can know which readings are of the same log.
-fn tell_of_readings(history: &History) {
-    for history in &history.recorders {
-        let name = &history.recorder.name;
-        let is_by_number = |life: &&LifeHistory| life.is_by_number;
-        let by_number = history.lives.iter().filter(is_by_number).count();
-        if by_number > 0 && by_number < history.lives.len() {
-            warn(format_args!(
-                "{name}: a file without sequence numbers stands beside other files; entries that \
-                 are in both come twice"
-            ));
-            advise("leave out the file whose header is only entry,time,input,state");
-        }
-        let nameless = |life: &&LifeHistory| life.life.is_none() && !life.is_by_number;
-        let nameless: Vec<&LifeHistory> = history.lives.iter().filter(nameless).collect();
-        let is_later =
-            |life: &&&LifeHistory| life.entries.first().is_some_and(|held| held.sequence > 1);
-        if nameless.len() > 1 && nameless.iter().any(|life| is_later(&life)) {
-            warn(format_args!(
-                "{name}: {} readings have no entry in common, so nobody knows whether they are of \
-                 one log; each is taken for a log of its own",
-                nameless.len()
-            ));
-            advise("ser-cli read --new and watch remember which log they read; their files fit");
-        }
-    }
 }

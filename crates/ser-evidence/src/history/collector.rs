@@ -5,11 +5,13 @@ use std::collections::btree_map::Entry;
 
 use super::gaps::{self, ToldGaps};
 use super::join::{self, Segment};
+use super::names::{self, TwoNames};
 use super::{Held, History, LifeHistory, RecorderHistory};
 use crate::record::{
-    ClockObservation, ClockStep, EntryRecord, Gap, Life, LifeRecord, Record, Watched, Why,
+    ClockObservation, ClockStep, EntryRecord, Gap, Life, LifeRecord, PointRecord, Record,
+    RecorderRecord, Watched, Why,
 };
-use crate::site::{Recorder, Site};
+use crate::site::{ClockRule, Recorder, Site};
 
 /// Collects the records of all sources.
 ///
@@ -39,6 +41,8 @@ struct Collected {
     steps: Vec<ClockStep>,
     watched: Vec<Watched>,
     reach: Reach,
+    points: Vec<PointRecord>,
+    stamps: Option<RecorderRecord>,
 }
 
 /// Whether the recorder was read.
@@ -97,6 +101,17 @@ impl Collector {
         }
     }
 
+    /// Adds to a site what files say of recorders and inputs that it does not name. Returns inputs
+    /// that files name differently.
+    pub fn name_inputs(&self, site: &mut Site) -> Vec<TwoNames> {
+        let mut told: Vec<&Collected> =
+            self.recorders.iter().filter(|collected| !collected.points.is_empty()).collect();
+        told.sort_by(|one, other| one.name.cmp(&other.name));
+        told.into_iter()
+            .flat_map(|collected| names::add_to(site, &collected.name, &collected.points))
+            .collect()
+    }
+
     /// Puts everything together. Recorders of the site of which nothing was collected are there,
     /// too, without a life.
     #[must_use]
@@ -145,6 +160,15 @@ impl Collected {
                 self.reach.read_here = true;
                 self.watched.push(watched);
             }
+            Record::Point(ref point) => self.add_point(point),
+            Record::Recorder(stamps) => self.stamps = self.stamps.max(Some(stamps)),
+        }
+    }
+
+    /// However often a file is read, there are few names.
+    fn add_point(&mut self, point: &PointRecord) {
+        if let Err(place) = self.points.binary_search(point) {
+            self.points.insert(place, point.clone());
         }
     }
 
@@ -168,6 +192,8 @@ impl Collected {
         self.observations.extend(other.observations);
         self.steps.extend(other.steps);
         self.watched.extend(other.watched);
+        other.points.iter().for_each(|point| self.add_point(point));
+        self.stamps = self.stamps.max(other.stamps);
     }
 
     fn add_entry(&mut self, record: &EntryRecord) {
@@ -223,14 +249,20 @@ impl Collected {
         }
         conflicts.sort_unstable_by_key(|conflict| (conflict.life, conflict.sequence));
         self.reach.end_source();
+        let mut recorder = described.unwrap_or_else(|| Recorder::named(&self.name));
+        if let Some(stamps) = self.stamps {
+            recorder.clock = ClockRule::Offset(stamps.utc_offset_s);
+        }
         RecorderHistory {
-            recorder: described.unwrap_or_else(|| Recorder::named(&self.name)),
+            recorder,
             site: id,
             lives,
             observations: sorted(self.observations),
             steps: sorted(self.steps),
             watched: sorted(self.watched),
             is_not_reached: self.reach.missed && !self.reach.read,
+            points: self.points,
+            stamps: self.stamps,
             conflicts,
         }
     }

@@ -7,13 +7,15 @@
 mod collector;
 mod gaps;
 mod join;
+mod names;
 
 use ser_proto::{Entry, Inputs};
 
 pub use collector::Collector;
 pub use gaps::LogGap;
+pub use names::TwoNames;
 
-use crate::record::{ClockObservation, ClockStep, Life, Watched};
+use crate::record::{ClockObservation, ClockStep, Life, PointRecord, RecorderRecord, Watched};
 use crate::site::{Recorder, RecorderId};
 
 /// Everything that is known of all recorders.
@@ -40,6 +42,10 @@ pub struct RecorderHistory {
     pub watched: Vec<Watched>,
     /// Whether a source could not reach it, and no other source has read it.
     pub is_not_reached: bool,
+    /// What files say that its inputs are called, by input.
+    pub points: Vec<PointRecord>,
+    /// In what time its stamps are, where a file says it.
+    pub stamps: Option<RecorderRecord>,
     /// Entries that cannot both be true, each with the sequence that they share.
     pub conflicts: Vec<Conflict>,
 }

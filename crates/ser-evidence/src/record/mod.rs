@@ -7,12 +7,14 @@ mod clock;
 mod entry;
 mod gap;
 mod life;
+mod names;
 mod watched;
 
 pub use clock::{Boot, ClockObservation, ClockStep, HostReading, How, Place, Reference};
 pub use entry::EntryRecord;
 pub use gap::{Gap, Lost, Why};
 pub use life::{Life, LifeRecord};
+pub use names::{PointRecord, RecorderRecord};
 pub use watched::Watched;
 
 /// One piece of evidence.
@@ -30,6 +32,10 @@ pub enum Record {
     Life(LifeRecord),
     /// From when to when nothing was missed.
     Watched(Watched),
+    /// What an input is called.
+    Point(PointRecord),
+    /// In what time the stamps are.
+    Recorder(RecorderRecord),
 }
 
 /// A record and the recorder that it is about.

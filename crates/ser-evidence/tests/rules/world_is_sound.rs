@@ -232,6 +232,8 @@ fn everything_that_can_happen_does() {
                 Record::Watched(_) => count("watched", 1),
                 Record::Step(_) => count("step", 1),
                 Record::Entry(_) | Record::Life(_) => {}
+                // No recorder of ours knows a name.
+                Record::Point(_) | Record::Recorder(_) => {}
             }
         }
         count("hand", story.world.site.observations.len());

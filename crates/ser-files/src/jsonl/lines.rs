@@ -64,6 +64,14 @@ pub(super) struct Line<'a> {
     #[serde(borrow)]
     pub(super) to: Option<HostLine<'a>>,
     pub(super) through: Option<u64>,
+    pub(super) input: Option<u8>,
+    #[serde(borrow)]
+    pub(super) name: Option<Text<'a>>,
+    #[serde(borrow)]
+    pub(super) on: Option<Text<'a>>,
+    #[serde(borrow)]
+    pub(super) off: Option<Text<'a>>,
+    pub(super) utc_offset_s: Option<i32>,
 }
 
 /// Both clocks of a host.

@@ -3,15 +3,15 @@
 use std::io::BufRead;
 
 use ser_evidence::record::{
-    ClockObservation, ClockStep, EntryRecord, Gap, How, Life, LifeRecord, Lost, Place, Record,
-    Reference, Told, Watched, Why,
+    ClockObservation, ClockStep, EntryRecord, Gap, How, Life, LifeRecord, Lost, Place, PointRecord,
+    Record, RecorderRecord, Reference, Told, Watched, Why,
 };
 use ser_evidence::time::{Bound, Scale, shown};
 use ser_proto::Entry;
 
 use super::SCHEMA;
 use super::lines::{HostLine, Line, PlaceLine, Result, moment, needed, stamp, understood, wrong};
-use super::texts::{Text, broadcast_named, life_named, model_named};
+use super::texts::{Text, broadcast_named, fit_to_show, life_named, model_named};
 use crate::error::{Problem, ReadError, quoted};
 use crate::lines::Lines;
 use crate::stamp as stamps;
@@ -133,6 +133,8 @@ fn item(line: &Line<'_>) -> std::result::Result<Item, Problem> {
         Some("step") => step(line),
         Some("life") => life(line),
         Some("watched") => watched(line),
+        Some("point") => point(line),
+        Some("recorder") => recorder(line),
         // Evidence that is passed over in silence would be lost.
         Some(kind) => Err(format!("there is no record {}", quoted(kind.as_bytes()))),
         None if line.entry.is_some() => entry(line),
@@ -260,4 +262,29 @@ fn watched(line: &Line<'_>) -> Result<Record> {
         to: needed(line.to.as_ref(), "to")?.reading()?,
         through: needed(line.through, "through")?,
     }))
+}
+
+fn point(line: &Line<'_>) -> Result<Record> {
+    let input = needed(line.input, "input")?;
+    if !(1..=PointRecord::LAST_INPUT).contains(&input) {
+        return Err(format!("there is no input {input}"));
+    }
+    let text = |field: &Option<Text<'_>>, name| {
+        let Text(text) = needed(field.as_ref(), name)?;
+        match fit_to_show(text) {
+            true => Ok(text.to_string()),
+            false => Err(wrong(name, text)),
+        }
+    };
+    let (name, on, off) =
+        (text(&line.name, "name")?, text(&line.on, "on")?, text(&line.off, "off")?);
+    Ok(Record::Point(PointRecord { input, name, on, off }))
+}
+
+fn recorder(line: &Line<'_>) -> Result<Record> {
+    let utc_offset_s = needed(line.utc_offset_s, "utc_offset_s")?;
+    if utc_offset_s.unsigned_abs() >= RecorderRecord::DAY_S.unsigned_abs() {
+        return Err(wrong("utc_offset_s", &utc_offset_s.to_string()));
+    }
+    Ok(Record::Recorder(RecorderRecord { utc_offset_s }))
 }

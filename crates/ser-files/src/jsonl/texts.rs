@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 use std::fmt;
 
-use ser_evidence::record::{How, Life, Why};
+use ser_console::is_obeyed;
+use ser_evidence::record::{How, Life, PointRecord, Why};
 use ser_proto::{Inputs, Model};
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::ser::SerializeSeq;
@@ -91,4 +92,11 @@ pub(super) fn broadcast_named(name: &str) -> Option<u64> {
 /// The life of this name; [`Life::UNKNOWN`] if there is no name.
 pub(super) fn life_named(name: Option<&str>) -> Option<Life> {
     name.map_or(Some(Life::UNKNOWN), Life::from_name)
+}
+
+/// Whether this may be the name of a point, or what a state is called: one line that can be seen.
+pub(super) fn fit_to_show(text: &str) -> bool {
+    text.trim() == text
+        && (1..=PointRecord::LONGEST).contains(&text.chars().count())
+        && !text.chars().any(is_obeyed)
 }

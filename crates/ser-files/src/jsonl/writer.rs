@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use ser_console::is_obeyed;
 use ser_evidence::record::{
     Boot, ClockObservation, ClockStep, EntryRecord, Gap, HostReading, Life, LifeRecord, Lost,
-    Place, Record, Reference, Watched, Why,
+    Place, PointRecord, Record, RecorderRecord, Reference, Watched, Why,
 };
 use ser_evidence::time::{Moment, stamp};
 use ser_proto::{Entry, Inputs, TimeStamp};
@@ -48,6 +48,8 @@ impl<W: Write> Writer<W> {
             Record::Step(step) => self.line(&StepLine::of(recorder, step)),
             Record::Life(life) => self.line(&LifeLine::of(recorder, life)),
             Record::Watched(watched) => self.line(&WatchedLine::of(recorder, watched)),
+            Record::Point(point) => self.line(&PointLine::of(recorder, point)),
+            Record::Recorder(stamps) => self.line(&RecorderLine::of(recorder, stamps)),
         }
     }
 
@@ -305,6 +307,36 @@ impl<'a> WatchedLine<'a> {
         let (from, to) = (HostFields::from(&watched.from), HostFields::from(&watched.to));
         let (life, through) = (AsText(watched.life), watched.through);
         WatchedLine { record: "watched", recorder, life, from, to, through }
+    }
+}
+
+#[derive(Serialize)]
+struct PointLine<'a> {
+    record: &'static str,
+    recorder: &'a str,
+    input: u8,
+    name: &'a str,
+    on: &'a str,
+    off: &'a str,
+}
+
+impl<'a> PointLine<'a> {
+    fn of(recorder: &'a str, point: &'a PointRecord) -> PointLine<'a> {
+        let PointRecord { input, name, on, off } = point;
+        PointLine { record: "point", recorder, input: *input, name, on, off }
+    }
+}
+
+#[derive(Serialize)]
+struct RecorderLine<'a> {
+    record: &'static str,
+    recorder: &'a str,
+    utc_offset_s: i32,
+}
+
+impl<'a> RecorderLine<'a> {
+    fn of(recorder: &'a str, stamps: &RecorderRecord) -> RecorderLine<'a> {
+        RecorderLine { record: "recorder", recorder, utc_offset_s: stamps.utc_offset_s }
     }
 }
 

@@ -17,6 +17,11 @@ pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>, program: &str) -> io:
     lines.file(program)?;
     for history in &timeline.history().recorders {
         let name = &history.recorder.name;
+        let stamps = history.stamps.iter().map(|stamps| Record::Recorder(*stamps));
+        let points = history.points.iter().map(|point| Record::Point(point.clone()));
+        for record in stamps.chain(points) {
+            lines.record(name, &record)?;
+        }
         for life in history.lives.iter().filter(|life| life.name().is_known()) {
             let record = LifeRecord {
                 life: life.name(),
