@@ -162,6 +162,19 @@ fn a_new_site_file_has_what_the_recorder_says() {
 }
 
 #[test]
+fn a_new_site_file_has_each_recorder_once() {
+    for (ports, told) in [
+        (["tcp://localhost:1", "tcp://127.0.0.1:1"], "are the same port"),
+        (["tcp://localhost:1", "tcp://localhost:1"], "is given twice"),
+    ] {
+        let new = ["site", "new", "--port", ports[0], "--port", ports[1]];
+        let output = ser_cli().args(new).output().expect("ser-cli runs");
+        assert_eq!(output.status.code(), Some(2), "{output:?}");
+        assert!(text(&output.stderr).contains(told), "{output:?}");
+    }
+}
+
+#[test]
 fn all_recorders_of_a_site_are_watched_in_one_list() {
     let (mut first, mut second) =
         (Bench::start(Kind::Native, &[]), Bench::start(Kind::Native, &["--model", "ser160"]));

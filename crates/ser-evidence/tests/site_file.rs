@@ -137,6 +137,7 @@ fn the_only_recorder_need_not_be_named() {
         "[[recorder]]\nname = \"A\"\n[[recorder]]\nname = \"B\"\n[[point]]\ninput = 1\nname = \"x\"",
     );
     assert_eq!(told(&two), ["missing-key: a point lacks the key `recorder`"]);
+    assert_eq!(inspect(&two).diagnostics[0].helps, ["add it, as in `recorder = \"A\"`"]);
 }
 
 #[test]

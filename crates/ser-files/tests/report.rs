@@ -197,8 +197,8 @@ fn a_stretch_that_begins_on_another_scale_is_told_by_its_entries() {
     let told = readings.told();
     let text = told.text();
     assert!(text.contains("entries 1 to 2, read until 2026-11-22 10:30:00.000"), "{text}");
-    let whole = "2026-11-22 10:00:01.002 ± 3.3 ms to 10:30:00.000 ± 1.0 ms";
-    assert!(text.contains(whole), "{text}");
+    let whole = "2026-11-22 10:00:01.002 ± 3.3 ms to 10:30:00.000";
+    assert!(text.contains(whole) && text.contains("± 1.0 ms"), "{text}");
     let recorders = told.json()["recorders"].clone();
     assert_eq!(recorders[0]["unbroken_from"]["sequence"], 1);
     assert_eq!(recorders[0]["unbroken_from"]["clock"]["utc_doubt_us"], Value::Null);
@@ -214,7 +214,7 @@ fn a_recorder_without_entries_has_no_times_that_could_be_doubtful() {
     let told = readings.told();
     let text = told.text();
     assert!(!text.contains("as it showed them"), "{text}");
-    assert!(text.contains("no entries until then, so no times"), "{text}");
+    assert!(text.contains("no entries, so no times"), "{text}");
     assert_eq!(told.json()["recorders"][1]["clock"], Value::Null);
 }
 

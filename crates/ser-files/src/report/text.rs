@@ -10,7 +10,7 @@ use ser_evidence::incident::{StepResult, Verdict};
 use super::names;
 use super::span::{doubt, duration};
 use super::style::Styles;
-use super::table::{Align, Cell, Table};
+use super::table::{Align, Cell, Table, wrapped};
 use super::verdict;
 use super::{Clock, Document};
 
@@ -93,19 +93,7 @@ fn labelled(
     style: anstyle::Style,
 ) -> io::Result<()> {
     const INDENT: usize = 11;
-    let mut lines = vec![String::new()];
-    for word in items.join("; ").split(' ') {
-        let length = lines.last().map_or(0, |line| line.chars().count());
-        if length > 0 && length + 1 + word.chars().count() > WIDTH - INDENT {
-            lines.push(String::new());
-        }
-        if let Some(line) = lines.last_mut() {
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-    }
+    let lines = wrapped(&items.join("; "), WIDTH - INDENT);
     for (number, line) in lines.iter().enumerate() {
         let label = if number == 0 { label } else { "" };
         let pad = INDENT - label.len();
@@ -153,7 +141,7 @@ fn steps(out: &mut dyn Write, document: &Document<'_>, styles: Styles) -> io::Re
         ("step", Align::Left),
         ("took", Align::Right),
         ("expected", Align::Left),
-        ("", Align::Left),
+        ("", Align::Wrapped),
     ]);
     for step in &report.steps {
         table.row(step_row(document, step, styles));

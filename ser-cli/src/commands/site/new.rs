@@ -14,6 +14,7 @@ use crate::unit_name::UnitName;
 
 pub(super) fn run(output: Option<&Path>, connection: &ConnectionArgs) -> Result<()> {
     // Before anybody is asked, which may take a while.
+    check_ports(connection)?;
     let file = output.map(create).transpose()?;
     let recorders: Vec<Known> = connection::ports(connection)
         .into_iter()
@@ -32,6 +33,23 @@ pub(super) fn run(output: Option<&Path>, connection: &ConnectionArgs) -> Result<
         "give its recorders and points their names, then ser-cli site check {}",
         path.display()
     ));
+    Ok(())
+}
+
+/// Two spellings of one port would become two recorders, and the site file would not be valid.
+fn check_ports(connection: &ConnectionArgs) -> Result<()> {
+    let mut known: Vec<(String, &str)> = Vec::new();
+    for port in connection::ports(connection) {
+        let name = connection::unit_name(&connection::at_port(connection, port))?.name;
+        if let Some((_, first)) = known.iter().find(|(known, _)| *known == name) {
+            return Err(Failure::usage(match *first == port {
+                true => format!("--port {port} is given twice"),
+                false => format!("--port {first} and --port {port} are the same port"),
+            })
+            .hint("give each recorder once"));
+        }
+        known.push((name, port));
+    }
     Ok(())
 }
 

@@ -70,7 +70,9 @@ impl<'t> Names<'t> {
         match self.table.recorders.as_slice() {
             [_] => Some(RecorderId(0)),
             [_, ..] if !owner.is_named => {
-                let key = ("recorder", "\"U1-SER1\"");
+                let name = self.recorders.keys().next().copied().unwrap_or("U1-SER1");
+                let example = format!("{name:?}");
+                let key = ("recorder", example.as_str());
                 missing_key::found(findings, owner.head.clone(), owner.what, key);
                 None
             }

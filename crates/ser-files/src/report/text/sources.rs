@@ -24,8 +24,8 @@ pub(super) fn write(
     let mut table = Table::new(vec![
         ("recorder", Align::Left),
         ("entries", Align::Right),
-        ("complete", Align::Left),
-        ("clock", Align::Left),
+        ("complete", Align::Wrapped),
+        ("clock", Align::Wrapped),
     ]);
     for of in &document.report.completeness {
         table.row(row(document, of, styles, clock));
@@ -40,11 +40,11 @@ pub(super) fn write(
     shifts(out, document.timeline, clock)?;
     let faint = styles.faint;
     let digest: String = document.report.digest.iter().map(|byte| format!("{byte:02x}")).collect();
-    writeln!(
-        out,
-        "{faint}{} entries, sha256 {digest}{faint:#}",
-        document.report.incident.events.len()
-    )?;
+    let entries = match document.report.incident.events.len() {
+        1 => "1 entry".to_owned(),
+        count => format!("{count} entries"),
+    };
+    writeln!(out, "{faint}{entries}, sha256 {digest}{faint:#}")?;
     let site = document.site_digest.as_ref();
     let site = site.map_or_else(String::new, |digest| format!(", site file sha256 {digest}"));
     writeln!(out, "{faint}{}{site}{faint:#}", document.program)
@@ -133,8 +133,8 @@ fn span((from, scale): &End, (until, _): &End, clock: &Clock) -> String {
 
 fn clock_text(state: ClockState) -> String {
     match state {
-        ClockState::NoEntry => "no entries until then, so no times".to_owned(),
-        ClockState::NotObserved => "never observed: its times are as it showed them".to_owned(),
+        ClockState::NoEntry => "no entries, so no times".to_owned(),
+        ClockState::NotObserved => "never observed: times as it showed them".to_owned(),
         ClockState::Observed { order_doubt_us, utc_doubt_us, .. } => {
             let order = order_doubt_us.map_or("order not known".to_owned(), |us| {
                 format!("± {} among recorders", doubt(us))

@@ -3,9 +3,7 @@
 use std::io::{self, Write};
 
 use ser_console::Harmless;
-use ser_evidence::site::{
-    ClockRule, Delays, Edge, Point, PointId, Recorder, RecorderId, Role, Site,
-};
+use ser_evidence::site::{ClockRule, Edge, Point, PointId, Recorder, RecorderId, Role, Site};
 use unicode_width::UnicodeWidthStr;
 
 use crate::output::Palette;
@@ -18,7 +16,7 @@ pub(super) fn write(out: &mut dyn Write, site: &Site, palette: Palette) -> io::R
     if let Some(us) = site.utc_doubt_us {
         writeln!(out, "this computer is within {} of UTC", milliseconds(us.into()))?;
     }
-    let tables = [recorders(site)].into_iter().chain(points(site)).chain([
+    let tables = [recorders(site), exactness(site)].into_iter().chain(points(site)).chain([
         expectations(site),
         observations(site),
         shifts(site),
@@ -79,13 +77,29 @@ fn recorders(site: &Site) -> Table {
             if *is_original { "original".to_owned() } else { String::new() },
             log_size.map(|size| size.to_string()).unwrap_or_default(),
             clock_name(*clock),
-            format!("{} ppm", thousandths(recorder.drift_ppb.into())),
-            delays(recorder.delays),
         ]
     };
     Table {
         title: None,
-        columns: vec!["recorder", "port", "model", "", "log", "clock", "drift", "delays"],
+        columns: vec!["recorder", "port", "model", "", "log", "clock"],
+        rows: site.recorders.iter().map(row).collect(),
+    }
+}
+
+/// How exact the recorders are.
+fn exactness(site: &Site) -> Table {
+    let row = |recorder: &Recorder| {
+        let Recorder { name, drift_ppb, delays, .. } = recorder;
+        vec![
+            harmless(name),
+            format!("{} ppm", thousandths((*drift_ppb).into())),
+            delay(delays.closing_us),
+            delay(delays.opening_us),
+        ]
+    };
+    Table {
+        title: None,
+        columns: vec!["recorder", "drift", "closing is seen after", "opening is seen after"],
         rows: site.recorders.iter().map(row).collect(),
     }
 }
@@ -212,12 +226,9 @@ fn clock_name(clock: ClockRule) -> String {
     }
 }
 
-fn delays(delays: Delays) -> String {
-    let range = |(shortest, longest): (u32, u32)| {
-        format!("{} to {}", thousandths(shortest.into()), thousandths(longest.into()))
-    };
-    let Delays { closing_us, opening_us } = delays;
-    format!("closing {}, opening {} ms", range(closing_us), range(opening_us))
+/// From the shortest to the longest.
+fn delay((shortest, longest): (u32, u32)) -> String {
+    format!("{} to {} ms", thousandths(shortest.into()), thousandths(longest.into()))
 }
 
 fn milliseconds(us: i128) -> String {
