@@ -1,11 +1,15 @@
-//! The report about one incident, as text for a terminal and as JSON.
+//! The report about one incident: as text for a terminal, as a page, and as JSON.
 //!
-//! Both say the same in the same order: the verdict, what the report is made from, the sequence of
+//! All say the same in the same order: the verdict, what the report is made from, the sequence of
 //! changes, what was expected, what has not returned to normal, and what is missing. All answers
-//! come from [`Report`]; here they become words.
+//! come from [`Report`]. The files here turn them into words; `text` and `html` draw the words.
 
+mod html;
 mod json;
 pub(crate) mod names;
+mod outcome;
+mod sequence;
+mod sources;
 pub(crate) mod span;
 mod style;
 mod table;
@@ -13,6 +17,7 @@ mod text;
 mod times;
 mod verdict;
 
+pub use html::{MAX_ROWS, PageError, write as write_html};
 pub use json::write as write_json;
 pub use style::Styles;
 pub use text::write as write_text;

@@ -5,14 +5,9 @@ mod sources;
 
 use std::io::{self, Write};
 
-use ser_evidence::incident::{StepResult, Verdict};
-
-use super::names;
-use super::span::{doubt, duration};
 use super::style::Styles;
 use super::table::{Align, Cell, Table, wrapped};
-use super::verdict;
-use super::{Clock, Document};
+use super::{Clock, Document, outcome, verdict};
 
 /// How wide lines of sentences are.
 const WIDTH: usize = 96;
@@ -40,30 +35,8 @@ fn headline(
     styles: Styles,
     clock: &Clock,
 ) -> io::Result<()> {
-    let Document { timeline, report, .. } = *document;
-    let events = &report.incident.events;
-    let at = |event: Option<&_>| {
-        event.and_then(|&event| timeline.time(event).map(ser_evidence::time::Moment::us))
-    };
-    let name = names::harmless(&timeline.site().name);
-    let title = if name.is_empty() { "Incident".to_owned() } else { name };
-    let span = match (at(events.first()), at(events.last())) {
-        (Some(first), Some(last)) if clock.date(first) == clock.date(last) => format!(
-            "{} to {} ({})",
-            clock.date_and_time(first),
-            clock.time(last),
-            clock.zone(first)
-        ),
-        (Some(first), Some(last)) => format!(
-            "{} to {} ({})",
-            clock.date_and_time(first),
-            clock.date_and_time(last),
-            clock.zone(first)
-        ),
-        _ => "time not known".to_owned(),
-    };
-    let style = styles.title;
-    writeln!(out, "{style}{title}{style:#}  {span}\n")
+    let (style, title) = (styles.title, outcome::title(document));
+    writeln!(out, "{style}{title}{style:#}  {}\n", outcome::window(document, clock))
 }
 
 fn verdict_lines(
@@ -114,17 +87,12 @@ fn groups(
     styles: Styles,
     clock: &Clock,
 ) -> io::Result<()> {
-    let Document { timeline, report, .. } = *document;
-    if report.groups.is_empty() {
+    let groups = outcome::groups(document, clock);
+    if groups.is_empty() {
         return Ok(());
     }
     heading(out, "First in each group", styles)?;
-    for (id, first) in &report.groups {
-        let name = timeline.site().groups.get(id.0).map(|group| names::harmless(&group.name));
-        let first = verdict::first_out(timeline, report, first, clock);
-        writeln!(out, "{}: {first}", name.unwrap_or_default())?;
-    }
-    Ok(())
+    groups.iter().try_for_each(|(name, first)| writeln!(out, "{name}: {first}"))
 }
 
 fn steps(out: &mut dyn Write, document: &Document<'_>, styles: Styles) -> io::Result<()> {
@@ -143,81 +111,37 @@ fn steps(out: &mut dyn Write, document: &Document<'_>, styles: Styles) -> io::Re
         ("expected", Align::Left),
         ("", Align::Wrapped),
     ]);
-    for step in &report.steps {
-        table.row(step_row(document, step, styles));
+    for step in outcome::steps(document) {
+        let style = if step.is_in_time { anstyle::Style::new() } else { styles.alarm };
+        table.row(vec![
+            Cell::styled(step.result, style),
+            Cell::from(step.name),
+            Cell::from(step.took),
+            Cell::from(step.expected),
+            Cell::from(step.note),
+        ]);
     }
     table.write(out, styles.faint)
 }
 
-fn step_row(document: &Document<'_>, step: &StepResult, styles: Styles) -> Vec<Cell> {
-    let timeline = document.timeline;
-    let Some(expectation) = timeline.site().expectations.get(step.expectation) else {
-        return Vec::new();
-    };
-    let (result, style) = match step.verdict {
-        Verdict::InTime => ("in time", anstyle::Style::new()),
-        Verdict::Early => ("early", styles.alarm),
-        Verdict::Late => ("late", styles.alarm),
-        Verdict::Missing => ("missing", styles.alarm),
-        Verdict::NotDecidable(_) => ("not decidable", styles.alarm),
-    };
-    let took = step.delta.and_then(|delta| Some((delta.middle_us()?, delta.doubt_us()?)));
-    let took = took.map(|(us, off)| format!("{} ± {}", duration(us), doubt(off)));
-    let (from, to) = expectation.within_us;
-    let note = match step.verdict {
-        Verdict::NotDecidable(why) => verdict::why_undecidable(why).to_owned(),
-        Verdict::Missing => format!("no {}", names::edge(timeline, expectation.then)),
-        _ => String::new(),
-    };
-    vec![
-        Cell::styled(result, style),
-        Cell::from(names::harmless(&expectation.name)),
-        Cell::from(took.unwrap_or_default()),
-        Cell::from(format!("{} to {}", duration(from), duration(to))),
-        Cell::from(note),
-    ]
-}
-
 fn breakers(out: &mut dyn Write, document: &Document<'_>, styles: Styles) -> io::Result<()> {
-    let Document { timeline, report, .. } = *document;
-    if report.operations.is_empty() && report.disagreements.is_empty() {
+    let lines = outcome::breakers(document);
+    if lines.is_empty() {
         return Ok(());
     }
     heading(out, "Breakers", styles)?;
-    for operation in &report.operations {
-        let off = operation.took.and_then(ser_evidence::timeline::Delta::doubt_us);
-        let off = off.map_or_else(String::new, |off| format!(", ± {}", doubt(off)));
-        writeln!(out, "{}{off}", verdict::operated(timeline, operation))?;
-    }
-    for disagreement in &report.disagreements {
-        let what = if disagreement.both_on { "on" } else { "off" };
-        let lasted = match (disagreement.lasted, disagreement.until) {
-            (Some(lasted), _) => match (lasted.middle_us(), lasted.doubt_us()) {
-                (Some(us), Some(off)) => format!("for {} ± {}", duration(us), doubt(off)),
-                _ => "for an unknown time".to_owned(),
-            },
-            (None, Some(_)) => "since before the incident, then no longer".to_owned(),
-            (None, None) => "still at the end".to_owned(),
-        };
-        let equipment = names::harmless(&disagreement.equipment);
-        writeln!(out, "{equipment}: 52a and 52b both {what} {lasted}")?;
-    }
-    Ok(())
+    lines.iter().try_for_each(|line| writeln!(out, "{line}"))
 }
 
 fn normal(out: &mut dyn Write, document: &Document<'_>, styles: Styles) -> io::Result<()> {
-    let Document { timeline, report, .. } = *document;
-    if report.abnormal.is_empty() {
+    let lines = outcome::not_normal(document);
+    if lines.is_empty() {
         return Ok(());
     }
     heading(out, "Not normal at the end", styles)?;
-    for abnormal in &report.abnormal {
-        let name = verdict::abnormal_name(timeline, abnormal);
-        let since = match abnormal.since {
-            Some(_) => "",
-            None => "  (since before the incident)",
-        };
-        let style = styles.abnormal;
+    let style = styles.abnormal;
+    for (name, since) in lines {
+        let since = since.map_or_else(String::new, |since| format!("  ({since})"));
         writeln!(out, "{style}{name}{style:#}{since}")?;
     }
     Ok(())

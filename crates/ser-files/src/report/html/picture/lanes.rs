@@ -1,0 +1,207 @@
+//! The lanes of a picture: for each point that moved, which state it had when, and how surely.
+
+use std::collections::BTreeMap;
+
+use ser_evidence::incident::{Incident, Row};
+use ser_evidence::site::PointId;
+use ser_evidence::time::Moment;
+use ser_evidence::timeline::{ChangeId, EventId, Timeline};
+
+use crate::report::{Document, names, sequence};
+
+/// One point over the time of the incident.
+#[derive(Debug)]
+pub(in crate::report::html) struct Lane {
+    pub(in crate::report::html) recorder: String,
+    pub(in crate::report::html) point: String,
+    /// Whether it may have moved first.
+    pub(super) is_first: bool,
+    pub(super) stretches: Vec<Stretch>,
+    pub(super) edges: Vec<Edge>,
+}
+
+/// A state over a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Stretch {
+    pub(super) from_us: i64,
+    pub(super) to_us: i64,
+    pub(super) state: State,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    Off {
+        is_abnormal: bool,
+    },
+    On {
+        is_abnormal: bool,
+    },
+    /// Something is missing there.
+    Unknown,
+}
+
+/// A change, and how far it may be off.
+#[derive(Clone, Debug)]
+pub(super) struct Edge {
+    pub(super) at_us: i64,
+    /// Either way; `None` if nobody knows.
+    pub(super) doubt_us: Option<i64>,
+    /// What it is: point, state, time and doubt.
+    pub(super) text: String,
+}
+
+/// All lanes, in the order in which their points moved first.
+#[derive(Debug)]
+pub(in crate::report::html) struct Lanes {
+    pub(in crate::report::html) lanes: Vec<Lane>,
+    by_input: BTreeMap<(u32, u8), usize>,
+    /// From the first change to the last one.
+    pub(super) first_us: i64,
+    pub(super) last_us: i64,
+    /// How many changes have no time, and are in no lane.
+    pub(super) timeless: usize,
+}
+
+impl Lanes {
+    /// The lanes of an incident; `None` if no change has a time.
+    pub(in crate::report::html) fn new(
+        document: &Document<'_>,
+        clock: &super::Clock,
+    ) -> Option<Lanes> {
+        let Document { timeline, report, .. } = *document;
+        let timed = |row: &&Row| time_us(timeline, row.change.event).is_some();
+        let times = || report.rows.iter().filter_map(|row| time_us(timeline, row.change.event));
+        let (first_us, last_us) = (times().min()?, times().max()?);
+        let mut lanes = Lanes {
+            lanes: Vec::new(),
+            by_input: BTreeMap::new(),
+            first_us,
+            last_us,
+            timeless: report.rows.iter().filter(|row| !timed(row)).count(),
+        };
+        for row in report.rows.iter().filter(timed) {
+            lanes.add_edge(document, row, clock);
+        }
+        let margin = lanes.margin_us();
+        let window = (first_us.saturating_sub(margin), last_us.saturating_add(margin));
+        for (&(recorder, input), &place) in &lanes.by_input {
+            let points = report.rows.iter().find(|row| key(row.change) == (recorder, input));
+            let point = points.and_then(|row| row.point);
+            let of = Track { timeline, incident: &report.incident, recorder, input, point };
+            if let Some(lane) = lanes.lanes.get_mut(place) {
+                lane.stretches = of.stretches(window);
+            }
+        }
+        Some(lanes)
+    }
+
+    /// What is shown before the first change and after the last one.
+    pub(super) fn margin_us(&self) -> i64 {
+        (self.last_us.saturating_sub(self.first_us) / 40).max(2_000)
+    }
+
+    /// The lane of a change.
+    pub(in crate::report::html) fn of(&self, change: ChangeId) -> Option<usize> {
+        self.by_input.get(&key(change)).copied()
+    }
+
+    fn add_edge(&mut self, document: &Document<'_>, row: &Row, clock: &super::Clock) {
+        let Document { timeline, report, .. } = *document;
+        let Some(at_us) = time_us(timeline, row.change.event) else { return };
+        let place = *self.by_input.entry(key(row.change)).or_insert_with(|| {
+            self.lanes.push(Lane {
+                recorder: names::recorder(timeline, row.change.event),
+                point: names::point(timeline, row.point, row.change.input),
+                is_first: false,
+                stretches: Vec::new(),
+                edges: Vec::new(),
+            });
+            self.lanes.len() - 1
+        });
+        let Some(lane) = self.lanes.get_mut(place) else { return };
+        let doubt_us = sequence::doubt_us(timeline, row.change);
+        let state = names::state(timeline, row.point, row.on);
+        let doubt = doubt_us.map_or("doubt not known".to_owned(), |us| {
+            format!("± {}", crate::report::span::doubt(us))
+        });
+        let text = format!("{} {state}, {} {doubt}", lane.point, clock.time(at_us));
+        lane.is_first |= report.first_out.includes(timeline, row.change);
+        lane.edges.push(Edge { at_us, doubt_us, text });
+    }
+}
+
+fn key(change: ChangeId) -> (u32, u8) {
+    (change.event.recorder, change.input)
+}
+
+fn time_us(timeline: &Timeline<'_>, event: EventId) -> Option<i64> {
+    timeline.time(event).map(Moment::us)
+}
+
+/// One input in the log of its recorder.
+struct Track<'a> {
+    timeline: &'a Timeline<'a>,
+    incident: &'a Incident,
+    recorder: u32,
+    input: u8,
+    point: Option<PointId>,
+}
+
+impl Track<'_> {
+    /// Its states over the window, one after the other.
+    fn stretches(&self, (from_us, to_us): (i64, i64)) -> Vec<Stretch> {
+        let mut stretches: Vec<Stretch> = Vec::new();
+        let mut add = |from_us: i64, to_us: i64, state: State| {
+            match stretches.last_mut() {
+                Some(last) if last.state == state && last.to_us >= from_us => {
+                    last.to_us = last.to_us.max(to_us);
+                }
+                _ if from_us < to_us => stretches.push(Stretch { from_us, to_us, state }),
+                _ => {}
+            };
+        };
+        let here = |event: &&EventId| event.recorder == self.recorder;
+        let mut at_us = from_us;
+        let mut state = None;
+        let mut life = None;
+        for &event in self.incident.events.iter().filter(here) {
+            let Some(next_us) = time_us(self.timeline, event) else { continue };
+            let is_broken =
+                self.has_gap_ahead(event) || life.is_some_and(|life| life != event.life);
+            let before = if is_broken { None } else { state.or_else(|| self.before(event)) };
+            add(at_us, next_us, self.state(before));
+            (at_us, life) = (next_us.max(at_us), Some(event.life));
+            state = self.after(event).or(if is_broken { None } else { state });
+        }
+        let ends_in_gap = self.incident.gaps.iter().any(|(event, _)| {
+            event.recorder == self.recorder && !self.incident.events.contains(event)
+        });
+        add(at_us, to_us, self.state(state.filter(|_| !ends_in_gap)));
+        stretches
+    }
+
+    fn has_gap_ahead(&self, event: EventId) -> bool {
+        self.incident.gaps.iter().any(|(ahead_of, _)| *ahead_of == event)
+    }
+
+    /// The state that an entry shows.
+    fn after(&self, event: EventId) -> Option<bool> {
+        let held = self.timeline.held(event)?;
+        held.known.contains(self.input).then(|| held.entry.state.contains(self.input))
+    }
+
+    /// The state right before an entry.
+    fn before(&self, event: EventId) -> Option<bool> {
+        let changed = self.timeline.held(event)?.entry.changed.contains(self.input);
+        self.after(event).map(|on| on != changed)
+    }
+
+    fn state(&self, on: Option<bool>) -> State {
+        let is_abnormal = |on| names::is_abnormal(self.timeline, self.point, on) == Some(true);
+        match on {
+            None => State::Unknown,
+            Some(true) => State::On { is_abnormal: is_abnormal(true) },
+            Some(false) => State::Off { is_abnormal: is_abnormal(false) },
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Expected steps in the picture: when each was to happen, and when it did.
+
+use maud::{Markup, html};
+use ser_evidence::time::Moment;
+use ser_evidence::timeline::EventId;
+
+use super::scale::Scale;
+use super::{FULL_PX, LANE_PX, LEFT_PX, px, shortened};
+use crate::report::{Document, names, outcome};
+use ser_evidence::incident::Verdict;
+
+/// One expected step, in microseconds after the first change.
+#[derive(Debug)]
+pub(super) struct StepLane {
+    name: String,
+    result: &'static str,
+    verdict: Verdict,
+    pub(super) after_us: i64,
+    /// The window in which it was to happen.
+    within_us: (i64, i64),
+    then_us: Option<i64>,
+}
+
+/// The steps that began at a known time.
+pub(super) fn lanes(document: &Document<'_>, origin_us: i64) -> Vec<StepLane> {
+    let timeline = document.timeline;
+    let at =
+        |event: EventId| timeline.time(event).map(|at| Moment::us(at).saturating_sub(origin_us));
+    let lane = |step: &ser_evidence::incident::StepResult| {
+        let expectation = timeline.site().expectations.get(step.expectation)?;
+        let after_us = at(step.after.event)?;
+        let (from, to) = expectation.within_us;
+        Some(StepLane {
+            name: names::harmless(&expectation.name),
+            result: outcome::result(step.verdict),
+            verdict: step.verdict,
+            after_us,
+            within_us: (after_us.saturating_add(from), after_us.saturating_add(to)),
+            then_us: step.then.and_then(|then| at(then.event)),
+        })
+    };
+    document.report.steps.iter().filter_map(lane).collect()
+}
+
+impl StepLane {
+    pub(super) fn draw(&self, y: f64, scale: &Scale) -> Markup {
+        let (from, to) = self.within_us;
+        let (x, width) = scale.stretch(from, to).unwrap_or((LEFT_PX, 0.0));
+        let took = self.then_us.map(|then| (self.after_us.min(then), self.after_us.max(then)));
+        let class = if self.verdict == Verdict::InTime { "took good" } else { "took bad" };
+        html! {
+            g.step {
+                rect.back x="0" y=(y) width=(FULL_PX) height=(LANE_PX) {}
+                text.name x=(LEFT_PX - 12.0) y=(y + 15.0) {
+                    title { (self.name) } (shortened(&self.name, 34))
+                }
+                text.recorder x=(LEFT_PX - 12.0) y=(y + 27.0) { "expected: " (self.result) }
+                rect.window data-a=(from) data-b=(to) x=(px(x)) y=(px(y + 7.0)) width=(px(width))
+                    height="18" {}
+                @if let Some((begin, end)) = took {
+                    @let (x, width) = scale.stretch(begin, end).unwrap_or((LEFT_PX, 0.0));
+                    rect class=(class) data-a=(begin) data-b=(end) x=(px(x)) y=(px(y + 14.0))
+                        width=(px(width)) height="4" { title { (self.name) ": " (self.result) } }
+                }
+            }
+        }
+    }
+}

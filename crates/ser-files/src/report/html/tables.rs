@@ -1,0 +1,234 @@
+//! The sections of a page that are words: tables and lists.
+
+use maud::{Markup, html};
+use ser_evidence::incident::Fold;
+
+use super::picture::Lanes;
+use crate::report::sequence::{self, ChangeLine, Line, Remark, Sign};
+use crate::report::span::since;
+use crate::report::{Clock, Document, names, outcome, sources, verdict};
+
+/// Recorders, their completeness and their clocks.
+pub(super) fn made_from(document: &Document<'_>, clock: &Clock) -> Markup {
+    html! {
+        section aria-labelledby="made-from" {
+            h2 #made-from { "Made from" }
+            div.scroll tabindex="0" role="group" aria-labelledby="made-from" {
+                table {
+                    thead { tr {
+                        th scope="col" { "Recorder" }
+                        th.number scope="col" { "Entries" }
+                        th scope="col" { "Complete" }
+                        th scope="col" { "Clock" }
+                    } }
+                    tbody {
+                        @for source in sources::recorders(document, clock) {
+                            tr {
+                                th scope="row" { (source.recorder) }
+                                td.number { (source.entries) }
+                                td.alarm[!source.is_complete] { (source.complete) }
+                                td { (source.clock) }
+                            }
+                        }
+                    }
+                }
+            }
+            @for missed in sources::not_reached(document) { p.alarm { "Not reached: " (missed) } }
+            @for finding in sources::findings(document.timeline) { p.alarm { "Clocks: " (finding) } }
+            @for shift in sources::shifts(document.timeline, clock) { p { "Shifted by hand: " (shift) } }
+        }
+    }
+}
+
+/// A row for each change.
+pub(super) fn sequence(document: &Document<'_>, lanes: Option<&Lanes>, clock: &Clock) -> Markup {
+    html! {
+        section aria-labelledby="sequence" {
+            h2 #sequence { "Sequence" }
+            div.scroll.tall tabindex="0" role="group" aria-labelledby="sequence" {
+                table.sequence {
+                    thead { tr {
+                        th scope="col" { span.unseen { "Order" } }
+                        th scope="col" { "Time" }
+                        th.number scope="col" { "Δ first" }
+                        th.number scope="col" { "Δ previous" }
+                        th.number scope="col" { "Doubt" }
+                        th scope="col" { "Recorder" }
+                        th scope="col" { "Point" }
+                        th scope="col" { "State" }
+                        th.number scope="col" { "Entry" }
+                        th scope="col" { "Notes" }
+                    } }
+                    tbody {
+                        @for line in sequence::lines(document, clock) {
+                            @match line {
+                                Line::Change(change) => (change_row(document, &change, lanes, clock)),
+                                Line::Remark(remark) => (remark_row(&remark)),
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn change_row(
+    document: &Document<'_>,
+    line: &ChangeLine<'_>,
+    lanes: Option<&Lanes>,
+    clock: &Clock,
+) -> Markup {
+    let (bracket, order) = match line.bracket {
+        Sign::None => ("", ""),
+        Sign::First => ("bracket begins", "order not known, from here"),
+        Sign::Inner => ("bracket", "order not known"),
+        Sign::Last => ("bracket ends", "order not known, to here"),
+    };
+    let lane = lanes.and_then(|lanes| lanes.of(line.row.change));
+    // Chatter has a note of its own, which unfolds.
+    let notes =
+        line.notes.iter().filter(|note| line.fold.is_none() || !note.starts_with("chatter"));
+    let notes: Vec<&str> = notes.map(String::as_str).collect();
+    html! {
+        tr.first[line.is_first] data-lane=[lane] {
+            td class=(bracket) { span.unseen { (order) } }
+            td.time { (line.time) }
+            td.number { (line.since_first) }
+            td.number { (line.since_previous) }
+            td.number.faint { (line.doubt) }
+            td { (line.recorder) }
+            td {
+                @match lane {
+                    Some(lane) => a href={ "#lane-" (lane) } { (line.point) },
+                    None => (line.point),
+                }
+            }
+            td.state.abnormal[line.is_abnormal] { (line.state) }
+            td.number { (line.entry) }
+            td {
+                (notes.join("; "))
+                @if let Some(fold) = line.fold { (chatter(document, fold, clock)) }
+            }
+        }
+    }
+}
+
+/// The changes that are folded into one row.
+fn chatter(document: &Document<'_>, fold: &Fold, clock: &Clock) -> Markup {
+    let timeline = document.timeline;
+    let changes = fold.changes.iter().map(|&change| {
+        let row = verdict::row_of(document.report, change);
+        let state = row.map(|row| names::state(timeline, row.point, row.on)).unwrap_or_default();
+        let at = timeline.time(change.event).map(|at| clock.time(at.us())).unwrap_or_default();
+        let after = timeline.delta(fold.first, change).middle_us().map(since).unwrap_or_default();
+        (at, after, state)
+    });
+    html! {
+        details {
+            summary { (sequence::chatter(timeline, fold)) }
+            ol {
+                @for (at, after, state) in changes {
+                    li { (at) " " span.faint { (after) } " " (state) }
+                }
+            }
+        }
+    }
+}
+
+fn remark_row(remark: &Remark) -> Markup {
+    html! {
+        tr.remark.loss[remark.is_loss] {
+            td {}
+            td colspan="4" { "– – –" }
+            td { (remark.recorder) }
+            td colspan="4" { (remark.text) }
+        }
+    }
+}
+
+/// What was first in each group.
+pub(super) fn groups(document: &Document<'_>, clock: &Clock) -> Markup {
+    let groups = outcome::groups(document, clock);
+    html! {
+        @if !groups.is_empty() {
+            section {
+                h2 { "First in each group" }
+                dl { @for (name, first) in groups { dt { (name) } dd { (first) } } }
+            }
+        }
+    }
+}
+
+/// Expected steps.
+pub(super) fn steps(document: &Document<'_>) -> Markup {
+    let steps = outcome::steps(document);
+    html! {
+        @if !document.timeline.site().expectations.is_empty() {
+            section aria-labelledby="steps" {
+                h2 #steps { "Expected steps" }
+                @if steps.is_empty() {
+                    p { "Nothing in this incident begins one." }
+                } @else {
+                    div.scroll tabindex="0" role="group" aria-labelledby="steps" {
+                        table {
+                            thead { tr {
+                                th scope="col" { "Result" }
+                                th scope="col" { "Step" }
+                                th.number scope="col" { "Took" }
+                                th scope="col" { "Expected" }
+                                th scope="col" { "Notes" }
+                            } }
+                            tbody {
+                                @for step in steps {
+                                    tr {
+                                        td.good[step.is_in_time].alarm[!step.is_in_time] { (step.result) }
+                                        th scope="row" { (step.name) }
+                                        td.number { (step.took) }
+                                        td { (step.expected) }
+                                        td { (step.note) }
+                                    }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What breakers did.
+pub(super) fn breakers(document: &Document<'_>) -> Markup {
+    list("Breakers", &outcome::breakers(document))
+}
+
+/// What is not normal at the end.
+pub(super) fn not_normal(document: &Document<'_>) -> Markup {
+    let lines = outcome::not_normal(document).into_iter().map(|(name, since)| match since {
+        Some(since) => format!("{name} ({since})"),
+        None => name,
+    });
+    list("Not normal at the end", &lines.collect::<Vec<_>>())
+}
+
+/// What is missing, so that the last thing on the page says whether all is there.
+pub(super) fn missing(document: &Document<'_>) -> Markup {
+    let Document { timeline, report, .. } = *document;
+    let of_recorders = report.completeness.iter();
+    let mut missing: Vec<String> =
+        of_recorders.filter_map(|of| verdict::incompleteness(timeline, of)).collect();
+    missing.extend(sources::not_reached(document).iter().map(|who| format!("not reached: {who}")));
+    match missing.is_empty() {
+        true => html! { section { h2 { "Missing" } p { "Nothing." } } },
+        false => list("Missing", &missing),
+    }
+}
+
+fn list(title: &str, lines: &[String]) -> Markup {
+    html! {
+        @if !lines.is_empty() {
+            section { h2 { (title) } ul { @for line in lines { li { (line) } } } }
+        }
+    }
+}
