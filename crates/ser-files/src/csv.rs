@@ -11,6 +11,7 @@
 
 use std::io::BufRead;
 
+use ser_evidence::history::LogGap;
 use ser_evidence::record::{EntryRecord, Gap, Life, Lost, Record, Told, Why};
 use ser_proto::{Entry, Inputs, TimeStamp};
 
@@ -322,7 +323,11 @@ fn place(fields: &Fields, parser: &mut Parser) -> Result<(Option<u64>, Life), St
     };
     let life = match life {
         b"" => Life::UNKNOWN,
-        text => parser.life(text).ok_or_else(|| wrong("life", text))?,
+        // An export for spreadsheets has an apostrophe before what they would take for a number.
+        text => {
+            let name = text.strip_prefix(b"'").unwrap_or(text);
+            parser.life(name).ok_or_else(|| wrong("life", text))?
+        }
     };
     Ok((sequence, life))
 }
@@ -353,6 +358,22 @@ fn lost_and_why(note: &str) -> Option<(Lost, Why)> {
         _ => Why::not_recorded(inputs(why.strip_prefix("not recorded, inputs ")?)?),
     };
     Some((lost, why))
+}
+
+/// A loss as the note of its row: `lost 37 (exactly) after 120: overwritten`.
+pub(crate) fn loss_note(gap: &LogGap) -> String {
+    let lost = match gap.lost {
+        Lost::Exactly(count) => format!("{count} (exactly)"),
+        Lost::AtLeast(count) => format!("{count} (at least)"),
+        Lost::Unknown => "an unknown number".to_owned(),
+    };
+    let why = match gap.why {
+        Why::Overwritten => "overwritten".to_owned(),
+        Why::LogBeganAnew => "log began anew".to_owned(),
+        Why::NotReached => "not reached".to_owned(),
+        Why::NotRecorded(inputs) => format!("not recorded, inputs {}", Inputs(inputs)),
+    };
+    format!("lost {lost} after {}: {why}", gap.after)
 }
 
 fn inputs(list: &str) -> Option<Inputs> {
