@@ -58,6 +58,7 @@ enum Command {
     Site(commands::site::Args),
     Report(commands::report::Args),
     Merge(commands::merge::Args),
+    Export(commands::export::Args),
     Sim(commands::sim::Args),
     Demo(commands::demo::Args),
     Completions(commands::completions::Args),
@@ -70,6 +71,7 @@ impl Command {
         match self {
             Read(_) | Print(_) | Watch(_) | Report(_) | Merge(_) => true,
             Decode(_) | Encode(_) | CommReq(_) | Completions(_) => true,
+            Command::Export(args) => args.prints(),
             #[cfg(unix)]
             Command::Genius(args) => args.is_offline(),
             // Their exit code alone is informative: is the recorder there?
@@ -167,6 +169,7 @@ impl Cli {
             Command::Site(args) => commands::site::run(args, connection),
             Command::Report(args) => commands::report::run(args, connection),
             Command::Merge(args) => commands::merge::run(args, connection),
+            Command::Export(args) => commands::export::run(args, connection),
             Command::Sim(args) => commands::sim::run(args),
             Command::Demo(args) => commands::demo::run(args),
             Command::Completions(args) => commands::completions::run(args, &mut Cli::definition()),

@@ -40,7 +40,7 @@ const CALLS: [&str; 26] = [
 ];
 
 /// File, call, how often, and why that is right.
-const JUDGED: [(&str, &str, usize, &str); 36] = [
+const JUDGED: [(&str, &str, usize, &str); 38] = [
     (
         "crates/geni-board/src/mapped_ram.rs",
         "map_raw(",
@@ -60,6 +60,18 @@ const JUDGED: [(&str, &str, usize, &str); 36] = [
         "fs::write(",
         1,
         "in a folder that it has just made for itself",
+    ),
+    (
+        "ser-cli/src/commands/export/new_files.rs",
+        ".persist(",
+        1,
+        "only with --force, over a file that was looked at",
+    ),
+    (
+        "ser-cli/src/commands/export/new_files.rs",
+        "remove_file(",
+        1,
+        "what it has given its name a moment before",
     ),
     (
         "ser-cli/src/kept.rs",

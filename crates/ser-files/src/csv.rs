@@ -424,7 +424,11 @@ fn place(fields: &Fields, parser: &mut Parser) -> Result<(Option<u64>, Life), St
     };
     let life = match life {
         b"" => Life::UNKNOWN,
-        text => parser.life(text).ok_or_else(|| wrong("life", text))?,
+        // An export for spreadsheets has an apostrophe before what they would take for a number.
+        text => {
+            let name = text.strip_prefix(b"'").unwrap_or(text);
+            parser.life(name).ok_or_else(|| wrong("life", text))?
+        }
     };
     Ok((sequence, life))
 }

@@ -14,6 +14,12 @@ pub(crate) fn push_number(line: &mut Vec<u8>, number: u64) {
     line.extend_from_slice(itoa::Buffer::new().format(number).as_bytes());
 }
 
+/// Adds the last digits of a number, up to four.
+pub(crate) fn push_digits(line: &mut Vec<u8>, number: u64, count: usize) {
+    let number = digits(u32::try_from(number % 10_000).unwrap_or_default());
+    line.extend(number.iter().skip(number.len().saturating_sub(count)));
+}
+
 /// Adds a stamp as it is always written.
 pub(crate) fn push_stamp(line: &mut Vec<u8>, stamp: &TimeStamp) {
     let TimeStamp { month, day, hour, minute, second, millisecond, .. } = *stamp;
@@ -32,6 +38,30 @@ pub(crate) fn push_stamp(line: &mut Vec<u8>, stamp: &TimeStamp) {
     }
     let [_, hundreds, tens, ones] = digits(millisecond.into());
     line.extend_from_slice(&[b'.', hundreds, tens, ones]);
+}
+
+/// Adds a stamp as a German spreadsheet reads it: `22.11.2026 10:00:00,250`.
+pub(crate) fn push_german(line: &mut Vec<u8>, stamp: &TimeStamp) {
+    let begin = line.len();
+    push_stamp(line, stamp);
+    make_german(line, begin);
+}
+
+/// Makes `22.11.2026 10:00:00,250` of the last text, if it begins as `2026-11-22T10:00:00.250`.
+fn make_german(line: &mut Vec<u8>, begin: usize) {
+    let text = line.get(begin..).and_then(|text| text.get(..23));
+    let Some(&[y0, y1, y2, y3, b'-', m0, m1, b'-', d0, d1, b'T', ref time @ ..]) =
+        text.and_then(|text| <&[u8; 23]>::try_from(text).ok())
+    else {
+        return;
+    };
+    let [h0, h1, _, n0, n1, _, s0, s1, _, t0, t1, t2] = *time;
+    let german = [
+        d0, d1, b'.', m0, m1, b'.', y0, y1, y2, y3, b' ', h0, h1, b':', n0, n1, b':', s0, s1, b',',
+        t0, t1, t2,
+    ];
+    line.truncate(begin);
+    line.extend_from_slice(&german);
 }
 
 /// The last four digits of a number.
@@ -84,6 +114,15 @@ impl UtcTexts {
             us,
             b'Z',
         ]);
+    }
+}
+
+impl UtcTexts {
+    /// Adds a moment as a German spreadsheet reads it, to the nearest millisecond.
+    pub(crate) fn push_german(&mut self, line: &mut Vec<u8>, utc_us: i64) {
+        let begin = line.len();
+        self.push(line, utc_us.saturating_add(500).div_euclid(1000).saturating_mul(1000));
+        make_german(line, begin);
     }
 }
 

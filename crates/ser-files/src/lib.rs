@@ -14,6 +14,7 @@
 pub mod csv;
 mod digits;
 mod error;
+pub mod export;
 mod fields;
 pub mod jsonl;
 mod lines;

@@ -8,6 +8,7 @@ pub(crate) mod decode;
 pub(crate) mod demo;
 pub(crate) mod encode;
 pub(crate) mod erase;
+pub(crate) mod export;
 #[cfg(unix)]
 pub(crate) mod genius;
 pub(crate) mod last_broadcast;

@@ -19,6 +19,14 @@ pub struct LogGap {
     pub why: Why,
 }
 
+impl LogGap {
+    /// The same as a record of the life that it is in.
+    #[must_use]
+    pub const fn record(&self, life: Life) -> Gap {
+        Gap { life, after: Some(self.after), lost: self.lost, why: self.why }
+    }
+}
+
 /// Gaps as they were told, by where they are.
 #[derive(Debug, Default)]
 pub(super) struct ToldGaps {

@@ -105,6 +105,17 @@ pub struct Conflict {
     pub other: Entry,
 }
 
+impl RecorderHistory {
+    /// What contradicts the entry at this place.
+    pub fn conflicts_at(&self, life: Life, sequence: u64) -> impl Iterator<Item = &Conflict> {
+        let at = move |conflict: &&Conflict| (conflict.life, conflict.sequence) == (life, sequence);
+        let first = self
+            .conflicts
+            .partition_point(|conflict| (conflict.life, conflict.sequence) < (life, sequence));
+        self.conflicts.iter().skip(first).take_while(at)
+    }
+}
+
 impl LifeHistory {
     /// The place of the first entry with at least this sequence.
     #[must_use]

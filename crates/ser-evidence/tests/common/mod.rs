@@ -69,6 +69,12 @@ impl Log {
         self
     }
 
+    /// These inputs change and no entry says so.
+    pub(crate) fn forgets(&mut self, inputs: &[u8]) -> &mut Log {
+        self.state ^= inputs.iter().fold(0, |bits, input| bits | 1 << (input - 1));
+        self
+    }
+
     /// So many entries are overwritten before they are read.
     pub(crate) fn loses(&mut self, count: u64) -> &mut Log {
         self.sequence += count;
@@ -118,6 +124,13 @@ pub(crate) fn booted_us() -> i64 {
 /// The monotonic clock of the host when its UTC shows this.
 pub(crate) fn monotonic_us(utc: &str) -> i64 {
     seen(utc).us() - booted_us()
+}
+
+impl Log {
+    /// What it has written down so far.
+    pub(crate) fn records(&self) -> &[Record] {
+        &self.records
+    }
 }
 
 /// Everything that these logs say.

@@ -13,6 +13,16 @@ use crate::jsonl::Writer;
 /// # Errors
 /// If `out` does not take it.
 pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>, program: &str) -> io::Result<()> {
+    write_items(out, timeline, timeline.items(), program)
+}
+
+/// As [`write`], with these entries and gaps only.
+pub(crate) fn write_items(
+    out: &mut dyn Write,
+    timeline: &Timeline<'_>,
+    items: impl Iterator<Item = Item>,
+    program: &str,
+) -> io::Result<()> {
     let mut lines = Writer::new(out);
     lines.file(program)?;
     for history in &timeline.history().recorders {
@@ -40,7 +50,7 @@ pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>, program: &str) -> io:
             lines.record(name, &record)?;
         }
     }
-    for item in timeline.items() {
+    for item in items {
         let (Item::Entry(event) | Item::Gap(event, _) | Item::ClockSet(event)) = item;
         let (Some(history), Some(life)) = (timeline.recorder(event), timeline.life(event)) else {
             continue;
@@ -57,12 +67,16 @@ pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>, program: &str) -> io:
                     known: held.known,
                 };
                 lines.entry(name, &record, None)?;
+                // What contradicts it is evidence, too. Its number in the ring is not kept.
+                for conflict in history.conflicts_at(life.name(), held.sequence) {
+                    let entry = conflict.other;
+                    let known = EntryRecord::ALL_KNOWN;
+                    lines.entry(name, &EntryRecord { entry, known, ..record }, None)?;
+                }
             }
             Item::Gap(_, index) => {
                 let Some(gap) = life.gaps.get(index) else { continue };
-                let (life, after) = (life.name(), Some(gap.after));
-                let gap = Gap { life, after, lost: gap.lost, why: gap.why };
-                lines.record(name, &Record::Gap(gap))?;
+                lines.record(name, &Record::Gap(gap.record(life.name())))?;
             }
             Item::ClockSet(_) => {}
         }

@@ -1,9 +1,15 @@
 //! One timeline of all recorders, as a table, as CSV or as JSON lines.
 
 mod csv;
+mod dialect;
 mod jsonl;
 mod table;
 
-pub use csv::{HEADER, write as write_csv};
+pub use csv::{CsvStyle, HEADER, write as write_csv};
+pub use dialect::Dialect;
 pub use jsonl::write as write_jsonl;
 pub use table::write as write_table;
+
+pub(crate) use csv::write_items as write_csv_items;
+pub(crate) use dialect::field;
+pub(crate) use jsonl::write_items as write_jsonl_items;

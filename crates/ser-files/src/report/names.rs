@@ -61,7 +61,7 @@ pub(crate) fn is_abnormal(timeline: &Timeline<'_>, id: Option<PointId>, on: bool
 }
 
 /// A point of the site.
-pub(super) fn point_of<'t>(timeline: &Timeline<'t>, id: PointId) -> Option<&'t Point> {
+pub(crate) fn point_of<'t>(timeline: &Timeline<'t>, id: PointId) -> Option<&'t Point> {
     timeline.site().points.get(id.0)
 }
 

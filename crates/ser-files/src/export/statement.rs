@@ -1,0 +1,143 @@
+//! What a file says about itself to people: where it comes from, and what is missing in it.
+
+use std::io::{self, Write};
+
+use ser_evidence::clock::Finding;
+use ser_evidence::timeline::{EventId, Item, Timeline};
+
+use super::axis::Axis;
+use super::channels::recorder_name;
+use super::selection::Selection;
+use super::survey::Survey;
+use crate::report::names::harmless;
+use crate::report::span::duration;
+use crate::report::{NotReached, missing, rfc3339};
+
+/// Where an export comes from.
+#[derive(Clone, Copy, Debug)]
+pub struct Origin<'a> {
+    /// The program that makes it, with its version.
+    pub program: &'a str,
+    /// SHA-256 of the site file, if there is one.
+    pub site_digest: Option<&'a str>,
+    /// Recorders that were to be read and were not, and why.
+    pub not_reached: &'a [NotReached],
+    /// Lines of sources that could not be read.
+    pub damaged_lines: u64,
+}
+
+/// Writes everything that people have to know, a line each, with this line end.
+pub(super) fn write(
+    out: &mut dyn Write,
+    timeline: &Timeline<'_>,
+    selection: &Selection,
+    survey: &Survey,
+    origin: &Origin<'_>,
+    end: &str,
+) -> io::Result<()> {
+    let site = timeline.site();
+    let mut line = |text: &str| write!(out, "{text}{end}");
+    line(&format!("Written by {}", harmless(origin.program)))?;
+    if !site.name.is_empty() {
+        line(&format!("Site: {}", harmless(&site.name)))?;
+    }
+    if let Some(digest) = origin.site_digest {
+        line(&format!("SHA-256 of the site file: {digest}"))?;
+    }
+    if let Some(span) = survey.span {
+        let time = |us| rfc3339(us).unwrap_or_default();
+        line(&format!("Entries from {} to {}", time(span.first_us), time(span.last_us)))?;
+    }
+    for missed in origin.not_reached {
+        let (name, why) = (harmless(&missed.recorder), harmless(&missed.why));
+        line(&format!("NOT READ: {name} could not be reached: {why}"))?;
+    }
+    if origin.damaged_lines > 0 {
+        line(&format!("NOT READ: {} damaged lines of the sources", origin.damaged_lines))?;
+    }
+    for shift in &site.shifts {
+        let name = site.recorders.get(shift.recorder.0).map_or("", |found| found.name.as_str());
+        let (by, why) = (duration(shift.us), harmless(&shift.why));
+        line(&format!("Shifted by hand: {} by {by}: {why}", harmless(name)))?;
+    }
+    if survey.counted.timeless > 0 {
+        let count = survey.counted.timeless;
+        line(&format!("LEFT OUT: {count} entries without a time (the clock was never set)"))?;
+    }
+    for text in doubts(timeline) {
+        line(&text)?;
+    }
+    completeness(out, timeline, selection, survey.axis, end)
+}
+
+/// What does not fit together.
+fn doubts(timeline: &Timeline<'_>) -> Vec<String> {
+    let mut texts = Vec::new();
+    for (recorder, history) in timeline.history().recorders.iter().enumerate() {
+        let count = history.conflicts.len();
+        if count > 0 {
+            let name = recorder_name(timeline, recorder);
+            texts
+                .push(format!("CONTRADICTION: {name}: {count} entries were read twice and differ"));
+        }
+    }
+    let contradicts = |finding: &&Finding| !matches!(finding, Finding::NotPlaced { .. });
+    if timeline.findings().iter().any(|finding| contradicts(&finding))
+        || !timeline.out_of_order().is_empty()
+    {
+        texts.push("CONTRADICTION: what is known of the clocks does not fit together".to_owned());
+    }
+    texts
+}
+
+/// For each recorder, what is missing, or that nothing is known to be.
+fn completeness(
+    out: &mut dyn Write,
+    timeline: &Timeline<'_>,
+    selection: &Selection,
+    axis: Axis,
+    end: &str,
+) -> io::Result<()> {
+    let count = timeline.history().recorders.len();
+    let mut entries = vec![0_u64; count];
+    let mut is_broken = vec![false; count];
+    for item in selection.items(timeline) {
+        match item {
+            Item::Entry(event) => {
+                if let Some(entries) = entries.get_mut(event.recorder as usize) {
+                    *entries += 1;
+                }
+            }
+            Item::Gap(event, index) => {
+                if let Some(is_broken) = is_broken.get_mut(event.recorder as usize) {
+                    *is_broken = true;
+                }
+                write!(out, "{}{end}", loss(timeline, axis, event, index))?;
+            }
+            Item::ClockSet(_) => {}
+        }
+    }
+    for (recorder, (entries, is_broken)) in entries.iter().zip(&is_broken).enumerate() {
+        let name = recorder_name(timeline, recorder);
+        let of = match (entries, is_broken) {
+            (_, true) => "INCOMPLETE, see above",
+            (0, false) => "nothing was recorded, or nothing was read",
+            (_, false) => "nothing is known to be missing between them",
+        };
+        write!(out, "{name}: {entries} entries, {of}{end}")?;
+    }
+    Ok(())
+}
+
+/// As `MISSING: U1-SER1: 37 entries missing (overwritten), after sequence 120, between … and …`.
+fn loss(timeline: &Timeline<'_>, axis: Axis, event: EventId, index: usize) -> String {
+    let name = recorder_name(timeline, event.recorder as usize);
+    let gap = timeline.life(event).and_then(|life| life.gaps.get(index));
+    let Some(gap) = gap else { return String::new() };
+    let time = |event: EventId| axis.at(timeline, event).and_then(rfc3339);
+    let before = event.place.checked_sub(1).map(|place| EventId { place, ..event });
+    let from = before.and_then(time).map_or(String::new(), |time| format!(", from {time}"));
+    let until = time(event).map_or(String::new(), |time| format!(", until {time}"));
+    let what = missing(gap.lost, gap.why);
+    format!("MISSING: {name}: {what}, after sequence {}{from}{until}", gap.after)
+}
