@@ -197,7 +197,11 @@ impl Envelope {
         }
         let before = self.points.clone();
         let place = self.points.partition_point(|point| point.x < x);
-        self.points.insert(place, Known { x, lo, hi, id: usize::MAX });
+        match self.points.get_mut(place).filter(|point| point.x == x) {
+            // Many pieces of news about one point are one piece of knowledge.
+            Some(point) => (point.lo, point.hi) = (point.lo.max(lo), point.hi.min(hi)),
+            None => self.points.insert(place, Known { x, lo, hi, id: usize::MAX }),
+        }
         if self.close() {
             return Some(true);
         }
@@ -373,5 +377,15 @@ mod tests {
         assert_eq!(envelope.learn(0, -5, 1005), Some(false));
         assert_eq!(envelope.learn(0, 300, 1005), Some(true));
         assert_eq!(envelope.at(0), (300, 1000));
+    }
+
+    #[test]
+    fn much_news_about_one_point_stays_one_point() {
+        let mut envelope = envelope(&[known(0, 0, 1000, 0)]);
+        for lo in 1..1000 {
+            assert_eq!(envelope.learn(5_000_000, lo, NO_HI), Some(true), "{lo}");
+        }
+        assert_eq!(envelope.points.len(), 2);
+        assert_eq!(envelope.at(5_000_000), (999, 1251));
     }
 }
