@@ -38,8 +38,8 @@ pub(crate) struct Slope {
 
 impl Slope {
     /// Between minus and plus this.
-    pub(crate) fn within(ppb: u32) -> Slope {
-        Slope { rate_ppb: 0, doubt_ppb: ppb.into() }
+    pub(crate) const fn within(ppb: u32) -> Slope {
+        Slope { rate_ppb: 0, doubt_ppb: ppb as i64 }
     }
 
     /// What two slopes have in common; `None` if that is nothing.
@@ -50,6 +50,13 @@ impl Slope {
         let (lo, hi) = (lo.max(other_lo), hi.min(other_hi));
         let rate_ppb = lo.midpoint(hi);
         (lo <= hi).then(|| Slope { rate_ppb, doubt_ppb: (hi - rate_ppb).max(rate_ppb - lo) })
+    }
+
+    /// The same against a clock that itself gains or loses at most `ppb`.
+    pub(crate) fn widened(self, ppb: u32) -> Slope {
+        let ppb = i64::from(ppb);
+        let of_each_other = parts(self.rate_ppb.saturating_abs() + self.doubt_ppb, ppb) + 1;
+        Slope { doubt_ppb: self.doubt_ppb + ppb + of_each_other, ..self }
     }
 
     /// The least and the most that the value changes over `dx`, which may be negative.

@@ -70,7 +70,7 @@ pub(crate) fn faults_of(seed: u64) -> Vec<Fault> {
         Trouble::Conflict => judge.stamps_are_true(),
         Trouble::WrongObservation | Trouble::SecretSet => false,
     };
-    if is_believable && said.contradictions().is_empty() {
+    if is_believable && story.world.are_hosts_true && said.contradictions().is_empty() {
         judge.list_respects_order();
     }
     judge.faults
