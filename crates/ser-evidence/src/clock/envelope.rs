@@ -38,8 +38,8 @@ pub(crate) struct Slope {
 
 impl Slope {
     /// Between minus and plus this.
-    pub(crate) fn within(ppb: u32) -> Slope {
-        Slope { rate_ppb: 0, doubt_ppb: ppb.into() }
+    pub(crate) const fn within(ppb: u32) -> Slope {
+        Slope { rate_ppb: 0, doubt_ppb: ppb as i64 }
     }
 
     /// What two slopes have in common; `None` if that is nothing.
@@ -50,6 +50,13 @@ impl Slope {
         let (lo, hi) = (lo.max(other_lo), hi.min(other_hi));
         let rate_ppb = lo.midpoint(hi);
         (lo <= hi).then(|| Slope { rate_ppb, doubt_ppb: (hi - rate_ppb).max(rate_ppb - lo) })
+    }
+
+    /// The same against a clock that itself gains or loses at most `ppb`.
+    pub(crate) fn widened(self, ppb: u32) -> Slope {
+        let ppb = i64::from(ppb);
+        let of_each_other = parts(self.rate_ppb.saturating_abs() + self.doubt_ppb, ppb) + 1;
+        Slope { doubt_ppb: self.doubt_ppb + ppb + of_each_other, ..self }
     }
 
     /// The least and the most that the value changes over `dx`, which may be negative.
@@ -197,7 +204,11 @@ impl Envelope {
         }
         let before = self.points.clone();
         let place = self.points.partition_point(|point| point.x < x);
-        self.points.insert(place, Known { x, lo, hi, id: usize::MAX });
+        match self.points.get_mut(place).filter(|point| point.x == x) {
+            // Many pieces of news about one point are one piece of knowledge.
+            Some(point) => (point.lo, point.hi) = (point.lo.max(lo), point.hi.min(hi)),
+            None => self.points.insert(place, Known { x, lo, hi, id: usize::MAX }),
+        }
         if self.close() {
             return Some(true);
         }
@@ -373,5 +384,15 @@ mod tests {
         assert_eq!(envelope.learn(0, -5, 1005), Some(false));
         assert_eq!(envelope.learn(0, 300, 1005), Some(true));
         assert_eq!(envelope.at(0), (300, 1000));
+    }
+
+    #[test]
+    fn much_news_about_one_point_stays_one_point() {
+        let mut envelope = envelope(&[known(0, 0, 1000, 0)]);
+        for lo in 1..1000 {
+            assert_eq!(envelope.learn(5_000_000, lo, NO_HI), Some(true), "{lo}");
+        }
+        assert_eq!(envelope.points.len(), 2);
+        assert_eq!(envelope.at(5_000_000), (999, 1251));
     }
 }

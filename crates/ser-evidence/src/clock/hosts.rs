@@ -10,6 +10,10 @@ use crate::time::{Bound, Host, Moment, Utc};
 /// billion. Operating systems slew a clock by at most this much.
 const HOST_DRIFT_PPB: u32 = 500_000;
 
+/// How much the monotonic clock of a host gains or loses at most, in parts per billion: as much as
+/// the crystals of computers do.
+pub(crate) const HOST_RATE_PPB: u32 = 50_000;
+
 /// What is known of the boots of all hosts.
 #[derive(Debug, Default)]
 pub(crate) struct Hosts {

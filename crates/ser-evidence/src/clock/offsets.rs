@@ -1,7 +1,7 @@
 //! The offset of a recorder's clock in one run.
 
 use super::envelope::{Envelope, Known, NO_HI, NO_LO, Slope, added};
-use super::hosts::Hosts;
+use super::hosts::{HOST_RATE_PPB, Hosts};
 use crate::record::{Boot, Reference};
 use crate::time::{AROUND_2069_US, Bound, CENTURY_US, Moment, Scale, Shown};
 
@@ -31,6 +31,7 @@ pub(crate) struct RunClock {
     offsets: Vec<(Home, Envelope)>,
     /// A stamp of the run. Others may be a century away by their digits only.
     reference: i64,
+    /// How its rate changes its offset in true time.
     drift: Slope,
 }
 
@@ -67,22 +68,29 @@ impl RunClock {
         (clock, contradictions)
     }
 
-    /// Whatever one scale has taught about the rate holds on all.
+    /// Whatever one scale has taught about the rate holds on all, as far as hosts keep true time.
     fn share_slope(&mut self) {
-        let mut slopes = self.offsets.iter().map(|(_, envelope)| envelope.slope());
+        let by_another = |slope: Slope, home: Home| match home {
+            Home::Boot(_) => slope.widened(HOST_RATE_PPB),
+            Home::Utc => slope,
+        };
+        let mut slopes =
+            self.offsets.iter().map(|(home, envelope)| by_another(envelope.slope(), *home));
         let common = slopes.try_fold(self.drift, Slope::intersection);
-        let Some(slope) = common else { return };
-        self.drift = slope;
-        for (_, envelope) in &mut self.offsets {
-            if envelope.slope() != slope {
+        let Some(in_true_time) = common else { return };
+        self.drift = in_true_time;
+        for (home, envelope) in &mut self.offsets {
+            let told = envelope.slope().intersection(by_another(in_true_time, *home));
+            if let Some(slope) = told.filter(|slope| *slope != envelope.slope()) {
                 *envelope = envelope.narrowed(slope);
             }
         }
     }
 
-    /// How the clock's rate may change its offset.
+    /// How the clock's rate may change its offset if all hosts keep true time.
     pub(crate) fn slope(&self) -> Slope {
-        self.drift
+        let mut slopes = self.offsets.iter().map(|(_, envelope)| envelope.slope());
+        slopes.try_fold(self.drift, Slope::intersection).unwrap_or(self.drift)
     }
 
     /// What an observation says about the offset on this scale.

@@ -127,6 +127,11 @@ fn by_neighbours(
     if !is_alone || !is_here {
         return None;
     }
+    // A command that somebody sent may have arrived twice, and then there was a time in between.
+    let was_sent = step.at.is_some() || step.set.is_some();
+    if was_sent && runs.may_show(runs.between_arrivals(place), observation.shown) {
+        return None;
+    }
     let stamp = |sequence| life.entry(sequence).and_then(|held| shown(&held.entry.time));
     let fits_before = stamp(at.after).is_none_or(|before| observation.shown >= before);
     let fits_after =

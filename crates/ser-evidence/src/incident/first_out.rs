@@ -69,29 +69,22 @@ pub(super) fn of_groups(
 /// recorders watch moves once, so both its changes are one candidate.
 fn of(timeline: &Timeline<'_>, incident: &Incident, counts: &dyn Fn(ChangeId) -> bool) -> FirstOut {
     let mut lives = BTreeSet::new();
-    let mut firsts: Vec<EventId> = Vec::new();
-    let mut candidates: Vec<EventId> = Vec::new();
-    for (place, &event) in incident.events.iter().enumerate() {
-        let is_first = changes(timeline, event).any(counts);
-        if !is_first || !lives.insert((event.recorder, event.life)) {
-            continue;
-        }
-        // The list respects what is proven, so what is earlier is before it there.
-        let mut earlier = incident.events.iter().take(place);
-        let has_begun = |other: &EventId| {
-            let is_first = |first: &EventId| {
-                (first.recorder, first.life) == (other.recorder, other.life)
-                    && first.place <= other.place
-            };
-            firsts.iter().any(is_first)
+    let mut is_first = |event: &&EventId| {
+        changes(timeline, **event).any(counts) && lives.insert((event.recorder, event.life))
+    };
+    let firsts: Vec<EventId> = incident.events.iter().filter(&mut is_first).copied().collect();
+    let has_begun = |event: &EventId| {
+        let is_begun_by = |first: &EventId| {
+            (first.recorder, first.life) == (event.recorder, event.life)
+                && first.place <= event.place
         };
-        let is_out =
-            earlier.any(|other| has_begun(other) && timeline.order(*other, event) == Order::Before);
-        firsts.push(event);
-        if !is_out {
-            candidates.push(event);
-        }
-    }
+        firsts.iter().any(is_begun_by)
+    };
+    let is_out = |event: EventId| {
+        let is_earlier = |other: &EventId| timeline.order(*other, event) == Order::Before;
+        incident.events.iter().any(|other| has_begun(other) && is_earlier(other))
+    };
+    let candidates: Vec<EventId> = firsts.iter().copied().filter(|&event| !is_out(event)).collect();
     let is_ahead = |gap: &(EventId, usize)| {
         let (after, _) = *gap;
         let first = firsts

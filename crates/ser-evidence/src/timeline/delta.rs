@@ -1,7 +1,9 @@
 //! The time between two changes, and their order.
 
 use super::{ChangeId, EventId, Timeline};
-use crate::clock::envelope::{NO_HI, NO_LO, added};
+use crate::clock::Home;
+use crate::clock::envelope::{NO_HI, NO_LO, Slope, added};
+use crate::clock::hosts::HOST_RATE_PPB;
 use crate::clock::offsets::{ends, moved};
 use crate::site::{Delays, Recorder};
 use crate::time::shown;
@@ -12,6 +14,10 @@ const PERIOD_US: i64 = 1000;
 /// Bounds are rounded outwards here and there. So much is moved at either end, in microseconds, that
 /// what is said of the order of two entries does not depend on it.
 const SLACK_US: i64 = 5;
+
+/// How far the time of a host may be from true time.
+/// A share of the host's own time is a little more than that of true time.
+const BY_HOST: Slope = Slope::within(HOST_RATE_PPB + HOST_RATE_PPB / 10_000);
 
 /// The time from one change to another, in microseconds; negative if the other came first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,14 +76,19 @@ impl Timeline<'_> {
         if is_timeless(one) != is_timeless(other) {
             return Order::Unknown;
         }
-        let (lo, hi) = self.moved_between((one, None), (other, None));
-        match () {
-            // What contradicts itself proves nothing.
-            () if lo > hi => Order::Unknown,
-            () if lo > 0 => Order::Before,
-            () if hi < 0 => Order::After,
-            () => Order::Unknown,
-        }
+        // A host that gains or loses does not change what came first.
+        let (lo, hi) = self.moved_between((one, None), (other, None), Slope::within(0));
+        let order = match (lo > 0, hi < 0) {
+            (true, false) => Order::Before,
+            (false, true) => Order::After,
+            _ => return Order::Unknown,
+        };
+        let is_consistent = || {
+            let (lo, hi) = self.moved_between((one, None), (other, None), BY_HOST);
+            lo <= hi
+        };
+        // What contradicts itself proves nothing.
+        if lo <= hi || is_consistent() { order } else { Order::Unknown }
     }
 
     /// The time from one change to another. From a change to itself it is 0, and so it is between two
@@ -92,7 +103,7 @@ impl Timeline<'_> {
         for one in seen(one).into_iter().flatten() {
             for other in seen(other).into_iter().flatten() {
                 let sides = ((one.event, Some(one.input)), (other.event, Some(other.input)));
-                let between = self.moved_between(sides.0, sides.1);
+                let between = self.moved_between(sides.0, sides.1, BY_HOST);
                 (lo, hi) = (lo.max(between.0), hi.min(between.1));
             }
         }
@@ -100,13 +111,15 @@ impl Timeline<'_> {
         Delta::of((lo.min(hi), hi.max(lo)))
     }
 
-    /// From the movement of one contact to that of another.
+    /// From the movement of one contact to that of another. `by_host` is how far the time of a host
+    /// may be from true time.
     fn moved_between(
         &self,
         one: (EventId, Option<u8>),
         other: (EventId, Option<u8>),
+        by_host: Slope,
     ) -> (i64, i64) {
-        let samples = self.samples_between(one.0, other.0);
+        let samples = self.samples_between(one.0, other.0, by_host);
         let (one_lo, one_hi) = self.delay_ends(one.0, one.1);
         let (other_lo, other_hi) = self.delay_ends(other.0, other.1);
         added(samples, (other_lo - one_hi, other_hi - one_lo))
@@ -121,13 +134,17 @@ impl Timeline<'_> {
     }
 
     /// From one sample to another, by everything that is known about both.
-    fn samples_between(&self, one: EventId, other: EventId) -> (i64, i64) {
+    fn samples_between(&self, one: EventId, other: EventId, by_host: Slope) -> (i64, i64) {
         let mut known = (NO_LO, NO_HI);
         let mut take = |(lo, hi): (i64, i64)| known = (known.0.max(lo), known.1.min(hi));
         for (home, bound) in self.samples(one) {
             let same = self.samples(other).filter(|(other, _)| *other == home);
             for (_, other) in same {
-                take(difference(bound, other));
+                let (lo, hi) = difference(bound, other);
+                take(match home {
+                    Home::Boot(_) => added((lo, hi), (by_host.change(lo).0, by_host.change(hi).1)),
+                    Home::Utc => (lo, hi),
+                });
             }
         }
         take(difference(ends(self.sample_utc(one)), ends(self.sample_utc(other))));

@@ -9,7 +9,7 @@ use ser_evidence::record::{Boot, Life, Told};
 use ser_evidence::site::{GroupId, Site};
 use ser_evidence::time::{Moment, Utc};
 use ser_evidence::timeline::{ChangeId, ContactTrouble, Order, Timeline};
-use ser_proto::Entry;
+use ser_proto::{Entry, Inputs};
 
 pub(crate) use ser_evidence::time::Bound;
 pub(crate) use ser_evidence::timeline::EventId;
@@ -40,6 +40,8 @@ pub(crate) struct Row {
     /// Whether it was read by its number, so that the sequence says nothing.
     pub(crate) is_by_number: bool,
     pub(crate) entry: Entry,
+    /// The inputs whose state is known.
+    pub(crate) known: Inputs,
 }
 
 /// As `SER2 9f3c5a7e21b04d68 17 2026-11-22T10:00:00.250`.
@@ -158,6 +160,7 @@ fn row(timeline: &Timeline<'_>, event: EventId) -> Row {
         sequence: held.sequence,
         is_by_number: life.is_by_number,
         entry: held.entry,
+        known: held.known,
     }
 }
 

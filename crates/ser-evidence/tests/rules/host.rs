@@ -6,7 +6,7 @@ use ser_evidence::time::{Bound, Host, Moment};
 use crate::chance::Chance;
 use crate::true_time::{Ps, US, ceil_us, floor_us};
 
-/// One boot of a host. Its monotonic clock runs at the true rate.
+/// One boot of a host.
 pub(crate) struct TrueHost {
     pub(crate) boot: Boot,
     /// What its monotonic clock shows when the world begins; may be negative.
@@ -19,14 +19,17 @@ pub(crate) struct TrueHost {
     unrest_us: i64,
     /// What the operating system says of that.
     told_doubt_us: Option<u64>,
+    /// How fast its monotonic clock gains, in parts per billion.
+    gains_ppb: i64,
 }
 
 impl TrueHost {
     /// A host whose clock is honest: off by no more than it says, or than the site says if it does
-    /// not know.
+    /// not know. Its monotonic clock gains or loses no more than `most_ppb`.
     pub(crate) fn draw(
         start_utc_us: i64,
         site_doubt_us: Option<u64>,
+        most_ppb: i64,
         chance: &mut Chance,
     ) -> TrueHost {
         let told_doubt_us = match chance.below(4) {
@@ -45,7 +48,8 @@ impl TrueHost {
             if chance.one_in(3) { chance.of(&[-room, room]) } else { chance.between(-room, room) };
         let zero_us = chance.between(0, 100_000_000_000);
         let boot = Boot(u128::from(chance.bits()));
-        TrueHost { boot, zero_us, start_utc_us, error_us, unrest_us, told_doubt_us }
+        let gains_ppb = chance.of(&[-most_ppb, 0, most_ppb]);
+        TrueHost { boot, zero_us, start_utc_us, error_us, unrest_us, told_doubt_us, gains_ppb }
     }
 
     /// Both clocks, read at this instant.
@@ -61,17 +65,26 @@ impl TrueHost {
 
     /// What its monotonic clock shows.
     pub(crate) fn monotonic_us(&self, at: Ps) -> i64 {
-        self.zero_us + floor_us(at)
+        self.zero_us + floor_us(self.counted(at))
+    }
+
+    /// What its monotonic clock has counted since the world began.
+    fn counted(&self, at: Ps) -> Ps {
+        let gained = (i128::from(at) * i128::from(self.gains_ppb)).div_euclid(1_000_000_000);
+        at + Ps::try_from(gained).expect("little")
     }
 
     /// From one instant to another by its monotonic clock, rounded outwards.
     pub(crate) fn bound(&self, from: Ps, to: Ps) -> Bound<Host> {
+        let (from, to) = (self.counted(from), self.counted(to));
         Bound::from_us(self.zero_us + floor_us(from), self.zero_us + ceil_us(to))
     }
 
     /// When its monotonic clock shows this.
     pub(crate) fn instant(&self, moment: Moment<Host>) -> Ps {
-        (moment.us() - self.zero_us).saturating_mul(US)
+        let counted = i128::from(moment.us() - self.zero_us) * i128::from(US);
+        let at = (counted * 1_000_000_000).div_euclid(1_000_000_000 + i128::from(self.gains_ppb));
+        Ps::try_from(at).expect("a time of the world")
     }
 
     /// How far the clock may be from UTC as it says itself or the site says for it.

@@ -2,7 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use ser_evidence::record::{Boot, Record};
+use ser_evidence::record::{Boot, EntryRecord, Record};
+
+use ser_proto::{Entry, Inputs};
 
 use crate::adapter::{Ends, Row, Said, Sayings, history};
 use crate::chance::Chance;
@@ -53,6 +55,7 @@ pub(crate) fn faults_of(seed: u64) -> Vec<Fault> {
             judge.order_is_true();
             judge.enough_is_said();
             judge.incidents_are_true();
+            judge.known_states_are_kept();
             judge.no_partner_is_overlooked();
             judge.one_movement_is_one();
         }
@@ -62,8 +65,12 @@ pub(crate) fn faults_of(seed: u64) -> Vec<Fault> {
     }
     // Where what is told is wrong, or nobody told that a clock was set, proofs may contradict each
     // other, whether that is noticed or not.
-    let is_believable = matches!(story.world.trouble, Trouble::None | Trouble::Conflict);
-    if is_believable && said.contradictions().is_empty() {
+    let is_believable = match story.world.trouble {
+        Trouble::None => true,
+        Trouble::Conflict => judge.stamps_are_true(),
+        Trouble::WrongObservation | Trouble::SecretSet => false,
+    };
+    if is_believable && story.world.are_hosts_true && said.contradictions().is_empty() {
         judge.list_respects_order();
     }
     judge.faults
@@ -85,13 +92,19 @@ impl<'a> Judge<'a> {
                     return row.life == life.name && row.sequence == sequence;
                 }
                 let is_place = row.is_by_number || row.sequence % 65_536 == truth.total % 65_536;
-                truth.entry == row.entry && is_place
+                is_seen_as(truth.entry, row.entry, row.known) && is_place
             };
             match recorder.entries.iter().find(is_it) {
                 Some(truth) => self.rows.push(Judged { row, truth }),
                 None => self.fault("complete", format!("{row:?} never was")),
             }
         }
+    }
+
+    /// Whether all entries are shown with their true stamps. Of two that contradict each other either
+    /// may be shown.
+    fn stamps_are_true(&self) -> bool {
+        self.rows.iter().all(|judged| judged.row.entry.time == judged.truth.entry.time)
     }
 
     /// Each entry that was read is there once.
@@ -105,12 +118,14 @@ impl<'a> Judge<'a> {
                 Some(sequence) if entry.life.is_known() => {
                     named.insert((recorder, entry.life, sequence));
                 }
-                _ => unnamed.push((recorder, entry.entry)),
+                _ => unnamed.push((recorder, entry.entry, entry.known)),
             }
         }
         let rows = self.rows.clone();
-        for &(recorder, entry) in &unnamed {
-            let is_it = |j: &&Judged<'_>| j.row.recorder == recorder && j.row.entry == entry;
+        for &(recorder, entry, known) in &unnamed {
+            let is_it = |j: &&Judged<'_>| {
+                j.row.recorder == recorder && is_seen_as(j.truth.entry, entry, known)
+            };
             if self.story.world.trouble != Trouble::Conflict && rows.iter().find(is_it).is_none() {
                 self.fault("complete", format!("an entry without a life is missing: {entry:?}"));
             }
@@ -163,6 +178,27 @@ impl<'a> Judge<'a> {
                 "no contradiction",
                 format!("nothing is wrong, and this is told: {contradiction}"),
             );
+        }
+    }
+
+    /// What one reader knows of the states is not lost because another one knows less.
+    fn known_states_are_kept(&mut self) {
+        let told = self.story.sources.iter().flatten();
+        let whole: BTreeSet<_> = told
+            .filter_map(|told| match told.record {
+                Record::Entry(entry) if entry.known == EntryRecord::ALL_KNOWN => {
+                    Some((entry.life, entry.sequence?))
+                }
+                _ => None,
+            })
+            .collect();
+        for Judged { row, truth } in self.rows.clone() {
+            let is_whole = row.known == EntryRecord::ALL_KNOWN;
+            let was_told = row.life.is_known() && whole.contains(&(row.life, row.sequence));
+            let is_true = is_seen_as(truth.entry, row.entry, row.known);
+            if was_told && !is_whole || !is_true {
+                self.fault("known states", format!("{row:?} knows {:?} only", row.known));
+            }
         }
     }
 
@@ -395,6 +431,12 @@ fn is_true(said: Said, one: Judged<'_>, other: Judged<'_>) -> bool {
         Said::Same => false,
         Said::Unknown => true,
     }
+}
+
+/// Whether an entry looks like this to a reader who knows the state of some inputs only.
+fn is_seen_as(truth: Entry, seen: Entry, known: Inputs) -> bool {
+    let is_same_state = (truth.state.0 ^ seen.state.0) & known.0 == 0;
+    (truth.time, truth.changed) == (seen.time, seen.changed) && is_same_state
 }
 
 pub(crate) fn contains((lo, hi): Ends, at: i64) -> bool {

@@ -17,12 +17,13 @@ pub(crate) fn draw(
     now_ms: i64,
     moments: &[Ps],
     until: Ps,
+    hosts_ppb: u32,
     chance: &mut Chance,
 ) -> (Site, Vec<Build>) {
     let count = chance.below(6) + 1;
     let set_takes_effect = chance.of(&[SetTakesEffect::AtOnce, SetTakesEffect::AtNextTick]);
     let mut builds: Vec<Build> = (0..count)
-        .map(|number| build(number, set_takes_effect, now_ms, moments, until, chance))
+        .map(|number| build(number, set_takes_effect, now_ms, moments, until, hosts_ppb, chance))
         .collect();
     wire(&mut builds, chance);
     let recorders = builds.iter().map(|build| build.site.clone()).collect();
@@ -54,6 +55,7 @@ fn build(
     now_ms: i64,
     moments: &[Ps],
     until: Ps,
+    hosts_ppb: u32,
     chance: &mut Chance,
 ) -> Build {
     let is_original = chance.one_in(4);
@@ -71,7 +73,8 @@ fn build(
         log_size: is_original.then_some(size),
         is_original,
         clock,
-        drift_ppb,
+        // As its hosts see it, with what both make of each other.
+        drift_ppb: drift_ppb + hosts_ppb + hosts_ppb.div_ceil(1000),
         wander_ppb,
         delays: delays(chance),
         ..Recorder::named(format!("SER{}", number + 1))
@@ -90,6 +93,7 @@ fn build(
         sample_place,
         set_takes_effect,
         rate_ppb: Rates { drift_ppb, wander_ppb }.draw(chance),
+        own_drift_ppb: drift_ppb,
         schedule: Schedule::draw(moments, until, now_ms, chance),
         first_total: chance.of(&[0, 0, 7, 65_530, 200_000]),
     }

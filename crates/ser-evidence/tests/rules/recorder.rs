@@ -42,6 +42,8 @@ pub(crate) struct Build {
     pub(crate) sample_place: SamplePlace,
     pub(crate) set_takes_effect: SetTakesEffect,
     pub(crate) rate_ppb: i64,
+    /// How much it drifts in true time at most; its site has what hosts see of it.
+    pub(crate) own_drift_ppb: u32,
     pub(crate) schedule: Schedule,
     /// The total of its log when the world begins.
     pub(crate) first_total: u64,
@@ -220,7 +222,7 @@ impl TrueRecorder {
 
 /// The clocks of all power-ups.
 fn clocks(build: &Build, sets: &[(Ps, i64)], until: Ps, chance: &mut Chance) -> Vec<TrueClock> {
-    let rates = Rates { drift_ppb: build.site.drift_ppb, wander_ppb: build.site.wander_ppb };
+    let rates = Rates { drift_ppb: build.own_drift_ppb, wander_ppb: build.site.wander_ppb };
     let mut clocks: Vec<TrueClock> = Vec::new();
     for power in &build.schedule.powers {
         let ticks = Ticks::draw(power.on, until.max(power.on + MS), build.rate_ppb, rates, chance);

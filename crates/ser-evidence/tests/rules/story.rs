@@ -55,14 +55,20 @@ impl Story {
         for _ in 0..chance.between(1, 2) {
             let host = chance.below(self.world.hosts.len());
             let times = times(&self.world.recorders[recorder], self.world.until, chance);
-            let (records, observed) =
+            let (mut records, observed) =
                 Collector::read_all(&self.world, recorder, host, &times, chance);
+            if chance.one_in(4) {
+                show_changes_only(&mut records);
+            }
             self.tell(recorder, records);
             self.observed.extend(observed);
         }
         for _ in 0..chance.between(0, 2) {
             let at = chance.between(self.world.until / 2, self.world.until);
-            let records = read_without_memory(&self.world.recorders[recorder], at, chance);
+            let mut records = read_without_memory(&self.world.recorders[recorder], at, chance);
+            if chance.one_in(4) {
+                show_changes_only(&mut records);
+            }
             self.tell(recorder, records);
         }
     }
@@ -138,6 +144,16 @@ impl fmt::Display for Story {
     }
 }
 
+/// Writes entries as a file has them that shows what changed and no other states.
+fn show_changes_only(records: &mut [Record]) {
+    for record in records {
+        if let Record::Entry(entry) = record {
+            entry.known = entry.entry.changed;
+            entry.entry.state = Inputs(entry.entry.state.0 & entry.known.0);
+        }
+    }
+}
+
 /// When a collector reads.
 fn times(recorder: &TrueRecorder, until: Ps, chance: &mut Chance) -> Vec<Ps> {
     let mut times: Vec<Ps> = (0..chance.between(1, 12)).map(|_| chance.between(0, until)).collect();
@@ -207,8 +223,9 @@ fn plant_conflict(sources: &mut Vec<Vec<Told>>, chance: &mut Chance) -> Option<T
     if chance.one_in(2) {
         record.entry.time.millisecond = (record.entry.time.millisecond + 1) % 1000;
     } else {
-        let Inputs(state) = record.entry.state;
-        record.entry.state = Inputs(state ^ 1);
+        // Of an input whose state is known in any case.
+        let (Inputs(state), Inputs(changed)) = (record.entry.state, record.entry.changed);
+        record.entry.state = Inputs(state ^ (changed & changed.wrapping_neg()));
     }
     sources.push(vec![told.clone()]);
     Some(told)

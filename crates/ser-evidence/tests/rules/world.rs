@@ -26,6 +26,9 @@ pub(crate) enum Trouble {
     SecretSet,
 }
 
+/// The most that the monotonic clock of a host gains or loses, in parts per billion.
+const MOST_HOST_PPB: u32 = 50_000;
+
 /// Everything that is true.
 pub(crate) struct World {
     pub(crate) seed: u64,
@@ -34,6 +37,8 @@ pub(crate) struct World {
     pub(crate) until: Ps,
     pub(crate) site: Site,
     pub(crate) hosts: Vec<TrueHost>,
+    /// Whether the monotonic clocks of hosts keep true time. The list is laid out as if they did.
+    pub(crate) are_hosts_true: bool,
     pub(crate) recorders: Vec<TrueRecorder>,
     pub(crate) operations: Vec<Operation>,
     pub(crate) set_takes_effect: SetTakesEffect,
@@ -54,13 +59,16 @@ impl World {
         let mut moments: Vec<Ps> =
             (0..chance.between(2, 8)).map(|_| chance.between(S, until)).collect();
         moments.sort_unstable();
-        let (mut site, builds) = plant::draw(start_utc_us / 1000, &moments, until, chance);
+        // What the clocks of hosts gain or lose counts as drift of the recorders that they observe.
+        let hosts_ppb: u32 = chance.of(&[0, 300, 10_000, MOST_HOST_PPB]);
+        let (mut site, builds) =
+            plant::draw(start_utc_us / 1000, &moments, until, hosts_ppb, chance);
         if chance.one_in(2) {
             site.utc_doubt_us =
                 Some(u64::try_from(chance.between(1000, 50_000)).expect("positive"));
         }
         let hosts: Vec<TrueHost> = (0..chance.between(1, 4))
-            .map(|_| TrueHost::draw(start_utc_us, site.utc_doubt_us, chance))
+            .map(|_| TrueHost::draw(start_utc_us, site.utc_doubt_us, hosts_ppb.into(), chance))
             .collect();
         let count = 1 + builds.iter().flat_map(|b| &b.wires).map(|w| w.contact).max().unwrap_or(0);
         let contacts = contact::draw(count, &moments, until, chance);
@@ -84,6 +92,7 @@ impl World {
             start_utc_us,
             until,
             site,
+            are_hosts_true: hosts_ppb == 0,
             hosts,
             recorders,
             operations,
