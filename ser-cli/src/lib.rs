@@ -16,6 +16,7 @@ mod interrupt;
 mod keeper;
 mod kept;
 mod log_look;
+mod new_files;
 mod outage;
 mod output;
 mod progress;

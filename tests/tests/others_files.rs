@@ -62,17 +62,12 @@ const JUDGED: [(&str, &str, usize, &str); 38] = [
         "in a folder that it has just made for itself",
     ),
     (
-        "ser-cli/src/commands/export/new_files.rs",
+        "ser-cli/src/new_files.rs",
         ".persist(",
         1,
         "only with --force, over a file that was looked at",
     ),
-    (
-        "ser-cli/src/commands/export/new_files.rs",
-        "remove_file(",
-        1,
-        "what it has given its name a moment before",
-    ),
+    ("ser-cli/src/new_files.rs", "remove_file(", 1, "what it has given its name a moment before"),
     (
         "ser-cli/src/kept.rs",
         ".write(true)",

@@ -1,22 +1,25 @@
 //! `report`: the answer after a trip.
 
 use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use ser_evidence::history::History;
 use ser_evidence::incident::{Incident, Report, Which};
 use ser_evidence::time::{Moment, Utc};
 use ser_evidence::timeline::Timeline;
-use ser_files::report::{self, Document, Styles};
+use ser_files::report::{self, Document, PageError, Styles};
 
 use crate::connection::ConnectionArgs;
 use crate::error::{Failure, Result, inform};
 use crate::gather::{self, Gathered, GivenMoment, SourceArgs, parse_moment};
+use crate::new_files::NewFiles;
 use crate::output::{PROGRAM, Palette};
 
 const EXAMPLES: &str = "\
 Examples:
   ser-cli report --site plant.toml              the last trip
+  ser-cli report --site plant.toml -o trip.html as a page, with a picture
   ser-cli report --site plant.toml --last       the last incident, trip or not
   ser-cli report --site plant.toml --format json > report.json
   ser-cli report --input u1.jsonl u2.jsonl --around 2026-11-22T11:00:00
@@ -47,9 +50,18 @@ pub(crate) struct Args {
     #[arg(long, value_name = "TIME", value_parser = parse_moment)]
     until: Option<GivenMoment>,
 
-    /// The format of the report.
-    #[arg(long, value_enum, default_value_t)]
-    format: Format,
+    /// The format of the report; without it that of the file, or text.
+    #[arg(long, value_enum)]
+    format: Option<Format>,
+
+    /// The file, instead of standard output: a page (.html), text (.txt) or JSON (.json). It appears
+    /// when it is whole.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+
+    /// Overwrite an existing file.
+    #[arg(long, requires = "output")]
+    force: bool,
 
     /// Show each change of a chattering contact.
     #[arg(long)]
@@ -69,14 +81,21 @@ enum Format {
     /// For people.
     #[default]
     Text,
+    /// A page with a picture: one file that needs no network, for screens and paper.
+    Html,
     /// One JSON object with everything.
     Json,
 }
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
+    let format = format(args)?;
     let gathered = gather::gather(&args.sources, connection)?;
-    let shown = Shown { format: args.format, unfold: args.unfold };
-    let is_complete = show(&gathered, which(args, &gathered)?, shown)?;
+    let which = which(args, &gathered)?;
+    let shown = Shown { format, unfold: args.unfold };
+    let is_complete = match &args.output {
+        None => show(&gathered, which, shown)?,
+        Some(path) => to_file(path, args.force, &gathered, which, shown)?,
+    };
     if args.fail_on_loss {
         gathered.require_complete()?;
         if !is_complete {
@@ -95,6 +114,37 @@ pub(super) struct Shown {
 
 /// Writes the report about an incident to standard output. Returns whether nothing is missing in it.
 pub(super) fn show(gathered: &Gathered, which: Which, shown: Shown) -> Result<bool> {
+    let mut out = io::BufWriter::new(io::stdout().lock());
+    let styles = styles(Palette::of_stdout());
+    let is_complete = write(&mut out, gathered, which, shown, styles)?;
+    out.flush()?;
+    Ok(is_complete)
+}
+
+/// Writes it to a file, which appears when it is whole.
+fn to_file(
+    path: &Path,
+    overwrites: bool,
+    gathered: &Gathered,
+    which: Which,
+    shown: Shown,
+) -> Result<bool> {
+    let mut files = NewFiles::new(overwrites);
+    let mut out = io::BufWriter::new(files.create(path)?);
+    let is_complete = write(&mut out, gathered, which, shown, Styles::default())?;
+    out.flush().map_err(|error| Failure::writing(path.display(), &error))?;
+    files.finish()?;
+    inform(format_args!("{} is written", path.display()));
+    Ok(is_complete)
+}
+
+fn write(
+    out: &mut dyn Write,
+    gathered: &Gathered,
+    which: Which,
+    shown: Shown,
+    styles: Styles,
+) -> Result<bool> {
     let timeline = Timeline::new(&gathered.site, &gathered.history);
     let incident =
         Incident::pick(&timeline, which).ok_or_else(|| no_entry(which, &gathered.history))?;
@@ -110,13 +160,33 @@ pub(super) fn show(gathered: &Gathered, which: Which, shown: Shown) -> Result<bo
         not_reached: &gathered.not_reached,
         unfold: shown.unfold,
     };
-    let mut out = io::BufWriter::new(io::stdout().lock());
     match shown.format {
-        Format::Text => report::write_text(&mut out, &document, styles(Palette::of_stdout()))?,
-        Format::Json => report::write_json(&mut out, &document)?,
+        Format::Text => report::write_text(out, &document, styles)?,
+        Format::Html => report::write_html(out, &document).map_err(|error| match error {
+            PageError::Io(error) => Failure::from(error),
+            PageError::TooManyRows(_) => Failure::new(error)
+                .hint("choose less of it with --around, or with --since and --until")
+                .hint("--format text and json have no limit, and export has formats for programs"),
+        })?,
+        Format::Json => report::write_json(out, &document)?,
     }
-    out.flush()?;
     Ok(!report.is_incomplete())
+}
+
+/// The format that the user wants, or that of the file's name.
+fn format(args: &Args) -> Result<Format> {
+    let Some(path) = &args.output else { return Ok(args.format.unwrap_or_default()) };
+    if let Some(format) = args.format {
+        return Ok(format);
+    }
+    let extension = path.extension().and_then(|extension| extension.to_str());
+    match extension.map(str::to_ascii_lowercase).as_deref() {
+        Some("html" | "htm") => Ok(Format::Html),
+        Some("txt") => Ok(Format::Text),
+        Some("json") => Ok(Format::Json),
+        _ => Err(Failure::usage(format!("{} does not say its format", path.display()))
+            .hint("name it .html, .txt or .json, or give --format")),
+    }
 }
 
 /// The nearest incident may be days away from the time that was asked for.

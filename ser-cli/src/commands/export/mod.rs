@@ -2,7 +2,6 @@
 
 mod choice;
 mod format;
-mod new_files;
 mod out;
 mod write;
 

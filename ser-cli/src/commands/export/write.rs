@@ -11,11 +11,11 @@ use ser_files::merged::CsvStyle;
 
 use super::Args;
 use super::format::Format;
-use super::new_files::NewFiles;
 use super::out::{BUFFER, Out};
 use crate::error::{Failure, Result, advise, inform, warn};
 use crate::gather::Gathered;
 use crate::interrupt::Caught;
+use crate::new_files::NewFiles;
 use crate::output::PROGRAM;
 
 /// Everything that is exported, and how.

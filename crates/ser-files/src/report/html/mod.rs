@@ -23,8 +23,8 @@ const SCRIPT: &str = include_str!("page.js");
 
 /// What the page may do: nothing but use its own style and its own script.
 const POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; \
-     style-src 'sha256-+o4qx+zepIsk+myQqD31Q7lkNrOv8bQIu45y0/Gr0Bs='; \
-     script-src 'sha256-lqQ98hNtQ0kFYE9TcO+M5Bx2huUYl8ZiGnT99KQkwMY='";
+     style-src 'sha256-zOf1zO0ePcjjWXh3i5uuE/AQBTMa4JodIMAMCDJDJuo='; \
+     script-src 'sha256-Us0YsfTqKOoUFk61wXqfGj9Jcmb0G7e61sboJeOZEjY='";
 
 /// Why there is no page.
 #[derive(Debug)]

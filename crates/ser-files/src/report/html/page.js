@@ -169,7 +169,4 @@
     event.preventDefault();
     light(row.dataset.lane)?.scrollIntoView({ block: "center" });
   }));
-  addEventListener("beforeprint", () => {
-    document.querySelectorAll("details").forEach((details) => { details.open = true; });
-  });
 })();

@@ -52,10 +52,10 @@ pub(super) fn sequence(document: &Document<'_>, lanes: Option<&Lanes>, clock: &C
                         th scope="col" { "Time" }
                         th.number scope="col" { "Δ first" }
                         th.number scope="col" { "Δ previous" }
-                        th.number scope="col" { "Doubt" }
                         th scope="col" { "Recorder" }
                         th scope="col" { "Point" }
                         th scope="col" { "State" }
+                        th.number scope="col" { "Doubt" }
                         th.number scope="col" { "Entry" }
                         th scope="col" { "Notes" }
                     } }
@@ -96,7 +96,6 @@ fn change_row(
             td.time { (line.time) }
             td.number { (line.since_first) }
             td.number { (line.since_previous) }
-            td.number.faint { (line.doubt) }
             td { (line.recorder) }
             td {
                 @match lane {
@@ -105,6 +104,7 @@ fn change_row(
                 }
             }
             td.state.abnormal[line.is_abnormal] { (line.state) }
+            td.number.faint { (line.doubt) }
             td.number { (line.entry) }
             td {
                 (notes.join("; "))
@@ -140,9 +140,9 @@ fn remark_row(remark: &Remark) -> Markup {
     html! {
         tr.remark.loss[remark.is_loss] {
             td {}
-            td colspan="4" { "– – –" }
+            td colspan="3" { "– – –" }
             td { (remark.recorder) }
-            td colspan="4" { (remark.text) }
+            td colspan="5" { (remark.text) }
         }
     }
 }

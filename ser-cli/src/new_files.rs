@@ -13,23 +13,23 @@ use crate::error::{Failure, Result};
 
 /// Files that are being written.
 #[derive(Debug)]
-pub(super) struct NewFiles {
+pub(crate) struct NewFiles {
     files: Vec<(NamedTempFile, PathBuf)>,
     /// Whether files of these names may be there, and are overwritten.
     overwrites: bool,
 }
 
 impl NewFiles {
-    pub(super) const fn new(overwrites: bool) -> NewFiles {
+    pub(crate) const fn new(overwrites: bool) -> NewFiles {
         NewFiles { files: Vec::new(), overwrites }
     }
 
     /// Begins the file of this name.
-    pub(super) fn create(&mut self, path: &Path) -> Result<File> {
+    pub(crate) fn create(&mut self, path: &Path) -> Result<File> {
         match fs::symlink_metadata(path) {
             Ok(found) if found.is_dir() => {
                 return Err(Failure::new(format!("{} is a folder", path.display()))
-                    .hint("name a file in it, or have it named with --comname COMPANY"));
+                    .hint("name a file in it"));
             }
             // What a device or a pipe gets cannot be taken back, and renaming would remove it.
             Ok(found) if !found.is_file() => {
@@ -47,7 +47,7 @@ impl NewFiles {
     }
 
     /// Gives all files their names.
-    pub(super) fn finish(self) -> Result<()> {
+    pub(crate) fn finish(self) -> Result<()> {
         for (file, path) in &self.files {
             file.as_file().sync_all().map_err(|error| Failure::writing(path.display(), &error))?;
         }
