@@ -10,6 +10,7 @@ pub(crate) mod encode;
 pub(crate) mod erase;
 #[cfg(unix)]
 pub(crate) mod genius;
+pub(crate) mod import;
 pub(crate) mod last_broadcast;
 pub(crate) mod merge;
 pub(crate) mod ports;
