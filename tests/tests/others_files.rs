@@ -40,7 +40,7 @@ const CALLS: [&str; 26] = [
 ];
 
 /// File, call, how often, and why that is right.
-const JUDGED: [(&str, &str, usize, &str); 36] = [
+const JUDGED: [(&str, &str, usize, &str); 37] = [
     (
         "crates/geni-board/src/mapped_ram.rs",
         "map_raw(",
@@ -60,6 +60,12 @@ const JUDGED: [(&str, &str, usize, &str); 36] = [
         "fs::write(",
         1,
         "in a folder that it has just made for itself",
+    ),
+    (
+        "ser-cli/src/commands/import/outlet.rs",
+        ".persist(",
+        1,
+        "over the file that the user names, and only with --force",
     ),
     (
         "ser-cli/src/kept.rs",

@@ -1,7 +1,7 @@
 //! Lists of other recorders: each sample is read as it is written down beside it.
 //!
 //! The samples are of our own making, in the shapes that devices write. `NAME.reading` is what a
-//! correct reader gets out of `NAME`; `SER_FILES_BLESS=1` writes it anew, to be looked at.
+//! correct reader gets out of `NAME`; `SER_WRITE_EXPECTED=1` writes it anew, to be looked at.
 
 use std::fmt::Write as _;
 use std::fs::{self, File};
@@ -98,7 +98,7 @@ fn records(text: &mut String, imported: &Imported) {
 fn expect_reading(file: &str, names: &[&str], options: Options) {
     let path = folder().join(file);
     let read = reading(names, options);
-    if std::env::var_os("SER_FILES_BLESS").is_some() {
+    if std::env::var_os("SER_WRITE_EXPECTED").is_some() {
         fs::write(&path, &read).expect("written");
     }
     let expected = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{file}: {error}"));
@@ -438,13 +438,18 @@ mod anything {
     }
 
     fn check(name: &str, bytes: &[u8], options: Options) {
-        let mut importer = Importer::new(options);
+        let mut importer = Importer::new(options.clone());
         let read = read_into(&mut importer, name, bytes);
         let imported = importer.finish();
         if read.is_err() {
             return;
         }
         let text = written(&imported);
+        let mut twice = Importer::new(options);
+        for _ in 0..2 {
+            read_into(&mut twice, name, bytes).expect("it was read once");
+        }
+        assert_eq!(written(&twice.finish()), text);
         let again = ser_files::jsonl::Reader::new(text.as_bytes(), "F3");
         let again = again.map(|told| told.expect("what was written can be read"));
         let again: Vec<_> = again.map(|told| (told.recorder, told.record)).collect();

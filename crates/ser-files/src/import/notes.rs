@@ -62,6 +62,8 @@ impl fmt::Display for Note {
 pub enum Refusal {
     /// The file cannot be read.
     Io(io::Error),
+    /// There is nothing in it.
+    Empty,
     /// It looks like UTF-16 without the mark that says so.
     Utf16,
     /// It is binary.
@@ -103,6 +105,7 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Refusal::Io(error) => write!(f, "cannot be read: {error}"),
+            Refusal::Empty => f.write_str("the file is empty"),
             Refusal::Utf16 => f.write_str("this looks like UTF-16, without the mark that says so"),
             Refusal::NoText => f.write_str("this is binary, and not text"),
             Refusal::Unknown => f.write_str("this is in none of the formats that are known"),

@@ -30,6 +30,9 @@ pub(super) fn opened<'a>(input: impl Read + 'a) -> Result<(Vec<u8>, Input<'a>), 
     };
     let mut input = input;
     let head = taken(&mut input, HEAD_LEN)?;
+    if head.is_empty() {
+        return Err(Refusal::Empty);
+    }
     let beginning = head.get(..TEXT_LEN.min(head.len())).unwrap_or_default();
     match beginning {
         [0, first, 0, ..] | [first, 0, _, 0, ..] if *first != 0 => return Err(Refusal::Utf16),
@@ -246,7 +249,7 @@ mod tests {
             let text = ["a", "", "b", ""].join(end);
             assert_eq!(all(text.as_bytes()).unwrap(), texts(&["a", "", "b"]), "{end:?}");
         }
-        assert_eq!(all(b"").unwrap(), []);
+        assert!(matches!(all(b""), Err(Refusal::Empty)));
         assert_eq!(all(b"a\n\rb").unwrap(), texts(&["a", "", "b"]));
     }
 

@@ -53,6 +53,7 @@ fn data_beside(path: &Path) -> io::Result<File> {
 fn refused(path: &Path, refusal: &Refusal) -> Failure {
     let failure = Failure::new(format!("{}: {refusal}", path.display()));
     match refusal {
+        Refusal::Empty => failure.hint("get the list from the device anew"),
         Refusal::Io(_) => failure.hint("check its name and your rights to it"),
         Refusal::Utf16 => {
             failure.hint("save it as UTF-8; the encoding is often in the dialogue Save As")
