@@ -24,7 +24,14 @@ Only data goes to standard output; everything else goes to standard error.";
 
 /// Subcommands that talk to no recorder. They accept the options that say how to reach one, but do
 /// not list them in their help.
-const OFFLINE: [&str; 7] = ["ports", "decode", "encode", "comm-req", "sim", "demo", "completions"];
+const OFFLINE: [&str; 8] =
+    ["ports", "decode", "encode", "comm-req", "import", "sim", "demo", "completions"];
+
+/// Two of these options mean something to `import` as well.
+const OF_IMPORT: [(&str, &str); 2] = [
+    ("recorder", "The recorder's name in the records; the name of the file if not given"),
+    ("site", "The site file, whose points a --map may name"),
+];
 
 /// Reads, configures, watches and simulates sequential event recorders (HE660SER160, HE660SER320).
 #[derive(Debug, Parser)]
@@ -59,6 +66,7 @@ enum Command {
     Report(commands::report::Args),
     Merge(commands::merge::Args),
     Export(commands::export::Args),
+    Import(commands::import::Args),
     Sim(commands::sim::Args),
     Demo(commands::demo::Args),
     Completions(commands::completions::Args),
@@ -83,10 +91,10 @@ impl Command {
 impl Command {
     /// Whether the command talks to recorders that the site file may name.
     fn reaches_a_recorder(&self) -> bool {
-        use Command::{CommReq, Completions, Decode, Demo, Encode, Ports, Sim, Site};
+        use Command::{CommReq, Completions, Decode, Demo, Encode, Import, Ports, Sim, Site};
         match self {
             Ports(_) | Decode(_) | Encode(_) | CommReq(_) | Sim(_) | Demo(_) => false,
-            Completions(_) | Site(_) => false,
+            Completions(_) | Site(_) | Import(_) => false,
             #[cfg(unix)]
             Command::Genius(args) => !args.is_offline(),
             _ => true,
@@ -109,7 +117,13 @@ impl Cli {
         let connection = ConnectionArgs::augment_args(clap::Command::new("connection"));
         OFFLINE.into_iter().fold(Cli::command(), |definition, name| {
             definition.mut_subcommand(name, |subcommand| {
-                subcommand.args(connection.get_arguments().map(|arg| arg.clone().hide(true)))
+                subcommand.args(connection.get_arguments().map(|arg| {
+                    let of_import = OF_IMPORT.iter().find(|(id, _)| arg.get_id() == id);
+                    match of_import.filter(|_| name == "import") {
+                        Some((_, help)) => arg.clone().help(*help).long_help(*help),
+                        None => arg.clone().hide(true),
+                    }
+                }))
             })
         })
     }
@@ -170,6 +184,7 @@ impl Cli {
             Command::Report(args) => commands::report::run(args, connection),
             Command::Merge(args) => commands::merge::run(args, connection),
             Command::Export(args) => commands::export::run(args, connection),
+            Command::Import(args) => commands::import::run(args, connection),
             Command::Sim(args) => commands::sim::run(args),
             Command::Demo(args) => commands::demo::run(args),
             Command::Completions(args) => commands::completions::run(args, &mut Cli::definition()),
@@ -254,6 +269,13 @@ mod tests {
             "site",
             "site show a.toml --format xml",
             "site new -o a.toml b.toml",
+            "import",
+            "import a.txt --format xml",
+            "import a.txt --zone Middle/Earth",
+            "import a.txt --dates ydm",
+            "import a.txt --epoch 1985",
+            "import a.txt --doubt-ms -1",
+            "import a.txt --force",
             "sim --model ser640",
             "sim --genius /tmp/host",
             "sim --node 5",

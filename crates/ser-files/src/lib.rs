@@ -4,6 +4,8 @@
 //! entries and gaps, and is read. A [`Source`] tells the two apart by their content and yields
 //! [`Told`](ser_evidence::record::Told) items, one after the other.
 //!
+//! Lists of other recorders and relays are read by [`import`], which makes JSON lines of them.
+//!
 //! Files come from outside. Whatever is in them, reading ends, and needs memory for one line. A
 //! damaged line is an error with its number, and the lines after it can still be read.
 #![cfg_attr(
@@ -16,6 +18,7 @@ mod digits;
 mod error;
 pub mod export;
 mod fields;
+pub mod import;
 pub mod jsonl;
 mod lines;
 pub mod merged;

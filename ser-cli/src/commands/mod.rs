@@ -11,6 +11,7 @@ pub(crate) mod erase;
 pub(crate) mod export;
 #[cfg(unix)]
 pub(crate) mod genius;
+pub(crate) mod import;
 pub(crate) mod last_broadcast;
 pub(crate) mod merge;
 pub(crate) mod ports;

@@ -35,7 +35,7 @@ impl Inspected {
     /// Reads a site file and looks at everything in it, its ports included.
     pub(crate) fn of(path: &Path) -> Result<Inspected> {
         let name = Harmless(path.display()).line();
-        let text = text(path, &name)?;
+        let text = text(path, &name, "ser-cli site new -o FILE writes a site file")?;
         let mut reading = site::inspect(&text);
         ports::look(&mut reading);
         Ok(Inspected { name, text, reading })
@@ -83,10 +83,18 @@ pub(crate) fn counted(count: usize, what: &str) -> Option<String> {
     }
 }
 
-fn text(path: &Path, name: &str) -> Result<String> {
-    let failure = |error: &io::Error| {
-        Failure::reading(name, error).hint("ser-cli site new -o FILE writes a site file")
-    };
+/// The text of a file that a user writes. `hint` says where to begin if it is not there.
+pub(crate) fn text_of(path: &Path, hint: &str) -> Result<String> {
+    text(path, &Harmless(path.display()).line(), hint)
+}
+
+/// Draws mistakes of such a file on standard error.
+pub(crate) fn draw(path: &Path, text: &str, mistakes: &[Diagnostic]) {
+    draw::on_stderr(&Harmless(path.display()).line(), text, mistakes);
+}
+
+fn text(path: &Path, name: &str, hint: &str) -> Result<String> {
+    let failure = |error: &io::Error| Failure::reading(name, error).hint(hint);
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(|error| failure(&error))?;
     file.take(LARGEST).read_to_end(&mut bytes).map_err(|error| failure(&error))?;

@@ -14,6 +14,7 @@ mod comm_req;
 mod commands;
 mod datagrams;
 mod dribble;
+mod foreign_lists;
 mod frames;
 mod framing;
 mod geni_driver;
@@ -30,6 +31,7 @@ pub use client::client;
 pub use comm_req::comm_req;
 pub use commands::commands;
 pub use datagrams::datagrams;
+pub use foreign_lists::foreign_lists;
 pub use frames::frames;
 pub use geni_driver::geni_driver;
 pub use node::node;
@@ -47,7 +49,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 12] = [
+pub const TARGETS: [Target; 13] = [
     Target { name: "frames", run: frames },
     Target { name: "commands", run: commands },
     Target { name: "replies", run: replies },
@@ -60,4 +62,5 @@ pub const TARGETS: [Target; 12] = [
     Target { name: "captures", run: captures },
     Target { name: "state_files", run: state_files },
     Target { name: "records", run: records },
+    Target { name: "foreign_lists", run: foreign_lists },
 ];

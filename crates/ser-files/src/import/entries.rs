@@ -1,0 +1,304 @@
+//! From rows in UTC to records of our recorders.
+//!
+//! A list becomes one life, whose name is made from its content: the same file read twice is the same
+//! life. Each row is an entry of its own, so rows of one millisecond keep their order. A list shows
+//! changes only, so an entry knows what the list has shown since the last hole.
+
+use std::collections::BTreeMap;
+
+use ser_evidence::record::{
+    ClockObservation, EntryRecord, Gap, How, Life, LifeRecord, Lost, Place as LogPlace,
+    PointRecord, Record, RecorderRecord, Reference, Why,
+};
+use ser_evidence::time::{Bound, Moment, stamp};
+use ser_proto::{Entry, Inputs as Bits, TimeStamp};
+use sha2::{Digest, Sha256};
+
+use super::inputs::Inputs;
+use super::list::{Texts, To};
+use super::notes::Notes;
+use super::states::Meanings;
+use super::timed::{Timed, TimedRow};
+use super::zone::Doubt;
+
+/// A record of a recorder, and what people should know of it.
+pub(super) struct Made {
+    pub(super) recorder: usize,
+    pub(super) record: Record,
+    pub(super) note: Option<String>,
+}
+
+/// How long a time between two rows deserves a new look at the clock, in milliseconds.
+const QUIET_MS: i64 = 10_000;
+
+/// Records of looks at the clock of one list that are written at most.
+const MOST_LOOKS: usize = 100_000;
+
+/// What is needed to make records.
+pub(super) struct Maker<'a> {
+    pub(super) points: &'a Texts,
+    pub(super) words: &'a Texts,
+    pub(super) inputs: &'a Inputs,
+    pub(super) meanings: &'a Meanings,
+    /// How far the clock may be from UTC, if the user says it.
+    pub(super) doubt_ms: Option<u32>,
+}
+
+impl Maker<'_> {
+    /// What is known of the recorders themselves.
+    pub(super) fn recorders(&self) -> Vec<Made> {
+        let mut made = Vec::new();
+        for recorder in 0..self.inputs.recorders.len() {
+            let record = Record::Recorder(RecorderRecord::UTC);
+            made.push(Made { recorder, record, note: None });
+            for (input, point) in self.inputs.points(recorder) {
+                let name = self.points.get(point).to_owned();
+                let [on, off] = self.meanings.texts(point);
+                let record = Record::Point(PointRecord { input, name, on, off });
+                made.push(Made { recorder, record, note: None });
+            }
+        }
+        made
+    }
+
+    /// The records of a list.
+    pub(super) fn list(&self, list: &Timed, notes: &mut Notes) -> Vec<Made> {
+        let mut life = Writing {
+            maker: self,
+            life: self.life(list),
+            logs: vec![Log::default(); self.inputs.recorders.len()],
+            is_split: self.inputs.recorders.len() > 1,
+            made: Vec::new(),
+            is_doubtful: list.rows.iter().any(|row| row.doubt.is_some()),
+            looked_ms: None,
+            looks: 0,
+        };
+        life.begin(list);
+        for row in &list.rows {
+            life.row(row, notes);
+        }
+        if life.is_doubtful && self.doubt_ms.is_some() {
+            notes.remark(
+                None,
+                "some local times of this list may be an hour off, so --doubt-ms is not used for it",
+            );
+        }
+        life.made
+    }
+
+    /// A name that the same content has each time.
+    fn life(&self, list: &Timed) -> Life {
+        let mut digest = Sha256::new();
+        let mut add = |text: &str| {
+            digest.update(text.len().to_le_bytes());
+            digest.update(text.as_bytes());
+        };
+        for row in &list.rows {
+            add(&format!("{} {}", row.place, row.at_ms));
+            for change in &row.changes {
+                add(self.points.get(change.point));
+                add(match change.to {
+                    To::State(true) => "on",
+                    To::State(false) => "off",
+                    To::Word(word) => self.words.get(word),
+                    To::Event => "event",
+                    To::Unseen => "changed",
+                });
+            }
+        }
+        let digest = digest.finalize();
+        let bits = digest.first_chunk().map_or(1, |bytes| u64::from_be_bytes(*bytes));
+        Life::from_bits(bits.max(1))
+    }
+}
+
+/// What a recorder has of the life that is being written.
+#[derive(Clone, Copy, Debug, Default)]
+struct Log {
+    sequence: u64,
+    /// Missing rows since its last entry.
+    missing: u64,
+    on: u32,
+    known: u32,
+    is_begun: bool,
+    /// When an observation by hand was written last.
+    vouched_ms: Option<i64>,
+}
+
+/// A life on its way.
+struct Writing<'a> {
+    maker: &'a Maker<'a>,
+    life: Life,
+    logs: Vec<Log>,
+    is_split: bool,
+    made: Vec<Made>,
+    is_doubtful: bool,
+    looked_ms: Option<i64>,
+    looks: usize,
+}
+
+impl Writing<'_> {
+    /// What is known before the first row.
+    fn begin(&mut self, list: &Timed) {
+        let first = list.rows.first().map_or(1, |row| row.place);
+        let counts = list.counts_from_beginning && !self.is_split;
+        let record =
+            LifeRecord { life: self.life, is_exact: counts, model: None, size: None, erased: None };
+        for recorder in 0..self.logs.len() {
+            self.tell(recorder, Record::Life(record), None);
+        }
+        let missing = first - 1;
+        if counts && list.overwritten == Some(missing) && missing > 0 {
+            let lost = Lost::Exactly(u32::try_from(missing).unwrap_or(u32::MAX));
+            let gap = Gap { life: self.life, after: Some(0), lost, why: Why::Overwritten };
+            self.tell(0, Record::Gap(gap), None);
+        }
+        let before = if list.counts_from_beginning { 0 } else { missing };
+        for log in &mut self.logs {
+            log.sequence = before;
+        }
+    }
+
+    fn tell(&mut self, recorder: usize, record: Record, note: Option<String>) {
+        self.made.push(Made { recorder, record, note });
+    }
+
+    fn row(&mut self, row: &TimedRow, notes: &mut Notes) {
+        let Some(time) = stamp(Moment::from_us(row.at_ms.saturating_mul(1000))) else {
+            notes.leave_out(row.line, "no recorder's clock shows this time");
+            return;
+        };
+        self.learn(row);
+        let moved = self.moved(row, notes);
+        if moved.is_empty() {
+            return;
+        }
+        self.look(row.at_ms, &moved);
+        for (recorder, (changed, on, known)) in moved {
+            let Some(log) = self.logs.get_mut(recorder) else { continue };
+            log.sequence = match self.is_split {
+                true => log.sequence + 1 + std::mem::take(&mut log.missing),
+                false => row.place,
+            };
+            log.is_begun = true;
+            log.on = log.on & !changed | on;
+            log.known = log.known & !changed | known;
+            let record = EntryRecord {
+                life: self.life,
+                sequence: Some(log.sequence),
+                number: u16::try_from((log.sequence - 1) % 65_535 + 1).unwrap_or(u16::MAX),
+                entry: Entry { changed: Bits(changed), state: Bits(log.on & log.known), time },
+                known: Bits(log.known),
+            };
+            self.tell(recorder, Record::Entry(record), note(row, &time));
+        }
+        self.doubt(row.at_ms);
+    }
+
+    /// What is known of states before a row.
+    fn learn(&mut self, row: &TimedRow) {
+        if row.forgets {
+            self.logs.iter_mut().for_each(|log| log.known = 0);
+        }
+        for (point, is_on) in &row.learnt {
+            let Some(place) = self.maker.inputs.of_point(*point) else { continue };
+            let Some(log) = self.logs.get_mut(place.recorder) else { continue };
+            let bit = 1 << (place.input - 1);
+            log.known |= bit;
+            log.on = if *is_on { log.on | bit } else { log.on & !bit };
+        }
+    }
+
+    /// What a row changes, by recorder: inputs, those that are on, those whose state is known.
+    fn moved(&mut self, row: &TimedRow, notes: &mut Notes) -> BTreeMap<usize, (u32, u32, u32)> {
+        let mut moved: BTreeMap<usize, (u32, u32, u32)> = BTreeMap::new();
+        for change in &row.changes {
+            let Some(place) = self.maker.inputs.of_point(change.point) else { continue };
+            let state = match self.maker.meanings.state(change.point, change.to) {
+                Ok(state) => state,
+                Err(word) => {
+                    let (point, word) =
+                        (self.maker.points.get(change.point), self.maker.words.get(word));
+                    let why = format!("{point:?} has two states already, and {word:?} is another");
+                    notes.leave_out(row.line, why);
+                    // Something happened that no entry has.
+                    self.logs
+                        .iter_mut()
+                        .for_each(|log| (log.missing, log.known) = (log.missing + 1, 0));
+                    continue;
+                }
+            };
+            let bit = 1_u32 << (place.input - 1);
+            let (changed, on, known) = moved.entry(place.recorder).or_default();
+            *changed |= bit;
+            *on |= if state == Some(true) { bit } else { 0 };
+            *known |= if state.is_some() { bit } else { 0 };
+        }
+        moved
+    }
+
+    /// Recorders of one list show one clock: now and then they say so to each other.
+    fn look(&mut self, at_ms: i64, moved: &BTreeMap<usize, (u32, u32, u32)>) {
+        let is_news = self.looked_ms.is_none_or(|before| (at_ms - before).abs() >= QUIET_MS)
+            || moved.keys().any(|moved| self.logs.get(*moved).is_some_and(|log| !log.is_begun));
+        if !self.is_split || !is_news || self.looks * self.logs.len() >= MOST_LOOKS {
+            return;
+        }
+        self.looked_ms = Some(at_ms);
+        self.looks += 1;
+        let mut digest = Sha256::new();
+        digest.update(self.life.bits().to_le_bytes());
+        digest.update(self.looks.to_le_bytes());
+        let broadcast =
+            digest.finalize().first_chunk().map_or(0, |bytes| u64::from_be_bytes(*bytes));
+        for recorder in 0..self.logs.len() {
+            let how = How::Mark { broadcast };
+            self.observe(recorder, how, at_ms, Bound::UNKNOWN);
+        }
+    }
+
+    /// What the user says of the clock.
+    fn doubt(&mut self, at_ms: i64) {
+        let Some(doubt_ms) = self.maker.doubt_ms.filter(|_| !self.is_doubtful) else { return };
+        let (at_us, doubt_us) = (at_ms * 1000, i64::from(doubt_ms) * 1000);
+        let bound = Bound::from_us(at_us - doubt_us, at_us + doubt_us);
+        for recorder in 0..self.logs.len() {
+            let Some(log) = self.logs.get_mut(recorder) else { continue };
+            let is_news = log.is_begun
+                && log.vouched_ms.is_none_or(|before| (at_ms - before).abs() >= QUIET_MS);
+            if is_news {
+                log.vouched_ms = Some(at_ms);
+                self.observe(recorder, How::Hand, at_ms, bound);
+            }
+        }
+    }
+
+    fn observe(
+        &mut self,
+        recorder: usize,
+        how: How,
+        at_ms: i64,
+        bound: Bound<ser_evidence::time::Utc>,
+    ) {
+        let sequence = self.logs.get(recorder).map(|log| log.sequence);
+        let place = LogPlace { life: self.life, after: sequence, before: sequence, newest: None };
+        let shown = Moment::from_us(at_ms.saturating_mul(1000));
+        let at = Reference::Utc(bound);
+        self.tell(recorder, Record::Clock(ClockObservation { how, shown, at, place }), None);
+    }
+}
+
+/// What people should know of a row.
+fn note(row: &TimedRow, time: &TimeStamp) -> Option<String> {
+    match row.doubt? {
+        Doubt::Twice(ns) => {
+            let minutes = ns / 60_000_000_000;
+            Some(format!(
+                "this hour came twice: it may also be {minutes} min later than {time} UTC"
+            ))
+        }
+        Doubt::Missing => {
+            Some("this local time was left out when the clocks went forward".to_owned())
+        }
+    }
+}

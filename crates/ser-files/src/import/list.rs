@@ -1,0 +1,270 @@
+//! What readers make of a file: lists of rows, each with its time as written and what changed.
+//!
+//! A [`List`] is one stretch of a log without an unknown jump inside. Points and words are kept once
+//! and named by their place. Nothing is decided here about zones, inputs and recorders.
+
+use std::collections::HashMap;
+
+use super::calendar::{Date, DateOrder, NoTime, time_of_day};
+use super::notes::{Notes, Refusal};
+use crate::error::quoted;
+
+/// The most changes that are read at once. Recorders hold some thousands; a file of more is cut.
+pub(super) const MOST_CHANGES: usize = 500_000;
+
+/// The most different names in a file.
+const MOST_NAMES: usize = 65_536;
+
+/// A row: one moment of a list.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Row {
+    /// The line that it is from.
+    pub(super) line: u64,
+    /// When, as it is written.
+    pub(super) when: When,
+    /// Its place in the list, from 1, larger for later rows. What is skipped is missing.
+    pub(super) place: u64,
+    /// Whether nothing is known any more of states before it.
+    pub(super) forgets: bool,
+    /// States that are known before it although no row shows them.
+    pub(super) learnt: Vec<(usize, bool)>,
+    /// What changed in it, each point once.
+    pub(super) changes: Vec<Change>,
+}
+
+/// A time as it is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct When {
+    /// The day.
+    pub(super) date: Date,
+    /// Nanoseconds since midnight.
+    pub(super) day_ns: u64,
+    /// How much later than that it is, in nanoseconds.
+    pub(super) later_ns: i64,
+    /// Seconds east of UTC, if the file says it.
+    pub(super) utc_offset_s: Option<i32>,
+}
+
+impl When {
+    /// Date and time of a row, to milliseconds or finer.
+    pub(super) fn parse(date: &str, time: &str) -> Result<When, String> {
+        let wrong = |what: &str, text: &str| format!("{} is no {what}", quoted(text.as_bytes()));
+        let date = Date::parse(date).ok_or_else(|| wrong("date", date))?;
+        let day_ns = time_of_day(time).map_err(|no_time| match no_time {
+            NoTime::Wrong => wrong("time", time),
+            NoTime::Coarse => format!("{} is coarser than milliseconds", quoted(time.as_bytes())),
+        })?;
+        Ok(When { date, day_ns, later_ns: 0, utc_offset_s: None })
+    }
+}
+
+/// What happened to a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Change {
+    /// The place of its name.
+    pub(super) point: usize,
+    /// What became of it.
+    pub(super) to: To,
+}
+
+/// What became of a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum To {
+    /// It went on or off.
+    State(bool),
+    /// It is called this from then, by the place of the word.
+    Word(usize),
+    /// Something happened that has no state.
+    Event,
+    /// It changed, and the list does not say to what.
+    Unseen,
+}
+
+/// How the rows of a list follow each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Order {
+    /// As their places say.
+    #[default]
+    Places,
+    /// As their places say, unless all of their times say that it is the other way round.
+    PlacesOrReversed,
+    /// By their times: the rows are of several devices, and one millisecond has no order.
+    Times,
+}
+
+/// A stretch of a log.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct List {
+    pub(super) rows: Vec<Row>,
+    pub(super) order: Order,
+    /// Dates of the same file that no row has. They are in the same order.
+    pub(super) other_dates: Vec<Date>,
+    /// The order in which the format has dates, if it says one.
+    pub(super) usual_dates: Option<DateOrder>,
+    /// Whether places count from the beginning of the log.
+    pub(super) counts_from_beginning: bool,
+    /// How many rows older ones took the places of, before the first.
+    pub(super) overwritten: Option<u64>,
+}
+
+/// Texts, each once.
+#[derive(Debug, Default)]
+pub(super) struct Texts {
+    places: HashMap<String, usize>,
+    all: Vec<String>,
+}
+
+impl Texts {
+    /// The place of a text; `None` if there are too many.
+    pub(super) fn place(&mut self, text: &str) -> Option<usize> {
+        if let Some(place) = self.places.get(text) {
+            return Some(*place);
+        }
+        if self.all.len() == MOST_NAMES {
+            return None;
+        }
+        self.places.insert(text.to_owned(), self.all.len());
+        self.all.push(text.to_owned());
+        Some(self.all.len() - 1)
+    }
+
+    /// Whether a text is there.
+    pub(super) fn contains(&self, text: &str) -> bool {
+        self.places.contains_key(text)
+    }
+
+    /// The text at a place.
+    pub(super) fn get(&self, place: usize) -> &str {
+        self.all.get(place).map_or("", String::as_str)
+    }
+}
+
+/// What is read from files of one recorder.
+#[derive(Debug, Default)]
+pub(super) struct Found {
+    pub(super) points: Texts,
+    pub(super) words: Texts,
+    pub(super) lists: Vec<List>,
+    changes: usize,
+}
+
+impl Found {
+    /// The place of a point's name, made fit to be shown.
+    pub(super) fn point(&mut self, name: &str) -> Result<usize, Refusal> {
+        let most = u64::try_from(MOST_NAMES).unwrap_or(u64::MAX);
+        let too_much = Refusal::TooMuch { what: "different names", most };
+        self.points.place(&fit(name)).ok_or(too_much)
+    }
+
+    /// The place of a word for a state, made fit to be shown.
+    pub(super) fn word(&mut self, word: &str) -> Result<usize, Refusal> {
+        let most = u64::try_from(MOST_NAMES).unwrap_or(u64::MAX);
+        let too_much = Refusal::TooMuch { what: "different words for states", most };
+        self.words.place(&fit(word)).ok_or(too_much)
+    }
+
+    /// Makes room for this many changes more.
+    pub(super) fn count(&mut self, changes: usize) -> Result<(), Refusal> {
+        self.changes = self.changes.saturating_add(changes);
+        let most = u64::try_from(MOST_CHANGES).unwrap_or(u64::MAX);
+        match self.changes > MOST_CHANGES {
+            true => Err(Refusal::TooMuch { what: "changes", most }),
+            false => Ok(()),
+        }
+    }
+}
+
+/// The longest name that is kept, in characters.
+const LONGEST: usize = 200;
+
+/// A name as it may be shown: one line of visible characters, not empty, of bounded length.
+pub(super) fn fit(name: &str) -> String {
+    let visible = |letter: char| match letter {
+        letter if ser_console::is_obeyed(letter) => '\u{FFFD}',
+        letter => letter,
+    };
+    let fit: String = name.trim().chars().take(LONGEST).map(visible).collect();
+    match fit.trim() {
+        "" => "(no name)".to_owned(),
+        fit => fit.to_owned(),
+    }
+}
+
+/// Takes rows that say their own number, the newest being 1, in any order.
+#[derive(Debug, Default)]
+pub(super) struct Numbered {
+    rows: Vec<(u64, Row)>,
+    pub(super) other_dates: Vec<Date>,
+}
+
+impl Numbered {
+    /// Adds a row with its number.
+    pub(super) fn add(&mut self, number: u64, row: Row) {
+        self.rows.push((number, row));
+    }
+
+    /// Whether there is a row.
+    pub(super) fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// The list so far; the next row begins another one.
+    pub(super) fn finish(&mut self, found: &mut Found, notes: &mut Notes) {
+        if self.rows.is_empty() {
+            return;
+        }
+        let mut rows = std::mem::take(&mut self.rows);
+        // The oldest first; of one number, the row that comes first in the file.
+        rows.sort_by_key(|(number, row)| (u64::MAX - number, row.line));
+        let oldest = rows.first().map_or(0, |(number, _)| *number);
+        let mut list = List {
+            order: Order::PlacesOrReversed,
+            other_dates: std::mem::take(&mut self.other_dates),
+            ..List::default()
+        };
+        let mut before: Option<u64> = None;
+        for (number, mut row) in rows {
+            if before == Some(number) {
+                let is_same = list
+                    .rows
+                    .last()
+                    .is_some_and(|kept| (kept.when, &kept.changes) == (row.when, &row.changes));
+                if !is_same {
+                    notes.leave_out(row.line, format!("another row has the number {number}, too"));
+                }
+                continue;
+            }
+            row.forgets |= before.is_some_and(|before| before != number + 1);
+            row.place = oldest - number + 1;
+            before = Some(number);
+            list.rows.push(row);
+        }
+        found.lists.push(list);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_can_be_shown() {
+        assert_eq!(fit("  86 LOCKOUT "), "86 LOCKOUT");
+        assert_eq!(fit("a\u{1B}[2J\u{202E}"), "a\u{FFFD}[2J\u{FFFD}");
+        assert_eq!(fit(" \t"), "(no name)");
+        assert_eq!(fit(&"x".repeat(999)).len(), LONGEST);
+        assert_eq!(fit(&format!("{}  y", "x".repeat(LONGEST - 1))).len(), LONGEST - 1);
+    }
+
+    #[test]
+    fn more_than_is_read_at_once_is_refused() {
+        let mut found = Found::default();
+        assert!(found.count(MOST_CHANGES).is_ok());
+        assert!(found.count(1).is_err());
+        for name in 0..MOST_NAMES {
+            found.point(&name.to_string()).unwrap();
+        }
+        assert!(found.point("0").is_ok());
+        assert!(found.point("one more").is_err());
+    }
+}

@@ -1,0 +1,246 @@
+//! Lists in UTC and whole milliseconds, in the order of what happened, without anything twice.
+//!
+//! A stamp that is finer than a millisecond is rounded up: a change lies in the millisecond that ends
+//! with its stamp. Files of one recorder overlap; lists that share a row and contradict each other
+//! nowhere are one.
+
+use std::collections::{BTreeMap, HashMap};
+
+use jiff::tz::TimeZone;
+
+use super::calendar::DateOrder;
+use super::list::{Change, List, Order};
+use super::notes::{Notes, Refusal};
+use super::zone::{Doubt, Utc, in_utc};
+
+const MS_NS: i64 = 1_000_000;
+
+/// A list in UTC.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Timed {
+    /// By place.
+    pub(super) rows: Vec<TimedRow>,
+    /// Whether the order of the rows is that of their times.
+    pub(super) by_time: bool,
+    /// Whether places count from the beginning of the log.
+    pub(super) counts_from_beginning: bool,
+    /// How many rows were overwritten before the first place that was left.
+    pub(super) overwritten: Option<u64>,
+}
+
+/// A row in UTC.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct TimedRow {
+    pub(super) line: u64,
+    /// Milliseconds since 1970.
+    pub(super) at_ms: i64,
+    pub(super) doubt: Option<Doubt>,
+    pub(super) place: u64,
+    pub(super) forgets: bool,
+    pub(super) learnt: Vec<(usize, bool)>,
+    pub(super) changes: Vec<Change>,
+}
+
+impl TimedRow {
+    /// Whether it may be the same row in another file.
+    fn is_same(&self, other: &TimedRow) -> bool {
+        (self.at_ms, &self.changes) == (other.at_ms, &other.changes)
+    }
+}
+
+/// Puts a list into UTC.
+pub(super) fn timed(
+    list: List,
+    order: DateOrder,
+    zone: Option<&TimeZone>,
+    notes: &mut Notes,
+) -> Result<Timed, Refusal> {
+    let times = in_utc(&list, order, zone, notes)?;
+    let List { rows, order, counts_from_beginning, overwritten, .. } = list;
+    let mut is_torn = false;
+    let mut timed: Vec<(Utc, TimedRow)> = Vec::with_capacity(rows.len());
+    for (row, time) in rows.into_iter().zip(times) {
+        let Some(utc) = time else {
+            is_torn = true;
+            continue;
+        };
+        let forgets = row.forgets || std::mem::take(&mut is_torn);
+        timed.push((
+            utc,
+            TimedRow {
+                line: row.line,
+                at_ms: utc.ns.div_euclid(MS_NS) + i64::from(utc.ns.rem_euclid(MS_NS) > 0),
+                doubt: utc.doubt,
+                place: row.place,
+                forgets,
+                learnt: row.learnt,
+                changes: row.changes,
+            },
+        ));
+    }
+    match order {
+        Order::Places => {}
+        Order::PlacesOrReversed => turn(&mut timed, notes),
+        // One millisecond has no order: by the file, so that it is the same each time.
+        Order::Times => timed.sort_by_key(|(utc, row)| (utc.ns, row.place)),
+    }
+    let rows = timed.into_iter().map(|(_, row)| row).collect();
+    let by_time = order == Order::Times;
+    Ok(Timed { rows, by_time, counts_from_beginning, overwritten })
+}
+
+/// Turns a list round whose times all say that it is upside down.
+fn turn(timed: &mut [(Utc, TimedRow)], notes: &mut Notes) {
+    let steps = || {
+        timed.windows(2).filter_map(|pair| match pair {
+            [(one, _), (other, _)] => Some(one.ns.cmp(&other.ns)),
+            _ => None,
+        })
+    };
+    let is_upside_down =
+        steps().all(std::cmp::Ordering::is_ge) && steps().filter(|step| step.is_gt()).count() >= 2;
+    if !is_upside_down {
+        return;
+    }
+    notes.remark(None, "by all of its times this list is the other way round; it was turned");
+    let last = timed.last().map_or(0, |(_, row)| row.place);
+    timed.reverse();
+    let mut place_before = None;
+    for (_, row) in timed.iter_mut() {
+        row.place = last + 1 - row.place;
+        row.forgets |= place_before.is_some_and(|before| before + 1 != row.place);
+        place_before = Some(row.place);
+    }
+}
+
+/// Joins the lists of one recorder that belong together.
+pub(super) fn joined(lists: Vec<Timed>) -> Vec<Timed> {
+    let (by_time, mut by_place): (Vec<Timed>, Vec<Timed>) =
+        lists.into_iter().partition(|list| list.by_time);
+    by_place.sort_by_key(|list| (list.rows.first().map(|row| row.at_ms), list.rows.len()));
+    let mut all = Joined::default();
+    for list in by_place {
+        all.add(list);
+    }
+    all.lists.extend(of_times(by_time));
+    all.lists.retain(|list| !list.rows.is_empty());
+    all.lists
+}
+
+/// Lists that were joined so far.
+#[derive(Default)]
+struct Joined {
+    lists: Vec<Timed>,
+    /// In which list, and at which place, a moment is first.
+    by_moment: HashMap<i64, (usize, u64)>,
+}
+
+/// So many rows are looked for elsewhere before a list is one of its own.
+const LOOKED_FOR: usize = 64;
+
+impl Joined {
+    fn add(&mut self, list: Timed) {
+        let home = self.home(&list);
+        let index = match home {
+            Some((index, shift)) => {
+                self.merge(index, list, shift);
+                index
+            }
+            None => {
+                self.lists.push(list);
+                self.lists.len() - 1
+            }
+        };
+        if let Some(list) = self.lists.get(index) {
+            for row in &list.rows {
+                self.by_moment.entry(row.at_ms).or_insert((index, row.place));
+            }
+        }
+    }
+
+    /// The list that this one goes on with or repeats, and what is added to its places then.
+    fn home(&self, list: &Timed) -> Option<(usize, i128)> {
+        let counted = |other: &Timed| other.counts_from_beginning && list.counts_from_beginning;
+        if let Some(index) = self.lists.iter().position(counted) {
+            return self.agree(index, list, 0).then_some((index, 0));
+        }
+        let firsts = list.rows.iter().filter_map(|row| {
+            let (index, place) = *self.by_moment.get(&row.at_ms)?;
+            Some((index, i128::from(place) - i128::from(row.place)))
+        });
+        firsts.take(LOOKED_FOR).find(|(index, shift)| self.shares(*index, list, *shift))
+    }
+
+    fn pairs<'a>(
+        &'a self,
+        index: usize,
+        list: &'a Timed,
+        shift: i128,
+    ) -> impl Iterator<Item = (&'a TimedRow, &'a TimedRow)> {
+        let rows = self.lists.get(index).map_or(&[][..], |list| &list.rows);
+        list.rows.iter().filter_map(move |row| {
+            let place = u64::try_from(i128::from(row.place) + shift).ok()?;
+            let at = rows.binary_search_by_key(&place, |row| row.place).ok()?;
+            Some((rows.get(at)?, row))
+        })
+    }
+
+    fn agree(&self, index: usize, list: &Timed, shift: i128) -> bool {
+        self.pairs(index, list, shift).all(|(one, other)| one.is_same(other))
+    }
+
+    fn shares(&self, index: usize, list: &Timed, shift: i128) -> bool {
+        self.pairs(index, list, shift).next().is_some() && self.agree(index, list, shift)
+    }
+
+    fn merge(&mut self, index: usize, list: Timed, shift: i128) {
+        let Some(home) = self.lists.get_mut(index) else { return };
+        let moved = |row: &TimedRow| i128::from(row.place) + shift;
+        // Places count from 1, so what comes before the first one moves all others.
+        let room = list.rows.first().map_or(1, moved).min(1);
+        let up = u64::try_from(1 - room).unwrap_or_default();
+        let mut rows: BTreeMap<u64, TimedRow> = BTreeMap::new();
+        for mut row in list.rows {
+            row.place = u64::try_from(i128::from(row.place) + shift + i128::from(up)).unwrap_or(1);
+            rows.insert(row.place, row);
+        }
+        for mut row in std::mem::take(&mut home.rows) {
+            row.place += up;
+            // A row that one list begins with, or that follows on a hole there, need not be so.
+            if let Some(other) = rows.get(&row.place) {
+                row.forgets &= other.forgets;
+            }
+            rows.insert(row.place, row);
+        }
+        home.rows = rows.into_values().collect();
+        home.overwritten = home.overwritten.max(list.overwritten);
+        if up > 0 {
+            // Other lists' moments stay where they are.
+            self.by_moment.retain(|_, (list, _)| *list != index);
+        }
+    }
+}
+
+/// Lists whose rows have the order of their times are one. A change that is in several is there once.
+fn of_times(lists: Vec<Timed>) -> Option<Timed> {
+    let mut rows: Vec<TimedRow> = lists.into_iter().flat_map(|list| list.rows).collect();
+    rows.sort_by_key(|row| row.at_ms);
+    let mut together: Vec<TimedRow> = Vec::new();
+    for row in rows {
+        match together.last_mut().filter(|last| last.at_ms == row.at_ms) {
+            Some(last) if row.changes.iter().all(|change| last.changes.contains(change)) => {}
+            Some(last) if !row.changes.iter().any(|change| has(last, change.point)) => {
+                last.changes.extend(row.changes);
+            }
+            _ => together.push(row),
+        }
+    }
+    for (place, row) in (1..).zip(&mut together) {
+        row.place = place;
+    }
+    (!together.is_empty()).then(|| Timed { rows: together, by_time: true, ..Timed::default() })
+}
+
+fn has(row: &TimedRow, point: usize) -> bool {
+    row.changes.iter().any(|change| change.point == point)
+}

@@ -1,0 +1,462 @@
+//! Lists of other recorders: each sample is read as it is written down beside it.
+//!
+//! The samples are of our own making, in the shapes that devices write. `NAME.reading` is what a
+//! correct reader gets out of `NAME`; `SER_WRITE_EXPECTED=1` writes it anew, to be looked at.
+
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+
+use ser_evidence::record::{EntryRecord, Record};
+use ser_files::import::{
+    DateOrder, Epoch, Format, Imported, Importer, Map, Options, Read, Refusal, zone_named,
+};
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/import")
+}
+
+fn in_zone(zone: &str) -> Options {
+    Options { zone: zone_named(zone), ..Options::default() }
+}
+
+fn read_into(importer: &mut Importer, name: &str, bytes: &[u8]) -> Result<Read, Refusal> {
+    let data = Path::new(name).with_extension("dat");
+    let data = || Ok(Box::new(File::open(folder().join(data))?) as Box<dyn io::Read>);
+    importer.read("F3", bytes, data)
+}
+
+fn sample(name: &str) -> Vec<u8> {
+    fs::read(folder().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// What is read of samples of one recorder.
+fn reading(names: &[&str], options: Options) -> String {
+    let mut importer = Importer::new(options);
+    let mut text = String::new();
+    for name in names {
+        match read_into(&mut importer, name, &sample(name)) {
+            Ok(read) => told(&mut text, name, &read),
+            Err(refusal) => writeln!(text, "{name}: refused: {refusal}").unwrap(),
+        }
+    }
+    records(&mut text, &importer.finish());
+    text
+}
+
+fn told(text: &mut String, name: &str, read: &Read) {
+    let channels = read.extent.map(|extent| {
+        format!(
+            ", {} analog and {} status channels",
+            extent.analog_channels, extent.status_channels
+        )
+    });
+    writeln!(text, "{name}: {}{}", read.format, channels.unwrap_or_default()).unwrap();
+    read.notes.remarks.iter().for_each(|note| writeln!(text, "  {note}").unwrap());
+    read.notes.left_out.iter().for_each(|note| writeln!(text, "  left out: {note}").unwrap());
+}
+
+/// Entries in words, and all other records as they are written.
+fn records(text: &mut String, imported: &Imported) {
+    imported.notes.remarks.iter().for_each(|note| writeln!(text, "  {note}").unwrap());
+    imported.notes.left_out.iter().for_each(|note| writeln!(text, "  left out: {note}").unwrap());
+    let mut points = Vec::new();
+    for (recorder, record) in imported.records() {
+        match record {
+            Record::Point(point) => points.push((recorder.to_owned(), point.clone())),
+            Record::Entry(entry) => {
+                let EntryRecord { sequence, entry, known, .. } = *entry;
+                let mut changes = String::new();
+                for input in entry.changed.numbers() {
+                    let is_it = |(of, point): &&(String, ser_evidence::record::PointRecord)| {
+                        of == recorder && point.input == input
+                    };
+                    let (_, point) = points.iter().find(is_it).expect("every input has a name");
+                    let state = match (known.contains(input), entry.state.contains(input)) {
+                        (false, _) => "?",
+                        (true, true) => &point.on,
+                        (true, false) => &point.off,
+                    };
+                    write!(changes, "  {} {state}", point.name).unwrap();
+                }
+                let sequence = sequence.expect("a sequence");
+                writeln!(text, "{recorder} {sequence} {}{changes}  (known {known:?})", entry.time)
+                    .unwrap();
+            }
+            Record::Life(life) => {
+                writeln!(text, "{recorder} a life, exact {}", life.is_exact).unwrap();
+            }
+            Record::Recorder(stamps) => {
+                writeln!(text, "{recorder} UTC{:+} s", stamps.utc_offset_s).unwrap();
+            }
+            other => writeln!(text, "{recorder} {other:?}").unwrap(),
+        }
+    }
+}
+
+fn expect_reading(file: &str, names: &[&str], options: Options) {
+    let path = folder().join(file);
+    let read = reading(names, options);
+    if std::env::var_os("SER_WRITE_EXPECTED").is_some() {
+        fs::write(&path, &read).expect("written");
+    }
+    let expected = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{file}: {error}"));
+    assert_eq!(read, expected, "{file}");
+}
+
+#[test]
+fn sel_reports() {
+    expect_reading("sel-report.reading", &["sel-report.txt"], in_zone("America/Chicago"));
+    let ymd = Options { dates: Some(DateOrder::Ymd), ..in_zone("UTC") };
+    expect_reading("sel-newest-first.reading", &["sel-newest-first.txt"], ymd);
+    expect_reading("sel-empty.reading", &["sel-empty.txt"], Options::default());
+    expect_reading("sel-551-shape.reading", &["sel-551-shape.txt"], in_zone("UTC"));
+}
+
+#[test]
+fn sel_compressed_lists() {
+    expect_reading("sel-compressed.reading", &["sel-compressed.txt"], in_zone("America/Chicago"));
+    expect_reading("sel-compressed-empty.reading", &["sel-compressed-empty.txt"], in_zone("UTC"));
+}
+
+#[test]
+fn cytime_logs() {
+    let local = Options { epoch: Some(Epoch::Local1984), ..in_zone("UTC") };
+    let posix = || Options { epoch: Some(Epoch::Posix), ..Options::default() };
+    let files = ["cytime-last.json", "cytime-verbose.json"];
+    expect_reading("cytime-verbose.reading", &files, local);
+    expect_reading("cytime-posix-verbose.reading", &["cytime-posix-verbose.json"], posix());
+    expect_reading("cytime-posix-short.reading", &["cytime-posix-short.json"], posix());
+}
+
+#[test]
+fn csv_for_prc_002() {
+    expect_reading("prc-002.reading", &["prc-002.csv"], Options::default());
+}
+
+#[test]
+fn comtrade_records() {
+    for name in ["comtrade-1999", "comtrade-1999-binary"] {
+        let (reading, cfg) = (format!("{name}.reading"), format!("{name}.cfg"));
+        expect_reading(&reading, &[&cfg], in_zone("America/Chicago"));
+    }
+    expect_reading("comtrade-1991.reading", &["comtrade-1991.cfg"], in_zone("UTC"));
+    for name in ["comtrade-2013-float.cfg", "comtrade-ascii.cff", "comtrade-binary.cff"] {
+        let reading = Path::new(name).with_extension("reading");
+        expect_reading(reading.to_str().expect("text"), &[name], Options::default());
+    }
+    expect_reading("comtrade-liberties.reading", &["comtrade-liberties.cfg"], in_zone("UTC"));
+}
+
+/// All samples that are read without the user saying more than a zone.
+const SAMPLES: [(&str, Format); 13] = [
+    ("sel-report.txt", Format::SelSer),
+    ("sel-newest-first.txt", Format::SelSer),
+    ("sel-empty.txt", Format::SelSer),
+    ("sel-compressed.txt", Format::SelCser),
+    ("sel-compressed-empty.txt", Format::SelCser),
+    ("cytime-verbose.json", Format::Cytime),
+    ("cytime-posix-short.json", Format::Cytime),
+    ("cytime-last.json", Format::Cytime),
+    ("prc-002.csv", Format::Prc002),
+    ("comtrade-1999.cfg", Format::Comtrade),
+    ("comtrade-liberties.cfg", Format::Comtrade),
+    ("comtrade-ascii.cff", Format::Comtrade),
+    ("comtrade-binary.cff", Format::Comtrade),
+];
+
+fn sure() -> Options {
+    let (dates, epoch) = (Some(DateOrder::Ymd), Some(Epoch::Local1984));
+    Options { dates, epoch, ..in_zone("UTC") }
+}
+
+#[test]
+fn the_format_is_known_by_the_content() {
+    for (name, format) in SAMPLES {
+        let head = sample(name);
+        assert_eq!(Format::of(&head), Some(format), "{name}");
+    }
+    assert_eq!(
+        Format::of(b"{\"record\":\"file\",\"schema\":1,\"program\":\"x\"}\n"),
+        Some(Format::Jsonl)
+    );
+    assert_eq!(Format::of(b"entry,time,input,state\n"), Some(Format::Csv));
+    for none in [&b""[..], b"\n", b"hello", b"1,2,3,4\n", b"ms,input,state\n1,1,1\n"] {
+        assert_eq!(Format::of(none), None, "{none:?}");
+    }
+}
+
+#[test]
+fn what_is_not_known_is_asked_for() {
+    let read = |name: &str, options: Options| {
+        let mut importer = Importer::new(options);
+        read_into(&mut importer, name, &sample(name)).map(|read| read.format)
+    };
+    assert!(matches!(read("sel-report.txt", Options::default()), Err(Refusal::NoZone)));
+    assert!(matches!(read("comtrade-1999.cfg", Options::default()), Err(Refusal::NoZone)));
+    let refused = read("sel-newest-first.txt", in_zone("UTC"));
+    let Err(Refusal::NoDates { example, possible }) = refused else { panic!("{refused:?}") };
+    assert_eq!((example.as_str(), possible), ("27/03/04", vec![DateOrder::Dmy, DateOrder::Ymd]));
+    assert!(matches!(read("cytime-verbose.json", in_zone("UTC")), Err(Refusal::NoEpoch)));
+    let data = read("comtrade-1999.dat", in_zone("UTC"));
+    assert!(matches!(data, Err(Refusal::NoConfiguration)), "{data:?}");
+    let mut importer = Importer::new(in_zone("UTC"));
+    let alone = read_into(&mut importer, "not-there.cfg", &sample("comtrade-1999.cfg"));
+    assert!(matches!(alone, Err(Refusal::NoData(_))), "{alone:?}");
+}
+
+fn written(imported: &Imported) -> String {
+    let mut out = Vec::new();
+    imported.write(&mut out, "ser-cli").expect("memory has room");
+    String::from_utf8(out).expect("JSON is UTF-8")
+}
+
+fn imported(files: &[&[u8]], options: Options) -> Imported {
+    let mut importer = Importer::new(options);
+    for bytes in files {
+        read_into(&mut importer, "comtrade-1999.cfg", bytes).expect("it can be read");
+    }
+    importer.finish()
+}
+
+#[test]
+fn the_encoding_and_the_ends_of_lines_change_nothing() {
+    for name in ["sel-report.txt", "sel-newest-first.txt", "prc-002.csv", "comtrade-1999.cfg"] {
+        let text = String::from_utf8(sample(name)).expect("UTF-8");
+        let expected = written(&imported(&[text.as_bytes()], sure_for(name)));
+        assert!(expected.contains("\"entry\""), "{name}");
+        let utf16 = |order: fn(u16) -> [u8; 2]| {
+            ["\u{FEFF}", &text].concat().encode_utf16().flat_map(order).collect::<Vec<u8>>()
+        };
+        for other in [
+            text.replace("\r\n", "\n").into_bytes(),
+            text.replace("\r\n", "\r").into_bytes(),
+            ["\u{FEFF}", &text].concat().into_bytes(),
+            utf16(u16::to_le_bytes),
+            utf16(u16::to_be_bytes),
+        ] {
+            assert_eq!(written(&imported(&[&other], sure_for(name))), expected, "{name}");
+        }
+    }
+    let bare: Vec<u8> = "=>SER\r\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    assert!(matches!(read_into(&mut Importer::new(sure()), "", &bare), Err(Refusal::Utf16)));
+}
+
+fn sure_for(name: &str) -> Options {
+    match name {
+        "sel-newest-first.txt" => sure(),
+        _ => Options { dates: None, ..sure() },
+    }
+}
+
+#[test]
+fn what_is_in_several_files_is_there_once() {
+    let text = String::from_utf8(sample("sel-report.txt")).expect("UTF-8");
+    let options = || in_zone("UTC");
+    let whole = written(&imported(&[text.as_bytes()], options()));
+    let twice = imported(&[text.as_bytes(), text.as_bytes()], options());
+    assert_eq!(written(&twice), whole);
+
+    // A week later two rows are new, and the numbers of all others are larger by two.
+    let rows: Vec<&str> = text.lines().collect();
+    let is_row = |line: &&&str| line.starts_with(|letter: char| letter.is_ascii_digit());
+    let own = |range: std::ops::Range<usize>, up: u64| -> String {
+        let head = rows.iter().filter(|line| line.starts_with('#')).map(|line| (*line).to_owned());
+        let kept = rows.iter().filter(is_row).skip(range.start).take(range.len()).map(|line| {
+            let (number, rest) = line.split_once(' ').expect("a number");
+            format!("{} {rest}", number.parse::<u64>().expect("a number") - up)
+        });
+        head.chain(kept).collect::<Vec<_>>().join("\n")
+    };
+    let all = own(0..9, 0);
+    let (early, late) = (own(0..5, 5), own(3..9, 0));
+    let expected = written(&imported(&[all.as_bytes()], options()));
+    for order in [[&early, &late], [&late, &early]] {
+        let order: Vec<&[u8]> = order.iter().map(|text| text.as_bytes()).collect();
+        assert_eq!(written(&imported(&order, options())), expected);
+    }
+    // Lists that share nothing are two lives: nobody knows what was between them.
+    let apart = [own(0..3, 5), own(5..9, 0)];
+    let apart = imported(&[apart[0].as_bytes(), apart[1].as_bytes()], options());
+    let lives = apart.records().filter(|(_, record)| matches!(record, Record::Life(_))).count();
+    assert_eq!(lives, 2);
+}
+
+/// A record of so many channels, each of which goes on five milliseconds after the one before.
+fn wide(channels: usize) -> String {
+    let mut text = format!("--- file type: CFG ---\nOAK,FR,2013\n{channels},0A,{channels}D\n");
+    for channel in 1..=channels {
+        writeln!(text, "{channel},point {channel},,,0").unwrap();
+    }
+    let samples = channels + 1;
+    writeln!(
+        text,
+        "60\n0\n0,{samples}\n14/03/2027,00:00:00.000000\n14/03/2027,00:00:00.000000\nASCII\n1\n0,0\n0,0\n\
+         --- file type: DAT ASCII ---"
+    )
+    .unwrap();
+    for sample in 1..=samples {
+        write!(text, "{sample},{}", sample * 5000).unwrap();
+        (1..=channels).for_each(|channel| write!(text, ",{}", u8::from(channel < sample)).unwrap());
+        text.push('\n');
+    }
+    text
+}
+
+#[test]
+fn more_points_than_inputs_become_several_recorders_of_one_clock() {
+    let imported = imported(&[wide(70).as_bytes()], Options::default());
+    let names: Vec<&str> = imported.recorders.iter().map(|recorder| &*recorder.name).collect();
+    assert_eq!(names, ["F3", "F3 (2)", "F3 (3)"]);
+    let points: Vec<u64> = imported.recorders.iter().map(|recorder| recorder.points).collect();
+    assert_eq!(points, [32, 32, 6]);
+    assert!(imported.notes.remarks.iter().any(|note| note.why.contains("are one clock")));
+    // The evidence knows their order although nobody ever observed the clock.
+    let mut collector = ser_evidence::history::Collector::new();
+    imported.records().for_each(|(recorder, record)| collector.add(recorder, record));
+    let mut site = ser_evidence::site::Site::unknown();
+    assert_eq!(collector.name_inputs(&mut site), []);
+    let history = collector.finish(&site);
+    let timeline = ser_evidence::timeline::Timeline::new(&site, &history);
+    let mut list = Vec::new();
+    ser_files::merged::write_csv(&mut list, &timeline).expect("memory has room");
+    let list = String::from_utf8(list).expect("UTF-8");
+    assert_eq!(list.lines().count(), 71, "{list}");
+    let gaps: usize = history.recorders.iter().flat_map(|r| &r.lives).map(|l| l.gaps.len()).sum();
+    assert_eq!(gaps, 0);
+    let which = ser_evidence::incident::Which::Last;
+    let incident = ser_evidence::incident::Incident::pick(&timeline, which).expect("an incident");
+    let report = ser_evidence::incident::Report::new(&timeline, incident);
+    let document = ser_files::report::Document {
+        timeline: &timeline,
+        report: &report,
+        program: "test",
+        site_digest: None,
+        not_reached: &[],
+        unfold: true,
+    };
+    let mut json = Vec::new();
+    ser_files::report::write_json(&mut json, &document).expect("memory has room");
+    let json: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
+    let rows = json["sequence"].as_array().expect("rows");
+    assert_eq!(rows.len(), 70);
+    for (place, row) in rows.iter().enumerate().skip(1) {
+        assert_eq!(row["order_to_previous"], "before", "{place}: {row}");
+        assert_eq!(row["point"], format!("point {}", place + 1));
+    }
+}
+
+#[test]
+fn a_map_fixes_inputs_and_words() {
+    let map = Map::parse(
+        "[[point]]\nfrom = \"52A\"\ninput = 1\n[[point]]\nfrom = \"86 T2\"\nrecorder = \"LO\"\n\
+         input = 9\noff = \"LOCKED\"\n",
+        None,
+    )
+    .expect("a map");
+    let imported = imported(&[&sample("sel-report.txt")], Options { map, ..in_zone("UTC") });
+    let points: Vec<String> = imported
+        .records()
+        .filter_map(|(recorder, record)| match record {
+            Record::Point(point) => Some(format!(
+                "{recorder} {} {} {}/{}",
+                point.input, point.name, point.on, point.off
+            )),
+            _ => None,
+        })
+        .collect();
+    assert!(points.contains(&"F3 1 52A Asserted/Deasserted".to_owned()), "{points:?}");
+    assert!(points.contains(&"LO 9 86 T2 not LOCKED/LOCKED".to_owned()), "{points:?}");
+    assert_eq!(points.iter().filter(|point| point.starts_with("F3 1 ")).count(), 1);
+}
+
+#[test]
+fn whatever_the_length_memory_and_time_are_bounded() {
+    const LONG: u64 = 200 << 20;
+    for (format, head) in [
+        (Format::SelSer, &b"#  DATE  TIME\n1  "[..]),
+        (Format::SelCser, b"\"FID\",\"0143\"\n\""),
+        (Format::Prc002, b"Date,Time,Local Time Code,Substation,Device,State\n"),
+        (Format::Comtrade, b"OAK,FR,2013\n1,0A,1D\n1,"),
+    ] {
+        let long = io::Cursor::new(head).chain(io::repeat(b'x').take(LONG));
+        let mut importer = Importer::new(Options { format: Some(format), ..sure() });
+        let read = importer.read("F3", long, || Err(io::ErrorKind::NotFound.into()));
+        match read {
+            Ok(read) => assert!(read.notes.left_out[0].why.contains("longer than"), "{format}"),
+            Err(refusal) => assert!(matches!(refusal, Refusal::Damaged { .. }), "{refusal}"),
+        }
+    }
+    let long = io::Cursor::new(b"{\"events\": [").chain(io::repeat(b' ').take(LONG));
+    let read = Importer::new(sure()).read("F3", long, || Err(io::ErrorKind::NotFound.into()));
+    assert!(matches!(read, Err(Refusal::TooMuch { .. })));
+    let (row, head) = (b"14/03/2027\n".repeat(1000), &b"OAK,FR,2013\n"[..]);
+    let long = io::Cursor::new([head, &row].concat()).chain(io::repeat(b'\n').take(LONG));
+    let options = Options { format: Some(Format::Comtrade), ..sure() };
+    let read = Importer::new(options).read("F3", long, || Err(io::ErrorKind::NotFound.into()));
+    assert!(matches!(read, Err(Refusal::TooMuch { .. })));
+}
+
+mod anything {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A sample, and what is done to it.
+    fn torn() -> impl Strategy<Value = (usize, Vec<(usize, Vec<u8>, usize)>)> {
+        let edit = (any::<usize>(), proptest::collection::vec(any::<u8>(), 0..6), 0_usize..12);
+        (0..SAMPLES.len(), proptest::collection::vec(edit, 1..8))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 1500, ..ProptestConfig::default() })]
+
+        #[test]
+        fn a_damaged_sample_is_read_or_refused_and_what_is_written_can_be_read(
+            (place, edits) in torn(), doubt_ms: Option<u8>,
+        ) {
+            let (name, format) = SAMPLES[place];
+            let mut bytes = sample(name);
+            for (at, new, gone) in edits {
+                let at = at % (bytes.len() + 1);
+                let end = (at + gone).min(bytes.len());
+                bytes.splice(at..end, new);
+            }
+            let options =
+                Options { format: Some(format), doubt_ms: doubt_ms.map(Into::into), dates: None, ..sure() };
+            check(name, &bytes, options);
+        }
+
+        #[test]
+        fn any_bytes_are_read_or_refused(
+            bytes in proptest::collection::vec(any::<u8>(), 0..300), place in 0..SAMPLES.len(),
+        ) {
+            check("comtrade-1999.cfg", &bytes, Options { format: Some(SAMPLES[place].1), ..sure() });
+            check("comtrade-1999.cfg", &bytes, sure());
+        }
+    }
+
+    fn check(name: &str, bytes: &[u8], options: Options) {
+        let mut importer = Importer::new(options.clone());
+        let read = read_into(&mut importer, name, bytes);
+        let imported = importer.finish();
+        if read.is_err() {
+            return;
+        }
+        let text = written(&imported);
+        let mut twice = Importer::new(options);
+        for _ in 0..2 {
+            read_into(&mut twice, name, bytes).expect("it was read once");
+        }
+        assert_eq!(written(&twice.finish()), text);
+        let again = ser_files::jsonl::Reader::new(text.as_bytes(), "F3");
+        let again = again.map(|told| told.expect("what was written can be read"));
+        let again: Vec<_> = again.map(|told| (told.recorder, told.record)).collect();
+        let made: Vec<_> = imported
+            .records()
+            .map(|(recorder, record)| (recorder.to_owned(), record.clone()))
+            .collect();
+        assert_eq!(again, made);
+    }
+}

@@ -1,0 +1,187 @@
+//! `import`: lists of other recorders and relays become files that `report` and `merge` take.
+
+mod files;
+mod outlet;
+mod telling;
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use ser_files::import::{DateOrder, Epoch, Format, Importer, Map, Options, zone_named};
+
+use crate::connection::ConnectionArgs;
+use crate::error::{Failure, Result};
+use crate::site_file;
+
+const EXAMPLES: &str = "\
+Examples:
+  ser-cli import f3.txt --zone Europe/Berlin -o f3.jsonl
+  ser-cli import f3.txt --zone -06:00 --dates mdy -o f3.jsonl
+  ser-cli import monday.txt tuesday.txt --recorder F3 --zone UTC -o f3.jsonl
+  ser-cli import record.cfg -o record.jsonl     COMTRADE, with record.dat
+  ser-cli import f3.txt --zone UTC --map f3.toml -o f3.jsonl
+  ser-cli report --site plant.toml --input f3.jsonl ours.jsonl
+
+The format is known by the content. What a list does not say is asked for and never guessed: its \
+time zone, the order of its dates. A line that is not understood is told with its reason, and the \
+rest is read. What each format holds, and what is lost, is in docs/formats.md.
+A map gives a name of the list an input, or a point of the site file (--site), and says which of its \
+words means on:
+  [[point]]
+  from = \"87T\"
+  input = 3
+  on = \"TRIPPED\"";
+
+/// Make the list of a relay or of another recorder a file for `report` and `merge`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Args {
+    /// The files. All files of one recorder belong into one import, with --recorder: what is in
+    /// several of them is there once.
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+
+    /// The format of the files.
+    #[arg(long, value_enum, default_value_t)]
+    format: GivenFormat,
+
+    /// The file to write; standard output if not given, or with -.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+
+    /// Overwrite the file if it exists.
+    #[arg(long, requires = "output")]
+    force: bool,
+
+    /// The time zone of times without one: Europe/Berlin, UTC, +05:30.
+    #[arg(long, value_name = "ZONE", value_parser = parse_zone, allow_hyphen_values = true)]
+    zone: Option<jiff::tz::TimeZone>,
+
+    /// The order of dates, where they leave it open.
+    #[arg(long, value_enum)]
+    dates: Option<Dates>,
+
+    /// From when `CyTime` counts seconds: 1970 in UTC if /posix/ was in the address, else 1984 in local
+    /// time.
+    #[arg(long, value_enum)]
+    epoch: Option<GivenEpoch>,
+
+    /// How far the clock may have been from UTC, in milliseconds. Without it nothing is known.
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(0..=86_400_000))]
+    doubt_ms: Option<u32>,
+
+    /// A file that says which input a name is, and what its words mean; see below.
+    #[arg(long, value_name = "FILE")]
+    map: Option<PathBuf>,
+
+    /// End with exit code 3 if a line was not understood.
+    #[arg(long)]
+    fail_on_loss: bool,
+}
+
+/// The format of a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum GivenFormat {
+    /// By the content.
+    #[default]
+    Auto,
+    /// CSV of ser-cli.
+    Csv,
+    /// JSON lines of ser-cli.
+    Jsonl,
+    /// What the command SER of an SEL relay prints.
+    SelSer,
+    /// What the command CSER of an SEL relay gives.
+    SelCser,
+    /// Answers of a `CyTime` recorder's web server.
+    Cytime,
+    /// A .cfg with its .dat beside it, or a .cff.
+    Comtrade,
+    /// CSV as asked for with NERC PRC-002.
+    Prc002,
+}
+
+/// The order of dates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Dates {
+    /// Month, day, year.
+    Mdy,
+    /// Day, month, year.
+    Dmy,
+    /// Year, month, day.
+    Ymd,
+}
+
+/// From when seconds count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum GivenEpoch {
+    /// 1970, in UTC.
+    Posix,
+    /// 1984, in the recorder's local time.
+    #[value(name = "1984")]
+    Local1984,
+}
+
+fn parse_zone(text: &str) -> std::result::Result<jiff::tz::TimeZone, String> {
+    zone_named(text).ok_or_else(|| {
+        "no time zone like Europe/Berlin or UTC, and no offset like +05:30".to_owned()
+    })
+}
+
+pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
+    let outlet = outlet::Outlet::of(args.output.as_deref(), args.force)?;
+    let mut importer = Importer::new(options(args, connection)?);
+    let files = files::without_data(&args.files);
+    let mut left_out = 0;
+    for path in &files {
+        let read = files::read(&mut importer, path, connection.recorder.as_deref())?;
+        left_out += read.notes.left_out_count;
+        telling::file(path, &read);
+    }
+    let imported = importer.finish();
+    left_out += imported.notes.left_out_count;
+    telling::all(&imported, left_out);
+    if imported.records().next().is_none() {
+        return Err(Failure::new("there is nothing in these files that could be written")
+            .hint("is the list empty? Then there is nothing to import")
+            .hint("--format says what the files are, if they were taken for something else"));
+    }
+    outlet.write(&imported)?;
+    match left_out {
+        1.. if args.fail_on_loss => Err(Failure::incomplete("not all lines were understood")),
+        _ => Ok(()),
+    }
+}
+
+fn options(args: &Args, connection: &ConnectionArgs) -> Result<Options> {
+    let site = connection.site.as_deref().filter(|_| args.map.is_some());
+    let site = site.map(site_file::load).transpose()?;
+    let map = match &args.map {
+        Some(path) => files::map(path, site.as_ref())?,
+        None => Map::default(),
+    };
+    Ok(Options {
+        format: match args.format {
+            GivenFormat::Auto => None,
+            GivenFormat::Csv => Some(Format::Csv),
+            GivenFormat::Jsonl => Some(Format::Jsonl),
+            GivenFormat::SelSer => Some(Format::SelSer),
+            GivenFormat::SelCser => Some(Format::SelCser),
+            GivenFormat::Cytime => Some(Format::Cytime),
+            GivenFormat::Comtrade => Some(Format::Comtrade),
+            GivenFormat::Prc002 => Some(Format::Prc002),
+        },
+        zone: args.zone.clone(),
+        dates: args.dates.map(|dates| match dates {
+            Dates::Mdy => DateOrder::Mdy,
+            Dates::Dmy => DateOrder::Dmy,
+            Dates::Ymd => DateOrder::Ymd,
+        }),
+        epoch: args.epoch.map(|epoch| match epoch {
+            GivenEpoch::Posix => Epoch::Posix,
+            GivenEpoch::Local1984 => Epoch::Local1984,
+        }),
+        doubt_ms: args.doubt_ms,
+        map,
+    })
+}

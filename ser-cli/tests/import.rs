@@ -1,0 +1,196 @@
+//! `import` as a user asks for it, and what is told, letter by letter.
+//!
+//! `tests/import/CASE.stderr` is what stands on standard error; `SER_WRITE_EXPECTED=1` writes it
+//! anew, for a person to review.
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use common::ser_cli;
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/import")
+}
+
+fn run(arguments: &str) -> Output {
+    let words = arguments.split_whitespace();
+    ser_cli().current_dir(folder()).args(words).output().expect("ser-cli runs")
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).expect("UTF-8")
+}
+
+/// Name, command line, exit code.
+const CASES: [(&str, &str, i32); 14] = [
+    ("relay", "import relay.txt --zone America/Chicago", 0),
+    ("damaged", "import relay.txt --zone America/Chicago --fail-on-loss", 3),
+    ("no-zone", "import relay.txt", 1),
+    ("no-dates", "import open-dates.txt --zone UTC", 1),
+    ("no-epoch", "import --format cytime events.json", 1),
+    ("unknown", "import unknown.csv", 1),
+    ("not-there", "import nowhere.txt", 1),
+    ("folder", "import .", 1),
+    ("data-alone", "import vendor.dat --zone UTC", 1),
+    ("comtrade", "import vendor.cfg vendor.dat --zone UTC", 0),
+    ("wrong-map", "import relay.txt --zone UTC --map wrong-map.toml --site plant.toml", 1),
+    ("map-without-site", "import relay.txt --zone UTC --map map.toml", 1),
+    ("map", "import relay.txt --zone UTC --map map.toml --site plant.toml", 0),
+    ("empty", "import empty.txt --zone UTC", 1),
+];
+
+#[test]
+fn what_is_told_is_told_letter_by_letter() {
+    for (case, arguments, code) in CASES {
+        let output = run(arguments);
+        let expected = folder().join(format!("{case}.stderr"));
+        if std::env::var_os("SER_WRITE_EXPECTED").is_some() {
+            fs::write(&expected, &output.stderr).expect("a text");
+        }
+        let told = text(&output.stderr);
+        assert_eq!(told, fs::read_to_string(&expected).unwrap_or_default(), "{case}");
+        assert_eq!(output.status.code(), Some(code), "{case}: {told}");
+        assert_eq!(output.stdout.is_empty(), code == 1, "{case}");
+    }
+}
+
+/// A folder with the list of the relay, imported.
+fn desk(arguments: &str) -> TempDir {
+    let desk = tempfile::tempdir().expect("a folder");
+    let output = desk.path().join("relay.jsonl");
+    let arguments =
+        format!("import relay.txt --zone America/Chicago {arguments} -o {}", output.display());
+    let run = run(&arguments);
+    assert_eq!(run.status.code(), Some(0), "{}", text(&run.stderr));
+    assert!(run.stdout.is_empty());
+    desk
+}
+
+fn report(desk: &TempDir, arguments: &str) -> String {
+    let imported = desk.path().join("relay.jsonl");
+    let arguments = format!(
+        "report --site plant.toml --input {} --input ours.jsonl {arguments}",
+        imported.display()
+    );
+    let run = run(&arguments);
+    assert_eq!(run.status.code(), Some(0), "{}", text(&run.stderr));
+    text(&run.stdout).to_owned()
+}
+
+#[test]
+fn the_list_of_a_relay_and_ours_are_one_timeline() {
+    let desk = desk("--doubt-ms 2");
+    let json: Value = serde_json::from_str(&report(&desk, "--format json")).expect("JSON");
+    let rows = json["sequence"].as_array().expect("rows");
+    let told: Vec<String> = rows
+        .iter()
+        .map(|row| {
+            let word = |key: &str| row[key].as_str().unwrap_or("-").to_owned();
+            format!(
+                "{} {} {} {}",
+                word("recorder"),
+                word("point"),
+                word("state"),
+                word("order_to_previous")
+            )
+        })
+        .collect();
+    assert_eq!(
+        told,
+        [
+            "relay 51P1T Asserted -",
+            // The relay's own rows are in the order of its list.
+            "relay TRIP COIL 1 ENERGIZED before",
+            // A millisecond later by another clock: nobody knows.
+            "SER1 trip coil ON unknown",
+            "relay 52A Deasserted before",
+            "relay 52B Asserted before",
+            // Ten milliseconds are more than what is doubtful about both clocks.
+            "SER1 52-7 closed OFF before",
+            "relay TRIP COIL 1 CALM before",
+            "relay 51P1T Deasserted before",
+            "SER1 trip coil OFF before",
+            "relay Relay Settings Changed event before",
+        ]
+    );
+    assert_eq!(
+        rows[0]["shown"], "2027-03-14T19:29:58.080",
+        "UTC, whatever the site says of clocks"
+    );
+    assert_eq!(rows[2]["shown"], "2027-03-14T14:29:58.105");
+    let told = report(&desk, "");
+    assert!(told.contains("first-out  51P1T Asserted (relay), 14:29:58.080"), "{told}");
+    assert!(told.contains("52-7 opened"), "{told}");
+    assert!(told.contains("order unknown within"), "{told}");
+}
+
+#[test]
+fn a_clock_of_which_nothing_is_said_orders_nothing() {
+    let desk = desk("");
+    let told = report(&desk, "");
+    assert!(told.contains("first-out  not certain"), "{told}");
+    assert!(told.contains("never observed"), "{told}");
+}
+
+#[test]
+fn what_is_imported_twice_is_there_once() {
+    let desk = desk("--doubt-ms 2");
+    let imported = desk.path().join("relay.jsonl");
+    let once = report(&desk, "");
+    assert_eq!(report(&desk, &format!("--input {}", imported.display())), once);
+    // All records survive a merge.
+    let merge =
+        format!("merge --site plant.toml --input {} ours.jsonl --format jsonl", imported.display());
+    let merged = run(&merge);
+    assert_eq!(merged.status.code(), Some(0), "{}", text(&merged.stderr));
+    fs::write(&imported, &merged.stdout).expect("a file");
+    assert_eq!(report(&desk, ""), once);
+}
+
+#[test]
+fn names_that_do_not_belong_together_are_told() {
+    let desk = desk("");
+    let other = desk.path().join("other.jsonl");
+    let line = "{\"record\":\"point\",\"recorder\":\"relay\",\"input\":1,\"name\":\"A\",\"on\":\"ON\",\"off\":\"OFF\"}\n";
+    fs::write(&other, line).expect("a file");
+    let imported = desk.path().join("relay.jsonl");
+    let run = run(&format!("merge --input {} {}", imported.display(), other.display()));
+    let told = text(&run.stderr);
+    assert!(told.contains("relay: one file calls input 1 \"51P1T\" and another \"A\""), "{told}");
+    assert!(told.contains("import all files of one recorder at once"), "{told}");
+}
+
+#[test]
+fn a_file_is_whole_or_not_there_and_none_is_overwritten_by_mistake() {
+    let desk = desk("");
+    let output = desk.path().join("relay.jsonl");
+    let first = fs::read(&output).expect("a file");
+    let again = format!("import relay.txt --zone UTC -o {}", output.display());
+    let refused = run(&again);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(text(&refused.stderr).contains("exists, and is not overwritten"));
+    assert_eq!(fs::read(&output).expect("a file"), first);
+    // Nothing is left of an import that fails, not even with --force.
+    let failed = run(&format!("import relay.txt -o {} --force", output.display()));
+    assert_eq!(failed.status.code(), Some(1));
+    assert_eq!(fs::read(&output).expect("a file"), first);
+    assert_eq!(run(&format!("{again} --force")).status.code(), Some(0));
+    assert_ne!(fs::read(&output).expect("a file"), first);
+    let names: Vec<_> = fs::read_dir(desk.path()).expect("a folder").collect();
+    assert_eq!(names.len(), 1, "{names:?}");
+    let to_stdout = run("import relay.txt --zone UTC -o -");
+    assert_eq!(to_stdout.stdout, fs::read(&output).expect("a file"));
+}
+
+#[test]
+fn our_own_files_pass_through() {
+    let run = run("import ours.jsonl");
+    let expected = fs::read_to_string(folder().join("ours.jsonl")).expect("a file");
+    let lines = |text: &str| text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(lines(text(&run.stdout)), lines(&expected));
+}
