@@ -26,6 +26,11 @@ pub(crate) fn evidence_mistakes() -> PathBuf {
     host_target().join("evidence-mistakes")
 }
 
+/// Where packages for Python are, which read what is exported. Tests look for them there.
+pub(crate) fn python_readers() -> PathBuf {
+    host_target().join("readers")
+}
+
 /// Where the firmware is built. The folder is separate because the compiler may be another one.
 pub(crate) fn firmware_target() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {
