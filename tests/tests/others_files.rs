@@ -40,7 +40,7 @@ const CALLS: [&str; 26] = [
 ];
 
 /// File, call, how often, and why that is right.
-const JUDGED: [(&str, &str, usize, &str); 38] = [
+const JUDGED: [(&str, &str, usize, &str); 39] = [
     (
         "crates/geni-board/src/mapped_ram.rs",
         "map_raw(",
@@ -219,6 +219,7 @@ const JUDGED: [(&str, &str, usize, &str); 38] = [
     ("xtask/src/evidence_mistakes/copy.rs", "fs::write(", 3, "in the build folder"),
     ("xtask/src/evidence_mistakes/copy.rs", "remove_dir_all(", 1, "in the build folder"),
     ("xtask/src/setup/apt.rs", "File::create(", 1, "in the build folder"),
+    ("xtask/src/setup/programs.rs", "fs::write(", 1, "in the build folder"),
     (
         "xtask/src/setup/apt.rs",
         "append(true)",

@@ -47,9 +47,10 @@ pub(crate) fn host(strict: bool) -> Result<()> {
         heading("Clippy");
         let deny = ["--", "-D", "warnings"];
         steps::run(steps::cargo().args(["clippy", "--workspace", "--all-targets"]).args(deny))?;
-        steps::run(
-            steps::cargo().args(["clippy", "--package", "xtask", "--features", "log"]).args(deny),
-        )?;
+        for (package, feature) in [("xtask", "log"), ("ser-cli", "parquet")] {
+            let with = ["clippy", "--package", package, "--features", feature, "--all-targets"];
+            steps::run(steps::cargo().args(with).args(deny))?;
+        }
     }
 
     heading("Documentation");

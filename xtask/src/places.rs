@@ -26,6 +26,16 @@ pub(crate) fn evidence_mistakes() -> PathBuf {
     host_target().join("evidence-mistakes")
 }
 
+/// Where packages for Python are, which read what is exported. Tests look for them there.
+pub(crate) fn python_readers() -> PathBuf {
+    host_target().join("readers")
+}
+
+/// Where the package is that judges pages. The test looks for it there.
+pub(crate) fn axe_core() -> PathBuf {
+    host_target().join("axe")
+}
+
 /// Where the firmware is built. The folder is separate because the compiler may be another one.
 pub(crate) fn firmware_target() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {

@@ -56,6 +56,7 @@ fn everything(demand: Demand) -> Result<()> {
         return Err(missing);
     }
     tests(demand, &checked)?;
+    optional_parts()?;
     evidence_mistakes::all("")
 }
 
@@ -92,6 +93,15 @@ fn tests(demand: Demand, images: &[Checked]) -> Result<()> {
         tests.env(PLUGIN_VARIABLE, plugin);
     }
     steps::run(&mut tests)
+}
+
+/// What a plain build leaves out.
+fn optional_parts() -> Result<()> {
+    heading("Tests of Parquet, which a plain build does not have");
+    let mut tests = steps::cargo();
+    tests.args(["test", "--package", "ser-cli", "--features", "parquet"]);
+    tests.args(["--test", "other_readers", "--", "--include-ignored", "parquet"]);
+    steps::run(tests.args(programs::skipped()))
 }
 
 /// All tests except those whose programs are missing.

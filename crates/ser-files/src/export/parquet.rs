@@ -17,10 +17,9 @@ use parquet::file::writer::{
 };
 use parquet::schema::parser::parse_message_type;
 use ser_evidence::history::Held;
-use ser_evidence::incident::Points;
-use ser_evidence::record::{Lost, Why};
+use ser_evidence::record::{Gap, Lost, Why};
 use ser_evidence::time::Moment;
-use ser_evidence::timeline::{ChangeId, EventId, Item, Timeline};
+use ser_evidence::timeline::{EventId, Item, Timeline};
 
 use super::axis::doubt_us;
 use super::counted::Counted;
@@ -92,6 +91,11 @@ fn written(
             rows.write(&mut file)?;
         }
     }
+    for (history, recorder) in timeline.history().recorders.iter().zip(0..) {
+        if history.is_not_reached {
+            rows.not_reached(recorder);
+        }
+    }
     rows.write(&mut file)?;
     file.close()?;
     Ok(counted)
@@ -146,9 +150,13 @@ impl<T> Column<T> {
     }
 }
 
+/// The name of a point, and what off and on mean.
+type PointTexts = (ByteArray, [ByteArray; 2]);
+
 /// The rows that are held.
 struct Rows {
-    points: Points,
+    /// By recorder and input: the name, and what off and on mean.
+    points: Vec<Vec<Option<PointTexts>>>,
     is_after_set: bool,
     /// By recorder: its name, and those of its lives.
     names: Vec<(ByteArray, Vec<ByteArray>)>,
@@ -194,7 +202,7 @@ impl Rows {
             (text(&names::harmless(&history.recorder.name)), lives.collect())
         });
         Rows {
-            points: Points::new(timeline),
+            points: points(timeline),
             is_after_set: false,
             names: names.collect(),
             kind: Vec::new(),
@@ -241,11 +249,11 @@ impl Rows {
             loss: None,
         };
         if entry.changed.is_empty() {
-            self.row(timeline, event, &common, None);
+            self.row(event, &common, None);
         }
         for input in entry.changed.numbers() {
             let change = (input, entry.state.contains(input));
-            self.row(timeline, event, &common, Some(change));
+            self.row(event, &common, Some(change));
         }
     }
 
@@ -258,21 +266,27 @@ impl Rows {
             loss: Some((gap.lost, gap.why)),
             ..Common::default()
         };
-        self.row(timeline, event, &common, None);
+        self.row(event, &common, None);
     }
 
-    fn row(
-        &mut self,
-        timeline: &Timeline<'_>,
-        event: EventId,
-        common: &Common,
-        change: Option<(u8, bool)>,
-    ) {
+    /// A recorder that nobody could read.
+    fn not_reached(&mut self, recorder: u32) {
+        let Gap { lost, why, .. } = Gap::NOT_REACHED;
+        let common = Common { kind: "loss", loss: Some((lost, why)), ..Common::default() };
+        // It has no life.
+        self.row(EventId { recorder, life: u32::MAX, place: 0 }, &common, None);
+    }
+
+    fn row(&mut self, event: EventId, common: &Common, change: Option<(u8, bool)>) {
         let of_recorder = self.names.get(event.recorder as usize);
         let recorder = of_recorder.map(|(name, _)| name.clone()).unwrap_or_default();
         let life = of_recorder.and_then(|(_, lives)| lives.get(event.life as usize).cloned());
-        let point = change.and_then(|(input, _)| self.points.of(ChangeId { event, input }));
-        let text = |text: String| ByteArray::from(text.into_bytes());
+        let texts = change.and_then(|(input, is_on)| {
+            let of_recorder = self.points.get(event.recorder as usize)?;
+            let (name, states) = of_recorder.get(usize::from(input).checked_sub(1)?)?.as_ref()?;
+            Some((name.clone(), states.get(usize::from(is_on))?.clone()))
+        });
+        let (point, meaning) = texts.unzip();
         self.kind.push(ByteArray::from(common.kind));
         self.recorder.push(recorder);
         self.life.push(life.unwrap_or_default());
@@ -281,9 +295,8 @@ impl Rows {
         self.stamp.push(common.stamp.clone());
         self.input.push(change.map(|(input, _)| input.into()));
         self.state.push(change.map(|(_, is_on)| is_on));
-        self.point.push(point.map(|point| text(names::point(timeline, Some(point), 0))));
-        let meaning = point.zip(change).map(|(point, (_, is_on))| (Some(point), is_on));
-        self.meaning.push(meaning.map(|(point, is_on)| text(names::state(timeline, point, is_on))));
+        self.point.push(point);
+        self.meaning.push(meaning);
         self.utc.push(common.utc);
         self.utc_earliest.push(common.ends.0);
         self.utc_latest.push(common.ends.1);
@@ -296,7 +309,8 @@ impl Rows {
         });
         self.lost.push(counted.and_then(|(count, _)| count));
         self.lost_count.push(counted.map(|(_, word)| ByteArray::from(word)));
-        self.lost_why.push(common.loss.map(|(_, why)| text(why_text(why))));
+        let why = common.loss.map(|(_, why)| ByteArray::from(why_text(why).into_bytes()));
+        self.lost_why.push(why);
     }
 
     /// Writes the rows as a group, and holds none.
@@ -329,6 +343,21 @@ impl Rows {
         optional_texts(&mut group, &mut self.lost_why)?;
         group.close().map(drop)
     }
+}
+
+/// By recorder and input: the name, and what off and on mean.
+fn points(timeline: &Timeline<'_>) -> Vec<Vec<Option<PointTexts>>> {
+    let text = |text: String| ByteArray::from(text.into_bytes());
+    let site = timeline.site();
+    let of_input = |id: Option<_>, input: u8| {
+        let point = id.and_then(|id| site.point_at(id, input))?;
+        let states = [false, true].map(|on| text(names::state(timeline, Some(point), on)));
+        Some((text(names::point(timeline, Some(point), input)), states))
+    };
+    let recorders = timeline.history().recorders.iter();
+    recorders
+        .map(|recorder| (1..=32).map(|input| of_input(recorder.site, input)).collect())
+        .collect()
 }
 
 /// Why entries are missing, as JSON lines name it; with the inputs where it is about some.

@@ -3,8 +3,7 @@
 use std::io::Write;
 
 use jiff::Timestamp;
-use ser_evidence::incident::Points;
-use ser_evidence::timeline::{ChangeId, EventId, Item, Timeline};
+use ser_evidence::timeline::{EventId, Item, Timeline};
 
 use super::axis::Axis;
 use super::channels::{Channels, recorder_name};
@@ -32,9 +31,7 @@ pub fn write(
     is_spreadsheet_safe: bool,
 ) -> Result<Counted, Refused> {
     let survey = Survey::of(timeline, selection);
-    if survey.span.is_none() {
-        return Err(Refused::Empty);
-    }
+    let span = survey.span.ok_or(Refused::Empty)?;
     let mut rows = Rows::new(timeline, survey.axis, &survey.channels, is_spreadsheet_safe);
     out.write_all(HEADER.as_bytes())?;
     for item in selection.items(timeline) {
@@ -46,20 +43,29 @@ pub fn write(
         }
         out.write_all(&rows.text)?;
     }
+    for (recorder, history) in timeline.history().recorders.iter().enumerate() {
+        if history.is_not_reached {
+            rows.text.clear();
+            rows.push_time(span.last_us);
+            let name = recorder_name(timeline, recorder);
+            let fields = rows.fields(&name, "RECORDS MISSING: the recorder could not be reached");
+            rows.text.extend_from_slice(&fields);
+            out.write_all(&rows.text)?;
+        }
+    }
     Ok(survey.counted)
 }
 
 struct Rows<'t> {
     timeline: &'t Timeline<'t>,
     axis: Axis,
-    points: Points,
     offsets: Offsets,
     /// The day since 1970 of the row before, and its date.
     day: Option<(i64, Vec<u8>)>,
+    /// By recorder and input: the last three fields, when it is off and when it is on.
+    changes: Vec<Vec<[Vec<u8>; 2]>>,
     substation: String,
     is_spreadsheet_safe: bool,
-    /// Whether names of points need that of their recorder.
-    has_several: bool,
     text: Vec<u8>,
 }
 
@@ -70,23 +76,45 @@ impl<'t> Rows<'t> {
         channels: &Channels,
         is_spreadsheet_safe: bool,
     ) -> Rows<'t> {
+        let site = names::harmless(&timeline.site().name);
         let mut rows = Rows {
             timeline,
             axis,
-            points: Points::new(timeline),
             offsets: Offsets::of(timeline.site().time_zone.clone()),
             day: None,
-            substation: String::new(),
+            changes: Vec::new(),
+            substation: field(&site, Dialect::Rfc4180, is_spreadsheet_safe),
             is_spreadsheet_safe,
-            has_several: channels.are_of_several(),
             text: Vec::new(),
         };
-        rows.substation = rows.field(&names::harmless(&timeline.site().name));
+        let recorders = 0..timeline.history().recorders.len();
+        rows.changes = recorders.map(|recorder| rows.changes_of(recorder, channels)).collect();
         rows
     }
 
-    fn field(&self, text: &str) -> String {
-        field(text, Dialect::Rfc4180, self.is_spreadsheet_safe)
+    /// By input of a recorder: the last three fields, off and on. Names of points need that of their
+    /// recorder where there are several.
+    fn changes_of(&self, recorder: usize, channels: &Channels) -> Vec<[Vec<u8>; 2]> {
+        let timeline = self.timeline;
+        let mut changes = vec![[Vec::new(), Vec::new()]; 32];
+        for channel in channels.of(recorder) {
+            let name = match channels.are_of_several() {
+                true => format!("{}/{}", recorder_name(timeline, recorder), channel.name(timeline)),
+                false => channel.name(timeline),
+            };
+            let place = usize::from(channel.input).wrapping_sub(1);
+            if let Some(of_input) = changes.get_mut(place) {
+                *of_input = [false, true]
+                    .map(|on| self.fields(&name, &names::state(timeline, channel.point, on)));
+            }
+        }
+        changes
+    }
+
+    /// The last three fields of a row.
+    fn fields(&self, device: &str, state: &str) -> Vec<u8> {
+        let field = |text: &str| field(text, Dialect::Rfc4180, self.is_spreadsheet_safe);
+        format!(",{},{},{}\r\n", self.substation, field(device), field(state)).into_bytes()
     }
 
     fn entry(&mut self, event: EventId) {
@@ -96,14 +124,13 @@ impl<'t> Rows<'t> {
             return;
         };
         for input in held.entry.changed.numbers() {
-            let point = self.points.of(ChangeId { event, input });
-            let name = names::point(timeline, point, input);
-            let name = match self.has_several {
-                true => format!("{}/{name}", recorder_name(timeline, event.recorder as usize)),
-                false => name,
-            };
-            let state = names::state(timeline, point, held.entry.state.contains(input));
-            self.row(at_us, &name, &state);
+            self.push_time(at_us);
+            let of_recorder = self.changes.get(event.recorder as usize);
+            let fields = of_recorder.and_then(|inputs| {
+                let of_input = inputs.get(usize::from(input).checked_sub(1)?)?;
+                of_input.get(usize::from(held.entry.state.contains(input)))
+            });
+            self.text.extend_from_slice(fields.map_or(b"\r\n", Vec::as_slice));
         }
     }
 
@@ -117,10 +144,13 @@ impl<'t> Rows<'t> {
         let (Some(at_us), Some(gap)) = (at_us, gap) else { return };
         let what = missing(gap.lost, gap.why);
         let name = recorder_name(timeline, event.recorder as usize);
-        self.row(at_us, &name, &format!("RECORDS MISSING: {what}"));
+        let fields = self.fields(&name, &format!("RECORDS MISSING: {what}"));
+        self.push_time(at_us);
+        self.text.extend_from_slice(&fields);
     }
 
-    fn row(&mut self, at_us: i64, device: &str, state: &str) {
+    /// The first three fields of a row.
+    fn push_time(&mut self, at_us: i64) {
         // To the nearest millisecond.
         let utc_ms = at_us.saturating_add(500).div_euclid(1000);
         let offset_s = self.offsets.at(utc_ms.saturating_mul(1000));
@@ -135,12 +165,6 @@ impl<'t> Rows<'t> {
         push_digits(&mut self.text, ms % 1000, 3);
         self.text.push(b',');
         self.text.extend_from_slice(hours(offset_s).as_bytes());
-        let fields = [self.substation.clone(), self.field(device), self.field(state)];
-        for field in fields {
-            self.text.push(b',');
-            self.text.extend_from_slice(field.as_bytes());
-        }
-        self.text.extend_from_slice(b"\r\n");
     }
 
     /// The date as `11/22/2026`, and a comma.

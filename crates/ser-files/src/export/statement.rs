@@ -52,6 +52,13 @@ pub(super) fn write(
         let (name, why) = (harmless(&missed.recorder), harmless(&missed.why));
         line(&format!("NOT READ: {name} could not be reached: {why}"))?;
     }
+    for (recorder, history) in timeline.history().recorders.iter().enumerate() {
+        let is_told =
+            || origin.not_reached.iter().any(|missed| missed.recorder == history.recorder.name);
+        if history.is_not_reached && !is_told() {
+            line(&format!("NOT READ: {} could not be reached", recorder_name(timeline, recorder)))?;
+        }
+    }
     if origin.damaged_lines > 0 {
         line(&format!("NOT READ: {} damaged lines of the sources", origin.damaged_lines))?;
     }
@@ -67,7 +74,7 @@ pub(super) fn write(
     for text in doubts(timeline) {
         line(&text)?;
     }
-    completeness(out, timeline, selection, survey.axis, end)
+    completeness(out, timeline, selection, survey, end)
 }
 
 /// What does not fit together.
@@ -95,29 +102,21 @@ fn completeness(
     out: &mut dyn Write,
     timeline: &Timeline<'_>,
     selection: &Selection,
-    axis: Axis,
+    survey: &Survey,
     end: &str,
 ) -> io::Result<()> {
-    let count = timeline.history().recorders.len();
-    let mut entries = vec![0_u64; count];
-    let mut is_broken = vec![false; count];
-    for item in selection.items(timeline) {
-        match item {
-            Item::Entry(event) => {
-                if let Some(entries) = entries.get_mut(event.recorder as usize) {
-                    *entries += 1;
-                }
-            }
-            Item::Gap(event, index) => {
-                if let Some(is_broken) = is_broken.get_mut(event.recorder as usize) {
-                    *is_broken = true;
-                }
-                write!(out, "{}{end}", loss(timeline, axis, event, index))?;
-            }
-            Item::ClockSet(_) => {}
+    // Most often there is nothing to look for among millions of entries.
+    let mut losses = survey.counted.losses;
+    for item in selection.items(timeline).take_while(|_| survey.counted.losses > 0) {
+        if let Item::Gap(event, index) = item {
+            write!(out, "{}{end}", loss(timeline, survey.axis, event, index))?;
+            losses -= 1;
+        }
+        if losses == 0 {
+            break;
         }
     }
-    for (recorder, (entries, is_broken)) in entries.iter().zip(&is_broken).enumerate() {
+    for (recorder, (entries, is_broken)) in survey.recorders.iter().enumerate() {
         let name = recorder_name(timeline, recorder);
         let of = match (entries, is_broken) {
             (_, true) => "INCOMPLETE, see above",

@@ -88,12 +88,15 @@ pub(super) fn for_each(
         let (Item::Entry(event) | Item::Gap(event, _) | Item::ClockSet(event)) = item;
         // What is missing at the end of a life was drawn after its last entry.
         let Some(at_us) = axis.at(timeline, event) else { continue };
-        drawing.draw_until(at_us - SAMPLE_US)?;
+        drawing.draw_until(at_us.saturating_sub(SAMPLE_US))?;
         match item {
             Item::Entry(event) => drawing.entry(event, at_us),
             // Others were drawn after the entry before, or at the beginning.
             Item::Gap(event, index) if event.place == 0 => {
-                drawing.add(at_us - SAMPLE_US, Coming::Happened(Happened::Loss(event, index)));
+                drawing.add(
+                    at_us.saturating_sub(SAMPLE_US),
+                    Coming::Happened(Happened::Loss(event, index)),
+                );
             }
             Item::Gap(..) => {}
             Item::ClockSet(event) => {
@@ -187,13 +190,13 @@ impl<'t, F: FnMut(&Step<'_>) -> io::Result<()>> Drawing<'t, F> {
         let Some(last) = self.last.get(recorder).copied() else { return };
         let at_us = at_us.max(last.at_us.saturating_add(1));
         let known = self.timeline.held(event).map_or(0, |held| held.known.0);
-        let before_us = (at_us - SAMPLE_US).max(last.unknown_us).max(last.at_us);
+        let before_us = at_us.saturating_sub(SAMPLE_US).max(last.unknown_us).max(last.at_us);
         if before_us < at_us && known & !last.known != 0 {
             self.add(before_us, Coming::Before(event));
         }
         self.add(at_us, Coming::Happened(Happened::Entry(event)));
         let unknown = self.gaps_after(event, at_us);
-        let unknown_us = if unknown == 0 { i64::MIN } else { at_us + SAMPLE_US };
+        let unknown_us = if unknown == 0 { i64::MIN } else { at_us.saturating_add(SAMPLE_US) };
         if let Some(last) = self.last.get_mut(recorder) {
             *last = Last { at_us, unknown_us, known: known & !unknown };
         }
@@ -203,7 +206,7 @@ impl<'t, F: FnMut(&Step<'_>) -> io::Result<()>> Drawing<'t, F> {
     fn gaps_after(&mut self, event: EventId, at_us: i64) -> u32 {
         let timeline = self.timeline;
         let Some(life) = timeline.life(event) else { return 0 };
-        let after_us = at_us + SAMPLE_US;
+        let after_us = at_us.saturating_add(SAMPLE_US);
         let next = EventId { place: event.place + 1, ..event };
         let place = next.place as usize;
         let mut inputs = 0;

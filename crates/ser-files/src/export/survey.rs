@@ -16,6 +16,8 @@ pub(super) struct Survey {
     /// Where the first and the last entry are on the axis; `None` if none has a time.
     pub(super) span: Option<Span>,
     pub(super) counted: Counted,
+    /// By recorder: how many entries, also without a time, and whether something is missing.
+    pub(super) recorders: Vec<(u64, bool)>,
     /// By recorder: the inputs that are on before the first entry, as far as entries say it.
     pub(super) first_on: Vec<u32>,
 }
@@ -30,7 +32,7 @@ pub(super) struct Span {
 impl Span {
     /// Where the axis begins: with the sample before the first entry.
     pub(super) const fn begins_us(self) -> i64 {
-        self.first_us - SAMPLE_US
+        self.first_us.saturating_sub(SAMPLE_US)
     }
 }
 
@@ -44,23 +46,30 @@ impl Survey {
             || vec![States::default(); count],
             |begins| states_before(timeline, begins),
         );
+        let mut recorders = vec![(0, false); count];
         let mut counted = Counted::default();
         let mut span: Option<Span> = None;
         for item in selection.items(timeline) {
             let event = match item {
                 Item::Entry(event) => event,
-                Item::Gap(..) => {
+                Item::Gap(event, _) => {
                     counted.losses += 1;
+                    if let Some((_, is_broken)) = recorders.get_mut(event.recorder as usize) {
+                        *is_broken = true;
+                    }
                     continue;
                 }
                 Item::ClockSet(_) => continue,
             };
+            let recorder = event.recorder as usize;
+            if let Some((entries, _)) = recorders.get_mut(recorder) {
+                *entries += 1;
+            }
             let Some(at_us) = axis.at(timeline, event) else {
                 counted.timeless += 1;
                 continue;
             };
             counted.entries += 1;
-            let recorder = event.recorder as usize;
             let of_recorder = (moved.get_mut(recorder), first.get_mut(recorder));
             if let ((Some(moved), Some(first)), Some(held)) = (of_recorder, timeline.held(event)) {
                 *moved |= held.entry.changed.0;
@@ -70,7 +79,14 @@ impl Survey {
             span = Some(Span { first_us, last_us: at_us });
         }
         let first_on = first.iter().map(|states| states.on).collect();
-        Survey { axis, channels: Channels::new(timeline, &moved), span, counted, first_on }
+        Survey {
+            axis,
+            channels: Channels::new(timeline, &moved),
+            span,
+            counted,
+            recorders,
+            first_on,
+        }
     }
 }
 

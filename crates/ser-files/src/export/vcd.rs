@@ -53,7 +53,10 @@ pub fn write(
     };
     steps::for_each(timeline, selection, (survey.axis, span.begins_us()), take)?;
     // So that the last state can be seen.
-    writeln!(out, "#{}", span.last_us - span.begins_us() + steps::SAMPLE_US)?;
+    let last = rows.last;
+    let length_us = span.last_us.saturating_sub(span.begins_us());
+    let ends = length_us.saturating_add(steps::SAMPLE_US).unsigned_abs().max(last + 1);
+    writeln!(out, "#{ends}")?;
     Ok(survey.counted)
 }
 
@@ -239,6 +242,8 @@ struct Rows<'t> {
     timeline: &'t Timeline<'t>,
     signals: &'t Signals,
     begins_us: i64,
+    /// The time that was written last.
+    last: u64,
     texts: UtcTexts,
     /// By recorder: the doubt that was written last.
     doubts: Vec<Option<Option<u64>>>,
@@ -251,6 +256,7 @@ impl<'t> Rows<'t> {
             timeline,
             signals,
             begins_us: span.begins_us(),
+            last: 0,
             texts: UtcTexts::default(),
             doubts: vec![None; signals.recorders.len()],
             text: Vec::new(),
@@ -279,7 +285,8 @@ impl<'t> Rows<'t> {
 
     fn step(&mut self, step: &Step<'_>) {
         self.text.clear();
-        let at = u64::try_from(step.at_us - self.begins_us).unwrap_or_default();
+        let at = u64::try_from(step.at_us.saturating_sub(self.begins_us)).unwrap_or_default();
+        self.last = at;
         // The beginning has its line.
         if at > 0 {
             self.text.push(b'#');

@@ -2,6 +2,8 @@
 
 use std::collections::HashSet;
 
+use ser_evidence::history::Collector;
+use ser_evidence::record::{Gap, Life, Lost, Record, Why};
 use ser_evidence::timeline::Timeline;
 use ser_files::export::{Refused, Selection, write_vcd};
 
@@ -92,6 +94,25 @@ fn entries_after_the_clock_was_set_back_keep_their_order() {
     times(&lines);
     let states: String = lines.iter().filter(|line| line.ends_with(')')).cloned().collect();
     assert_eq!(states, "x)0)1)0)1)0)", "no change is swallowed: {lines:?}");
+}
+
+#[test]
+fn a_loss_at_the_very_end_is_before_the_end_of_the_drawing() {
+    let site = site(&recorder("U1", &[(1, "a")]));
+    let mut log = Log::of("U1", 1);
+    log.changes("2026-11-22T10:00:00.250", &[1]);
+    let mut collector = Collector::new();
+    log.records().iter().for_each(|record| collector.add("U1", record));
+    let (life, why) = (Life::from_bits(1), Why::LogBeganAnew);
+    let gap = Gap { life, after: Some(1), lost: Lost::Unknown, why };
+    collector.add("U1", &Record::Gap(gap));
+    let history = collector.finish(&site);
+    let timeline = Timeline::new(&site, &history);
+    let mut out = Vec::new();
+    write_vcd(&mut out, &timeline, &Selection::everything(), &NOWHERE).expect("written");
+    let lines = changes(&out);
+    times(&lines);
+    assert_eq!(lines.join(" "), "#0 $dumpvars x) $end 0) #1000 1) #2000 x) 1& #2001");
 }
 
 #[test]

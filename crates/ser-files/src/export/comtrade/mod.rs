@@ -22,11 +22,12 @@ use super::selection::Selection;
 use super::statement::Origin;
 use super::survey::{Span, Survey};
 
-/// The longest stamp in text has ten digits.
-const MAX_STAMP: u64 = 9_999_999_999;
+/// The longest stamp in text has ten digits. Entries whose times do not rise are drawn a little
+/// later than the last one, and have room for that here.
+const MAX_STAMP: u64 = 9_999_000_000;
 
-/// The longest binary stamp. The next one says that there is none.
-const MAX_BINARY_STAMP: u64 = 0xFFFF_FFFE;
+/// The longest binary stamp, with the same room. FFFFFFFF says that there is none.
+const MAX_BINARY_STAMP: u64 = 0xFFF0_0000;
 
 /// The longest record with a row for every millisecond: an hour.
 const MAX_ROWS_AT_RATE: u64 = 3_600_000;
