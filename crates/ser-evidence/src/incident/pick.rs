@@ -201,8 +201,7 @@ fn between(
     for item in timeline.items() {
         let (Item::Entry(event) | Item::Gap(event, _) | Item::ClockSet(event)) = item;
         match timeline.sort_key(event) {
-            Some(key) if key > until => break,
-            Some(key) if key >= since => match item {
+            Some(key) if (since..=until).contains(&key) => match item {
                 Item::Entry(event) => incident.events.push(event),
                 Item::Gap(event, index) => incident.gaps.push((event, index)),
                 Item::ClockSet(event) => incident.clock_sets.push(event),

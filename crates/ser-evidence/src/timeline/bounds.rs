@@ -209,8 +209,16 @@ impl LifeBounds {
     }
 
     fn home(&self, place: usize) -> Option<Home> {
+        self.stretch(place)?.home
+    }
+
+    fn is_run_sure(&self, place: usize) -> bool {
+        self.stretch(place).is_none_or(|stretch| stretch.is_sure)
+    }
+
+    fn stretch(&self, place: usize) -> Option<&Stretch> {
         let next = self.stretches.partition_point(|stretch| stretch.first <= place);
-        self.stretches.get(next.checked_sub(1)?)?.home
+        self.stretches.get(next.checked_sub(1)?)
     }
 }
 
@@ -377,6 +385,11 @@ impl Timeline<'_> {
             Some(run.homes().skip(1).map(on))
         };
         sample.into_iter().chain(others().into_iter().flatten())
+    }
+
+    /// Whether it is known in which run of its clock an entry is.
+    pub(super) fn is_run_sure(&self, event: EventId) -> bool {
+        self.bounds(event).is_none_or(|bounds| bounds.is_run_sure(event.place as usize))
     }
 
     /// The instant of the sample in UTC.

@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 use std::collections::binary_heap::PeekMut;
 
 use super::bounds::Key;
-use super::{EventId, Timeline, event_id};
+use super::{EventId, Order, Timeline, event_id};
 
 /// Something in the list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +31,8 @@ pub struct Items<'t> {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Head {
     key: Key,
+    /// Whether it is not known to be ahead of others of the same key.
+    is_later: bool,
     recorder: u32,
     life: u32,
     place: u32,
@@ -61,7 +63,7 @@ impl<'t> Timeline<'t> {
         self.held(event)?;
         let key = self.key(event)?;
         let EventId { recorder, life, place } = event;
-        Some(Head { key, recorder, life, place })
+        Some(Head { key, is_later: true, recorder, life, place })
     }
 
     /// Adds gaps and clock sets that are shown ahead of an entry, the last one first.
@@ -84,6 +86,45 @@ impl<'t> Timeline<'t> {
     }
 }
 
+impl Head {
+    fn event(self) -> EventId {
+        EventId { recorder: self.recorder, life: self.life, place: self.place }
+    }
+}
+
+impl Items<'_> {
+    /// Where an entry goes whose run is not sure is a guess. If another one is proven to be earlier,
+    /// that one comes first.
+    fn put_what_is_proven_first(&mut self) {
+        let is_sure = |head: &Head| self.timeline.is_run_sure(head.event());
+        if self.heads.iter().all(|Reverse(head)| is_sure(head)) {
+            return;
+        }
+        let Some(mut first) = self.heads.peek().map(|Reverse(head)| *head) else { return };
+        // Each is earlier than the one before, so there is an end.
+        for _ in 0..self.heads.len() {
+            let is_earlier = |head: &Head| {
+                (!is_sure(head) || !is_sure(&first))
+                    && self.timeline.order(head.event(), first.event()) == Order::Before
+            };
+            let earlier = self.heads.iter().map(|Reverse(head)| *head).filter(is_earlier).min();
+            let Some(earlier) = earlier else { break };
+            first = earlier;
+        }
+        let key = self.heads.peek().map(|Reverse(head)| head.key);
+        if let Some(key) = key.filter(|key| *key != first.key) {
+            let mut heads = std::mem::take(&mut self.heads).into_vec();
+            for Reverse(head) in
+                heads.iter_mut().filter(|Reverse(head)| head.event() == first.event())
+            {
+                head.key = key;
+                head.is_later = false;
+            }
+            self.heads = heads.into();
+        }
+    }
+}
+
 impl Iterator for Items<'_> {
     type Item = Item;
 
@@ -91,11 +132,12 @@ impl Iterator for Items<'_> {
         if let Some(item) = self.pending.pop() {
             return Some(item);
         }
+        self.put_what_is_proven_first();
         // The next entry takes the place of this one: that is less work than to take one away and
         // to put another one in.
         let mut first = self.heads.peek_mut()?;
         let Reverse(head) = *first;
-        let event = EventId { recorder: head.recorder, life: head.life, place: head.place };
+        let event = head.event();
         let next = EventId { place: head.place + 1, ..event };
         match self.timeline.head(next) {
             Some(head) => *first = Reverse(head),
