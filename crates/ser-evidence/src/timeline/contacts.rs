@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{ChangeId, EventId, Timeline, event_id};
+use super::{ChangeId, EventId, Order, Timeline, event_id};
 use crate::clock::LinkReason;
 use crate::clock::links::Link;
 use crate::history::LifeHistory;
@@ -15,6 +15,9 @@ use crate::time::shown;
 
 /// Changes whose times are less certain than this are not paired, in microseconds.
 const WIDEST_US: i64 = 60_000_000;
+
+/// How many entries on either side of a change are asked whether they are earlier or later.
+const MOST_NEAR: usize = 64;
 
 /// A contact that two recorders should have seen alike, and have not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -234,14 +237,13 @@ fn trouble(
             seen.on == change.on && seen.key.abs_diff(change.key) <= quiet.unsigned_abs()
         })
         .min_by_key(|seen| (seen.key.abs_diff(change.key), seen.change));
-    if let Some(nearest) = nearest {
-        let is_known = timeline.delta(change.change, nearest.change).middle_us().is_some();
-        return is_known.then_some(ContactTrouble::Apart(nearest.change));
-    }
-    was_watching(timeline, change, other).then_some(ContactTrouble::Missing)
+    let trouble =
+        nearest.map_or(ContactTrouble::Missing, |nearest| ContactTrouble::Apart(nearest.change));
+    was_watching(timeline, change, other).then_some(trouble)
 }
 
-/// Whether the recorder of a point has entries on both sides of a change, and no gap there.
+/// Whether the recorder of a point has an entry that is proven to be earlier than a change and one that
+/// is proven to be later, and between them neither a gap nor a change of the point.
 fn was_watching(timeline: &Timeline<'_>, change: &Seen, point: PointId) -> bool {
     let Some(point) = timeline.site.points.get(point.0) else { return false };
     let recorders = timeline.history.recorders.iter().enumerate();
@@ -249,15 +251,29 @@ fn was_watching(timeline: &Timeline<'_>, change: &Seen, point: PointId) -> bool 
         .filter(|(_, recorder)| recorder.site == Some(point.recorder))
         .flat_map(|(index, recorder)| {
             let lives = recorder.lives.iter().enumerate();
-            lives.map(move |(life_index, life)| (index, life_index, life))
+            lives.map(move |(life_index, life)| (event_id(index, life_index, 0), life))
         });
-    let covers = |index: usize, life_index: usize, life: &LifeHistory| {
-        let key = |place: usize| timeline.sort_key(event_id(index, life_index, place));
-        let last = life.entries.len().checked_sub(1);
-        let is_inside = key(0).is_some_and(|first| first < change.key - change.width)
-            && last.and_then(key).is_some_and(|last| last > change.key + change.width);
-        let event = event_id(index, life_index, 0);
-        is_inside && !life.gaps.iter().any(|gap| is_near(timeline, event, gap.place, change))
+    lives.any(|(first, life)| covers(timeline, change, (first, life), point.input))
+}
+
+/// The same for one life, which begins with the entry `first`.
+fn covers(
+    timeline: &Timeline<'_>,
+    change: &Seen,
+    (first, life): (EventId, &LifeHistory),
+    input: u8,
+) -> bool {
+    let event = |place: usize| {
+        let place = u32::try_from(place).unwrap_or(u32::MAX);
+        EventId { place, ..first }
     };
-    lives.any(|(index, life_index, life)| covers(index, life_index, life))
+    let order = |place: usize| timeline.order(event(place), change.change.event);
+    let near = timeline.place_before(first, change.key).map_or(0, |place| place + 1);
+    let before = (0..near).rev().take(MOST_NEAR).find(|&place| order(place) == Order::Before);
+    let after =
+        (near..life.entries.len()).take(MOST_NEAR).find(|&place| order(place) == Order::After);
+    let Some((before, after)) = before.zip(after) else { return false };
+    let is_gap = life.gaps.iter().any(|gap| (before + 1..=after).contains(&gap.place));
+    let between = life.entries.get(before + 1..after).unwrap_or_default();
+    !is_gap && !between.iter().any(|held| held.entry.changed.contains(input))
 }

@@ -236,6 +236,11 @@ impl<'a> Timeline<'a> {
         last.max().map(|(_, event)| event)
     }
 
+    /// The last place of the life of this entry whose time is known to be below this key.
+    fn place_before(&self, event: EventId, key: i64) -> Option<usize> {
+        self.bounds(event)?.place_before(key)
+    }
+
     fn bounds(&self, event: EventId) -> Option<&LifeBounds> {
         self.lives.get(event.recorder as usize)?.get(event.life as usize)
     }

@@ -1,7 +1,9 @@
 //! The plant: recorders as they are built and wired, and the site that people wrote down of it.
 
 use jiff::tz::TimeZone;
-use ser_evidence::site::{ClockRule, Delays, Group, GroupId, Point, Recorder, RecorderId, Site};
+use ser_evidence::site::{
+    ClockRule, Delays, Group, GroupId, Point, PointId, Recorder, RecorderId, Site,
+};
 use ser_proto::Model;
 
 use crate::chance::Chance;
@@ -149,6 +151,10 @@ fn points(builds: &[Build], chance: &mut Chance) -> Vec<Point> {
             }
             let group = if chance.one_in(4) { None } else { Some(GroupId(chance.below(2))) };
             let partner = of_contact.iter().position(|&(contact, _)| contact == wire.contact);
+            // As a site file that was read has it: either names the other.
+            if let Some(partner) = partner {
+                points[partner].same_as = Some(PointId(points.len()));
+            }
             let inverted = partner.is_some_and(|at| of_contact[at].1 != wire.is_inverted);
             points.push(Point {
                 recorder: RecorderId(recorder),
@@ -160,7 +166,7 @@ fn points(builds: &[Build], chance: &mut Chance) -> Vec<Point> {
                 on: "ON".to_owned(),
                 off: "OFF".to_owned(),
                 normal: None,
-                same_as: partner.map(ser_evidence::site::PointId),
+                same_as: partner.map(PointId),
                 inverted,
             });
             of_contact.push((wire.contact, wire.is_inverted));

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use ser_evidence::record::{Record, Reference, Told};
-use ser_evidence::site::{HandObservation, RecorderId};
+use ser_evidence::record::{ClockObservation, How, Record, Reference, Told};
+use ser_evidence::site::{HandObservation, RecorderId, Shift};
 use ser_evidence::time::Moment;
 use ser_proto::Inputs;
 
@@ -32,6 +32,7 @@ impl Story {
         let mut chance = Chance::new(seed);
         let mut world = World::draw(seed, &mut chance);
         add_hand_observations(&mut world, &mut chance);
+        add_shift(&mut world, &mut Chance::new(!seed));
         let mut story = Story { world, sources: Vec::new(), observed: Vec::new(), planted: None };
         for recorder in 0..story.world.recorders.len() {
             story.read(recorder, &mut chance);
@@ -55,8 +56,11 @@ impl Story {
         for _ in 0..chance.between(1, 2) {
             let host = chance.below(self.world.hosts.len());
             let times = times(&self.world.recorders[recorder], self.world.until, chance);
-            let (mut records, observed) =
+            let (mut records, mut observed) =
                 Collector::read_all(&self.world, recorder, host, &times, chance);
+            let off_us = self.off_us(recorder);
+            records.iter_mut().for_each(|record| mistime(record, off_us));
+            observed.iter_mut().for_each(|one| mistime_observation(&mut one.observation, off_us));
             if chance.one_in(4) {
                 show_changes_only(&mut records);
             }
@@ -76,11 +80,25 @@ impl Story {
     fn operate(&mut self, operation: usize, chance: &mut Chance) {
         let operation = self.world.operations[operation].clone();
         for &recorder in &operation.recorders {
-            if let Some((record, observed)) = observe(&self.world, recorder, &operation, chance) {
+            if let Some((mut record, mut observed)) =
+                observe(&self.world, recorder, &operation, chance)
+            {
+                let off_us = self.off_us(recorder);
+                mistime(&mut record, off_us);
+                if let Some(one) = &mut observed {
+                    mistime_observation(&mut one.observation, off_us);
+                }
                 self.tell(recorder, vec![record]);
                 self.observed.extend(observed);
             }
         }
+    }
+
+    /// How much later everything is told that was observed of a clock. A shift by hand makes up for it.
+    fn off_us(&self, recorder: usize) -> i64 {
+        let mut shifts = self.world.site.shifts.iter();
+        let shift = shifts.find(|shift| shift.recorder == RecorderId(recorder));
+        shift.map_or(0, |shift| -shift.us)
     }
 
     fn tell(&mut self, recorder: usize, records: Vec<Record>) {
@@ -187,6 +205,50 @@ fn add_hand_observations(world: &mut World, chance: &mut Chance) {
             doubt_us: u64::try_from(doubt_us).expect("positive"),
         });
     }
+}
+
+/// Whoever observed one of the recorders had a wrong time, and people know by how much. That is said
+/// of one host's time for another's only if hosts agree about how long a second is.
+fn add_shift(world: &mut World, chance: &mut Chance) {
+    if world.trouble != Trouble::None || !world.are_hosts_true || !chance.one_in(3) {
+        return;
+    }
+    let recorder = RecorderId(chance.below(world.recorders.len()));
+    let most = chance.of(&[3000, 250_000, 7_200_000_000]);
+    let us = chance.between(-most, most);
+    let century = |year: i64| Moment::from_us((year - 1970) * 366 * 86_400 * 1_000_000);
+    let why = "the computer's clock was wrong".to_owned();
+    let (from, to) = (century(1900), century(2100));
+    world.site.shifts.push(Shift { recorder, us, from, to, why });
+    for seen in world.site.observations.iter_mut().filter(|seen| seen.recorder == recorder) {
+        seen.host_time = seen.host_time.after(-us);
+    }
+}
+
+/// Tells what was observed of a clock by a time that is off. Nothing of it is shared with others.
+fn mistime(record: &mut Record, off_us: i64) {
+    match record {
+        Record::Clock(observation) => mistime_observation(observation, off_us),
+        Record::Step(step) => {
+            step.reading.monotonic = step.reading.monotonic.after(off_us);
+            step.reading.utc = step.reading.utc.after(off_us);
+        }
+        _ => {}
+    }
+}
+
+fn mistime_observation(observation: &mut ClockObservation, off_us: i64) {
+    if off_us == 0 {
+        return;
+    }
+    if let Reference::Host { bound, .. } = &mut observation.at {
+        *bound = bound.shifted(off_us, off_us);
+    }
+    observation.how = match observation.how {
+        How::Set { .. } => How::Set { broadcast: None },
+        How::Mark { .. } => How::Query,
+        how => how,
+    };
 }
 
 /// Moves the bound of one observation so far that the truth is not in it.
