@@ -18,19 +18,25 @@ use crate::setting;
 const EXAMPLES: &str = "\
 Examples:
   ser-cli demo
+  ser-cli demo -o trip.html          the report as a page, too
   ser-cli demo --image firmware.elf  the ARM image, in QEMU";
 
 /// Play a breaker trip to two simulated recorders, and report what happened.
 ///
 /// Only the contacts are simulated. The recorders' own code samples them every millisecond, and the
 /// client asks for the events in the frames of the RS-232 protocol, at 19200 baud over TCP. The
-/// report is that of `ser-cli report`. The demo takes a few seconds, and leaves nothing behind.
+/// report is that of `ser-cli report`. The demo takes a few seconds, and leaves nothing behind but the
+/// page that you want.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
     /// Run this ARM image (mps2-an385) in QEMU as the first recorder.
     #[arg(long, value_name = "ELF")]
     image: Option<PathBuf>,
+
+    /// Write the report as a page to this file as well.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
 }
 
 /// How many lines of the site file are shown: a point and what is expected of it.
@@ -55,7 +61,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
          log of SER2 goes round. What happened, what is wrong, and what is missing?",
         &["ser-cli report --input first.jsonl --live"],
     )?;
-    report::show(&bench.gather_all()?, Which::LastTrip, Shown::default())?;
+    let gathered = bench.gather_all()?;
+    report::show(&gathered, Which::LastTrip, Shown::default())?;
+    if let Some(page) = &args.output {
+        report::to_page(page, &gathered, Which::LastTrip)?;
+    }
     bench.switch_off()
 }
 

@@ -12,7 +12,7 @@ use ser_files::report::{self, Document, PageError, Styles};
 
 use crate::connection::ConnectionArgs;
 use crate::error::{Failure, Result, inform};
-use crate::gather::{self, Gathered, GivenMoment, SourceArgs, parse_moment};
+use crate::gather::{self, ChoiceArgs, Gathered, SourceArgs};
 use crate::new_files::NewFiles;
 use crate::output::{PROGRAM, Palette};
 
@@ -34,21 +34,8 @@ is not certain is a set, and entries that are missing are a row of their own.";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// The last incident, whether something tripped or not.
-    #[arg(long, conflicts_with_all = ["around", "since", "until"])]
-    last: bool,
-
-    /// The incident at this time, or nearest to it.
-    #[arg(long, value_name = "TIME", value_parser = parse_moment, conflicts_with_all = ["since", "until"])]
-    around: Option<GivenMoment>,
-
-    /// Everything from this time on.
-    #[arg(long, value_name = "TIME", value_parser = parse_moment)]
-    since: Option<GivenMoment>,
-
-    /// Everything until this time.
-    #[arg(long, value_name = "TIME", value_parser = parse_moment)]
-    until: Option<GivenMoment>,
+    #[command(flatten)]
+    choice: ChoiceArgs,
 
     /// The format of the report; without it that of the file, or text.
     #[arg(long, value_enum)]
@@ -90,7 +77,7 @@ enum Format {
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let format = format(args)?;
     let gathered = gather::gather(&args.sources, connection)?;
-    let which = which(args, &gathered)?;
+    let which = args.choice.which(&gathered.site)?.unwrap_or(Which::LastTrip);
     let shown = Shown { format, unfold: args.unfold };
     let is_complete = match &args.output {
         None => show(&gathered, which, shown)?,
@@ -119,6 +106,12 @@ pub(super) fn show(gathered: &Gathered, which: Which, shown: Shown) -> Result<bo
     let is_complete = write(&mut out, gathered, which, shown, styles)?;
     out.flush()?;
     Ok(is_complete)
+}
+
+/// Writes it as a page to a file, which must not be there.
+pub(super) fn to_page(path: &Path, gathered: &Gathered, which: Which) -> Result<()> {
+    let shown = Shown { format: Format::Html, unfold: false };
+    to_file(path, false, gathered, which, shown).map(|_| ())
 }
 
 /// Writes it to a file, which appears when it is whole.
@@ -214,25 +207,6 @@ fn no_entry(which: Which, history: &History) -> Failure {
         _ => Failure::new("there is no entry in what was read"),
     };
     failure.hint("ser-cli merge with the same sources lists everything, also without a time")
-}
-
-fn which(args: &Args, gathered: &Gathered) -> Result<Which> {
-    let zone = &gathered.site.time_zone;
-    let in_zone = |given: Option<GivenMoment>| given.map(|given| given.in_zone(zone)).transpose();
-    let (around, since, until) =
-        (in_zone(args.around)?, in_zone(args.since)?, in_zone(args.until)?);
-    if let (Some(since), Some(until)) = (since, until)
-        && until < since
-    {
-        return Err(Failure::usage("--until is before --since")
-            .hint("exchange the two, or leave one out: it is then open at that end"));
-    }
-    Ok(match around {
-        Some(around) => Which::Around(around),
-        None if since.is_some() || until.is_some() => Which::Between(since, until),
-        None if args.last => Which::Last,
-        None => Which::LastTrip,
-    })
 }
 
 pub(super) fn styles(palette: Palette) -> Styles {

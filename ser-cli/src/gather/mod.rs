@@ -1,6 +1,7 @@
 //! From the sources that the user names to the history of all recorders: recorders of a site that
 //! are read now, and files that were written before.
 
+mod choice;
 mod files;
 mod live;
 mod moment;
@@ -17,6 +18,7 @@ use crate::connection::{ConnectionArgs, ports};
 use crate::error::{Failure, Result};
 use crate::keeper::StateArgs;
 
+pub(crate) use choice::ChoiceArgs;
 pub(crate) use moment::{GivenMoment, parse_moment};
 
 /// Where entries come from.

@@ -24,7 +24,7 @@ const SCRIPT: &str = include_str!("page.js");
 /// What the page may do: nothing but use its own style and its own script.
 const POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; \
      style-src 'sha256-zOf1zO0ePcjjWXh3i5uuE/AQBTMa4JodIMAMCDJDJuo='; \
-     script-src 'sha256-Us0YsfTqKOoUFk61wXqfGj9Jcmb0G7e61sboJeOZEjY='";
+     script-src 'sha256-oNR/zJVD66M8bHNILh90sp+6HCl0EjT1+uam/Iqx8sc='";
 
 /// Why there is no page.
 #[derive(Debug)]

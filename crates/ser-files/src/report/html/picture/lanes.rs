@@ -97,7 +97,7 @@ impl Lanes {
 
     /// What is shown before the first change and after the last one.
     pub(super) fn margin_us(&self) -> i64 {
-        (self.last_us.saturating_sub(self.first_us) / 40).max(2_000)
+        (self.last_us.saturating_sub(self.first_us) / 40).max(5_000)
     }
 
     /// The lane of a change.

@@ -42,7 +42,7 @@ pub(super) fn section(document: &Document<'_>, lanes: &Lanes, clock: &Clock) -> 
     let length = lanes.last_us.saturating_sub(lanes.first_us);
     let steps = steps::lanes(document, lanes.first_us);
     let whole = Window { name: "lane", from_us: -margin, to_us: length.saturating_add(margin) };
-    let early = Window { name: "early", from_us: -2_000, to_us: EARLY_US };
+    let early = Window { name: "early", from_us: -5_000, to_us: EARLY_US };
     let draw = |window: &Window, title: &str| picture(lanes, &steps, window, title, clock);
     html! {
         (draw(&whole, "The whole incident"))
