@@ -142,18 +142,15 @@ const LOOKED_FOR: usize = 64;
 impl Joined {
     fn add(&mut self, list: Timed) {
         let home = self.home(&list);
-        let index = match home {
-            Some((index, shift)) => {
-                self.merge(index, list, shift);
-                index
-            }
+        let (index, first) = match home {
+            Some((index, shift)) => (index, self.merge(index, list, shift)),
             None => {
                 self.lists.push(list);
-                self.lists.len() - 1
+                (self.lists.len() - 1, 0)
             }
         };
         if let Some(list) = self.lists.get(index) {
-            for row in &list.rows {
+            for row in list.rows.get(first..).unwrap_or_default() {
                 self.by_moment.entry(row.at_ms).or_insert((index, row.place));
             }
         }
@@ -194,8 +191,9 @@ impl Joined {
         self.pairs(index, list, shift).next().is_some() && self.agree(index, list, shift)
     }
 
-    fn merge(&mut self, index: usize, list: Timed, shift: i128) {
-        let Some(home) = self.lists.get_mut(index) else { return };
+    /// Adds a list to another one. Returns from which row on that may be another one than before.
+    fn merge(&mut self, index: usize, list: Timed, shift: i128) -> usize {
+        let Some(home) = self.lists.get_mut(index) else { return 0 };
         // Places count from 1, so what comes before the first one moves all others.
         let first = list.rows.first().map_or(1, |row| i128::from(row.place) + shift);
         let up = u64::try_from(1 - first.min(1)).unwrap_or_default();
@@ -221,6 +219,7 @@ impl Joined {
         }
         home.rows.extend(rows.into_values());
         home.overwritten = home.overwritten.max(list.overwritten);
+        if up > 0 { 0 } else { at }
     }
 }
 
