@@ -194,3 +194,37 @@ fn our_own_files_pass_through() {
     let lines = |text: &str| text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(lines(text(&run.stdout)), lines(&expected));
 }
+
+#[test]
+fn what_we_export_for_others_can_be_imported() {
+    let changes = |file: &Path| {
+        let site = folder().join("plant.toml");
+        let merge =
+            format!("merge --site {} --input {} --format csv", site.display(), file.display());
+        let merged = run(&merge);
+        assert_eq!(merged.status.code(), Some(0), "{}", text(&merged.stderr));
+        // Time in UTC and state of each change, without names.
+        let rows = text(&merged.stdout).lines().skip(1).map(|row| {
+            let fields: Vec<&str> = row.split(',').collect();
+            format!("{} {}", fields[8], fields[3])
+        });
+        rows.collect::<Vec<_>>()
+    };
+    let ours = folder().join("ours.jsonl");
+    let at = |times: Vec<String>| times.iter().map(|row| row[..23].to_owned()).collect::<Vec<_>>();
+    for format in ["cff", "prc002"] {
+        let desk = tempfile::tempdir().expect("a folder");
+        let (exported, imported) = (desk.path().join("ours"), desk.path().join("again.jsonl"));
+        let export = format!(
+            "export --site plant.toml --input ours.jsonl --format {format} -o {}",
+            exported.display()
+        );
+        let export = run(&export);
+        assert_eq!(export.status.code(), Some(0), "{}", text(&export.stderr));
+        let import = run(&format!("import {} -o {}", exported.display(), imported.display()));
+        assert_eq!(import.status.code(), Some(0), "{format}: {}", text(&import.stderr));
+        let (again, expected) = (changes(&imported), changes(&ours));
+        assert_eq!(again.len(), 3, "{again:?}");
+        assert_eq!(at(again), at(expected), "{format}");
+    }
+}

@@ -348,6 +348,23 @@ fn more_points_than_inputs_become_several_recorders_of_one_clock() {
 }
 
 #[test]
+fn samples_without_stamps_come_at_the_rates_of_the_configuration() {
+    let mut text = String::from(
+        "--- file type: CFG ---\nOAK,FR,1999\n1,0A,1D\n1,a,,,0\n60\n2\n1000,4\n500,8\n\
+         14/03/2027,00:00:00.000000\n14/03/2027,00:00:00.000000\nASCII\n1\n\
+         --- file type: DAT ASCII ---\n",
+    );
+    (1..=8).for_each(|sample| writeln!(text, "{sample},,{}", sample % 2).unwrap());
+    let imported = imported(&[text.as_bytes()], in_zone("UTC"));
+    let ms = imported.records().filter_map(|(_, record)| match record {
+        Record::Entry(entry) => Some(entry.entry.time.millisecond),
+        _ => None,
+    });
+    // As the comtrade package for Python has it, version 0.2.0.
+    assert_eq!(ms.collect::<Vec<_>>(), [1, 2, 3, 5, 7, 9, 11]);
+}
+
+#[test]
 fn a_map_fixes_inputs_and_words() {
     let map = Map::parse(
         "[[point]]\nfrom = \"52A\"\ninput = 1\n[[point]]\nfrom = \"86 T2\"\nrecorder = \"LO\"\n\

@@ -1,7 +1,7 @@
 //! Takes records one by one, from many sources, in any order.
 
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::gaps::{self, ToldGaps};
 use super::join::{self, Segment};
@@ -41,7 +41,7 @@ struct Collected {
     steps: Vec<ClockStep>,
     watched: Vec<Watched>,
     reach: Reach,
-    points: Vec<PointRecord>,
+    points: BTreeSet<PointRecord>,
     stamps: Option<RecorderRecord>,
 }
 
@@ -160,15 +160,8 @@ impl Collected {
                 self.reach.read_here = true;
                 self.watched.push(watched);
             }
-            Record::Point(ref point) => self.add_point(point),
+            Record::Point(ref point) => _ = self.points.insert(point.clone()),
             Record::Recorder(stamps) => self.stamps = self.stamps.max(Some(stamps)),
-        }
-    }
-
-    /// However often a file is read, there are few names.
-    fn add_point(&mut self, point: &PointRecord) {
-        if let Err(place) = self.points.binary_search(point) {
-            self.points.insert(place, point.clone());
         }
     }
 
@@ -192,7 +185,7 @@ impl Collected {
         self.observations.extend(other.observations);
         self.steps.extend(other.steps);
         self.watched.extend(other.watched);
-        other.points.iter().for_each(|point| self.add_point(point));
+        self.points.extend(other.points);
         self.stamps = self.stamps.max(other.stamps);
     }
 
@@ -261,7 +254,7 @@ impl Collected {
             steps: sorted(self.steps),
             watched: sorted(self.watched),
             is_not_reached: self.reach.missed && !self.reach.read,
-            points: self.points,
+            points: self.points.into_iter().collect(),
             stamps: self.stamps,
             conflicts,
         }

@@ -1,7 +1,13 @@
 //! Names that files bring along, where the site file has none.
 
+use std::collections::BTreeSet;
+
 use crate::record::PointRecord;
 use crate::site::{Point, Recorder, RecorderId, Site};
+
+/// The most recorders that a site is made to have: each is looked for by its name. In a file of more,
+/// inputs keep their numbers.
+const MOST_RECORDERS: usize = 2000;
 
 /// An input that files name differently: they do not belong together.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,11 +21,19 @@ pub struct TwoNames {
 }
 
 /// Adds points of a recorder to a site, and the recorder itself, where the site does not have them.
-pub(super) fn add_to(site: &mut Site, recorder: &str, told: &[PointRecord]) -> Vec<TwoNames> {
-    let id = site.recorder(recorder).unwrap_or_else(|| {
-        site.recorders.push(Recorder::named(recorder));
-        RecorderId(site.recorders.len() - 1)
-    });
+pub(super) fn add_to(
+    site: &mut Site,
+    recorder: &str,
+    told: &BTreeSet<PointRecord>,
+) -> Vec<TwoNames> {
+    let id = match site.recorder(recorder) {
+        Some(id) => id,
+        None if site.recorders.len() >= MOST_RECORDERS => return Vec::new(),
+        None => {
+            site.recorders.push(Recorder::named(recorder));
+            RecorderId(site.recorders.len() - 1)
+        }
+    };
     let named = site.points.iter().filter(|point| point.recorder == id);
     let named = named.fold(0, |named, point| named | bit(point.input));
     let mut two_names = Vec::new();

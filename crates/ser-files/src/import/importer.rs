@@ -23,6 +23,9 @@ use super::{prc002, sel};
 use crate::Source;
 use crate::jsonl::Writer;
 
+/// The most lists of one recorder: one a day for a year, and more.
+const MOST_LISTS: usize = 500;
+
 /// What the user says of the files.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
@@ -125,8 +128,13 @@ impl Importer {
         }
         let group = self.group(recorder);
         let Some(group) = self.groups.get_mut(group) else { return Ok(read) };
+        group.found.lists.clear();
         read_foreign(&mut group.found, (&head, input, data), self.options.epoch, &mut read)?;
         let lists = std::mem::take(&mut group.found.lists);
+        if group.lists.len() + lists.len() > MOST_LISTS {
+            let most = u64::try_from(MOST_LISTS).unwrap_or(u64::MAX);
+            return Err(Refusal::TooMuch { what: "lists", most });
+        }
         let needs_order = lists.iter().any(|list| !list.rows.is_empty());
         let order = match needs_order {
             true => date_order(&lists, self.options.dates, &mut read.notes)?,

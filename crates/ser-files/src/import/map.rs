@@ -468,7 +468,8 @@ mod tests {
             let told = parse(text).unwrap_err();
             assert!(told.iter().any(|told| told == expected), "{text}: {told:?}");
         }
-        assert_eq!(parse("[[point]\nfrom =").unwrap_err().len(), 2);
+        let told = parse("[[point]\nfrom =").unwrap_err();
+        assert!(told.iter().all(|told| told.starts_with("syntax: ")), "{told:?}");
         assert!(Map::parse("[[point]]\nfrom = \"a\"\npoint = \"b\"", None).is_err());
         assert!(Map::parse(&" ".repeat(MOST_BYTES + 1), None).is_err());
     }

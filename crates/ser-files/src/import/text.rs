@@ -35,7 +35,9 @@ pub(super) fn opened<'a>(input: impl Read + 'a) -> Result<(Vec<u8>, Input<'a>), 
     }
     let beginning = head.get(..TEXT_LEN.min(head.len())).unwrap_or_default();
     match beginning {
-        [0, first, 0, ..] | [first, 0, _, 0, ..] if *first != 0 => return Err(Refusal::Utf16),
+        [0, first, 0, second, ..] | [first, 0, second, 0, ..] if *first != 0 && *second != 0 => {
+            return Err(Refusal::Utf16);
+        }
         beginning if beginning.contains(&0) => return Err(Refusal::NoText),
         _ => {}
     }

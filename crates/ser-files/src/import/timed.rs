@@ -4,6 +4,7 @@
 //! with its stamp. Files of one recorder overlap; lists that share a row and contradict each other
 //! nowhere are one.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 
 use jiff::tz::TimeZone;
@@ -141,18 +142,15 @@ const LOOKED_FOR: usize = 64;
 impl Joined {
     fn add(&mut self, list: Timed) {
         let home = self.home(&list);
-        let index = match home {
-            Some((index, shift)) => {
-                self.merge(index, list, shift);
-                index
-            }
+        let (index, first) = match home {
+            Some((index, shift)) => (index, self.merge(index, list, shift)),
             None => {
                 self.lists.push(list);
-                self.lists.len() - 1
+                (self.lists.len() - 1, 0)
             }
         };
         if let Some(list) = self.lists.get(index) {
-            for row in &list.rows {
+            for row in list.rows.get(first..).unwrap_or_default() {
                 self.by_moment.entry(row.at_ms).or_insert((index, row.place));
             }
         }
@@ -193,31 +191,35 @@ impl Joined {
         self.pairs(index, list, shift).next().is_some() && self.agree(index, list, shift)
     }
 
-    fn merge(&mut self, index: usize, list: Timed, shift: i128) {
-        let Some(home) = self.lists.get_mut(index) else { return };
-        let moved = |row: &TimedRow| i128::from(row.place) + shift;
+    /// Adds a list to another one. Returns from which row on that may be another one than before.
+    fn merge(&mut self, index: usize, list: Timed, shift: i128) -> usize {
+        let Some(home) = self.lists.get_mut(index) else { return 0 };
         // Places count from 1, so what comes before the first one moves all others.
-        let room = list.rows.first().map_or(1, moved).min(1);
-        let up = u64::try_from(1 - room).unwrap_or_default();
-        let mut rows: BTreeMap<u64, TimedRow> = BTreeMap::new();
-        for mut row in list.rows {
-            row.place = u64::try_from(i128::from(row.place) + shift + i128::from(up)).unwrap_or(1);
-            rows.insert(row.place, row);
-        }
-        for mut row in std::mem::take(&mut home.rows) {
-            row.place += up;
-            // A row that one list begins with, or that follows on a hole there, need not be so.
-            if let Some(other) = rows.get(&row.place) {
-                row.forgets &= other.forgets;
-            }
-            rows.insert(row.place, row);
-        }
-        home.rows = rows.into_values().collect();
-        home.overwritten = home.overwritten.max(list.overwritten);
+        let first = list.rows.first().map_or(1, |row| i128::from(row.place) + shift);
+        let up = u64::try_from(1 - first.min(1)).unwrap_or_default();
         if up > 0 {
-            // Other lists' moments stay where they are.
+            home.rows.iter_mut().for_each(|row| row.place += up);
             self.by_moment.retain(|_, (list, _)| *list != index);
         }
+        let moved =
+            |place: u64| u64::try_from(i128::from(place) + shift + i128::from(up)).unwrap_or(1);
+        let first = list.rows.first().map_or(u64::MAX, |row| moved(row.place));
+        // Usually a list goes on where another one ends, which is not gone over then.
+        let at = home.rows.partition_point(|row| row.place < first);
+        let tail = home.rows.split_off(at);
+        let mut rows: BTreeMap<u64, TimedRow> =
+            tail.into_iter().map(|row| (row.place, row)).collect();
+        for mut row in list.rows {
+            row.place = moved(row.place);
+            match rows.entry(row.place) {
+                // A row that one list begins with, or that follows on a hole there, need not do so.
+                Entry::Occupied(mut known) => known.get_mut().forgets &= row.forgets,
+                Entry::Vacant(vacant) => _ = vacant.insert(row),
+            }
+        }
+        home.rows.extend(rows.into_values());
+        home.overwritten = home.overwritten.max(list.overwritten);
+        if up > 0 { 0 } else { at }
     }
 }
 

@@ -4,7 +4,7 @@
 //! for where they do not. An hour that comes twice is told apart by the rows around it; where they
 //! do not, the row is kept with the earlier one and says so.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 
 use jiff::tz::{AmbiguousOffset, Offset, TimeZone};
 
@@ -53,9 +53,9 @@ pub(super) fn date_order(
         list.rows.iter().map(|row| row.when.date).chain(list.other_dates.iter().copied())
     });
     let is_one = |date: &Date| DateOrder::ALL.iter().any(|order| date.in_order(*order).is_some());
-    let mut dates: Vec<Date> = dates.filter(is_one).collect();
+    let dates: HashSet<Date> = dates.filter(is_one).collect();
+    let mut dates: Vec<Date> = dates.into_iter().collect();
     dates.sort_unstable_by_key(ToString::to_string);
-    dates.dedup();
     let fits = |order: &DateOrder| dates.iter().all(|date| date.in_order(*order).is_some());
     if let Some(usual) = lists.iter().find_map(|list| list.usual_dates).filter(fits) {
         return Ok(usual);
