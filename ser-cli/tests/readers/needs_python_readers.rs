@@ -126,7 +126,7 @@ fn comtrade_reads_16_17_and_32_channels_with_and_without_a_rate() {
                 }
                 let read = comtrade(&desk, older, &files);
                 let at = |time_ms: i64| {
-                    let before = states.iter().take_while(|(at_ms, _)| at_ms + 1 <= time_ms);
+                    let before = states.iter().take_while(|(at_ms, _)| *at_ms < time_ms);
                     before.last().map_or(0, |&(_, on)| on)
                 };
                 assert!(!read.rows.is_empty());
@@ -171,7 +171,7 @@ print(json.dumps({var.full_name: [[time, str(value)] for time, value in var.tv]
     assert_eq!(lost[0][0], before * 1000);
     assert!(signals["Northfield.U2.loss"].as_array().expect("events").is_empty());
     let utc = signals["Northfield.utc"].as_array().expect("times");
-    let began = format!("{}", utc[0][1].as_str().expect("a time"));
+    let began = utc[0][1].as_str().expect("a time");
     let ms = BEGIN_MS + first_ms;
     let moment = jiff::Timestamp::from_millisecond(ms).expect("a time");
     assert_eq!(began, moment.strftime("%Y-%m-%dT%H:%M:%S%.6fZ").to_string());

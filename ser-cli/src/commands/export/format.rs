@@ -62,7 +62,7 @@ pub(super) enum Data {
     /// As text.
     #[default]
     Ascii,
-    /// As binary numbers: a fifth of the size, and fewer programs read it.
+    /// As binary numbers: much smaller, and fewer programs read it.
     Binary,
 }
 

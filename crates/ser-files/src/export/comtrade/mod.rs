@@ -27,7 +27,7 @@ use super::survey::{Span, Survey};
 const MAX_STAMP: u64 = 9_999_000_000;
 
 /// The longest binary stamp, with the same room. FFFFFFFF says that there is none.
-const MAX_BINARY_STAMP: u64 = 0xFFF0_0000;
+const MAX_BINARY_STAMP: u64 = 4_294_900_000;
 
 /// The longest record with a row for every millisecond: an hour.
 const MAX_ROWS_AT_RATE: u64 = 3_600_000;
