@@ -1,4 +1,4 @@
-//! A browser without a window, driven as the W3C's WebDriver says.
+//! A browser without a window, driven by the protocol `WebDriver`.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -146,10 +146,10 @@ impl Drop for Browser {
     }
 }
 
-fn value(path: &str, answer: Value) -> Value {
-    let value = &answer["value"];
+fn value(path: &str, mut answer: Value) -> Value {
+    let value = answer["value"].take();
     assert!(value.get("error").is_none(), "{path}: {}", value["message"]);
-    value.clone()
+    value
 }
 
 fn decoded(base64: &Value) -> Vec<u8> {

@@ -73,9 +73,9 @@ fn the_picture_can_be_zoomed_and_is_drawn_as_the_program_drew_it() {
         "document.querySelector('figure.picture').scrollIntoView({block: 'center', behavior: \
          'instant'}); const place = document.querySelector('figure.picture svg')\
          .getBoundingClientRect(); return [place.x + place.width * 0.3, place.y + place.height / 2, \
-         place.x + place.width * 0.4]",
+         place.x + place.width * 0.4].map(Math.round)",
     );
-    let place = |index: usize| place[index].as_f64().expect("a number").round() as i64;
+    let place = |index: usize| place[index].as_i64().expect("a number");
     browser.drag((place(0), place(1)), (place(2), place(1)));
     let marked = strings(&browser.eval(LABELS));
     assert_ne!(marked, drawn, "what was marked is shown");
