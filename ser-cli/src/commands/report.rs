@@ -18,9 +18,9 @@ use crate::output::{PROGRAM, Palette};
 
 const EXAMPLES: &str = "\
 Examples:
-  ser-cli report --site plant.toml               the last trip
-  ser-cli report --site plant.toml -o trip.html  as a page, with a picture
-  ser-cli report --site plant.toml --last        the last incident, trip or not
+  ser-cli report --site plant.toml            the last trip
+  ser-cli report --site plant.toml -o t.html  as a page, with a picture
+  ser-cli report --site plant.toml --last     the last incident, trip or not
   ser-cli report --site plant.toml --format json > report.json
   ser-cli report --input u1.jsonl u2.jsonl --around 2026-11-22T11:00:00
 
