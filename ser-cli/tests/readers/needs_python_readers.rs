@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::plant::{BEGIN_MS, Desk, Log, hostile_names, instants, thirty_hours};
 use crate::common::bench::text;
+use crate::common::ser_cli;
 
 /// Where `cargo xtask test` puts them.
 fn readers() -> PathBuf {
@@ -268,4 +269,81 @@ print(json.dumps(dict(rows=rows, lost=lost, names=names, count=table.num_rows,
         (&"timestamp[us, tz=UTC]".into(), &"Northfield".into())
     );
     assert!(told["stamp"].as_str().expect("a text").starts_with("2026-11-22T"));
+}
+
+/// The changes in a record, as `comtrade` has them: `2027-03-14 19:29:58.104 status A 1`, in UTC if
+/// the record's own time is so many hours behind that. (`comtrade` leaves the time code alone.)
+fn changes_by_comtrade(desk: &Desk, files: &str, hours: i32) -> Vec<String> {
+    let script = format!(
+        "import comtrade, json
+from datetime import timedelta
+from math import ceil
+record = comtrade.Comtrade(use_double_precision=True)
+record.load({files})
+changes = []
+for row in range(1, len(record.time)):
+    # The millisecond in which it was seen, or the next one.
+    us = record.start_timestamp.microsecond + round(float(record.time[row]) * 1e6)
+    at = record.start_timestamp.replace(microsecond=0) + timedelta(milliseconds=ceil(us / 1000))
+    at += timedelta(hours={hours})
+    for name, states in zip(record.status_channel_ids, record.status):
+        if states[row] != states[row - 1]:
+            changes.append(f'{{at:%Y-%m-%d %H:%M:%S}}.{{at.microsecond // 1000:03}} {{name}} {{states[row]}}')
+print(json.dumps(changes))"
+    );
+    let changes = told(desk, false, &script);
+    let texts = changes.as_array().expect("a list").iter();
+    texts.map(|change| change.as_str().expect("a text").to_owned()).collect()
+}
+
+/// The changes in the same record, as `import` has them.
+fn changes_by_import(desk: &Desk, file: &str) -> Vec<String> {
+    let mut import = ser_cli();
+    import.current_dir(desk.0.path()).args(["import", file, "--zone", "UTC", "--recorder", "F"]);
+    let output = import.output().expect("ser-cli runs");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let records: Vec<Value> = text(&output.stdout)
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    let name = |input: &Value| {
+        let is_its = |record: &&Value| record["record"] == "point" && record["input"] == *input;
+        let point = records.iter().find(is_its).expect("a name");
+        point["name"].as_str().expect("a text").to_owned()
+    };
+    let mut changes = Vec::new();
+    for entry in records.iter().filter(|record| record["record"] == "entry") {
+        let at = entry["time"].as_str().expect("a time").replace('T', " ");
+        let on = entry["state"].as_array().expect("a list");
+        for input in entry["changed"].as_array().expect("a list") {
+            changes.push(format!("{at} {} {}", name(input), u8::from(on.contains(input))));
+        }
+    }
+    changes
+}
+
+#[test]
+#[ignore = "needs python-readers: cargo xtask test"]
+fn import_reads_the_records_of_others_as_comtrade_does() {
+    let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/ser-files/tests/import");
+    let desk = Desk::of(&[]);
+    for (name, hours) in [
+        ("comtrade-1999.cfg", 0),
+        ("comtrade-1999-binary.cfg", 0),
+        ("comtrade-2013-float.cfg", 5),
+        ("comtrade-ascii.cff", -1),
+        ("comtrade-binary.cff", 0),
+    ] {
+        let data = name.replace(".cfg", ".dat");
+        for file in [name, &data] {
+            std::fs::copy(samples.join(file), desk.0.path().join(file)).expect("a file");
+        }
+        let files = match data == name {
+            true => format!("'{name}'"),
+            false => format!("'{name}', '{data}'"),
+        };
+        let theirs = changes_by_comtrade(&desk, &files, hours);
+        assert!(!theirs.is_empty(), "{name}");
+        assert_eq!(changes_by_import(&desk, name), theirs, "{name}");
+    }
 }
