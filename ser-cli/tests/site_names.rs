@@ -279,4 +279,17 @@ fn the_recorders_of_a_bus_have_their_names_and_their_clocks_one_setting() {
     );
     write("+00:00");
     assert_eq!(genius("broadcast clock").status.code(), Some(0));
+
+    // One window is for all recorders on its bus, and they are read at the same time.
+    let mut merge = ser_cli();
+    merge.env("SER_SITE", &file).env("SER_STATE_DIR", folder.path());
+    let output = merge.args(["--timeout", "20s", "merge", "--format", "jsonl"]).output();
+    let output = output.expect("ser-cli runs");
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let (list, told) = (text(&output.stdout), text(&output.stderr));
+    assert_eq!(told, "reading U1-SER1, U1-SER2 …\n");
+    for recorder in ["U1-SER1", "U1-SER2"] {
+        let watched = format!("{{\"record\":\"watched\",\"recorder\":\"{recorder}\"");
+        assert!(list.contains(&watched), "{list}");
+    }
 }

@@ -12,6 +12,7 @@ use ser_evidence::site::{Recorder, Site};
 use ser_evidence::time::{Bound, shown};
 use ser_files::report::NotReached;
 
+use crate::buses::Buses;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
 use crate::host_reading;
@@ -42,11 +43,12 @@ pub(super) fn read(
             .hint("or give files with --input FILE…"));
     }
     inform(format_args!("reading {} …", names.join(", ")));
+    let buses = Buses::default();
     let one = |recorder: &Recorder| {
         let port = recorder.port.as_deref().unwrap_or_default();
         let baud = connection.baud.or(recorder.baud);
         let connection = ConnectionArgs { baud, ..connection::at_port(connection, port) };
-        read_one(recorder, &connection, state, &stop)
+        read_one(recorder, &connection, state, &buses, &stop)
     };
     let results: Vec<(&Recorder, Result<Vec<Record>>)> = thread::scope(|scope| {
         let running: Vec<_> =
@@ -97,13 +99,14 @@ fn read_one(
     recorder: &Recorder,
     connection: &ConnectionArgs,
     state: &StateArgs,
+    buses: &Buses,
     stop: &AtomicBool,
 ) -> Result<Vec<Record>> {
     let unit_name = connection::unit_name(connection)?;
     let mut state_file = StateFile::of_unit(&unit_name, state.directory())?;
     let remembered = state_file.load()?;
     let from = host_reading::now();
-    let mut unit = connection::open(connection)?;
+    let mut unit = buses.open(connection)?;
     let known_size = remembered.map(|delivered| delivered.size).filter(|&size| size > 0);
     let size = connection::log_size(&mut unit, recorder.log_size, known_size)?;
     let mut follower = LogFollower::new(None, size);

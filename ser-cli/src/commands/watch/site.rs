@@ -4,7 +4,6 @@
 //! as delivered only when the list has written it, so that a crash repeats events and loses none.
 //! A recorder that fails is told and asked again later; the others go on.
 
-mod buses;
 mod follower;
 mod order;
 
@@ -15,12 +14,12 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::Args;
+use crate::buses::Buses;
 use crate::connection::ConnectionArgs;
 use crate::error::{Failure, Result, inform};
 use crate::interrupt;
 use crate::output::{Format, Palette, Record, RecorderColumn, Rows, SiteTable, site_header};
 use crate::site_file::Chosen;
-use buses::Buses;
 use follower::Follower;
 use order::{Evidence, Row};
 

@@ -10,7 +10,7 @@ use ser_client::{Delivery, LogFollower, LogWatcher};
 
 use super::super::{Args, POLL_EVERY};
 use super::Batch;
-use super::buses::Buses;
+use crate::buses::Buses;
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::error::{Failure, Result, inform};
 use crate::keeper::{self, Keeper};

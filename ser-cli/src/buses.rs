@@ -9,7 +9,7 @@ use crate::error::Result;
 
 /// Opened buses.
 #[derive(Default)]
-pub(super) struct Buses {
+pub(crate) struct Buses {
     #[cfg(unix)]
     by_name: std::sync::Mutex<std::collections::BTreeMap<String, Bus>>,
 }
@@ -20,7 +20,7 @@ type Bus = std::sync::Arc<std::sync::Mutex<Option<ser_client::GeniHost>>>;
 
 impl Buses {
     /// Opens the way to a recorder.
-    pub(super) fn open(&self, connection: &ConnectionArgs) -> Result<Unit> {
+    pub(crate) fn open(&self, connection: &ConnectionArgs) -> Result<Unit> {
         #[cfg(unix)]
         if let Endpoint::Geni { window, node: Some(node) } = connection::endpoint(connection)? {
             let bus = self.named(crate::site_file::bus_name(&window));
