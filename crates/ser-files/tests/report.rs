@@ -210,10 +210,15 @@ fn a_recorder_without_entries_has_no_times_that_could_be_doubtful() {
     let mut readings = Readings::of(SHARED);
     readings.set("U1-SER1", 0, "2026-11-22T10:00:00.000");
     readings.entry("U1-SER1", 1, "2026-11-22T10:00:01.000", (4, 4));
+    // Twice, and in a life that nobody knows.
+    for time in ["2026-11-22T10:00:00.000", "2026-11-22T10:10:00.000"] {
+        readings.set("U1-SER2", 7, time);
+    }
     readings.watched("U1-SER2", 0, "2026-11-22T10:30:00.000");
     let told = readings.told();
     let text = told.text();
     assert!(!text.contains("as it showed them"), "{text}");
+    assert!(!text.contains("cannot be placed"), "{text}");
     assert!(text.contains("no entries, so no times"), "{text}");
     assert_eq!(told.json()["recorders"][1]["clock"], Value::Null);
 }

@@ -132,7 +132,16 @@ pub(super) fn findings(timeline: &Timeline<'_>) -> Vec<String> {
     let name = |recorder: usize| {
         verdict::recorder_name(timeline, u32::try_from(recorder).unwrap_or(u32::MAX))
     };
-    let of_clocks = timeline.findings().iter().map(|finding| match finding {
+    // Where there is no entry, there is nothing that an observation could say anything about.
+    let has_entries = |recorder: usize| {
+        let history = timeline.history().recorders.get(recorder);
+        history.is_some_and(|history| history.lives.iter().any(|life| !life.entries.is_empty()))
+    };
+    let is_told = |finding: &&Finding| match finding {
+        Finding::NotPlaced { recorder, .. } => has_entries(*recorder),
+        _ => true,
+    };
+    let of_clocks = timeline.findings().iter().filter(is_told).map(|finding| match finding {
         Finding::Contradiction { recorder, .. } => format!(
             "{}: two observations of its clock contradict each other; what either allows is used",
             name(*recorder)
@@ -161,7 +170,9 @@ pub(super) fn findings(timeline: &Timeline<'_>) -> Vec<String> {
             sequence(other)
         )
     });
-    of_clocks.chain(of_entries).collect()
+    let mut findings: Vec<String> = of_clocks.chain(of_entries).collect();
+    findings.dedup();
+    findings
 }
 
 /// What was added by hand.
