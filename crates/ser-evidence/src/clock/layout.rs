@@ -182,8 +182,8 @@ impl Layout {
         one.and_then(|one| one.offset.learn(tie.x, lo, hi)).unwrap_or(false)
     }
 
-    /// An entry that may be in any of several runs bounds its neighbours, too: by the earliest, or by
-    /// the latest, that it may be.
+    /// An entry that may be in any of several runs bounds its neighbours, too: by the earliest, or
+    /// by the latest, that it may be.
     fn heed_doubtful(&mut self, successions: &[Succession], ties: &[Tie]) {
         for _ in 0..MOST_ROUNDS {
             let mut is_news = false;
@@ -235,7 +235,8 @@ impl Layout {
                 self.place(clock, x, Some(utc), ties);
             }
         }
-        // What a clock is said to show counts where it is not bounded on both sides, and comes first.
+        // What a clock is said to show counts where it is not bounded on both sides, and comes
+        // first.
         for (run, facts) in runs.iter().enumerate() {
             let clock = self.boots.len() + run;
             let Some((x, utc)) = facts.nominal else { continue };

@@ -239,9 +239,8 @@ fn everything_that_can_happen_does() {
                 Record::Entry(entry) if entry.known == entry.entry.changed => {
                     count("changes only", 1);
                 }
-                Record::Entry(_) | Record::Life(_) => {}
                 // No recorder of ours knows a name.
-                Record::Point(_) | Record::Recorder(_) => {}
+                Record::Entry(_) | Record::Life(_) | Record::Point(_) | Record::Recorder(_) => {}
             }
         }
         count("shifts", story.world.site.shifts.len());
