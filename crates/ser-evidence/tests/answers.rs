@@ -3,9 +3,10 @@
 mod common;
 
 use common::{Log, history, monotonic_us, site};
+use ser_evidence::clock::Finding;
 use ser_evidence::incident::{Doubt, Incident, Report, Verdict, Which};
 use ser_evidence::record::{How, Lost, Why};
-use ser_evidence::timeline::{ChangeId, ContactTrouble, Order, Timeline};
+use ser_evidence::timeline::{ChangeId, ContactTrouble, EventId, Order, Timeline};
 
 const TWO_RECORDERS: &str = "
 [[recorder]]
@@ -259,6 +260,29 @@ fn a_breaker_says_how_long_it_took_and_its_contacts_how_long_they_disagreed() {
 
 const SET: How = How::Set { broadcast: None };
 
+#[test]
+fn a_clock_that_was_set_in_a_log_without_a_life_may_be_that_of_any_life() {
+    let site = site(TWO_RECORDERS);
+    let (mut known, mut unknown) = (Log::of("U1", 1), Log::of("U1", 0));
+    let at = |utc: &str| (monotonic_us(utc), monotonic_us(utc) + 2_000);
+    let observed = |log: &mut Log, how, showed: &str, utc: &str| {
+        log.observed(how, showed, at(utc), Some(0));
+    };
+    known.changes("2026-11-22T10:00:01.000", &[1]);
+    observed(&mut known, How::Query, "2026-11-22T10:00:02.000", "2026-11-22T11:00:02.000");
+    // Another reader finds entries 3 and 4, knows nothing of lives, and sets the clock.
+    unknown.loses(2).changes("2026-11-22T10:00:03.000", &[2]);
+    unknown.changes("2026-11-22T10:00:04.000", &[2]);
+    observed(&mut unknown, SET, "2026-11-22T11:00:05.000", "2026-11-22T11:00:05.000");
+    known.loses(8).changes("2026-11-22T11:00:06.000", &[2]);
+    observed(&mut known, How::Query, "2026-11-22T11:00:07.000", "2026-11-22T11:00:07.000");
+    let history = history(&site, &[&known, &unknown]);
+    assert_eq!(history.recorders[0].lives.len(), 2, "nothing joins the two");
+    let timeline = Timeline::new(&site, &history);
+    let is_wrong = |finding: &&Finding| matches!(finding, Finding::Contradiction { .. });
+    assert_eq!(timeline.findings().iter().find(is_wrong), None, "nothing contradicts anything");
+}
+
 const SHARED: &str = "
 [[recorder]]
 name = \"U1\"
@@ -286,11 +310,12 @@ fn a_contact_on_two_recorders_ties_their_clocks_together() {
     let how = How::Set { broadcast: None };
     u1.observed(how, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(0));
     u2.observed(how, "2026-11-22T10:00:00.000", (at - 90_000, at + 90_000), Some(0));
-    u1.changes("2026-11-22T10:00:10.000", &[1]);
+    u1.changes("2026-11-22T10:00:01.000", &[4]).changes("2026-11-22T10:00:10.000", &[1]);
     // Normally on there: inverted, so it goes on first.
-    u2.changes("2026-11-22T09:59:59.000", &[9]);
+    u2.changes("2026-11-22T10:00:01.000", &[9]);
     u2.changes("2026-11-22T10:00:10.050", &[9]).changes("2026-11-22T10:00:10.056", &[3]);
-    u1.changes("2026-11-22T10:00:10.002", &[2]);
+    u1.changes("2026-11-22T10:00:10.002", &[2]).changes("2026-11-22T10:00:30.000", &[4]);
+    u2.changes("2026-11-22T10:00:30.000", &[3]);
     let history = history(&site, &[&u1, &u2]);
     let timeline = Timeline::new(&site, &history);
     let find = |recorder: u32, sequence: u64| {
@@ -304,7 +329,58 @@ fn a_contact_on_two_recorders_ties_their_clocks_together() {
     };
     assert_eq!(timeline.contact_findings(), []);
     // Without the shared contact 180 ms would be unknown between them.
-    assert_eq!(timeline.order(find(0, 2), find(1, 3)), Order::Before);
+    assert_eq!(timeline.order(find(0, 3), find(1, 3)), Order::Before);
+}
+
+#[test]
+fn two_movements_of_which_each_recorder_missed_one_are_not_taken_for_one() {
+    let site = site(SHARED);
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    // Whether U1 was read again, and found to have seen nothing, decides it.
+    for (is_read_again, is_one) in [(false, false), (true, true)] {
+        let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
+        u1.observed(SET, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(0));
+        u2.observed(SET, "2026-11-22T10:00:00.000", (at - 5_000_000, at + 5_000_000), Some(0));
+        u1.changes("2026-11-22T10:00:01.000", &[4]).changes("2026-11-22T10:00:10.000", &[1]);
+        u1.changes("2026-11-22T10:00:10.100", &[4]);
+        // Its power came back only now. Inverted, so this is the same direction.
+        u2.changes("2026-11-22T10:00:12.000", &[3]).changes("2026-11-22T10:00:13.000", &[9]);
+        u2.changes("2026-11-22T10:00:14.000", &[3]).changes("2026-11-22T10:00:15.000", &[9]);
+        u2.changes("2026-11-22T10:00:17.000", &[3]);
+        if is_read_again {
+            u1.changes("2026-11-22T10:00:40.000", &[4]);
+        }
+        let history = history(&site, &[&u1, &u2]);
+        let timeline = Timeline::new(&site, &history);
+        let mine = |event: &EventId| (event.recorder, timeline.held(*event).unwrap().sequence);
+        let event = timeline.entries().find(|event| mine(event) == (0, 2)).expect("an entry");
+        let same = timeline.same_movement(ChangeId { event, input: 1 });
+        assert_eq!(same.is_some(), is_one, "{is_read_again}: {same:?}");
+    }
+}
+
+#[test]
+fn a_contact_that_bounced_is_not_taken_for_one_movement_of_a_recorder_that_overlooked_a_part() {
+    let site = site(SHARED);
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    for (back_ms, is_one) in [(11, false), (50, true)] {
+        let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
+        for log in [&mut u1, &mut u2] {
+            log.observed(SET, "2026-11-22T10:00:00.000", (at, at + 8_000), Some(0));
+            log.changes("2026-11-22T10:00:01.000", &[4]);
+        }
+        u2.changes("2026-11-22T10:00:01.500", &[9]).changes("2026-11-22T10:00:10.013", &[9]);
+        u2.changes("2026-11-22T10:00:12.000", &[4]);
+        u1.changes("2026-11-22T10:00:10.010", &[1]);
+        u1.changes(&format!("2026-11-22T10:00:10.0{back_ms}"), &[1]);
+        u1.changes("2026-11-22T10:00:12.000", &[4]);
+        let history = history(&site, &[&u1, &u2]);
+        let timeline = Timeline::new(&site, &history);
+        let mine = |event: &EventId| (event.recorder, timeline.held(*event).unwrap().sequence);
+        let event = timeline.entries().find(|event| mine(event) == (0, 2)).expect("an entry");
+        let same = timeline.same_movement(ChangeId { event, input: 1 });
+        assert_eq!(same.is_some(), is_one, "{back_ms}: {same:?}");
+    }
 }
 
 #[test]
@@ -339,7 +415,7 @@ fn a_contact_that_one_of_its_recorders_saw_later_than_something_else_was_not_fir
     u1.observed(SET, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(0));
     u2.observed(SET, "2026-11-22T10:00:00.000", (at - 90_000, at + 90_000), Some(0));
     u2.changes("2026-11-22T10:00:01.000", &[9]).changes("2026-11-22T10:00:20.000", &[9]);
-    u1.changes("2026-11-22T10:00:20.000", &[4]);
+    u1.changes("2026-11-22T10:00:01.000", &[5]).changes("2026-11-22T10:00:20.000", &[4]);
     // Two milliseconds prove that it came after input 4 here, but not there.
     u1.changes("2026-11-22T10:00:20.002", &[1]).changes("2026-11-22T10:00:20.040", &[2]);
     u2.changes("2026-11-22T10:00:20.050", &[3]);

@@ -57,9 +57,9 @@ impl Hosts {
         self.boots.keys().copied()
     }
 
-    /// UTC less the monotonic clock, for the list. Where nothing is known of it, the host's own UTC is
-    /// taken to be right to `anything_us`. If its readings allow it, the host's monotonic clock is
-    /// taken to run as UTC does: then all recorders that it has observed stay together.
+    /// UTC less the monotonic clock, for the list. Where nothing is known of it, the host's own UTC
+    /// is taken to be right to `anything_us`. If its readings allow it, the host's monotonic clock
+    /// is taken to run as UTC does: then all recorders that it has observed stay together.
     pub(crate) fn placed(&self, boot: Boot, anything_us: i64) -> Envelope {
         let steady = Slope::within(0);
         let Some(clock) = self.boots.get(&boot) else {

@@ -15,8 +15,12 @@ use crate::record::{Boot, Reference};
 /// How wrong a clock may be of which nothing is known: a hundred years, in microseconds.
 const ANYTHING_US: i64 = 100 * 366 * 86_400_000_000;
 
-/// How often bounds are passed on. Each round passes them over one more link.
+/// How often bounds are passed on at once. Each round passes them over one more link, so few are
+/// enough unless ties contradict each other: then bounds go round in circles and grow for ever.
 const MOST_ROUNDS: usize = 200;
+
+/// The same for entries of doubtful runs, together with all that they set off.
+const MOST_DOUBTFUL_ROUNDS: usize = 5 * MOST_ROUNDS;
 
 /// All clocks on one scale: first those of the boots, then those of the runs.
 #[derive(Debug, Default)]
@@ -56,6 +60,20 @@ struct Tie {
     other_x: i64,
     lo: i64,
     hi: i64,
+}
+
+impl Tie {
+    /// The same, seen from the other end.
+    fn reversed(&self) -> Tie {
+        Tie {
+            one: self.other,
+            x: self.other_x,
+            other: self.one,
+            other_x: self.x,
+            lo: negated(self.hi),
+            hi: negated(self.lo),
+        }
+    }
 }
 
 /// A run, and what its entries say about where it may be.
@@ -124,9 +142,9 @@ impl Layout {
             }
         }
         let mut layout = Layout { boots, clocks };
-        layout.settle(&ties);
-        layout.heed_doubtful(successions, &ties);
-        layout.place_the_rest(hosts, runs, &ties);
+        layout.settle(&mut ties);
+        layout.heed_doubtful(successions, &mut ties);
+        layout.place_the_rest(hosts, runs, &mut ties);
         layout
     }
 
@@ -145,24 +163,22 @@ impl Layout {
         })
     }
 
-    /// Passes bounds on over all ties until nothing changes. A tie that contradicts the others is
-    /// passed over; that it does is told elsewhere.
-    fn settle(&mut self, ties: &[Tie]) {
-        for _ in 0..MOST_ROUNDS {
+    /// Passes bounds on over all ties until nothing changes. A tie that contradicts what is known is
+    /// passed over; ties that still bring news after so many rounds go round in circles, and are
+    /// dropped. That they contradict each other is told elsewhere. Returns the number of rounds.
+    fn settle(&mut self, ties: &mut Vec<Tie>) -> usize {
+        let mut rounds = 0;
+        loop {
+            rounds += 1;
+            let is_last = rounds % MOST_ROUNDS == 0;
             let mut is_news = false;
-            for tie in ties {
-                let back = Tie {
-                    one: tie.other,
-                    x: tie.other_x,
-                    other: tie.one,
-                    other_x: tie.x,
-                    lo: negated(tie.hi),
-                    hi: negated(tie.lo),
-                };
-                is_news |= self.pass_on(tie) | self.pass_on(&back);
-            }
+            ties.retain(|tie| {
+                let brings_news = self.pass_on(tie) | self.pass_on(&tie.reversed());
+                is_news |= brings_news;
+                !(brings_news && is_last)
+            });
             if !is_news {
-                return;
+                return rounds;
             }
         }
     }
@@ -182,10 +198,12 @@ impl Layout {
         one.and_then(|one| one.offset.learn(tie.x, lo, hi)).unwrap_or(false)
     }
 
-    /// An entry that may be in any of several runs bounds its neighbours, too: by the earliest, or by
-    /// the latest, that it may be.
-    fn heed_doubtful(&mut self, successions: &[Succession], ties: &[Tie]) {
-        for _ in 0..MOST_ROUNDS {
+    /// An entry that may be in any of several runs bounds its neighbours, too: by the earliest, or
+    /// by the latest, that it may be. Returns the number of rounds.
+    fn heed_doubtful(&mut self, successions: &[Succession], ties: &mut Vec<Tie>) -> usize {
+        let mut rounds = 0;
+        // Entries that contradict each other bring news for ever, so that has to have an end.
+        while rounds < MOST_DOUBTFUL_ROUNDS {
             let mut is_news = false;
             for Succession { earlier, later } in successions {
                 is_news |= match (&earlier[..], &later[..]) {
@@ -201,11 +219,13 @@ impl Layout {
                     _ => false,
                 };
             }
+            rounds += 1;
             if !is_news {
-                return;
+                break;
             }
-            self.settle(ties);
+            rounds += self.settle(ties);
         }
+        rounds
     }
 
     /// The instants at which any of these runs showed what it did.
@@ -228,14 +248,15 @@ impl Layout {
     /// Gives a place to clocks of which little is known. What a clock showed, or what the site says
     /// that it shows, is taken to be right as far as that can be; what is known on one side only is
     /// taken to be right there.
-    fn place_the_rest(&mut self, hosts: &Hosts, runs: &[RunFacts<'_>], ties: &[Tie]) {
+    fn place_the_rest(&mut self, hosts: &Hosts, runs: &[RunFacts<'_>], ties: &mut Vec<Tie>) {
         let boots = self.boots.clone();
         for (clock, boot) in boots.into_iter().enumerate() {
             if let Some((x, utc)) = hosts.nominal_only(boot) {
                 self.place(clock, x, Some(utc), ties);
             }
         }
-        // What a clock is said to show counts where it is not bounded on both sides, and comes first.
+        // What a clock is said to show counts where it is not bounded on both sides, and comes
+        // first.
         for (run, facts) in runs.iter().enumerate() {
             let clock = self.boots.len() + run;
             let Some((x, utc)) = facts.nominal else { continue };
@@ -255,7 +276,7 @@ impl Layout {
     }
 
     /// Gives a clock a place where it showed `x`, if it has none or is only said to have one.
-    fn place(&mut self, clock: usize, x: i64, said: Option<i64>, ties: &[Tie]) {
+    fn place(&mut self, clock: usize, x: i64, said: Option<i64>, ties: &mut Vec<Tie>) {
         let Some(placed) = self.clocks.get_mut(clock) else { return };
         let (lo, hi) = placed.offset.at(x);
         let at = match (said, lo, hi) {
@@ -330,4 +351,58 @@ fn own_points(facts: &RunFacts<'_>) -> Envelope {
         }));
     }
     Envelope::with_slope(points, facts.clock.slope())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clock::envelope::Slope;
+
+    /// Clocks that may be wrong by a hundred years.
+    fn layout(clocks: usize) -> Layout {
+        let known = Known { x: 0, lo: -ANYTHING_US, hi: ANYTHING_US, id: 0 };
+        let clock = || placed(Envelope::with_slope(vec![known], Slope::within(0)));
+        Layout { boots: Vec::new(), clocks: (0..clocks).map(|_| clock()).collect() }
+    }
+
+    /// The clock `one` showed 0 at least so long after the clock `other` did.
+    fn later(one: usize, other: usize, us: i64) -> Tie {
+        Tie { one, x: 0, other, other_x: 0, lo: us, hi: NO_HI }
+    }
+
+    fn earliest(layout: &Layout, clock: usize) -> i64 {
+        layout.clocks[clock].offset.at(0).0
+    }
+
+    #[test]
+    fn many_ties_that_contradict_each_other_come_to_an_end() {
+        const PAIRS: usize = 300;
+        let mut layout = layout(2 * PAIRS + 3);
+        // Of each pair, either is later than the other one.
+        let mut ties: Vec<Tie> = (0..PAIRS)
+            .flat_map(|pair| {
+                let (one, other) = (2 * pair, 2 * pair + 1);
+                [later(one, other, 1000), later(other, one, 1000)]
+            })
+            .collect();
+        // These three have nothing to do with them.
+        let (first, second, third) = (2 * PAIRS, 2 * PAIRS + 1, 2 * PAIRS + 2);
+        ties.extend([later(third, second, 70), later(second, first, 50)]);
+        let rounds = layout.settle(&mut ties);
+        assert!(rounds <= MOST_ROUNDS + 2, "{rounds}");
+        assert_eq!(ties.len(), 2, "the others are dropped");
+        assert_eq!(earliest(&layout, third), earliest(&layout, first) + 120);
+        assert_eq!(layout.settle(&mut ties), 1, "nothing more is news");
+    }
+
+    #[test]
+    fn doubtful_entries_that_contradict_ties_come_to_an_end() {
+        let mut layout = layout(3);
+        let mut ties = vec![later(0, 2, 1000), later(1, 2, 1000)];
+        layout.settle(&mut ties);
+        // An entry of clock 0 or 1 came before one of clock 2, which was earlier than both.
+        let doubtful = Succession { earlier: vec![(0, 0), (1, 0)], later: vec![(2, 0)] };
+        let rounds = layout.heed_doubtful(&[doubtful], &mut ties);
+        assert!((MOST_DOUBTFUL_ROUNDS..MOST_DOUBTFUL_ROUNDS + 10).contains(&rounds), "{rounds}");
+    }
 }

@@ -73,9 +73,21 @@ impl Links {
         Links { by_pair }
     }
 
-    /// How long after run `other` began to show `other_x` run `one` began to show `x`, by the
-    /// nearest links on both sides.
+    /// How long after run `other` began to show `other_x` run `one` began to show `x`, by the links
+    /// that are nearest to either. It is the same both ways.
     pub(crate) fn difference(
+        &self,
+        runs: &[RunClock],
+        one: (usize, i64),
+        other: (usize, i64),
+    ) -> Option<(i64, i64)> {
+        let (lo, hi) = self.by_nearest_to_first(runs, one, other)?;
+        // Which links are nearest to one is not always which are nearest to the other.
+        let (back_lo, back_hi) = self.by_nearest_to_first(runs, other, one)?;
+        Some((lo.max(back_hi.saturating_neg()), hi.min(back_lo.saturating_neg())))
+    }
+
+    fn by_nearest_to_first(
         &self,
         runs: &[RunClock],
         (one, x): (usize, i64),

@@ -30,14 +30,16 @@ pub(super) fn life_clocks(
     next_run: &mut usize,
 ) -> Vec<LifeClock> {
     let mut steps: Vec<Vec<Step>> = vec![Vec::new(); recorder.lives.len()];
+    let is_named = |life: usize| recorder.lives.get(life).is_some_and(|life| life.life.is_some());
     let mut add = |whereabouts: Whereabouts, step: Step| {
-        for (index, (life, steps)) in recorder.lives.iter().zip(&mut steps).enumerate() {
+        for (index, steps) in steps.iter_mut().enumerate() {
             match whereabouts {
                 Whereabouts::Here(Located { life, after, before }) if life == index => {
                     steps.push(Step { after, before, is_sure: true, ..step });
                 }
-                // A life without a name may be the same one, read at another time.
-                Whereabouts::Here(_) | Whereabouts::Elsewhere if life.life.is_some() => {}
+                // A life without a name may be any other one, read at another time.
+                Whereabouts::Here(Located { life, .. }) if is_named(life) && is_named(index) => {}
+                Whereabouts::Elsewhere if is_named(index) => {}
                 _ => steps.push(step),
             }
         }

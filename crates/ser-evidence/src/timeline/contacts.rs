@@ -6,18 +6,15 @@
 
 use std::collections::BTreeMap;
 
-use super::{ChangeId, EventId, Order, Timeline, event_id};
+use super::watching::{Side, reaches, stands_alone, was_watching};
+use super::{ChangeId, EventId, Timeline, event_id};
 use crate::clock::LinkReason;
 use crate::clock::links::Link;
-use crate::history::LifeHistory;
 use crate::site::{Point, PointId};
 use crate::time::shown;
 
 /// Changes whose times are less certain than this are not paired, in microseconds.
 const WIDEST_US: i64 = 60_000_000;
-
-/// How many entries on either side of a change are asked whether they are earlier or later.
-const MOST_NEAR: usize = 64;
 
 /// A contact that two recorders should have seen alike, and have not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -97,7 +94,7 @@ fn pair(timeline: &Timeline<'_>, one: PointId, other: PointId, shared: &mut Shar
                     let is_mutual = partners(timeline, partner, these).len() == 1;
                     if is_mutual
                         && !is_chatter(timeline, those, partner)
-                        && is_covered(timeline, change, partner.change.event)
+                        && is_one(timeline, change.change, partner.change)
                     {
                         let (change, partner) = (change.change, partner.change);
                         shared.pairs.extend([(change, partner), (partner, change)]);
@@ -181,28 +178,24 @@ fn is_chatter(timeline: &Timeline<'_>, these: &[Seen], change: &Seen) -> bool {
     near.count() >= chatter.changes as usize
 }
 
-/// Whether nothing is missing around the partner, where another change could have been.
-fn is_covered(timeline: &Timeline<'_>, change: &Seen, partner: EventId) -> bool {
-    let both = [change.change.event, partner];
-    both.into_iter().all(|event| {
-        let Some(life) = timeline.life(event) else { return false };
-        !life.gaps.iter().any(|gap| {
-            let distance = gap.place.abs_diff(event.place as usize);
-            distance <= 1 || is_near(timeline, event, gap.place, change)
-        })
-    })
+/// Whether two changes that may be one movement are one. If they were not, one of them came first,
+/// and either log would lack the partner of the other's change: so it is enough that one of the two
+/// is known there. Neither can have overlooked what lasted.
+fn is_one(timeline: &Timeline<'_>, one: ChangeId, other: ChangeId) -> bool {
+    let shortest_us = shortest_seen_us(timeline, one).max(shortest_seen_us(timeline, other));
+    let lasted = |change| stands_alone(timeline, change, shortest_us);
+    let reaches = |from, to, side| reaches(timeline, from, to, side);
+    lasted(one)
+        && lasted(other)
+        && (reaches(other, one, Side::After) || reaches(one, other, Side::Before))
+        && (reaches(other, one, Side::Before) || reaches(one, other, Side::After))
 }
 
-/// Whether a gap may be about as early or late as a change.
-fn is_near(timeline: &Timeline<'_>, event: EventId, place: usize, change: &Seen) -> bool {
-    let key = |place: usize| {
-        let place = u32::try_from(place).unwrap_or(u32::MAX);
-        timeline.sort_key(EventId { place, ..event })
-    };
-    let begins = place.checked_sub(1).and_then(key).unwrap_or(i64::MIN);
-    let ends = key(place).unwrap_or(i64::MAX);
-    let reach = change.width.saturating_mul(2);
-    begins <= change.key.saturating_add(reach) && change.key.saturating_sub(reach) <= ends
+/// What is shorter than this, in microseconds, the recorder of a change may overlook: it may be
+/// over before it arrives, and before the next sample.
+fn shortest_seen_us(timeline: &Timeline<'_>, change: ChangeId) -> i64 {
+    let (earliest, latest) = timeline.delay_ends(change.event, None);
+    latest - earliest
 }
 
 /// What both changes being one movement says about the two clocks.
@@ -239,41 +232,6 @@ fn trouble(
         .min_by_key(|seen| (seen.key.abs_diff(change.key), seen.change));
     let trouble =
         nearest.map_or(ContactTrouble::Missing, |nearest| ContactTrouble::Apart(nearest.change));
-    was_watching(timeline, change, other).then_some(trouble)
-}
-
-/// Whether the recorder of a point has an entry that is proven to be earlier than a change and one that
-/// is proven to be later, and between them neither a gap nor a change of the point.
-fn was_watching(timeline: &Timeline<'_>, change: &Seen, point: PointId) -> bool {
-    let Some(point) = timeline.site.points.get(point.0) else { return false };
-    let recorders = timeline.history.recorders.iter().enumerate();
-    let mut lives = recorders
-        .filter(|(_, recorder)| recorder.site == Some(point.recorder))
-        .flat_map(|(index, recorder)| {
-            let lives = recorder.lives.iter().enumerate();
-            lives.map(move |(life_index, life)| (event_id(index, life_index, 0), life))
-        });
-    lives.any(|(first, life)| covers(timeline, change, (first, life), point.input))
-}
-
-/// The same for one life, which begins with the entry `first`.
-fn covers(
-    timeline: &Timeline<'_>,
-    change: &Seen,
-    (first, life): (EventId, &LifeHistory),
-    input: u8,
-) -> bool {
-    let event = |place: usize| {
-        let place = u32::try_from(place).unwrap_or(u32::MAX);
-        EventId { place, ..first }
-    };
-    let order = |place: usize| timeline.order(event(place), change.change.event);
-    let near = timeline.place_before(first, change.key).map_or(0, |place| place + 1);
-    let before = (0..near).rev().take(MOST_NEAR).find(|&place| order(place) == Order::Before);
-    let after =
-        (near..life.entries.len()).take(MOST_NEAR).find(|&place| order(place) == Order::After);
-    let Some((before, after)) = before.zip(after) else { return false };
-    let is_gap = life.gaps.iter().any(|gap| (before + 1..=after).contains(&gap.place));
-    let between = life.entries.get(before + 1..after).unwrap_or_default();
-    !is_gap && !between.iter().any(|held| held.entry.changed.contains(input))
+    let point = timeline.site.points.get(other.0)?;
+    was_watching(timeline, (change.change, change.key), point).then_some(trouble)
 }

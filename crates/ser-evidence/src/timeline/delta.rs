@@ -11,8 +11,8 @@ use crate::time::shown;
 /// How often a recorder looks at its inputs, in microseconds.
 const PERIOD_US: i64 = 1000;
 
-/// Bounds are rounded outwards here and there. So much is moved at either end, in microseconds, that
-/// what is said of the order of two entries does not depend on it.
+/// Bounds are rounded outwards here and there. So much is moved at either end, in microseconds,
+/// that what is said of the order of two entries does not depend on it.
 const SLACK_US: i64 = 5;
 
 /// How far the time of a host may be from true time.
@@ -91,8 +91,8 @@ impl Timeline<'_> {
         if lo <= hi || is_consistent() { order } else { Order::Unknown }
     }
 
-    /// The time from one change to another. From a change to itself it is 0, and so it is between two
-    /// that are [one movement](Self::same_movement).
+    /// The time from one change to another. From a change to itself it is 0, and so it is between
+    /// two that are [one movement](Self::same_movement).
     #[must_use]
     pub fn delta(&self, one: ChangeId, other: ChangeId) -> Delta {
         if one == other || self.same_movement(one) == Some(other) {
@@ -111,6 +111,16 @@ impl Timeline<'_> {
         Delta::of((lo.min(hi), hi.max(lo)))
     }
 
+    /// How far two movements are apart at least, whichever came first; negative if they may be one.
+    pub(super) fn moved_apart(
+        &self,
+        one: (EventId, Option<u8>),
+        other: (EventId, Option<u8>),
+    ) -> i64 {
+        let (lo, hi) = self.moved_between(one, other, BY_HOST);
+        lo.max(hi.saturating_neg())
+    }
+
     /// From the movement of one contact to that of another. `by_host` is how far the time of a host
     /// may be from true time.
     fn moved_between(
@@ -125,8 +135,8 @@ impl Timeline<'_> {
         added(samples, (other_lo - one_hi, other_hi - one_lo))
     }
 
-    /// The earliest and the latest movement, from the sample: of one input, or of any change of this
-    /// recorder.
+    /// The earliest and the latest movement, from the sample: of one input, or of any change of
+    /// this recorder.
     pub(super) fn delay_ends(&self, event: EventId, input: Option<u8>) -> (i64, i64) {
         let Some(recorder) = self.recorder(event) else { return (0, 0) };
         let is_on = input.and_then(|input| Some(self.held(event)?.entry.state.contains(input)));

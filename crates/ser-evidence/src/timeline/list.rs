@@ -93,8 +93,8 @@ impl Head {
 }
 
 impl Items<'_> {
-    /// Where an entry goes whose run is not sure is a guess. If another one is proven to be earlier,
-    /// that one comes first.
+    /// Where an entry goes whose run is not sure is a guess. If another one is proven to be
+    /// earlier, that one comes first.
     fn put_what_is_proven_first(&mut self) {
         let is_sure = |head: &Head| self.timeline.is_run_sure(head.event());
         if self.heads.iter().all(|Reverse(head)| is_sure(head)) {

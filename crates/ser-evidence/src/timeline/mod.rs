@@ -10,6 +10,7 @@ mod bounds;
 mod contacts;
 mod delta;
 mod list;
+mod watching;
 
 pub use contacts::{ContactFinding, ContactTrouble};
 pub use delta::{Delta, Order};
@@ -136,8 +137,8 @@ impl<'a> Timeline<'a> {
         &self.contact_findings
     }
 
-    /// The change of another recorder that is the same movement of the same contact, if it is beyond
-    /// doubt which one that is.
+    /// The change of another recorder that is the same movement of the same contact, if it is
+    /// beyond doubt which one that is.
     #[must_use]
     pub fn same_movement(&self, change: ChangeId) -> Option<ChangeId> {
         self.pairs.get(&change).copied()

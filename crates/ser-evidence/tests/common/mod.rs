@@ -43,13 +43,14 @@ pub(crate) struct Log {
     state: u32,
     records: Vec<Record>,
     sequence: u64,
+    newest: Option<Entry>,
 }
 
 impl Log {
-    /// An empty one.
+    /// An empty one. Nobody knows which life number 0 is.
     pub(crate) fn of(recorder: &'static str, life: u64) -> Log {
         let life = Life::from_bits(life);
-        Log { recorder, life, state: 0, records: Vec::new(), sequence: 0 }
+        Log { recorder, life, state: 0, records: Vec::new(), sequence: 0, newest: None }
     }
 
     /// These inputs change.
@@ -59,6 +60,7 @@ impl Log {
         self.sequence += 1;
         let entry =
             Entry { changed: Inputs(changed), state: Inputs(self.state), time: stamp(time) };
+        self.newest = Some(entry);
         self.records.push(Record::Entry(EntryRecord {
             life: self.life,
             sequence: Some(self.sequence),
@@ -108,7 +110,7 @@ impl Log {
             life: self.life,
             after: Some(self.sequence),
             before: Some(self.sequence),
-            newest: None,
+            newest: self.newest.filter(|_| !self.life.is_known()),
         };
         let at = Reference::Host { bound: Bound::from_us(bound_us.0, bound_us.1), reading };
         self.records.push(Record::Clock(ClockObservation { how, shown: seen(showed), at, place }));

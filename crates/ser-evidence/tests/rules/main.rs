@@ -6,8 +6,8 @@
 //! be said at least. [`adapter`] alone knows how the crate is asked.
 //!
 //! A seed decides everything. `SER_RULES_SEED=17` tries one seed and tells its story if something is
-//! wrong, `SER_RULES_SEEDS=10000` tries that many, `SER_RULES_WRONG=1` ends at the first that is
-//! wrong. `cargo xtask evidence-mistakes` shows that
+//! wrong, `SER_RULES_SEEDS=10000` tries that many, from `SER_RULES_FIRST=10000` on if that is said,
+//! `SER_RULES_WRONG=1` ends at the first that is wrong. `cargo xtask evidence-mistakes` shows that
 //! mistakes in the crate are noticed.
 
 mod adapter;
@@ -46,9 +46,10 @@ const MOST_TEXT: usize = 20_000;
 
 /// The seeds to try: the one that the environment names, or so many.
 fn seeds(by_default: u64) -> Range<u64> {
+    let first = number("SER_RULES_FIRST").unwrap_or(0);
     match (number("SER_RULES_SEED"), number("SER_RULES_SEEDS")) {
         (Some(seed), _) => seed..seed + 1,
-        (None, count) => 0..count.unwrap_or(by_default),
+        (None, count) => first..first + count.unwrap_or(by_default),
     }
 }
 
