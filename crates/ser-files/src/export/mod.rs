@@ -5,7 +5,7 @@
 //! and losses is in `docs/formats.md`, with a table of what each format cannot say.
 //!
 //! CSV, PRC-002 and JSON lines hold entries and losses as they are. A waveform (VCD, COMTRADE) has
-//! one axis of time and a state for each input at each instant: [`steps`] makes that of the entries,
+//! one axis of time and a state for each input at each instant: `steps` makes that of the entries,
 //! and both formats are made from it.
 
 mod axis;

@@ -1,9 +1,9 @@
 //! Lists of other recorders and relays, made records of ours.
 //!
-//! A reader for each format ([`sel`], [`cytime`], [`comtrade`], [`prc002`]) takes a file of any
-//! origin apart into lists of rows ([`list`]). What follows is the same for all: times become UTC
-//! ([`zone`], [`timed`]), words become states ([`states`]), points get inputs ([`inputs`]), and rows
-//! become entries ([`entries`]). An [`Importer`] does that for any number of files.
+//! A reader for each format (`sel`, `cytime`, `comtrade`, `prc002`) takes a file of any
+//! origin apart into lists of rows (`list`). What follows is the same for all: times become UTC
+//! (`zone`, `timed`), words become states (`states`), points get inputs (`inputs`), and rows
+//! become entries (`entries`). An [`Importer`] does that for any number of files.
 //!
 //! Files come from outside. Whatever is in them, reading ends, memory is bounded, and what was not
 //! understood is told with its line and reason while the rest is read.
