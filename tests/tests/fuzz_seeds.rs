@@ -19,7 +19,7 @@ macro_rules! targets {
     };
 }
 
-targets! { frames commands replies datagrams comm_req geni_driver node client cli_files captures state_files records foreign_lists }
+targets! { frames commands replies datagrams comm_req geni_driver node client cli_files captures state_files records foreign_lists site_files }
 
 fn replay(name: &str) {
     let target = TARGETS.iter().find(|target| target.name == name).expect("a target");

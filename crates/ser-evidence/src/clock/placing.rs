@@ -4,7 +4,7 @@ use ser_proto::Entry;
 
 use super::runs::{LifeRuns, Side, Step, When, is_earlier};
 use crate::history::{Held, LifeHistory, RecorderHistory};
-use crate::record::{ClockObservation, How, Place};
+use crate::record::{ClockObservation, EntryRecord, How, Place};
 use crate::time::{Bound, Moment, Shown, Utc, shown};
 
 /// What a recorder counts modulo.
@@ -63,7 +63,7 @@ fn same_entry(life: &LifeHistory, sequence: u64, entry: &Entry) -> Option<u64> {
     if life.is_by_number {
         return None;
     }
-    let is_it = |held: &&Held| held.sequence % WRAP == sequence % WRAP && held.entry == *entry;
+    let is_it = |held: &&Held| held.sequence % WRAP == sequence % WRAP && may_be(held, entry);
     let (first, last) = (life.entries.first()?.sequence, life.entries.last()?.sequence);
     let wraps = (last - first) / WRAP + 1;
     // With fewer entries than wraps, it is quicker to look at each of them.
@@ -74,6 +74,11 @@ fn same_entry(life: &LifeHistory, sequence: u64, entry: &Entry) -> Option<u64> {
     let candidates =
         (0..=wraps).filter_map(|wrap| first.checked_add(behind)?.checked_add(wrap * WRAP));
     candidates.filter_map(|candidate| life.entry(candidate)).find(is_it).map(|held| held.sequence)
+}
+
+/// Whether an entry that was held may be one of which everything was read.
+fn may_be(held: &Held, entry: &Entry) -> bool {
+    held.agrees(&Held { entry: *entry, known: EntryRecord::ALL_KNOWN, ..*held })
 }
 
 /// The run of a located observation, by its index in the life; `None` if it cannot be said.
@@ -180,4 +185,34 @@ pub(crate) fn run_by_stamps(
 pub(crate) fn by_hand(host_time: Moment<Utc>, doubt_us: u64) -> Bound<Utc> {
     let doubt = i64::try_from(doubt_us).unwrap_or(i64::MAX / 4);
     Bound::from_us(host_time.us().saturating_sub(doubt), host_time.us().saturating_add(doubt))
+}
+
+#[cfg(test)]
+mod tests {
+    use ser_proto::{Inputs, TimeStamp};
+
+    use super::*;
+
+    #[test]
+    fn an_entry_of_which_only_the_changes_are_known_is_found_by_them() {
+        let entry = |changed, state| Entry {
+            changed: Inputs(changed),
+            state: Inputs(state),
+            time: TimeStamp {
+                year: 26,
+                month: 11,
+                day: 22,
+                hour: 10,
+                minute: 0,
+                second: 0,
+                millisecond: 0,
+            },
+        };
+        let held = Held { sequence: 70_000, entry: entry(1, 1), number: 1, known: Inputs(1) };
+        let life = LifeHistory { entries: vec![held], ..LifeHistory::default() };
+        let total = 70_000 % WRAP;
+        assert_eq!(same_entry(&life, total, &entry(1, 0b101)), Some(70_000));
+        assert_eq!(same_entry(&life, total, &entry(1, 0b100)), None, "it went off");
+        assert_eq!(same_entry(&life, total, &entry(0b101, 0b101)), None, "another changed too");
+    }
 }

@@ -68,6 +68,32 @@ impl Operation {
         }
     }
 
+    /// A command that arrives twice before a moment at which something happens, and a look at the
+    /// clock between the arrivals.
+    pub(crate) fn twice_before(moment: Ps, chance: &mut Chance) -> [Operation; 2] {
+        let mut one = || Operation::draw(0, false, chance);
+        let (set, look) = (one(), one());
+        let arrived = moment - chance.between(10 * MS, 2 * S);
+        let asked = arrived - chance.between(2 * S, 9 * S);
+        let sent = asked - chance.between(2 * S, 9 * S);
+        let received = arrived + chance.between(MS, 8 * MS);
+        let set = Operation {
+            before: sent - MS,
+            sent,
+            arrivals: vec![sent + chance.between(MS, S), arrived],
+            received,
+            after: received + MS,
+            is_answered: true,
+            ..set
+        };
+        let received = asked + chance.between(MS, S);
+        let arrivals = vec![chance.between(asked, received)];
+        let (before, after) = (asked - MS, received + MS);
+        let look =
+            Operation { before, sent: asked, arrivals, received, after, is_answered: true, ..look };
+        [set, look]
+    }
+
     /// The true instant that an answered operation is about.
     pub(crate) fn instant(&self) -> Ps {
         *self.arrivals.last().expect("an answered operation arrived")

@@ -110,20 +110,13 @@ fn operations(
     chance: &mut Chance,
 ) -> Vec<Operation> {
     let mut operations = Vec::new();
-    let mut add = |whose: Vec<usize>, is_broadcast: bool, chance: &mut Chance| {
-        let sent = if chance.one_in(2) {
-            chance.of(moments) + chance.between(-30 * S, 5 * S)
-        } else {
-            chance.between(0, until)
-        };
-        let mut operation = Operation::draw(sent.max(0), is_broadcast, chance);
+    let mut add = |mut operation: Operation, whose: Vec<usize>, sets: bool, chance: &mut Chance| {
         operation.host = chance.below(hosts.len());
         let is_steady = |&recorder: &usize| {
             let schedule = &builds[recorder].schedule;
             schedule.is_one_life(operation.before - 10 * MS, operation.after + 10 * MS)
         };
         operation.recorders = whose.into_iter().filter(is_steady).collect();
-        let sets = if is_broadcast { chance.one_in(2) } else { chance.one_in(3) };
         if sets && let Some(&recorder) = operation.recorders.first() {
             let reading = hosts[operation.host].reading(operation.sent, chance);
             let east_us = match builds[recorder].site.clock {
@@ -134,14 +127,30 @@ fn operations(
         }
         operations.push(operation);
     };
+    let draw = |is_broadcast: bool, chance: &mut Chance| {
+        let sent = if chance.one_in(2) {
+            chance.of(moments) + chance.between(-30 * S, 5 * S)
+        } else {
+            chance.between(0, until)
+        };
+        Operation::draw(sent.max(0), is_broadcast, chance)
+    };
     for recorder in 0..builds.len() {
         for _ in 0..chance.between(0, 6) {
-            add(vec![recorder], false, chance);
+            let sets = chance.one_in(3);
+            add(draw(false, chance), vec![recorder], sets, chance);
+        }
+        let moment = chance.of(moments);
+        if chance.one_in(6) && moment > 30 * S {
+            let [set, look] = Operation::twice_before(moment, chance);
+            add(set, vec![recorder], true, chance);
+            add(look, vec![recorder], false, chance);
         }
     }
     let bus: Vec<usize> = (0..builds.len()).filter(|_| !chance.one_in(4)).collect();
     for _ in 0..chance.between(0, 3) {
-        add(bus.clone(), true, chance);
+        let sets = chance.one_in(2);
+        add(draw(true, chance), bus.clone(), sets, chance);
     }
     operations.sort_by_key(|operation| operation.sent);
     operations

@@ -23,6 +23,7 @@ mod records;
 mod replies;
 mod script;
 pub mod seeds;
+mod site_files;
 mod state_files;
 
 pub use captures::captures;
@@ -37,6 +38,7 @@ pub use geni_driver::geni_driver;
 pub use node::node;
 pub use records::records;
 pub use replies::replies;
+pub use site_files::site_files;
 pub use state_files::state_files;
 
 /// A function that takes any bytes and panics when something does not hold.
@@ -49,7 +51,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 13] = [
+pub const TARGETS: [Target; 14] = [
     Target { name: "frames", run: frames },
     Target { name: "commands", run: commands },
     Target { name: "replies", run: replies },
@@ -63,4 +65,5 @@ pub const TARGETS: [Target; 13] = [
     Target { name: "state_files", run: state_files },
     Target { name: "records", run: records },
     Target { name: "foreign_lists", run: foreign_lists },
+    Target { name: "site_files", run: site_files },
 ];
