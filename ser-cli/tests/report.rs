@@ -440,8 +440,20 @@ fn damaged_lines_are_told_and_passed_over() {
         assert!(told.contains("; the line is left out\n"), "{told}");
         assert!(told.contains("warning: a.jsonl: 2 more damaged lines\nhint: "), "{told}");
         assert!(text(&output.stdout).contains("input 2"), "{output:?}");
+        assert!(text(&output.stdout).contains("could not be read"), "{output:?}");
         let strict = desk.run(&format!("{command} --input a.jsonl --fail-on-loss"));
         assert_eq!((strict.status.code(), &strict.stdout), (Some(3), &output.stdout));
+    }
+    let report = desk.json("report --input a.jsonl");
+    assert_eq!((&report["is_incomplete"], &report["damaged_lines"]), (&true.into(), &5.into()));
+    // What was merged from it says so, too.
+    for format in ["jsonl", "csv"] {
+        let merged = desk.ok(&format!("merge --input a.jsonl --format {format}"));
+        let file = format!("merged.{format}");
+        let report = desk.file(&file, &merged).ok(&format!("report --input {file}"));
+        assert!(report.contains("(a line could not be read)"), "{report}");
+        let strict = desk.run(&format!("report --input {file} --fail-on-loss"));
+        assert_eq!(strict.status.code(), Some(3), "{strict:?}");
     }
 }
 

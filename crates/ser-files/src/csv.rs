@@ -118,7 +118,8 @@ impl<R: BufRead> Reader<R> {
                 Ok(Row::Header(columns)) => self.columns = Some(columns),
                 Err(error) => {
                     self.is_over = !error.is_of_one_line();
-                    self.held = Some((0, Err(error)));
+                    // Whose it was, nobody knows; most rows follow one of the same recorder.
+                    self.held = Some((self.recorders.last, Err(error)));
                 }
             }
             // Whatever else it was, it may have been of any recorder.
@@ -454,6 +455,7 @@ pub fn loss_note(gap: &Gap) -> String {
         Why::Overwritten => "overwritten".to_owned(),
         Why::LogBeganAnew => "log began anew".to_owned(),
         Why::NotReached => "not reached".to_owned(),
+        Why::Unreadable => "unreadable".to_owned(),
         Why::NotRecorded(inputs) => format!("not recorded, inputs {}", Inputs(inputs)),
     };
     format!("{lost}{after}: {why}")
@@ -474,6 +476,7 @@ fn lost_and_why(note: &str) -> Option<(Lost, Why)> {
         "overwritten" => Why::Overwritten,
         "log began anew" => Why::LogBeganAnew,
         "not reached" => Why::NotReached,
+        "unreadable" => Why::Unreadable,
         _ => Why::not_recorded(inputs(why.strip_prefix("not recorded, inputs ")?)?),
     };
     Some((lost, why))

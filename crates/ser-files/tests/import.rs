@@ -334,6 +334,7 @@ fn more_points_than_inputs_become_several_recorders_of_one_clock() {
         program: "test",
         site_digest: None,
         not_reached: &[],
+        damaged_lines: 0,
         unfold: true,
     };
     let mut json = Vec::new();

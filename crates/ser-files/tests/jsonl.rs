@@ -88,6 +88,7 @@ fn any_gap() -> impl Strategy<Value = Record> {
         Just(Why::LogBeganAnew),
         any::<u32>().prop_map(Why::NotRecorded),
         Just(Why::NotReached),
+        Just(Why::Unreadable),
     ];
     (any_life(), any::<Option<u64>>(), lost, why)
         .prop_map(|(life, after, lost, why)| Record::Gap(Gap { life, after, lost, why }))

@@ -87,6 +87,7 @@ impl Told {
             program: "ser-files",
             site_digest: None,
             not_reached: &[],
+            damaged_lines: 0,
             unfold: false,
         };
         let mut out = Vec::new();

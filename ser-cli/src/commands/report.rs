@@ -151,6 +151,7 @@ fn write(
         program: PROGRAM,
         site_digest: gathered.site_digest.clone(),
         not_reached: &gathered.not_reached,
+        damaged_lines: gathered.damaged_lines,
         unfold: shown.unfold,
     };
     match shown.format {
@@ -163,7 +164,7 @@ fn write(
         })?,
         Format::Json => report::write_json(out, &document)?,
     }
-    Ok(!report.is_incomplete())
+    Ok(!document.is_incomplete())
 }
 
 /// The format that the user wants, or that of the file's name.

@@ -8,6 +8,7 @@ use std::sync::Mutex;
 use std::thread;
 
 use ser_evidence::history::Collector;
+use ser_evidence::record::{EntryRecord, Gap, Lost, Record, Why};
 use ser_evidence::site::{Recorder, Site};
 use ser_files::Source;
 
@@ -70,14 +71,27 @@ fn read_one(path: &Path, names: &Names, collector: &mut Collector) -> Result<u64
     let mut source = Source::new(input, &recorder_of(path)).map_err(|error| failed(&error))?;
     collector.begin_source();
     let mut damaged = 0;
+    let (mut last, mut last_of) = (None, String::new());
     while let Some(record) = source.read() {
+        let told = source.recorder();
+        let recorder = names.get(told).map_or(told, String::as_str);
+        if last_of != recorder {
+            (last, last_of) = (None, recorder.to_owned());
+        }
         match record {
             Ok(record) => {
-                let told = source.recorder();
-                collector.add(names.get(told).map_or(told, String::as_str), &record);
+                if let Record::Entry(EntryRecord { life, sequence, .. }) = record {
+                    last = Some((life, sequence));
+                }
+                collector.add(recorder, &record);
             }
             Err(error) if error.is_of_one_line() => {
                 damaged += 1;
+                // The line may have been the next entry of the same log.
+                if let Some((life, after)) = last {
+                    let (lost, why) = (Lost::Unknown, Why::Unreadable);
+                    collector.add(recorder, &Record::Gap(Gap { life, after, lost, why }));
+                }
                 if damaged <= TOLD {
                     warn(format_args!("{}: {error}; the line is left out", path.display()));
                 }

@@ -21,14 +21,17 @@ pub(crate) fn parse_moment(text: &str) -> std::result::Result<GivenMoment, Strin
     if let Ok(absolute) = text.parse() {
         return Ok(GivenMoment::Absolute(absolute));
     }
+    let wrong = "not a date and time like 2026-11-22T10:00:00.250, or with Z or +01:00 at the end; a \
+                 date alone is its midnight, a time alone is today's in the zone of the site";
+    // What follows a time without a date, such as an offset, would be read and not used.
+    let is_plain = |sign: char| sign.is_ascii_digit() || "-:.,T ".contains(sign);
+    if !text.chars().all(is_plain) {
+        return Err(wrong.to_owned());
+    }
     if let Ok(local) = text.parse() {
         return Ok(GivenMoment::Local(local));
     }
-    let time = text.parse().map_err(|_| {
-        "not a date and time like 2026-11-22T10:00:00.250, or with Z or +01:00 at the end; a date \
-         alone is its midnight, a time alone is today's"
-    })?;
-    Ok(GivenMoment::Today(time))
+    Ok(GivenMoment::Today(text.parse().map_err(|_| wrong)?))
 }
 
 impl GivenMoment {
@@ -74,7 +77,9 @@ mod tests {
         assert_eq!(us("2026-11-22T05:00:00.250-05:00", "Europe/Berlin"), expected);
         assert_eq!(us("2026-11-22 11:00", "Europe/Berlin"), expected - 250_000);
         assert_eq!(us("2026-11-22", "UTC"), expected - 36_000_250_000, "midnight");
-        assert!(parse_moment("yesterday").is_err());
+        for wrong in ["yesterday", "13:45:19+00:00", "13:45:19Z", "2026-11-22+01:00"] {
+            assert!(parse_moment(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

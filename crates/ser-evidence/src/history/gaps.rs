@@ -88,8 +88,12 @@ pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps) -> Vec<LogGap> {
         }
     }
     let last = life.entries.last().map_or(0, |held| held.sequence);
-    let ends = told.at(life.name(), last).iter().filter(|gap| gap.why == Why::LogBeganAnew);
-    for gap in ends.take(usize::from(life.life.is_some())) {
+    let ends = told.at(life.name(), last).iter().filter(|gap| match gap.why {
+        Why::LogBeganAnew => life.life.is_some(),
+        Why::Unreadable => !life.entries.is_empty(),
+        _ => false,
+    });
+    for gap in ends {
         let (place, lost, why) = (life.entries.len(), gap.lost, gap.why);
         gaps.push(LogGap { place, after: last, lost, why });
     }

@@ -46,6 +46,8 @@ pub enum Why {
     /// The recorder, or the host that reads it, could not be reached. Without a sequence to come
     /// [after](Gap::after): the reading that these records are from did not get to this recorder.
     NotReached,
+    /// A line of a file could not be read. What is missing may have been in it.
+    Unreadable,
 }
 
 impl Why {

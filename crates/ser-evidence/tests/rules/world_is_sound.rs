@@ -225,6 +225,7 @@ fn everything_that_can_happen_does() {
                         ser_evidence::record::Why::LogBeganAnew => "began anew",
                         ser_evidence::record::Why::NotRecorded(_) => "not recorded",
                         ser_evidence::record::Why::NotReached => "not reached",
+                        ser_evidence::record::Why::Unreadable => "unreadable",
                     },
                     1,
                 ),

@@ -366,6 +366,7 @@ fn why_text(why: Why) -> String {
         Why::Overwritten => "overwritten".to_owned(),
         Why::LogBeganAnew => "log began anew".to_owned(),
         Why::NotReached => "not reached".to_owned(),
+        Why::Unreadable => "unreadable".to_owned(),
         Why::NotRecorded(inputs) => {
             format!("not recorded, inputs {}", ser_proto::Inputs(inputs))
         }

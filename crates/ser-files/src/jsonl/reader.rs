@@ -188,6 +188,7 @@ fn gap(line: &Line<'_>) -> Result<Record> {
         "log began anew" => Why::LogBeganAnew,
         "not recorded" => Why::not_recorded(needed(line.inputs, "inputs")?.0),
         "not reached" => Why::NotReached,
+        "unreadable" => Why::Unreadable,
         other => return Err(wrong("why", other)),
     };
     Ok(Record::Gap(Gap { life: life_of(line)?, after: line.after, lost, why }))

@@ -70,6 +70,7 @@ pub(super) const fn why_name(why: Why) -> &'static str {
         Why::LogBeganAnew => "log began anew",
         Why::NotRecorded(_) => "not recorded",
         Why::NotReached => "not reached",
+        Why::Unreadable => "unreadable",
     }
 }
 

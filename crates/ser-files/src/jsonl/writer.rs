@@ -156,7 +156,7 @@ impl<'a> GapLine<'a> {
         };
         let inputs = match why {
             Why::NotRecorded(inputs) => Some(Numbers(Inputs(inputs))),
-            Why::Overwritten | Why::LogBeganAnew | Why::NotReached => None,
+            Why::Overwritten | Why::LogBeganAnew | Why::NotReached | Why::Unreadable => None,
         };
         let (why, life) = (why_name(why), AsText(life));
         GapLine { record: "gap", recorder, lost, count, after, why, inputs, life }

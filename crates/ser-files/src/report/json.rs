@@ -8,9 +8,9 @@ use ser_evidence::incident::{ClockState, FirstOut, StretchEnd, Verdict};
 use ser_evidence::timeline::{ChangeId, Delta, EventId};
 use serde_json::{Value, json};
 
+use super::Document;
 use super::times::rfc3339;
 use super::verdict;
-use super::{Clock, Document};
 
 /// The version of the layout. A change that old readers would misread gets the next number.
 const SCHEMA: u32 = 1;
@@ -36,7 +36,7 @@ pub fn write(out: &mut dyn Write, document: &Document<'_>) -> io::Result<()> {
 fn object(document: &Document<'_>) -> Value {
     let Document { timeline, report, .. } = *document;
     let site = timeline.site();
-    let clock = Clock::in_zone(site.time_zone.clone());
+    let clock = super::outcome::clock(document);
     let digest: String = report.digest.iter().map(|byte| format!("{byte:02x}")).collect();
     json!({
         "report": "incident",
@@ -45,7 +45,8 @@ fn object(document: &Document<'_>) -> Value {
         "site": site.name,
         "site_sha256": document.site_digest,
         "entries_sha256": digest,
-        "is_incomplete": report.is_incomplete() || !document.not_reached.is_empty(),
+        "is_incomplete": document.is_incomplete(),
+        "damaged_lines": document.damaged_lines,
         "verdict": {
             "first_out": verdict::first_out(timeline, report, &report.first_out, &clock),
             "operated": report

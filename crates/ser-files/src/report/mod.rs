@@ -42,8 +42,18 @@ pub struct Document<'a> {
     pub site_digest: Option<String>,
     /// Recorders that were to be read and were not, and why.
     pub not_reached: &'a [NotReached],
+    /// How many lines of the sources could not be read.
+    pub damaged_lines: u64,
     /// Whether chatter is shown row by row.
     pub unfold: bool,
+}
+
+impl Document<'_> {
+    /// Whether something is missing, or may be.
+    #[must_use]
+    pub fn is_incomplete(&self) -> bool {
+        self.report.is_incomplete() || !self.not_reached.is_empty() || self.damaged_lines > 0
+    }
 }
 
 /// A recorder that could not be read.

@@ -14,19 +14,27 @@ pub(super) fn title(document: &Document<'_>) -> String {
     if name.is_empty() { "Incident".to_owned() } else { name }
 }
 
+/// The clock by which the times of an incident are shown.
+pub(super) fn clock(document: &Document<'_>) -> Clock {
+    let clock = Clock::in_zone(document.timeline.site().time_zone.clone());
+    match ends(document) {
+        Some((first, last)) => clock.over(first, last),
+        None => clock,
+    }
+}
+
 /// From when to when, in the zone of the site.
 pub(super) fn window(document: &Document<'_>, clock: &Clock) -> String {
+    let Some((first, last)) = ends(document) else { return "time not known".to_owned() };
+    format!("{} to {} ({})", clock.date_and_time(first), clock.time(last), clock.zone(first))
+}
+
+/// When the first and the last entry were, in UTC.
+fn ends(document: &Document<'_>) -> Option<(i64, i64)> {
     let Document { timeline, report, .. } = *document;
-    let events = &report.incident.events;
     let at = |event: Option<&EventId>| timeline.time(*event?).map(Moment::us);
-    let (Some(first), Some(last)) = (at(events.first()), at(events.last())) else {
-        return "time not known".to_owned();
-    };
-    let until = match clock.date(first) == clock.date(last) {
-        true => clock.time(last),
-        false => clock.date_and_time(last),
-    };
-    format!("{} to {until} ({})", clock.date_and_time(first), clock.zone(first))
+    let events = &report.incident.events;
+    at(events.first()).zip(at(events.last()))
 }
 
 /// Each group that wants to know, and what was first in it.

@@ -17,7 +17,7 @@ const WIDTH: usize = 96;
 /// # Errors
 /// If `out` does not take it.
 pub fn write(out: &mut dyn Write, document: &Document<'_>, styles: Styles) -> io::Result<()> {
-    let clock = Clock::in_zone(document.timeline.site().time_zone.clone());
+    let clock = outcome::clock(document);
     headline(out, document, styles, &clock)?;
     verdict_lines(out, document, styles, &clock)?;
     sources::write(out, document, styles, &clock)?;

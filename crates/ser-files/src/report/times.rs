@@ -7,13 +7,25 @@ use jiff::tz::TimeZone;
 #[derive(Clone, Debug)]
 pub struct Clock {
     zone: TimeZone,
+    /// Whether a time of the day does not say which day, or which offset, is meant.
+    needs_date: bool,
+    needs_offset: bool,
 }
 
 impl Clock {
     /// Shows times in this zone.
     #[must_use]
     pub const fn in_zone(zone: TimeZone) -> Clock {
-        Clock { zone }
+        Clock { zone, needs_date: false, needs_offset: false }
+    }
+
+    /// The same for times from `first_us` to `last_us`: times of the day have a date where these are
+    /// of several days, and their offset from UTC where that changes between them.
+    #[must_use]
+    pub fn over(self, first_us: i64, last_us: i64) -> Clock {
+        let differ = |format: &str| self.format(first_us, format) != self.format(last_us, format);
+        let (needs_date, needs_offset) = (differ("%Y-%m-%d"), differ("%:z"));
+        Clock { needs_date, needs_offset, ..self }
     }
 
     /// As `2026-11-22 11:00:00.250`, to the nearest millisecond.
@@ -28,10 +40,18 @@ impl Clock {
         self.format(utc_us, "%Y-%m-%d %H:%M:%S%.3f%:z")
     }
 
-    /// As `11:00:00.250`, to the nearest millisecond.
+    /// As `11:00:00.250`, to the nearest millisecond; with date and offset where they are
+    /// [needed](Self::over).
     #[must_use]
     pub fn time(&self, utc_us: i64) -> String {
-        self.format(utc_us, "%H:%M:%S%.3f")
+        let (date, offset) = (self.needs_date, self.needs_offset);
+        let format = match (date, offset) {
+            (false, false) => "%H:%M:%S%.3f",
+            (true, false) => "%Y-%m-%d %H:%M:%S%.3f",
+            (false, true) => "%H:%M:%S%.3f%:z",
+            (true, true) => "%Y-%m-%d %H:%M:%S%.3f%:z",
+        };
+        self.format(utc_us, format)
     }
 
     /// As `2026-11-22`.
@@ -78,5 +98,10 @@ mod tests {
         assert_eq!(Clock::in_zone(TimeZone::UTC).zone(us), "UTC");
         assert_eq!(rfc3339(us).unwrap(), "2026-11-22T10:00:00.249600Z");
         assert_eq!(clock.time(i64::MAX), "-");
+        let berlin = || Clock::in_zone(TimeZone::get("Europe/Berlin").unwrap());
+        assert_eq!(berlin().over(us, us + 1_000_000).time(us), "11:00:00.250");
+        assert_eq!(berlin().over(us, us + 86_400_000_000).time(us), "2026-11-22 11:00:00.250");
+        let summer = us - 29 * 86_400_000_000;
+        assert_eq!(berlin().over(summer, us).time(summer), "2026-10-24 12:00:00.250+02:00");
     }
 }

@@ -104,6 +104,7 @@ pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
             .iter()
             .map(|missed| format!("{} not reached", harmless(&missed.recorder))),
     );
+    wrong.extend(damaged(document));
     for recorder in &report.completeness {
         wrong.extend(incompleteness(timeline, recorder));
     }
@@ -113,7 +114,9 @@ pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
     for fold in &report.chatter {
         if let Some(row) = row_of(report, fold.first) {
             let point = names::point(timeline, row.point, row.change.input);
-            wrong.push(format!("{point} chattered ({} changes)", fold.changes.len()));
+            let recorder = names::recorder(timeline, row.change.event);
+            let changes = fold.changes.len();
+            wrong.push(format!("{point} ({recorder}) chattered ({changes} changes)"));
         }
     }
     let moved = report.abnormal.iter().filter(|abnormal| abnormal.since.is_some());
@@ -167,10 +170,19 @@ pub(super) fn why_undecidable(why: Doubt) -> &'static str {
     }
 }
 
+/// Lines of the sources that could not be read: nobody knows what was in them.
+pub(super) fn damaged(document: &Document<'_>) -> Option<String> {
+    match document.damaged_lines {
+        0 => None,
+        1 => Some("1 line of the sources could not be read".to_owned()),
+        lines => Some(format!("{lines} lines of the sources could not be read")),
+    }
+}
+
 /// What is missing of a recorder, if anything.
 pub(super) fn incompleteness(timeline: &Timeline<'_>, of: &Completeness) -> Option<String> {
     let name = recorder_name(timeline, of.recorder);
-    let mut text: Vec<String> = of.gaps.iter().map(|(gap, _)| missing(gap.lost, gap.why)).collect();
+    let mut text = missing_in_all(of.gaps.iter().map(|(gap, _)| (gap.lost, gap.why)));
     if of.conflicts > 0 {
         text.push(format!("{} entries contradict others", of.conflicts));
     }
@@ -183,6 +195,31 @@ pub(super) fn incompleteness(timeline: &Timeline<'_>, of: &Completeness) -> Opti
     (!text.is_empty()).then(|| format!("{name}: {}", text.join(", ")))
 }
 
+/// What is missing in several places: entries that are missing for one reason are counted together.
+fn missing_in_all(gaps: impl Iterator<Item = (Lost, Why)>) -> Vec<String> {
+    let mut exactly: Vec<(Why, u32, u32)> = Vec::new();
+    let mut others = Vec::new();
+    for (lost, why) in gaps {
+        match (lost, exactly.iter_mut().find(|(known, ..)| *known == why)) {
+            (Lost::Exactly(count), Some((_, sum, places))) => {
+                (*sum, *places) = (sum.saturating_add(count), *places + 1);
+            }
+            (Lost::Exactly(count), None) => exactly.push((why, count, 1)),
+            _ => others.push(missing(lost, why)),
+        }
+    }
+    let counted = exactly.into_iter().map(|(why, sum, places)| {
+        let text = missing(Lost::Exactly(sum), why);
+        match places {
+            1 => text,
+            _ => text.replacen(" missing", &format!(" missing in {places} places"), 1),
+        }
+    });
+    let mut all: Vec<String> = counted.chain(others).collect();
+    all.dedup();
+    all
+}
+
 /// How many entries are missing, and why.
 pub(crate) fn missing(lost: Lost, why: Why) -> String {
     let why = match why {
@@ -192,10 +229,12 @@ pub(crate) fn missing(lost: Lost, why: Why) -> String {
             return format!("inputs changed without being recorded: {}", ser_proto::Inputs(inputs));
         }
         Why::NotReached => "in none of the sources",
+        Why::Unreadable => "a line could not be read",
     };
     match lost {
         Lost::Exactly(1) => format!("1 entry missing ({why})"),
         Lost::Exactly(count) => format!("{count} entries missing ({why})"),
+        Lost::AtLeast(1) => format!("at least 1 entry missing ({why})"),
         Lost::AtLeast(count) => format!("at least {count} entries missing ({why})"),
         Lost::Unknown => format!("an unknown number of entries missing ({why})"),
     }

@@ -23,8 +23,8 @@ const SCRIPT: &str = include_str!("page.js");
 
 /// What the page may do: nothing but use its own style and its own script.
 const POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; \
-     style-src 'sha256-zOf1zO0ePcjjWXh3i5uuE/AQBTMa4JodIMAMCDJDJuo='; \
-     script-src 'sha256-oNR/zJVD66M8bHNILh90sp+6HCl0EjT1+uam/Iqx8sc='";
+     style-src 'sha256-rebzgpP7zJx7iGv3umnONUJskBpW5iIbFgbqATNZQmg='; \
+     script-src 'sha256-k/X1fMbvu6sp/I77tI1RB0Fr/A+YbhaEU3UjDX6mD/Q='";
 
 /// Why there is no page.
 #[derive(Debug)]
@@ -63,7 +63,7 @@ pub fn write(out: &mut dyn Write, document: &Document<'_>) -> Result<(), PageErr
     if rows > MAX_ROWS {
         return Err(PageError::TooManyRows(rows));
     }
-    let clock = Clock::in_zone(document.timeline.site().time_zone.clone());
+    let clock = outcome::clock(document);
     out.write_all(page(document, &clock).into_string().as_bytes())?;
     Ok(())
 }

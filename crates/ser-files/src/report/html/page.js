@@ -85,7 +85,7 @@
     }
     const zoom = (by, at = (from + to) / 2) => show(at - (at - from) * by, at + (to - at) * by);
     const move = (by) => show(from + by * (to - from), to + by * (to - from));
-    const all = () => show(...whole), early = () => show(-5e3, 100e3);
+    const all = () => show(...whole), early = () => show(-5e3, 105e3);
 
     const bar = document.createElement("span");
     bar.className = "zoom";

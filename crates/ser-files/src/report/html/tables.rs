@@ -219,6 +219,7 @@ pub(super) fn missing(document: &Document<'_>) -> Markup {
     let mut missing: Vec<String> =
         of_recorders.filter_map(|of| verdict::incompleteness(timeline, of)).collect();
     missing.extend(sources::not_reached(document).iter().map(|who| format!("not reached: {who}")));
+    missing.extend(verdict::damaged(document));
     match missing.is_empty() {
         true => html! { section { h2 { "Missing" } p { "Nothing." } } },
         false => list("Missing", &missing),

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use super::heading;
 use crate::report::style::Styles;
 use crate::report::table::{Align, Cell, Table};
-use crate::report::{Clock, Document, sources};
+use crate::report::{Clock, Document, sources, verdict};
 
 pub(super) fn write(
     out: &mut dyn Write,
@@ -33,6 +33,9 @@ pub(super) fn write(
     let (alarm, faint) = (styles.alarm, styles.faint);
     for missed in sources::not_reached(document) {
         writeln!(out, "{alarm}not reached{alarm:#} {missed}")?;
+    }
+    if let Some(damaged) = verdict::damaged(document) {
+        writeln!(out, "{alarm}damaged{alarm:#} {damaged}: what was in them is not known")?;
     }
     for finding in sources::findings(document.timeline) {
         writeln!(out, "{alarm}clocks{alarm:#} {finding}")?;

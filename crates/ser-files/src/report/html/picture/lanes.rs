@@ -1,12 +1,14 @@
 //! The lanes of a picture: for each point that moved, which state it had when, and how surely.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use ser_evidence::incident::{Incident, Row};
+use ser_evidence::record::Why;
 use ser_evidence::site::PointId;
-use ser_evidence::time::Moment;
 use ser_evidence::timeline::{ChangeId, EventId, Timeline};
+use ser_proto::Inputs;
 
+use super::axis::Axis;
 use crate::report::{Document, names, sequence};
 
 /// One point over the time of the incident.
@@ -20,7 +22,7 @@ pub(in crate::report::html) struct Lane {
     pub(super) edges: Vec<Edge>,
 }
 
-/// A state over a time.
+/// A state over a time, in microseconds after the first change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Stretch {
     pub(super) from_us: i64,
@@ -40,7 +42,7 @@ pub(super) enum State {
     Unknown,
 }
 
-/// A change, and how far it may be off.
+/// A change, in microseconds after the first one, and how far it may be off.
 #[derive(Clone, Debug)]
 pub(super) struct Edge {
     pub(super) at_us: i64,
@@ -55,9 +57,11 @@ pub(super) struct Edge {
 pub(in crate::report::html) struct Lanes {
     pub(in crate::report::html) lanes: Vec<Lane>,
     by_input: BTreeMap<(u32, u8), usize>,
-    /// From the first change to the last one.
-    pub(super) first_us: i64,
-    pub(super) last_us: i64,
+    /// When the first change was, in UTC.
+    pub(super) origin_us: i64,
+    /// From the earliest change to the latest one, after the first in the list.
+    pub(super) least_us: i64,
+    pub(super) most_us: i64,
     /// How many changes have no time, and are in no lane.
     pub(super) timeless: usize,
 }
@@ -69,25 +73,30 @@ impl Lanes {
         clock: &super::Clock,
     ) -> Option<Lanes> {
         let Document { timeline, report, .. } = *document;
-        let timed = |row: &&Row| time_us(timeline, row.change.event).is_some();
-        let times = || report.rows.iter().filter_map(|row| time_us(timeline, row.change.event));
-        let (first_us, last_us) = (times().min()?, times().max()?);
+        let axis = Axis::new(document)?;
+        let placed: Vec<(&Row, i64)> =
+            report.rows.iter().filter_map(|row| Some((row, axis.of(row.change)?))).collect();
+        let times = || placed.iter().map(|(_, at)| *at);
+        let (least_us, most_us) = (times().min()?, times().max()?);
         let mut lanes = Lanes {
             lanes: Vec::new(),
             by_input: BTreeMap::new(),
-            first_us,
-            last_us,
-            timeless: report.rows.iter().filter(|row| !timed(row)).count(),
+            origin_us: axis.origin_us,
+            least_us,
+            most_us,
+            timeless: report.rows.len() - placed.len(),
         };
-        for row in report.rows.iter().filter(timed) {
-            lanes.add_edge(document, row, clock);
+        let mut points = BTreeMap::new();
+        for (row, at_us) in placed {
+            points.entry(key(row.change)).or_insert(row.point);
+            lanes.add_edge(document, row, at_us, clock);
         }
         let margin = lanes.margin_us();
-        let window = (first_us.saturating_sub(margin), last_us.saturating_add(margin));
+        let window = (least_us.saturating_sub(margin), most_us.saturating_add(margin));
         for (&(recorder, input), &place) in &lanes.by_input {
-            let points = report.rows.iter().find(|row| key(row.change) == (recorder, input));
-            let point = points.and_then(|row| row.point);
-            let of = Track { timeline, incident: &report.incident, recorder, input, point };
+            let point = points.get(&(recorder, input)).copied().flatten();
+            let incident = &report.incident;
+            let of = Track { timeline, incident, axis: &axis, recorder, input, point };
             if let Some(lane) = lanes.lanes.get_mut(place) {
                 lane.stretches = of.stretches(window);
             }
@@ -97,7 +106,7 @@ impl Lanes {
 
     /// What is shown before the first change and after the last one.
     pub(super) fn margin_us(&self) -> i64 {
-        (self.last_us.saturating_sub(self.first_us) / 40).max(5_000)
+        (self.most_us.saturating_sub(self.least_us) / 40).max(5_000)
     }
 
     /// The lane of a change.
@@ -105,9 +114,8 @@ impl Lanes {
         self.by_input.get(&key(change)).copied()
     }
 
-    fn add_edge(&mut self, document: &Document<'_>, row: &Row, clock: &super::Clock) {
+    fn add_edge(&mut self, document: &Document<'_>, row: &Row, at_us: i64, clock: &super::Clock) {
         let Document { timeline, report, .. } = *document;
-        let Some(at_us) = time_us(timeline, row.change.event) else { return };
         let place = *self.by_input.entry(key(row.change)).or_insert_with(|| {
             self.lanes.push(Lane {
                 recorder: names::recorder(timeline, row.change.event),
@@ -124,7 +132,9 @@ impl Lanes {
         let doubt = doubt_us.map_or("doubt not known".to_owned(), |us| {
             format!("± {}", crate::report::span::doubt(us))
         });
-        let text = format!("{} {state}, {} {doubt}", lane.point, clock.time(at_us));
+        let time = timeline.time(row.change.event).map(|at| clock.time(at.us()));
+        let time = time.unwrap_or_else(|| "time not known".to_owned());
+        let text = format!("{} {state}, {time} {doubt}", lane.point);
         lane.is_first |= report.first_out.includes(timeline, row.change);
         lane.edges.push(Edge { at_us, doubt_us, text });
     }
@@ -134,14 +144,11 @@ fn key(change: ChangeId) -> (u32, u8) {
     (change.event.recorder, change.input)
 }
 
-fn time_us(timeline: &Timeline<'_>, event: EventId) -> Option<i64> {
-    timeline.time(event).map(Moment::us)
-}
-
 /// One input in the log of its recorder.
 struct Track<'a> {
     timeline: &'a Timeline<'a>,
     incident: &'a Incident,
+    axis: &'a Axis<'a>,
     recorder: u32,
     input: u8,
     point: Option<PointId>,
@@ -160,28 +167,44 @@ impl Track<'_> {
                 _ => {}
             };
         };
+        let gaps = self.gaps();
         let here = |event: &&EventId| event.recorder == self.recorder;
         let mut at_us = from_us;
         let mut state = None;
         let mut life = None;
         for &event in self.incident.events.iter().filter(here) {
-            let Some(next_us) = time_us(self.timeline, event) else { continue };
-            let is_broken =
-                self.has_gap_ahead(event) || life.is_some_and(|life| life != event.life);
+            let Some(next_us) = self.place(event) else { continue };
+            let is_broken = gaps.contains(&event) || life.is_some_and(|life| life != event.life);
             let before = if is_broken { None } else { state.or_else(|| self.before(event)) };
             add(at_us, next_us, self.state(before));
             (at_us, life) = (next_us.max(at_us), Some(event.life));
             state = self.after(event).or(if is_broken { None } else { state });
         }
-        let ends_in_gap = self.incident.gaps.iter().any(|(event, _)| {
-            event.recorder == self.recorder && !self.incident.events.contains(event)
-        });
+        let ends_in_gap = gaps.iter().any(|event| !self.incident.events.contains(event));
         add(at_us, to_us, self.state(state.filter(|_| !ends_in_gap)));
         stretches
     }
 
-    fn has_gap_ahead(&self, event: EventId) -> bool {
-        self.incident.gaps.iter().any(|(ahead_of, _)| *ahead_of == event)
+    /// Entries ahead of which something is missing that may be about this input.
+    fn gaps(&self) -> BTreeSet<EventId> {
+        let concerns = |(event, index): &&(EventId, usize)| {
+            let gap = self.timeline.life(*event).and_then(|life| life.gaps.get(*index));
+            event.recorder == self.recorder
+                && gap.is_some_and(|gap| match gap.why {
+                    Why::NotRecorded(inputs) => Inputs(inputs).contains(self.input),
+                    _ => true,
+                })
+        };
+        self.incident.gaps.iter().filter(concerns).map(|(event, _)| *event).collect()
+    }
+
+    /// Where an entry is; where this input moved, if it did.
+    fn place(&self, event: EventId) -> Option<i64> {
+        let changed = self.timeline.held(event)?.entry.changed.contains(self.input);
+        match changed {
+            true => self.axis.of(ChangeId { event, input: self.input }),
+            false => self.axis.of_entry(event),
+        }
     }
 
     /// The state that an entry shows.

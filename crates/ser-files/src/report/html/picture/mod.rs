@@ -4,6 +4,7 @@
 //! first change. The page's script moves it when the reader zooms; without the script the picture
 //! is as it was drawn.
 
+mod axis;
 mod lanes;
 mod scale;
 mod steps;
@@ -39,10 +40,14 @@ const EARLY_US: i64 = 100_000;
 /// The incident, and the first 100 ms of it if it is much longer.
 pub(super) fn section(document: &Document<'_>, lanes: &Lanes, clock: &Clock) -> Markup {
     let margin = lanes.margin_us();
-    let length = lanes.last_us.saturating_sub(lanes.first_us);
-    let steps = steps::lanes(document, lanes.first_us);
-    let whole = Window { name: "lane", from_us: -margin, to_us: length.saturating_add(margin) };
-    let early = Window { name: "early", from_us: -5_000, to_us: EARLY_US };
+    let steps = steps::lanes(document);
+    let whole = Window {
+        name: "lane",
+        from_us: lanes.least_us.saturating_sub(margin),
+        to_us: lanes.most_us.saturating_add(margin),
+    };
+    let early = Window { name: "early", from_us: -5_000, to_us: EARLY_US + 5_000 };
+    let length = lanes.most_us.saturating_sub(lanes.least_us);
     let draw = |window: &Window, title: &str| picture(lanes, &steps, window, title, clock);
     html! {
         (draw(&whole, "The whole incident"))
@@ -71,11 +76,9 @@ fn picture(
     title: &str,
     clock: &Clock,
 ) -> Markup {
-    let origin_us = lanes.first_us;
+    let origin_us = lanes.origin_us;
     let scale = Scale::new((window.from_us, window.to_us), LEFT_PX, WIDTH_PX);
-    let moved = |lane: &Lane| {
-        lane.edges.iter().any(|edge| scale.contains(edge.at_us.saturating_sub(origin_us)))
-    };
+    let moved = |lane: &Lane| lane.edges.iter().any(|edge| scale.contains(edge.at_us));
     let shown: Vec<(usize, &Lane)> =
         lanes.lanes.iter().enumerate().filter(|(_, lane)| moved(lane)).collect();
     let steps: Vec<&StepLane> = steps.iter().filter(|step| scale.contains(step.after_us)).collect();
@@ -92,7 +95,7 @@ fn picture(
                     (hatching(window.name))
                     (axis(&scale, window, bottom))
                     @for (row, &(number, lane)) in shown.iter().enumerate() {
-                        (draw_lane(lane, (window.name, number), y_px(row), origin_us, &scale))
+                        (draw_lane(lane, (window.name, number), y_px(row), &scale))
                     }
                     @for (row, step) in steps.iter().enumerate() {
                         (step.draw(y_px(shown.len() + row), &scale))
@@ -146,13 +149,7 @@ fn axis(scale: &Scale, window: &Window, bottom: f64) -> Markup {
     }
 }
 
-fn draw_lane(
-    lane: &Lane,
-    (name, number): (&str, usize),
-    y: f64,
-    origin_us: i64,
-    scale: &Scale,
-) -> Markup {
+fn draw_lane(lane: &Lane, (name, number): (&str, usize), y: f64, scale: &Scale) -> Markup {
     let text = names_of(lane);
     html! {
         g.lane.first[lane.is_first] id={ (name) "-" (number) } data-lane=(number) {
@@ -163,10 +160,10 @@ fn draw_lane(
                 @if lane.is_first { " · first-out" }
             }
             @for stretch in &lane.stretches {
-                (draw_stretch(stretch, name, y, origin_us, scale))
+                (draw_stretch(stretch, name, y, scale))
             }
             @for edge in &lane.edges {
-                (draw_edge(edge, y, origin_us, scale))
+                (draw_edge(edge, y, scale))
             }
         }
     }
@@ -184,9 +181,8 @@ fn shortened(name: &str, most: usize) -> String {
     }
 }
 
-fn draw_stretch(stretch: &Stretch, name: &str, y: f64, origin_us: i64, scale: &Scale) -> Markup {
-    let (from, to) =
-        (stretch.from_us.saturating_sub(origin_us), stretch.to_us.saturating_sub(origin_us));
+fn draw_stretch(stretch: &Stretch, name: &str, y: f64, scale: &Scale) -> Markup {
+    let (from, to) = (stretch.from_us, stretch.to_us);
     let (class, top, height) = match stretch.state {
         State::On { is_abnormal: false } => ("on", 7.0, 18.0),
         State::On { is_abnormal: true } => ("on abnormal", 7.0, 18.0),
@@ -204,8 +200,8 @@ fn draw_stretch(stretch: &Stretch, name: &str, y: f64, origin_us: i64, scale: &S
     }
 }
 
-fn draw_edge(edge: &Edge, y: f64, origin_us: i64, scale: &Scale) -> Markup {
-    let at = edge.at_us.saturating_sub(origin_us);
+fn draw_edge(edge: &Edge, y: f64, scale: &Scale) -> Markup {
+    let at = edge.at_us;
     let doubt = edge.doubt_us.unwrap_or_default();
     let (from, to) = (at.saturating_sub(doubt), at.saturating_add(doubt));
     let (x, width) = scale.stretch(from, to).unwrap_or((LEFT_PX, 0.0));

@@ -1,9 +1,8 @@
 //! Expected steps in the picture: when each was to happen, and when it did.
 
 use maud::{Markup, html};
-use ser_evidence::time::Moment;
-use ser_evidence::timeline::EventId;
 
+use super::axis::Axis;
 use super::scale::Scale;
 use super::{FULL_PX, LANE_PX, LEFT_PX, px, shortened};
 use crate::report::{Document, names, outcome};
@@ -22,13 +21,12 @@ pub(super) struct StepLane {
 }
 
 /// The steps that began at a known time.
-pub(super) fn lanes(document: &Document<'_>, origin_us: i64) -> Vec<StepLane> {
+pub(super) fn lanes(document: &Document<'_>) -> Vec<StepLane> {
     let timeline = document.timeline;
-    let at =
-        |event: EventId| timeline.time(event).map(|at| Moment::us(at).saturating_sub(origin_us));
+    let Some(axis) = Axis::new(document) else { return Vec::new() };
     let lane = |step: &ser_evidence::incident::StepResult| {
         let expectation = timeline.site().expectations.get(step.expectation)?;
-        let after_us = at(step.after.event)?;
+        let after_us = axis.of(step.after)?;
         let (from, to) = expectation.within_us;
         Some(StepLane {
             name: names::harmless(&expectation.name),
@@ -36,7 +34,7 @@ pub(super) fn lanes(document: &Document<'_>, origin_us: i64) -> Vec<StepLane> {
             verdict: step.verdict,
             after_us,
             within_us: (after_us.saturating_add(from), after_us.saturating_add(to)),
-            then_us: step.then.and_then(|then| at(then.event)),
+            then_us: step.then.and_then(|then| axis.of(then)),
         })
     };
     document.report.steps.iter().filter_map(lane).collect()
