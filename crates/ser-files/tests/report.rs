@@ -43,8 +43,13 @@ impl Readings {
     fn set(&mut self, recorder: &str, after: u64, time: &str) {
         let reading = reading(time);
         let us = reading.monotonic.us();
-        let place =
-            Place { life: life(recorder), after: Some(after), before: Some(after), newest: None };
+        let place = Place {
+            life: life(recorder),
+            after: Some(after),
+            before: Some(after),
+            newest: None,
+            fellow: None,
+        };
         self.collector.add(
             recorder,
             &Record::Clock(ClockObservation {

@@ -218,7 +218,7 @@ mod tests {
                 Some(Moment::from_us(reading.monotonic.us() + 1000)),
             );
             let life = crate::output::testing::life();
-            let place = Place { life, after: Some(0), before: Some(0), newest: None };
+            let place = Place { life, after: Some(0), before: Some(0), newest: None, fellow: None };
             let at = Reference::Host { bound, reading };
             let how = How::Set { broadcast: None };
             let observation = ClockObservation { how, shown, at, place };
