@@ -95,6 +95,6 @@ impl LogLook {
             // Where the life has no name, totals are counted modulo 65536.
             self.sequence.map_or(total.into(), |_| after.saturating_add(more))
         });
-        Place { life: self.life, after: Some(after), before, newest: self.newest }
+        Place { life: self.life, after: Some(after), before, newest: self.newest, fellow: None }
     }
 }

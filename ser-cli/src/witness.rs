@@ -219,6 +219,12 @@ fn observation(complete_at: Moment<Host>, arrived: &Arrived) -> Option<ClockObse
         how: How::Event,
         shown: shown(&entry.time)?,
         at: Reference::Host { bound, reading: host_reading::at(at) },
-        place: Place { life, after: Some(sequence?), before: sequence, newest: Some(entry) },
+        place: Place {
+            life,
+            after: Some(sequence?),
+            before: sequence,
+            newest: Some(entry),
+            fellow: None,
+        },
     })
 }

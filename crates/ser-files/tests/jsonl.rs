@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use ser_evidence::record::{
-    Boot, ClockObservation, ClockStep, EntryRecord, Gap, HostReading, How, Life, LifeRecord, Lost,
-    Place, PointRecord, Record, RecorderRecord, Reference, Told, Watched, Why,
+    Boot, ClockObservation, ClockStep, EntryRecord, Fellow, Gap, HostReading, How, Life,
+    LifeRecord, Lost, Place, PointRecord, Record, RecorderRecord, Reference, Told, Watched, Why,
 };
 use ser_evidence::time::{Bound, Moment, Scale};
 use ser_files::jsonl::{Reader, SCHEMA, Writer};
@@ -47,8 +47,12 @@ fn any_bound<S: Scale>() -> impl Strategy<Value = Bound<S>> {
 
 fn any_place() -> impl Strategy<Value = Place> {
     let newest = proptest::option::of(any_entry());
-    (any_life(), any::<Option<u64>>(), any::<Option<u64>>(), newest)
-        .prop_map(|(life, after, before, newest)| Place { life, after, before, newest })
+    let fellow = proptest::option::of(
+        (any::<i64>(), any_entry()).prop_map(|(ahead, entry)| Fellow { ahead, entry }),
+    );
+    (any_life(), any::<Option<u64>>(), any::<Option<u64>>(), newest, fellow).prop_map(
+        |(life, after, before, newest, fellow)| Place { life, after, before, newest, fellow },
+    )
 }
 
 fn any_how() -> impl Strategy<Value = How> {

@@ -43,8 +43,13 @@ impl Readings {
     fn set(&mut self, recorder: &str, after: u64, time: &str) {
         let reading = reading(time);
         let us = reading.monotonic.us();
-        let place =
-            Place { life: life(recorder), after: Some(after), before: Some(after), newest: None };
+        let place = Place {
+            life: life(recorder),
+            after: Some(after),
+            before: Some(after),
+            newest: None,
+            fellow: None,
+        };
         self.collector.add(
             recorder,
             &Record::Clock(ClockObservation {
@@ -235,4 +240,35 @@ fn the_first_row_is_at_no_distance_from_itself() {
     // Another input of the same sample moved somewhere in the same millisecond.
     assert!(rows[1]["since_first"]["least_us"].as_i64() < Some(0), "{rows:#}");
     assert_eq!(rows[1]["since_previous"], rows[1]["since_first"]);
+}
+
+#[test]
+fn a_row_that_is_not_listed_at_what_its_clock_showed_says_what_that_was() {
+    let mut readings = Readings::of(SHARED);
+    readings.entry("U1-SER1", 1, "2026-11-22T13:45:05.588", (4, 4));
+    readings.entry("U1-SER1", 2, "2026-11-22T07:45:18.979", (2, 6));
+    readings.entry("U1-SER1", 3, "2026-11-21T07:45:19.051", (4, 2));
+    let text = readings.told().text();
+    assert!(!text.contains("showed 13:45:05.588"), "that is where it is: {text}");
+    assert!(text.contains("its clock showed 07:45:18.979"), "{text}");
+    assert!(text.contains("its clock showed 2026-11-21 07:45:19.051"), "{text}");
+    assert!(text.contains("never observed, and set: times as it showed them, or"), "{text}");
+}
+
+#[test]
+fn a_row_at_what_its_clock_showed_says_nothing_of_it() {
+    let mut readings = Readings::of(SHARED);
+    readings.entry("U1-SER1", 1, "2026-11-22T13:45:05.588", (4, 4));
+    readings.entry("U1-SER1", 2, "2026-11-22T13:45:05.979", (2, 6));
+    let text = readings.told().text();
+    assert!(!text.contains("its clock showed"), "{text}");
+    assert!(text.contains("never observed: times as it showed them"), "{text}");
+    // Nor if the clock was observed, and is known to be wrong.
+    let mut readings = Readings::of(SHARED);
+    readings.entry("U1-SER1", 1, "2026-11-22T13:45:05.588", (4, 4));
+    readings.set("U1-SER1", 1, "2026-11-22T07:45:06.000");
+    readings.entry("U1-SER1", 2, "2026-11-22T07:45:06.979", (2, 6));
+    readings.watched("U1-SER1", 2, "2026-11-22T10:30:00.000");
+    let text = readings.told().text();
+    assert!(!text.contains("its clock showed 07:45"), "{text}");
 }

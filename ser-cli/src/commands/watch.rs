@@ -39,8 +39,9 @@ told not to report and is read without a pause. Events that are overwritten neve
 counted in the output, at their place.
 With --site and no port, several recorders are asked every second and shown in one list, in the \
 order of what is known of their clocks; their settings are left alone. A ~ is in front of a row \
-whose order to the one before is not known. A recorder that does not answer is asked again later, \
-and delays no other. If the site has one recorder with a port, it is watched as with --port.
+that is not known to have come after the one before. What is read late may even be earlier for \
+sure, and such a row says so. A recorder that does not answer is asked again later, and delays no \
+other. If the site has one recorder with a port, it is watched as with --port.
 On a Genius bus the command waits for a board or a recorder that fails, for a minute or as long \
 as --timeout says.";
 

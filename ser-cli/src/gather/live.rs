@@ -155,6 +155,7 @@ fn newest(records: &[Record], read_at: std::time::Duration) -> Option<Record> {
         after: entry.sequence,
         before: entry.sequence,
         newest: Some(entry.entry),
+        fellow: None,
     };
     Some(Record::Clock(ClockObservation {
         how: How::Event,

@@ -24,7 +24,7 @@ pub(crate) use palette::Palette;
 pub(crate) use points::Points;
 pub(crate) use record::{Annotator, Before, Event, Loss, Record};
 pub(crate) use rows::{Rows, sync_stdout};
-pub(crate) use site_table::{RecorderColumn, SiteTable, header as site_header};
+pub(crate) use site_table::{RecorderColumn, RowOrder, SiteTable, header as site_header};
 pub(crate) use table::Table;
 
 /// The format of events.

@@ -14,8 +14,22 @@ pub(crate) struct RecorderColumn {
     pub(crate) points: Points,
 }
 
+/// What is known of the order of a row and the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RowOrder {
+    /// The row before came first, or both at once.
+    AsShown,
+    /// Nobody knows.
+    Unknown,
+    /// This row came first: its recorder was read later.
+    Earlier,
+}
+
+/// What is said of a row that came before the one above it.
+const EARLIER: &str = "earlier than the row above";
+
 /// Writes lines like `  U1-SER1     17  2026-11-22T10:00:00.250  52-1 closed OPEN`, with a `~` in
-/// front where the order of this row and the one before is not known.
+/// front where this row is not known to have come after the one before.
 pub(crate) struct SiteTable<W> {
     out: W,
     palette: Palette,
@@ -41,7 +55,7 @@ impl<W: Write> SiteTable<W> {
         &mut self,
         recorder: usize,
         record: &Record,
-        is_order_unknown: bool,
+        order: RowOrder,
     ) -> io::Result<()> {
         if std::mem::take(&mut self.header_due) {
             let title = self.palette.title;
@@ -52,10 +66,11 @@ impl<W: Write> SiteTable<W> {
         };
         let name = Harmless(name).line();
         let blanks = self.width.saturating_sub(name.width());
-        let (alarm, mark) = (self.palette.alarm, if is_order_unknown { "~" } else { " " });
+        let (alarm, mark) =
+            (self.palette.alarm, if order == RowOrder::AsShown { " " } else { "~" });
         write!(self.out, "{alarm}{mark}{alarm:#} {name}{:blanks$}  ", "")?;
         match record {
-            Record::Event(event) => event_cells(&mut self.out, self.palette, points, event),
+            Record::Event(event) => event_cells(&mut self.out, self.palette, points, event, order),
             Record::Loss(loss) => loss_cells(&mut self.out, self.palette, loss),
         }
     }
@@ -82,6 +97,7 @@ fn event_cells(
     palette: Palette,
     points: &Points,
     event: &Event,
+    order: RowOrder,
 ) -> io::Result<()> {
     let (on, alarm) = (palette.on, palette.alarm);
     write!(out, "{:>5}  {:<23}", event.number, event.entry.time.to_string())?;
@@ -93,10 +109,11 @@ fn event_cells(
             false => write!(out, "  {change}")?,
         }
     }
-    match event.note() {
-        Some(note) => writeln!(out, "  {alarm}({note}){alarm:#}"),
-        None => writeln!(out),
+    let earlier = (order == RowOrder::Earlier).then(|| EARLIER.to_owned());
+    for note in event.note().into_iter().chain(earlier) {
+        write!(out, "  {alarm}({note}){alarm:#}")?;
     }
+    writeln!(out)
 }
 
 fn loss_cells(out: &mut dyn Write, palette: Palette, loss: &Loss) -> io::Result<()> {
@@ -118,15 +135,20 @@ mod tests {
         let mut out = Vec::new();
         let mut table = SiteTable::new(&mut out, Palette::plain(), recorders, false);
         let first = event(9, entry("00.250", &[3, 17], &[17]));
-        table.record(0, &Record::Event(first), false).unwrap();
-        table.record(1, &Record::Event(event(2048, entry("00.262", &[3], &[3]))), true).unwrap();
-        table.record(0, &Record::Loss(four_lost()), false).unwrap();
+        let second = Record::Event(event(2048, entry("00.262", &[3], &[3])));
+        let late = Record::Event(event(10, entry("00.251", &[17], &[])));
+        table.record(0, &Record::Event(first), RowOrder::AsShown).unwrap();
+        table.record(1, &second, RowOrder::Unknown).unwrap();
+        table.record(0, &late, RowOrder::Earlier).unwrap();
+        table.record(0, &Record::Loss(four_lost()), RowOrder::AsShown).unwrap();
         assert_eq!(
             String::from_utf8(out).unwrap().lines().collect::<Vec<_>>(),
             [
                 "  recorder       entry  time                     changes",
                 "  U1-SER1            9  2026-11-22T10:00:00.250  52-1 closed OPEN  17 ON",
                 "~ 遮断器 記録 2   2048  2026-11-22T10:00:00.262  3 ON",
+                "~ U1-SER1           10  2026-11-22T10:00:00.251  17 OFF  \
+                 (earlier than the row above)",
                 "  U1-SER1            -  4 events were overwritten before they were read",
             ]
         );

@@ -4,7 +4,7 @@ use ser_proto::Entry;
 
 use super::runs::{LifeRuns, Side, Step, When, is_earlier};
 use crate::history::{Held, LifeHistory, RecorderHistory};
-use crate::record::{ClockObservation, EntryRecord, How, Place};
+use crate::record::{ClockObservation, EntryRecord, Fellow, How, Place};
 use crate::time::{Bound, Moment, Shown, Utc, shown};
 
 /// What a recorder counts modulo.
@@ -52,7 +52,17 @@ pub(crate) fn locate(history: &RecorderHistory, place: &Place) -> Whereabouts {
         let found = history.lives.iter().enumerate().find_map(|(index, life)| {
             same_entry(life, after, newest).map(|sequence| (index, sequence))
         });
-        return found.map_or(Whereabouts::Anywhere, |(life, sequence)| here(life, sequence));
+        if let Some((life, sequence)) = found {
+            return here(life, sequence);
+        }
+    }
+    if let Some(Fellow { ahead, entry }) = &place.fellow {
+        let total = after.wrapping_add_signed(*ahead);
+        let found = history.lives.iter().enumerate().find_map(|(index, life)| {
+            let sequence = same_entry(life, total, entry)?;
+            Some((index, sequence.checked_add_signed(ahead.checked_neg()?)?))
+        });
+        return found.map_or(Whereabouts::Anywhere, |(life, after)| here(life, after));
     }
     // That only one life is known does not prove that there was only one.
     Whereabouts::Anywhere

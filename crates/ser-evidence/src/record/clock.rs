@@ -127,12 +127,24 @@ pub struct Place {
     pub before: Option<u64>,
     /// The entry whose sequence is `after`. Its content tells which life it was.
     pub newest: Option<Entry>,
+    /// Another entry of the same life, where that one may not be at hand: a part of a log says so
+    /// of what happened outside of it.
+    pub fellow: Option<Fellow>,
+}
+
+/// An entry by which the place of something in its life is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fellow {
+    /// Its sequence less that of the entry after which the place is.
+    pub ahead: i64,
+    /// The entry.
+    pub entry: Entry,
 }
 
 impl Place {
     /// Nothing is known of the place.
     pub const UNKNOWN: Place =
-        Place { life: Life::UNKNOWN, after: None, before: None, newest: None };
+        Place { life: Life::UNKNOWN, after: None, before: None, newest: None, fellow: None };
 }
 
 /// A place where a clock may have been set, for example by a command that was not answered.

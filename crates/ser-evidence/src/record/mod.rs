@@ -10,7 +10,7 @@ mod life;
 mod names;
 mod watched;
 
-pub use clock::{Boot, ClockObservation, ClockStep, HostReading, How, Place, Reference};
+pub use clock::{Boot, ClockObservation, ClockStep, Fellow, HostReading, How, Place, Reference};
 pub use entry::EntryRecord;
 pub use gap::{Gap, Lost, Why};
 pub use life::{Life, LifeRecord};

@@ -20,8 +20,10 @@ use std::collections::BTreeMap;
 
 use crate::clock::lives::LifeClock;
 use crate::clock::model::ClockModel;
+use crate::clock::placing::{self, Whereabouts};
 use crate::clock::{Finding, Nominal};
 use crate::history::{Held, History, LifeHistory, RecorderHistory};
+use crate::record::Place;
 use crate::site::{Recorder, Site};
 use crate::time::{Bound, Moment, Utc};
 use bounds::{Key, LifeBounds};
@@ -235,6 +237,16 @@ impl<'a> Timeline<'a> {
             Some((self.sort_key(event)?, event))
         });
         last.max().map(|(_, event)| event)
+    }
+
+    /// After which sequence of which life a place in the log of a recorder is; `None` if no entry
+    /// of the life is known, or if nobody can say.
+    #[must_use]
+    pub fn located(&self, recorder: usize, place: &Place) -> Option<(usize, u64)> {
+        match placing::locate(self.history.recorders.get(recorder)?, place) {
+            Whereabouts::Here(at) => Some((at.life, at.after)),
+            Whereabouts::Elsewhere | Whereabouts::Anywhere => None,
+        }
     }
 
     /// The last place of the life of this entry whose time is known to be below this key.

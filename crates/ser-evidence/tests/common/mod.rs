@@ -111,6 +111,7 @@ impl Log {
             after: Some(self.sequence),
             before: Some(self.sequence),
             newest: self.newest.filter(|_| !self.life.is_known()),
+            fellow: None,
         };
         let at = Reference::Host { bound: Bound::from_us(bound_us.0, bound_us.1), reading };
         self.records.push(Record::Clock(ClockObservation { how, shown: seen(showed), at, place }));

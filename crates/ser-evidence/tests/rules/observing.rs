@@ -105,7 +105,7 @@ fn place(
     let life = &recorder.lives[life];
     let (mut after, mut before) = (Some(life.sequence(after)), Some(life.sequence(before)));
     if !how.is_set() && chance.one_in(8) || chance.one_in(40) {
-        return Place { life: life.name, after: None, before: None, newest: None };
+        return Place { life: life.name, after: None, before: None, newest: None, fellow: None };
     }
     match chance.below(12) {
         0 => after = None,
@@ -115,7 +115,13 @@ fn place(
     let newest = newest.filter(|_| after.is_some());
     if chance.one_in(8) {
         let modulo = |sequence: Option<u64>| sequence.map(|sequence| sequence % 65_536);
-        return Place { life: Life::UNKNOWN, after: modulo(after), before: modulo(before), newest };
+        return Place {
+            life: Life::UNKNOWN,
+            after: modulo(after),
+            before: modulo(before),
+            newest,
+            fellow: None,
+        };
     }
-    Place { life: life.name, after, before, newest }
+    Place { life: life.name, after, before, newest, fellow: None }
 }

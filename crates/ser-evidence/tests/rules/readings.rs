@@ -159,6 +159,7 @@ impl<'w> Collector<'w> {
                 after: Some(sequence),
                 before: Some(sequence),
                 newest: Some(entry.entry),
+                fellow: None,
             },
         };
         self.told.push(Record::Clock(observation));

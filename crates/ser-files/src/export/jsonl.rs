@@ -2,8 +2,10 @@
 
 use std::io::Write;
 
+use ser_evidence::record::Place;
 use ser_evidence::timeline::Timeline;
 
+use super::anchors::Anchors;
 use super::counted::Counted;
 use super::refused::Refused;
 use super::selection::Selection;
@@ -20,7 +22,9 @@ pub fn write(
     program: &str,
 ) -> Result<Counted, Refused> {
     let mut counted = Counted::default();
+    let anchors = Anchors::of(timeline, selection);
+    let place = |recorder: usize, place: &Place| anchors.in_part(timeline, recorder, place);
     let items = selection.items(timeline).inspect(|item| counted.count(*item));
-    merged::write_jsonl_items(out, timeline, items, program)?;
+    merged::write_jsonl_items(out, timeline, (&place, items), program)?;
     Ok(counted)
 }

@@ -8,6 +8,7 @@
 //! one axis of time and a state for each input at each instant: `steps` makes that of the entries,
 //! and both formats are made from it.
 
+mod anchors;
 mod axis;
 mod channels;
 mod comname;

@@ -281,7 +281,13 @@ impl Writing<'_> {
         bound: Bound<ser_evidence::time::Utc>,
     ) {
         let sequence = self.logs.get(recorder).map(|log| log.sequence);
-        let place = LogPlace { life: self.life, after: sequence, before: sequence, newest: None };
+        let place = LogPlace {
+            life: self.life,
+            after: sequence,
+            before: sequence,
+            newest: None,
+            fellow: None,
+        };
         let shown = Moment::from_us(at_ms.saturating_mul(1000));
         let at = Reference::Utc(bound);
         self.tell(recorder, Record::Clock(ClockObservation { how, shown, at, place }), None);

@@ -1,6 +1,6 @@
 //! Lines as they are read: one flat struct for all kinds, so that a line is gone over once.
 
-use ser_evidence::record::{Boot, HostReading, Place};
+use ser_evidence::record::{Boot, Fellow, HostReading, Place};
 use ser_evidence::time::{Moment, Scale};
 use ser_proto::{Entry, TimeStamp};
 use serde::Deserialize;
@@ -93,6 +93,19 @@ pub(super) struct PlaceLine<'a> {
     before: Option<u64>,
     #[serde(borrow)]
     newest: Option<NewestLine<'a>>,
+    #[serde(borrow)]
+    fellow: Option<FellowLine<'a>>,
+}
+
+/// Another entry of the same life.
+#[derive(Debug, Deserialize)]
+struct FellowLine<'a> {
+    ahead: i64,
+    #[serde(borrow)]
+    time: Text<'a>,
+    year: Option<u8>,
+    changed: Numbers,
+    state: Numbers,
 }
 
 /// An entry as it was read, without its place in the ring.
@@ -157,7 +170,16 @@ impl PlaceLine<'_> {
         let name = self.life.as_ref().map(|Text(life)| &**life);
         let life = life_named(name).ok_or_else(|| wrong("life", name.unwrap_or_default()))?;
         let newest = self.newest.as_ref().map(NewestLine::entry).transpose()?;
-        Ok(Place { life, after: self.after, before: self.before, newest })
+        let fellow = self.fellow.as_ref().map(FellowLine::fellow).transpose()?;
+        Ok(Place { life, after: self.after, before: self.before, newest, fellow })
+    }
+}
+
+impl FellowLine<'_> {
+    fn fellow(&self) -> Result<Fellow> {
+        let time = stamp(&self.time, self.year)?;
+        let entry = Entry { changed: self.changed.0, state: self.state.0, time };
+        Ok(Fellow { ahead: self.ahead, entry })
     }
 }
 

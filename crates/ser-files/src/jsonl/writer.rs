@@ -5,8 +5,8 @@ use std::io::{self, Write};
 
 use ser_console::is_obeyed;
 use ser_evidence::record::{
-    Boot, ClockObservation, ClockStep, EntryRecord, Gap, HostReading, Life, LifeRecord, Lost,
-    Place, PointRecord, Record, RecorderRecord, Reference, Watched, Why,
+    Boot, ClockObservation, ClockStep, EntryRecord, Fellow, Gap, HostReading, Life, LifeRecord,
+    Lost, Place, PointRecord, Record, RecorderRecord, Reference, Watched, Why,
 };
 use ser_evidence::time::{Moment, stamp};
 use ser_proto::{Entry, Inputs, TimeStamp};
@@ -207,12 +207,28 @@ struct PlaceFields {
     after: Option<u64>,
     before: Option<u64>,
     newest: Option<NewestFields>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fellow: Option<FellowFields>,
+}
+
+#[derive(Serialize)]
+struct FellowFields {
+    ahead: i64,
+    #[serde(flatten)]
+    entry: NewestFields,
 }
 
 impl From<&Place> for PlaceFields {
     fn from(place: &Place) -> PlaceFields {
-        let Place { life, after, before, newest } = *place;
-        PlaceFields { life: AsText(life), after, before, newest: newest.map(NewestFields::from) }
+        let Place { life, after, before, newest, fellow } = *place;
+        PlaceFields {
+            life: AsText(life),
+            after,
+            before,
+            newest: newest.map(NewestFields::from),
+            fellow: fellow
+                .map(|Fellow { ahead, entry }| FellowFields { ahead, entry: entry.into() }),
+        }
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::io::{self, Write};
 
-use ser_evidence::record::{EntryRecord, Gap, LifeRecord, Record};
+use ser_evidence::record::{
+    ClockObservation, ClockStep, EntryRecord, Gap, LifeRecord, Place, Record,
+};
 use ser_evidence::timeline::{Item, Timeline};
 
 use crate::jsonl::Writer;
@@ -13,19 +15,22 @@ use crate::jsonl::Writer;
 /// # Errors
 /// If `out` does not take it.
 pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>, program: &str) -> io::Result<()> {
-    write_items(out, timeline, timeline.items(), program)
+    write_items(out, timeline, (&|_, place| Some(*place), timeline.items()), program)
 }
 
-/// As [`write`], with these entries and gaps only.
+/// As a place in the log of a recorder is written, by its index; `None` to leave out what was there.
+type Placed<'p> = &'p dyn Fn(usize, &Place) -> Option<Place>;
+
+/// As [`write`], with these entries and gaps only, and places so that they are found by them.
 pub(crate) fn write_items(
     out: &mut dyn Write,
     timeline: &Timeline<'_>,
-    items: impl Iterator<Item = Item>,
+    (placed, items): (Placed<'_>, impl Iterator<Item = Item>),
     program: &str,
 ) -> io::Result<()> {
     let mut lines = Writer::new(out);
     lines.file(program)?;
-    for history in &timeline.history().recorders {
+    for (recorder, history) in timeline.history().recorders.iter().enumerate() {
         let name = &history.recorder.name;
         let stamps = history.stamps.iter().map(|stamps| Record::Recorder(*stamps));
         let points = history.points.iter().map(|point| Record::Point(point.clone()));
@@ -42,8 +47,14 @@ pub(crate) fn write_items(
             };
             lines.record(name, &Record::Life(record))?;
         }
-        let observations = history.observations.iter().map(|found| Record::Clock(*found));
-        let steps = history.steps.iter().map(|found| Record::Step(*found));
+        let observations = history.observations.iter().filter_map(|found| {
+            let place = placed(recorder, &found.place)?;
+            Some(Record::Clock(ClockObservation { place, ..*found }))
+        });
+        let steps = history.steps.iter().filter_map(|found| {
+            let place = placed(recorder, &found.place)?;
+            Some(Record::Step(ClockStep { place, ..*found }))
+        });
         let watched = history.watched.iter().map(|found| Record::Watched(*found));
         let missed = history.is_not_reached.then_some(Record::Gap(Gap::NOT_REACHED));
         for record in observations.chain(steps).chain(watched).chain(missed) {

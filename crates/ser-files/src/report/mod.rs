@@ -4,6 +4,7 @@
 //! changes, what was expected, what has not returned to normal, and what is missing. All answers
 //! come from [`Report`]. The files here turn them into words; `text` and `html` draw the words.
 
+mod elsewhere;
 mod html;
 mod json;
 pub(crate) mod names;

@@ -9,7 +9,7 @@ use ser_evidence::timeline::{ChangeId, EventId, Order, Timeline};
 
 use super::names;
 use super::span::{doubt, since};
-use super::{Clock, Document, verdict};
+use super::{Clock, Document, elsewhere, verdict};
 
 /// A line of the sequence.
 #[derive(Debug)]
@@ -234,6 +234,7 @@ fn notes(
     }
     notes.extend(fold_of(report, row.change).map(|fold| chatter(timeline, fold)));
     notes.extend(local_time_note(timeline, row.change.event, clock));
+    notes.extend(elsewhere::note(timeline, row.change.event, clock));
     let shift = timeline.shift_us(row.change.event);
     if shift != 0 {
         notes.push(format!("shifted by hand {}", since(shift)));

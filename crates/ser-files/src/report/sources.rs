@@ -8,7 +8,7 @@ use ser_evidence::timeline::{EventId, Timeline};
 
 use super::names;
 use super::span::{doubt, duration};
-use super::{Clock, Document, verdict};
+use super::{Clock, Document, elsewhere, verdict};
 
 /// A recorder in words.
 #[derive(Debug)]
@@ -39,7 +39,7 @@ fn source(document: &Document<'_>, of: &Completeness, clock: &Clock) -> Source {
         Some(text) => text.strip_prefix(&format!("{name}: ")).unwrap_or(&text).to_owned(),
         None => complete(timeline, of, clock),
     };
-    let (entries, clock) = (of.entries, clock_text(of.clock));
+    let (entries, clock) = (of.entries, clock_text(document, of));
     Source { recorder: name, entries, complete, is_complete, clock }
 }
 
@@ -104,9 +104,21 @@ fn span((from, scale): &End, (until, _): &End, clock: &Clock) -> String {
     format!("{} to {ends}{by}", with_doubt(&begins, from.1))
 }
 
-fn clock_text(state: ClockState) -> String {
-    match state {
+/// Whether a row of a recorder is listed elsewhere than its clock said.
+fn has_row_elsewhere(document: &Document<'_>, recorder: u32) -> bool {
+    let mut events = document.report.incident.events.iter();
+    events.any(|&event| {
+        event.recorder == recorder && elsewhere::is_elsewhere(document.timeline, event)
+    })
+}
+
+fn clock_text(document: &Document<'_>, of: &Completeness) -> String {
+    match of.clock {
         ClockState::NoEntry => "no entries, so no times".to_owned(),
+        ClockState::NotObserved if has_row_elsewhere(document, of.recorder) => {
+            "never observed, and set: times as it showed them, or what it showed in a note"
+                .to_owned()
+        }
         ClockState::NotObserved => "never observed: times as it showed them".to_owned(),
         ClockState::Observed { order_doubt_us, utc_doubt_us, .. } => {
             let order = order_doubt_us.map_or("order not known".to_owned(), |us| {

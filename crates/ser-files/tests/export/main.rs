@@ -5,6 +5,7 @@
 mod common;
 mod comtrade;
 mod lossless;
+mod part;
 mod prc002;
 mod vcd;
 mod writing;

@@ -130,9 +130,9 @@ impl List {
                 }
                 waiting.push(written);
             }
-            for Row { recorder, record, is_order_unknown } in self.evidence.ordered(by_recorder) {
+            for Row { recorder, record, order } in self.evidence.ordered(by_recorder) {
                 self.losses += usize::from(matches!(record, Record::Loss(_)));
-                self.table.record(recorder, &record, is_order_unknown)?;
+                self.table.record(recorder, &record, order)?;
             }
             self.table.flush()?;
             // A thread that has ended does not wait any more.

@@ -9,7 +9,7 @@ use ser_evidence::site::Site;
 use ser_evidence::timeline::{EventId, Order, Timeline};
 
 use crate::kept::KeptRecords;
-use crate::output::Record;
+use crate::output::{Record, RowOrder};
 
 /// How often what is remembered of clocks is read anew: somebody may have set one.
 const RELOAD_EVERY: Duration = Duration::from_secs(30);
@@ -32,8 +32,9 @@ pub(super) struct Row {
     /// The recorder's place among the recorders.
     pub(super) recorder: usize,
     pub(super) record: Record,
-    /// Whether nobody knows if the event in the row before came first.
-    pub(super) is_order_unknown: bool,
+    /// Whether the event in the row before came first, as far as is known. What arrives late may
+    /// have come before rows that are shown.
+    pub(super) order: RowOrder,
 }
 
 /// What an entry is: the name of its recorder, its life and its sequence.
@@ -81,14 +82,18 @@ impl Evidence {
         for (_, recorder, record) in all {
             let key = self.key(recorder, &record);
             let of = |key: &Option<Key>| Some(ranks.get(key.as_ref()?)?.1);
-            let is_order_unknown = match (of(&self.last), of(&key)) {
+            let order = match (of(&self.last), of(&key)) {
                 (Some(last), Some(this)) if last.recorder != this.recorder => {
-                    timeline.order(last, this) == Order::Unknown
+                    match timeline.order(last, this) {
+                        Order::Before | Order::Same => RowOrder::AsShown,
+                        Order::After => RowOrder::Earlier,
+                        Order::Unknown => RowOrder::Unknown,
+                    }
                 }
-                _ => false,
+                _ => RowOrder::AsShown,
             };
             self.last = key.or_else(|| self.last.take());
-            rows.push(Row { recorder, record, is_order_unknown });
+            rows.push(Row { recorder, record, order });
         }
         rows
     }
@@ -218,7 +223,7 @@ mod tests {
                 Some(Moment::from_us(reading.monotonic.us() + 1000)),
             );
             let life = crate::output::testing::life();
-            let place = Place { life, after: Some(0), before: Some(0), newest: None };
+            let place = Place { life, after: Some(0), before: Some(0), newest: None, fellow: None };
             let at = Reference::Host { bound, reading };
             let how = How::Set { broadcast: None };
             let observation = ClockObservation { how, shown, at, place };
@@ -239,18 +244,35 @@ mod tests {
         );
     }
 
+    /// How each row stands to the one before.
+    fn marks(evidence: &mut Evidence, of_recorders: Vec<Vec<Record>>) -> Vec<RowOrder> {
+        evidence.ordered(of_recorders).iter().map(|row| row.order).collect()
+    }
+
     #[test]
     fn a_row_that_may_have_come_before_the_one_ahead_of_it_is_marked() {
-        let marks = |evidence: &mut Evidence, of_recorders| -> Vec<bool> {
-            evidence.ordered(of_recorders).iter().map(|row| row.is_order_unknown).collect()
-        };
+        use RowOrder::{AsShown, Unknown};
         let mut known = evidence_of_clocks();
         let first = vec![vec![at(1, "15.000")], vec![at(1, "05.001"), at(2, "06.000")]];
-        assert_eq!(marks(&mut known, first), [false, true, false]);
+        assert_eq!(marks(&mut known, first), [AsShown, Unknown, AsShown]);
         let later = vec![vec![at(2, "16.001"), at(3, "19.000")], vec![at(3, "09.500")]];
-        assert_eq!(marks(&mut known, later), [true, false, false], "of the row shown before");
+        assert_eq!(
+            marks(&mut known, later),
+            [Unknown, AsShown, AsShown],
+            "of the row shown before"
+        );
         let without = vec![vec![at(1, "00.250")], vec![at(1, "50.000")]];
-        assert_eq!(marks(&mut evidence(), without), [false, true]);
+        assert_eq!(marks(&mut evidence(), without), [AsShown, Unknown]);
+    }
+
+    #[test]
+    fn a_row_that_arrives_late_and_is_proven_to_be_earlier_says_so() {
+        use RowOrder::{AsShown, Earlier};
+        let mut known = evidence_of_clocks();
+        let first = vec![vec![at(1, "15.000"), at(2, "16.000")], vec![]];
+        assert_eq!(marks(&mut known, first), [AsShown, AsShown]);
+        let late = vec![vec![at(3, "19.000")], vec![at(1, "04.000"), at(2, "05.500")]];
+        assert_eq!(marks(&mut known, late), [Earlier, AsShown, AsShown]);
     }
 
     #[test]

@@ -1,0 +1,79 @@
+//! A part as JSON lines says of its entries what the whole says.
+
+use ser_evidence::history::Collector;
+use ser_evidence::record::How;
+use ser_evidence::site::Site;
+use ser_evidence::time::{Bound, Utc};
+use ser_evidence::timeline::Timeline;
+use ser_files::Source;
+use ser_files::export::write_jsonl;
+
+use crate::common::{Log, history, monotonic_us, site};
+use crate::{between, recorder};
+
+/// What is told of an entry: its recorder, what its clock showed, and when it was.
+type Row = (String, String, Bound<Utc>);
+
+/// The entries from a time on, and whatever is wrong with clocks.
+fn told(timeline: &Timeline<'_>, from: &str) -> (Vec<Row>, String) {
+    let row = |event| {
+        let name = timeline.recorder(event)?.recorder.name.clone();
+        let shown = timeline.held(event)?.entry.time.to_string();
+        (shown.as_str() >= from).then(|| (name, shown, timeline.moved_utc(event, None)))
+    };
+    (timeline.entries().filter_map(row).collect(), format!("{:?}", timeline.findings()))
+}
+
+/// The part of these logs between two times, written and read again.
+fn part(site: &Site, logs: &[&Log], since: &str, until: &str) -> (String, Collector) {
+    let history = history(site, logs);
+    let timeline = Timeline::new(site, &history);
+    let mut out = Vec::new();
+    let selection = between(&timeline, since, until);
+    write_jsonl(&mut out, &timeline, &selection, "test 1.0").expect("written");
+    let text = String::from_utf8(out).expect("UTF-8");
+    let mut collector = Collector::new();
+    collector.begin_source();
+    for told in Source::new(text.as_bytes(), "").expect("ours") {
+        let told = told.expect("a record");
+        collector.add(&told.recorder, &told.record);
+    }
+    (text, collector)
+}
+
+/// A recorder of whose lives nothing is remembered: its clock was set back after its first entry.
+fn set_back(name: &'static str, first: &str, set_ms: u32) -> Log {
+    let mut log = Log::of(name, 0);
+    log.changes(first, &[7]);
+    let set = format!("2026-11-22T09:00:06.{set_ms:03}");
+    let at = monotonic_us(&set);
+    log.observed(How::Set { broadcast: None }, &set, (at, at + 5000), Some(1000));
+    log
+}
+
+fn set_back_site() -> Site {
+    site(&(recorder("U1", &[(1, "a")]) + &recorder("U2", &[(1, "b")])))
+}
+
+#[test]
+fn a_clock_that_was_set_before_the_part_is_known_in_it() {
+    let site = set_back_site();
+    let mut one = set_back("U1", "2026-11-22T13:00:05.588", 662);
+    one.changes("2026-11-22T09:00:18.979", &[1]).changes("2026-11-22T09:00:19.089", &[1]);
+    let mut other = set_back("U2", "2026-11-22T13:00:05.496", 895);
+    other.changes("2026-11-22T09:00:19.082", &[1]).changes("2026-11-22T09:10:00.000", &[1]);
+    let (since, until) = ("2026-11-22T09:00:18.000", "2026-11-22T09:00:30.000");
+    let whole = history(&site, &[&one, &other]);
+    let whole = Timeline::new(&site, &whole);
+    let (mut expected, findings) = told(&whole, since);
+    expected.retain(|(_, shown, _)| shown.as_str() < until);
+    assert_eq!(expected.len(), 3);
+
+    let (text, collector) = part(&site, &[&one, &other], since, until);
+    let history = collector.finish(&site);
+    let timeline = Timeline::new(&site, &history);
+    assert_eq!(told(&timeline, since), (expected, findings), "{text}");
+    // Found by what the part holds: the entries before the sets are outside of it.
+    assert_eq!(text.matches("\"fellow\":{\"ahead\":1,").count(), 2, "{text}");
+    assert!(!text.contains("2026-11-22T13:00:05.588\",\"changed\":[7],\"state\":[7],\"seq"));
+}
