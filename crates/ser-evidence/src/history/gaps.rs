@@ -88,7 +88,11 @@ pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps) -> Vec<LogGap> {
         }
     }
     let last = life.entries.last().map_or(0, |held| held.sequence);
-    let ends = told.at(life.name(), last).iter().filter(|gap| gap.why == Why::LogBeganAnew);
+    let ends = told.at(life.name(), last).iter().filter(|gap| {
+        // That a recorder was not reached is no loss yet, unless it is known that it has more.
+        matches!(gap.why, Why::LogBeganAnew | Why::NotRecorded(_))
+            || matches!(gap.lost, Lost::AtLeast(1..))
+    });
     for gap in ends.take(usize::from(life.life.is_some())) {
         let (place, lost, why) = (life.entries.len(), gap.lost, gap.why);
         gaps.push(LogGap { place, after: last, lost, why });
