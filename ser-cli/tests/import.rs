@@ -228,3 +228,29 @@ fn what_we_export_for_others_can_be_imported() {
         assert_eq!(at(again), at(expected), "{format}");
     }
 }
+
+#[test]
+fn samples_that_are_missing_are_told_and_make_the_report_incomplete() {
+    let desk = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| desk.path().join(name);
+    let cfg = "OAK,F3,2013\n4,0A,4D\n1,52A,,,1\n2,52B,,,0\n3,51P,,,0\n4,86,,,0\n60\n0\n0,5\n\
+               14/03/2027,14:29:57.999000\n14/03/2027,14:29:58.000000\nASCII\n1\n0,0\n6,0\n";
+    fs::write(at("f3.cfg"), cfg).expect("written");
+    let rows = "1,0,1,0,0,0\r\n2,1000,1,0,1,0\r\n5,53000,0,1,1,1\r\n";
+    fs::write(at("f3.dat"), rows).expect("written");
+    let site = "site = \"OAK\"\ntime_zone = \"UTC\"\n[[recorder]]\nname = \"f3\"\n";
+    fs::write(at("site.toml"), site).expect("written");
+    let run = |arguments: &str| {
+        let words = arguments.split_whitespace();
+        ser_cli().current_dir(desk.path()).args(words).output().expect("ser-cli runs")
+    };
+    let import = run("import f3.cfg --doubt-ms 2 --fail-on-loss -o f3.jsonl");
+    assert_eq!(import.status.code(), Some(3), "{}", text(&import.stderr));
+    let told = "line 3: there are no samples 3 to 4, and meanwhile these changed: 52A, 52B, 86";
+    assert!(text(&import.stderr).contains(told), "{}", text(&import.stderr));
+    let report =
+        run("report --site site.toml --input f3.jsonl --around 2027-03-14T14:29:58 --fail-on-loss");
+    let shown = text(&report.stdout);
+    assert!(shown.contains("inputs changed without being recorded: 2 3 4"), "{shown}");
+    assert_eq!(report.status.code(), Some(3), "{}", text(&report.stderr));
+}

@@ -8,7 +8,7 @@ use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
-use ser_evidence::record::{EntryRecord, Record};
+use ser_evidence::record::{EntryRecord, Lost, Record, Why};
 use ser_files::import::{
     DateOrder, Epoch, Format, Imported, Importer, Map, Options, Read, Refusal, zone_named,
 };
@@ -281,6 +281,89 @@ fn what_is_in_several_files_is_there_once() {
     let apart = imported(&[apart[0].as_bytes(), apart[1].as_bytes()], options());
     let lives = apart.records().filter(|(_, record)| matches!(record, Record::Life(_))).count();
     assert_eq!(lives, 2);
+}
+
+/// The gaps that are written: after which sequence, how many are lost, and why.
+fn gaps(imported: &Imported) -> Vec<(Option<u64>, Lost, Why)> {
+    let gaps = imported.records().filter_map(|(_, record)| match record {
+        Record::Gap(gap) => Some((gap.after, gap.lost, gap.why)),
+        _ => None,
+    });
+    gaps.collect()
+}
+
+/// A COMTRADE record of four channels with these samples.
+fn sampled(rows: &str) -> (Read, Imported) {
+    let text = format!(
+        "--- file type: CFG ---\nOAK,FR,2013\n4,0A,4D\n1,52A,,,0\n2,52B,,,0\n3,51P,,,0\n4,86,,,0\n\
+         60\n0\n0,9\n14/03/2027,09:05:00.000000\n14/03/2027,09:05:00.000000\nASCII\n1\n0,0\n0,0\n\
+         --- file type: DAT ASCII ---\n{rows}"
+    );
+    let mut importer = Importer::new(Options::default());
+    let read = read_into(&mut importer, "x.cff", text.as_bytes()).expect("it can be read");
+    (read, importer.finish())
+}
+
+#[test]
+fn what_changed_in_samples_that_are_missing_is_a_gap() {
+    let lost = |inputs| (Some(1), Lost::Unknown, Why::NotRecorded(inputs));
+    // At the end, also of 52A and 52B, which no other sample changes. 51P is the first that moved.
+    let (read, imported) = sampled("1,0,1,0,0,0\n2,1000,1,0,1,0\n5,53000,0,1,1,1\n");
+    assert_eq!(gaps(&imported), [lost(0b1110)]);
+    let [note] = &read.notes.lost[..] else { panic!("{:?}", read.notes.lost) };
+    assert_eq!(note.why, "there are no samples 3 to 4, and meanwhile these changed: 52A, 52B, 86");
+    // A change follows, and the next one is not lost.
+    let (_, imported) =
+        sampled("1,0,1,0,0,0\n2,1,1,0,1,0\n5,2,0,0,1,0\n6,3,0,1,1,0\n7,4,0,1,0,0\n");
+    assert_eq!(gaps(&imported), [lost(0b010)]);
+    // A damaged row is the same, also the last one.
+    let (read, imported) = sampled("1,0,1,0,0,0\n2,1000,1,0,1,0\n3,2000,x\n4,3000,0,1,1,0\n");
+    assert_eq!((gaps(&imported), read.notes.left_out_count), (vec![lost(0b110)], 1));
+    let (_, imported) = sampled("1,0,1,0,0,0\n2,1000,1,0,1,0\n3,2000,x\n");
+    assert_eq!(gaps(&imported), [(Some(1), Lost::Unknown, Why::NotReached)]);
+    // Nothing is missing.
+    let (read, imported) = sampled("1,0,1,0,0,0\n2,1000,1,0,1,0\n3,2000,0,1,1,0\n");
+    assert_eq!((gaps(&imported), read.notes.lost_count), (vec![], 0));
+}
+
+#[test]
+fn a_row_that_is_left_out_is_a_gap_where_it_stood() {
+    let in_list = |after, lines: &[&str]| {
+        let text = lines.join("\n");
+        let imported = imported(&[text.as_bytes()], in_zone("UTC"));
+        assert_eq!(gaps(&imported), [(Some(after), Lost::AtLeast(1), Why::NotReached)], "{text}");
+    };
+    let head = "#     DATE        TIME            ELEMENT      STATE";
+    let [three, two, one] = [
+        "3     2027-03-14  09:05:00.001    52A    Asserted",
+        "2     2027-03-14  09:05:00.002    52B    Asserted",
+        "1     2027-03-1x  09:05:00.003    52A    Deasserted",
+    ];
+    // The newest row, whichever way the list is printed.
+    in_list(2, &[head, three, two, one]);
+    in_list(2, &[head, one, two, three]);
+    let head = "Date,Time,Local Time Code,Substation,Device,State";
+    let [first, second, third, damaged] = [
+        "03/14/2027,09:05:00.001,+00,OAK,52A,OPEN",
+        "03/14/2027,09:05:00.002,+00,OAK,52B,OPEN",
+        "03/14/2027,09:05:00.003,+00,OAK,52A,CLOSED",
+        "03/14/2027,09:05:xx,+00,OAK,52B,CLOSED",
+    ];
+    in_list(1, &[head, first, damaged, second, third]);
+    in_list(1, &[head, third, second, damaged, first]);
+    in_list(3, &[head, first, second, third, damaged]);
+    in_list(3, &[head, damaged, third, second, first]);
+    let event = |number: u64, status: &str| {
+        format!(
+            "{{\"event_type\":1,\"channel\":1,\"status\":{status},\"milliseconds\":{number},\
+             \"seconds\":1800000000,\"seq_num\":{number}}}"
+        )
+    };
+    let text = format!("{{\"events\":[{},{},{}]}}", event(1, "1"), event(2, "0"), event(3, "x1"));
+    let text = text.replace("x1", "\"x\"");
+    let options = Options { epoch: Some(Epoch::Posix), ..Options::default() };
+    let imported = imported(&[text.as_bytes()], options);
+    assert_eq!(gaps(&imported), [(Some(2), Lost::AtLeast(1), Why::NotReached)]);
 }
 
 /// A record of so many channels, each of which goes on five milliseconds after the one before.

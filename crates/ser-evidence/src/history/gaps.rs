@@ -88,9 +88,12 @@ pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps) -> Vec<LogGap> {
         }
     }
     let last = life.entries.last().map_or(0, |held| held.sequence);
-    let ends = told.at(life.name(), last).iter().filter(|gap| match gap.why {
-        Why::LogBeganAnew => life.life.is_some(),
-        Why::Unreadable => !life.entries.is_empty(),
+    let is_named = life.life.is_some();
+    let ends = told.at(life.name(), last).iter().filter(|gap| match (gap.why, gap.lost) {
+        (Why::Unreadable, _) => !life.entries.is_empty(),
+        (Why::LogBeganAnew | Why::NotRecorded(_), _) => is_named,
+        // That a recorder was not reached is no loss yet, unless it is known that it has more.
+        (_, Lost::AtLeast(1..)) => is_named,
         _ => false,
     });
     for gap in ends {

@@ -75,6 +75,14 @@ struct Event {
     coincident: u32,
 }
 
+/// An event and where it is from.
+struct Placed {
+    line: u64,
+    /// Whether an event before it was left out.
+    is_torn: bool,
+    event: Event,
+}
+
 /// Whether a file begins like such an answer.
 pub(super) fn is_it(head: &str) -> bool {
     let head = head.trim_start();
@@ -108,18 +116,42 @@ pub(super) fn read(
     }
     let mut lines = LineNumbers { text: &text, at: 0, line: 1 };
     let mut events = Vec::new();
+    let (mut is_torn, mut damaged) = (false, 0);
     for raw in answer.events.unwrap_or_default() {
         let line = lines.of(raw.get());
         match understood(raw.get()) {
-            Ok(event) => events.push((line, event)),
-            Err(why) => notes.leave_out(line, why),
+            Ok(event) => {
+                events.push(Placed { line, is_torn: std::mem::take(&mut is_torn), event });
+            }
+            Err(why) => {
+                notes.leave_out(line, why);
+                (is_torn, damaged) = (true, damaged + 1);
+            }
         }
     }
     rows(&events, epoch, &mut list, found)?;
+    if list.counts_from_beginning {
+        // Sequence numbers tell where an event was, but for the newest.
+        torn_at_end(damaged, &mut list);
+    } else if is_torn {
+        list.torn_at_end = Some(Vec::new());
+    }
     if !list.rows.is_empty() || list.overwritten.is_some() {
         found.lists.push(list);
     }
     Ok(())
+}
+
+/// Events that were left out and that no hole in the sequence accounts for are among the newest, or
+/// before the first, where nobody knows what was.
+fn torn_at_end(damaged: u64, list: &mut List) {
+    let ends = (list.rows.first(), list.rows.last());
+    let (Some(first), Some(last)) = ends else { return };
+    let kept = u64::try_from(list.rows.len()).unwrap_or(u64::MAX);
+    let holes = (last.place - first.place).saturating_add(1).saturating_sub(kept);
+    if damaged > holes {
+        list.torn_at_end = Some(Vec::new());
+    }
 }
 
 /// The answer `last`: how many events there are, and how many there were.
@@ -212,7 +244,7 @@ fn of_words(text: &str) -> Result<Event, String> {
 }
 
 fn rows(
-    events: &[(u64, Event)],
+    events: &[Placed],
     epoch: Option<Epoch>,
     list: &mut List,
     found: &mut Found,
@@ -222,22 +254,25 @@ fn rows(
         None if events.is_empty() => return Ok(()),
         None => return Err(Refusal::NoEpoch),
     };
-    let mut sorted: Vec<&(u64, Event)> = events.iter().collect();
+    let mut sorted: Vec<&Placed> = events.iter().collect();
     let is_counted =
-        events.iter().all(|(_, event)| event.sequence.is_some_and(|number| number > 0));
+        events.iter().all(|placed| placed.event.sequence.is_some_and(|number| number > 0));
     if is_counted {
-        sorted.sort_by_key(|(_, event)| event.sequence);
-        sorted.dedup_by_key(|(_, event)| event.sequence);
+        sorted.sort_by_key(|placed| placed.event.sequence);
+        sorted.dedup_by_key(|placed| placed.event.sequence);
     } else {
         (list.order, list.counts_from_beginning) = (Order::PlacesOrReversed, false);
     }
-    let own: HashSet<(u32, u16, u8)> =
-        events.iter().map(|(_, event)| (event.seconds, event.milliseconds, event.input)).collect();
+    let own: HashSet<(u32, u16, u8)> = events
+        .iter()
+        .map(|Placed { event, .. }| (event.seconds, event.milliseconds, event.input))
+        .collect();
     let mut before: Option<u64> = None;
-    for (line, event) in &sorted {
+    for Placed { line, is_torn, event } in sorted {
+        let is_torn = *is_torn && !is_counted;
         let place = match event.sequence.filter(|_| is_counted) {
             Some(sequence) => sequence,
-            None => before.map_or(1, |before| before + 1),
+            None => before.map_or(1, |before| before + 1 + u64::from(is_torn)),
         };
         let is_own = |input: u8| own.contains(&(event.seconds, event.milliseconds, input));
         let changes = changes(event, is_own, found)?;
@@ -247,6 +282,7 @@ fn rows(
             when: when(event, epoch)?,
             place,
             forgets: before.is_some_and(|before| before + 1 != place),
+            torn: is_torn.then(Vec::new),
             learnt: Vec::new(),
             changes,
         });

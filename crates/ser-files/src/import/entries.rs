@@ -68,6 +68,7 @@ impl Maker<'_> {
             life: self.life(list),
             logs: vec![Log::default(); self.inputs.recorders.len()],
             is_split: self.inputs.recorders.len() > 1,
+            is_sampled: list.is_sampled,
             made: Vec::new(),
             is_doubtful: list.rows.iter().any(|row| row.doubt.is_some()),
             looked_ms: None,
@@ -76,6 +77,12 @@ impl Maker<'_> {
         life.begin(list);
         for row in &list.rows {
             life.row(row, notes);
+        }
+        if let Some(points) = &list.torn_at_end {
+            life.tear(points);
+        }
+        for recorder in 0..life.logs.len() {
+            life.tell_gap(recorder);
         }
         if life.is_doubtful && self.doubt_ms.is_some() {
             notes.remark(
@@ -118,6 +125,8 @@ struct Log {
     sequence: u64,
     /// Missing rows since its last entry.
     missing: u64,
+    /// Whether something is lost since its last entry: the inputs that are known to have changed.
+    torn: Option<u32>,
     on: u32,
     known: u32,
     is_begun: bool,
@@ -131,6 +140,7 @@ struct Writing<'a> {
     life: Life,
     logs: Vec<Log>,
     is_split: bool,
+    is_sampled: bool,
     made: Vec<Made>,
     is_doubtful: bool,
     looked_ms: Option<i64>,
@@ -166,8 +176,13 @@ impl Writing<'_> {
     fn row(&mut self, row: &TimedRow, notes: &mut Notes) {
         let Some(time) = stamp(Moment::from_us(row.at_ms.saturating_mul(1000))) else {
             notes.leave_out(row.line, "no recorder's clock shows this time");
+            self.logs.iter_mut().for_each(|log| log.missing += 1);
+            self.tear(&[]);
             return;
         };
+        if let Some(points) = &row.torn {
+            self.tear(points);
+        }
         self.learn(row);
         let moved = self.moved(row, notes);
         if moved.is_empty() {
@@ -175,6 +190,7 @@ impl Writing<'_> {
         }
         self.look(row.at_ms, &moved);
         for (recorder, (changed, on, known)) in moved {
+            self.tell_gap(recorder);
             let Some(log) = self.logs.get_mut(recorder) else { continue };
             log.sequence = match self.is_split {
                 true => log.sequence + 1 + std::mem::take(&mut log.missing),
@@ -193,6 +209,37 @@ impl Writing<'_> {
             self.tell(recorder, Record::Entry(record), note(row, &time));
         }
         self.doubt(row.at_ms);
+    }
+
+    /// Something is lost, in which these points are known to have changed.
+    fn tear(&mut self, points: &[usize]) {
+        for log in &mut self.logs {
+            log.torn.get_or_insert_default();
+            // The next sample shows all states again; a list does not.
+            log.known = if self.is_sampled { log.known } else { 0 };
+        }
+        for place in points.iter().filter_map(|point| self.maker.inputs.of_point(*point)) {
+            if let Some(log) = self.logs.get_mut(place.recorder) {
+                *log.torn.get_or_insert_default() |= 1 << (place.input - 1);
+            }
+        }
+    }
+
+    /// Tells what is lost since the last entry of a recorder.
+    fn tell_gap(&mut self, recorder: usize) {
+        let Some(log) = self.logs.get_mut(recorder) else { return };
+        let Some(inputs) = log.torn.take() else { return };
+        let why = match inputs {
+            0 => Why::NotReached,
+            inputs => Why::NotRecorded(inputs),
+        };
+        // A row of a list is an entry of somebody; a sample need not be.
+        let lost = match self.is_sampled || self.is_split {
+            true => Lost::Unknown,
+            false => Lost::AtLeast(1),
+        };
+        let gap = Gap { life: self.life, after: Some(log.sequence), lost, why };
+        self.tell(recorder, Record::Gap(gap), None);
     }
 
     /// What is known of states before a row.
@@ -222,9 +269,8 @@ impl Writing<'_> {
                     let why = format!("{point:?} has two states already, and {word:?} is another");
                     notes.leave_out(row.line, why);
                     // Something happened that no entry has.
-                    self.logs
-                        .iter_mut()
-                        .for_each(|log| (log.missing, log.known) = (log.missing + 1, 0));
+                    self.logs.iter_mut().for_each(|log| log.missing += 1);
+                    self.tear(&[]);
                     continue;
                 }
             };

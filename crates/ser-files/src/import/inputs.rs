@@ -40,8 +40,15 @@ impl Inputs {
             .map(|(recorder, input)| (recorder.unwrap_or(name).to_owned(), input))
             .collect();
         let mut spare = (1_usize, 1_u8);
-        let moved = lists.iter().flat_map(|list| &list.rows).flat_map(|row| &row.changes);
-        for point in moved.map(|change| change.point) {
+        // What changed where something is lost has a name, too.
+        let moved = lists.iter().flat_map(|list| {
+            let rows = list.rows.iter().flat_map(|row| {
+                let changes = row.changes.iter().map(|change| change.point);
+                row.torn.iter().flatten().copied().chain(changes)
+            });
+            rows.chain(list.torn_at_end.iter().flatten().copied())
+        });
+        for point in moved {
             if inputs.of_points.contains_key(&point) || inputs.without_input.contains(&point) {
                 continue;
             }

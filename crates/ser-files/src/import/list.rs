@@ -26,6 +26,9 @@ pub(super) struct Row {
     pub(super) place: u64,
     /// Whether nothing is known any more of states before it.
     pub(super) forgets: bool,
+    /// What is lost between the row before and this one: the points that are known to have changed
+    /// there. Nothing is if this is `None`.
+    pub(super) torn: Option<Vec<usize>>,
     /// States that are known before it although no row shows them.
     pub(super) learnt: Vec<(usize, bool)>,
     /// What changed in it, each point once.
@@ -103,6 +106,10 @@ pub(super) struct List {
     pub(super) usual_dates: Option<DateOrder>,
     /// Whether places count from the beginning of the log.
     pub(super) counts_from_beginning: bool,
+    /// Whether it is made of samples, which show all states.
+    pub(super) is_sampled: bool,
+    /// What is lost behind the last row, as [`Row::torn`].
+    pub(super) torn_at_end: Option<Vec<usize>>,
     /// How many rows older ones took the places of, before the first.
     pub(super) overwritten: Option<u64>,
 }
@@ -195,12 +202,19 @@ pub(super) fn fit(name: &str) -> String {
 pub(super) struct Numbered {
     rows: Vec<(u64, Row)>,
     pub(super) other_dates: Vec<Date>,
+    /// Rows of this list that were left out.
+    damaged: u64,
 }
 
 impl Numbered {
     /// Adds a row with its number.
     pub(super) fn add(&mut self, number: u64, row: Row) {
         self.rows.push((number, row));
+    }
+
+    /// Notes that a row was left out.
+    pub(super) fn tear(&mut self) {
+        self.damaged += 1;
     }
 
     /// Whether there is a row.
@@ -210,6 +224,7 @@ impl Numbered {
 
     /// The list so far; the next row begins another one.
     pub(super) fn finish(&mut self, found: &mut Found, notes: &mut Notes) {
+        let damaged = std::mem::take(&mut self.damaged);
         if self.rows.is_empty() {
             return;
         }
@@ -238,6 +253,14 @@ impl Numbered {
             row.place = oldest - number + 1;
             before = Some(number);
             list.rows.push(row);
+        }
+        // Numbers that are missing in between tell where a row was. What they do not account for was
+        // among the newest, if those are missing.
+        let newest = before.unwrap_or(1);
+        let kept = u64::try_from(list.rows.len()).unwrap_or(u64::MAX);
+        let holes = (oldest - newest).saturating_add(1).saturating_sub(kept);
+        if newest > 1 && damaged > holes {
+            list.torn_at_end = Some(Vec::new());
         }
         found.lists.push(list);
     }

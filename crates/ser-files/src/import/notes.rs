@@ -25,6 +25,10 @@ pub struct Notes {
     pub left_out: Vec<Note>,
     /// How many were left out.
     pub left_out_count: u64,
+    /// What the file has lost itself: places where it shows that something is not in it.
+    pub lost: Vec<Note>,
+    /// How many such places there are.
+    pub lost_count: u64,
     /// What else has to be known.
     pub remarks: Vec<Note>,
 }
@@ -35,6 +39,14 @@ impl Notes {
         self.left_out_count += 1;
         if self.left_out.len() < KEPT {
             self.left_out.push(Note { line: Some(line), why: why.into() });
+        }
+    }
+
+    /// Something is missing before a line.
+    pub(super) fn lose(&mut self, line: u64, why: impl Into<String>) {
+        self.lost_count += 1;
+        if self.lost.len() < KEPT {
+            self.lost.push(Note { line: Some(line), why: why.into() });
         }
     }
 

@@ -31,12 +31,14 @@ pub(super) fn read(
     let mut fields = Fields::new();
     let mut places: Option<Columns> = None;
     let mut list = List { order: Order::Times, ..List::default() };
+    let mut torn: Option<Vec<usize>> = None;
     while let Some(line) = lines.next()? {
         let text = match line {
             Line::Text(text) if text.trim().is_empty() => continue,
             Line::Text(text) => text.to_owned(),
             Line::TooLong => {
                 notes.leave_out(lines.number(), format!("longer than {} bytes", lines.limit()));
+                torn = Some(Vec::new());
                 continue;
             }
         };
@@ -54,11 +56,16 @@ pub(super) fn read(
         match row(&text, columns, &mut fields, number, found)? {
             Ok(mut row) => {
                 row.place = u64::try_from(list.rows.len()).unwrap_or(u64::MAX) + 1;
+                row.torn = torn.take();
                 list.rows.push(row);
             }
-            Err(why) => notes.leave_out(number, why),
+            Err(why) => {
+                notes.leave_out(number, why);
+                torn = Some(Vec::new());
+            }
         }
     }
+    list.torn_at_end = torn;
     found.lists.push(list);
     Ok(())
 }
@@ -99,7 +106,15 @@ fn row(
     let to = To::Word(found.word(&state)?);
     found.count(1)?;
     let changes = vec![Change { point, to }];
-    Ok(Ok(Row { line: number, when, place: 0, forgets: false, learnt: Vec::new(), changes }))
+    Ok(Ok(Row {
+        line: number,
+        when,
+        place: 0,
+        forgets: false,
+        torn: None,
+        learnt: Vec::new(),
+        changes,
+    }))
 }
 
 fn texts(line: &str, columns: Columns, fields: &mut Fields) -> Result<[String; 6], String> {

@@ -27,6 +27,10 @@ pub(super) struct Timed {
     pub(super) counts_from_beginning: bool,
     /// How many rows were overwritten before the first place that was left.
     pub(super) overwritten: Option<u64>,
+    /// Whether it is made of samples, which show all states.
+    pub(super) is_sampled: bool,
+    /// What is lost behind the last row, as [`TimedRow::torn`].
+    pub(super) torn_at_end: Option<Vec<usize>>,
 }
 
 /// A row in UTC.
@@ -38,6 +42,9 @@ pub(super) struct TimedRow {
     pub(super) doubt: Option<Doubt>,
     pub(super) place: u64,
     pub(super) forgets: bool,
+    /// The points that are known to have changed between the row before and this one, if something is
+    /// lost there.
+    pub(super) torn: Option<Vec<usize>>,
     pub(super) learnt: Vec<(usize, bool)>,
     pub(super) changes: Vec<Change>,
 }
@@ -57,12 +64,18 @@ pub(super) fn timed(
     notes: &mut Notes,
 ) -> Result<Timed, Refusal> {
     let times = in_utc(&list, order, zone, notes)?;
-    let List { rows, order, counts_from_beginning, overwritten, .. } = list;
+    let List { rows, order, counts_from_beginning, overwritten, is_sampled, .. } = list;
+    let mut torn_at_end = list.torn_at_end;
     let mut is_torn = false;
     let mut timed: Vec<(Utc, TimedRow)> = Vec::with_capacity(rows.len());
-    for (row, time) in rows.into_iter().zip(times) {
+    let mut lost: Option<Vec<usize>> = None;
+    for (mut row, time) in rows.into_iter().zip(times) {
+        if let Some(torn) = row.torn.take() {
+            lost.get_or_insert_default().extend(torn);
+        }
         let Some(utc) = time else {
             is_torn = true;
+            lost.get_or_insert_default();
             continue;
         };
         let forgets = row.forgets || std::mem::take(&mut is_torn);
@@ -74,24 +87,36 @@ pub(super) fn timed(
                 doubt: utc.doubt,
                 place: row.place,
                 forgets,
+                torn: lost.take(),
                 learnt: row.learnt,
                 changes: row.changes,
             },
         ));
     }
+    if let Some(lost) = lost {
+        torn_at_end.get_or_insert_default().extend(lost);
+    }
     match order {
         Order::Places => {}
-        Order::PlacesOrReversed => turn(&mut timed, notes),
-        // One millisecond has no order: by the file, so that it is the same each time.
-        Order::Times => timed.sort_by_key(|(utc, row)| (utc.ns, row.place)),
+        Order::PlacesOrReversed => turn(&mut timed, &mut torn_at_end, notes),
+        Order::Times => {
+            let ends = (timed.first(), timed.last());
+            if let (Some((first, _)), Some((last, _))) = ends
+                && first.ns > last.ns
+            {
+                turn_tears(&mut timed, &mut torn_at_end);
+            }
+            // One millisecond has no order: by the file, so that it is the same each time.
+            timed.sort_by_key(|(utc, row)| (utc.ns, row.place));
+        }
     }
     let rows = timed.into_iter().map(|(_, row)| row).collect();
     let by_time = order == Order::Times;
-    Ok(Timed { rows, by_time, counts_from_beginning, overwritten })
+    Ok(Timed { rows, by_time, counts_from_beginning, overwritten, is_sampled, torn_at_end })
 }
 
 /// Turns a list round whose times all say that it is upside down.
-fn turn(timed: &mut [(Utc, TimedRow)], notes: &mut Notes) {
+fn turn(timed: &mut [(Utc, TimedRow)], torn_at_end: &mut Option<Vec<usize>>, notes: &mut Notes) {
     let steps = || {
         timed.windows(2).filter_map(|pair| match pair {
             [(one, _), (other, _)] => Some(one.ns.cmp(&other.ns)),
@@ -105,6 +130,7 @@ fn turn(timed: &mut [(Utc, TimedRow)], notes: &mut Notes) {
     }
     notes.remark(None, "by all of its times this list is the other way round; it was turned");
     let last = timed.last().map_or(0, |(_, row)| row.place);
+    turn_tears(timed, torn_at_end);
     timed.reverse();
     let mut place_before = None;
     for (_, row) in timed.iter_mut() {
@@ -112,6 +138,15 @@ fn turn(timed: &mut [(Utc, TimedRow)], notes: &mut Notes) {
         row.forgets |= place_before.is_some_and(|before| before + 1 != row.place);
         place_before = Some(row.place);
     }
+}
+
+/// What is lost before a row is lost after it where the rows come the other way round.
+fn turn_tears(timed: &mut [(Utc, TimedRow)], torn_at_end: &mut Option<Vec<usize>>) {
+    let mut after = torn_at_end.take();
+    for (_, row) in timed.iter_mut().rev() {
+        std::mem::swap(&mut after, &mut row.torn);
+    }
+    *torn_at_end = after;
 }
 
 /// Joins the lists of one recorder that belong together.
@@ -194,6 +229,14 @@ impl Joined {
     /// Adds a list to another one. Returns from which row on that may be another one than before.
     fn merge(&mut self, index: usize, list: Timed, shift: i128) -> usize {
         let Some(home) = self.lists.get_mut(index) else { return 0 };
+        let end = |rows: &[TimedRow], shift: i128| {
+            rows.last().map_or(0, |row| i128::from(row.place) + shift)
+        };
+        home.torn_at_end = match end(&home.rows, 0).cmp(&end(&list.rows, shift)) {
+            std::cmp::Ordering::Less => list.torn_at_end,
+            std::cmp::Ordering::Equal => home.torn_at_end.take().and(list.torn_at_end),
+            std::cmp::Ordering::Greater => home.torn_at_end.take(),
+        };
         // Places count from 1, so what comes before the first one moves all others.
         let first = list.rows.first().map_or(1, |row| i128::from(row.place) + shift);
         let up = u64::try_from(1 - first.min(1)).unwrap_or_default();
@@ -213,7 +256,11 @@ impl Joined {
             row.place = moved(row.place);
             match rows.entry(row.place) {
                 // A row that one list begins with, or that follows on a hole there, need not do so.
-                Entry::Occupied(mut known) => known.get_mut().forgets &= row.forgets,
+                Entry::Occupied(mut known) => {
+                    let known = known.get_mut();
+                    known.forgets &= row.forgets;
+                    known.torn = known.torn.take().and(row.torn);
+                }
                 Entry::Vacant(vacant) => _ = vacant.insert(row),
             }
         }
@@ -225,22 +272,52 @@ impl Joined {
 
 /// Lists whose rows have the order of their times are one. A change that is in several is there once.
 fn of_times(lists: Vec<Timed>) -> Option<Timed> {
-    let mut rows: Vec<TimedRow> = lists.into_iter().flat_map(|list| list.rows).collect();
+    let last = |list: &Timed| list.rows.last().map(|row| row.at_ms);
+    let end = lists.iter().filter_map(last).max();
+    let mut rows: Vec<TimedRow> = Vec::new();
+    let mut torn_at_end = None;
+    // Where a list ends torn and another goes on, the next row follows on what is lost.
+    let mut torn_behind: Vec<i64> = Vec::new();
+    for list in lists {
+        match (list.torn_at_end.is_some(), last(&list)) {
+            (true, Some(at_ms)) if Some(at_ms) < end => torn_behind.push(at_ms),
+            (true, Some(_)) => torn_at_end = Some(Vec::new()),
+            _ => {}
+        }
+        rows.extend(list.rows);
+    }
     rows.sort_by_key(|row| row.at_ms);
+    for at_ms in torn_behind {
+        let next = rows.partition_point(|row| row.at_ms <= at_ms);
+        if let Some(row) = rows.get_mut(next) {
+            row.torn.get_or_insert_default();
+        }
+    }
     let mut together: Vec<TimedRow> = Vec::new();
     for row in rows {
         match together.last_mut().filter(|last| last.at_ms == row.at_ms) {
-            Some(last) if row.changes.iter().all(|change| last.changes.contains(change)) => {}
+            Some(last) if row.changes.iter().all(|change| last.changes.contains(change)) => {
+                last.torn = last.torn.take().or(row.torn);
+            }
             Some(last) if !row.changes.iter().any(|change| has(last, change.point)) => {
+                last.torn = last.torn.take().or(row.torn);
                 last.changes.extend(row.changes);
             }
             _ => together.push(row),
         }
     }
-    for (place, row) in (1..).zip(&mut together) {
+    let mut place = 0;
+    for row in &mut together {
+        // What is lost has a place of its own.
+        place += 1 + u64::from(row.torn.is_some() && place > 0);
         row.place = place;
     }
-    (!together.is_empty()).then(|| Timed { rows: together, by_time: true, ..Timed::default() })
+    (!together.is_empty()).then(|| Timed {
+        rows: together,
+        by_time: true,
+        torn_at_end,
+        ..Timed::default()
+    })
 }
 
 fn has(row: &TimedRow, point: usize) -> bool {

@@ -232,7 +232,15 @@ mod tests {
             let date = Date::parse(date).unwrap();
             let day_ns = time_of_day(time).unwrap();
             let when = When { date, day_ns, later_ns: 0, utc_offset_s: None };
-            Row { line: place, when, place, forgets: false, learnt: vec![], changes: vec![] }
+            Row {
+                line: place,
+                when,
+                place,
+                forgets: false,
+                torn: None,
+                learnt: vec![],
+                changes: vec![],
+            }
         };
         List { rows: (1..).zip(rows).map(row).collect(), ..List::default() }
     }

@@ -74,7 +74,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
 
-    /// End with exit code 3 if a line was not understood.
+    /// End with exit code 3 if a line was not understood, or if a file shows that something is missing.
     #[arg(long)]
     fail_on_loss: bool,
 }
@@ -132,10 +132,11 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let outlet = outlet::Outlet::of(args.output.as_deref(), args.force)?;
     let mut importer = Importer::new(options(args, connection)?);
     let files = files::without_data(&args.files);
-    let mut left_out = 0;
+    let (mut left_out, mut lost) = (0, 0);
     for path in &files {
         let read = files::read(&mut importer, path, connection.recorder.as_deref())?;
         left_out += read.notes.left_out_count;
+        lost += read.notes.lost_count;
         telling::file(path, &read);
     }
     let imported = importer.finish();
@@ -147,8 +148,11 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             .hint("--format says what the files are, if they were taken for something else"));
     }
     outlet.write(&imported)?;
-    match left_out {
-        1.. if args.fail_on_loss => Err(Failure::incomplete("not all lines were understood")),
+    match (left_out, lost) {
+        (1.., _) if args.fail_on_loss => Err(Failure::incomplete("not all lines were understood")),
+        (_, 1..) if args.fail_on_loss => {
+            Err(Failure::incomplete("something is missing in the files"))
+        }
         _ => Ok(()),
     }
 }

@@ -22,6 +22,7 @@ pub(super) fn file(path: &Path, read: &Read) {
         inform(format_args!("{name}: {channels} passed over"));
     }
     left_out(&format!("{name}: "), &read.notes.left_out, read.notes.left_out_count);
+    lost(&format!("{name}: "), &read.notes.lost, read.notes.lost_count);
 }
 
 /// What all files became.
@@ -50,6 +51,17 @@ fn left_out(name: &str, notes: &[Note], all: u64) {
     let more = all.saturating_sub(u64::try_from(notes.len().min(TOLD)).unwrap_or(u64::MAX));
     if more > 0 {
         warn(format_args!("{name}{more} more left out"));
+    }
+}
+
+/// Places where the file itself shows that something is missing.
+fn lost(name: &str, notes: &[Note], all: u64) {
+    for note in notes.iter().take(TOLD) {
+        warn(format_args!("{name}{note}"));
+    }
+    let more = all.saturating_sub(u64::try_from(notes.len().min(TOLD)).unwrap_or(u64::MAX));
+    if more > 0 {
+        warn(format_args!("{name}something is missing at {}", count(as_usize(more), "more place")));
     }
 }
 

@@ -52,6 +52,7 @@ pub(super) fn ascii(
                     Ok((own, stamp)) => samples.add(
                         &Sample { line: number, number: own, stamp, states: &states },
                         found,
+                        notes,
                     )?,
                     Err(why) => Err(why),
                 };
@@ -165,7 +166,7 @@ pub(super) fn binary(
         }
         let stamp = Some(word(4)).filter(|stamp| *stamp != MISSING).map(u64::from);
         let sample = Sample { line: number, number: word(0).into(), stamp, states: &states };
-        if let Err(why) = samples.add(&sample, found)? {
+        if let Err(why) = samples.add(&sample, found, notes)? {
             notes.leave_out(number, why);
             samples.tear();
         }

@@ -48,6 +48,7 @@ impl Samples {
             list: List {
                 other_dates: vec![configuration.first.date],
                 usual_dates: configuration.dates,
+                is_sampled: true,
                 ..List::default()
             },
             rates: configuration.rates.clone(),
@@ -77,6 +78,7 @@ impl Samples {
         &mut self,
         sample: &Sample<'_>,
         found: &mut Found,
+        notes: &mut Notes,
     ) -> Result<Result<(), String>, Refusal> {
         let (first, last) = self.numbers.unwrap_or((sample.number, sample.number.wrapping_sub(1)));
         if self.numbers.is_some() && sample.number <= last {
@@ -85,12 +87,13 @@ impl Samples {
         let Some(later_ns) = self.later_ns(sample, sample.number - first) else {
             return Ok(Err("this sample has neither a time nor a rate".to_owned()));
         };
-        let is_torn = std::mem::take(&mut self.is_torn) || sample.number != last.wrapping_add(1);
+        let skipped = sample.number.wrapping_sub(last).wrapping_sub(1);
+        let is_torn = std::mem::take(&mut self.is_torn) || skipped > 0;
         self.numbers = Some((first, sample.number));
         self.count += 1;
         if self.states.is_empty() || is_torn {
             // Whatever changed meanwhile, nobody knows when.
-            return self.begin_anew(sample, found).map(Ok);
+            return self.begin_anew(sample, (last, skipped), found, notes).map(Ok);
         }
         let moved: Vec<Change> = self
             .points
@@ -109,19 +112,28 @@ impl Samples {
             Some(pending) => pending.place,
             None => self.list.rows.last().map_or(1, |row| row.place + 1),
         };
+        let (torn, learnt) = pending.map_or((None, Vec::new()), |row| (row.torn, row.learnt));
         self.list.rows.push(Row {
             line: sample.line,
             when: When { later_ns, ..self.first },
             place,
             forgets: false,
-            learnt: pending.map_or_else(Vec::new, |pending| pending.learnt),
+            torn,
+            learnt,
             changes: moved,
         });
         Ok(Ok(()))
     }
 
-    /// Keeps what a sample shows for the next change.
-    fn begin_anew(&mut self, sample: &Sample<'_>, found: &mut Found) -> Result<(), Refusal> {
+    /// Keeps what a sample shows for the next change. `last` is the sample before, and so many are
+    /// not there in between.
+    fn begin_anew(
+        &mut self,
+        sample: &Sample<'_>,
+        (last, skipped): (u64, u64),
+        found: &mut Found,
+        notes: &mut Notes,
+    ) -> Result<(), Refusal> {
         let pending = self.list.rows.pop_if(|row| row.changes.is_empty());
         let is_first = self.states.is_empty();
         let shown = self.points.iter().copied().zip(sample.states.iter().copied());
@@ -138,17 +150,23 @@ impl Samples {
         // What was passed over is a place of its own if something changed in it.
         let is_missing = u64::from(!is_first && !news.is_empty());
         let place = self.list.rows.last().map_or(1, |row| row.place + 1);
-        let mut learnt = Vec::new();
+        let (mut learnt, mut torn) = (Vec::new(), None);
         let place = pending.map_or(place, |pending| {
-            learnt = pending.learnt;
+            (learnt, torn) = (pending.learnt, pending.torn);
             pending.place
         });
+        if !is_first {
+            let moved: Vec<usize> = news.iter().map(|(point, _)| *point).collect();
+            notes.lose(sample.line, lost(sample.number, (last, skipped), &moved, found));
+            torn.get_or_insert_with(Vec::new).extend(moved);
+        }
         learnt.extend(news);
         self.list.rows.push(Row {
             line: sample.line,
             when: self.first,
             place: place + is_missing,
             forgets: false,
+            torn,
             learnt,
             changes: Vec::new(),
         });
@@ -188,7 +206,12 @@ impl Samples {
 
     /// Hands over what was found.
     pub(super) fn finish(mut self, found: &mut Found, notes: &mut Notes) {
-        self.list.rows.pop_if(|row| row.changes.is_empty());
+        // What no change follows is lost behind the last one.
+        let pending = self.list.rows.pop_if(|row| row.changes.is_empty());
+        self.list.torn_at_end = pending.and_then(|row| row.torn);
+        if self.is_torn && !self.states.is_empty() {
+            self.list.torn_at_end.get_or_insert_default();
+        }
         if self.count < self.announced {
             notes.remark(
                 None,
@@ -211,6 +234,26 @@ impl Samples {
             );
         }
         found.lists.push(self.list);
+    }
+}
+
+/// What is lost before a sample, in words.
+fn lost(number: u64, (last, skipped): (u64, u64), moved: &[usize], found: &Found) -> String {
+    /// Channels that are named; of others their number is told.
+    const NAMED: usize = 8;
+    let between = match skipped {
+        0 => format!("something may be lost before sample {number}"),
+        1 => format!("there is no sample {}", last.wrapping_add(1)),
+        _ => format!("there are no samples {} to {}", last.wrapping_add(1), number - 1),
+    };
+    let names: Vec<&str> = moved.iter().take(NAMED).map(|point| found.points.get(*point)).collect();
+    let more = match moved.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    match names.is_empty() {
+        true => between,
+        false => format!("{between}, and meanwhile these changed: {}{more}", names.join(", ")),
     }
 }
 

@@ -37,6 +37,7 @@ pub(in super::super) fn read(
         let number = lines.number();
         if is_too_long {
             notes.leave_out(number, format!("longer than {} bytes", lines.limit()));
+            numbered.tear();
             continue;
         }
         let raw = bare(lines.raw());
@@ -47,6 +48,7 @@ pub(in super::super) fn read(
         match checked(raw, &mut fields) {
             None => {
                 notes.leave_out(number, format!("this line has no checksum: {}", quoted(raw)));
+                numbered.tear();
                 continue;
             }
             Some(Err(why)) => {
@@ -57,6 +59,7 @@ pub(in super::super) fn read(
                     _ => why,
                 };
                 notes.leave_out(number, which);
+                numbered.tear();
                 continue;
             }
             Some(Ok(())) => {}
@@ -69,7 +72,10 @@ pub(in super::super) fn read(
         } else if let Some(text) = number_of(&fields, columns) {
             match row(&fields, columns, number, found)? {
                 Ok(row) => numbered.add(text, row),
-                Err(why) => notes.leave_out(number, why),
+                Err(why) => {
+                    notes.leave_out(number, why);
+                    numbered.tear();
+                }
             }
         }
         // Everything else identifies the relay.
@@ -139,5 +145,5 @@ fn row(
     let state = state.filter(|state| !state.is_empty());
     let changes = super::changes(found, &text(element), state.as_deref())?;
     let forgets = state.is_none();
-    Ok(Ok(Row { line, when, place: 0, forgets, learnt: Vec::new(), changes }))
+    Ok(Ok(Row { line, when, place: 0, forgets, torn: None, learnt: Vec::new(), changes }))
 }

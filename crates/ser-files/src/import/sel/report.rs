@@ -31,6 +31,7 @@ pub(in super::super) fn read(
         let Line::Text(text) = line else {
             let limit = lines.limit();
             notes.leave_out(lines.number(), format!("longer than {limit} bytes"));
+            numbered.tear();
             continue;
         };
         let text = cleaned(text);
@@ -50,12 +51,14 @@ pub(in super::super) fn read(
                 Ok(row) => numbered.add(written.number, row),
                 Err(why) => {
                     without_element += u64::from(written.rest.is_empty());
+                    numbered.tear();
                     notes.leave_out(number, why);
                 }
             },
             Kind::Other if is_below_columns => {
                 let why = format!("this is no row of a list: {}", quoted(text.trim().as_bytes()));
                 notes.leave_out(number, why);
+                numbered.tear();
             }
             Kind::Nothing | Kind::Other => {}
         }
@@ -163,7 +166,7 @@ fn row(
         };
     let changes = super::changes(found, element, state)?;
     let forgets = state.is_none();
-    Ok(Ok(Row { line, when, place: 0, forgets, learnt: Vec::new(), changes }))
+    Ok(Ok(Row { line, when, place: 0, forgets, torn: None, learnt: Vec::new(), changes }))
 }
 
 /// Element and state. What the relay says of itself has no state.
