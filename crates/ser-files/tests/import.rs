@@ -386,6 +386,20 @@ fn two_events_of_one_sequence_are_told() {
     assert!(read([1, 1]).notes.left_out.is_empty());
 }
 
+#[test]
+fn long_names_stay_apart_and_are_told() {
+    let long = "x".repeat(300);
+    let text = format!(
+        "Date,Time,Local Time Code,Substation,Device,State\n\
+         03/14/2027,09:05:00.001,+00,OAK,{long}a,OPEN\n\
+         03/14/2027,09:05:00.002,+00,OAK,{long}b,OPEN\n"
+    );
+    let mut importer = Importer::new(Options::default());
+    let read = read_into(&mut importer, "x.csv", text.as_bytes()).expect("it is read");
+    assert!(read.notes.remarks.iter().any(|note| note.why.contains("longer than 200")));
+    assert_eq!(importer.finish().recorders[0].points, 2);
+}
+
 /// A record of so many channels, each of which goes on five milliseconds after the one before.
 fn wide(channels: usize) -> String {
     let mut text = format!("--- file type: CFG ---\nOAK,FR,2013\n{channels},0A,{channels}D\n");
