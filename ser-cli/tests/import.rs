@@ -248,8 +248,38 @@ fn samples_that_are_missing_are_told_and_make_the_report_incomplete() {
     assert_eq!(import.status.code(), Some(3), "{}", text(&import.stderr));
     let told = "line 3: there are no samples 3 to 4, and meanwhile these changed: 52A, 52B, 86";
     assert!(text(&import.stderr).contains(told), "{}", text(&import.stderr));
-    let report = run("report --site site.toml --input f3.jsonl --around 2027-03-14T14:29:58 --fail-on-loss");
+    let report =
+        run("report --site site.toml --input f3.jsonl --around 2027-03-14T14:29:58 --fail-on-loss");
     let shown = text(&report.stdout);
     assert!(shown.contains("inputs changed without being recorded: 2 3 4"), "{shown}");
     assert_eq!(report.status.code(), Some(3), "{}", text(&report.stderr));
+}
+
+#[test]
+fn what_is_read_is_not_overwritten_even_with_force() {
+    let desk = desk("");
+    let at = |name: &str| desk.path().join(name).display().to_string();
+    let before = fs::read(at("relay.jsonl")).expect("read");
+    fs::copy(folder().join("plant.toml"), at("plant.toml")).expect("copied");
+    for arguments in [
+        format!("import {0} --force -o {0}", at("relay.jsonl")),
+        format!(
+            "export --site plant.toml --input {0} --format jsonl --force -o {0}",
+            at("relay.jsonl")
+        ),
+        format!(
+            "report --site plant.toml --input {0} --format json --force -o {0}",
+            at("relay.jsonl")
+        ),
+        format!(
+            "report --site {1} --input {0} --format json --force -o {1}",
+            at("relay.jsonl"),
+            at("plant.toml")
+        ),
+    ] {
+        let run = run(&arguments);
+        assert_eq!(run.status.code(), Some(1), "{arguments}: {}", text(&run.stderr));
+        assert!(text(&run.stderr).contains("is read by this command"), "{}", text(&run.stderr));
+    }
+    assert_eq!(fs::read(at("relay.jsonl")).expect("read"), before);
 }

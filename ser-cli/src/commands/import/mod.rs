@@ -129,7 +129,9 @@ fn parse_zone(text: &str) -> std::result::Result<jiff::tz::TimeZone, String> {
 }
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
-    let outlet = outlet::Outlet::of(args.output.as_deref(), args.force)?;
+    let mut inputs = files::with_data(&args.files);
+    inputs.extend(args.map.iter().chain(&connection.site).cloned());
+    let outlet = outlet::Outlet::of(args.output.as_deref(), args.force, inputs)?;
     let mut importer = Importer::new(options(args, connection)?);
     let files = files::without_data(&args.files);
     let (mut left_out, mut lost) = (0, 0);
