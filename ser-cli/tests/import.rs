@@ -283,3 +283,15 @@ fn what_is_read_is_not_overwritten_even_with_force() {
     }
     assert_eq!(fs::read(at("relay.jsonl")).expect("read"), before);
 }
+
+#[test]
+fn options_that_do_nothing_for_our_own_files_are_refused() {
+    for option in ["--zone UTC", "--dates mdy", "--doubt-ms 2", "--recorder F3"] {
+        let run = run(&format!("import ours.jsonl {option}"));
+        assert_eq!(run.status.code(), Some(2), "{option}: {}", text(&run.stderr));
+        let name = option.split(' ').next().expect("a name");
+        assert!(text(&run.stderr).contains(&format!("{name} does nothing for")), "{option}");
+    }
+    let run = run("import relay.txt --zone UTC --doubt-ms 0.5");
+    assert!(text(&run.stderr).contains("a whole number of milliseconds"), "{}", text(&run.stderr));
+}
