@@ -17,11 +17,19 @@ pub(crate) struct NewFiles {
     files: Vec<(NamedTempFile, PathBuf)>,
     /// Whether files of these names may be there, and are overwritten.
     overwrites: bool,
+    /// What is read meanwhile, and is never overwritten.
+    inputs: Vec<PathBuf>,
 }
 
 impl NewFiles {
     pub(crate) const fn new(overwrites: bool) -> NewFiles {
-        NewFiles { files: Vec::new(), overwrites }
+        NewFiles { files: Vec::new(), overwrites, inputs: Vec::new() }
+    }
+
+    /// With these files kept whatever the user says: what is written is made of them.
+    pub(crate) fn sparing(mut self, inputs: impl IntoIterator<Item = PathBuf>) -> NewFiles {
+        self.inputs.extend(inputs);
+        self
     }
 
     /// Begins the file of this name.
@@ -35,6 +43,13 @@ impl NewFiles {
             Ok(found) if !found.is_file() => {
                 return Err(Failure::new(format!("{} is not a file", path.display()))
                     .hint("without -o the data goes to standard output; send that there"));
+            }
+            Ok(_) if self.inputs.iter().any(|input| is_same(input, path)) => {
+                return Err(Failure::new(format!(
+                    "{} is read by this command, and is never overwritten",
+                    path.display()
+                ))
+                .hint("give another name with -o"));
             }
             Ok(_) if !self.overwrites => return Err(exists(path)),
             _ => {}
@@ -83,6 +98,19 @@ fn take_back(named: &[PathBuf]) {
 fn exists(path: &Path) -> Failure {
     Failure::new(format!("{} exists, and is not overwritten", path.display()))
         .hint("give another name with -o, or overwrite it with --force")
+}
+
+/// Whether two names are of one file.
+fn is_same(one: &Path, other: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let id = |path| fs::metadata(path).map(|about| (about.dev(), about.ino()));
+        if let (Ok(one), Ok(other)) = (id(one), id(other)) {
+            return one == other;
+        }
+    }
+    matches!((fs::canonicalize(one), fs::canonicalize(other)), (Ok(one), Ok(other)) if one == other)
 }
 
 /// The folder in which a file is to be.
@@ -174,6 +202,27 @@ mod tests {
         files.create(&path).unwrap().write_all(b"new").unwrap();
         files.finish().unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+    }
+
+    #[test]
+    fn what_is_read_is_never_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("a.jsonl"), "read").unwrap();
+        fs::write(at("b.jsonl"), "other").unwrap();
+        let mut names = vec![at("a.jsonl"), at(".").join("a.jsonl")];
+        #[cfg(unix)]
+        {
+            fs::hard_link(at("a.jsonl"), at("c.jsonl")).unwrap();
+            names.push(at("c.jsonl"));
+        }
+        let mut files = NewFiles::new(true).sparing([at("nowhere"), at("a.jsonl")]);
+        for name in names {
+            let refused = files.create(&name).unwrap_err();
+            assert!(refused.message().contains("is read by"), "{}", refused.message());
+        }
+        assert!(files.create(&at("b.jsonl")).is_ok());
+        assert!(files.create(&at("d.jsonl")).is_ok());
     }
 
     #[test]

@@ -254,3 +254,44 @@ fn samples_that_are_missing_are_told_and_make_the_report_incomplete() {
     assert!(shown.contains("inputs changed without being recorded: 2 3 4"), "{shown}");
     assert_eq!(report.status.code(), Some(3), "{}", text(&report.stderr));
 }
+
+#[test]
+fn what_is_read_is_not_overwritten_even_with_force() {
+    let desk = desk("");
+    let at = |name: &str| desk.path().join(name).display().to_string();
+    let before = fs::read(at("relay.jsonl")).expect("read");
+    fs::copy(folder().join("plant.toml"), at("plant.toml")).expect("copied");
+    for arguments in [
+        format!("import {0} --force -o {0}", at("relay.jsonl")),
+        format!(
+            "export --site plant.toml --input {0} --format jsonl --force -o {0}",
+            at("relay.jsonl")
+        ),
+        format!(
+            "report --site plant.toml --input {0} --format json --force -o {0}",
+            at("relay.jsonl")
+        ),
+        format!(
+            "report --site {1} --input {0} --format json --force -o {1}",
+            at("relay.jsonl"),
+            at("plant.toml")
+        ),
+    ] {
+        let run = run(&arguments);
+        assert_eq!(run.status.code(), Some(1), "{arguments}: {}", text(&run.stderr));
+        assert!(text(&run.stderr).contains("is read by this command"), "{}", text(&run.stderr));
+    }
+    assert_eq!(fs::read(at("relay.jsonl")).expect("read"), before);
+}
+
+#[test]
+fn options_that_do_nothing_for_our_own_files_are_refused() {
+    for option in ["--zone UTC", "--dates mdy", "--doubt-ms 2", "--recorder F3"] {
+        let run = run(&format!("import ours.jsonl {option}"));
+        assert_eq!(run.status.code(), Some(2), "{option}: {}", text(&run.stderr));
+        let name = option.split(' ').next().expect("a name");
+        assert!(text(&run.stderr).contains(&format!("{name} does nothing for")), "{option}");
+    }
+    let run = run("import relay.txt --zone UTC --doubt-ms 0.5");
+    assert!(text(&run.stderr).contains("a whole number of milliseconds"), "{}", text(&run.stderr));
+}

@@ -366,6 +366,40 @@ fn a_row_that_is_left_out_is_a_gap_where_it_stood() {
     assert_eq!(gaps(&imported), [(Some(2), Lost::AtLeast(1), Why::NotReached)]);
 }
 
+#[test]
+fn two_events_of_one_sequence_are_told() {
+    let event = |milliseconds: u16| {
+        format!(
+            "{{\"event_type\":1,\"channel\":1,\"status\":1,\"milliseconds\":{milliseconds},\
+             \"seconds\":1800000000,\"seq_num\":7}}"
+        )
+    };
+    let read = |milliseconds: [u16; 2]| {
+        let [first, second] = milliseconds.map(event);
+        let text = format!("{{\"events\":[{first},\n{second}]}}");
+        let options = Options { epoch: Some(Epoch::Posix), ..Options::default() };
+        read_into(&mut Importer::new(options), "events.json", text.as_bytes()).expect("it is read")
+    };
+    let told = read([1, 2]).notes.left_out;
+    let [note] = &told[..] else { panic!("{told:?}") };
+    assert_eq!(note.to_string(), "line 2: another event, in line 1, has the sequence 7");
+    assert!(read([1, 1]).notes.left_out.is_empty());
+}
+
+#[test]
+fn long_names_stay_apart_and_are_told() {
+    let long = "x".repeat(300);
+    let text = format!(
+        "Date,Time,Local Time Code,Substation,Device,State\n\
+         03/14/2027,09:05:00.001,+00,OAK,{long}a,OPEN\n\
+         03/14/2027,09:05:00.002,+00,OAK,{long}b,OPEN\n"
+    );
+    let mut importer = Importer::new(Options::default());
+    let read = read_into(&mut importer, "x.csv", text.as_bytes()).expect("it is read");
+    assert!(read.notes.remarks.iter().any(|note| note.why.contains("longer than 200")));
+    assert_eq!(importer.finish().recorders[0].points, 2);
+}
+
 /// A record of so many channels, each of which goes on five milliseconds after the one before.
 fn wide(channels: usize) -> String {
     let mut text = format!("--- file type: CFG ---\nOAK,FR,2013\n{channels},0A,{channels}D\n");

@@ -81,7 +81,10 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let shown = Shown { format, unfold: args.unfold };
     let is_complete = match &args.output {
         None => show(&gathered, which, shown)?,
-        Some(path) => to_file(path, args.force, &gathered, which, shown)?,
+        Some(path) => {
+            let files = NewFiles::new(args.force).sparing(args.sources.files(connection));
+            to_file(path, files, &gathered, which, shown)?
+        }
     };
     if args.fail_on_loss {
         gathered.require_complete()?;
@@ -111,18 +114,17 @@ pub(super) fn show(gathered: &Gathered, which: Which, shown: Shown) -> Result<bo
 /// Writes it as a page to a file, which must not be there.
 pub(super) fn to_page(path: &Path, gathered: &Gathered, which: Which) -> Result<()> {
     let shown = Shown { format: Format::Html, unfold: false };
-    to_file(path, false, gathered, which, shown).map(|_| ())
+    to_file(path, NewFiles::new(false), gathered, which, shown).map(|_| ())
 }
 
 /// Writes it to a file, which appears when it is whole.
 fn to_file(
     path: &Path,
-    overwrites: bool,
+    mut files: NewFiles,
     gathered: &Gathered,
     which: Which,
     shown: Shown,
 ) -> Result<bool> {
-    let mut files = NewFiles::new(overwrites);
     let mut out = io::BufWriter::new(files.create(path)?);
     let is_complete = write(&mut out, gathered, which, shown, Styles::default())?;
     out.flush().map_err(|error| Failure::writing(path.display(), &error))?;

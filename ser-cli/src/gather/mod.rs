@@ -47,6 +47,11 @@ impl SourceArgs {
     pub(crate) const fn live_and(input: Vec<PathBuf>, state: StateArgs) -> SourceArgs {
         SourceArgs { input, live: true, state }
     }
+
+    /// The files that are read, with the site file.
+    pub(crate) fn files(&self, connection: &ConnectionArgs) -> Vec<PathBuf> {
+        self.input.iter().chain(&connection.site).cloned().collect()
+    }
 }
 
 /// Everything that the sources say.

@@ -63,6 +63,7 @@ struct Written<'a> {
 }
 
 /// An event.
+#[derive(PartialEq, Eq)]
 struct Event {
     kind: u8,
     /// The input, from 1; 0 if the event is of none.
@@ -129,7 +130,7 @@ pub(super) fn read(
             }
         }
     }
-    rows(&events, epoch, &mut list, found)?;
+    rows(&events, epoch, &mut list, found, notes)?;
     if list.counts_from_beginning {
         // Sequence numbers tell where an event was, but for the newest.
         torn_at_end(damaged, &mut list);
@@ -248,6 +249,7 @@ fn rows(
     epoch: Option<Epoch>,
     list: &mut List,
     found: &mut Found,
+    notes: &mut Notes,
 ) -> Result<(), Refusal> {
     let epoch = match epoch {
         Some(epoch) => epoch,
@@ -259,7 +261,7 @@ fn rows(
         events.iter().all(|placed| placed.event.sequence.is_some_and(|number| number > 0));
     if is_counted {
         sorted.sort_by_key(|placed| placed.event.sequence);
-        sorted.dedup_by_key(|placed| placed.event.sequence);
+        sorted = each_once(sorted, notes);
     } else {
         (list.order, list.counts_from_beginning) = (Order::PlacesOrReversed, false);
     }
@@ -289,6 +291,24 @@ fn rows(
         before = Some(place);
     }
     Ok(())
+}
+
+/// Of one sequence number, the event that comes first in the file. One that contradicts it is told.
+fn each_once<'e>(sorted: Vec<&'e Placed>, notes: &mut Notes) -> Vec<&'e Placed> {
+    let mut once: Vec<&Placed> = Vec::with_capacity(sorted.len());
+    for placed in sorted {
+        match once.last().filter(|kept| kept.event.sequence == placed.event.sequence) {
+            Some(kept) if kept.event == placed.event => {}
+            Some(kept) => {
+                let sequence = kept.event.sequence.unwrap_or_default();
+                let why =
+                    format!("another event, in line {}, has the sequence {sequence}", kept.line);
+                notes.leave_out(placed.line, why);
+            }
+            None => once.push(placed),
+        }
+    }
+    once
 }
 
 /// What an event tells. Inputs that changed in the same millisecond and have no event of their own

@@ -12,7 +12,7 @@ use super::cytime::{self, Epoch};
 use super::entries::{Made, Maker};
 use super::format::Format;
 use super::inputs::{Inputs, MOST_RECORDERS};
-use super::list::{Found, MOST_CHANGES, fit};
+use super::list::{Found, LONGEST, MOST_CHANGES, fit};
 use super::map::Map;
 use super::notes::{Note, Notes, Refusal};
 use super::states::Meanings;
@@ -130,6 +130,13 @@ impl Importer {
         let Some(group) = self.groups.get_mut(group) else { return Ok(read) };
         group.found.lists.clear();
         read_foreign(&mut group.found, (&head, input, data), self.options.epoch, &mut read)?;
+        if std::mem::take(&mut group.found.is_cut) {
+            let why = format!(
+                "a name longer than {LONGEST} characters is cut, and has eight digits at its end that \
+                 tell it from others"
+            );
+            read.notes.remark(None, why);
+        }
         let lists = std::mem::take(&mut group.found.lists);
         if group.lists.len() + lists.len() > MOST_LISTS {
             let most = u64::try_from(MOST_LISTS).unwrap_or(u64::MAX);

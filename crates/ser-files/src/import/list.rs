@@ -5,6 +5,8 @@
 
 use std::collections::HashMap;
 
+use sha2::{Digest, Sha256};
+
 use super::calendar::{Date, DateOrder, NoTime, time_of_day};
 use super::notes::{Notes, Refusal};
 use crate::error::quoted;
@@ -153,6 +155,8 @@ pub(super) struct Found {
     pub(super) words: Texts,
     pub(super) lists: Vec<List>,
     changes: usize,
+    /// Whether a name was too long to be kept whole.
+    pub(super) is_cut: bool,
 }
 
 impl Found {
@@ -160,6 +164,7 @@ impl Found {
     pub(super) fn point(&mut self, name: &str) -> Result<usize, Refusal> {
         let most = u64::try_from(MOST_NAMES).unwrap_or(u64::MAX);
         let too_much = Refusal::TooMuch { what: "different names", most };
+        self.is_cut |= is_too_long(name);
         self.points.place(&fit(name)).ok_or(too_much)
     }
 
@@ -167,6 +172,7 @@ impl Found {
     pub(super) fn word(&mut self, word: &str) -> Result<usize, Refusal> {
         let most = u64::try_from(MOST_NAMES).unwrap_or(u64::MAX);
         let too_much = Refusal::TooMuch { what: "different words for states", most };
+        self.is_cut |= is_too_long(word);
         self.words.place(&fit(word)).ok_or(too_much)
     }
 
@@ -182,15 +188,30 @@ impl Found {
 }
 
 /// The longest name that is kept, in characters.
-const LONGEST: usize = 200;
+pub(super) const LONGEST: usize = 200;
 
-/// A name as it may be shown: one line of visible characters, not empty, of bounded length.
+/// So many characters of a longer one are kept, and eight digits that tell it from others.
+const KEPT: usize = LONGEST - 9;
+
+fn is_too_long(name: &str) -> bool {
+    name.trim().chars().nth(LONGEST).is_some()
+}
+
+/// A name as it may be shown: one line of visible characters, not empty, of bounded length. Two names
+/// that begin alike stay apart, however long they are.
 pub(super) fn fit(name: &str) -> String {
     let visible = |letter: char| match letter {
         letter if ser_console::is_obeyed(letter) => '\u{FFFD}',
         letter => letter,
     };
-    let fit: String = name.trim().chars().take(LONGEST).map(visible).collect();
+    let name = name.trim();
+    let most = if is_too_long(name) { KEPT } else { LONGEST };
+    let mut fit: String = name.chars().take(most).map(visible).collect();
+    if most == KEPT {
+        let sum = Sha256::digest(name.as_bytes());
+        let sum = sum.first_chunk().map_or(0, |bytes| u32::from_be_bytes(*bytes));
+        fit.push_str(&format!("~{sum:08x}"));
+    }
     match fit.trim() {
         "" => "(no name)".to_owned(),
         fit => fit.to_owned(),
@@ -276,7 +297,11 @@ mod tests {
         assert_eq!(fit("a\u{1B}[2J\u{202E}"), "a\u{FFFD}[2J\u{FFFD}");
         assert_eq!(fit(" \t"), "(no name)");
         assert_eq!(fit(&"x".repeat(999)).len(), LONGEST);
-        assert_eq!(fit(&format!("{}  y", "x".repeat(LONGEST - 1))).len(), LONGEST - 1);
+        let long = |end: &str| fit(&format!("{}{end}", "x".repeat(LONGEST)));
+        assert_eq!(long("").len(), LONGEST);
+        assert_eq!(long(" ").len(), LONGEST);
+        assert_eq!((long("a").len(), long("a") == long("a")), (LONGEST, true));
+        assert_ne!(long("a"), long("b"));
     }
 
     #[test]

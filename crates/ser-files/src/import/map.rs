@@ -209,6 +209,13 @@ impl Reading<'_> {
                 return None;
             }
         };
+        if let Some(recorder) = target.0.as_deref().filter(|name| self.is_read(name)) {
+            let phrase = format!("{} has a log of its own", quoted(recorder));
+            self.tell(error("own-log", span.clone(), &phrase).help(
+                "give the list a recorder without `port` in the site file, and connect points that \
+                 watch one contact with `same_as`",
+            ));
+        }
         if let Some(first) = self.taken.insert(target.clone(), span.clone()) {
             let mut twice = error("duplicate-input", span, "two names for one input")
                 .help("give one of them another input");
@@ -216,6 +223,13 @@ impl Reading<'_> {
             self.tell(twice);
         }
         Some(target)
+    }
+
+    /// Whether a recorder is read over its own port. Its stamps are its own, and a list that says UTC
+    /// of them would shift them.
+    fn is_read(&self, name: &str) -> bool {
+        let recorders = self.site.iter().flat_map(|site| &site.recorders);
+        recorders.into_iter().any(|recorder| recorder.name == name && recorder.port.is_some())
     }
 
     /// A point of the site.
@@ -384,6 +398,8 @@ mod tests {
 
     const SITE: &str = "site = \"N\"\ntime_zone = \"UTC\"\n[[recorder]]\nname = \"F3\"\n\
                         [[recorder]]\nname = \"F4\"\n\
+                        [[recorder]]\nname = \"SER1\"\nport = \"/dev/ttyUSB0\"\n\
+                        [[point]]\nrecorder = \"SER1\"\ninput = 1\nname = \"coil\"\n\
                         [[point]]\nrecorder = \"F3\"\ninput = 7\nname = \"52-1 closed\"\n\
                         [[point]]\nrecorder = \"F4\"\ninput = 9\nname = \"trip\"\n\
                         [[point]]\nrecorder = \"F3\"\ninput = 9\nname = \"trip\"\n";
@@ -439,6 +455,14 @@ mod tests {
             (
                 "[[point]]\nfrom = \"a\"\nrecorder = \"F\"",
                 "missing-key: `input` is missing beside `recorder` (\"F\")",
+            ),
+            (
+                "[[point]]\nfrom = \"a\"\npoint = \"SER1/coil\"",
+                "own-log: `SER1` has a log of its own (\"SER1/coil\")",
+            ),
+            (
+                "[[point]]\nfrom = \"a\"\nrecorder = \"SER1\"\ninput = 3",
+                "own-log: `SER1` has a log of its own (3)",
             ),
             (
                 "[[point]]\nfrom = \"a\"\npoint = \"52-1 close\"",

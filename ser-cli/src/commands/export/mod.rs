@@ -103,7 +103,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let gathered = gather::gather(&args.sources, connection)?;
     let timeline = Timeline::new(&gathered.site, &gathered.history);
     let selection = args.choice.selection(&timeline)?;
-    let counted = write::write(args, &gathered, &timeline, &selection)?;
+    let counted =
+        write::write(args, args.sources.files(connection), &gathered, &timeline, &selection)?;
     write::tell(counted);
     if args.fail_on_loss {
         gathered.require_complete()?;

@@ -29,6 +29,7 @@ struct Export<'e> {
 /// Writes the file or the files.
 pub(super) fn write(
     args: &Args,
+    inputs: Vec<PathBuf>,
     gathered: &Gathered,
     timeline: &Timeline<'_>,
     selection: &Selection,
@@ -43,7 +44,7 @@ pub(super) fn write(
     // Standard output is left as it is when the user presses Ctrl-C; files are taken back.
     let Some(output) = &args.output else { return export.to_stdout() };
     let caught = Caught::for_now()?;
-    let result = export.to_files(output, caught.flag());
+    let result = export.to_files(output, inputs, caught.flag());
     if caught.ends_interrupted() {
         return Err(Failure::Interrupted);
     }
@@ -72,9 +73,9 @@ impl Export<'_> {
         Ok(counted)
     }
 
-    fn to_files(&self, output: &Path, stop: &AtomicBool) -> Result<Counted> {
+    fn to_files(&self, output: &Path, inputs: Vec<PathBuf>, stop: &AtomicBool) -> Result<Counted> {
         let path = self.path(output)?;
-        let mut files = NewFiles::new(self.args.force);
+        let mut files = NewFiles::new(self.args.force).sparing(inputs);
         let counted = match self.args.format {
             Format::Comtrade => self.comtrade(&path, &mut files, stop)?,
             _ => {

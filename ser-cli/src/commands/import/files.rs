@@ -24,6 +24,15 @@ pub(super) fn without_data(files: &[PathBuf]) -> Vec<PathBuf> {
     files.iter().filter(|path| !belongs(path)).cloned().collect()
 }
 
+/// Everything that may be read for these files: also the data beside configurations.
+pub(super) fn with_data(files: &[PathBuf]) -> Vec<PathBuf> {
+    let beside = files.iter().flat_map(|path| DATA.map(|kind| path.with_extension(kind)));
+    files.iter().cloned().chain(beside).collect()
+}
+
+/// How the data of a configuration ends.
+const DATA: [&str; 3] = ["dat", "DAT", "Dat"];
+
 /// Reads a file. Its recorder is named, or has the name of the file up to the last dot.
 pub(super) fn read(importer: &mut Importer, path: &Path, recorder: Option<&str>) -> Result<Read> {
     let file = File::open(path).map_err(|error| Failure::reading(path.display(), &error))?;
@@ -40,7 +49,7 @@ pub(super) fn read(importer: &mut Importer, path: &Path, recorder: Option<&str>)
 /// The data of a configuration: the same name, ending with dat.
 fn data_beside(path: &Path) -> io::Result<File> {
     let mut first = None;
-    for extension in ["dat", "DAT", "Dat"] {
+    for extension in DATA {
         match File::open(path.with_extension(extension)) {
             Ok(file) => return Ok(file),
             Err(error) => first = first.or(Some(error)),

@@ -4,7 +4,7 @@ mod files;
 mod outlet;
 mod telling;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use ser_files::import::{DateOrder, Epoch, Format, Importer, Map, Options, zone_named};
@@ -67,7 +67,7 @@ pub(crate) struct Args {
     epoch: Option<GivenEpoch>,
 
     /// How far the clock may have been from UTC, in milliseconds. Without it nothing is known.
-    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(0..=86_400_000))]
+    #[arg(long, value_name = "MS", value_parser = parse_doubt)]
     doubt_ms: Option<u32>,
 
     /// A file that says which input a name is, and what its words mean; see below.
@@ -128,13 +128,47 @@ fn parse_zone(text: &str) -> std::result::Result<jiff::tz::TimeZone, String> {
     })
 }
 
+fn parse_doubt(text: &str) -> std::result::Result<u32, String> {
+    /// A day.
+    const MOST_MS: u32 = 86_400_000;
+    let doubt_ms = text.parse().ok().filter(|doubt_ms| *doubt_ms <= MOST_MS);
+    doubt_ms.ok_or_else(|| format!("a whole number of milliseconds from 0 to {MOST_MS} is needed"))
+}
+
+/// Refuses options that say nothing about files of our own: these say it themselves.
+fn fits(path: &Path, format: Format, args: &Args, recorder: Option<&str>) -> Result<()> {
+    if !matches!(format, Format::Csv | Format::Jsonl) {
+        return Ok(());
+    }
+    let given = [
+        ("--zone", args.zone.is_some()),
+        ("--dates", args.dates.is_some()),
+        ("--epoch", args.epoch.is_some()),
+        ("--doubt-ms", args.doubt_ms.is_some()),
+        ("--map", args.map.is_some()),
+        // A table does not name its recorder.
+        ("--recorder", recorder.is_some() && format == Format::Jsonl),
+    ];
+    match given.iter().find(|(_, is_given)| *is_given) {
+        Some((option, _)) => Err(Failure::usage(format!(
+            "{option} does nothing for {}, which is {format}",
+            path.display()
+        ))
+        .hint(format!("leave {option} out, or import the lists that need it by themselves"))),
+        None => Ok(()),
+    }
+}
+
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
-    let outlet = outlet::Outlet::of(args.output.as_deref(), args.force)?;
+    let mut inputs = files::with_data(&args.files);
+    inputs.extend(args.map.iter().chain(&connection.site).cloned());
+    let outlet = outlet::Outlet::of(args.output.as_deref(), args.force, inputs)?;
     let mut importer = Importer::new(options(args, connection)?);
     let files = files::without_data(&args.files);
     let (mut left_out, mut lost) = (0, 0);
     for path in &files {
         let read = files::read(&mut importer, path, connection.recorder.as_deref())?;
+        fits(path, read.format, args, connection.recorder.as_deref())?;
         left_out += read.notes.left_out_count;
         lost += read.notes.lost_count;
         telling::file(path, &read);

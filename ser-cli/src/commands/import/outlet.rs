@@ -19,13 +19,17 @@ pub(super) enum Outlet {
 
 impl Outlet {
     /// The file of this name; standard output without one, and for `-`. A file that is there is
-    /// refused before anything is read, unless it may be overwritten.
-    pub(super) fn of(path: Option<&Path>, overwrites: bool) -> Result<Outlet> {
+    /// refused before anything is read, unless it may be overwritten; `inputs` never are.
+    pub(super) fn of(
+        path: Option<&Path>,
+        overwrites: bool,
+        inputs: Vec<PathBuf>,
+    ) -> Result<Outlet> {
         let Some(path) = path.filter(|path| path.as_os_str() != "-") else {
             closed_stdout::check()?;
             return Ok(Outlet::Stdout);
         };
-        let mut files = NewFiles::new(overwrites);
+        let mut files = NewFiles::new(overwrites).sparing(inputs);
         let file = files.create(path)?;
         Ok(Outlet::File { files, file, path: path.to_owned() })
     }
