@@ -22,7 +22,7 @@ pub(crate) mod model;
 pub(crate) mod offsets;
 pub(crate) mod placing;
 pub(crate) mod runs;
-mod sorting;
+pub(crate) mod sorting;
 mod successions;
 
 pub use finding::Finding;

@@ -51,6 +51,11 @@ impl Step {
         self.before < other.after || is_earlier(self.when(), other.when())
     }
 
+    /// Whether nobody told of it, and only the stamps around it do.
+    pub(crate) fn is_silent(&self) -> bool {
+        self.is_sure && self.set.is_none() && self.at.is_none() && self.utc == Bound::UNKNOWN
+    }
+
     /// When it was, on all scales.
     pub(crate) fn when(&self) -> When {
         (self.at, self.utc)

@@ -212,7 +212,7 @@ fn sure_run_of(lives: &[LifeClock], index: usize, observation: &ClockObservation
 /// The clocks of the runs that an observation tells of: of one, or, for a set that may be in any of
 /// several lives, of the run that it begins in each. The run between two arrivals of a set is one
 /// more.
-fn runs_of(
+pub(crate) fn runs_of(
     recorder: &RecorderHistory,
     lives: &[LifeClock],
     hosts: &Hosts,

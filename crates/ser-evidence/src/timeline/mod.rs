@@ -21,11 +21,13 @@ use std::collections::BTreeMap;
 use crate::clock::lives::LifeClock;
 use crate::clock::model::ClockModel;
 use crate::clock::placing::{self, Whereabouts};
+use crate::clock::runs::Step;
+use crate::clock::sorting;
 use crate::clock::{Finding, Nominal};
 use crate::history::{Held, History, LifeHistory, RecorderHistory};
 use crate::record::Place;
 use crate::site::{Recorder, Site};
-use crate::time::{Bound, Moment, Utc};
+use crate::time::{Bound, Moment, Utc, shown};
 use bounds::{Key, LifeBounds};
 
 /// One entry of one life of one recorder.
@@ -247,6 +249,32 @@ impl<'a> Timeline<'a> {
             Whereabouts::Here(at) => Some((at.life, at.after)),
             Whereabouts::Elsewhere | Whereabouts::Anywhere => None,
         }
+    }
+
+    /// Whether an observation, by its index, tells nothing of the entries from one to another of the
+    /// same life, and would seem to if they were all that is held of it: only the stamps of others
+    /// say that its clock was set in between.
+    #[must_use]
+    pub fn is_of_others(&self, observation: usize, first: EventId, last: EventId) -> bool {
+        let told = || {
+            let history = self.recorder(first)?;
+            let lives = self.model.lives.get(first.recorder as usize)?;
+            let observed = (observation, history.observations.get(observation)?);
+            let clock = self.clock(first)?;
+            let held = self.life(first)?.entries.get(first.place as usize..=last.place as usize)?;
+            let (begin, end) = (held.first()?.sequence, held.last()?.sequence);
+            let is_outside = |step: &Step| step.before < begin || step.after >= end;
+            if !clock.runs.steps.iter().any(|step| step.is_silent() && is_outside(step)) {
+                return Some(false);
+            }
+            let of = sorting::runs_of(history, lives, &self.model.hosts, observed);
+            let may_be = |held: &Held| {
+                let mut runs = clock.runs.of(held.sequence, shown(&held.entry.time)).runs();
+                runs.any(|run| clock.ids.get(run).is_some_and(|id| of.contains(id)))
+            };
+            Some(!held.iter().any(may_be))
+        };
+        told().unwrap_or(false)
     }
 
     /// The last place of the life of this entry whose time is known to be below this key.

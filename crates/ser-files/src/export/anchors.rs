@@ -38,19 +38,31 @@ impl Anchors {
         Anchors { held: Some(held) }
     }
 
-    /// A place so that it is found in the part; `None` if it is in a life without a name of which
-    /// the part holds nothing: nobody could tell that it is not in another one.
+    /// A place so that it is found in the part. `None` if it is in a life without a name of which
+    /// the part holds nothing: nobody could tell that it is not in another one. `None` also for an
+    /// observation of a clock that was set before the entries of the part came, or after that, if
+    /// only entries outside say so.
     pub(super) fn in_part(
         &self,
         timeline: &Timeline<'_>,
-        recorder: usize,
+        (recorder, observation): (usize, Option<usize>),
         place: &Place,
     ) -> Option<Place> {
-        let Some(held) = self.held.as_ref().filter(|_| !place.life.is_known()) else {
+        let Some(held) = self.held.as_ref() else {
             return Some(*place);
         };
         let Some((index, after)) = timeline.located(recorder, place) else { return Some(*place) };
-        let &(first, last) = held.get(&(recorder, index))?;
+        let Some(&(first, last)) = held.get(&(recorder, index)) else {
+            return place.life.is_known().then_some(*place);
+        };
+        let event = |place: usize| event_id(recorder, index, place);
+        if observation.is_some_and(|found| timeline.is_of_others(found, event(first), event(last)))
+        {
+            return None;
+        }
+        if place.life.is_known() {
+            return Some(*place);
+        }
         let life = timeline.history().recorders.get(recorder)?.lives.get(index)?;
         let is_held = (first..=last).contains(&life.place_of(after)) && life.entry(after).is_some();
         if is_held && place.newest.is_some() {
@@ -58,6 +70,11 @@ impl Anchors {
         }
         Some(Place { fellow: fellow(life, first, after), ..*place })
     }
+}
+
+fn event_id(recorder: usize, life: usize, place: usize) -> EventId {
+    let index = |index: usize| u32::try_from(index).unwrap_or(u32::MAX);
+    EventId { recorder: index(recorder), life: index(life), place: index(place) }
 }
 
 /// The entry at this place as one by which a sequence is found.

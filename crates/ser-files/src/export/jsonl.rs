@@ -23,7 +23,9 @@ pub fn write(
 ) -> Result<Counted, Refused> {
     let mut counted = Counted::default();
     let anchors = Anchors::of(timeline, selection);
-    let place = |recorder: usize, place: &Place| anchors.in_part(timeline, recorder, place);
+    let place = |recorder: usize, observation: Option<usize>, place: &Place| {
+        anchors.in_part(timeline, (recorder, observation), place)
+    };
     let items = selection.items(timeline).inspect(|item| counted.count(*item));
     merged::write_jsonl_items(out, timeline, (&place, items), program)?;
     Ok(counted)

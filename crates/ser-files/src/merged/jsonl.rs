@@ -15,11 +15,12 @@ use crate::jsonl::Writer;
 /// # Errors
 /// If `out` does not take it.
 pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>, program: &str) -> io::Result<()> {
-    write_items(out, timeline, (&|_, place| Some(*place), timeline.items()), program)
+    write_items(out, timeline, (&|_, _, place| Some(*place), timeline.items()), program)
 }
 
-/// As a place in the log of a recorder is written, by its index; `None` to leave out what was there.
-type Placed<'p> = &'p dyn Fn(usize, &Place) -> Option<Place>;
+/// As a place in the log of a recorder is written, by its index and that of the observation, if it
+/// is of one; `None` to leave out what was there.
+type Placed<'p> = &'p dyn Fn(usize, Option<usize>, &Place) -> Option<Place>;
 
 /// As [`write`], with these entries and gaps only, and places so that they are found by them.
 pub(crate) fn write_items(
@@ -47,12 +48,12 @@ pub(crate) fn write_items(
             };
             lines.record(name, &Record::Life(record))?;
         }
-        let observations = history.observations.iter().filter_map(|found| {
-            let place = placed(recorder, &found.place)?;
+        let observations = history.observations.iter().enumerate().filter_map(|(index, found)| {
+            let place = placed(recorder, Some(index), &found.place)?;
             Some(Record::Clock(ClockObservation { place, ..*found }))
         });
         let steps = history.steps.iter().filter_map(|found| {
-            let place = placed(recorder, &found.place)?;
+            let place = placed(recorder, None, &found.place)?;
             Some(Record::Step(ClockStep { place, ..*found }))
         });
         let watched = history.watched.iter().map(|found| Record::Watched(*found));

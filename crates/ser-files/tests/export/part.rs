@@ -77,3 +77,29 @@ fn a_clock_that_was_set_before_the_part_is_known_in_it() {
     assert_eq!(text.matches("\"fellow\":{\"ahead\":1,").count(), 2, "{text}");
     assert!(!text.contains("2026-11-22T13:00:05.588\",\"changed\":[7],\"state\":[7],\"seq"));
 }
+
+#[test]
+fn what_a_clock_showed_before_it_was_set_silently_is_not_taken_for_a_part_after_that() {
+    let site = set_back_site();
+    for life in [0, 1] {
+        let mut log = Log::of("U1", life);
+        log.changes("2026-11-22T13:00:05.588", &[7]);
+        let at = monotonic_us("2026-11-22T13:00:06.000");
+        log.observed(How::Query, "2026-11-22T13:00:06.000", (at, at + 5000), Some(1000));
+        log.changes("2026-11-22T13:00:07.000", &[7]);
+        // Somebody set it back, and nobody says so.
+        log.changes("2026-11-22T09:00:18.979", &[1]).changes("2026-11-22T19:00:19.089", &[1]);
+        let (text, collector) =
+            part(&site, &[&log], "2026-11-22T20:00:00.000", "2026-11-22T23:59:00.000");
+        assert!(text.contains("19:00:19.089") && !text.contains("\"sequence\":3"), "{text}");
+        let history = collector.finish(&site);
+        let timeline = Timeline::new(&site, &history);
+        let (rows, findings) = told(&timeline, "2026-11-22");
+        assert_eq!(rows.len(), 1);
+        assert!(!rows[0].2.is_known(), "life {life}: nobody observed that clock: {text}");
+        assert_eq!(findings, "[]");
+        // What belongs to the part is in it.
+        let (text, _) = part(&site, &[&log], "2026-11-22T13:00:06.500", "2026-11-22T13:00:08.000");
+        assert!(text.contains("\"query\""), "{text}");
+    }
+}
