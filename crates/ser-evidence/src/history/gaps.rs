@@ -91,9 +91,8 @@ pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps) -> Vec<LogGap> {
     let is_named = life.life.is_some();
     let ends = told.at(life.name(), last).iter().filter(|gap| match (gap.why, gap.lost) {
         (Why::Unreadable, _) => !life.entries.is_empty(),
-        (Why::LogBeganAnew | Why::NotRecorded(_), _) => is_named,
         // That a recorder was not reached is no loss yet, unless it is known that it has more.
-        (_, Lost::AtLeast(1..)) => is_named,
+        (Why::LogBeganAnew | Why::NotRecorded(_), _) | (_, Lost::AtLeast(1..)) => is_named,
         _ => false,
     });
     for gap in ends {
