@@ -387,6 +387,13 @@ impl Timeline<'_> {
         sample.into_iter().chain(others().into_iter().flatten())
     }
 
+    /// The first entry of the stretch that an entry is in.
+    pub(super) fn first_of_stretch(&self, event: EventId) -> EventId {
+        let stretch = self.bounds(event).and_then(|bounds| bounds.stretch(event.place as usize));
+        let first = stretch.and_then(|stretch| u32::try_from(stretch.first).ok());
+        EventId { place: first.unwrap_or(event.place), ..event }
+    }
+
     /// Whether it is known in which run of its clock an entry is.
     pub(super) fn is_run_sure(&self, event: EventId) -> bool {
         self.bounds(event).is_none_or(|bounds| bounds.is_run_sure(event.place as usize))

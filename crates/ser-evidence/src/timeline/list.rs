@@ -38,6 +38,10 @@ struct Head {
     place: u32,
 }
 
+/// How many entries of doubtful run are looked at ahead of a place in the list: there are seldom
+/// more than a few, and a log may hold millions.
+const MOST_DOUBTFUL: usize = 256;
+
 impl<'t> Timeline<'t> {
     /// Everything in the list, in order.
     #[must_use]
@@ -64,6 +68,31 @@ impl<'t> Timeline<'t> {
         let key = self.key(event)?;
         let EventId { recorder, life, place } = event;
         Some(Head { key, is_later: true, recorder, life, place })
+    }
+
+    /// Whether the place of an entry in the list rests on no guess: its run is sure, and it is not
+    /// where it is because the guess for the one before it has pushed it there.
+    fn is_surely_placed(&self, event: EventId) -> bool {
+        let first = self.first_of_stretch(event);
+        let before = first.place.checked_sub(1).map(|place| EventId { place, ..first });
+        let is_pushed = before
+            .is_some_and(|before| !self.is_run_sure(before) && self.key(before) == self.key(first));
+        self.is_run_sure(event) && !is_pushed
+    }
+
+    /// This entry, and those after it in its log to the first one whose run is sure. What is known
+    /// of that one does not bound the others before it, although they came first.
+    fn from_doubtful(&self, event: EventId) -> impl Iterator<Item = EventId> {
+        let mut next = Some(event);
+        let follow = move || {
+            let event = next.take()?;
+            let after = EventId { place: event.place + 1, ..event };
+            let is_doubtful = |event| !self.is_run_sure(event);
+            let goes_on = self.held(after).is_some() && (is_doubtful(event) || is_doubtful(after));
+            next = goes_on.then_some(after);
+            Some(event)
+        };
+        std::iter::from_fn(follow).take(MOST_DOUBTFUL)
     }
 
     /// Adds gaps and clock sets that are shown ahead of an entry, the last one first.
@@ -94,9 +123,9 @@ impl Head {
 
 impl Items<'_> {
     /// Where an entry goes whose run is not sure is a guess. If another one is proven to be
-    /// earlier, that one comes first.
+    /// earlier, that one comes first, and what precedes it in its log before that.
     fn put_what_is_proven_first(&mut self) {
-        let is_sure = |head: &Head| self.timeline.is_run_sure(head.event());
+        let is_sure = |head: &Head| self.timeline.is_surely_placed(head.event());
         if self.heads.iter().all(|Reverse(head)| is_sure(head)) {
             return;
         }
@@ -105,7 +134,10 @@ impl Items<'_> {
         for _ in 0..self.heads.len() {
             let is_earlier = |head: &Head| {
                 (!is_sure(head) || !is_sure(&first))
-                    && self.timeline.order(head.event(), first.event()) == Order::Before
+                    && self
+                        .timeline
+                        .from_doubtful(head.event())
+                        .any(|event| self.timeline.order(event, first.event()) == Order::Before)
             };
             let earlier = self.heads.iter().map(|Reverse(head)| *head).filter(is_earlier).min();
             let Some(earlier) = earlier else { break };
