@@ -82,7 +82,7 @@ impl<'t> Timeline<'t> {
 
     /// This entry, and those after it in its log to the first one whose run is sure. What is known
     /// of that one does not bound the others before it, although they came first.
-    fn from_doubtful(&self, event: EventId) -> impl Iterator<Item = EventId> {
+    fn doubtful_from(&self, event: EventId) -> impl Iterator<Item = EventId> {
         let mut next = Some(event);
         let follow = move || {
             let event = next.take()?;
@@ -136,7 +136,7 @@ impl Items<'_> {
                 (!is_sure(head) || !is_sure(&first))
                     && self
                         .timeline
-                        .from_doubtful(head.event())
+                        .doubtful_from(head.event())
                         .any(|event| self.timeline.order(event, first.event()) == Order::Before)
             };
             let earlier = self.heads.iter().map(|Reverse(head)| *head).filter(is_earlier).min();
