@@ -36,6 +36,9 @@ struct Head {
     recorder: u32,
     life: u32,
     place: u32,
+    /// Whether its place rests on no guess. Asked for once: heads are looked at again for each entry
+    /// of the list.
+    is_sure: bool,
 }
 
 /// How many entries of doubtful run are looked at ahead of a place in the list: there are seldom
@@ -67,7 +70,8 @@ impl<'t> Timeline<'t> {
         self.held(event)?;
         let key = self.key(event)?;
         let EventId { recorder, life, place } = event;
-        Some(Head { key, is_later: true, recorder, life, place })
+        let is_sure = self.is_surely_placed(event);
+        Some(Head { key, is_later: true, recorder, life, place, is_sure })
     }
 
     /// Whether the place of an entry in the list rests on no guess: its run is sure, and it is not
@@ -125,15 +129,14 @@ impl Items<'_> {
     /// Where an entry goes whose run is not sure is a guess. If another one is proven to be
     /// earlier, that one comes first, and what precedes it in its log before that.
     fn put_what_is_proven_first(&mut self) {
-        let is_sure = |head: &Head| self.timeline.is_surely_placed(head.event());
-        if self.heads.iter().all(|Reverse(head)| is_sure(head)) {
+        if self.heads.iter().all(|Reverse(head)| head.is_sure) {
             return;
         }
         let Some(mut first) = self.heads.peek().map(|Reverse(head)| *head) else { return };
         // Each is earlier than the one before, so there is an end.
         for _ in 0..self.heads.len() {
             let is_earlier = |head: &Head| {
-                (!is_sure(head) || !is_sure(&first))
+                (!head.is_sure || !first.is_sure)
                     && self
                         .timeline
                         .doubtful_from(head.event())
