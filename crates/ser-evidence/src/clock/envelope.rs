@@ -230,18 +230,26 @@ fn grown(point: &Known, change: (i64, i64)) -> (i64, i64) {
     added((point.lo, point.hi), change)
 }
 
-/// One pass forward and one back: afterwards each point knows all that the others know.
+/// Afterwards each point knows all that the others know.
 fn narrow(points: &mut [Known], slope: Slope) {
-    let mut told: Option<Known> = None;
-    let mut take = |point: &mut Known| {
-        if let Some(neighbour) = told {
-            let (lo, hi) = grown(&neighbour, slope.change(point.x.saturating_sub(neighbour.x)));
-            (point.lo, point.hi) = (point.lo.max(lo), point.hi.min(hi));
+    both_ways(points, |told, point| {
+        let (lo, hi) = grown(told, slope.change(point.x.saturating_sub(told.x)));
+        (point.lo, point.hi) = (point.lo.max(lo), point.hi.min(hi));
+    });
+}
+
+/// Tells each item what the one before it knows, and then, from the end, what the one after it
+/// does: so each hears of all others.
+pub(crate) fn both_ways<T: Copy>(items: &mut [T], mut tell: impl FnMut(&T, &mut T)) {
+    let mut told: Option<T> = None;
+    let mut take = |item: &mut T| {
+        if let Some(told) = &told {
+            tell(told, item);
         }
-        told = Some(*point);
+        told = Some(*item);
     };
-    points.iter_mut().for_each(&mut take);
-    points.iter_mut().rev().for_each(&mut take);
+    items.iter_mut().for_each(&mut take);
+    items.iter_mut().rev().for_each(&mut take);
 }
 
 /// Whether two points cannot both be true.

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::envelope::added;
+use super::envelope::{added, both_ways};
 use super::offsets::{Home, RunClock};
 
 /// How often bounds are passed on over all links. Each round passes them one link further.
@@ -110,67 +110,71 @@ impl Links {
     }
 }
 
-/// One pass forward and one back: afterwards each link of a pair knows what the others know.
+/// Afterwards each link of a pair knows what the others know.
 fn narrow(links: &mut [Link], one: &RunClock, other: &RunClock) {
-    let mut told: Option<Link> = None;
-    let mut take = |link: &mut Link| {
-        if let Some(neighbour) = told {
-            let (least, most) = one.elapsed(link.x - neighbour.x);
-            let (other_least, other_most) = other.elapsed(link.other_x - neighbour.other_x);
-            let lo = neighbour.lo.saturating_add(least).saturating_sub(other_most);
-            let hi = neighbour.hi.saturating_add(most).saturating_sub(other_least);
-            // What contradicts is told elsewhere, and says nothing here.
-            if lo <= link.hi && link.lo <= hi {
-                (link.lo, link.hi) = (link.lo.max(lo), link.hi.min(hi));
-            }
+    both_ways(links, |told, link| {
+        let (least, most) = one.elapsed(link.x - told.x);
+        let (other_least, other_most) = other.elapsed(link.other_x - told.other_x);
+        let lo = told.lo.saturating_add(least).saturating_sub(other_most);
+        let hi = told.hi.saturating_add(most).saturating_sub(other_least);
+        // What contradicts is told elsewhere, and says nothing here.
+        if lo <= link.hi && link.lo <= hi {
+            (link.lo, link.hi) = (link.lo.max(lo), link.hi.min(hi));
         }
-        told = Some(*link);
-    };
-    links.iter_mut().for_each(&mut take);
-    links.iter_mut().rev().for_each(&mut take);
+    });
 }
 
 /// Lets the clocks bound each other until nothing changes any more. Links that contradict what is
-/// known otherwise are left out and returned.
+/// known otherwise are left out and returned. Each new start has fewer links than the one before,
+/// so there is an end, whatever they say.
 pub(crate) fn tighten(runs: &mut Vec<RunClock>, links: &mut Vec<Link>) -> Vec<Link> {
     links.sort_unstable();
     links.dedup();
     let untouched = runs.clone();
     let mut wrong = Vec::new();
-    while let Some(contradiction) = pass_on(runs, links) {
+    loop {
+        let (contradicting, possible) = pass_on(runs, links);
+        *links = possible;
+        if contradicting.is_empty() {
+            return wrong;
+        }
+        wrong.extend(contradicting);
         runs.clone_from(&untouched);
-        links.retain(|link| *link != contradiction);
-        wrong.push(contradiction);
     }
-    wrong
 }
 
-/// Passes bounds on over all links; the first one that cannot be, if there is one.
-fn pass_on(runs: &mut [RunClock], links: &[Link]) -> Option<Link> {
+/// Passes bounds on over all links, up to the first round in which some cannot be. Those come
+/// first, the others second.
+fn pass_on(runs: &mut [RunClock], links: &[Link]) -> (Vec<Link>, Vec<Link>) {
     for _ in 0..MOST_ROUNDS {
         let mut is_news = false;
-        for link in links {
-            for home in common_homes(runs, link) {
-                for link in [*link, link.reversed()] {
-                    let other = runs.get(link.other)?.instant(home, link.other_x);
-                    let known = added(other, (link.lo, link.hi));
-                    match runs.get_mut(link.one)?.learn(home, link.x, known) {
-                        None => return Some(link_as_given(link, links)),
-                        Some(news) => is_news |= news,
-                    }
-                }
-            }
-        }
-        if !is_news {
-            break;
+        let mut is_possible = |link: &Link| {
+            let news = pass_on_over(runs, *link);
+            is_news |= news == Some(true);
+            news.is_some()
+        };
+        let (possible, contradicting): (Vec<Link>, Vec<Link>) =
+            links.iter().partition(|link| is_possible(link));
+        if !contradicting.is_empty() || !is_news {
+            return (contradicting, possible);
         }
     }
-    None
+    (Vec::new(), links.to_vec())
 }
 
-/// The link as it is in the list, whichever end it was seen from.
-fn link_as_given(link: Link, links: &[Link]) -> Link {
-    if links.contains(&link) { link } else { link.reversed() }
+/// Passes bounds on over one link, both ways. Returns whether that was news; `None` if what one
+/// clock knows cannot be by what the other one does.
+fn pass_on_over(runs: &mut [RunClock], link: Link) -> Option<bool> {
+    let mut is_news = false;
+    for home in common_homes(runs, &link) {
+        for link in [link, link.reversed()] {
+            let Some(other) = runs.get(link.other) else { continue };
+            let known = added(other.instant(home, link.other_x), (link.lo, link.hi));
+            let Some(one) = runs.get_mut(link.one) else { continue };
+            is_news |= one.learn(home, link.x, known)?;
+        }
+    }
+    Some(is_news)
 }
 
 fn common_homes(runs: &[RunClock], link: &Link) -> Vec<Home> {
