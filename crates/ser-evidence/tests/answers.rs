@@ -2,10 +2,11 @@
 
 mod common;
 
-use common::{Log, history, monotonic_us, site};
+use common::{Log, history, monotonic_us, seen, site};
 use ser_evidence::clock::Finding;
 use ser_evidence::incident::{Doubt, Incident, Report, Verdict, Which};
 use ser_evidence::record::{How, Lost, Why};
+use ser_evidence::time::Moment;
 use ser_evidence::timeline::{ChangeId, ContactTrouble, EventId, Order, Timeline};
 
 const TWO_RECORDERS: &str = "
@@ -16,6 +17,8 @@ clock = \"utc\"
 name = \"U2\"
 clock = \"utc\"
 ";
+
+const HOW: How = How::Set { broadcast: None };
 
 /// The changes of a report as `U1/3 on`.
 fn rows(timeline: &Timeline<'_>, report: &Report) -> Vec<String> {
@@ -204,6 +207,54 @@ fn trip(opens_ms: u32, later: Option<&str>) -> Log {
         u1.changes(later, &[20]);
     }
     u1
+}
+
+#[test]
+fn a_time_that_cuts_an_incident_leaves_it_open_what_was_first() {
+    let site = site(TWO_RECORDERS);
+    let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
+    for log in [&mut u1, &mut u2] {
+        let at = monotonic_us("2026-11-22T10:00:00.000");
+        log.observed(HOW, "2026-11-22T10:00:00.000", (at, at + 1_000), Some(0));
+    }
+    u1.changes("2026-11-22T10:00:05.000", &[1]).changes("2026-11-22T10:00:05.100", &[2]);
+    u2.changes("2026-11-22T10:00:05.200", &[1]).changes("2026-11-22T10:00:30.000", &[2]);
+    let history = history(&site, &[&u1, &u2]);
+    let timeline = Timeline::new(&site, &history);
+    let us = |text| Some(Moment::from_us(seen(text).us()));
+    let between = |since, until| report(&timeline, Which::Between(us(since), us(until)));
+
+    let whole = between("2026-11-22T10:00:00.000", "2026-11-22T10:00:20.000");
+    assert_eq!((whole.incident.earlier, whole.incident.later), (0, 0), "25 s are a quiet time");
+    assert!(whole.first_out.known().is_some());
+    let cut = between("2026-11-22T10:00:05.150", "2026-11-22T10:00:20.000");
+    assert_eq!((cut.incident.earlier, cut.incident.later), (2, 0));
+    assert_eq!((cut.first_out.changes.len(), cut.first_out.known()), (1, None));
+    let cut = between("2026-11-22T10:00:00.000", "2026-11-22T10:00:05.050");
+    assert_eq!((cut.incident.earlier, cut.incident.later), (0, 2));
+    assert!(cut.first_out.known().is_some());
+}
+
+#[test]
+fn of_several_incidents_in_the_minute_that_was_asked_for_the_one_with_a_trip_is_meant() {
+    let site = site(&format!(
+        "{TWO_RECORDERS}[[point]]\nrecorder = \"U1\"\ninput = 1\nname = \"trip\"\nrole = \"trip\"\n"
+    ));
+    let mut u1 = Log::of("U1", 1);
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    u1.observed(HOW, "2026-11-22T10:00:00.000", (at, at + 1_000), Some(0));
+    for (time, input) in [("10:05:05", 2), ("10:05:20", 1), ("10:05:40", 3), ("10:06:30", 1)] {
+        u1.changes(&format!("2026-11-22T{time}.000"), &[input]);
+    }
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let moment = |text| Moment::from_us(seen(text).us());
+    let around = |from, until| {
+        let report = report(&timeline, Which::Around(moment(from), moment(until)));
+        report.rows[0].change.event.place
+    };
+    assert_eq!(around("2026-11-22T10:05:00.000", "2026-11-22T10:05:59.999"), 1);
+    assert_eq!(around("2026-11-22T10:05:38.000", "2026-11-22T10:05:39.000"), 2, "the nearest");
 }
 
 #[test]

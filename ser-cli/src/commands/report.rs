@@ -143,8 +143,8 @@ fn write(
     let timeline = Timeline::new(&gathered.site, &gathered.history);
     let incident =
         Incident::pick(&timeline, which).ok_or_else(|| no_entry(which, &gathered.history))?;
-    if let Which::Around(at) = which {
-        tell_if_elsewhere(&timeline, &incident, at);
+    if let Which::Around(from, until) = which {
+        tell_if_elsewhere(&timeline, &incident, (from, until));
     }
     let report = Report::new(&timeline, incident);
     let document = Document {
@@ -186,11 +186,15 @@ fn format(args: &Args) -> Result<Format> {
 }
 
 /// The nearest incident may be days away from the time that was asked for.
-fn tell_if_elsewhere(timeline: &Timeline<'_>, incident: &Incident, asked: Moment<Utc>) {
+fn tell_if_elsewhere(
+    timeline: &Timeline<'_>,
+    incident: &Incident,
+    (from, until): (Moment<Utc>, Moment<Utc>),
+) {
     let times = || incident.events.iter().filter_map(|&event| timeline.time(event));
     let (Some(first), Some(last)) = (times().min(), times().max()) else { return };
     let quiet_us = timeline.site().incident.quiet_us;
-    let (away_us, where_) = match (first.since(asked), asked.since(last)) {
+    let (away_us, where_) = match (first.since(until), from.since(last)) {
         (later, _) if later > quiet_us => (later, "later"),
         (_, earlier) if earlier > quiet_us => (earlier, "earlier"),
         _ => return,

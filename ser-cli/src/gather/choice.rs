@@ -13,7 +13,8 @@ pub(crate) struct ChoiceArgs {
     #[arg(long, conflicts_with_all = ["around", "since", "until"])]
     last: bool,
 
-    /// The incident at this time, or nearest to it.
+    /// The incident at this time, or nearest to it; of several in the minute, or on the day, that is
+    /// given, the last one in which something tripped.
     #[arg(
         long,
         value_name = "TIME",
@@ -38,8 +39,8 @@ impl ChoiceArgs {
         let in_zone = |given: Option<GivenMoment>| {
             given.map(|given| given.in_zone(&site.time_zone)).transpose()
         };
-        let (around, since, until) =
-            (in_zone(self.around)?, in_zone(self.since)?, in_zone(self.until)?);
+        let (since, until) = (in_zone(self.since)?, in_zone(self.until)?);
+        let around = self.around.map(|given| given.span_in_zone(&site.time_zone)).transpose()?;
         if let (Some(since), Some(until)) = (since, until)
             && until < since
         {
@@ -47,7 +48,7 @@ impl ChoiceArgs {
                 .hint("exchange the two, or leave one out: it is then open at that end"));
         }
         Ok(match around {
-            Some(around) => Some(Which::Around(around)),
+            Some((from, until)) => Some(Which::Around(from, until)),
             None if since.is_some() || until.is_some() => Some(Which::Between(since, until)),
             None => self.last.then_some(Which::Last),
         })

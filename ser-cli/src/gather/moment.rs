@@ -4,9 +4,17 @@ use ser_evidence::time::{Moment, Utc};
 
 use crate::error::{Failure, Result};
 
-/// A moment of the command line: with an offset it is one, without it depends on the site's zone.
+/// A moment of the command line, given to the second, to the minute, or as a date.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum GivenMoment {
+pub(crate) struct GivenMoment {
+    given: Given,
+    /// How long that lasts: nothing, a second, a minute, an hour or a day.
+    lasts: jiff::SignedDuration,
+}
+
+/// With an offset it is one moment, without it depends on the site's zone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Given {
     Absolute(jiff::Timestamp),
     Local(jiff::civil::DateTime),
     /// A time of the day that it is now.
@@ -18,8 +26,12 @@ pub(crate) enum GivenMoment {
 /// midnight, a time alone is today's.
 pub(crate) fn parse_moment(text: &str) -> std::result::Result<GivenMoment, String> {
     let text = text.trim();
+    Ok(GivenMoment { given: parse(text)?, lasts: lasts(text) })
+}
+
+fn parse(text: &str) -> std::result::Result<Given, String> {
     if let Ok(absolute) = text.parse() {
-        return Ok(GivenMoment::Absolute(absolute));
+        return Ok(Given::Absolute(absolute));
     }
     let wrong = "not a date and time like 2026-11-22T10:00:00.250, or with Z or +01:00 at the end; a \
                  date alone is its midnight, a time alone is today's in the zone of the site";
@@ -29,20 +41,46 @@ pub(crate) fn parse_moment(text: &str) -> std::result::Result<GivenMoment, Strin
         return Err(wrong.to_owned());
     }
     if let Ok(local) = text.parse() {
-        return Ok(GivenMoment::Local(local));
+        return Ok(Given::Local(local));
     }
-    Ok(GivenMoment::Today(text.parse().map_err(|_| wrong)?))
+    Ok(Given::Today(text.parse().map_err(|_| wrong)?))
+}
+
+/// How long a moment lasts that is written like this.
+fn lasts(text: &str) -> jiff::SignedDuration {
+    let time = match text.split_once(['T', 't', ' ']) {
+        Some((_, time)) => time,
+        None if text.contains(':') => text,
+        None => return jiff::SignedDuration::from_hours(24),
+    };
+    let time = time.split(['Z', 'z', '+', '-']).next().unwrap_or_default();
+    match time.chars().filter(char::is_ascii_digit).count() {
+        _ if time.contains(['.', ',']) => jiff::SignedDuration::ZERO,
+        0..=2 => jiff::SignedDuration::from_hours(1),
+        3..=4 => jiff::SignedDuration::from_mins(1),
+        _ => jiff::SignedDuration::from_secs(1),
+    }
 }
 
 impl GivenMoment {
-    /// The moment, in the zone of a site.
+    /// Its first and its last microsecond, in the zone of a site.
+    pub(crate) fn span_in_zone(
+        self,
+        zone: &jiff::tz::TimeZone,
+    ) -> Result<(Moment<Utc>, Moment<Utc>)> {
+        let first = self.in_zone(zone)?;
+        let lasts_us = i64::try_from(self.lasts.as_micros()).unwrap_or_default();
+        Ok((first, first.after((lasts_us - 1).max(0))))
+    }
+
+    /// The moment, in the zone of a site; of a longer one its beginning.
     pub(crate) fn in_zone(self, zone: &jiff::tz::TimeZone) -> Result<Moment<Utc>> {
-        let local = match self {
-            GivenMoment::Absolute(timestamp) => {
+        let local = match self.given {
+            Given::Absolute(timestamp) => {
                 return Ok(Moment::from_us(timestamp.as_microsecond()));
             }
-            GivenMoment::Local(local) => local,
-            GivenMoment::Today(time) => {
+            Given::Local(local) => local,
+            Given::Today(time) => {
                 jiff::Timestamp::now().to_zoned_datetime(zone.clone()).date().to_datetime(time)
             }
         };
@@ -89,6 +127,25 @@ mod tests {
         let (before, given, after) = (today(), us("12:07", "UTC"), today());
         let of = |date: &str| us(&format!("{date}T12:07:00Z"), "UTC");
         assert!([of(&before), of(&after)].contains(&given));
+    }
+
+    #[test]
+    fn a_moment_lasts_as_long_as_it_is_coarse() {
+        let lasts_us = |text: &str| {
+            let span = parse_moment(text).unwrap().span_in_zone(&jiff::tz::TimeZone::UTC).unwrap();
+            span.1.since(span.0) + 1
+        };
+        for (text, us) in [
+            ("2026-11-22", 86_400_000_000),
+            ("07:45", 60_000_000),
+            ("2026-11-22T07:45Z", 60_000_000),
+            ("2026-11-22T07:45+01:00", 60_000_000),
+            ("2026-11-22 07:45:12", 1_000_000),
+            ("2026-11-22 07:45:12-05:00", 1_000_000),
+            ("2026-11-22 07:45:12.000", 1),
+        ] {
+            assert_eq!(lasts_us(text), us, "{text}");
+        }
     }
 
     #[test]

@@ -20,14 +20,17 @@ pub struct FirstOut {
     /// Recorders, by their indices in the history, that have nothing in the incident and are not
     /// known to have been read since it began.
     pub unread: Vec<u32>,
+    /// How many entries of the incident came before the time that was asked for. What moved first
+    /// of all may be in one of them.
+    pub earlier: usize,
 }
 
 impl FirstOut {
     /// The change that was first, if that is known.
     #[must_use]
     pub fn known(&self) -> Option<ChangeId> {
-        match (&self.changes[..], &self.gaps[..], &self.unread[..]) {
-            ([only], [], []) => Some(*only),
+        match (&self.changes[..], &self.gaps[..], &self.unread[..], self.earlier) {
+            ([only], [], [], 0) => Some(*only),
             _ => None,
         }
     }
@@ -96,6 +99,7 @@ fn of(timeline: &Timeline<'_>, incident: &Incident, counts: &dyn Fn(ChangeId) ->
         changes: movements(timeline, &firsts, &candidates, counts),
         gaps: incident.gaps.iter().copied().filter(is_ahead).collect(),
         unread: unread(timeline, incident, &candidates),
+        earlier: incident.earlier,
     }
 }
 

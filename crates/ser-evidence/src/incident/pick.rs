@@ -17,6 +17,10 @@ pub struct Incident {
     pub gaps: Vec<(EventId, usize)>,
     /// Entries ahead of which a clock was set, or may have been.
     pub clock_sets: Vec<EventId>,
+    /// How many entries came before the time that was asked for, with no quiet time between.
+    pub earlier: usize,
+    /// How many came after it, with no quiet time between.
+    pub later: usize,
 }
 
 /// Which incident is meant.
@@ -26,8 +30,9 @@ pub enum Which {
     LastTrip,
     /// The last one.
     Last,
-    /// The one that was going on at this time, else the one nearest to it.
-    Around(Moment<Utc>),
+    /// The one that was going on between these times, ends included, else the one nearest to them.
+    /// Of several the last one in which a point moved whose role trips, if there is one.
+    Around(Moment<Utc>, Moment<Utc>),
     /// Everything between two times, ends included; `None` is no end.
     Between(Option<Moment<Utc>>, Option<Moment<Utc>>),
 }
@@ -116,7 +121,11 @@ impl Incident {
 
 /// How well an incident fits; of equals the later one is meant.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Rank(i64);
+struct Rank {
+    /// The less, the further away.
+    nearness: i64,
+    trips: bool,
+}
 
 impl Rank {
     fn of(
@@ -126,13 +135,15 @@ impl Rank {
         (first, last): (i64, i64),
         which: Which,
     ) -> Rank {
+        let trips = || has_trip(timeline, points, incident);
         match which {
-            Which::LastTrip => Rank(i64::from(has_trip(timeline, points, incident))),
-            Which::Last | Which::Between(..) => Rank(0),
-            Which::Around(time) => {
-                let time = time.us();
-                let distance = first.saturating_sub(time).max(time.saturating_sub(last)).max(0);
-                Rank(-distance)
+            Which::LastTrip => Rank { nearness: 0, trips: trips() },
+            Which::Last | Which::Between(..) => Rank { nearness: 0, trips: false },
+            Which::Around(from, until) => {
+                let (later, earlier) =
+                    (first.saturating_sub(until.us()), from.us().saturating_sub(last));
+                let distance = later.max(earlier).max(0);
+                Rank { nearness: -distance, trips: trips() }
             }
         }
     }
@@ -198,16 +209,46 @@ fn between(
 ) -> Option<Incident> {
     let (since, until) = (since.map_or(i64::MIN, Moment::us), until.map_or(i64::MAX, Moment::us));
     let mut incident = Incident::default();
+    let (mut before, mut after) = (Outside::default(), Outside::default());
+    let quiet = timeline.site().incident.quiet_us;
     for item in timeline.items() {
         let (Item::Entry(event) | Item::Gap(event, _) | Item::ClockSet(event)) = item;
-        match timeline.sort_key(event) {
-            Some(key) if (since..=until).contains(&key) => match item {
-                Item::Entry(event) => incident.events.push(event),
+        let Some(key) = timeline.sort_key(event) else { continue };
+        if (since..=until).contains(&key) {
+            match item {
+                Item::Entry(event) => {
+                    if incident.events.is_empty() {
+                        incident.earlier = before.joined_with(key, quiet);
+                    }
+                    after = Outside { last: Some(key), entries: 0 };
+                    incident.events.push(event);
+                }
                 Item::Gap(event, index) => incident.gaps.push((event, index)),
                 Item::ClockSet(event) => incident.clock_sets.push(event),
-            },
-            _ => {}
+            }
+        } else if matches!(item, Item::Entry(_)) {
+            if key < since {
+                before = Outside { last: Some(key), entries: before.joined_with(key, quiet) + 1 };
+            } else if after.last.is_some_and(|last| key.saturating_sub(last) <= quiet) {
+                after = Outside { last: Some(key), entries: after.entries + 1 };
+            }
         }
     }
+    incident.later = after.entries;
     (!incident.events.is_empty()).then_some(incident)
+}
+
+/// Entries that follow each other without a quiet time, on one side of a time that was asked for.
+#[derive(Clone, Copy, Debug, Default)]
+struct Outside {
+    last: Option<i64>,
+    entries: usize,
+}
+
+impl Outside {
+    /// How many of them an entry joins.
+    fn joined_with(self, key: i64, quiet: i64) -> usize {
+        let is_near = self.last.is_some_and(|last| key.saturating_sub(last) <= quiet);
+        if is_near { self.entries } else { 0 }
+    }
 }

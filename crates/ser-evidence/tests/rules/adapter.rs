@@ -192,7 +192,8 @@ impl Sayings<'_> {
         let all = Incident::all(&self.timeline);
         let firsts = all.iter().filter_map(|incident| incident.events.first());
         let keys = firsts.filter_map(|&first| self.timeline.sort_key(first));
-        let around = keys.map(|key| Which::Around(Moment::from_us(key)));
+        let moments = keys.map(Moment::from_us);
+        let around = moments.map(|moment| Which::Around(moment, moment));
         let picked = around.filter_map(|which| Incident::pick(&self.timeline, which));
         picked.map(|incident| self.incident(incident)).collect()
     }

@@ -47,6 +47,8 @@ fn object(document: &Document<'_>) -> Value {
         "entries_sha256": digest,
         "is_incomplete": document.is_incomplete(),
         "damaged_lines": document.damaged_lines,
+        "entries_before": report.incident.earlier,
+        "entries_after": report.incident.later,
         "verdict": {
             "first_out": verdict::first_out(timeline, report, &report.first_out, &clock),
             "operated": report

@@ -26,7 +26,15 @@ pub(super) fn clock(document: &Document<'_>) -> Clock {
 /// From when to when, in the zone of the site.
 pub(super) fn window(document: &Document<'_>, clock: &Clock) -> String {
     let Some((first, last)) = ends(document) else { return "time not known".to_owned() };
-    format!("{} to {} ({})", clock.date_and_time(first), clock.time(last), clock.zone(first))
+    let (from, to) = (clock.date_and_time(first), clock.time(last));
+    let goes_on = match document.report.incident.later {
+        0 => String::new(),
+        1 => "; 1 more entry of the incident is after the time asked for".to_owned(),
+        entries => {
+            format!("; {entries} more entries of the incident are after the time asked for")
+        }
+    };
+    format!("{from} to {to} ({}){goes_on}", clock.zone(first))
 }
 
 /// When the first and the last entry were, in UTC.

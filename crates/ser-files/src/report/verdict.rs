@@ -54,6 +54,13 @@ pub(super) fn first_out(
         recorders.dedup();
         text += &format!("; or one of the entries missing on {}", list(recorders.into_iter()));
     }
+    match first.earlier {
+        0 => {}
+        1 => text += "; 1 entry of the incident is before the time asked for",
+        entries => {
+            text += &format!("; {entries} entries of the incident are before the time asked for");
+        }
+    }
     text
 }
 

@@ -37,9 +37,12 @@ fn recorder(text: &mut String, number: usize, known: &Known) {
         (Some(Model::Ser160), _) => writeln!(text, "model = \"ser160\""),
         (Some(Model::Ser320), _) => writeln!(text, "model = \"ser320\""),
         (None, true) => {
-            writeln!(text, "# model = \"ser320\"  # its log was empty, which does not show it")
+            writeln!(
+                text,
+                "# model =  # \"ser160\" or \"ser320\": its log was empty, which does not show it"
+            )
         }
-        (None, false) => writeln!(text, "# model = \"ser320\"  # it did not answer"),
+        (None, false) => writeln!(text, "# model =  # \"ser160\" or \"ser320\": it did not answer"),
     };
     let _ = match (size, has_answered) {
         (Some(size), _) => writeln!(text, "log_size = {size}"),
