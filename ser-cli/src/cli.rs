@@ -75,11 +75,13 @@ enum Command {
 impl Command {
     /// Whether the command only prints.
     fn is_for_its_output(&self) -> bool {
-        use Command::{CommReq, Completions, Decode, Encode, Merge, Print, Read, Report, Watch};
+        use Command::{CommReq, Completions, Decode, Encode, Merge, Print, Read, Watch};
         match self {
-            Read(_) | Print(_) | Watch(_) | Report(_) | Merge(_) => true,
+            Read(_) | Print(_) | Watch(_) | Merge(_) => true,
             Decode(_) | Encode(_) | CommReq(_) | Completions(_) => true,
             Command::Export(args) => args.prints(),
+            Command::Import(args) => args.prints(),
+            Command::Report(args) => args.prints(),
             #[cfg(unix)]
             Command::Genius(args) => args.is_offline(),
             // Their exit code alone is informative: is the recorder there?

@@ -19,6 +19,9 @@ const ONE_WISH: Duration = Duration::from_millis(500);
 /// What to tell the user if the program ends before it has cleaned up.
 static LEFT_BEHIND: Mutex<Option<&str>> = Mutex::new(None);
 
+/// What removes everything that is not whole before the program ends.
+static CLEAN_UP: OnceLock<fn()> = OnceLock::new();
+
 /// Set by an interrupt, once somebody checks for interrupts.
 static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
@@ -32,6 +35,18 @@ pub(crate) fn catch() -> Result<Arc<AtomicBool>> {
     // Before the first interrupt can come.
     LOOKING.fetch_add(1, Ordering::SeqCst);
     flag()
+}
+
+/// From now on the program calls this before an interrupt ends it. Nobody has to check a flag: it
+/// ends at once, whatever it is doing. A file that reaches the size limit of the process becomes a
+/// failed write, where the signal for it would end the program without this call.
+pub(crate) fn clean_up_with(clean_up: fn()) -> Result<()> {
+    CLEAN_UP.get_or_init(|| clean_up);
+    flag()?;
+    #[cfg(unix)]
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())
+        .map_err(not_caught)?;
+    Ok(())
 }
 
 /// Checks the flag for as long as this exists.
@@ -76,13 +91,19 @@ fn flag() -> Result<Arc<AtomicBool>> {
             if let Some(hint) = *LEFT_BEHIND.lock().unwrap_or_else(PoisonError::into_inner) {
                 advise(hint);
             }
+            if let Some(clean_up) = CLEAN_UP.get() {
+                clean_up();
+            }
             std::process::exit(EXIT_FAILURE.into());
         }
     };
-    on_every_signal(caught).map_err(|error| {
-        Failure::new(format!("cannot catch Ctrl-C: {error}")).hint("report this as a bug")
-    })?;
+    on_every_signal(caught).map_err(not_caught)?;
     Ok(flag)
+}
+
+#[allow(clippy::needless_pass_by_value, reason = "as map_err has it")]
+fn not_caught(error: io::Error) -> Failure {
+    Failure::new(format!("cannot catch Ctrl-C: {error}")).hint("report this as a bug")
 }
 
 /// Calls a function at every Ctrl-C, termination signal and hang-up. A signal that was ignored when

@@ -19,6 +19,7 @@ mod kept;
 mod log_look;
 mod new_files;
 mod outage;
+mod outlet;
 mod output;
 mod progress;
 mod setting;

@@ -1,15 +1,26 @@
 //! Files that appear when all of them are whole, and not before.
 //!
 //! Each is written under a name that nobody can foresee, in the folder where it is to be. When all
-//! are on the disk they get their names, one after the other. If anything fails, none has its name.
+//! are on the disk they get their names, one after the other. If one cannot get its name, those
+//! before it are taken back, and what stood there under `--force` stands there again. An interrupt
+//! removes what has no name yet, and waits while names are given.
+//!
+//! No file system gives several names at once. If the power fails, or the program is killed, in the
+//! instant in which names are given, some files may be new and others old; what was replaced is
+//! then beside them as `.ser-cli-….old`.
 
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempPath};
 
-use crate::error::{Failure, Result};
+use crate::error::{Failure, Result, warn};
+use crate::interrupt;
+
+/// Files that are being written and have no names yet, for an interrupt to remove.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Files that are being written.
 #[derive(Debug)]
@@ -54,45 +65,163 @@ impl NewFiles {
             Ok(_) if !self.overwrites => return Err(exists(path)),
             _ => {}
         }
-        let failed = |error: io::Error| Failure::writing(path.display(), &error);
-        let file = temporary(folder_of(path)).map_err(failed)?;
-        let handle = file.as_file().try_clone().map_err(failed)?;
+        interrupt::clean_up_with(remove_unfinished)?;
+        // An interrupt waits, so that it knows of the file.
+        let mut unfinished = unfinished();
+        let file = temporary(folder_of(path)).map_err(|error| not_begun(path, &error))?;
+        let handle = file.as_file().try_clone();
+        let handle = handle.map_err(|error| Failure::writing(path.display(), &error))?;
+        unfinished.push(file.path().to_owned());
         self.files.push((file, path.to_owned()));
         Ok(handle)
     }
 
     /// Gives all files their names.
-    pub(crate) fn finish(self) -> Result<()> {
+    pub(crate) fn finish(mut self) -> Result<()> {
         for (file, path) in &self.files {
             file.as_file().sync_all().map_err(|error| Failure::writing(path.display(), &error))?;
         }
-        let mut named: Vec<PathBuf> = Vec::new();
-        for (file, path) in self.files {
-            let result = match self.overwrites {
-                true => file.persist(&path),
-                false => file.persist_noclobber(&path),
-            };
-            if let Err(error) = result {
-                take_back(&named);
-                return Err(match error.error.kind() {
-                    io::ErrorKind::AlreadyExists => exists(&path),
-                    _ => Failure::writing(path.display(), &error.error),
-                });
+        let files = std::mem::take(&mut self.files);
+        // An interrupt waits until all have their names, or none has.
+        let mut unfinished = unfinished();
+        forget(&mut unfinished, &files);
+        let mut named: Vec<Named> = Vec::new();
+        let last = files.len().saturating_sub(1);
+        for (place, (file, path)) in files.into_iter().enumerate() {
+            // What the last one replaces need not be put back: nothing can fail after it.
+            match give_name(file, &path, self.overwrites, place < last) {
+                Ok(old) => named.push(Named { path, old }),
+                Err(error) => {
+                    named.into_iter().rev().for_each(Named::take_back);
+                    return Err(match error.kind() {
+                        io::ErrorKind::AlreadyExists => exists(&path),
+                        _ => Failure::writing(path.display(), &error),
+                    });
+                }
             }
-            named.push(path);
         }
         // The names are in the folder, which has to be on the disk as well.
-        named.iter().for_each(|path| sync_folder(folder_of(path)));
+        named.iter().for_each(|named| sync_folder(folder_of(&named.path)));
         Ok(())
     }
 }
 
-/// Removes what was given its name just now.
-fn take_back(named: &[PathBuf]) {
-    for path in named {
-        // If that fails, too, there is nothing else to try.
+impl Drop for NewFiles {
+    fn drop(&mut self) {
+        let files = std::mem::take(&mut self.files);
+        forget(&mut unfinished(), &files);
+    }
+}
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn forget(unfinished: &mut Vec<PathBuf>, files: &[(NamedTempFile, PathBuf)]) {
+    unfinished.retain(|path| !files.iter().any(|(file, _)| file.path() == path));
+}
+
+/// Before an interrupt ends the program: nothing is left of what is not whole.
+fn remove_unfinished() {
+    let unfinished = unfinished();
+    for path in unfinished.iter() {
+        // If that fails there is nothing else to try.
         let _ = fs::remove_file(path);
     }
+    if !unfinished.is_empty() {
+        warn("interrupted, and nothing is written");
+    }
+    // Until the program has ended, no file is begun or gets its name.
+    std::mem::forget(unfinished);
+}
+
+/// Gives a file its name. Returns what had the name before, if that `is_kept`.
+fn give_name(
+    file: NamedTempFile,
+    path: &Path,
+    overwrites: bool,
+    is_kept: bool,
+) -> io::Result<Option<Old>> {
+    if !overwrites {
+        return file.persist_noclobber(path).map(|_| None).map_err(|error| error.error);
+    }
+    let old = if is_kept { Old::aside(path)? } else { None };
+    match file.persist(path) {
+        Ok(_) => Ok(old),
+        Err(error) => {
+            if let Some(old) = old {
+                old.put_back(path);
+            }
+            Err(error.error)
+        }
+    }
+}
+
+/// A file that was given its name just now.
+struct Named {
+    path: PathBuf,
+    old: Option<Old>,
+}
+
+impl Named {
+    /// Puts back what was there before, if there was anything.
+    fn take_back(self) {
+        match self.old {
+            Some(old) => old.put_back(&self.path),
+            // If that fails, too, there is nothing else to try.
+            None => _ = fs::remove_file(self.path),
+        }
+    }
+}
+
+/// A file that is being replaced, under a name beside it. It is gone when this is dropped.
+struct Old(TempPath);
+
+impl Old {
+    /// Keeps what has this name now, if anything has.
+    fn aside(path: &Path) -> io::Result<Option<Old>> {
+        match fs::symlink_metadata(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(error),
+            Ok(_) => {}
+        }
+        // With a second name for it, the first one is never without a file; but there are file
+        // systems without second names.
+        let aside = beside(path, |aside| fs::hard_link(path, aside))
+            .or_else(|_| beside(path, |aside| fs::rename(path, aside)))?;
+        Ok(Some(Old(aside)))
+    }
+
+    fn put_back(self, path: &Path) {
+        if let Err(error) = self.0.persist(path) {
+            let (why, kept) = (error.error, error.path);
+            let place = kept.display().to_string();
+            // What cannot be kept is told in vain, and there is nothing else to try.
+            let _ = kept.keep();
+            warn(format_args!("what was {} is now {place}: {why}", path.display()));
+        }
+    }
+}
+
+/// Makes a name beside a file, in this way.
+fn beside(path: &Path, make: impl FnMut(&Path) -> io::Result<()>) -> io::Result<TempPath> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".ser-cli-").suffix(".old");
+    builder.make_in(folder_of(path), make).map(NamedTempFile::into_temp_path)
+}
+
+/// Why a file could not be begun. The error tells of a name that the user does not know.
+fn not_begun(path: &Path, error: &io::Error) -> Failure {
+    let name = path.display();
+    if error.kind() == io::ErrorKind::NotFound {
+        let folder = folder_of(path).display();
+        return Failure::new(format!("cannot write {name}: there is no folder {folder}"))
+            .hint("make the folder first, or name another one");
+    }
+    let text = error.to_string();
+    let why = text.split_once(" at path ").map_or(&*text, |(why, _)| why);
+    Failure::new(format!("cannot write {name}: {why}"))
+        .hint("check your rights to its folder, and that it has room")
 }
 
 fn exists(path: &Path) -> Failure {
@@ -189,6 +318,48 @@ mod tests {
         assert!(failure.message().contains("a.dat exists"), "{}", failure.message());
         assert_eq!(names(folder.path()), ["a.dat"]);
         assert_eq!(fs::read_to_string(folder.path().join("a.dat")).unwrap(), "theirs");
+    }
+
+    /// The same where others are overwritten: what stood there stands there again.
+    #[test]
+    fn if_one_cannot_get_its_name_the_old_ones_are_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("a.dat"), "old").unwrap();
+        let mut files = NewFiles::new(true);
+        for name in ["a.dat", "a.hdr", "a.cfg"] {
+            files.create(&at(name)).unwrap().write_all(b"new").unwrap();
+        }
+        fs::create_dir(at("a.cfg")).unwrap();
+        fs::write(at("a.cfg").join("theirs"), "").unwrap();
+        let failure = files.finish().unwrap_err();
+        assert!(failure.message().contains("a.cfg"), "{}", failure.message());
+        assert_eq!(names(folder.path()), ["a.cfg", "a.dat"]);
+        assert_eq!(fs::read_to_string(at("a.dat")).unwrap(), "old");
+    }
+
+    #[test]
+    fn several_files_are_overwritten_and_nothing_else_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let mut files = NewFiles::new(true);
+        for name in ["a.dat", "a.cfg"] {
+            fs::write(at(name), "old").unwrap();
+            files.create(&at(name)).unwrap().write_all(b"new").unwrap();
+        }
+        files.finish().unwrap();
+        assert_eq!(names(folder.path()), ["a.cfg", "a.dat"]);
+        for name in ["a.dat", "a.cfg"] {
+            assert_eq!(fs::read_to_string(at(name)).unwrap(), "new");
+        }
+    }
+
+    #[test]
+    fn a_folder_that_is_not_there_is_told_by_the_users_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let failure = NewFiles::new(false).create(&folder.path().join("no/a.csv")).unwrap_err();
+        assert!(failure.message().contains("no/a.csv: there is no folder "), "{failure:?}");
+        assert!(!failure.message().contains(".part"), "{failure:?}");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use common::bench::text;
-use common::ser_cli;
+use common::{Running, ser_cli, wait_until};
 use tempfile::TempDir;
 
 const HEADER: &str = "entry,time,input,state,sequence,life,note";
@@ -157,7 +157,7 @@ fn a_name_can_say_what_is_in_the_file() {
     assert_eq!(desk.made(), expected);
     desk.ok("--format prc002 --comname ACME -o .");
     assert!(desk.made().contains(&"261122,100000249,+1,Northfield,U1,ACME.csv".to_owned()));
-    assert!(desk.refused("--format csv --comname ACME -o nowhere", 2).contains("is no folder"));
+    assert!(desk.refused("--format csv --comname ACME -o nowhere", 2).contains("is not a folder"));
 }
 
 #[test]
@@ -194,8 +194,12 @@ fn losses_can_be_a_failure() {
 
 /// Many entries, so that not all of them fit into any buffer.
 fn with_much(desk: &Desk) {
+    with_entries(desk, 60_000);
+}
+
+fn with_entries(desk: &Desk, entries: u32) {
     let mut rows = format!("{HEADER}\n");
-    for entry in 0..60_000 {
+    for entry in 0..entries {
         let (minute, second, ms) = (entry / 60_000, entry / 1000 % 60, entry % 1000);
         let (number, state) = (entry % 2048 + 1, entry % 2);
         let sequence = entry + 1;
@@ -209,22 +213,167 @@ fn with_much(desk: &Desk) {
 
 const FORMATS: [&str; 6] = ["csv", "jsonl", "vcd", "cff", "prc002", "comtrade"];
 
+/// Every format that this build writes.
+fn formats() -> impl Iterator<Item = &'static str> {
+    FORMATS.into_iter().chain(cfg!(feature = "parquet").then_some("parquet"))
+}
+
+/// `ser-cli`, whose files may not grow beyond a few blocks, which is like a full disk. Unless the
+/// program takes care, the signal for it ends it.
+fn on_a_full_disk(desk: &Desk) -> Command {
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "ulimit -f 64; exec \"$@\"", "sh"]).arg(env!("CARGO_BIN_EXE_ser-cli"));
+    shell.current_dir(desk.0.path()).env_remove("SER_SITE").env_remove("SER_PORT");
+    shell
+}
+
 #[test]
 fn a_full_disk_leaves_nothing() {
     let desk = Desk::new();
     with_much(&desk);
-    for format in FORMATS {
-        // No file may grow beyond a few blocks, which is told like a full disk.
-        let mut shell = Command::new("sh");
-        let limited = "trap '' XFSZ; ulimit -f 64; exec \"$@\"";
-        shell.args(["-c", limited, "sh"]).arg(env!("CARGO_BIN_EXE_ser-cli"));
-        shell.args(["export", "--site", "north.toml", "--input", "U1.csv", "--format", format]);
-        let output =
-            shell.args(["-o", "a.cfg"]).current_dir(desk.0.path()).output().expect("a shell");
+    let entries = "--site north.toml --input U1.csv";
+    let commands = formats()
+        .map(|format| (format!("export {entries} --format {format} -o a.cfg"), "a."))
+        .chain(
+            // The whole incident as text and JSON; a page has a limit of its own.
+            ["txt", "json"].map(|end| (format!("report {entries} --unfold -o a.{end}"), "a.")),
+        )
+        .chain([("import U1.csv -o a.jsonl".to_owned(), "a.jsonl")]);
+    for (command, name) in commands {
+        let mut limited = on_a_full_disk(&desk);
+        let output = limited.args(command.split_whitespace()).output().expect("a shell");
         let told = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{format}: {told}");
-        assert!(told.contains("cannot write a.") && told.contains("hint: "), "{format}: {told}");
-        assert_eq!(desk.made(), Vec::<String>::new(), "{format}");
+        assert_eq!(output.status.code(), Some(1), "{command}: {told}");
+        assert!(told.contains(&format!("cannot write {name}")), "{command}: {told}");
+        assert!(told.contains("hint: "), "{command}: {told}");
+        assert_eq!(desk.made(), Vec::<String>::new(), "{command}");
+    }
+}
+
+/// Nothing is left, neither part nor whole, and the exit code says so.
+fn assert_interrupted(desk: &Desk, mut running: Running, signal: &str) {
+    running.signal(signal);
+    assert_eq!(running.wait(), Some(1), "{signal}");
+    let told: Vec<String> = running.told().iter().collect();
+    assert!(
+        told.iter().any(|line| line.contains("interrupted, and nothing is written")),
+        "{told:?}"
+    );
+    assert_eq!(desk.made(), Vec::<String>::new(), "{signal}");
+}
+
+#[test]
+fn an_interrupt_leaves_nothing_of_an_export() {
+    let desk = Desk::new();
+    for (format, signal) in [("jsonl", "-INT"), ("vcd", "-TERM"), ("comtrade", "-HUP")] {
+        let mut entries = 300_000;
+        // A fast computer may be done before the interrupt; then there has to be more to do.
+        let running = loop {
+            with_entries(&desk, entries);
+            let mut command = desk.command(&format!("--format {format} -o a.cfg --force"));
+            let mut running = Running::start(command.stderr(Stdio::piped()));
+            let is_part = |name: &String| name.ends_with(".part");
+            let is_begun =
+                |name: String| fs::metadata(desk.path(&name)).is_ok_and(|about| about.len() > 0);
+            wait_until("it writes", || {
+                desk.made().into_iter().filter(is_part).any(is_begun) || desk.path("a.cfg").exists()
+            });
+            if running.0.try_wait().expect("a child").is_none() && !desk.path("a.cfg").exists() {
+                break running;
+            }
+            assert_eq!(running.wait(), Some(0));
+            desk.made().iter().for_each(|name| fs::remove_file(desk.path(name)).expect("removed"));
+            entries *= 2;
+        };
+        assert_interrupted(&desk, running, signal);
+    }
+}
+
+#[test]
+fn an_interrupt_leaves_nothing_of_an_import_or_a_report_that_waits_for_its_input() {
+    let desk = Desk::new();
+    let pipe =
+        desk.0.path().parent().expect("a folder").join(format!(
+            "pipe-{}.csv",
+            desk.0.path().file_name().expect("a name").to_string_lossy()
+        ));
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs").success());
+    let of_pipe = pipe.display();
+    for command in [
+        format!("import {of_pipe} -o a.jsonl"),
+        format!("report --site north.toml --input {of_pipe} -o a.html"),
+        format!("export --site north.toml --input {of_pipe} --format csv -o a.csv"),
+    ] {
+        let mut waiting = ser_cli();
+        waiting.current_dir(desk.0.path()).args(command.split_whitespace());
+        let running = Running::start(waiting.stderr(Stdio::piped()));
+        wait_until("it has begun", || desk.made().iter().any(|name| name.ends_with(".part")));
+        assert_interrupted(&desk, running, "-INT");
+    }
+    fs::remove_file(&pipe).expect("removed");
+}
+
+#[test]
+fn force_replaces_all_files_of_a_record_or_none() {
+    let desk = Desk::new();
+    for name in ["trip.cfg", "trip.dat", "trip.hdr"] {
+        fs::write(desk.path(name), "theirs").expect("a file");
+    }
+    // Nothing can take the place of a folder that is not empty.
+    fs::remove_file(desk.path("trip.cfg")).expect("removed");
+    fs::create_dir_all(desk.path("trip.cfg/in")).expect("a folder");
+    let told = desk.refused("--format comtrade -o trip.cfg --force", 1);
+    assert!(told.contains("trip.cfg is a folder"), "{told}");
+    assert_eq!(desk.made(), ["trip.cfg", "trip.dat", "trip.hdr"]);
+    assert_eq!(fs::read_to_string(desk.path("trip.dat")).expect("text"), "theirs");
+}
+
+#[test]
+fn a_line_means_standard_output_everywhere() {
+    let desk = Desk::new();
+    assert_eq!(desk.ok("--format csv -o -"), desk.ok("--format csv"));
+    assert!(desk.refused("--format comtrade -o -", 2).contains("needs a name"));
+    assert!(desk.refused("--format csv --comname ACME -o -", 2).contains("has no name"));
+    let run = |arguments: &str| {
+        let mut command = ser_cli();
+        command.current_dir(desk.0.path()).args(arguments.split_whitespace());
+        let output = command.output().expect("ser-cli runs");
+        assert_eq!(output.status.code(), Some(0), "{arguments}: {}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let report = "report --site north.toml --input U1.csv --format json";
+    assert_eq!(run(&format!("{report} -o -")), run(report));
+    assert_eq!(run("import U1.csv -o -"), run("import U1.csv"));
+    assert_eq!(desk.made(), Vec::<String>::new());
+}
+
+#[test]
+fn who_names_a_file_needs_no_standard_output() {
+    let desk = Desk::new();
+    for command in [
+        "report --site north.toml --input U1.csv -o a.html",
+        "export --site north.toml --input U1.csv --format csv -o a.csv",
+        "import U1.csv -o a.jsonl",
+    ] {
+        let mut shell = Command::new("sh");
+        let closed = format!("exec \"$0\" {command} >&-");
+        shell.args(["-c", &closed, env!("CARGO_BIN_EXE_ser-cli")]).current_dir(desk.0.path());
+        let output = shell.output().expect("a shell");
+        assert_eq!(output.status.code(), Some(0), "{command}: {}", text(&output.stderr));
+    }
+    assert_eq!(desk.made(), ["a.csv", "a.html", "a.jsonl"]);
+}
+
+#[test]
+fn a_page_that_cannot_be_written_is_told_before_the_demo_begins() {
+    let desk = Desk::new();
+    for (page, told) in [("no/page.html", "there is no folder no"), ("-", "tells its story")] {
+        let mut demo = ser_cli();
+        demo.current_dir(desk.0.path()).args(["demo", "-o", page]);
+        let output = demo.output().expect("ser-cli runs");
+        assert!(text(&output.stderr).contains(told), "{}", text(&output.stderr));
+        assert_ne!(output.status.code(), Some(0));
+        assert!(output.stdout.is_empty());
     }
 }
 
@@ -232,7 +381,7 @@ fn a_full_disk_leaves_nothing() {
 fn a_full_output_is_told() {
     let desk = Desk::new();
     with_much(&desk);
-    for format in FORMATS.into_iter().filter(|format| *format != "comtrade") {
+    for format in formats().filter(|format| *format != "comtrade") {
         let full = fs::File::options().write(true).open("/dev/full").expect("a device");
         let mut command = desk.command(&format!("--format {format}"));
         let output = command.stdout(full).output().expect("ser-cli runs");
@@ -246,7 +395,7 @@ fn a_full_output_is_told() {
 fn a_reader_that_has_enough_is_no_failure() {
     let desk = Desk::new();
     with_much(&desk);
-    for format in FORMATS.into_iter().filter(|format| *format != "comtrade") {
+    for format in formats().filter(|format| *format != "comtrade") {
         let mut command = desk.command(&format!("--format {format}"));
         let mut child =
             command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("ser-cli runs");
@@ -265,5 +414,6 @@ fn only_a_file_is_a_place_for_a_file() {
     assert!(desk.refused("--format csv -o . --force", 1).contains("is a folder"));
     assert!(desk.refused("--format csv -o /dev/null --force", 1).contains("is not a file"));
     assert!(Path::new("/dev/null").exists());
-    desk.refused("--format csv -o no/such/folder.csv", 1);
+    let told = desk.refused("--format csv -o no/such/folder.csv", 1);
+    assert!(told.contains("no/such/folder.csv: there is no folder no/such\n"), "{told}");
 }

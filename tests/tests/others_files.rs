@@ -40,7 +40,7 @@ const CALLS: [&str; 26] = [
 ];
 
 /// File, call, how often, and why that is right.
-const JUDGED: [(&str, &str, usize, &str); 39] = [
+const JUDGED: [(&str, &str, usize, &str); 41] = [
     (
         "crates/geni-board/src/mapped_ram.rs",
         "map_raw(",
@@ -64,10 +64,27 @@ const JUDGED: [(&str, &str, usize, &str); 39] = [
     (
         "ser-cli/src/new_files.rs",
         ".persist(",
-        1,
-        "only with --force, over a file that was looked at",
+        2,
+        "only with --force, over a file that was looked at; or what was replaced, put back",
     ),
-    ("ser-cli/src/new_files.rs", "remove_file(", 1, "what it has given its name a moment before"),
+    (
+        "ser-cli/src/new_files.rs",
+        "remove_file(",
+        2,
+        "what it has given its name a moment before, or has made and not given its name",
+    ),
+    (
+        "ser-cli/src/new_files.rs",
+        "fs::hard_link(",
+        1,
+        "only with --force, what is replaced, under a name that nothing has",
+    ),
+    (
+        "ser-cli/src/new_files.rs",
+        "fs::rename(",
+        1,
+        "only with --force, what is replaced, under a name that nothing has",
+    ),
     (
         "ser-cli/src/kept.rs",
         ".write(true)",

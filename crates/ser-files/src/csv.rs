@@ -21,6 +21,7 @@ use ser_proto::{Entry, Inputs, TimeStamp};
 use crate::error::{ReadError, quoted};
 use crate::fields::Fields;
 use crate::lines::Lines;
+use crate::merged::without_apostrophe;
 use crate::stamp;
 
 /// The columns, in their order. Later versions may append more.
@@ -211,7 +212,9 @@ impl Recorders {
             return Ok(self.last);
         }
         let text = std::str::from_utf8(name);
-        let text = text.map_err(|_| format!("recorder cannot be {}", quoted(name)))?;
+        let text = text.map_err(|_| {
+            format!("the recorder {} is not UTF-8; save the file as UTF-8", quoted(name))
+        })?;
         self.last = match self.by_name.get(text) {
             Some(&known) => known,
             None if self.names.len() < MAX_RECORDERS => {
@@ -370,7 +373,7 @@ fn row(
         return Err(format!("{} fields where {wanted} have to be", fields.count()));
     }
     let recorder = match has_recorder {
-        true => recorders.place(fields.field(COLUMNS.len()))?,
+        true => recorders.place(made_plain(fields.field(COLUMNS.len())))?,
         false => 0,
     };
     let is_loss = (0..FIRST_COLUMNS).all(|place| fields.field(place).is_empty());
@@ -425,13 +428,18 @@ fn place(fields: &Fields, parser: &mut Parser) -> Result<(Option<u64>, Life), St
     };
     let life = match life {
         b"" => Life::UNKNOWN,
-        // An export for spreadsheets has an apostrophe before what they would take for a number.
-        text => {
-            let name = text.strip_prefix(b"'").unwrap_or(text);
-            parser.life(name).ok_or_else(|| wrong("life", text))?
-        }
+        text => parser.life(made_plain(text)).ok_or_else(|| wrong("life", text))?,
     };
     Ok((sequence, life))
+}
+
+/// A text without what an export for spreadsheets puts before one that they would take for something
+/// else.
+fn made_plain(text: &[u8]) -> &[u8] {
+    match text.first() {
+        Some(b'\'') => std::str::from_utf8(text).map_or(text, |t| without_apostrophe(t).as_bytes()),
+        _ => text,
+    }
 }
 
 fn loss(fields: &Fields, parser: &mut Parser) -> Result<Gap, String> {

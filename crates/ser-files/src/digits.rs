@@ -118,10 +118,10 @@ impl UtcTexts {
 }
 
 impl UtcTexts {
-    /// Adds a moment as a German spreadsheet reads it, to the nearest millisecond.
+    /// Adds a moment as a German spreadsheet reads it: the millisecond in which it is.
     pub(crate) fn push_german(&mut self, line: &mut Vec<u8>, utc_us: i64) {
         let begin = line.len();
-        self.push(line, utc_us.saturating_add(500).div_euclid(1000).saturating_mul(1000));
+        self.push(line, utc_us.div_euclid(1000).saturating_mul(1000));
         make_german(line, begin);
     }
 }

@@ -34,6 +34,8 @@ pub enum Problem {
         /// The version of its layout.
         schema: u32,
     },
+    /// Lines end with a carriage return alone, which ends no line of ours.
+    LoneReturns,
     /// The line is longer than any of ours.
     TooLong,
     /// The line holds something else than it has to, for this reason.
@@ -78,6 +80,10 @@ impl fmt::Display for Problem {
                 f,
                 "written by a later version (schema {schema}; this one reads up to {})",
                 crate::jsonl::SCHEMA
+            ),
+            Problem::LoneReturns => f.write_str(
+                "its lines end with CR alone, as those of old Macintosh computers do; save it with \
+                 lines that end with LF or CR LF",
             ),
             Problem::TooLong => write!(f, "longer than {MAX_LINE_LEN} bytes"),
             Problem::Damaged(why) => f.write_str(why),

@@ -22,6 +22,7 @@ pub mod import;
 pub mod jsonl;
 mod lines;
 pub mod merged;
+mod missing;
 pub mod report;
 mod source;
 mod stamp;

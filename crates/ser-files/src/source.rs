@@ -33,6 +33,9 @@ impl<R: BufRead> Source<R> {
     pub fn new(mut input: R, recorder: &str) -> Result<Source<R>, ReadError> {
         let first = first_line(&mut input).map_err(|error| ReadError::at(1, Problem::Io(error)))?;
         let line = first.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&first).trim_ascii_start();
+        if has_lone_return(&first) {
+            return Err(ReadError::at(1, Problem::LoneReturns));
+        }
         let kind = line.first().copied();
         let is_csv = csv::is_header(line);
         let input = Cursor::new(first).chain(input);
@@ -82,6 +85,11 @@ impl<R: BufRead> Iterator for Source<R> {
         let record = self.read()?;
         Some(record.map(|record| Told { recorder: self.recorder().to_owned(), record }))
     }
+}
+
+/// Whether a carriage return stands anywhere but before the end of a line.
+fn has_lone_return(lines: &[u8]) -> bool {
+    lines.windows(2).any(|pair| matches!(pair, [b'\r', next] if *next != b'\n'))
 }
 
 /// The first line that is not empty, with the empty ones before it.

@@ -595,3 +595,102 @@ mod anything {
         assert_eq!(again, made);
     }
 }
+
+#[test]
+fn numbers_that_no_recorder_has_are_told_and_nothing_overflows() {
+    let last = u64::MAX;
+    let sel = format!(
+        "#    DATE        TIME            ELEMENT   STATE\n\
+         {last}  03/14/2027  14:21:00.017    51P1T     Asserted\n\
+         {}  03/14/2027  14:21:00.018    51P1T     Deasserted\n\
+         0  03/14/2027  14:21:00.019    51P1T     Asserted\n",
+        last - 1
+    );
+    let cytime = format!(
+        "{{\"events\":[{{\"event_type\":1,\"channel\":1,\"status\":1,\"milliseconds\":1,\
+         \"seconds\":1800000000,\"seq_num\":{last}}}]}}"
+    );
+    for (text, count) in [(sel, 3), (cytime, 1)] {
+        let options = Options { epoch: Some(Epoch::Posix), ..sure() };
+        let mut importer = Importer::new(options);
+        let read = read_into(&mut importer, "", text.as_bytes()).expect("it is read");
+        assert_eq!(read.notes.left_out_count, count, "{:?}", read.notes);
+        assert_eq!(importer.finish().records().count(), 0);
+    }
+    // Samples may have any number.
+    let (_, imported) = sampled(&format!("{},0,1,0,0,0\n{last},1000,1,0,1,0\n", last - 1));
+    assert_eq!(gaps(&imported), []);
+    sampled(&format!("1,0,1,0,0,0\n{last},1000,1,0,1,0\n"));
+}
+
+fn points(imported: &Imported) -> Vec<String> {
+    let name = |(_, record): (_, &Record)| match record {
+        Record::Point(point) => Some(point.name.clone()),
+        _ => None,
+    };
+    imported.records().filter_map(name).collect()
+}
+
+#[test]
+fn channels_of_one_name_stay_apart_whatever_others_are_called() {
+    let text = "--- file type: CFG ---\nOAK,FR,2013\n4,0A,4D\n1,a,,,0\n2,a,,,0\n3,a (1),,,0\n\
+                4,a (1) (1),,,0\n60\n0\n0,9\n14/03/2027,09:05:00.000000\n\
+                14/03/2027,09:05:00.000000\nASCII\n1\n0,0\n0,0\n--- file type: DAT ASCII ---\n\
+                1,0,0,0,0,0\n2,1000,1,1,1,1\n";
+    let imported = imported(&[text.as_bytes()], Options::default());
+    assert_eq!(points(&imported), ["a (1) (1) (1)", "a (2)", "a (1)", "a (1) (1)"]);
+}
+
+#[test]
+fn a_row_of_our_own_table_that_says_what_is_missing_is_no_point() {
+    let text = "Date, Time, Local Time Code, Substation, Device, State\n\
+                03/14/2027, 09:29:58.104, -5, Oakridge, 51P1T, Operate\n\
+                03/14/2027, 09:29:58.146, -5, Oakridge, U1, RECORDS MISSING: 37 entries missing\n\
+                03/14/2027, 09:29:58.146, -5, Oakridge, 51P1T, Reset\n";
+    let mut importer = Importer::new(Options::default());
+    let read = read_into(&mut importer, "", text.as_bytes()).expect("it is read");
+    let [note] = &read.notes.lost[..] else { panic!("{:?}", read.notes) };
+    let told = "line 3: U1 says that records are missing: 37 entries missing";
+    assert_eq!(note.to_string(), told);
+    let imported = importer.finish();
+    assert_eq!(points(&imported), ["Oakridge 51P1T"]);
+    assert_eq!(gaps(&imported), [(Some(1), Lost::AtLeast(1), Why::NotReached)]);
+}
+
+#[test]
+fn only_a_key_says_that_a_file_is_of_a_cytime_recorder() {
+    let jsonl = "{\"record\":\"life\",\"recorder\":\"events\",\"life\":\"1\",\"exact\":true}\n";
+    assert_eq!(Format::of(jsonl.as_bytes()), Some(Format::Jsonl));
+    assert_eq!(Format::of(b"{\"events\" : []}"), Some(Format::Cytime));
+}
+
+#[test]
+fn two_words_of_one_meaning_are_told() {
+    let text = "Date, Time, Local Time Code, Substation, Device, State\n\
+                03/14/2027, 09:29:58.104, -5, Oakridge, 51P1T, Operate\n\
+                03/14/2027, 09:29:58.146, -5, Oakridge, 51P1T, Reset\n\
+                03/14/2027, 09:29:58.147, -5, Oakridge, 51P1T, PICKUP\n\
+                03/14/2027, 09:29:58.148, -5, Oakridge, 51P1T, RESET\n";
+    let remarks = imported(&[text.as_bytes()], Options::default()).notes.remarks;
+    let told: Vec<String> = remarks.iter().map(ToString::to_string).collect();
+    let expected =
+        "\"Operate\" and \"PICKUP\" of \"Oakridge 51P1T\" both mean on; \"Operate\" is shown";
+    assert_eq!(told, [expected]);
+}
+
+#[test]
+fn our_own_files_in_another_dress_are_refused_by_line_and_reason() {
+    let header = "entry,time,input,state,sequence,life,note,recorder\n";
+    let row = "1,2026-11-22T10:00:00.250,3,1,1,9f3c5a7e21b04d68,,";
+    let read = |bytes: &[u8]| read_into(&mut Importer::new(Options::default()), "", bytes);
+    let returns = format!("{header}{row}U1\n").replace('\n', "\r");
+    let refused = read(returns.as_bytes()).expect_err("no line ends").to_string();
+    assert!(refused.starts_with("line 1: its lines end with CR alone"), "{refused}");
+    let latin = [header.as_bytes(), row.as_bytes(), b"Pr\xFCfstand\n"].concat();
+    let left_out = read(&latin).expect("it is read").notes.left_out;
+    assert!(left_out[0].to_string().contains("line 2: the recorder"), "{left_out:?}");
+    assert!(left_out[0].why.contains("is not UTF-8"), "{left_out:?}");
+    let json = b"{\"record\":\"entry\",\n{\"recorder\":\"Pr\xFCfstand\"}\n";
+    let left_out = read(json).expect("it is read").notes.left_out;
+    assert!(left_out[1].to_string().contains("line 2: this is not UTF-8"), "{left_out:?}");
+}

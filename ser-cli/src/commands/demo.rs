@@ -4,7 +4,7 @@ mod bench;
 mod plant;
 mod story;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use ser_evidence::incident::Which;
 
@@ -12,7 +12,9 @@ use self::bench::Bench;
 use self::plant::Recorder;
 use self::story::Story;
 use super::report::{self, Shown};
-use crate::error::Result;
+use crate::error::{Failure, Result};
+use crate::new_files::NewFiles;
+use crate::outlet::{Outlet, file_named};
 use crate::setting;
 
 const EXAMPLES: &str = "\
@@ -43,6 +45,7 @@ pub(crate) struct Args {
 const SHOWN_LINES: usize = 16;
 
 pub(crate) fn run(args: &Args) -> Result<()> {
+    let page = page(args.output.as_deref())?;
     let mut story = Story::begin();
     let bench = Bench::switch_on(args.image.as_deref())?;
     introduce(&bench, args.image.is_some(), &mut story)?;
@@ -62,11 +65,21 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         &["ser-cli report --input first.jsonl --live"],
     )?;
     let gathered = bench.gather_all()?;
-    report::show(&gathered, Which::LastTrip, Shown::default())?;
-    if let Some(page) = &args.output {
-        report::to_page(page, &gathered, Which::LastTrip)?;
+    report::write(Outlet::Stdout, &gathered, Which::LastTrip, Shown::default())?;
+    if let Some(page) = page {
+        report::write(page, &gathered, Which::LastTrip, Shown::PAGE)?;
     }
     bench.switch_off()
+}
+
+/// The page that the user wants. A name that cannot be used is refused before the demo begins.
+fn page(output: Option<&Path>) -> Result<Option<Outlet>> {
+    let Some(output) = output else { return Ok(None) };
+    let Some(path) = file_named(Some(output)) else {
+        return Err(Failure::usage("standard output is where the demo tells its story")
+            .hint("name a file for the page, as in -o trip.html"));
+    };
+    Outlet::open(Some(path), NewFiles::new(false)).map(Some)
 }
 
 fn introduce(bench: &Bench, has_image: bool, story: &mut Story) -> Result<()> {

@@ -1,7 +1,6 @@
 //! `report`: the answer after a trip.
 
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 use ser_evidence::history::History;
@@ -14,6 +13,7 @@ use crate::connection::ConnectionArgs;
 use crate::error::{Failure, Result, inform};
 use crate::gather::{self, ChoiceArgs, Gathered, SourceArgs};
 use crate::new_files::NewFiles;
+use crate::outlet::{NotWritten, Outlet, file_named};
 use crate::output::{PROGRAM, Palette};
 
 const EXAMPLES: &str = "\
@@ -41,7 +41,7 @@ pub(crate) struct Args {
     #[arg(long, value_enum)]
     format: Option<Format>,
 
-    /// The file, instead of standard output: a page (.html), text (.txt) or JSON (.json). It appears
+    /// The file, instead of standard output (-): a page (.html), text (.txt) or JSON (.json). It appears
     /// when it is whole.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -74,18 +74,21 @@ enum Format {
     Json,
 }
 
+impl Args {
+    /// Whether the report goes to standard output.
+    pub(crate) fn prints(&self) -> bool {
+        file_named(self.output.as_deref()).is_none()
+    }
+}
+
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let format = format(args)?;
+    let files = NewFiles::new(args.force).sparing(args.sources.files(connection));
+    let outlet = Outlet::open(file_named(args.output.as_deref()), files)?;
     let gathered = gather::gather(&args.sources, connection)?;
     let which = args.choice.which(&gathered.site)?.unwrap_or(Which::LastTrip);
     let shown = Shown { format, unfold: args.unfold };
-    let is_complete = match &args.output {
-        None => show(&gathered, which, shown)?,
-        Some(path) => {
-            let files = NewFiles::new(args.force).sparing(args.sources.files(connection));
-            to_file(path, files, &gathered, which, shown)?
-        }
-    };
+    let is_complete = write(outlet, &gathered, which, shown)?;
     if args.fail_on_loss {
         gathered.require_complete()?;
         if !is_complete {
@@ -102,44 +105,23 @@ pub(super) struct Shown {
     unfold: bool,
 }
 
-/// Writes the report about an incident to standard output. Returns whether nothing is missing in it.
-pub(super) fn show(gathered: &Gathered, which: Which, shown: Shown) -> Result<bool> {
-    let mut out = io::BufWriter::new(io::stdout().lock());
-    let styles = styles(Palette::of_stdout());
-    let is_complete = write(&mut out, gathered, which, shown, styles)?;
-    out.flush()?;
-    Ok(is_complete)
+impl Shown {
+    /// As a page.
+    pub(super) const PAGE: Shown = Shown { format: Format::Html, unfold: false };
 }
 
-/// Writes it as a page to a file, which must not be there.
-pub(super) fn to_page(path: &Path, gathered: &Gathered, which: Which) -> Result<()> {
-    let shown = Shown { format: Format::Html, unfold: false };
-    to_file(path, NewFiles::new(false), gathered, which, shown).map(|_| ())
-}
-
-/// Writes it to a file, which appears when it is whole.
-fn to_file(
-    path: &Path,
-    mut files: NewFiles,
+/// Writes the report about an incident. Returns whether nothing is missing in it.
+pub(super) fn write(
+    outlet: Outlet,
     gathered: &Gathered,
     which: Which,
     shown: Shown,
 ) -> Result<bool> {
-    let mut out = io::BufWriter::new(files.create(path)?);
-    let is_complete = write(&mut out, gathered, which, shown, Styles::default())?;
-    out.flush().map_err(|error| Failure::writing(path.display(), &error))?;
-    files.finish()?;
-    inform(format_args!("{} is written", path.display()));
-    Ok(is_complete)
-}
-
-fn write(
-    out: &mut dyn Write,
-    gathered: &Gathered,
-    which: Which,
-    shown: Shown,
-    styles: Styles,
-) -> Result<bool> {
+    // Colours are for terminals.
+    let styles = match outlet {
+        Outlet::Stdout => styles(Palette::of_stdout()),
+        Outlet::File(..) => Styles::default(),
+    };
     let timeline = Timeline::new(&gathered.site, &gathered.history);
     let incident =
         Incident::pick(&timeline, which).ok_or_else(|| no_entry(which, &gathered.history))?;
@@ -156,22 +138,26 @@ fn write(
         damaged_lines: gathered.damaged_lines,
         unfold: shown.unfold,
     };
-    match shown.format {
-        Format::Text => report::write_text(out, &document, styles)?,
+    outlet.write(|out| match shown.format {
+        Format::Text => Ok(report::write_text(out, &document, styles)?),
         Format::Html => report::write_html(out, &document).map_err(|error| match error {
-            PageError::Io(error) => Failure::from(error),
-            PageError::TooManyRows(_) => Failure::new(error)
-                .hint("choose less of it with --around, or with --since and --until")
-                .hint("--format text and json have no limit, and export has formats for programs"),
-        })?,
-        Format::Json => report::write_json(out, &document)?,
-    }
+            PageError::Io(error) => NotWritten::Io(error),
+            PageError::TooManyRows(_) => NotWritten::Failed(
+                Failure::new(error)
+                    .hint("choose less of it with --around, or with --since and --until")
+                    .hint("--format text and json have no limit, nor have formats of export"),
+            ),
+        }),
+        Format::Json => Ok(report::write_json(out, &document)?),
+    })?;
     Ok(!document.is_incomplete())
 }
 
 /// The format that the user wants, or that of the file's name.
 fn format(args: &Args) -> Result<Format> {
-    let Some(path) = &args.output else { return Ok(args.format.unwrap_or_default()) };
+    let Some(path) = file_named(args.output.as_deref()) else {
+        return Ok(args.format.unwrap_or_default());
+    };
     if let Some(format) = args.format {
         return Ok(format);
     }

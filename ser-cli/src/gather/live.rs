@@ -16,7 +16,7 @@ use crate::buses::Buses;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
 use crate::host_reading;
-use crate::interrupt;
+use crate::interrupt::Caught;
 use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
 use crate::log_look;
@@ -30,7 +30,8 @@ pub(super) fn read(
     state: &StateArgs,
     collector: &mut Collector,
 ) -> Result<Vec<NotReached>> {
-    let stop = interrupt::catch()?;
+    let caught = Caught::for_now()?;
+    let stop = caught.flag();
     let is_meant = |recorder: &&Recorder| {
         connection.recorder.as_ref().is_none_or(|name| *name == recorder.name)
     };
@@ -48,7 +49,7 @@ pub(super) fn read(
         let port = recorder.port.as_deref().unwrap_or_default();
         let baud = connection.baud.or(recorder.baud);
         let connection = ConnectionArgs { baud, ..connection::at_port(connection, port) };
-        read_one(recorder, &connection, state, &buses, &stop)
+        read_one(recorder, &connection, state, &buses, stop)
     };
     let results: Vec<(&Recorder, Result<Vec<Record>>)> = thread::scope(|scope| {
         let running: Vec<_> =
@@ -68,7 +69,7 @@ pub(super) fn read(
             Ok(records) => {
                 records.iter().for_each(|record| collector.add(&recorder.name, record));
             }
-            Err(Failure::Interrupted) => return Err(Failure::Interrupted),
+            Err(Failure::Interrupted) => return Err(interrupted()),
             Err(failure) => {
                 let why = failure.message();
                 warn(format_args!("{}: {why}", recorder.name));
@@ -81,6 +82,12 @@ pub(super) fn read(
         }
     }
     Ok(not_reached)
+}
+
+/// Unlike a command that goes on until Ctrl-C, the one that reads here has not done its work.
+fn interrupted() -> Failure {
+    Failure::new("interrupted before everything was read, and nothing is written")
+        .hint("nothing is marked as delivered; run the command again")
 }
 
 fn kept(

@@ -14,6 +14,7 @@ use super::selection::Selection;
 use super::survey::Survey;
 use crate::digits::push_digits;
 use crate::merged::{Dialect, field};
+use crate::missing::RECORDS_MISSING;
 use crate::report::{missing, names};
 
 const HEADER: &str = "Date, Time, Local Time Code, Substation, Device, State\r\n";
@@ -48,7 +49,8 @@ pub fn write(
             rows.text.clear();
             rows.push_time(span.last_us);
             let name = recorder_name(timeline, recorder);
-            let fields = rows.fields(&name, "RECORDS MISSING: the recorder could not be reached");
+            let why = format!("{RECORDS_MISSING}: the recorder could not be reached");
+            let fields = rows.fields(&name, &why);
             rows.text.extend_from_slice(&fields);
             out.write_all(&rows.text)?;
         }
@@ -144,7 +146,7 @@ impl<'t> Rows<'t> {
         let (Some(at_us), Some(gap)) = (at_us, gap) else { return };
         let what = missing(gap.lost, gap.why);
         let name = recorder_name(timeline, event.recorder as usize);
-        let fields = self.fields(&name, &format!("RECORDS MISSING: {what}"));
+        let fields = self.fields(&name, &format!("{RECORDS_MISSING}: {what}"));
         self.push_time(at_us);
         self.text.extend_from_slice(&fields);
     }

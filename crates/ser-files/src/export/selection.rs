@@ -14,7 +14,7 @@ pub struct Selection {
 /// A part of the list.
 #[derive(Debug)]
 struct Part {
-    /// The places in the list of the first and the last entry.
+    /// The lowest and the highest sort key of an entry.
     first: i64,
     last: i64,
     /// What is missing in it. The entries around a gap may be outside.
@@ -31,8 +31,9 @@ impl Selection {
     /// The entries of an incident, and what is missing in it.
     #[must_use]
     pub fn of(timeline: &Timeline<'_>, incident: &Incident) -> Selection {
-        let key = |event: Option<&EventId>| event.and_then(|&event| timeline.sort_key(event));
-        let (first, last) = (key(incident.events.first()), key(incident.events.last()));
+        // The list is in another order than that of its keys where a guess is overruled.
+        let keys = || incident.events.iter().filter_map(|&event| timeline.sort_key(event));
+        let (first, last) = (keys().min(), keys().max());
         let (first, last) = (first.unwrap_or(i64::MIN), last.unwrap_or(i64::MAX));
         let gaps = incident.gaps.iter().copied().collect();
         Selection { part: Some(Part { first, last, gaps }) }

@@ -13,7 +13,7 @@ use super::steps::{SAMPLE_US, States, states_before};
 pub(super) struct Survey {
     pub(super) axis: Axis,
     pub(super) channels: Channels,
-    /// Where the first and the last entry are on the axis; `None` if none has a time.
+    /// Where the earliest and the latest entry are on the axis; `None` if none has a time.
     pub(super) span: Option<Span>,
     pub(super) counted: Counted,
     /// By recorder: how many entries, also without a time, and whether something is missing.
@@ -75,8 +75,10 @@ impl Survey {
                 *moved |= held.entry.changed.0;
                 *first = first.revealed_by(held);
             }
-            let first_us = span.map_or(at_us, |span| span.first_us);
-            span = Some(Span { first_us, last_us: at_us });
+            let (first_us, last_us) = span.map_or((at_us, at_us), |span: Span| {
+                (span.first_us.min(at_us), span.last_us.max(at_us))
+            });
+            span = Some(Span { first_us, last_us });
         }
         let first_on = first.iter().map(|states| states.on).collect();
         Survey {

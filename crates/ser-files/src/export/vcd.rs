@@ -6,7 +6,7 @@
 //! calendar, so the signal `utc` tells the time under the cursor, and `err_us` of each recorder how
 //! far that may be off.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::io::Write;
 
 use ser_evidence::timeline::Timeline;
@@ -121,7 +121,11 @@ impl Signals {
 
 /// Names that are taken in a scope.
 #[derive(Default)]
-struct Names(HashSet<String>);
+struct Names {
+    taken: HashSet<String>,
+    /// By name: the number that was given last.
+    counts: HashMap<String, u32>,
+}
 
 impl Names {
     /// The name with nothing in it that a viewer takes for something else, and unlike those before.
@@ -133,13 +137,17 @@ impl Names {
         };
         let cleaned: String = name.chars().map(clean).collect();
         let cleaned = if cleaned.is_empty() { "_".to_owned() } else { cleaned };
-        let mut unique = cleaned.clone();
-        let mut count = 1_u32;
-        while !self.0.insert(unique.clone()) {
-            count += 1;
-            unique = format!("{cleaned}_{count}");
+        if self.taken.insert(cleaned.clone()) {
+            return cleaned;
         }
-        unique
+        let count = self.counts.entry(cleaned.clone()).or_insert(1);
+        loop {
+            *count += 1;
+            let unique = format!("{cleaned}_{count}");
+            if self.taken.insert(unique.clone()) {
+                return unique;
+            }
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use serde::Deserialize;
 use serde_json::value::RawValue;
 
 use super::calendar::{Date, SECOND_NS};
-use super::list::{Change, Found, List, Order, Row, To, When};
+use super::list::{Change, Found, LAST_PLACE, List, Order, Row, To, When};
 use super::notes::{Notes, Refusal};
 use crate::error::quoted;
 
@@ -84,11 +84,15 @@ struct Placed {
     event: Event,
 }
 
-/// Whether a file begins like such an answer.
+/// Whether a file begins like such an answer. A text may be called `events`; only a key counts.
 pub(super) fn is_it(head: &str) -> bool {
     let head = head.trim_start();
-    head.starts_with('{')
-        && ["\"events\"", "\"NumberOfEvents\""].iter().any(|key| head.contains(key))
+    let is_key = |name: &str| {
+        head.match_indices(name).any(|(at, _)| {
+            head.get(at + name.len()..).is_some_and(|rest| rest.trim_start().starts_with(':'))
+        })
+    };
+    head.starts_with('{') && ["\"events\"", "\"NumberOfEvents\""].into_iter().any(is_key)
 }
 
 /// Reads an answer.
@@ -199,9 +203,12 @@ fn understood(text: &str) -> Result<Event, String> {
         Some(words) => of_words(words)?,
         None => of_fields(&written)?,
     };
-    match event.milliseconds {
-        0..1000 => Ok(event),
-        ms => Err(format!("there is no millisecond {ms}")),
+    match (event.milliseconds, event.sequence) {
+        (_, Some(number)) if number > LAST_PLACE => {
+            Err(format!("there is no sequence number {number}"))
+        }
+        (0..1000, _) => Ok(event),
+        (ms, _) => Err(format!("there is no millisecond {ms}")),
     }
 }
 

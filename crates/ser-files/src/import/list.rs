@@ -14,6 +14,10 @@ use crate::error::quoted;
 /// The most changes that are read at once. Recorders hold some thousands; a file of more is cut.
 pub(super) const MOST_CHANGES: usize = 500_000;
 
+/// The last place that a row of a list can have. Recorders count in 16 or 32 bits; beyond this a
+/// number is damaged, and sums of places would overflow.
+pub(super) const LAST_PLACE: u64 = 1 << 48;
+
 /// The most different names in a file.
 const MOST_NAMES: usize = 65_536;
 
@@ -228,9 +232,13 @@ pub(super) struct Numbered {
 }
 
 impl Numbered {
-    /// Adds a row with its number.
-    pub(super) fn add(&mut self, number: u64, row: Row) {
+    /// Adds a row with its number; an error says why it is left out.
+    pub(super) fn add(&mut self, number: u64, row: Row) -> Result<(), String> {
+        if number > LAST_PLACE {
+            return Err(format!("there is no row {number}"));
+        }
         self.rows.push((number, row));
+        Ok(())
     }
 
     /// Notes that a row was left out.

@@ -9,8 +9,16 @@ use super::notes::{Notes, Refusal};
 use super::text::{Line, TextLines};
 use crate::error::quoted;
 use crate::fields::Fields;
+use crate::missing::RECORDS_MISSING;
 
 const COLUMNS: [&str; 6] = ["date", "time", "local time code", "substation", "device", "state"];
+
+/// What a row says.
+enum Said {
+    Change(Row),
+    /// Something is missing here; in words.
+    Missing(String),
+}
 
 /// Where the columns are.
 type Columns = [usize; 6];
@@ -54,7 +62,11 @@ pub(super) fn read(
             ));
         };
         match row(&text, columns, &mut fields, number, found)? {
-            Ok(mut row) => {
+            Ok(Said::Missing(what)) => {
+                notes.lose(number, what);
+                torn = Some(Vec::new());
+            }
+            Ok(Said::Change(mut row)) => {
                 row.place = u64::try_from(list.rows.len()).unwrap_or(u64::MAX) + 1;
                 row.torn = torn.take();
                 list.rows.push(row);
@@ -87,7 +99,7 @@ fn row(
     fields: &mut Fields,
     number: u64,
     found: &mut Found,
-) -> Result<Result<Row, String>, Refusal> {
+) -> Result<Result<Said, String>, Refusal> {
     let [date, time, code, substation, device, state] = match texts(line, columns, fields) {
         Ok(texts) => texts,
         Err(why) => return Ok(Err(why)),
@@ -102,11 +114,16 @@ fn row(
     if device.is_empty() || state.is_empty() {
         return Ok(Err("a row needs a device and a state".to_owned()));
     }
+    // With --spreadsheet-safe our own export may have an apostrophe before it.
+    if let Some(what) = state.trim_start_matches('\'').strip_prefix(RECORDS_MISSING) {
+        let what = what.trim_start_matches([':', ' ']);
+        return Ok(Ok(Said::Missing(format!("{device} says that records are missing: {what}"))));
+    }
     let point = found.point(&format!("{substation} {device}"))?;
     let to = To::Word(found.word(&state)?);
     found.count(1)?;
     let changes = vec![Change { point, to }];
-    Ok(Ok(Row {
+    Ok(Ok(Said::Change(Row {
         line: number,
         when,
         place: 0,
@@ -114,7 +131,7 @@ fn row(
         torn: None,
         learnt: Vec::new(),
         changes,
-    }))
+    })))
 }
 
 fn texts(line: &str, columns: Columns, fields: &mut Fields) -> Result<[String; 6], String> {

@@ -110,8 +110,17 @@ impl Meanings {
         for (side, word) in sides.iter().zip(known) {
             let Some(side) = *side else { continue };
             self.on.insert((point, *word), side);
-            if let Some(text) = texts.get_mut(usize::from(!side)) {
-                text.get_or_insert_with(|| words.get(*word).to_owned());
+            let Some(text) = texts.get_mut(usize::from(!side)) else { continue };
+            let word = words.get(*word);
+            let shown = text.get_or_insert_with(|| word.to_owned());
+            if shown.to_lowercase() != word.to_lowercase() {
+                let side = if side { "on" } else { "off" };
+                notes.remark(
+                    None,
+                    format!(
+                        "{shown:?} and {word:?} of {name:?} both mean {side}; {shown:?} is shown"
+                    ),
+                );
             }
         }
         self.texts.insert(point, texts);

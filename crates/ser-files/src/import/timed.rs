@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, HashMap};
 use jiff::tz::TimeZone;
 
 use super::calendar::DateOrder;
-use super::list::{Change, List, Order};
+use super::list::{Change, List, Order, To};
 use super::notes::{Notes, Refusal};
 use super::zone::{Doubt, Utc, in_utc};
 
@@ -105,9 +105,10 @@ pub(super) fn timed(
                 && first.ns > last.ns
             {
                 turn_tears(&mut timed, &mut torn_at_end);
+                timed.reverse();
             }
             // One millisecond has no order: by the file, so that it is the same each time.
-            timed.sort_by_key(|(utc, row)| (utc.ns, row.place));
+            timed.sort_by_key(|(utc, _)| utc.ns);
         }
     }
     let rows = timed.into_iter().map(|(_, row)| row).collect();
@@ -274,37 +275,34 @@ impl Joined {
 fn of_times(lists: Vec<Timed>) -> Option<Timed> {
     let last = |list: &Timed| list.rows.last().map(|row| row.at_ms);
     let end = lists.iter().filter_map(last).max();
-    let mut rows: Vec<TimedRow> = Vec::new();
+    let mut rows: Vec<(usize, TimedRow)> = Vec::new();
     let mut torn_at_end = None;
     // Where a list ends torn and another goes on, the next row follows on what is lost.
     let mut torn_behind: Vec<i64> = Vec::new();
-    for list in lists {
+    for (place, list) in lists.into_iter().enumerate() {
         match (list.torn_at_end.is_some(), last(&list)) {
             (true, Some(at_ms)) if Some(at_ms) < end => torn_behind.push(at_ms),
             (true, Some(_)) => torn_at_end = Some(Vec::new()),
             _ => {}
         }
-        rows.extend(list.rows);
+        rows.extend(list.rows.into_iter().map(|row| (place, row)));
     }
-    rows.sort_by_key(|row| row.at_ms);
+    rows.sort_by_key(|(_, row)| row.at_ms);
     for at_ms in torn_behind {
-        let next = rows.partition_point(|row| row.at_ms <= at_ms);
-        if let Some(row) = rows.get_mut(next) {
+        let next = rows.partition_point(|(_, row)| row.at_ms <= at_ms);
+        if let Some((_, row)) = rows.get_mut(next) {
             row.torn.get_or_insert_default();
         }
     }
     let mut together: Vec<TimedRow> = Vec::new();
-    for row in rows {
-        match together.last_mut().filter(|last| last.at_ms == row.at_ms) {
-            Some(last) if row.changes.iter().all(|change| last.changes.contains(change)) => {
-                last.torn = last.torn.take().or(row.torn);
-            }
-            Some(last) if !row.changes.iter().any(|change| has(last, change.point)) => {
-                last.torn = last.torn.take().or(row.torn);
-                last.changes.extend(row.changes);
-            }
-            _ => together.push(row),
+    let mut rows = rows.into_iter().peekable();
+    while let Some((list, first)) = rows.next() {
+        let at_ms = first.at_ms;
+        let mut moment = Instant::of(list, first);
+        while let Some((list, row)) = rows.next_if(|(_, row)| row.at_ms == at_ms) {
+            moment.add(list, row);
         }
+        together.extend(moment.rows());
     }
     let mut place = 0;
     for row in &mut together {
@@ -320,6 +318,126 @@ fn of_times(lists: Vec<Timed>) -> Option<Timed> {
     })
 }
 
-fn has(row: &TimedRow, point: usize) -> bool {
-    row.changes.iter().any(|change| change.point == point)
+/// What several lists say of one millisecond. Only the changes of each point have an order there.
+struct Instant {
+    /// The first row; the changes are kept by point.
+    row: TimedRow,
+    /// The points, in the order in which they are first named.
+    points: Vec<usize>,
+    /// By point: what became of it, one after the other, as all lists before the present one say it,
+    /// and as that one does.
+    of_points: HashMap<usize, (Vec<To>, Vec<To>)>,
+    list: usize,
+}
+
+impl Instant {
+    fn of(list: usize, mut row: TimedRow) -> Instant {
+        let changes = std::mem::take(&mut row.changes);
+        let mut instant = Instant { row, points: Vec::new(), of_points: HashMap::new(), list };
+        instant.take(changes);
+        instant
+    }
+
+    fn add(&mut self, list: usize, row: TimedRow) {
+        if list != self.list {
+            self.list = list;
+            self.of_points.values_mut().for_each(settle);
+        }
+        self.row.torn = self.row.torn.take().or(row.torn);
+        self.take(row.changes);
+    }
+
+    fn take(&mut self, changes: Vec<Change>) {
+        for Change { point, to } in changes {
+            let (_, now) = self.of_points.entry(point).or_insert_with(|| {
+                self.points.push(point);
+                Default::default()
+            });
+            // The same row twice is one change.
+            if now.last() != Some(&to) {
+                now.push(to);
+            }
+        }
+    }
+
+    /// As few rows as hold the changes of each point in their order.
+    fn rows(mut self) -> Vec<TimedRow> {
+        self.of_points.values_mut().for_each(settle);
+        let mut rows: Vec<TimedRow> = Vec::new();
+        for point in self.points {
+            let Some((changes, _)) = self.of_points.remove(&point) else { continue };
+            for (nth, to) in changes.into_iter().enumerate() {
+                if nth == rows.len() {
+                    let torn = if nth == 0 { self.row.torn.take() } else { None };
+                    rows.push(TimedRow { torn, ..self.row.clone() });
+                }
+                if let Some(row) = rows.get_mut(nth) {
+                    row.changes.push(Change { point, to });
+                }
+            }
+        }
+        rows
+    }
+}
+
+/// Adds what one list says of a point to what others say: the longer account of the two if one begins
+/// as the other, else one after the other.
+fn settle((all, now): &mut (Vec<To>, Vec<To>)) {
+    let now = std::mem::take(now);
+    if now.starts_with(all) {
+        *all = now;
+    } else if !all.starts_with(&now) {
+        all.extend(now);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn change(point: usize, is_on: bool) -> Change {
+        Change { point, to: To::State(is_on) }
+    }
+
+    fn list(rows: &[(i64, usize, bool)]) -> Timed {
+        let rows = (1..).zip(rows).map(|(place, &(at_ms, point, is_on))| TimedRow {
+            line: place,
+            at_ms,
+            doubt: None,
+            place,
+            forgets: false,
+            torn: None,
+            learnt: Vec::new(),
+            changes: vec![change(point, is_on)],
+        });
+        Timed { rows: rows.collect(), by_time: true, ..Timed::default() }
+    }
+
+    fn changes(lists: &[&Timed]) -> Vec<(i64, Vec<Change>)> {
+        let joined = joined(lists.iter().map(|&list| list.clone()).collect());
+        joined.into_iter().flat_map(|list| list.rows).map(|row| (row.at_ms, row.changes)).collect()
+    }
+
+    #[test]
+    fn a_list_that_is_there_twice_says_everything_once() {
+        let one = list(&[(5, 0, true), (5, 0, false), (5, 1, true), (7, 0, true)]);
+        let expected = [
+            (5, vec![change(0, true), change(1, true)]),
+            (5, vec![change(0, false)]),
+            (7, vec![change(0, true)]),
+        ];
+        assert_eq!(changes(&[&one]), expected);
+        assert_eq!(changes(&[&one, &one]), expected);
+        // A part of it says nothing new; what contradicts it is kept.
+        assert_eq!(changes(&[&one, &list(&[(5, 0, true)])]), expected);
+        assert_eq!(changes(&[&one, &list(&[(5, 0, false)])]).len(), 4);
+    }
+
+    /// So many that a look at each other one would take hours.
+    #[test]
+    fn many_changes_of_one_millisecond_are_joined_at_once() {
+        let many: Vec<(i64, usize, bool)> =
+            (0..200_000).map(|place| (5, place % 60_000, place / 60_000 % 2 == 0)).collect();
+        assert_eq!(changes(&[&list(&many), &list(&many)]).len(), 4);
+    }
 }

@@ -113,7 +113,13 @@ fn parse(line: &[u8]) -> std::result::Result<Line<'_>, Trouble> {
     if line.trim_ascii_start().first() != Some(&b'{') {
         return Err((None, Problem::Damaged(format!("this is no object: {}", quoted(line)))));
     }
-    serde_json::from_slice(line).map_err(|error| not_json(&error, line))
+    serde_json::from_slice(line).map_err(|error| match std::str::from_utf8(line) {
+        Ok(_) => not_json(&error, line),
+        Err(no_text) => (
+            Some(no_text.valid_up_to() + 1),
+            Problem::Damaged("this is not UTF-8; save the file as UTF-8".to_owned()),
+        ),
+    })
 }
 
 fn not_json(error: &serde_json::Error, line: &[u8]) -> Trouble {

@@ -183,12 +183,15 @@ impl Rows {
             tail.push(separator);
             tail.extend_from_slice(text.as_bytes());
         }
-        for us in [timeline.time(event).map(Moment::us)].into_iter().chain(ends) {
+        let [earliest, latest] = ends;
+        let middle = timeline.time(event).map(Moment::us);
+        // Where a column has milliseconds only, the ends are not rounded towards each other.
+        for (us, up_us) in [(middle, 500), (earliest, 0), (latest, 999)] {
             tail.push(separator);
             let Some(us) = us else { continue };
             match self.style.dialect {
                 Dialect::Plain | Dialect::Rfc4180 => self.utc.push(tail, us),
-                Dialect::ExcelDe => self.utc.push_german(tail, us),
+                Dialect::ExcelDe => self.utc.push_german(tail, us.saturating_add(up_us)),
             }
         }
     }

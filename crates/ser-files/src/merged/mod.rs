@@ -11,5 +11,5 @@ pub use jsonl::write as write_jsonl;
 pub use table::write as write_table;
 
 pub(crate) use csv::write_items as write_csv_items;
-pub(crate) use dialect::field;
+pub(crate) use dialect::{field, without_apostrophe};
 pub(crate) use jsonl::write_items as write_jsonl_items;

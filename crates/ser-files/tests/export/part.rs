@@ -1,12 +1,14 @@
 //! A part as JSON lines says of its entries what the whole says.
 
 use ser_evidence::history::Collector;
+use ser_evidence::incident::{Incident, Which};
 use ser_evidence::record::How;
 use ser_evidence::site::Site;
 use ser_evidence::time::{Bound, Utc};
 use ser_evidence::timeline::Timeline;
 use ser_files::Source;
-use ser_files::export::write_jsonl;
+use ser_files::export::{Selection, write_csv, write_jsonl};
+use ser_files::merged::{CsvStyle, Dialect};
 
 use crate::common::{Log, history, monotonic_us, site};
 use crate::{between, recorder};
@@ -102,4 +104,44 @@ fn what_a_clock_showed_before_it_was_set_silently_is_not_taken_for_a_part_after_
         let (text, _) = part(&site, &[&log], "2026-11-22T13:00:06.500", "2026-11-22T13:00:08.000");
         assert!(text.contains("\"query\""), "{text}");
     }
+}
+
+/// Where a guess is overruled, the list is in another order than that of its keys.
+#[test]
+fn a_part_holds_all_entries_of_its_incident_in_whatever_order_they_are() {
+    let site = site(&recorder("U1", &[(1, "a")]));
+    let mut log = Log::of("U1", 1);
+    log.changes("2026-11-22T09:00:18.979", &[1]).changes("2026-11-22T09:00:19.089", &[1]);
+    let history = history(&site, &[&log]);
+    let timeline = Timeline::new(&site, &history);
+    let mut incident = Incident::pick(&timeline, Which::Last).expect("some entries");
+    incident.events.reverse();
+    let mut out = Vec::new();
+    let selection = Selection::of(&timeline, &incident);
+    let counted = write_jsonl(&mut out, &timeline, &selection, "test 1.0").expect("written");
+    assert_eq!(counted.entries, 2);
+}
+
+/// What `--spreadsheet-safe` puts before texts is taken away again where our own reader reads them.
+#[test]
+fn a_table_that_is_safe_for_spreadsheets_is_read_as_it_was() {
+    let site = site(&recorder("=52-1", &[(1, "10:30")]));
+    let mut log = Log::of("=52-1", 0x1234_5678_9012_3456);
+    log.changes("2026-11-22T09:00:18.979", &[1]).changes("2026-11-22T09:00:19.089", &[1]);
+    let history = history(&site, &[&log]);
+    let timeline = Timeline::new(&site, &history);
+    let records = |is_spreadsheet_safe| {
+        let style = CsvStyle { dialect: Dialect::Rfc4180, is_spreadsheet_safe, has_names: true };
+        let mut out = Vec::new();
+        let all = Selection::everything();
+        write_csv(&mut out, &timeline, &all, style).expect("written");
+        let text = String::from_utf8(out).expect("UTF-8");
+        assert_eq!(text.contains(",'=52-1,"), is_spreadsheet_safe, "{text}");
+        assert_eq!(text.contains(",'10:30,"), is_spreadsheet_safe, "{text}");
+        let read: Vec<_> = Source::new(text.as_bytes(), "file").expect("ours").collect();
+        read.into_iter().map(|told| told.expect("a record")).collect::<Vec<_>>()
+    };
+    let plain = records(false);
+    assert!(plain.len() == 2 && plain.iter().all(|told| told.recorder == "=52-1"));
+    assert_eq!(records(true), plain);
 }

@@ -2,7 +2,6 @@
 
 mod choice;
 mod format;
-mod out;
 mod write;
 
 use std::path::PathBuf;
@@ -12,6 +11,7 @@ use ser_evidence::timeline::Timeline;
 use crate::connection::ConnectionArgs;
 use crate::error::{Failure, Result};
 use crate::gather::{self, SourceArgs};
+use crate::outlet::file_named;
 use choice::Choice;
 use format::{CsvDialect, Data, Format};
 
@@ -26,8 +26,8 @@ Examples:
 Without a choice of time everything is exported. Times without an offset are in the time zone of \
 the site.
 Every format says what is missing. What it cannot say is in a table in docs/formats.md.
-With -o the file appears when it is whole, and not before: a full disk or Ctrl-C leaves nothing. An \
-existing file is not overwritten without --force.";
+With -o the file appears when it is whole, and not before: a full disk or Ctrl-C leaves nothing, \
+and ends with exit code 1. An existing file is not overwritten without --force.";
 
 /// Write the entries as a file for a spreadsheet, a database, a waveform viewer or an analysis.
 #[derive(Debug, clap::Args)]
@@ -37,7 +37,7 @@ pub(crate) struct Args {
     #[arg(long, value_enum)]
     format: Format,
 
-    /// The file, instead of standard output. comtrade writes .cfg, .dat and .hdr beside each other,
+    /// The file, instead of standard output (-). comtrade writes .cfg, .dat and .hdr beside each other,
     /// under this name.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -85,8 +85,8 @@ pub(crate) struct Args {
 
 impl Args {
     /// Whether the data goes to standard output.
-    pub(crate) const fn prints(&self) -> bool {
-        self.output.is_none()
+    pub(crate) fn prints(&self) -> bool {
+        file_named(self.output.as_deref()).is_none()
     }
 }
 
@@ -100,11 +100,11 @@ fn line_frequency(text: &str) -> std::result::Result<u8, String> {
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     fits(args)?;
+    let destination = write::Destination::of(args, args.sources.files(connection))?;
     let gathered = gather::gather(&args.sources, connection)?;
     let timeline = Timeline::new(&gathered.site, &gathered.history);
     let selection = args.choice.selection(&timeline)?;
-    let counted =
-        write::write(args, args.sources.files(connection), &gathered, &timeline, &selection)?;
+    let counted = write::write(args, destination, &gathered, &timeline, &selection)?;
     write::tell(counted);
     if args.fail_on_loss {
         gathered.require_complete()?;
@@ -131,10 +131,14 @@ fn fits(args: &Args) -> Result<()> {
         return Err(Failure::usage(format!("{option} is for --format {formats}"))
             .hint("leave it out, or choose that format"));
     }
-    if args.format == Format::Comtrade && args.output.is_none() {
+    if args.format == Format::Comtrade && args.prints() {
         return Err(Failure::usage("comtrade is several files, and needs a name for them")
             .hint("give it with -o, as in -o trip.cfg")
             .hint("or write one file with --format cff"));
+    }
+    if args.comname.is_some() && args.prints() {
+        return Err(Failure::usage("standard output has no name that --comname could give")
+            .hint("with --comname, -o is the folder of the file"));
     }
     #[cfg(not(feature = "parquet"))]
     if args.format == Format::Parquet {

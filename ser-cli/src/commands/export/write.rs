@@ -1,8 +1,7 @@
 //! From the timeline to files.
 
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use ser_evidence::timeline::Timeline;
 use ser_files::export::comtrade::{Comtrade, Options};
@@ -11,11 +10,10 @@ use ser_files::merged::CsvStyle;
 
 use super::Args;
 use super::format::Format;
-use super::out::{BUFFER, Out};
-use crate::error::{Failure, Result, advise, inform, warn};
+use crate::error::{Failure, Result, advise, warn};
 use crate::gather::Gathered;
-use crate::interrupt::Caught;
 use crate::new_files::NewFiles;
+use crate::outlet::{NotWritten, Outlet, Part, file_named, finish};
 use crate::output::PROGRAM;
 
 /// Everything that is exported, and how.
@@ -26,10 +24,78 @@ struct Export<'e> {
     origin: Origin<'e>,
 }
 
+/// Where an export goes.
+pub(super) enum Destination {
+    /// One file, or standard output.
+    One(Outlet),
+    /// The parts of a COMTRADE record.
+    Record(NewFiles, Parts),
+    /// A folder, in which the content names the files.
+    Folder(NewFiles, PathBuf),
+}
+
+/// The parts of a COMTRADE record that are files of their own.
+pub(super) struct Parts {
+    cfg: PathBuf,
+    /// The data, the header and the configuration. The configuration gets its name last: a program
+    /// that looks for it finds the others.
+    parts: [Part; 3],
+}
+
+impl Destination {
+    /// What the user names. A name that cannot be used is refused before anything is read; `inputs`
+    /// are never overwritten.
+    pub(super) fn of(args: &Args, inputs: Vec<PathBuf>) -> Result<Destination> {
+        let files = NewFiles::new(args.force).sparing(inputs);
+        match file_named(args.output.as_deref()) {
+            None => Ok(Destination::One(Outlet::Stdout)),
+            Some(folder) if args.comname.is_some() => match folder.is_dir() {
+                true => Ok(Destination::Folder(files, folder.to_owned())),
+                false => Err(Failure::usage(format!("{} is not a folder", folder.display())).hint(
+                    "with --comname, -o is the folder, and the file is named by what is in it",
+                )),
+            },
+            Some(path) => Destination::named(args.format, files, path),
+        }
+    }
+
+    /// The file of this name, or the files.
+    fn named(format: Format, mut files: NewFiles, path: &Path) -> Result<Destination> {
+        match format {
+            Format::Comtrade => {
+                let parts = Parts::begin(&mut files, path)?;
+                Ok(Destination::Record(files, parts))
+            }
+            _ => Outlet::open(Some(path), files).map(Destination::One),
+        }
+    }
+}
+
+impl Parts {
+    fn begin(files: &mut NewFiles, cfg: &Path) -> Result<Parts> {
+        let extension = cfg.extension().and_then(|extension| extension.to_str());
+        let Some(extension @ ("cfg" | "CFG")) = extension else {
+            let proposal = cfg.with_extension("cfg");
+            return Err(Failure::usage(format!(
+                "{} is not a name of a COMTRADE file",
+                cfg.display()
+            ))
+            .hint(format!("let it end with .cfg, as in -o {}", proposal.display())));
+        };
+        let beside = |lower: &str, upper: &str| {
+            cfg.with_extension(if extension == "cfg" { lower } else { upper })
+        };
+        let dat = Part::begin(files, &beside("dat", "DAT"))?;
+        let hdr = Part::begin(files, &beside("hdr", "HDR"))?;
+        let parts = [dat, hdr, Part::begin(files, cfg)?];
+        Ok(Parts { cfg: cfg.to_owned(), parts })
+    }
+}
+
 /// Writes the file or the files.
 pub(super) fn write(
     args: &Args,
-    inputs: Vec<PathBuf>,
+    destination: Destination,
     gathered: &Gathered,
     timeline: &Timeline<'_>,
     selection: &Selection,
@@ -40,15 +106,7 @@ pub(super) fn write(
         not_reached: &gathered.not_reached,
         damaged_lines: gathered.damaged_lines,
     };
-    let export = Export { args, timeline, selection, origin };
-    // Standard output is left as it is when the user presses Ctrl-C; files are taken back.
-    let Some(output) = &args.output else { return export.to_stdout() };
-    let caught = Caught::for_now()?;
-    let result = export.to_files(output, inputs, caught.flag());
-    if caught.ends_interrupted() {
-        return Err(Failure::Interrupted);
-    }
-    result
+    Export { args, timeline, selection, origin }.write(destination)
 }
 
 /// Tells what is not in the file.
@@ -65,54 +123,27 @@ pub(super) fn tell(counted: Counted) {
 }
 
 impl Export<'_> {
-    fn to_stdout(&self) -> Result<Counted> {
-        let mut out = io::BufWriter::with_capacity(BUFFER, io::stdout());
-        let written = self.write_one(&mut out);
-        let counted = written.map_err(|refused| told(refused, &"standard output"))?;
-        out.flush()?;
-        Ok(counted)
-    }
-
-    fn to_files(&self, output: &Path, inputs: Vec<PathBuf>, stop: &AtomicBool) -> Result<Counted> {
-        let path = self.path(output)?;
-        let mut files = NewFiles::new(self.args.force).sparing(inputs);
-        let counted = match self.args.format {
-            Format::Comtrade => self.comtrade(&path, &mut files, stop)?,
-            _ => {
-                let mut out = Out::new(files.create(&path)?, stop);
-                in_file(&path, &mut out, |out| self.write_one(out))?
+    fn write(&self, destination: Destination) -> Result<Counted> {
+        match destination {
+            Destination::One(outlet) => outlet.write(|out| self.write_one(out).map_err(told)),
+            Destination::Record(files, parts) => self.comtrade(files, parts),
+            Destination::Folder(files, folder) => {
+                let path = folder.join(self.name()?);
+                self.write(Destination::named(self.args.format, files, &path)?)
             }
-        };
-        // Between here and the end nothing waits for anybody.
-        if stop.load(Ordering::Relaxed) {
-            return Err(Failure::Interrupted);
         }
-        files.finish()?;
-        inform(format_args!("{} is written", path.display()));
-        Ok(counted)
     }
 
-    /// The parts of a record that are files of their own. The configuration gets its name last: a
-    /// program that looks for it finds the others.
-    fn comtrade(&self, cfg: &Path, files: &mut NewFiles, stop: &AtomicBool) -> Result<Counted> {
-        let extension = cfg.extension().and_then(|extension| extension.to_str());
-        let Some(extension @ ("cfg" | "CFG")) = extension else {
-            let proposal = cfg.with_extension("cfg");
-            return Err(Failure::usage(format!("{} is no name of a COMTRADE file", cfg.display()))
-                .hint(format!("let it end with .cfg, as in -o {}", proposal.display())));
-        };
-        let beside = |lower: &str, upper: &str| {
-            cfg.with_extension(if extension == "cfg" { lower } else { upper })
-        };
-        let (dat, hdr) = (beside("dat", "DAT"), beside("hdr", "HDR"));
-        let record = self.record().map_err(|refused| told(refused, &cfg.display()))?;
-        // Before anything is written, which may take a while.
-        let mut created = |path: &Path| Ok::<_, Failure>(Out::new(files.create(path)?, stop));
-        let mut outs = [created(&dat)?, created(&hdr)?, created(cfg)?];
-        let [to_dat, to_hdr, to_cfg] = &mut outs;
-        in_file(&dat, to_dat, |out| record.write_dat(out))?;
-        in_file(&hdr, to_hdr, |out| record.write_hdr(out, &self.origin))?;
-        in_file(cfg, to_cfg, |out| record.write_cfg(out))?;
+    fn comtrade(&self, files: NewFiles, Parts { cfg, parts }: Parts) -> Result<Counted> {
+        let record = self.record().map_err(|refused| match told(refused) {
+            NotWritten::Failed(failure) => failure,
+            NotWritten::Io(error) => Failure::writing(cfg.display(), &error),
+        })?;
+        let [to_dat, to_hdr, to_cfg] = parts;
+        to_dat.write(|out| record.write_dat(out).map_err(told))?;
+        to_hdr.write(|out| record.write_hdr(out, &self.origin).map_err(told))?;
+        to_cfg.write(|out| record.write_cfg(out).map_err(told))?;
+        finish(files, &cfg)?;
         Ok(record.counted())
     }
 
@@ -151,15 +182,10 @@ impl Export<'_> {
         }
     }
 
-    /// The name of the file.
-    fn path(&self, output: &Path) -> Result<PathBuf> {
-        let Some(company) = &self.args.comname else { return Ok(output.to_owned()) };
-        if !output.is_dir() {
-            return Err(Failure::usage(format!("{} is no folder", output.display()))
-                .hint("with --comname, -o is the folder, and the file is named by what is in it"));
-        }
+    /// The name of the file by its content.
+    fn name(&self) -> Result<String> {
         let Some(begins_us) = export::begins_us(self.timeline, self.selection) else {
-            return Err(told(Refused::Empty, &output.display()));
+            return Err(empty());
         };
         // Rows of PRC-002 are in local time, everything else is in UTC.
         let offset_s = match self.args.format {
@@ -179,33 +205,25 @@ impl Export<'_> {
             offset_s,
             station: &self.timeline.site().name,
             device: &device,
-            company,
+            company: self.args.comname.as_deref().unwrap_or_default(),
             extension: self.args.format.extension(),
         };
-        Ok(output.join(export::file_name(&name)))
+        Ok(export::file_name(&name))
     }
-}
-
-/// Writes to a file to its end.
-fn in_file<T>(
-    path: &Path,
-    out: &mut Out<'_>,
-    write: impl FnOnce(&mut Out<'_>) -> std::result::Result<T, Refused>,
-) -> Result<T> {
-    let written = write(out).map_err(|refused| told(refused, &path.display()))?;
-    out.flush().map_err(|error| Failure::writing(path.display(), &error))?;
-    Ok(written)
 }
 
 /// Why nothing is written, and what to do about it.
-fn told(refused: Refused, to: &dyn std::fmt::Display) -> Failure {
-    match refused {
-        Refused::Io(error) => Failure::writing(to, &error),
-        Refused::Empty => {
-            Failure::new(refused).hint("--format csv and jsonl hold entries without a time, too")
-        }
+fn told(refused: Refused) -> NotWritten {
+    let failure = match refused {
+        Refused::Io(error) => return NotWritten::Io(error),
+        Refused::Empty => empty(),
         Refused::TooLong { .. } => Failure::new(refused)
             .hint("choose a part of it with --last-trip, --around, or --since and --until")
             .hint("or another format: csv, jsonl and vcd may be as long as you like"),
-    }
+    };
+    NotWritten::Failed(failure)
+}
+
+fn empty() -> Failure {
+    Failure::new(Refused::Empty).hint("--format csv and jsonl hold entries without a time, too")
 }

@@ -1,7 +1,6 @@
 //! `import`: lists of other recorders and relays become files that `report` and `merge` take.
 
 mod files;
-mod outlet;
 mod telling;
 
 use std::path::{Path, PathBuf};
@@ -11,6 +10,9 @@ use ser_files::import::{DateOrder, Epoch, Format, Importer, Map, Options, zone_n
 
 use crate::connection::ConnectionArgs;
 use crate::error::{Failure, Result};
+use crate::new_files::NewFiles;
+use crate::outlet::{Outlet, file_named};
+use crate::output::PROGRAM;
 use crate::site_file;
 
 const EXAMPLES: &str = "\
@@ -36,7 +38,7 @@ words means on:
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// The files. All files of one recorder belong into one import, with --recorder: what is in
+    /// The files. All files of one recorder belong in one import, with --recorder: what is in
     /// several of them is there once.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
@@ -122,6 +124,13 @@ enum GivenEpoch {
     Local1984,
 }
 
+impl Args {
+    /// Whether the data goes to standard output.
+    pub(crate) fn prints(&self) -> bool {
+        file_named(self.output.as_deref()).is_none()
+    }
+}
+
 fn parse_zone(text: &str) -> std::result::Result<jiff::tz::TimeZone, String> {
     zone_named(text).ok_or_else(|| {
         "no time zone like Europe/Berlin or UTC, and no offset like +05:30".to_owned()
@@ -162,7 +171,8 @@ fn fits(path: &Path, format: Format, args: &Args, recorder: Option<&str>) -> Res
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let mut inputs = files::with_data(&args.files);
     inputs.extend(args.map.iter().chain(&connection.site).cloned());
-    let outlet = outlet::Outlet::of(args.output.as_deref(), args.force, inputs)?;
+    let files = NewFiles::new(args.force).sparing(inputs);
+    let outlet = Outlet::open(file_named(args.output.as_deref()), files)?;
     let mut importer = Importer::new(options(args, connection)?);
     let files = files::without_data(&args.files);
     let (mut left_out, mut lost) = (0, 0);
@@ -181,7 +191,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             .hint("is the list empty? Then there is nothing to import")
             .hint("--format says what the files are, if they were taken for something else"));
     }
-    outlet.write(&imported)?;
+    outlet.write(|out| Ok(imported.write(out, PROGRAM)?))?;
     match (left_out, lost) {
         (1.., _) if args.fail_on_loss => Err(Failure::incomplete("not all lines were understood")),
         (_, 1..) if args.fail_on_loss => {

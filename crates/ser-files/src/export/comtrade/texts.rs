@@ -1,6 +1,6 @@
 //! Names in a configuration, which have no way to quote a comma.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use ser_evidence::timeline::Timeline;
 
@@ -29,7 +29,7 @@ pub(super) fn channels(
     channels: &Channels,
     options: Options,
 ) -> Vec<ChannelText> {
-    let mut taken = HashSet::new();
+    let mut taken = Taken::default();
     let with_recorder = channels.are_of_several();
     let text = |channel: &Channel| {
         let point = channel.named(timeline);
@@ -40,7 +40,7 @@ pub(super) fn channels(
         };
         let equipment = point.and_then(|point| point.equipment.as_deref()).unwrap_or_default();
         ChannelText {
-            name: unique(&name, &mut taken),
+            name: taken.unique(&name),
             equipment: field(&harmless(equipment)),
             is_normally_on: point.and_then(|point| point.normal).unwrap_or(false),
         }
@@ -48,7 +48,7 @@ pub(super) fn channels(
     let mut texts: Vec<ChannelText> = channels.all().iter().map(text).collect();
     if options.has_rate && options.data == Data::Binary {
         while !texts.len().is_multiple_of(16) {
-            let name = unique(&format!("spare {}", texts.len() + 1), &mut taken);
+            let name = taken.unique(&format!("spare {}", texts.len() + 1));
             texts.push(ChannelText { name, equipment: String::new(), is_normally_on: false });
         }
     }
@@ -61,16 +61,34 @@ pub(super) fn field(text: &str) -> String {
     cut.replace(',', ";").trim().to_owned()
 }
 
-fn unique(name: &str, taken: &mut HashSet<String>) -> String {
-    let mut unique = field(name);
-    let mut count = 1_u32;
-    while unique.is_empty() || !taken.insert(unique.clone()) {
-        count += 1;
-        let end = format!("~{count}");
-        let kept = MAX_NAME.saturating_sub(end.len());
-        unique = field(name).chars().take(kept).collect::<String>() + &end;
+/// Names that are taken.
+#[derive(Default)]
+struct Taken {
+    names: HashSet<String>,
+    /// By what stands before a number: the number that was given last. Of many equal names none looks
+    /// at all others.
+    counts: HashMap<String, u32>,
+}
+
+impl Taken {
+    fn unique(&mut self, name: &str) -> String {
+        let name = field(name);
+        if !name.is_empty() && self.names.insert(name.clone()) {
+            return name;
+        }
+        // A longer number leaves less room for the name.
+        let mut digits = 1;
+        loop {
+            let stem: String = name.chars().take(MAX_NAME.saturating_sub(1 + digits)).collect();
+            let count = self.counts.entry(format!("{stem}~")).or_insert(1);
+            *count += 1;
+            let unique = format!("{stem}~{count}");
+            digits = count.to_string().len().max(digits);
+            if unique.chars().count() <= MAX_NAME && self.names.insert(unique.clone()) {
+                return unique;
+            }
+        }
     }
-    unique
 }
 
 #[cfg(test)]
@@ -79,13 +97,26 @@ mod tests {
 
     #[test]
     fn names_have_no_comma_and_are_neither_long_nor_twice() {
-        let mut taken = HashSet::new();
+        let mut taken = Taken::default();
         let long = "Ü".repeat(200);
         let given = ["a, b", "a; b", &long, &long, ""];
-        let unique = given.map(|name| unique(name, &mut taken));
+        let unique = given.map(|name| taken.unique(name));
         assert_eq!(unique[..2], ["a; b", "a; b~2"]);
         assert_eq!(unique[2].chars().count(), 64);
         assert_eq!(unique[3], format!("{}~2", "Ü".repeat(62)));
         assert!(!unique[4].is_empty());
+    }
+
+    /// So many that a look at each other one would take minutes.
+    #[test]
+    fn many_equal_names_are_numbered_at_once() {
+        let mut taken = Taken::default();
+        let long = "x".repeat(MAX_NAME);
+        let all: HashSet<String> = (0..100_000)
+            .map(|place| taken.unique(if place % 2 == 0 { "a" } else { &long }))
+            .collect();
+        assert_eq!(all.len(), 100_000);
+        assert!(all.iter().all(|name| name.chars().count() <= MAX_NAME));
+        assert!(all.contains("a~50000"));
     }
 }

@@ -4,13 +4,13 @@
 //! is beyond doubt: line ends, blanks, padding, case, a missing line of rates. What contradicts
 //! itself is refused or told.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::Extent;
 use super::decimal::{number, whole};
 use crate::error::quoted;
 use crate::import::calendar::{Date, DateOrder, seconds_of_day, utc_offset};
-use crate::import::list::When;
+use crate::import::list::{When, fit};
 use crate::import::notes::{Notes, Refusal};
 
 /// More status channels than any record has.
@@ -188,19 +188,33 @@ fn names(lines: &mut Lines<'_>, count: usize, notes: &mut Notes) -> Result<Vec<S
         }
         names.push(match name.trim() {
             "" => format!("status {place}"),
-            name => name.to_owned(),
+            // As it will be shown: what is alike then has to be told apart here.
+            name => fit(name),
         });
     }
-    let mut seen: HashMap<&str, usize> = HashMap::new();
-    for name in &names {
-        *seen.entry(name).or_default() += 1;
+    Ok(told_apart(&names))
+}
+
+/// The same names, where each that comes more than once has its place behind it.
+fn told_apart(names: &[String]) -> Vec<String> {
+    let mut counts: HashMap<&str, usize> = HashMap::new();
+    for name in names {
+        *counts.entry(name).or_default() += 1;
     }
-    let once = |name: &str| seen.get(name) == Some(&1);
-    let told = (1..).zip(&names).map(|(place, name): (usize, &String)| match once(name) {
-        true => name.clone(),
-        false => format!("{name} ({place})"),
+    let mut made = HashSet::new();
+    let told = (1..).zip(names).map(|(place, name): (usize, &String)| {
+        if counts.get(name.as_str()) == Some(&1) {
+            return name.clone();
+        }
+        // Another channel may be called so as it is.
+        let mut told = format!("{name} ({place})");
+        while counts.contains_key(told.as_str()) || made.contains(&told) {
+            told = format!("{told} ({place})");
+        }
+        made.insert(told.clone());
+        told
     });
-    Ok(told.collect())
+    told.collect()
 }
 
 /// Sampling rates and the number of samples.

@@ -70,8 +70,8 @@ pub(in super::super) fn read(
         } else if fields.field(0) == b"No Data Available" {
             notes.remark(Some(number), "the relay says that its list is empty");
         } else if let Some(text) = number_of(&fields, columns) {
-            match row(&fields, columns, number, found)? {
-                Ok(row) => numbered.add(text, row),
+            match row(&fields, columns, number, found)?.and_then(|row| numbered.add(text, row)) {
+                Ok(()) => {}
                 Err(why) => {
                     notes.leave_out(number, why);
                     numbered.tear();

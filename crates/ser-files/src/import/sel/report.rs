@@ -47,8 +47,10 @@ pub(in super::super) fn read(
                 is_below_columns = false;
             }
             Kind::Empty => notes.remark(Some(number), "the relay says that its list is empty"),
-            Kind::Row(written) => match row(&written, number, found)? {
-                Ok(row) => numbered.add(written.number, row),
+            Kind::Row(written) => match row(&written, number, found)?
+                .and_then(|row| numbered.add(written.number, row))
+            {
+                Ok(()) => {}
                 Err(why) => {
                     without_element += u64::from(written.rest.is_empty());
                     numbered.tear();
