@@ -17,6 +17,9 @@ pub(super) const HOSTILE: [&str; 5] = [
     "]]><img src=x onerror=alert(1)>",
 ];
 
+/// How often each of the contacts of the crowded incident moves that chatter.
+pub(super) const CHATTER: u32 = 20;
+
 /// A folder with a site file and the evidence of an incident.
 pub(super) struct Incident {
     folder: TempDir,
@@ -26,13 +29,20 @@ pub(super) struct Incident {
 impl Incident {
     /// At a site of two recorders: U1 with hostile names at its inputs 1 to 5 and a breaker, and U2.
     pub(super) fn new() -> Incident {
+        Incident::at(&["U1", "U2 & co"])
+    }
+
+    /// The same with other recorders beside U1.
+    fn at(recorders: &[&str]) -> Incident {
         let folder = tempfile::tempdir().expect("a folder");
         let mut site = String::from(
-            "site = \"Northfield <1>\"\ntime_zone = \"UTC\"\n\
-             [host]\nutc_doubt_ms = 1\n\
-             [[recorder]]\nname = \"U1\"\nclock = \"utc\"\n\
-             [[recorder]]\nname = \"U2 & co\"\nclock = \"utc\"\n\
-             [[point]]\nrecorder = \"U1\"\ninput = 6\nname = \"Trip\"\nrole = \"trip\"\n\
+            "site = \"Northfield <1>\"\ntime_zone = \"UTC\"\n[host]\nutc_doubt_ms = 1\n",
+        );
+        for name in recorders {
+            write!(site, "[[recorder]]\nname = \"{name}\"\nclock = \"utc\"\n").expect("text");
+        }
+        site.push_str(
+            "[[point]]\nrecorder = \"U1\"\ninput = 6\nname = \"Trip\"\nrole = \"trip\"\n\
              equipment = \"52-1\"\n\
              [[point]]\nrecorder = \"U1\"\ninput = 7\nname = \"52-1 closed\"\nrole = \"52a\"\n\
              equipment = \"52-1\"\non = \"CLOSED\"\noff = \"OPEN\"\nnormal = \"on\"\n\
@@ -48,7 +58,7 @@ impl Incident {
         fs::write(folder.path().join("north.toml"), site).expect("a file");
         let mut incident = Incident { folder, lines: String::new() };
         incident.line("{\"record\":\"file\",\"schema\":1,\"program\":\"a test\"}");
-        for recorder in ["U1", "U2 & co"] {
+        for recorder in recorders {
             incident.set(recorder);
         }
         incident
@@ -71,6 +81,33 @@ impl Incident {
         }
         // Entry 5 is missing.
         incident.entry("U1", 6, 900, 0b1_1100, 0b1_1111 | 1 << 5);
+        incident
+    }
+
+    /// Five recorders, one of a long name, on which more points move than a page of paper has room
+    /// for; two contacts that chatter, and entries that are missing.
+    pub(super) fn crowded() -> Incident {
+        const POINTS: u32 = 18;
+        let long = "n".repeat(200);
+        let recorders = ["U1", "U2 & co", "U3", "U4", &long];
+        let mut incident = Incident::at(&recorders);
+        for (late, recorder) in (0..).zip(recorders) {
+            let mut state = 1 << 6;
+            let mut sequence = 0;
+            let mut change = |ms: u32, input: u32, missing: u32| {
+                state ^= 1 << input;
+                sequence += 1 + missing;
+                incident.entry(recorder, sequence, ms, 1 << input, state);
+            };
+            for input in 0..POINTS {
+                let missing = if (recorder, input) == ("U3", 9) { 3 } else { 0 };
+                change(100 + late + 13 * input, input, missing);
+            }
+            if late % 2 == 1 {
+                (0..CHATTER).for_each(|again| change(500 + 10 * again, 20, 0));
+            }
+            (0..POINTS).step_by(2).for_each(|input| change(900 + 20 * input, input, 0));
+        }
         incident
     }
 
@@ -116,7 +153,7 @@ impl Incident {
              \"shown\":\"2026-11-22T09:59:00.000\",\"scale\":\"host\",\"lo_us\":1000000,\
              \"hi_us\":1002000,\"host\":{{\"boot\":\"0123456789abcdef0123456789abcdef\",\
              \"monotonic_us\":1002000,\"utc_us\":1795341540002000,\"utc_doubt_us\":1000}},\
-             \"place\":{{\"life\":\"{}\",\"after\":0,\"before\":0,\"newest\":null}}}}",
+             \"place\":{{\"life\":\"{:016x}\",\"after\":0,\"before\":0,\"newest\":null}}}}",
             life(recorder)
         ));
     }
@@ -131,7 +168,7 @@ impl Incident {
         self.line(&format!(
             "{{\"record\":\"entry\",\"recorder\":\"{recorder}\",\"entry\":{sequence},\
              \"time\":\"2026-11-22T10:{minute:02}:{second:02}.{ms:03}\",\"changed\":[{}],\
-             \"state\":[{}],\"sequence\":{sequence},\"life\":\"{}\"}}",
+             \"state\":[{}],\"sequence\":{sequence},\"life\":\"{:016x}\"}}",
             set(changed),
             set(state),
             life(recorder)
@@ -139,8 +176,8 @@ impl Incident {
     }
 }
 
-fn life(recorder: &str) -> &'static str {
-    if recorder == "U1" { "00000000000000a1" } else { "00000000000000a2" }
+fn life(recorder: &str) -> u64 {
+    recorder.bytes().fold(1, |bits: u64, byte| bits.wrapping_mul(31).wrapping_add(byte.into()))
 }
 
 fn toml_text(text: &str) -> String {

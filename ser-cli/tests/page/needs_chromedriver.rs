@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use serde_json::Value;
 
 use super::browser::Browser;
-use super::incident::{HOSTILE, Incident};
+use super::incident::{CHATTER, HOSTILE, Incident};
 
-/// A screen and a telephone.
-const SIZES: [(u32, u32); 2] = [(1300, 900), (420, 800)];
+/// A screen, and a small telephone.
+const SIZES: [(u32, u32); 2] = [(1300, 900), (360, 800)];
 
-/// The names of the times on the axis of the first picture.
-const LABELS: &str = "return [...document.querySelector('figure.picture').querySelectorAll('.ticks \
+/// The names of the times on the axis of the first chart.
+const LABELS: &str = "return [...document.querySelector('figure.picture svg').querySelectorAll('.ticks \
      text')].map(text => text.textContent)";
 
 fn strings(value: &Value) -> Vec<String> {
@@ -116,13 +116,144 @@ fn two_thousand_rows_are_a_page_that_still_zooms() {
 
 #[test]
 #[ignore = "needs chromedriver: cargo xtask test"]
-fn it_prints_on_the_papers_of_both_worlds() {
+fn charts_are_zoomed_together() {
+    let (incident, browser) = (Incident::crowded(), Browser::start());
+    browser.show_as(SIZES[0], "light");
+    browser.open(&incident.page());
+    let axes = "return [...document.querySelector('figure.picture').querySelectorAll('svg')].map(\
+         svg => [...svg.querySelectorAll('.ticks text')].map(text => text.textContent).join())";
+    let drawn = strings(&browser.eval(axes));
+    assert!(drawn.len() > 3 && drawn.iter().all(|axis| *axis == drawn[0]), "{drawn:?}");
+    press(&browser, "first 100 ms");
+    let early = strings(&browser.eval(axes));
+    assert!(early.iter().all(|axis| axis == "0,20 ms,40 ms,60 ms,80 ms,100 ms"), "{early:?}");
+    press(&browser, "whole");
+    assert_eq!(strings(&browser.eval(axes)), drawn);
+    assert_eq!(browser.console(), Vec::<String>::new());
+}
+
+#[test]
+#[ignore = "needs chromedriver: cargo xtask test"]
+fn only_tables_and_pictures_are_wider_than_a_telephone() {
+    let browser = Browser::start();
+    for incident in [Incident::trip(), Incident::crowded()] {
+        browser.show_as(SIZES[1], "light");
+        browser.open(&incident.page());
+        let width = browser.eval("return document.documentElement.scrollWidth");
+        assert_eq!(width, SIZES[1].0);
+        let card = browser
+            .eval("return document.querySelector('.first-out').getBoundingClientRect().height");
+        let height = card.as_f64().expect("a number");
+        assert!(height < f64::from(SIZES[1].1) / 2.0, "the first-out is {height} px high");
+    }
+}
+
+#[test]
+#[ignore = "needs chromedriver: cargo xtask test"]
+fn colour_is_never_all_that_says_not_normal() {
     let (incident, browser) = (Incident::trip(), Browser::start());
     browser.open(&incident.page());
-    for (name, paper) in [("a4", (21.0, 29.7)), ("letter", (21.59, 27.94))] {
-        let pdf = browser.pdf(paper);
-        assert!(pdf.starts_with(b"%PDF-") && pdf.len() > 20_000, "{name}: {}", pdf.len());
-        fs::write(shown_in().join(format!("{name}.pdf")), pdf).expect("a file");
+    let states = browser.eval(
+        "return [...document.querySelectorAll('td.abnormal')].map(state => state.textContent)",
+    );
+    assert_eq!(strings(&states), ["OPEN not normal"]);
+    let drawn = browser.eval(
+        "return [...document.querySelectorAll('.lane .abnormal')].map(bar => \
+         getComputedStyle(bar).fill.replaceAll('\"', '') + ' ' + bar.textContent)",
+    );
+    let drawn = strings(&drawn);
+    assert!(!drawn.is_empty());
+    assert!(drawn.iter().all(|bar| bar == "url(#striped) off, not normal"), "{drawn:?}");
+    let legend = browser.eval("return document.querySelector('.legend').textContent");
+    let legend = legend.as_str().expect("text");
+    for (part, is_there) in [
+        ("not normal", true),
+        ("something is missing", true),
+        ("took", true),
+        ("nobody knows how far", false),
+    ] {
+        assert_eq!(legend.contains(part), is_there, "{part}: {legend}");
+    }
+}
+
+#[test]
+#[ignore = "needs chromedriver: cargo xtask test"]
+fn the_longest_page_opens_and_is_searched() {
+    let incident = Incident::of(20_000);
+    let page = incident.page();
+    let bytes = fs::metadata(&page).expect("a file").len();
+    assert!((5_000_000..20_000_000).contains(&bytes), "{bytes} bytes");
+    let browser = Browser::start();
+    browser.open(&page);
+    let rows = browser.eval("return document.querySelectorAll('tbody tr[data-lane]').length");
+    assert_eq!(rows, 20_000);
+    // What the browser's own search finds: the last row but one. The head names the last one.
+    assert_eq!(browser.eval("return window.find('10:13:19.921')"), true);
+    let selected =
+        browser.eval("return getSelection().anchorNode.parentElement.closest('tr').rowIndex");
+    assert_eq!(selected, 19_999);
+    press(&browser, "first 100 ms");
+    assert_eq!(strings(&browser.eval(LABELS)), ["0", "20 ms", "40 ms", "60 ms", "80 ms", "100 ms"]);
+    assert_eq!(browser.console(), Vec::<String>::new());
+}
+
+mod needs_pdftotext {
+    use std::io::Write as _;
+    use std::process::{Command, Stdio};
+
+    use super::*;
+
+    /// The papers of both worlds, in centimetres, and one that lies on its side.
+    const PAPERS: [(&str, (f64, f64)); 3] =
+        [("a4", (21.0, 29.7)), ("letter", (21.59, 27.94)), ("across", (29.7, 21.0))];
+
+    /// The text of each page.
+    fn pages(pdf: &[u8]) -> Vec<String> {
+        let mut command = Command::new("pdftotext");
+        command.args(["-layout", "-", "-"]).stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut reader = command.spawn().expect("pdftotext runs: cargo xtask test --all");
+        reader.stdin.take().expect("piped").write_all(pdf).expect("it reads");
+        let output = reader.wait_with_output().expect("it ends");
+        assert!(output.status.success(), "{output:?}");
+        let text = String::from_utf8(output.stdout).expect("UTF-8");
+        text.trim_end_matches('\u{c}').split('\u{c}').map(str::to_owned).collect()
+    }
+
+    #[test]
+    #[ignore = "needs pdftotext: cargo xtask test"]
+    fn paper_has_all_of_it_and_no_chart_is_cut() {
+        let (incident, browser) = (Incident::crowded(), Browser::start());
+        browser.open(&incident.page());
+        let headings = browser.eval(
+            "return [...document.querySelectorAll('h2, figcaption')].map(heading => \
+             heading.firstChild.textContent.trim())",
+        );
+        let headings = strings(&headings);
+        let charts = browser.eval("return document.querySelectorAll('svg.chart').length");
+        for (name, paper) in PAPERS {
+            let pdf = browser.pdf(paper);
+            fs::write(shown_in().join(format!("{name}.pdf")), &pdf).expect("a file");
+            let pages = pages(&pdf);
+            let count = |page: &str, text: &str| page.matches(text).count();
+            let mut drawn = 0;
+            for page in &pages {
+                let (axes, ends) = (count(page, "after the first change"), count(page, "lanes "));
+                assert_eq!(axes, ends, "{name}: each chart has its axis and its end: {page}");
+                drawn += axes;
+                let last = page.lines().rfind(|line| !line.trim().is_empty()).unwrap_or_default();
+                assert!(!headings.iter().any(|heading| heading == last.trim()), "{name}: {page}");
+            }
+            assert_eq!(charts, drawn, "{name}");
+            let all = pages.concat();
+            for change in 1..=CHATTER {
+                let ms = 491 + 10 * change;
+                let time = format!("10:00:00.{ms}");
+                assert_eq!(count(&all, &time), if change == 1 { 4 } else { 2 }, "{name}: {time}");
+            }
+        }
+        // It is folded again afterwards.
+        let open = browser.eval("return document.querySelectorAll('details[open]').length");
+        assert_eq!(open, 0);
     }
 }
 
@@ -142,21 +273,31 @@ mod needs_axe_core {
         let axe = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
         let axe = axe.parent().expect("a folder").join("axe/node_modules/axe-core/axe.min.js");
         let axe = fs::read_to_string(axe).expect("cargo xtask test installs axe-core");
-        let (incident, browser) = (Incident::trip(), Browser::start());
-        for size in SIZES {
-            for scheme in ["light", "dark"] {
-                browser.show_as(size, scheme);
-                browser.open(&incident.page());
-                let name = format!("{scheme}-{}.png", size.0);
-                fs::write(shown_in().join(name), browser.picture()).expect("a file");
-                browser.eval(&axe);
-                let found = browser.eval_later(
-                    "const done = arguments[0]; axe.run().then(found => done(found.violations\
-                     .map(found => found.impact + ': ' + found.id + ' ' + \
-                     found.nodes.map(node => node.html).join(' '))))",
-                );
-                assert_eq!(strings(&found), Vec::<String>::new(), "{scheme} {size:?}");
+        let browser = Browser::start();
+        for (incident, page) in [("trip", Incident::trip()), ("crowded", Incident::crowded())] {
+            for size in SIZES {
+                for scheme in ["light", "dark"] {
+                    browser.show_as(size, scheme);
+                    browser.open(&page.page());
+                    let name = format!("{incident}-{scheme}-{}.png", size.0);
+                    fs::write(shown_in().join(name), browser.picture()).expect("a file");
+                    assert_eq!(faults(&browser, &axe), Vec::<String>::new(), "{scheme} {size:?}");
+                }
             }
         }
+        // What is long is no other page, so once is enough.
+        browser.open(&Incident::of(2_000).page());
+        assert_eq!(faults(&browser, &axe), Vec::<String>::new());
+    }
+
+    /// What axe finds, each with its elements.
+    fn faults(browser: &Browser, axe: &str) -> Vec<String> {
+        browser.eval(axe);
+        let found = browser.eval_later(
+            "const done = arguments[0]; axe.run().then(found => done(found.violations\
+             .map(found => found.impact + ': ' + found.id + ' ' + \
+             found.nodes.map(node => node.html).join(' '))))",
+        );
+        strings(&found)
     }
 }

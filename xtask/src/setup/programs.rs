@@ -51,7 +51,7 @@ const fn program(
 }
 
 /// All programs. Sizes are those of Debian 12.
-static PROGRAMS: [Program; 6] = [
+static PROGRAMS: [Program; 7] = [
     program(
         "sqlite3",
         "the test that imports a log into SQLite",
@@ -81,6 +81,12 @@ static PROGRAMS: [Program; 6] = [
         "the tests that open the page of a report in a browser",
         (125, 398),
         Source::Debian("chromium-driver"),
+    ),
+    program(
+        "pdftotext",
+        "the test that reads the printed page of a report",
+        (2, 6),
+        Source::Debian("poppler-utils"),
     ),
     program(
         "axe-core",
@@ -193,7 +199,8 @@ fn is_there(program: &Program) -> bool {
 }
 
 fn there(name: &str) -> bool {
-    works(unrelated(name).arg("--version"))
+    // Those of Poppler know the short form alone.
+    ["--version", "-v"].iter().any(|version| works(unrelated(name).arg(version)))
 }
 
 /// How the names of modules with such tests begin.

@@ -51,6 +51,8 @@ pub(super) struct Remark {
     pub(super) text: String,
     /// Whether something is missing here.
     pub(super) is_loss: bool,
+    /// Whether a bracket goes on over it: nothing else than `None` and `Inner`.
+    pub(super) bracket: Sign,
 }
 
 /// Where a line stands in a bracket.
@@ -63,6 +65,24 @@ pub(super) enum Sign {
     Last,
 }
 
+impl Sign {
+    /// Of what stands right below a line, before the next one.
+    pub(super) const fn below(self) -> Sign {
+        match self {
+            Sign::First | Sign::Inner => Sign::Inner,
+            Sign::None | Sign::Last => Sign::None,
+        }
+    }
+
+    /// Of what stands right above a line, after the one before.
+    const fn above(self) -> Sign {
+        match self {
+            Sign::Inner | Sign::Last => Sign::Inner,
+            Sign::None | Sign::First => Sign::None,
+        }
+    }
+}
+
 /// All lines. Chatter is folded unless the document wants it row by row.
 pub(super) fn lines<'d>(document: &Document<'d>, clock: &Clock) -> Vec<Line<'d>> {
     let rows = shown_rows(document);
@@ -70,7 +90,9 @@ pub(super) fn lines<'d>(document: &Document<'d>, clock: &Clock) -> Vec<Line<'d>>
     let mut lines = Vec::with_capacity(rows.len());
     let mut previous = None;
     for (row, bracket) in rows.iter().zip(&brackets) {
-        lines.extend(remarks_ahead(document, row, previous).map(Line::Remark));
+        let sign = bracket.sign.above();
+        let remarks = remarks_ahead(document, row, previous);
+        lines.extend(remarks.map(|remark| Line::Remark(Remark { bracket: sign, ..remark })));
         lines.push(Line::Change(change(document, row, previous, bracket, clock)));
         previous = Some(row.change);
     }
@@ -277,6 +299,7 @@ fn remarks_ahead(
         recorder: names::recorder(timeline, event),
         text: "the clock was set here".to_owned(),
         is_loss: false,
+        bracket: Sign::None,
     });
     gaps.into_iter().chain(set).filter(move |_| begins_entry)
 }
@@ -284,5 +307,5 @@ fn remarks_ahead(
 fn gap(timeline: &Timeline<'_>, event: EventId, index: usize) -> Option<Remark> {
     let gap = timeline.life(event)?.gaps.get(index)?;
     let (recorder, text) = (names::recorder(timeline, event), verdict::missing(gap.lost, gap.why));
-    Some(Remark { recorder, text, is_loss: true })
+    Some(Remark { recorder, text, is_loss: true, bracket: Sign::None })
 }

@@ -21,10 +21,13 @@ pub const MAX_ROWS: usize = 20_000;
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
+/// A first-out of more characters has smaller letters, and a line of its own.
+const LONG: usize = 160;
+
 /// What the page may do: nothing but use its own style and its own script.
 const POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; \
-     style-src 'sha256-rebzgpP7zJx7iGv3umnONUJskBpW5iIbFgbqATNZQmg='; \
-     script-src 'sha256-k/X1fMbvu6sp/I77tI1RB0Fr/A+YbhaEU3UjDX6mD/Q='";
+     style-src 'sha256-FIgWNZoSp4z648tNyzZvtvFTyPMGdHXh2uJS+j3NEqk='; \
+     script-src 'sha256-OIVVx06r1h7mc3x1XYY2qype8GgxynYwVZ7R3r3UW0o='";
 
 /// Why there is no page.
 #[derive(Debug)]
@@ -134,8 +137,9 @@ fn verdict(document: &Document<'_>, clock: &Clock) -> Markup {
         several => html! { ul { @for item in several { li { (item) } } } },
     };
     let is_known = report.first_out.known().is_some();
+    let is_long = first.chars().count() > LONG;
     html! {
-        section.verdict aria-label="Verdict" {
+        section.verdict.long[is_long] aria-label="Verdict" {
             div.first-out.doubtful[!is_known] { h2 { "First-out" } p { (first) } }
             div { h2 { "Operated" } (items(&operated, "no breaker")) }
             div.wrong[!wrong.is_empty()] { h2 { "Wrong" } (items(&wrong, "nothing")) }

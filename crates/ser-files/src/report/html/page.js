@@ -1,11 +1,13 @@
 "use strict";
-// The page is whole without this. It adds zooming, and shows the lane of a row that is clicked.
+// The page is whole without this. It adds zooming, shows the lane of a row that is clicked, and
+// unfolds chatter for the printer.
 (() => {
   const MINUTE = 60e6, HOUR = 60 * MINUTE, DAY = 24 * HOUR;
   const STEPS = [1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 5e5, 1e6, 2e6, 5e6, 10e6, 15e6, 30e6,
     MINUTE, 2 * MINUTE, 5 * MINUTE, 10 * MINUTE, 15 * MINUTE, 30 * MINUTE, HOUR, 2 * HOUR,
     3 * HOUR, 6 * HOUR, 12 * HOUR, DAY, 7 * DAY];
   const MOST_TICKS = 10, SHORTEST = 5e3, SVG = "http://www.w3.org/2000/svg";
+  const all = (selector, within = document) => [...within.querySelectorAll(selector)];
 
   // As the program has drawn the axis before anybody zoomed.
   function ticks(from, to) {
@@ -30,143 +32,178 @@
     const end = `${two(seconds % 60)}${step < 1e6 ? "." + fraction : ""}`;
     return sign + (hours ? `${hours}:${two(minutes)}:${end}` : `${minutes}:${end}`);
   }
-
-  function zoomable(figure) {
-    const svg = figure.querySelector("svg"), box = figure.querySelector(".scroll");
-    const left = Number(svg.dataset.left), width = Number(svg.dataset.width);
-    const bottom = Number(svg.dataset.bottom);
-    const whole = [Number(figure.dataset.from), Number(figure.dataset.to)];
-    let [from, to] = whole;
-    const placed = [...svg.querySelectorAll("[data-a]")].filter((e) => !e.closest(".ticks"));
-    const ends = svg.querySelectorAll(".end"), texts = [...ends].map((end) => end.textContent);
-
-    const x = (at) => left + (Math.min(Math.max(at, from), to) - from) / (to - from) * width;
-    function draw() {
-      for (const element of placed) {
-        const a = Number(element.dataset.a);
-        const b = element.dataset.b === undefined ? a : Number(element.dataset.b);
-        const isSeen = a <= to && b >= from;
-        element.setAttribute("display", isSeen ? "inline" : "none");
-        if (!isSeen) continue;
-        if (element.tagName === "rect") {
-          element.setAttribute("x", x(a));
-          element.setAttribute("width", Math.max(x(b) - x(a), 0));
-        } else {
-          element.setAttribute("x1", x(a));
-          element.setAttribute("x2", x(a));
-        }
-      }
-      const found = ticks(from, to), group = svg.querySelector(".ticks");
-      group.dataset.step = found.step;
-      group.replaceChildren(...found.at.flatMap((at) => {
-        const line = document.createElementNS(SVG, "line");
-        line.setAttribute("class", "grid");
-        for (const [name, value] of [["x1", x(at)], ["x2", x(at)], ["y1", 26], ["y2", bottom]])
-          line.setAttribute(name, value);
-        const text = document.createElementNS(SVG, "text");
-        text.setAttribute("class", "axis");
-        text.setAttribute("x", x(at));
-        text.setAttribute("y", 18);
-        text.textContent = label(at, found.step);
-        return [line, text];
-      }));
-      const isWhole = from === whole[0] && to === whole[1];
-      ends.forEach((end, n) => {
-        const offset = [from, to][n];
-        end.textContent = isWhole ? texts[n] : label(Math.round(offset), 1e3);
-      });
-    }
-    function show(newFrom, newTo) {
-      const middle = (newFrom + newTo) / 2, most = whole[1] - whole[0];
-      const span = Math.min(Math.max(newTo - newFrom, SHORTEST), most);
-      from = Math.min(Math.max(middle - span / 2, whole[0]), whole[1] - span);
-      to = from + span;
-      draw();
-    }
-    const zoom = (by, at = (from + to) / 2) => show(at - (at - from) * by, at + (to - at) * by);
-    const move = (by) => show(from + by * (to - from), to + by * (to - from));
-    const all = () => show(...whole), early = () => show(-5e3, 105e3);
-
-    const bar = document.createElement("span");
-    bar.className = "zoom";
-    for (const [text, name, act] of [["+", "zoom in", () => zoom(1 / 2)],
-      ["−", "zoom out", () => zoom(2)], ["←", "earlier", () => move(-1 / 4)],
-      ["→", "later", () => move(1 / 4)], ["first 100 ms", "", early], ["whole", "", all]]) {
-      const button = document.createElement("button");
-      button.type = "button";
-      button.textContent = text;
-      if (name) {
-        button.title = name;
-        button.setAttribute("aria-label", name);
-      }
-      button.addEventListener("click", act);
-      bar.append(button);
-    }
-    figure.querySelector("figcaption").append(bar);
-    box.classList.add("zoomable");
-    box.addEventListener("keydown", (event) => {
-      const act = { "+": () => zoom(1 / 2), "=": () => zoom(1 / 2), "-": () => zoom(2),
-        ArrowLeft: () => move(-1 / 4), ArrowRight: () => move(1 / 4), Home: all, "0": all,
-        "1": early }[event.key];
-      if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
-      event.preventDefault();
-      act();
-    });
-
-    const at = (event) => {
-      const place = svg.getBoundingClientRect();
-      const unit = svg.viewBox.baseVal.width / place.width;
-      const part = ((event.clientX - place.left) * unit - left) / width;
-      return from + Math.min(Math.max(part, 0), 1) * (to - from);
-    };
-    svg.addEventListener("wheel", (event) => {
-      if (!event.ctrlKey && !event.shiftKey) return;
-      event.preventDefault();
-      zoom((event.deltaY || event.deltaX) > 0 ? 1.3 : 1 / 1.3, at(event));
-    }, { passive: false });
-    svg.addEventListener("dblclick", all);
-    // A stretch of time that is marked with the mouse is shown.
-    let began = null, picked = null;
-    svg.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0 || event.pointerType === "touch") return;
-      began = at(event);
-      event.preventDefault();
-      box.focus({ preventScroll: true });
-    });
-    addEventListener("pointermove", (event) => {
-      if (began === null) return;
-      const now = at(event);
-      if (!picked && Math.abs(x(now) - x(began)) < 4) return;
-      if (!picked) {
-        picked = document.createElementNS(SVG, "rect");
-        picked.setAttribute("class", "picked");
-        picked.setAttribute("y", 26);
-        picked.setAttribute("height", bottom - 26);
-        svg.append(picked);
-      }
-      picked.setAttribute("x", Math.min(x(now), x(began)));
-      picked.setAttribute("width", Math.abs(x(now) - x(began)));
-    });
-    addEventListener("pointerup", (event) => {
-      const [start, end] = [began, picked && at(event)];
-      picked?.remove();
-      began = picked = null;
-      if (start !== null && end !== null && start !== end)
-        show(Math.min(start, end), Math.max(start, end));
-    });
+  function drawn(tag, attributes, text = "") {
+    const element = document.createElementNS(SVG, tag);
+    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+    element.textContent = text;
+    return element;
   }
 
-  document.querySelectorAll("figure.picture").forEach(zoomable);
+  // The charts of one figure, which all show the same stretch of time.
+  class Picture {
+    constructor(figure) {
+      this.figure = figure;
+      this.charts = all("svg", figure);
+      this.box = figure.querySelector(".scroll");
+      this.left = Number(this.charts[0].dataset.left);
+      this.width = Number(this.charts[0].dataset.width);
+      this.whole = [Number(figure.dataset.from), Number(figure.dataset.to)];
+      [this.from, this.to] = this.whole;
+      const isPlaced = (element) => !element.closest(".ticks");
+      this.placed = all("[data-a]", figure).filter(isPlaced).map((element) => {
+        const a = Number(element.dataset.a), b = Number(element.dataset.b ?? a);
+        return { element, a, b, isBar: element.tagName === "rect" };
+      });
+      this.ends = all(".end", figure).map((end) => ({ end, text: end.textContent }));
+    }
+
+    x(at) {
+      const part = Math.min(Math.max(at, this.from), this.to) - this.from;
+      return this.left + part / (this.to - this.from) * this.width;
+    }
+    // The time under the mouse.
+    at(event) {
+      const place = this.charts[0].getBoundingClientRect();
+      const unit = this.charts[0].viewBox.baseVal.width / place.width;
+      const part = ((event.clientX - place.left) * unit - this.left) / this.width;
+      return this.from + Math.min(Math.max(part, 0), 1) * (this.to - this.from);
+    }
+
+    show(newFrom, newTo) {
+      const [least, most] = this.whole, middle = (newFrom + newTo) / 2;
+      const span = Math.min(Math.max(newTo - newFrom, SHORTEST), most - least);
+      this.from = Math.min(Math.max(middle - span / 2, least), most - span);
+      this.to = this.from + span;
+      this.draw();
+    }
+    showAll() { this.show(...this.whole); }
+    showEarly() { this.show(-5e3, 105e3); }
+    zoom(by, at = (this.from + this.to) / 2) {
+      this.show(at - (at - this.from) * by, at + (this.to - at) * by);
+    }
+    move(by) {
+      const us = by * (this.to - this.from);
+      this.show(this.from + us, this.to + us);
+    }
+
+    draw() {
+      for (const { element, a, b, isBar } of this.placed) {
+        const isSeen = a <= this.to && b >= this.from;
+        element.setAttribute("display", isSeen ? "inline" : "none");
+        if (!isSeen) continue;
+        element.setAttribute(isBar ? "x" : "x1", this.x(a));
+        if (isBar) element.setAttribute("width", Math.max(this.x(b) - this.x(a), 0));
+        else element.setAttribute("x2", this.x(a));
+      }
+      const found = ticks(this.from, this.to);
+      for (const chart of this.charts) this.drawAxis(chart, found);
+      const isWhole = this.from === this.whole[0] && this.to === this.whole[1];
+      this.ends.forEach(({ end, text }, n) => {
+        const offset = n % 2 ? this.to : this.from;
+        end.textContent = isWhole ? text : label(Math.round(offset), 1e3);
+      });
+    }
+    drawAxis(chart, { step, at }) {
+      const group = chart.querySelector(".ticks"), bottom = chart.dataset.bottom;
+      group.dataset.step = step;
+      group.replaceChildren(...at.flatMap((at) => {
+        const x = this.x(at);
+        return [drawn("line", { class: "grid", x1: x, x2: x, y1: 26, y2: bottom }),
+          drawn("text", { class: "axis", x, y: 18 }, label(at, step))];
+      }));
+    }
+
+    addButtons() {
+      const bar = document.createElement("span");
+      bar.className = "zoom";
+      const add = (text, name, act) => {
+        const button = document.createElement("button");
+        button.type = "button";
+        button.textContent = text;
+        if (name) button.title = name;
+        if (name) button.setAttribute("aria-label", name);
+        button.addEventListener("click", act);
+        bar.append(button);
+      };
+      add("+", "zoom in", () => this.zoom(1 / 2));
+      add("−", "zoom out", () => this.zoom(2));
+      add("←", "earlier", () => this.move(-1 / 4));
+      add("→", "later", () => this.move(1 / 4));
+      add("first 100 ms", "", () => this.showEarly());
+      add("whole", "", () => this.showAll());
+      this.figure.querySelector("figcaption").append(bar);
+    }
+    hearKeys() {
+      const whole = () => this.showAll(), closer = () => this.zoom(1 / 2);
+      const acts = { "+": closer, "=": closer, "-": () => this.zoom(2),
+        ArrowLeft: () => this.move(-1 / 4), ArrowRight: () => this.move(1 / 4),
+        Home: whole, "0": whole, "1": () => this.showEarly() };
+      this.box.addEventListener("keydown", (event) => {
+        const act = acts[event.key];
+        if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
+        event.preventDefault();
+        act();
+      });
+    }
+    // The wheel zooms, and a stretch of time that is marked with the mouse is shown.
+    hearMouse() {
+      let began = null, marked = null;
+      this.box.addEventListener("wheel", (event) => {
+        if (!event.ctrlKey && !event.shiftKey) return;
+        event.preventDefault();
+        this.zoom((event.deltaY || event.deltaX) > 0 ? 1.3 : 1 / 1.3, this.at(event));
+      }, { passive: false });
+      this.box.addEventListener("dblclick", () => this.showAll());
+      this.box.addEventListener("pointerdown", (event) => {
+        const chart = event.target.closest("svg");
+        if (!chart || event.button !== 0 || event.pointerType === "touch") return;
+        began = { chart, at: this.at(event) };
+        event.preventDefault();
+        this.box.focus({ preventScroll: true });
+      });
+      addEventListener("pointermove", (event) => {
+        if (!began) return;
+        const [one, other] = [this.x(began.at), this.x(this.at(event))];
+        if (!marked && Math.abs(one - other) < 4) return;
+        marked?.remove();
+        marked = drawn("rect", { class: "picked", x: Math.min(one, other), y: 26,
+          width: Math.abs(one - other), height: began.chart.dataset.bottom - 26 });
+        began.chart.append(marked);
+      });
+      addEventListener("pointerup", (event) => {
+        const ends = began && marked ? [began.at, this.at(event)] : [0, 0];
+        marked?.remove();
+        began = marked = null;
+        if (ends[0] !== ends[1]) this.show(Math.min(...ends), Math.max(...ends));
+      });
+    }
+  }
+
+  for (const figure of all("figure.picture")) {
+    const picture = new Picture(figure);
+    picture.addButtons();
+    picture.hearKeys();
+    picture.hearMouse();
+    picture.box.classList.add("zoomable");
+  }
 
   function light(lane) {
-    document.querySelectorAll(".lane.lit").forEach((lit) => lit.classList.remove("lit"));
-    const found = document.querySelectorAll(`.lane[data-lane="${lane}"]`);
+    all(".lane.lit").forEach((lit) => lit.classList.remove("lit"));
+    const found = all(`.lane[data-lane="${lane}"]`);
     found.forEach((found) => found.classList.add("lit"));
     return found[0];
   }
-  document.querySelectorAll("tr[data-lane]").forEach((row) => row.addEventListener("click", (event) => {
-    if (event.target.closest("details") || String(getSelection())) return;
+  document.querySelector(".sequence").addEventListener("click", (event) => {
+    const row = event.target.closest("tr[data-lane]");
+    if (!row || event.target.closest("details") || String(getSelection())) return;
     event.preventDefault();
     light(row.dataset.lane)?.scrollIntoView({ block: "center" });
-  }));
+  });
+
+  let unfolded = [];
+  addEventListener("beforeprint", () => {
+    unfolded = all("details:not([open])");
+    unfolded.forEach((details) => { details.open = true; });
+  });
+  addEventListener("afterprint", () => unfolded.forEach((details) => { details.open = false; }));
 })();

@@ -79,20 +79,14 @@ fn change_row(
     lanes: Option<&Lanes>,
     clock: &Clock,
 ) -> Markup {
-    let (bracket, order) = match line.bracket {
-        Sign::None => ("", ""),
-        Sign::First => ("bracket begins", "order not known, from here"),
-        Sign::Inner => ("bracket", "order not known"),
-        Sign::Last => ("bracket ends", "order not known, to here"),
-    };
     let lane = lanes.and_then(|lanes| lanes.of(line.row.change));
     // Chatter has a note of its own, which unfolds.
     let notes =
         line.notes.iter().filter(|note| line.fold.is_none() || !note.starts_with("chatter"));
     let notes: Vec<&str> = notes.map(String::as_str).collect();
     html! {
-        tr.first[line.is_first] data-lane=[lane] {
-            td class=(bracket) { span.unseen { (order) } }
+        tr.first[line.is_first].chattering[line.fold.is_some()] data-lane=[lane] {
+            (bracket(line.bracket))
             td.time { (line.time) }
             td.number { (line.since_first) }
             td.number { (line.since_previous) }
@@ -103,18 +97,37 @@ fn change_row(
                     None => (line.point),
                 }
             }
-            td.state.abnormal[line.is_abnormal] { (line.state) }
+            td.state.abnormal[line.is_abnormal] {
+                (line.state)
+                @if line.is_abnormal { " " span.flag { "not normal" } }
+            }
             td.number.faint { (line.doubt) }
             td.number { (line.entry) }
-            td {
-                (notes.join("; "))
-                @if let Some(fold) = line.fold { (chatter(document, fold, clock)) }
+            td { (notes.join("; ")) }
+        }
+        @if let Some(fold) = line.fold {
+            tr.folded {
+                (bracket(line.bracket.below()))
+                td colspan="9" { (chatter(document, fold, clock)) }
             }
         }
     }
 }
 
-/// The changes that are folded into one row.
+/// The cell of the bracket around rows whose order is not known.
+fn bracket(sign: Sign) -> Markup {
+    let (class, order) = match sign {
+        Sign::None => (None, None),
+        Sign::First => (Some("bracket begins"), Some("order not known, from here")),
+        Sign::Inner => (Some("bracket"), Some("order not known")),
+        Sign::Last => (Some("bracket ends"), Some("order not known, to here")),
+    };
+    html! {
+        td class=[class] { @if let Some(order) = order { span.unseen { (order) } } }
+    }
+}
+
+/// The changes that are folded into the row above.
 fn chatter(document: &Document<'_>, fold: &Fold, clock: &Clock) -> Markup {
     let timeline = document.timeline;
     let changes = fold.changes.iter().map(|&change| {
@@ -139,7 +152,7 @@ fn chatter(document: &Document<'_>, fold: &Fold, clock: &Clock) -> Markup {
 fn remark_row(remark: &Remark) -> Markup {
     html! {
         tr.remark.loss[remark.is_loss] {
-            td {}
+            (bracket(remark.bracket))
             td colspan="3" { "– – –" }
             td { (remark.recorder) }
             td colspan="5" { (remark.text) }

@@ -52,14 +52,8 @@ fn add_change(line: &ChangeLine<'_>, table: &mut Table, styles: Styles) {
     let is_short = notes.chars().count() <= NOTE_WIDTH;
     let (beside, below) = if is_short { (notes, None) } else { (String::new(), Some(notes)) };
     let style_if = |is_it: bool, style: Style| if is_it { style } else { Style::new() };
-    let (sign, sign_below) = match line.bracket {
-        Sign::None => ("", ""),
-        Sign::First => ("┌", "│"),
-        Sign::Inner => ("│", "│"),
-        Sign::Last => ("└", ""),
-    };
     table.row(vec![
-        Cell::styled(sign, styles.alarm),
+        Cell::styled(drawn(line.bracket), styles.alarm),
         Cell::styled(line.time.as_str(), style_if(line.is_first, styles.first_out)),
         Cell::from(line.since_first.clone()),
         Cell::from(line.since_previous.clone()),
@@ -72,7 +66,7 @@ fn add_change(line: &ChangeLine<'_>, table: &mut Table, styles: Styles) {
     ]);
     if let Some(notes) = below {
         table.row(sparse([
-            (0, Cell::styled(sign_below, styles.alarm)),
+            (0, Cell::styled(drawn(line.bracket.below()), styles.alarm)),
             (POINT, Cell::remark(notes, styles.faint)),
         ]));
     }
@@ -81,10 +75,21 @@ fn add_change(line: &ChangeLine<'_>, table: &mut Table, styles: Styles) {
 fn add_remark(remark: Remark, table: &mut Table, styles: Styles) {
     let style = if remark.is_loss { styles.alarm } else { styles.faint };
     table.row(sparse([
+        (0, Cell::styled(drawn(remark.bracket), styles.alarm)),
         (TIME, Cell::styled("- - -", style)),
         (RECORDER, Cell::styled(remark.recorder, style)),
         (POINT, Cell::remark(remark.text, style)),
     ]));
+}
+
+/// A part of a bracket.
+const fn drawn(sign: Sign) -> &'static str {
+    match sign {
+        Sign::None => "",
+        Sign::First => "┌",
+        Sign::Inner => "│",
+        Sign::Last => "└",
+    }
 }
 
 /// A row in which most cells are empty.

@@ -9,7 +9,7 @@ use ser_evidence::timeline::{ChangeId, EventId, Timeline};
 use ser_proto::Inputs;
 
 use super::axis::Axis;
-use crate::report::{Document, names, sequence};
+use crate::report::{Clock, Document, names, sequence};
 
 /// One point over the time of the incident.
 #[derive(Debug)]
@@ -68,10 +68,7 @@ pub(in crate::report::html) struct Lanes {
 
 impl Lanes {
     /// The lanes of an incident; `None` if no change has a time.
-    pub(in crate::report::html) fn new(
-        document: &Document<'_>,
-        clock: &super::Clock,
-    ) -> Option<Lanes> {
+    pub(in crate::report::html) fn new(document: &Document<'_>, clock: &Clock) -> Option<Lanes> {
         let Document { timeline, report, .. } = *document;
         let axis = Axis::new(document)?;
         let placed: Vec<(&Row, i64)> =
@@ -114,7 +111,7 @@ impl Lanes {
         self.by_input.get(&key(change)).copied()
     }
 
-    fn add_edge(&mut self, document: &Document<'_>, row: &Row, at_us: i64, clock: &super::Clock) {
+    fn add_edge(&mut self, document: &Document<'_>, row: &Row, at_us: i64, clock: &Clock) {
         let Document { timeline, report, .. } = *document;
         let place = *self.by_input.entry(key(row.change)).or_insert_with(|| {
             self.lanes.push(Lane {

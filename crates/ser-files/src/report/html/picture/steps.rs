@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 
 use super::axis::Axis;
+use super::frame::{FULL_PX, LANE_PX, LEFT_PX, NAMES_PX, px, shortened};
 use super::scale::Scale;
-use super::{FULL_PX, LANE_PX, LEFT_PX, px, shortened};
 use crate::report::{Document, names, outcome};
 use ser_evidence::incident::Verdict;
 
@@ -17,7 +17,7 @@ pub(super) struct StepLane {
     pub(super) after_us: i64,
     /// The window in which it was to happen.
     within_us: (i64, i64),
-    then_us: Option<i64>,
+    pub(super) then_us: Option<i64>,
 }
 
 /// The steps that began at a known time.
@@ -49,10 +49,10 @@ impl StepLane {
         html! {
             g.step {
                 rect.back x="0" y=(y) width=(FULL_PX) height=(LANE_PX) {}
-                text.name x=(LEFT_PX - 12.0) y=(y + 15.0) {
+                text.name x=(NAMES_PX) y=(y + 15.0) {
                     title { (self.name) } (shortened(&self.name, 34))
                 }
-                text.recorder x=(LEFT_PX - 12.0) y=(y + 27.0) { "expected: " (self.result) }
+                text.recorder x=(NAMES_PX) y=(y + 27.0) { "expected: " (self.result) }
                 rect.window data-a=(from) data-b=(to) x=(px(x)) y=(px(y + 7.0)) width=(px(width))
                     height="18" {}
                 @if let Some((begin, end)) = took {

@@ -1,0 +1,89 @@
+//! What the marks of the picture mean: those that are in it, and no others.
+
+use maud::{Markup, html};
+
+use super::drawing::{STRIPED, UNKNOWN};
+use super::lanes::{Lanes, State};
+use super::steps::StepLane;
+
+/// Which marks a picture has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Marks {
+    on: bool,
+    off: bool,
+    abnormal: bool,
+    unknown: bool,
+    doubt: bool,
+    no_doubt_known: bool,
+    expected: bool,
+    took: bool,
+}
+
+impl Marks {
+    fn of(lanes: &Lanes, steps: &[StepLane]) -> Marks {
+        let mut marks = Marks::default();
+        for stretch in lanes.lanes.iter().flat_map(|lane| &lane.stretches) {
+            match stretch.state {
+                State::On { is_abnormal: false } => marks.on = true,
+                State::Off { is_abnormal: false } => marks.off = true,
+                State::On { .. } | State::Off { .. } => marks.abnormal = true,
+                State::Unknown => marks.unknown = true,
+            }
+        }
+        let mut edges = lanes.lanes.iter().flat_map(|lane| &lane.edges);
+        marks.doubt = edges.clone().any(|edge| edge.doubt_us.is_some());
+        marks.no_doubt_known = edges.any(|edge| edge.doubt_us.is_none());
+        marks.expected = !steps.is_empty();
+        marks.took = steps.iter().any(|step| step.then_us.is_some());
+        marks
+    }
+}
+
+pub(super) fn legend(lanes: &Lanes, steps: &[StepLane]) -> Markup {
+    let marks = Marks::of(lanes, steps);
+    let bar = |class: &str| html! { rect class=(class) x="0" y="4" width="28" height="12" {} };
+    html! {
+        p.legend {
+            @if marks.on { (item(&bar("on"), "on")) }
+            @if marks.off {
+                (item(&html! { rect.off x="0" y="14" width="28" height="2" {} }, "off"))
+            }
+            @if marks.abnormal { (item(&abnormal(), "not normal, on and off")) }
+            @if marks.unknown { (item(&unknown(), "not known: something is missing")) }
+            @if marks.doubt { (item(&change(), "a change and its doubt")) }
+            @if marks.no_doubt_known {
+                (item(&loose_change(), "a change of which nobody knows how far its time is off"))
+            }
+            @if marks.expected { (item(&bar("window"), "expected within")) }
+            @if marks.took {
+                (item(&html! { rect.took x="0" y="8" width="28" height="4" {} }, "took"))
+            }
+        }
+    }
+}
+
+fn item(mark: &Markup, meaning: &str) -> Markup {
+    html! { span { svg viewBox="0 0 28 20" aria-hidden="true" { (mark) } (meaning) } }
+}
+
+fn abnormal() -> Markup {
+    html! {
+        rect.abnormal fill=(STRIPED) x="0" y="2" width="13" height="16" {}
+        rect.abnormal fill=(STRIPED) x="15" y="12" width="13" height="6" {}
+    }
+}
+
+fn unknown() -> Markup {
+    html! { rect.unknown fill=(UNKNOWN) x="0" y="4" width="28" height="12" {} }
+}
+
+fn change() -> Markup {
+    html! {
+        rect.doubt x="6" y="1" width="16" height="18" {}
+        line.moved x1="14" x2="14" y1="1" y2="19" {}
+    }
+}
+
+fn loose_change() -> Markup {
+    html! { line.moved.loose x1="14" x2="14" y1="1" y2="19" {} }
+}
