@@ -19,7 +19,8 @@ pub const QUEUE_LEN: usize = 256;
 pub(crate) struct Sample {
     /// When, in milliseconds since power-up, wrapping.
     pub(crate) tick_ms: u32,
-    /// The inputs that changed. Empty in the very first sample, which is the baseline.
+    /// The inputs that changed. Empty in the very first sample, which is the baseline, and in one
+    /// that says that other debounce times are in force from here on.
     pub(crate) changed: u32,
     /// The inputs that are on.
     pub(crate) state: u32,
@@ -97,6 +98,21 @@ impl Default for CaptureChannel {
     }
 }
 
+/// Debounce times on their way to the interrupt, made ready so that it is held off for a moment
+/// only.
+#[derive(Clone, Debug)]
+pub struct DebounceTimes {
+    filter: Filter,
+}
+
+impl DebounceTimes {
+    /// Makes these times ready.
+    #[must_use]
+    pub fn new(debounce: &Debounce) -> DebounceTimes {
+        DebounceTimes { filter: Filter::new(debounce, 0) }
+    }
+}
+
 /// The interrupt's end of the channel.
 pub struct Capture<'a> {
     queue: Writer<'a, Sample, QUEUE_LEN>,
@@ -139,6 +155,21 @@ impl Capture<'_> {
     fn begin(&mut self, tick_ms: u32, inputs: u32) {
         self.filter = Some(Filter::new(&self.debounce, inputs));
         self.push(Sample { tick_ms, changed: 0, state: inputs });
+    }
+
+    /// Filters by these debounce times from the next sample on. False when that is not possible
+    /// now, and then nothing changes: an input whose time would change is being debounced, or the
+    /// queue is full. A board that is told so tries again in the next pass of its main loop.
+    ///
+    /// The main loop calls this with the capture interrupt held off. It takes as long as a few
+    /// samples.
+    pub fn take_times(&mut self, times: &DebounceTimes) -> bool {
+        let Some(filter) = &mut self.filter else { return false };
+        if !self.queue.has_room() || !filter.take_times(&times.filter) {
+            return false;
+        }
+        let state = filter.accepted();
+        self.queue.push(Sample { tick_ms: self.tick_ms, changed: 0, state })
     }
 
     #[inline]
@@ -225,7 +256,7 @@ impl CaptureReader<'_> {
         self.shared.samples_missed.load(Ordering::Relaxed)
     }
 
-    /// The debounce times that the samples went through.
+    /// The debounce times at power-up.
     #[must_use]
     pub const fn debounce(&self) -> &Debounce {
         &self.debounce

@@ -110,6 +110,26 @@ impl Filter {
         self.accepted
     }
 
+    /// Takes over the times of another filter. Inputs whose time stays go on counting. False, and
+    /// nothing changes, while an input counts whose time would change: the change that it may
+    /// become began by the old time.
+    pub(crate) fn take_times(&mut self, other: &Filter) -> bool {
+        let (mut counting, mut others) = (0, 0);
+        for (plane, other) in self.planes.iter().zip(&other.planes) {
+            counting |= plane.moved;
+            others |= plane.start ^ other.start;
+        }
+        if counting & others != 0 {
+            return false;
+        }
+        for (plane, other) in self.planes.iter_mut().zip(&other.planes) {
+            plane.start = other.start;
+        }
+        self.due = self.due & !others | other.without & others;
+        self.without = other.without;
+        true
+    }
+
     /// Whether no input has a debounce time, so that repeating a sample changes nothing.
     pub(crate) const fn is_off(&self) -> bool {
         self.without == u32::MAX
@@ -205,6 +225,20 @@ mod tests {
         let accepted = bounce.map(|sample| filter.step(sample));
         assert_eq!(accepted, [0, 0, 0, 0, 0, 0, 0, 1, 0]);
         assert_eq!(filter.accepted(), 1);
+    }
+
+    #[test]
+    fn times_change_only_for_inputs_that_are_not_counting() {
+        let mut filter = Filter::new(&Debounce::OFF.with(1, 3).with(2, 2), 0);
+        let other = Filter::new(&Debounce::OFF.with(1, 3).with(2, 1), 0);
+        assert_eq!(filter.step(0b011), 0);
+        assert!(!filter.take_times(&other), "input 2 is counting");
+        assert_eq!(filter.step(0b001), 0);
+        assert!(filter.take_times(&other), "input 1 is counting and keeps its time");
+        assert_eq!([0b011, 0b011].map(|sample| filter.step(sample)), [0, 0b011]);
+        assert!(filter.take_times(&Filter::new(&Debounce::OFF, 0)));
+        assert!(filter.is_off());
+        assert_eq!(filter.step(0), 0b011);
     }
 
     #[test]

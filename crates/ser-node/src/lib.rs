@@ -27,6 +27,7 @@ mod arrival;
 pub mod calendar;
 pub mod capture;
 mod changes;
+pub mod chatter;
 pub mod clock;
 pub mod debounce;
 pub mod diagnostics;
@@ -48,7 +49,7 @@ pub mod ticks;
 mod version;
 mod waiting;
 
-pub use capture::{Capture, CaptureChannel, CaptureReader};
+pub use capture::{Capture, CaptureChannel, CaptureReader, DebounceTimes};
 pub use clock::{NoRtc, Rtc};
 pub use debounce::Debounce;
 pub use diagnostics::Diagnostics;

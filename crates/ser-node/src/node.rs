@@ -11,6 +11,7 @@ use ser_proto::{AutoReport, Baud, ReadReply};
 
 use crate::arrival::Way;
 use crate::clock::Rtc;
+use crate::debounce::Debounce;
 use crate::diagnostics::Diagnostics;
 use crate::genius_port::{FromBus, GeniusPort};
 use crate::recorder::{NodeParts, Recorder};
@@ -101,6 +102,18 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
     /// The line has changed to the rate that [`baud_change`](Self::baud_change) gave.
     pub fn baud_changed(&mut self, baud: Baud) {
         self.serial.baud_changed(baud);
+    }
+
+    /// The debounce times that the capture interrupt has to take over
+    /// ([`Capture::take_times`](crate::Capture::take_times)); `None` if it has them.
+    pub fn debounce_change(&self) -> Option<Debounce> {
+        self.recorder.debounce_change()
+    }
+
+    /// The capture interrupt has taken over the times that [`debounce_change`](Self::debounce_change)
+    /// gave.
+    pub fn debounce_changed(&mut self, debounce: Debounce) {
+        self.recorder.debounce_changed(debounce);
     }
 
     /// Says that the GENI board pulsed its interrupt line at `tick_ms`, because a datagram arrived

@@ -16,6 +16,7 @@ use crate::calendar::date_time;
 use crate::capture::CaptureReader;
 use crate::changes::Changes;
 use crate::clock::{Clock, Rtc, to_time_stamp};
+use crate::debounce::Debounce;
 use crate::diagnostics::{Diagnostics, count};
 use crate::event_log::{Event, EventLog};
 use crate::history::{Bits, History};
@@ -158,6 +159,16 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
     /// set clock or mode.
     pub(crate) fn hold_after(&mut self, arrived_ms: Option<u32>) {
         self.changes.hold_after(arrived_ms);
+    }
+
+    /// The debounce times that capture has to take over, if it does not have them.
+    pub(crate) fn debounce_change(&self) -> Option<Debounce> {
+        self.changes.debounce_change()
+    }
+
+    /// Capture has taken these times over.
+    pub(crate) fn debounce_changed(&mut self, debounce: Debounce) {
+        self.changes.debounce_changed(debounce);
     }
 
     /// Whether another command from this way finds room to wait for its turn.

@@ -87,6 +87,13 @@ impl Sequencer {
         self.state = state;
     }
 
+    /// Changes that are accepted from now on went through these debounce times. No input whose
+    /// time changes was being debounced then, so what it does next begins later.
+    pub(crate) fn change_debounce(&mut self, debounce: Debounce) {
+        self.debounce = debounce;
+        self.hold_ms = debounce.longest_ms().into();
+    }
+
     /// Holds back changes after this tick, for as long as there is room.
     pub(crate) fn hold_after(&mut self, tick_ms: Option<u64>) {
         self.hold_after_ms = tick_ms;
