@@ -2,15 +2,18 @@
 //! when the clock and mode of their millisecond are known.
 
 use crate::capture::CaptureReader;
+use crate::chatter::{Chatter, ChatterRule};
 use crate::debounce::Debounce;
 use crate::sequencer::{Change, Sequencer};
 use crate::ticks::Ticks;
 
-/// The main loop's end of the capture channel, and the sequencer that orders its samples.
+/// The main loop's end of the capture channel, the sequencer that orders its samples, and the
+/// filter that leaves chatter out.
 pub(crate) struct Changes<'a> {
     capture: CaptureReader<'a>,
     ticks: Ticks,
     sequencer: Sequencer,
+    chatter: Chatter,
     /// The inputs that the recorder has.
     mask: u32,
     has_begun: bool,
@@ -32,10 +35,21 @@ impl<'a> Changes<'a> {
             capture,
             ticks: Ticks::new(),
             sequencer: Sequencer::new(in_force),
+            chatter: Chatter::new(),
             mask,
             has_begun: false,
             debounce: DebounceChange { in_force, taken: None, wanted: in_force },
         }
+    }
+
+    /// From now on this rule decides when input `number` (1–32) chatters.
+    pub(crate) fn set_chatter_rule(&mut self, number: u8, rule: ChatterRule) {
+        self.chatter.set_rule(number, rule);
+    }
+
+    /// The filter for inputs that chatter.
+    pub(crate) fn chatter(&self) -> &Chatter {
+        &self.chatter
     }
 
     /// Wants these debounce times.
@@ -83,16 +97,17 @@ impl<'a> Changes<'a> {
 
     /// Hands on the changes of all samples up to `until_ms`, in the order in which they began.
     pub(crate) fn take_until(&mut self, until_ms: u64, mut record: impl FnMut(Change)) {
-        let Changes { capture, ticks, sequencer, mask, has_begun, debounce } = self;
+        let Changes { capture, ticks, sequencer, chatter, mask, has_begun, debounce } = self;
         while let Some(sample) = capture.next_if(|sample| ticks.extend(sample.tick_ms) <= until_ms)
         {
             let tick_ms = ticks.extend(sample.tick_ms);
             while let Some(change) = sequencer.next(tick_ms) {
-                record(change);
+                chatter.take(change, &mut record);
             }
             if !*has_begun {
                 *has_begun = true;
                 sequencer.baseline(sample.state & *mask);
+                chatter.baseline(sample.state & *mask);
             } else if sample.changed == 0 {
                 // What capture had to drop shows in the state, and began by the old times.
                 sequencer.push(tick_ms, 0, sample.state & *mask);
@@ -105,8 +120,9 @@ impl<'a> Changes<'a> {
             }
         }
         while let Some(change) = sequencer.next(until_ms + 1) {
-            record(change);
+            chatter.take(change, &mut record);
         }
+        chatter.settle(sequencer.settled_ms(), record);
     }
 }
 

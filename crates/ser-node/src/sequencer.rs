@@ -99,6 +99,11 @@ impl Sequencer {
         self.hold_after_ms = tick_ms;
     }
 
+    /// All changes that began up to this tick have been handed on.
+    pub(crate) fn settled_ms(&self) -> u64 {
+        self.front_ms.saturating_sub(1)
+    }
+
     /// Whether a change that began after this tick has been handed on.
     pub(crate) fn is_past(&self, tick_ms: u64) -> bool {
         self.handed_on_ms > tick_ms
