@@ -91,7 +91,7 @@ impl Surroundings {
                 }
                 Act::Say(command) => {
                     let bytes = FrameEncoder::new(command.to_body());
-                    self.bytes.extend(bytes.map(|byte| ReceivedByte { byte, tick_ms: now_ms }));
+                    self.bytes.extend(bytes.map(|byte| ReceivedByte { byte, at: now_ms.into() }));
                 }
             }
         }
@@ -173,7 +173,7 @@ impl Line for Lines {
 
     fn receive(&mut self, now_ms: u32) -> Option<ReceivedByte> {
         let bytes = &mut self.around.borrow_mut().bytes;
-        if bytes.front()?.tick_ms <= now_ms { bytes.pop_front() } else { None }
+        if bytes.front()?.at.tick_ms <= now_ms { bytes.pop_front() } else { None }
     }
 
     fn errors(&mut self) -> u32 {

@@ -72,7 +72,7 @@ fn take_in<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L,
             break;
         }
         let Some(received) = line.receive(now_ms) else { break };
-        node.serial_receive(received.byte, received.tick_ms);
+        node.serial_receive(received.byte, received.at);
     }
 }
 

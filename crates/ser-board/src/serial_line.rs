@@ -5,8 +5,9 @@
 //! is counted at once, in a count of its own. The main loop learns of it even if no other byte ever
 //! comes and even if the ring is full.
 
-use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, Ordering};
 
+use ser_node::TickStamp;
 use ser_proto::Baud;
 
 use crate::counter::Counter;
@@ -21,8 +22,8 @@ pub const CHARACTER_BITS: u32 = 10;
 pub struct ReceivedByte {
     /// The byte.
     pub byte: u8,
-    /// When, in milliseconds since power-up, wrapping.
-    pub tick_ms: u32,
+    /// When.
+    pub at: TickStamp,
 }
 
 /// Takes the oldest byte out of the ring, if it arrived no later than at tick `now_ms`. A byte that
@@ -31,7 +32,8 @@ pub fn take_until<const N: usize>(
     ring: &mut Reader<'_, ReceivedByte, N>,
     now_ms: u32,
 ) -> Option<ReceivedByte> {
-    let has_come = |received: &ReceivedByte| now_ms.wrapping_sub(received.tick_ms) <= u32::MAX / 2;
+    let has_come =
+        |received: &ReceivedByte| now_ms.wrapping_sub(received.at.tick_ms) <= u32::MAX / 2;
     ring.peek().filter(has_come)?;
     ring.pop()
 }
@@ -39,16 +41,19 @@ pub fn take_until<const N: usize>(
 /// One received byte in a ring.
 pub struct ReceivedCell {
     tick_ms: AtomicU32,
+    us: AtomicU16,
     byte: AtomicU8,
 }
 
 impl Slot for ReceivedByte {
     type Cell = ReceivedCell;
-    const EMPTY: ReceivedCell = ReceivedCell { tick_ms: AtomicU32::new(0), byte: AtomicU8::new(0) };
+    const EMPTY: ReceivedCell =
+        ReceivedCell { tick_ms: AtomicU32::new(0), us: AtomicU16::new(0), byte: AtomicU8::new(0) };
 
     #[inline]
     fn store(self, cell: &ReceivedCell) {
-        cell.tick_ms.store(self.tick_ms, Ordering::Relaxed);
+        cell.tick_ms.store(self.at.tick_ms, Ordering::Relaxed);
+        cell.us.store(self.at.us, Ordering::Relaxed);
         cell.byte.store(self.byte, Ordering::Relaxed);
     }
 
@@ -56,7 +61,10 @@ impl Slot for ReceivedByte {
     fn load(cell: &ReceivedCell) -> ReceivedByte {
         ReceivedByte {
             byte: cell.byte.load(Ordering::Relaxed),
-            tick_ms: cell.tick_ms.load(Ordering::Relaxed),
+            at: TickStamp {
+                tick_ms: cell.tick_ms.load(Ordering::Relaxed),
+                us: cell.us.load(Ordering::Relaxed),
+            },
         }
     }
 }
@@ -155,14 +163,14 @@ impl<const N: usize> Receiver<'_, N> {
     /// overrun and no byte the next time, while its data register still holds the byte that was
     /// read. Reading it again only clears the overrun.
     #[inline]
-    pub fn take(&mut self, shown: ReceiveStatus, read: impl FnOnce() -> u8, tick_ms: u32) {
+    pub fn take(&mut self, shown: ReceiveStatus, read: impl FnOnce() -> u8, at: TickStamp) {
         let ReceiveStatus { has_byte, overrun, misread } = shown;
         if !has_byte && !overrun {
             return;
         }
         let byte = read();
         if has_byte {
-            self.push(ReceivedByte { byte, tick_ms });
+            self.push(ReceivedByte { byte, at });
         }
         for _ in 0..u32::from(has_byte && misread) + u32::from(overrun) {
             self.count_error();
@@ -235,7 +243,7 @@ mod tests {
     use super::*;
 
     fn byte(byte: u8, tick_ms: u32) -> ReceivedByte {
-        ReceivedByte { byte, tick_ms }
+        ReceivedByte { byte, at: tick_ms.into() }
     }
 
     #[test]
@@ -258,7 +266,7 @@ mod tests {
             ends.receiver.push(byte(b'x', tick_ms));
         }
         let mut take =
-            |now_ms| take_until(&mut ends.received, now_ms).map(|received| received.tick_ms);
+            |now_ms| take_until(&mut ends.received, now_ms).map(|received| received.at.tick_ms);
         assert_eq!(
             [take(u32::MAX - 1), take(u32::MAX), take(u32::MAX)],
             [None, Some(u32::MAX), None]
@@ -332,7 +340,7 @@ mod tests {
                 uart.arrive(*first);
                 between = rest;
             }
-            receiver.take(status, || uart.read(), 7);
+            receiver.take(status, || uart.read(), 7.into());
         }
         panic!("the interrupt never ends");
     }
@@ -388,7 +396,7 @@ mod tests {
         let mut uart = Uart { data: b'z', ..Uart::default() };
         let mut rings = SerialRings::<8, 2>::new();
         let mut ends = rings.split();
-        ends.receiver.take(uart.status(), || unreachable!("there is nothing to read"), 0);
+        ends.receiver.take(uart.status(), || unreachable!("there is nothing to read"), 0.into());
         assert_eq!((ends.received.pop(), ends.errors.take()), (None, 0));
     }
 

@@ -151,7 +151,7 @@ mod tests {
         let mut line = UartLine::new(Mock::default(), received, errors, to_send);
         assert!(!line.has_received());
         let [first, late] =
-            [(b'a', 5), (b'b', 7)].map(|(byte, tick_ms)| ReceivedByte { byte, tick_ms });
+            [(b'a', 5), (b'b', 7)].map(|(byte, at)| ReceivedByte { byte, at: u32::into(at) });
         receiver.push(first);
         receiver.push(late);
         assert!(line.has_received());

@@ -171,7 +171,7 @@ impl Board<'_> {
 
     fn arrive(&mut self, command: &Command) {
         for byte in FrameEncoder::new(command.to_body()) {
-            self.receiver.push(ReceivedByte { byte, tick_ms: self.tick_ms });
+            self.receiver.push(ReceivedByte { byte, at: self.tick_ms.into() });
         }
     }
 
@@ -233,7 +233,7 @@ fn what_arrives_during_the_longest_stall_is_not_lost() {
         board.stall_ms(if ms.is_multiple_of(2) { 0 } else { u32::MAX });
         while arrived < budget::bytes_in(ms) {
             let byte = line.next().unwrap();
-            board.receiver.push(ReceivedByte { byte, tick_ms: board.tick_ms });
+            board.receiver.push(ReceivedByte { byte, at: board.tick_ms.into() });
             arrived += 1;
         }
     }
@@ -252,7 +252,7 @@ fn bytes_beyond_the_ring_are_counted_as_line_errors() {
     let mut memory = Memory::new();
     let mut board = memory.power_up();
     for _ in 0..RECEIVE + 10 {
-        board.receiver.push(ReceivedByte { byte: b'.', tick_ms: 0 });
+        board.receiver.push(ReceivedByte { byte: b'.', at: 0.into() });
     }
     board.receiver.count_error();
     // At once, because no further byte may ever follow.

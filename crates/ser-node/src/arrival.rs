@@ -2,6 +2,8 @@
 
 use ser_proto::{Command, ParseError};
 
+use crate::tick_stamp::TickStamp;
+
 /// The way on which a command came, and on which its reply goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -19,8 +21,8 @@ pub(crate) enum Way {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Arrival {
     pub(crate) command: Result<Command, ParseError>,
-    /// The tick of arrival. The tick of reading where nobody saw the arrival.
-    pub(crate) tick_ms: u32,
+    /// The moment of arrival, to the tick on the bus. That of reading where nobody saw the arrival.
+    pub(crate) at: TickStamp,
     pub(crate) is_seen: bool,
     pub(crate) way: Way,
 }

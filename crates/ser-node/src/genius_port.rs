@@ -256,7 +256,8 @@ impl<W: SharedRam> GeniusPort<W> {
             Way::Bus(datagram.source)
         };
         let tick_ms = datagram.arrived_ms.unwrap_or(now_ms);
-        FromBus::Arrived(Arrival { command, tick_ms, is_seen: datagram.arrived_ms.is_some(), way })
+        let at = tick_ms.into();
+        FromBus::Arrived(Arrival { command, at, is_seen: datagram.arrived_ms.is_some(), way })
     }
 
     fn sent(&mut self, arrived: bool, now_ms: u32) -> FromBus {

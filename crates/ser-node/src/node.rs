@@ -17,6 +17,7 @@ use crate::genius_port::{FromBus, GeniusPort};
 use crate::recorder::{NodeParts, Recorder};
 use crate::serial_port::SerialPort;
 use crate::settings::Storage;
+use crate::tick_stamp::TickStamp;
 use crate::waiting::Request;
 
 /// Events of the GENI board that one poll handles at most.
@@ -50,13 +51,13 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.recorder.record_until(now_ms);
     }
 
-    /// Takes a byte that arrived from the RS-232 line at `tick_ms`. The command that it completes
-    /// is accepted here.
+    /// Takes a byte that arrived from the RS-232 line at this moment, which may be the bare tick of
+    /// a sample. The command that it completes is accepted here.
     ///
     /// Clock and mode are set at once, as of that tick. Every other command is carried out when its
     /// reply has its turn.
-    pub fn serial_receive(&mut self, byte: u8, tick_ms: u32) {
-        match self.serial.receive(byte, tick_ms) {
+    pub fn serial_receive(&mut self, byte: u8, at: impl Into<TickStamp>) {
+        match self.serial.receive(byte, at.into()) {
             Some(Ok(arrival)) => self.recorder.arrived(&arrival),
             Some(Err(error)) => self.recorder.count_frame_error(error),
             None => {}

@@ -180,7 +180,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
     /// Clock and mode are then set at once, as of the command's tick. Everything else is done when
     /// the reply has its turn.
     pub(crate) fn arrived(&mut self, arrival: &Arrival) {
-        let Arrival { command, tick_ms, is_seen, way } = *arrival;
+        let Arrival { command, at, is_seen, way } = *arrival;
         if !is_seen && matches!(command, Ok(Command::SetMode { .. })) {
             // The setting takes effect late, which is better than never. Changes after its arrival
             // have already been recorded by the old mode.
@@ -193,7 +193,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
             return;
         }
         self.commands = self.commands.wrapping_add(1);
-        let tick_ms = self.record_until(tick_ms);
+        let tick_ms = self.record_until(at.tick_ms);
         let pending = match command {
             Ok(command) => Some(self.begin(&command, tick_ms)),
             Err(error) => self.refuse(error),

@@ -6,6 +6,7 @@ use ser_proto::{Baud, Command, Decoded, FrameDecoder, FrameEncoder, FrameError, 
 
 use crate::arrival::{Arrival, Way};
 use crate::print_line::PrintLine;
+use crate::tick_stamp::TickStamp;
 
 /// Bytes of the longest command (set clock and configure are shorter than this).
 const MAX_COMMAND_LEN: usize = 16;
@@ -46,17 +47,17 @@ impl SerialPort {
         SerialPort { decoder: FrameDecoder::new(), outgoing: Outgoing::Nothing, baud }
     }
 
-    /// Takes a byte that arrived at `tick_ms`. Returns the command that it completes, or the fault
+    /// Takes a byte that arrived then. Returns the command that it completes, or the fault
     /// of the frame.
     pub(crate) fn receive(
         &mut self,
         byte: u8,
-        tick_ms: u32,
+        at: TickStamp,
     ) -> Option<Result<Arrival, FrameError>> {
         match self.decoder.push(byte)? {
             Decoded::Frame(body) => {
                 let command = Command::parse(body);
-                Some(Ok(Arrival { command, tick_ms, is_seen: true, way: Way::Line }))
+                Some(Ok(Arrival { command, at, is_seen: true, way: Way::Line }))
             }
             Decoded::Dropped(dropped) => Some(Err(dropped.cause)),
             // A recorder expects no text.

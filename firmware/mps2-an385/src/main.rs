@@ -154,7 +154,7 @@ mod app {
 
     #[task(binds = UART0_RX, priority = 2, local = [receive])]
     fn receive(cx: receive::Context) {
-        cx.local.receive.on_interrupt(timer::tick_ms());
+        cx.local.receive.on_interrupt(timer::stamp());
     }
 
     #[task(binds = UART0_TX, priority = 1, local = [transmit])]

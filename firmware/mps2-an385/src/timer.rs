@@ -15,7 +15,7 @@
 use core::num::NonZeroU32;
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use ser_node::TickCounter;
+use ser_node::{TickCounter, TickStamp};
 
 use crate::device::{self, base};
 use crate::mmio::Word;
@@ -64,10 +64,20 @@ const TIMER1: Registers = unsafe { Registers::at(base::TIMER1) };
 
 static TICK_MS: AtomicU32 = AtomicU32::new(0);
 
+/// The count at tick 0.
+static STARTED_AT: AtomicU32 = AtomicU32::new(0);
+
 /// Milliseconds since boot, wrapping. The tick of the latest sample, for those who have no part in
 /// capture.
 pub(crate) fn tick_ms() -> u32 {
     TICK_MS.load(Ordering::Relaxed)
+}
+
+/// This moment.
+pub(crate) fn stamp() -> TickStamp {
+    let tick_ms = tick_ms();
+    let elapsed = count_up().wrapping_sub(STARTED_AT.load(Ordering::Relaxed));
+    TickStamp::new(tick_ms, elapsed, COUNTS_PER_MS)
 }
 
 /// Both timers, running.
@@ -84,7 +94,9 @@ impl Timer {
     /// Starts the interrupt; the tick begins at 0.
     pub(crate) fn start() -> Timer {
         TIMER0.start(COUNTS_PER_MS.get() - 1, ENABLE | INTERRUPT_ENABLE);
-        Timer { ticks: TickCounter::new(COUNTS_PER_MS, count_up()) }
+        let count = count_up();
+        STARTED_AT.store(count, Ordering::Relaxed);
+        Timer { ticks: TickCounter::new(COUNTS_PER_MS, count) }
     }
 
     /// Acknowledges the interrupt. Returns the tick, or `None` when the previous interrupt has

@@ -20,6 +20,7 @@ use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
 use ser_board::ring::Reader;
 use ser_board::serial_line::{Quiet, ReceivedByte, Receiver, SerialEnds, SerialRings};
 use ser_board::uart_line::{Uart, UartLine};
+use ser_node::TickStamp;
 use ser_proto::Baud;
 
 use crate::device::{self, Interrupt, base};
@@ -82,7 +83,7 @@ pub(crate) struct ReceiveInterrupt {
 
 impl ReceiveInterrupt {
     /// Moves what has arrived into the ring.
-    pub(crate) fn on_interrupt(&mut self, tick_ms: u32) {
+    pub(crate) fn on_interrupt(&mut self, now: TickStamp) {
         while STATE.read() & RECEIVE_FULL != 0 {
             if !self.receiver.has_room() {
                 // The main loop unmasks it when it has made room.
@@ -95,7 +96,7 @@ impl ReceiveInterrupt {
                 STATE.write(RECEIVE_OVERRUN);
                 self.receiver.count_error();
             }
-            self.receiver.push(ReceivedByte { byte, tick_ms });
+            self.receiver.push(ReceivedByte { byte, at: now });
         }
     }
 }

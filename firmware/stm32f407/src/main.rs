@@ -204,7 +204,7 @@ mod app {
 
     #[task(binds = USART2, priority = 2, local = [serial_interrupt])]
     fn serial(cx: serial::Context) {
-        cx.local.serial_interrupt.on_interrupt(timer::tick_ms());
+        cx.local.serial_interrupt.on_interrupt(timer::stamp());
     }
 
     /// A datagram has arrived at the GENI board. Wakes the main loop.

@@ -12,7 +12,7 @@
 use core::num::NonZeroU32;
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use ser_node::TickCounter;
+use ser_node::{TickCounter, TickStamp};
 use stm32f4::stm32f407::{RCC, TIM2, TIM3};
 
 use crate::clocks;
@@ -25,10 +25,20 @@ const _: () = assert!(PRESCALER as u32 * COUNTS_PER_SECOND == clocks::TIMER_HZ);
 
 static TICK_MS: AtomicU32 = AtomicU32::new(0);
 
+/// The count at tick 0.
+static STARTED_AT: AtomicU32 = AtomicU32::new(0);
+
 /// Milliseconds since boot, wrapping. The tick of the latest sample, for those who have no part in
 /// capture.
 pub(crate) fn tick_ms() -> u32 {
     TICK_MS.load(Ordering::Relaxed)
+}
+
+/// This moment.
+pub(crate) fn stamp() -> TickStamp {
+    let tick_ms = tick_ms();
+    let elapsed = count_us().wrapping_sub(STARTED_AT.load(Ordering::Relaxed));
+    TickStamp::new(tick_ms, elapsed, COUNTS_PER_MS)
 }
 
 /// Both timers, running.
@@ -57,7 +67,9 @@ impl Timer {
         interval.dier().write(|w| w.uie().set_bit());
         interval.cr1().write(|w| w.cen().set_bit());
 
-        let ticks = TickCounter::new(COUNTS_PER_MS, counter.cnt().read().bits());
+        let count_us = counter.cnt().read().bits();
+        STARTED_AT.store(count_us, Ordering::Relaxed);
+        let ticks = TickCounter::new(COUNTS_PER_MS, count_us);
         Timer { interval, counter, ticks }
     }
 
@@ -70,4 +82,9 @@ impl Timer {
         TICK_MS.store(tick_ms, Ordering::Relaxed);
         Some(tick_ms)
     }
+}
+
+fn count_us() -> u32 {
+    // SAFETY: the register is there, and a look at the count changes nothing.
+    unsafe { (*TIM2::ptr()).cnt().read().bits() }
 }

@@ -14,6 +14,7 @@ use ser_board::budget::{RECEIVE_RING_LEN, TRANSMIT_RING_LEN};
 use ser_board::ring::Reader;
 use ser_board::serial_line::{ReceiveStatus, Receiver, SerialEnds, SerialRings};
 use ser_board::uart_line::{Uart, UartLine};
+use ser_node::TickStamp;
 use ser_proto::Baud;
 use stm32f4::stm32f407::{RCC, USART2};
 
@@ -61,7 +62,7 @@ pub(crate) struct SerialInterrupt {
 
 impl SerialInterrupt {
     /// Takes the byte that has arrived, and sends one if there is room.
-    pub(crate) fn on_interrupt(&mut self, tick_ms: u32) {
+    pub(crate) fn on_interrupt(&mut self, now: TickStamp) {
         // Reading status and then data clears the error flags.
         let status = self.uart.sr().read();
         let shown = ReceiveStatus {
@@ -73,7 +74,7 @@ impl SerialInterrupt {
             let [byte, ..] = self.uart.dr().read().bits().to_le_bytes();
             byte
         };
-        self.receiver.take(shown, data, tick_ms);
+        self.receiver.take(shown, data, now);
         if status.txe().bit_is_set() {
             match self.transmitter.pop() {
                 Some(byte) => {
