@@ -5,7 +5,7 @@
 //! and gives bytes as fast as they come therefore cannot hold up the main loop.
 
 use geni_board::SharedRam;
-use ser_node::{Node, Rtc, Storage};
+use ser_node::{DebounceTimes, Node, Rtc, Storage};
 use ser_proto::Baud;
 
 use crate::genius::{GeniBoard, Genius};
@@ -61,6 +61,20 @@ pub fn pass<S: Storage, R: Rtc, L: Line, W: SharedRam, B: GeniBoard>(
         genius.serve(node);
     }
     now_ms
+}
+
+/// Hands other debounce times over to capture, if some are wanted. `take` lets capture take them
+/// ([`Capture::take_times`](ser_node::Capture::take_times)) while its interrupt is held off. It is
+/// tried again in the next pass where that is not possible now.
+pub fn change_debounce<S: Storage, R: Rtc>(
+    node: &mut Node<'_, S, R>,
+    take: impl FnOnce(&DebounceTimes) -> bool,
+) {
+    if let Some(debounce) = node.debounce_change()
+        && take(&DebounceTimes::new(&debounce))
+    {
+        node.debounce_changed(debounce);
+    }
 }
 
 fn take_in<S: Storage, R: Rtc, L: Line>(node: &mut Node<'_, S, R>, line: &mut L, now_ms: u32) {

@@ -68,13 +68,14 @@ mod app {
     };
 
     #[shared]
-    struct Shared {}
+    struct Shared {
+        capture: Capture<'static>,
+    }
 
     #[local]
     struct Local {
         timer: Timer,
         sampler: Sampler<'static, InputLatch>,
-        capture: Capture<'static>,
         receive: ReceiveInterrupt,
         transmit: TransmitInterrupt,
         serial: SerialLine,
@@ -118,11 +119,10 @@ mod app {
         let lamps = Lamps::new();
         let was_fault = boot.cause.is_fault();
         (
-            Shared {},
+            Shared { capture },
             Local {
                 timer,
                 sampler,
-                capture,
                 receive,
                 transmit,
                 serial,
@@ -141,13 +141,15 @@ mod app {
     }
 
     /// Takes a sample of all inputs.
-    #[task(binds = TIMER0, priority = 3, local = [timer, sampler, capture])]
+    #[task(binds = TIMER0, priority = 3, local = [timer, sampler], shared = [capture])]
     fn capture(cx: capture::Context) {
-        let capture::LocalResources { timer, sampler, capture, .. } = cx.local;
+        let capture::LocalResources { timer, sampler, .. } = cx.local;
+        let mut capture = cx.shared.capture;
         if let Some(tick_ms) = timer.on_interrupt()
             && let Sample::Fresh(inputs) | Sample::Held(inputs) = sampler.sample()
         {
-            capture.sample(tick_ms, inputs);
+            // Nothing is locked: no task has a higher priority.
+            capture.lock(|capture| capture.sample(tick_ms, inputs));
             external_bus::mark_sample(tick_ms, inputs);
         }
     }
@@ -162,14 +164,18 @@ mod app {
         cx.local.transmit.on_interrupt();
     }
 
-    #[idle(local = [serial, node, genius, lamps, watchdog, was_fault])]
+    #[idle(local = [serial, node, genius, lamps, watchdog, was_fault], shared = [capture])]
     fn idle(cx: idle::Context) -> ! {
         let idle::LocalResources { serial, node, genius, lamps, watchdog, was_fault, .. } =
             cx.local;
+        let mut capture = cx.shared.capture;
         let mut liveness = Liveness::new();
         let mut report = Report::new(node.tick_ms(), &HEALTH);
         loop {
             let now_ms = main_loop::pass(node, serial, genius.as_mut());
+            main_loop::change_debounce(node, |times| {
+                capture.lock(|capture| capture.take_times(times))
+            });
             let broken = HEALTH.is_broken();
             lamps.show(
                 now_ms,

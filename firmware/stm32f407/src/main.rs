@@ -73,13 +73,14 @@ mod app {
     };
 
     #[shared]
-    struct Shared {}
+    struct Shared {
+        capture: Capture<'static>,
+    }
 
     #[local]
     struct Local {
         timer: Timer,
         sampler: Sampler<'static, InputPins>,
-        capture: Capture<'static>,
         serial_interrupt: SerialInterrupt,
         geni_line: InterruptLine,
         serial: SerialLine,
@@ -161,11 +162,10 @@ mod app {
         let sampler = Sampler::new(contacts, inputs::wiring(model), &INPUT_HEALTH);
         let timer = Timer::start(&device.RCC, device.TIM2, device.TIM3);
         (
-            Shared {},
+            Shared { capture },
             Local {
                 timer,
                 sampler,
-                capture,
                 serial_interrupt,
                 geni_line,
                 serial,
@@ -192,13 +192,15 @@ mod app {
     }
 
     /// Takes a sample of all inputs.
-    #[task(binds = TIM3, priority = 3, local = [timer, sampler, capture])]
+    #[task(binds = TIM3, priority = 3, local = [timer, sampler], shared = [capture])]
     fn capture(cx: capture::Context) {
-        let capture::LocalResources { timer, sampler, capture, .. } = cx.local;
+        let capture::LocalResources { timer, sampler, .. } = cx.local;
+        let mut capture = cx.shared.capture;
         if let Some(tick_ms) = timer.on_interrupt()
             && let Sample::Fresh(inputs) | Sample::Held(inputs) = sampler.sample()
         {
-            capture.sample(tick_ms, inputs);
+            // Nothing is locked: no task has a higher priority.
+            capture.lock(|capture| capture.sample(tick_ms, inputs));
         }
     }
 
@@ -213,13 +215,17 @@ mod app {
         cx.local.geni_line.on_interrupt(timer::tick_ms());
     }
 
-    #[idle(local = [serial, node, genius, lamps, watchdog, start])]
+    #[idle(local = [serial, node, genius, lamps, watchdog, start], shared = [capture])]
     fn idle(cx: idle::Context) -> ! {
         let idle::LocalResources { serial, node, genius, lamps, watchdog, start, .. } = cx.local;
+        let mut capture = cx.shared.capture;
         let mut liveness = Liveness::new();
         let mut report = Report::new(node.tick_ms(), &HEALTH);
         loop {
             let now_ms = main_loop::pass(node, serial, genius.as_mut());
+            main_loop::change_debounce(node, |times| {
+                capture.lock(|capture| capture.take_times(times))
+            });
             let broken = start.clock_source != Source::Crystal || HEALTH.is_broken();
             lamps.show(
                 now_ms,
