@@ -72,13 +72,14 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use ser_proto::{
-    Code, Command, Decoded, FrameDecoder, MAX_BODY_LEN, ParseError, Reply, TimeStamp, encoded_len,
+    Code, Command, Decoded, ESC, FrameDecoder, MAX_BODY_LEN, ParseError, Reply, TimeStamp,
+    encoded_len,
 };
 
 use crate::transport::line_rate::LineRate;
 use counters::Counters;
 use diagnosis::Diagnosis;
-use exchange::Exchange;
+use exchange::{Beginning, Exchange};
 use owed::Owed;
 use pace::Pace;
 pub use request::Attempt;
@@ -151,6 +152,8 @@ pub struct Session {
     lines: LineAssembler,
     counters: Counters,
     last_byte_at: Duration,
+    /// When the frame began that is arriving, or has just arrived.
+    frame_began: Beginning,
     /// Those under way come first, in the order of sending.
     requests: VecDeque<Request>,
     /// When the attempt of the first request under way ends.
@@ -174,6 +177,7 @@ impl Session {
             lines: LineAssembler::default(),
             counters: Counters::default(),
             last_byte_at: Duration::ZERO,
+            frame_began: Beginning::at(Duration::ZERO),
             requests: VecDeque::new(),
             deadline: Duration::ZERO,
             answers: VecDeque::new(),
@@ -306,6 +310,10 @@ impl Session {
         for &byte in bytes {
             self.counters.bytes += 1;
             self.last_byte_at = now;
+            if byte == ESC {
+                self.frame_began = Beginning::at(now);
+            }
+            self.frame_began.take_byte(now, self.timing.line_rate);
             let message = match self.decoder.push(byte) {
                 None => continue,
                 Some(Decoded::Text(byte)) => {
@@ -327,6 +335,7 @@ impl Session {
     /// Takes a body that has arrived without a frame, as on a Genius bus.
     pub fn process_body(&mut self, now: Duration, body: &[u8]) {
         self.counters.bytes += body.len() as u64;
+        self.frame_began = Beginning::at(now);
         self.take_message(now, understand(body));
     }
 
@@ -385,7 +394,7 @@ impl Session {
             self.unsolicited.drop_lines();
             self.lines.clear();
         }
-        let exchange = request.exchange(now, &reply, self.timing.line_rate);
+        let exchange = request.exchange(now, self.frame_began, self.timing.line_rate);
         self.answers.push_back(Ok((reply, exchange)));
         self.unsolicited.mark();
         if place == 0 {

@@ -7,7 +7,7 @@ use ser_proto::{
 };
 
 use super::counters::Counters;
-use super::exchange::Exchange;
+use super::exchange::{Beginning, Exchange};
 use crate::transport::line_rate::LineRate;
 
 /// A request whose answer has not come.
@@ -72,10 +72,15 @@ impl Request {
     }
 
     /// When it was asked and answered.
-    pub(super) fn exchange(&self, now: Duration, reply: &Reply, line_rate: LineRate) -> Exchange {
-        let lengths =
-            (encoded_len(self.command.to_body().len()), encoded_len(reply.to_body().len()));
-        Exchange::new(self.sent, (self.first_sent, self.last_sent, now), lengths, line_rate)
+    pub(super) fn exchange(
+        &self,
+        now: Duration,
+        reply: Beginning,
+        line_rate: LineRate,
+    ) -> Exchange {
+        let request = encoded_len(self.command.to_body().len());
+        let times = (self.first_sent, self.last_sent, now);
+        Exchange::new(self.sent, times, request, reply, line_rate)
     }
 
     /// Marks the attempt under way as failed.
