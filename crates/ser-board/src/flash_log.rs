@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! slot   0         1         2         3
-//!     |  marker | record  | record  | erased … |      16 bytes each; the last one in use is the copy
+//!     |  marker | record  | record  | erased … |     256 bytes each; the last one in use is the copy
 //! ```
 //!
 //! # Design
@@ -19,18 +19,21 @@
 //! sectors of one size for each copy that has sectors of its own. Of the four sectors of 16 KiB on
 //! an STM32F407, the first has to hold the vector table. Here there is one value of one length,
 //! which brings its own check and number, so a log of slots is enough. Two sectors of 16 KiB with
-//! 10 000 erases each last for 20 million changes.
+//! 10 000 erases each last for 1.2 million records.
 //!
 //! # Notes
-//! A sector of 16 KiB takes 1023 records, one of 128 KiB 8191. The copies take turns, so an erase
-//! is due once in as many changes, and with the very first change of each copy. On an STM32F4 it
+//! A sector of 16 KiB takes 63 records, one of 128 KiB 511. The copies take turns, so an erase is
+//! due once in as many records, and with the very first one of each copy. On an STM32F4 it
 //! takes 250–500 ms for 16 KiB and 1–2 s for 128 KiB (data sheet, "Flash memory programming", 32
 //! bits at a time). Nothing can be read from that bank until the erase is done: code that runs from
 //! it stands still, interrupts included. There are two ways out. Either the capture interrupt, all
 //! that it calls and the vector table are in RAM; capture then goes on while the main loop waits,
 //! and its queue takes 256 changes. Or the samples of that time are missed, and `ser_node` counts
-//! them. The board feeds its watchdog meanwhile. Writing a record takes 16 bytes of at most 100 µs
+//! them. The board feeds its watchdog meanwhile. Writing a record takes 64 words of at most 100 µs
 //! each.
+//!
+//! Before records had 256 bytes, they had 16, behind a marker of their own. Such a sector is read,
+//! and is erased before anything is written to it.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -39,13 +42,22 @@ use ser_node::{CopyNumber, RECORD_LEN, Storage};
 
 use crate::counter::Counter;
 
-/// Content of slot 0 in a sector whose erase was completed.
-const MARKER: [u8; RECORD_LEN] = *b"SER settings 1\r\n";
-const CLEARED: [u8; RECORD_LEN] = [0; RECORD_LEN];
+/// How slot 0 begins in a sector whose erase was completed.
+const MARKER: Piece = *b"SER settings 2\r\n";
+/// The same where records have the length of a piece.
+const OLD_MARKER: Piece = *b"SER settings 1\r\n";
+const CLEARED: Piece = [0; PIECE_LEN];
 const ERASED: u8 = 0xFF;
 
-#[expect(clippy::cast_possible_truncation, reason = "16")]
+/// What is looked at in one go.
+type Piece = [u8; PIECE_LEN];
+const PIECE_LEN: usize = 16;
+
+#[expect(clippy::cast_possible_truncation, reason = "256")]
 const SLOT_LEN: u32 = RECORD_LEN as u32;
+#[expect(clippy::cast_possible_truncation, reason = "16")]
+const OLD_SLOT_LEN: u32 = PIECE_LEN as u32;
+const _: () = assert!(RECORD_LEN.is_multiple_of(PIECE_LEN));
 
 /// Counts that the storage shares with the board; for a static.
 #[derive(Debug, Default)]
@@ -97,7 +109,7 @@ impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
     const SLOTS: u32 = {
         assert!(F::ERASE_SIZE.is_multiple_of(RECORD_LEN) && F::ERASE_SIZE >= 2 * RECORD_LEN);
         assert!(
-            RECORD_LEN.is_multiple_of(F::WRITE_SIZE) && RECORD_LEN.is_multiple_of(F::READ_SIZE)
+            PIECE_LEN.is_multiple_of(F::WRITE_SIZE) && PIECE_LEN.is_multiple_of(F::READ_SIZE)
         );
         assert!(F::ERASE_SIZE <= i32::MAX as usize);
         #[expect(clippy::cast_possible_truncation, reason = "checked above")]
@@ -105,7 +117,7 @@ impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
         sector_len / SLOT_LEN
     };
 
-    /// Configurations that one sector takes before it is erased.
+    /// Records that one sector takes before it is erased.
     pub const RECORDS_PER_SECTOR: u32 = Self::SLOTS - 1;
 
     const SECTOR_LEN: u32 = Self::SLOTS * SLOT_LEN;
@@ -116,14 +128,17 @@ impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
         FlashLog { flash, health }
     }
 
-    /// How many configurations find room in the sector of `copy` before it has to be erased: 0 when
+    /// How many records find room in the sector of `copy` before it has to be erased: 0 when
     /// that is due.
     ///
     /// # Errors
     /// When the memory cannot be read.
     pub fn records_left(&mut self, copy: CopyNumber) -> Result<u32, F::Error> {
-        let used = self.slots_used(Self::sector(copy))?;
-        Ok(used.map_or(0, |used| Self::SLOTS - used))
+        let sector = Self::sector(copy);
+        match self.piece(sector)? {
+            MARKER => Ok(Self::SLOTS - self.slots_used(sector, SLOT_LEN)?),
+            _ => Ok(0),
+        }
     }
 
     /// Where the sector of a copy begins.
@@ -135,46 +150,62 @@ impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
     }
 
     #[inline]
-    fn slot(&mut self, sector: u32, slot: u32) -> Result<[u8; RECORD_LEN], F::Error> {
-        let mut content = [0; RECORD_LEN];
-        self.flash.read(sector + slot * SLOT_LEN, &mut content)?;
+    fn piece(&mut self, offset: u32) -> Result<Piece, F::Error> {
+        let mut content = [0; PIECE_LEN];
+        self.flash.read(offset, &mut content)?;
         Ok(content)
     }
 
-    /// Slots up to the last one in use, the marker's included; `None` when the sector has to be
-    /// erased first.
-    fn slots_used(&mut self, sector: u32) -> Result<Option<u32>, F::Error> {
-        if self.slot(sector, 0)? != MARKER {
-            return Ok(None);
+    fn is_erased(&mut self, from: u32, len: u32) -> Result<bool, F::Error> {
+        for offset in (from..from + len).step_by(PIECE_LEN) {
+            // As one number: in a sector with few records this is most of what a start does.
+            if u128::from_ne_bytes(self.piece(offset)?) != u128::MAX {
+                return Ok(false);
+            }
         }
+        Ok(true)
+    }
+
+    /// Slots up to the last one in use, the marker's included.
+    fn slots_used(&mut self, sector: u32, slot_len: u32) -> Result<u32, F::Error> {
         // From the end: behind a record that was cut short there may be nothing, in front of it
         // there are only records. Not by halves: one that was cut short may hold bits that read now
         // so, now so, and must not hide those that came after it.
-        for slot in (1..Self::SLOTS).rev() {
-            // As one number: in a sector with few records this is most of what a start does.
-            if u128::from_ne_bytes(self.slot(sector, slot)?) != u128::MAX {
-                return Ok(Some(slot + 1));
+        for slot in (1..Self::SECTOR_LEN / slot_len).rev() {
+            if !self.is_erased(sector + slot * slot_len, slot_len)? {
+                return Ok(slot + 1);
             }
         }
-        Ok(Some(1))
+        Ok(1)
     }
 
-    fn newest(&mut self, copy: CopyNumber) -> Result<[u8; RECORD_LEN], F::Error> {
+    /// Reads the newest record of a copy. A short one is followed by what erased memory holds.
+    fn newest(&mut self, copy: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), F::Error> {
         let sector = Self::sector(copy);
-        match self.slots_used(sector)? {
-            Some(used) if used > 1 => self.slot(sector, used - 1),
-            _ => Ok([ERASED; RECORD_LEN]),
+        record.fill(ERASED);
+        let slot_len = match self.piece(sector)? {
+            MARKER => SLOT_LEN,
+            OLD_MARKER => OLD_SLOT_LEN,
+            _ => return Ok(()),
+        };
+        let used = self.slots_used(sector, slot_len)?;
+        match record.get_mut(..slot_len as usize) {
+            Some(record) if used > 1 => self.flash.read(sector + (used - 1) * slot_len, record),
+            _ => Ok(()),
         }
     }
 
     fn append(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), F::Error> {
         let sector = Self::sector(copy);
-        let slot = match self.slots_used(sector)? {
-            Some(used) if used < Self::SLOTS => used,
-            _ => {
-                self.erase(sector)?;
-                1
-            }
+        let used = match self.piece(sector)? {
+            MARKER => self.slots_used(sector, SLOT_LEN)?,
+            _ => Self::SLOTS,
+        };
+        let slot = if used < Self::SLOTS {
+            used
+        } else {
+            self.erase(sector)?;
+            1
         };
         self.health.writes.count();
         self.flash.write(sector + slot * SLOT_LEN, record)
@@ -192,9 +223,8 @@ impl<F: MultiwriteNorFlash> Storage for FlashLog<'_, F> {
     type Error = F::Error;
 
     fn read(&mut self, copy: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), F::Error> {
-        let newest = self.newest(copy);
-        *record = self.health.note(newest)?;
-        Ok(())
+        let read = self.newest(copy, record);
+        self.health.note(read)
     }
 
     fn write(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), F::Error> {
