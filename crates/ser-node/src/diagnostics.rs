@@ -60,9 +60,9 @@ impl Diagnostics {
         let counter = match error {
             ParseError::Empty => &mut self.frames_empty,
             ParseError::UnknownCode { .. } => &mut self.commands_unknown,
-            ParseError::WrongLength { .. } | ParseError::EntrySize { .. } => {
-                &mut self.commands_wrong_length
-            }
+            ParseError::WrongLength { .. }
+            | ParseError::TooShort { .. }
+            | ParseError::EntrySize { .. } => &mut self.commands_wrong_length,
             ParseError::BadValue { .. } => &mut self.parameters_refused,
         };
         count(counter, 1);

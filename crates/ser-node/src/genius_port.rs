@@ -44,6 +44,7 @@ use ser_proto::{Command, Inputs, Model, ReadReply, Reply};
 
 use crate::arrival::{Arrival, Way};
 use crate::diagnostics::count;
+use crate::served::command_in;
 
 use reporter::Reporter;
 
@@ -243,7 +244,7 @@ impl<W: SharedRam> GeniusPort<W> {
     }
 
     fn receive_message(&mut self, datagram: &ReceivedDatagram, now_ms: u32) -> FromBus {
-        let command = Command::parse(&datagram.data);
+        let command = command_in(&datagram.data);
         // The time in it was right at its arrival, and the tick of its arrival is not known.
         if datagram.arrived_ms.is_none() && matches!(command, Ok(Command::SetClock(_))) {
             count(&mut self.diagnostics.clocks_refused, 1);

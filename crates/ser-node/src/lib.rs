@@ -42,6 +42,7 @@ mod recorder;
 pub mod ring;
 pub mod sequencer;
 mod serial_port;
+mod served;
 pub mod settings;
 mod tick_counter;
 pub mod ticks;

@@ -243,6 +243,12 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
                 | Command::QueryMode
                 | Command::SetMode { .. }
                 | Command::SetClock(_) => Reply::Configuration(self.configuration),
+                // No port hands these on: see `served`.
+                Command::Identify
+                | Command::Time { .. }
+                | Command::QueryFilters { .. }
+                | Command::SetFilter { .. }
+                | Command::Diagnostics { .. } => return None,
             },
         })
     }

@@ -2,10 +2,11 @@
 //!
 //! The port holds one message at a time. It asks for the next one when that has gone out.
 
-use ser_proto::{Baud, Command, Decoded, FrameDecoder, FrameEncoder, FrameError, Reply};
+use ser_proto::{Baud, Decoded, FrameDecoder, FrameEncoder, FrameError, Reply};
 
 use crate::arrival::{Arrival, Way};
 use crate::print_line::PrintLine;
+use crate::served::command_in;
 
 /// Bytes of the longest command (set clock and configure are shorter than this).
 const MAX_COMMAND_LEN: usize = 16;
@@ -55,7 +56,7 @@ impl SerialPort {
     ) -> Option<Result<Arrival, FrameError>> {
         match self.decoder.push(byte)? {
             Decoded::Frame(body) => {
-                let command = Command::parse(body);
+                let command = command_in(body);
                 Some(Ok(Arrival { command, tick_ms, is_seen: true, way: Way::Line }))
             }
             Decoded::Dropped(dropped) => Some(Err(dropped.cause)),

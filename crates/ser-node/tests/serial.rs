@@ -496,6 +496,41 @@ fn the_clock_goes_on_after_a_power_cycle() {
     assert_eq!(bench.read(1, 1).entries[0].time.to_string(), "2026-11-22T10:00:00.002");
 }
 
+// I, T, F, D: our extension
+
+#[test]
+fn commands_of_the_extension_are_met_with_silence_as_unknown_ones() {
+    let ours: [&[u8]; 9] = [
+        &[0x49],
+        &[0x49, 0],
+        &[0x54, 0xBE, 0xEF],
+        &[0x54],
+        &[0x46, 1],
+        &[0x46, 0, 5, 10, 0x03, 0xE8, 0x07, 0xD0],
+        // Input 33.
+        &[0x46, 33, 5, 10, 0x03, 0xE8, 0x07, 0xD0],
+        &[0x44, 1],
+        &[0x44, 1, 2],
+    ];
+    let mut bench = Bench::new(Model::Ser160);
+    let mut other = Bench::new(Model::Ser160);
+    for body in ours {
+        let frame = |body: &[u8]| {
+            let sum = body.iter().fold(0, |sum: u8, &byte| sum.wrapping_add(byte));
+            let digits: String =
+                body.iter().chain([&sum]).map(|byte| format!("{byte:02X}")).collect();
+            format!("\x1B{:02X}{digits}", body.len()).into_bytes()
+        };
+        bench.send(frame(body));
+        assert_eq!(bench.line(), b"", "{body:02X?}");
+        let unknown: Vec<u8> = [&[0x58], &body[1..]].concat();
+        other.send(frame(&unknown));
+        assert_eq!(bench.diagnostics(), other.diagnostics(), "{body:02X?}");
+    }
+    assert_eq!(bench.diagnostics().commands_unknown, 9);
+    assert!(matches!(bench.ask(&Command::QueryMode)[..], [Reply::Mode(_)]));
+}
+
 // C: configure
 
 #[test]
