@@ -1,12 +1,17 @@
 //! What a host says to a recorder.
 
+use core::num::NonZeroU8;
+
 use nom::Parser;
 use nom::number::complete::{be_u8, be_u16};
 
 use crate::fields::{byte, flag};
 use crate::params::parse_params;
 use crate::read_reply::parse_request;
-use crate::{Body, Code, Configure, ParseError, TimeStamp};
+use crate::{
+    Body, Code, Configure, Counter, InputFilter, ParseError, TimeStamp, clock_reading, diagnostics,
+    filters,
+};
 
 /// A message to the recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +50,30 @@ pub enum Command {
     },
     /// `S`: set the clock. The time is that of the arrival of the message's last byte.
     SetClock(TimeStamp),
+    /// `I`: asks what the recorder is and can do. This and all that follow are our extension.
+    Identify,
+    /// `T`: asks what the clock shows. As a broadcast it is a mark, which is not answered.
+    Time {
+        /// Comes back with the reply, or stays with the mark.
+        token: u16,
+    },
+    /// `F`: asks for the filters of the inputs.
+    QueryFilters {
+        /// The first input, from 1.
+        first: NonZeroU8,
+    },
+    /// `F`: set the filter of an input. The reply gives the filters in force from this input on.
+    SetFilter {
+        /// The input, 1–32; `None` for all.
+        input: Option<NonZeroU8>,
+        /// Its filter.
+        filter: InputFilter,
+    },
+    /// `D`: asks for the counters.
+    Diagnostics {
+        /// The first counter.
+        first: Counter,
+    },
 }
 
 impl Command {
@@ -52,7 +81,8 @@ impl Command {
     ///
     /// # Errors
     /// See [`ParseError`]. Start and count of `R` and `P` are never refused here: a recorder
-    /// answers with what exists. A date that does not exist is refused.
+    /// answers with what exists. A date that does not exist is refused, and so is a filter that
+    /// cannot be set.
     pub fn parse(body: &[u8]) -> Result<Command, ParseError> {
         let (&byte, params) = body.split_first().ok_or(ParseError::Empty)?;
         let code = Code::from_byte(byte).ok_or(ParseError::UnknownCode { code: byte })?;
@@ -68,7 +98,11 @@ impl Command {
                 parse_request(params).map(|(start, count)| Command::Read { start, count })
             }
             (Code::SetClock, _) => parse_set_clock(params),
-            (Code::Erase | Code::LastBroadcast, _) => {
+            (Code::Identify, 0) => Ok(Command::Identify),
+            (Code::Time, _) => clock_reading::parse_question(params),
+            (Code::Filters, _) => filters::parse_command(params),
+            (Code::Diagnostics, _) => diagnostics::parse_question(params),
+            (Code::Erase | Code::LastBroadcast | Code::Identify, _) => {
                 Err(ParseError::WrongLength { code: byte, length: body.len() })
             }
         }
@@ -82,7 +116,8 @@ impl Command {
             Command::QueryConfiguration
             | Command::QueryMode
             | Command::Erase
-            | Command::LastBroadcast => {}
+            | Command::LastBroadcast
+            | Command::Identify => {}
             Command::Configure(configure) => return configure.to_body(),
             // The version byte has no meaning in this direction; the manual's example sends one.
             Command::SetMode { recording } => body.put(&[u8::from(recording), 0]),
@@ -99,6 +134,13 @@ impl Command {
                 body.put(&[count]);
             }
             Command::SetClock(time) => time.put_on(&mut body),
+            Command::Time { token } => body.put_u16(token),
+            Command::QueryFilters { first } => body.put(&[first.get()]),
+            Command::SetFilter { input, filter } => {
+                body.put(&[input.map_or(0, NonZeroU8::get)]);
+                filter.put_on(&mut body);
+            }
+            Command::Diagnostics { first } => body.put(&[first.id().get()]),
         }
         body
     }
@@ -114,6 +156,10 @@ impl Command {
             Command::Print { .. } => Code::Print,
             Command::Read { .. } => Code::Read,
             Command::SetClock(_) => Code::SetClock,
+            Command::Identify => Code::Identify,
+            Command::Time { .. } => Code::Time,
+            Command::QueryFilters { .. } | Command::SetFilter { .. } => Code::Filters,
+            Command::Diagnostics { .. } => Code::Diagnostics,
         }
     }
 }
@@ -170,7 +216,7 @@ mod tests {
 
     #[test]
     fn every_wrong_length_of_every_command_is_refused() {
-        let allowed: [(Code, &[usize]); 7] = [
+        let allowed: [(Code, &[usize]); 11] = [
             (Code::Configure, &[1, 7]),
             (Code::Erase, &[1]),
             (Code::LastBroadcast, &[1]),
@@ -178,6 +224,10 @@ mod tests {
             (Code::Print, &[3, 5]),
             (Code::Read, &[4]),
             (Code::SetClock, &[9]),
+            (Code::Identify, &[1]),
+            (Code::Time, &[1, 3]),
+            (Code::Filters, &[1, 2, 8]),
+            (Code::Diagnostics, &[1, 2]),
         ];
         for (code, lengths) in allowed {
             // The lengths are tried with values that are right and with values that no field can

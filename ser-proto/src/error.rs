@@ -8,7 +8,7 @@ use core::fmt;
 pub enum ParseError {
     /// The body has no command byte.
     Empty,
-    /// The command byte is none of the seven.
+    /// No message has this command byte.
     UnknownCode {
         /// The byte found.
         code: u8,
@@ -17,6 +17,16 @@ pub enum ParseError {
     WrongLength {
         /// The command byte.
         code: u8,
+        /// Bytes in the body, the command byte included.
+        length: usize,
+    },
+    /// A reply of our extension ends before all of its fields are there. A longer one is no error:
+    /// it may have grown.
+    TooShort {
+        /// The command byte.
+        code: u8,
+        /// Where the first field starts that is missing or cut off.
+        offset: u16,
         /// Bytes in the body, the command byte included.
         length: usize,
     },
@@ -46,6 +56,13 @@ impl fmt::Display for ParseError {
             ParseError::WrongLength { code, length } => {
                 write!(f, "{} never has {length} bytes", Name(code))
             }
+            ParseError::TooShort { code, offset, length } => {
+                write!(
+                    f,
+                    "{} ends after {length} bytes, before the field at byte {offset} is complete",
+                    Name(code)
+                )
+            }
             ParseError::BadValue { code, offset, value } => {
                 write!(f, "{} cannot have {value} ({value:02X}h) at byte {offset}", Name(code))
             }
@@ -61,6 +78,21 @@ impl fmt::Display for ParseError {
 }
 
 impl core::error::Error for ParseError {}
+
+impl ParseError {
+    /// The command byte of the body, if it has one.
+    #[must_use]
+    pub const fn code(&self) -> Option<u8> {
+        match *self {
+            ParseError::Empty => None,
+            ParseError::UnknownCode { code }
+            | ParseError::WrongLength { code, .. }
+            | ParseError::TooShort { code, .. }
+            | ParseError::BadValue { code, .. } => Some(code),
+            ParseError::EntrySize { .. } => Some(crate::Code::Read.byte()),
+        }
+    }
+}
 
 /// A command byte as a person reads it.
 struct Name(u8);

@@ -1,7 +1,8 @@
 //! Fields of a message, parsed with nom behind our own errors.
 //!
-//! The length is checked before any field, so a message of a wrong length is never mistaken for one
-//! with a bad value.
+//! A layout of the manual has one length. It is checked before any field, so a message of a wrong
+//! length is never mistaken for one with a bad value. A reply of our extension may be longer than
+//! what is known of it; its fields are taken from the front, and the first fault found there counts.
 
 use nom::Parser;
 use nom::error::{ErrorKind, FromExternalError, ParseError as NomParseError};
@@ -61,6 +62,32 @@ pub(crate) fn parse_exactly<'a, T>(
             Err(Refusal::Value { offset: bytes.len() - remaining, value })
         }
         Err(_) => Err(Refusal::Length),
+    }
+}
+
+/// The first fault among the fields at the front of some bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FrontFault {
+    /// Where the field starts.
+    pub(crate) offset: usize,
+    /// What it holds and may not hold; `None` when the bytes end before the field does.
+    pub(crate) value: Option<u16>,
+}
+
+/// Parses the fields at the front of `bytes`, whatever stands behind them.
+pub(crate) fn parse_front<'a, T>(
+    bytes: Bytes<'a>,
+    mut parser: impl Parser<Bytes<'a>, Output = T, Error = Fault>,
+) -> Result<T, FrontFault> {
+    match parser.parse(bytes) {
+        Ok((_, fields)) => Ok(fields),
+        Err(nom::Err::Error(Fault { remaining, value })) => {
+            Err(FrontFault { offset: bytes.len().saturating_sub(remaining), value })
+        }
+        // These parsers return neither.
+        Err(nom::Err::Failure(_) | nom::Err::Incomplete(_)) => {
+            Err(FrontFault { offset: bytes.len(), value: None })
+        }
     }
 }
 

@@ -1,6 +1,9 @@
 //! What a recorder sends to a host.
 
-use crate::{Body, Code, Configuration, LastBroadcast, Mode, ParseError, ReadReply};
+use crate::{
+    Body, ClockReading, Code, Configuration, Counters, Filters, Identity, LastBroadcast, Mode,
+    ParseError, ReadReply,
+};
 
 /// A message from the recorder: the answer to a command, or an unsolicited read reply (auto
 /// report).
@@ -21,10 +24,20 @@ pub enum Reply {
     Read(ReadReply),
     /// `S`: the clock is set.
     ClockSet,
+    /// `I`: what the recorder is and can do. This and all that follow are our extension.
+    Identity(Identity),
+    /// `T`: what the clock showed.
+    Time(ClockReading),
+    /// `F`: the filters in force.
+    Filters(Filters),
+    /// `D`: counters.
+    Diagnostics(Counters),
 }
 
 impl Reply {
     /// Parses a body that came from a recorder.
+    ///
+    /// Bytes behind what is known of a reply of our extension are ignored: it may have grown.
     ///
     /// # Errors
     /// See [`ParseError`].
@@ -40,6 +53,10 @@ impl Reply {
             (Code::Print, 0 | 2 | 4) => Ok(Reply::PrintAccepted),
             (Code::Read, _) => ReadReply::parse(params).map(Reply::Read),
             (Code::SetClock, 0) => Ok(Reply::ClockSet),
+            (Code::Identify, _) => Identity::parse(params).map(Reply::Identity),
+            (Code::Time, _) => ClockReading::parse(params).map(Reply::Time),
+            (Code::Filters, _) => Filters::parse(params).map(Reply::Filters),
+            (Code::Diagnostics, _) => Counters::parse(params).map(Reply::Diagnostics),
             (Code::Erase | Code::Print | Code::SetClock, _) => {
                 Err(ParseError::WrongLength { code: byte, length: body.len() })
             }
@@ -54,6 +71,10 @@ impl Reply {
             Reply::LastBroadcast(last) => LastBroadcast::to_body(*last),
             Reply::Mode(mode) => mode.to_body(),
             Reply::Read(reply) => reply.to_body(),
+            Reply::Identity(identity) => identity.to_body(),
+            Reply::Time(reading) => reading.to_body(),
+            Reply::Filters(filters) => filters.to_body(),
+            Reply::Diagnostics(counters) => counters.to_body(),
             Reply::Erased | Reply::PrintAccepted | Reply::ClockSet => Body::new(self.code()),
         }
     }
@@ -69,6 +90,10 @@ impl Reply {
             Reply::PrintAccepted => Code::Print,
             Reply::Read(_) => Code::Read,
             Reply::ClockSet => Code::SetClock,
+            Reply::Identity(_) => Code::Identify,
+            Reply::Time(_) => Code::Time,
+            Reply::Filters(_) => Code::Filters,
+            Reply::Diagnostics(_) => Code::Diagnostics,
         }
     }
 }
@@ -76,7 +101,7 @@ impl Reply {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Entry, Inputs, MAX_BODY_LEN, MAX_ENTRIES, Model, TimeStamp};
+    use crate::{Entry, Inputs, LONGEST_READ_REPLY, MAX_ENTRIES, Model, TimeStamp};
 
     fn read_reply(model: Model, count: usize) -> ReadReply {
         let time = TimeStamp {
@@ -115,9 +140,10 @@ mod tests {
     }
 
     #[test]
-    fn ten_entries_of_16_inputs_are_128_bytes_and_ten_of_32_the_longest_body() {
+    fn ten_entries_of_16_inputs_are_128_bytes_and_ten_of_32_the_longest_reply() {
         assert_eq!(Reply::Read(read_reply(Model::Ser160, 10)).to_body().len(), 128);
-        assert_eq!(Reply::Read(read_reply(Model::Ser320, 10)).to_body().len(), MAX_BODY_LEN);
+        assert_eq!(Reply::Read(read_reply(Model::Ser320, 10)).to_body().len(), LONGEST_READ_REPLY);
+        assert_eq!(LONGEST_READ_REPLY, 168);
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! The protocol vectors: examples of frames with what they mean, from `vectors/rs232.txt`.
+//! The protocol vectors: examples of frames with what they mean, from `vectors/rs232.txt` and, for
+//! our extension, from `vectors/extension.txt`.
 
 use ser_proto::{Command, Decoded, ESC, FrameDecoder, Reply};
 
@@ -14,6 +15,8 @@ pub enum Sender {
 /// One example.
 #[derive(Clone, Debug)]
 pub struct Vector {
+    /// The file.
+    pub file: &'static str,
     /// The line of the file, for messages.
     pub line: usize,
     /// Who sends it.
@@ -28,29 +31,35 @@ pub struct Vector {
     pub meaning: String,
 }
 
-/// All examples of the file.
+/// All examples of the files.
 ///
 /// # Panics
-/// When the file differs from the format that its head describes.
+/// When a file differs from the format that its head describes.
 #[must_use]
 pub fn all() -> Vec<Vector> {
-    include_str!("../vectors/rs232.txt")
-        .lines()
-        .enumerate()
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
-        .map(|(index, line)| vector(index + 1, line))
+    let files = [
+        ("rs232.txt", include_str!("../vectors/rs232.txt")),
+        ("extension.txt", include_str!("../vectors/extension.txt")),
+    ];
+    files
+        .into_iter()
+        .flat_map(|(file, text)| {
+            (1..).zip(text.lines()).map(move |(line, text)| (file, line, text))
+        })
+        .filter(|(_, _, text)| !text.is_empty() && !text.starts_with('#'))
+        .map(|(file, line, text)| vector(file, line, text))
         .collect()
 }
 
-fn vector(line: usize, text: &str) -> Vector {
+fn vector(file: &'static str, line: usize, text: &str) -> Vector {
     let fields: Vec<_> = text.split('|').map(str::trim).collect();
     let [verdict, sender, bytes, meaning] = fields[..] else {
-        panic!("line {line}: four fields expected")
+        panic!("{file}, line {line}: four fields expected")
     };
     let sender = match sender {
         "host" => Sender::Host,
         "unit" => Sender::Unit,
-        other => panic!("line {line}: sender {other}"),
+        other => panic!("{file}, line {line}: sender {other}"),
     };
     let mut wire = Vec::new();
     for (position, byte) in bytes.split(' ').enumerate() {
@@ -59,14 +68,14 @@ fn vector(line: usize, text: &str) -> Vector {
             _ => wire.extend(byte.bytes()),
         }
     }
-    assert_eq!(wire.first(), Some(&ESC), "line {line}: a frame starts with ESC");
+    assert_eq!(wire.first(), Some(&ESC), "{file}, line {line}: a frame starts with ESC");
     let (refused, canonical) = match verdict {
         "holds" | "corrected" | "ours" => (false, true),
         "accepted" => (false, false),
-        "misprint" => (true, false),
-        other => panic!("line {line}: verdict {other}"),
+        "misprint" | "refused" => (true, false),
+        other => panic!("{file}, line {line}: verdict {other}"),
     };
-    Vector { line, sender, refused, canonical, wire, meaning: meaning.to_owned() }
+    Vector { file, line, sender, refused, canonical, wire, meaning: meaning.to_owned() }
 }
 
 /// What a decoder makes of a stream, in the words of `Debug`: messages, refusals and stretches of

@@ -155,7 +155,11 @@ fn a_broadcast_is_carried_out_and_not_answered() {
     // What was not a command was not a broadcast.
     world.transmit(Broadcast, 0x40, 0x50, &[0x53, 26, 2, 30, 0, 0, 0, 0, 0]);
     world.transmit(Broadcast, 0x40, 0x50, &[0x99]);
+    // Nor was a command of our extension, which is unknown to this recorder.
+    world.transmit(Broadcast, 0x40, 0x50, &[0x54, 0x00, 0x07]);
+    world.transmit(Device(UNIT), 0x40, 0x50, &[0x49]);
     world.run(50);
+    assert_eq!(world.take_message(UNIT), None);
     let Reply::LastBroadcast(Some(LastBroadcast { code, .. })) =
         world.ask(UNIT, &Command::LastBroadcast)
     else {

@@ -251,7 +251,8 @@ impl Bench {
         };
         let model = Model::Ser160;
         let log = vec![Change::EMPTY; 2048].leak();
-        let node = Node::new(NodeParts { model, log, capture: reader, storage, rtc: NoRtc });
+        let node =
+            Node::new(NodeParts { model, log, capture: reader, storage, rtc: NoRtc, id: None });
         let lines = || Lines { around: Rc::clone(&around), window: window(board), is_away: false };
         let options = GeniusOptions { start: RESET, ..GeniusOptions::new(model) };
         let genius = Genius::new(lines(), window(board), options);

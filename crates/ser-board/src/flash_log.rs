@@ -108,9 +108,7 @@ impl<'a, F: MultiwriteNorFlash> FlashLog<'a, F> {
     /// Slots of a sector, including the marker's.
     const SLOTS: u32 = {
         assert!(F::ERASE_SIZE.is_multiple_of(RECORD_LEN) && F::ERASE_SIZE >= 2 * RECORD_LEN);
-        assert!(
-            PIECE_LEN.is_multiple_of(F::WRITE_SIZE) && PIECE_LEN.is_multiple_of(F::READ_SIZE)
-        );
+        assert!(PIECE_LEN.is_multiple_of(F::WRITE_SIZE) && PIECE_LEN.is_multiple_of(F::READ_SIZE));
         assert!(F::ERASE_SIZE <= i32::MAX as usize);
         #[expect(clippy::cast_possible_truncation, reason = "checked above")]
         let sector_len = F::ERASE_SIZE as u32;

@@ -5,7 +5,7 @@ use core::mem::MaybeUninit;
 use chrono::NaiveDate;
 use embedded_storage::nor_flash::MultiwriteNorFlash;
 use ser_node::{Capture, CaptureChannel, Debounce, Event, Node, NodeParts};
-use ser_proto::Model;
+use ser_proto::{Model, RecorderId};
 
 use crate::clock_chip::{ClockChip, KeepsTime};
 use crate::flash_log::FlashLog;
@@ -55,6 +55,8 @@ pub struct BoardParts<F, C> {
     pub flash: F,
     /// The battery-backed clock.
     pub clock: C,
+    /// The number that tells this recorder from all others, if it has one.
+    pub id: Option<RecorderId>,
 }
 
 /// Powers a recorder up; returns the capture interrupt's end and the main loop's.
@@ -71,6 +73,7 @@ pub fn start<'a, F: MultiwriteNorFlash, C: KeepsTime>(
         capture: reader,
         storage: FlashLog::new(parts.flash, health.storage),
         rtc: ClockChip::new(parts.clock, NOT_BEFORE, health.clock),
+        id: parts.id,
     }));
     (capture, node)
 }

@@ -134,6 +134,7 @@ impl Memory {
             capture: reader,
             storage: NoStorage,
             rtc: NoRtc,
+            id: None,
         });
         let SerialEnds { receiver, received, errors, to_send, transmitter } = self.rings.split();
         let uart = Uart {

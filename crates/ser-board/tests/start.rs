@@ -74,6 +74,7 @@ fn run(
         debounce: Debounce::OFF,
         flash: flash.clone(),
         clock: Clock(day),
+        id: None,
     };
     let (mut capture, node) = start(&mut memory, board, &parts.health());
     then(&mut capture, node);
@@ -136,6 +137,7 @@ fn debounce_and_model_are_the_boards() {
         debounce: Debounce::uniform(3),
         flash: BoardFlash::new(2),
         clock: Clock(NOT_BEFORE),
+        id: None,
     };
     let (mut capture, node) = start(&mut memory, board, &parts.health());
     capture.sample(1, 0);

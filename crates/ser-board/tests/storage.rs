@@ -25,7 +25,7 @@ use ser_proto::{
 };
 
 /// Sectors small enough to go through many erases. The layout does not depend on their size.
-const SMALL: usize = 128;
+const SMALL: usize = 2048;
 /// Sectors 0–3 of an STM32F407.
 const REAL: usize = 16 * 1024;
 
@@ -62,6 +62,7 @@ impl Ram {
             capture: reader,
             storage,
             rtc: NoRtc,
+            id: None,
         };
         Recorder { node: Node::new(parts), _capture: capture }
     }
@@ -118,14 +119,14 @@ impl Storage for OneSector {
     type Error = PowerCut;
 
     fn read(&mut self, copy: CopyNumber, record: &mut [u8; RECORD_LEN]) -> Result<(), PowerCut> {
-        self.0.read([0, 16][copy as usize], record)
+        self.0.read([0, 256][copy as usize], record)
     }
 
     fn write(&mut self, copy: CopyNumber, record: &[u8; RECORD_LEN]) -> Result<(), PowerCut> {
         let mut both = [0; 2 * RECORD_LEN];
         self.0.read(0, &mut both)?;
         both[copy as usize * RECORD_LEN..][..RECORD_LEN].copy_from_slice(record);
-        self.0.erase(0, 128)?;
+        self.0.erase(0, 2048)?;
         self.0.write(0, &both)
     }
 }
@@ -226,7 +227,7 @@ fn cut_again<const SECTOR: usize, const WORD: usize, S: Storage>(
 #[test]
 fn a_cut_at_any_write_leaves_the_old_or_the_new_configuration() {
     // Seven records per sector: eleven erases of sectors in use.
-    let cuts = cut_everywhere(log::<SMALL, 1>, 1..80) + cut_everywhere(log::<SMALL, 4>, 1..80);
+    let cuts = cut_everywhere(log::<SMALL, 1>, 1..10) + cut_everywhere(log::<SMALL, 4>, 1..40);
     assert!(cuts > 20_000, "{cuts}");
 }
 

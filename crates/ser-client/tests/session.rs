@@ -2,14 +2,15 @@
 
 mod common;
 
+use std::num::NonZeroU8;
 use std::time::Duration;
 
 use common::Recorder;
 use proptest::prelude::*;
 use ser_client::{Busy, Diagnosis, LineRate, NoReply, Session, TextLine, Timing, Unsolicited};
 use ser_proto::{
-    AutoReport, Baud, Code, Command, Configure, FrameEncoder, Mode, ParseError, ReadReply, Reply,
-    TimeStamp,
+    AutoReport, Baud, ClockReading, ClockSource, Code, Command, Configure, Counter, Counters,
+    Filters, FrameEncoder, InputFilter, Mode, ParseError, ReadReply, Reply, TimeStamp,
 };
 
 const TIMEOUT: Duration = Duration::from_secs(1);
@@ -152,6 +153,72 @@ fn what_must_not_be_done_twice_is_sent_once() {
         let given_up = session.take_answer().unwrap().unwrap_err();
         assert!(given_up.may_have_been_done, "{command:?}");
     }
+}
+
+#[test]
+fn what_only_asks_once_is_sent_once_and_changes_nothing() {
+    let (first, counter) = (NonZeroU8::MIN, Counter::FIRST);
+    let setting = Command::SetFilter { input: None, filter: InputFilter::OFF };
+    for (command, attempts, changes) in [
+        (Command::Identify, 1, false),
+        (Command::Time { token: 7 }, 1, false),
+        (Command::QueryFilters { first }, 3, false),
+        (setting, 3, true),
+        (Command::Diagnostics { first: counter }, 3, false),
+    ] {
+        let mut session = session(2);
+        session.request(command).unwrap();
+        let frames =
+            (0..20).filter(|&second| sent(&mut session, ms(second * 1000)).is_some()).count();
+        assert_eq!(frames, attempts, "{command:?}");
+        let given_up = session.take_answer().unwrap().unwrap_err();
+        assert_eq!(given_up.may_have_been_done, changes, "{command:?}");
+    }
+}
+
+#[test]
+fn a_reply_of_the_extension_answers_its_own_question_only() {
+    let input = |number| NonZeroU8::new(number).unwrap();
+    let filters = |first| Reply::Filters(Filters { first: input(first), filters: [].into() });
+    let counters = |id| {
+        let first = Counter::from_id(input(id));
+        Reply::Diagnostics(Counters { first, next: None, values: [].into() })
+    };
+    let setting = |input| Command::SetFilter { input, filter: InputFilter::OFF };
+    let from = |id| Command::Diagnostics { first: Counter::from_id(input(id)) };
+    for (question, late, answer) in [
+        (Command::Time { token: 2 }, reading(1), reading(2)),
+        (Command::QueryFilters { first: input(17) }, filters(1), filters(17)),
+        (setting(Some(input(3))), filters(1), filters(3)),
+        (setting(None), filters(3), filters(1)),
+        (from(20), counters(1), counters(20)),
+        // The recorder has none of the ids 20 to 31.
+        (from(20), counters(1), counters(32)),
+    ] {
+        let mut session = session(0);
+        session.request(question).unwrap();
+        sent(&mut session, ms(0)).unwrap();
+        session.process(ms(1), &frame(&late));
+        assert_eq!(session.take_answer(), None, "{question:?}");
+        session.process(ms(2), &frame(&answer));
+        assert_eq!(session.take_answer(), Some(Ok(answer)), "{question:?}");
+    }
+}
+
+/// The answer to a `T` with this token.
+fn reading(token: u16) -> Reply {
+    Reply::Time(ClockReading {
+        token,
+        clock_us: 0,
+        source: ClockSource::NeverSet,
+        age_s: 0,
+        doubt_us: None,
+        drift_ppb: None,
+        tick_us: 0,
+        life: 1,
+        next_sequence: 1,
+        last_mark: None,
+    })
 }
 
 #[test]

@@ -1,8 +1,10 @@
 //! The changes of the inputs on their way from capture to the log. They come out in order, and only
 //! when the clock and mode of their millisecond are known.
 
+use ser_proto::InputFilter;
+
 use crate::capture::CaptureReader;
-use crate::chatter::{Chatter, ChatterRule};
+use crate::chatter::Chatter;
 use crate::debounce::Debounce;
 use crate::sequencer::{Change, Sequencer};
 use crate::ticks::Ticks;
@@ -42,19 +44,18 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// From now on this rule decides when input `number` (1–32) chatters.
-    pub(crate) fn set_chatter_rule(&mut self, number: u8, rule: ChatterRule) {
-        self.chatter.set_rule(number, rule);
+    /// From now on these filters hold, by input.
+    pub(crate) fn set_filters(&mut self, filters: &[InputFilter]) {
+        self.debounce.wanted = Debounce::OFF;
+        for (number, filter) in (1..).zip(filters) {
+            self.debounce.wanted = self.debounce.wanted.with(number, filter.debounce_ms);
+            self.chatter.set_filter(number, filter.chatter);
+        }
     }
 
     /// The filter for inputs that chatter.
     pub(crate) fn chatter(&self) -> &Chatter {
         &self.chatter
-    }
-
-    /// Wants these debounce times.
-    pub(crate) fn want_debounce(&mut self, debounce: Debounce) {
-        self.debounce.wanted = debounce;
     }
 
     /// The debounce times that capture has to take over; `None` if it has them, or is about to show
@@ -151,7 +152,9 @@ mod tests {
             let tick_ms = u32::try_from(index).unwrap() + 1;
             capture.sample(tick_ms, inputs);
             if index == at {
-                main_loop.want_debounce(other);
+                let times = (1..=32).map(|number| other.time_ms(number));
+                let filters = times.map(|debounce_ms| InputFilter { debounce_ms, chatter: None });
+                main_loop.set_filters(&filters.collect::<Vec<_>>());
             }
             if let Some(wanted) = main_loop.debounce_change()
                 && capture.take_times(&DebounceTimes::new(&wanted))

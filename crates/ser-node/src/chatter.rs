@@ -5,22 +5,9 @@
 //! on the log shows the input as it was last recorded, and its changes are counted. When it has been
 //! quiet for its re-arm time, an entry of that moment shows where it came to rest, if that differs.
 
-use ser_proto::Inputs;
+use ser_proto::{ChatterFilter, Inputs};
 
 use crate::sequencer::Change;
-
-/// When an input chatters.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ChatterRule {
-    /// With so many changes in one window an input chatters; 0 switches the filter off.
-    pub changes: u8,
-    /// The length of the window, in milliseconds. It begins with the first change outside of the
-    /// one before.
-    pub window_ms: u16,
-    /// For how long an input must be quiet until it is recorded again, in milliseconds.
-    pub rearm_ms: u16,
-}
 
 /// The filter at work, for all inputs.
 pub(crate) struct Chatter {
@@ -39,7 +26,7 @@ pub(crate) struct Chatter {
 /// What is known of one input.
 #[derive(Clone, Copy, Debug)]
 struct Input {
-    rule: ChatterRule,
+    filter: Option<ChatterFilter>,
     /// When its window began, and how many changes there were since.
     window_began_ms: u64,
     changes: u8,
@@ -50,24 +37,20 @@ struct Input {
 }
 
 impl Input {
-    const NEW: Input = Input {
-        rule: ChatterRule { changes: 0, window_ms: 0, rearm_ms: 0 },
-        window_began_ms: 0,
-        changes: 0,
-        changed_ms: 0,
-        suppressed: 0,
-    };
+    const NEW: Input =
+        Input { filter: None, window_began_ms: 0, changes: 0, changed_ms: 0, suppressed: 0 };
 
     /// Takes a change. Whether it is the one by which chatter is recognised.
     fn count(&mut self, tick_ms: u64) -> bool {
-        let is_over = tick_ms - self.window_began_ms >= u64::from(self.rule.window_ms);
+        let Some(filter) = self.filter else { return false };
+        let is_over = tick_ms.saturating_sub(self.window_began_ms) >= filter.window_ms.into();
         if is_over || self.changes == 0 {
             self.window_began_ms = tick_ms;
             self.changes = 0;
         }
         self.changes = self.changes.saturating_add(1);
         self.changed_ms = tick_ms;
-        self.changes >= self.rule.changes
+        self.changes >= filter.changes.get()
     }
 
     /// Takes a change that is left out.
@@ -94,22 +77,16 @@ impl Chatter {
         (self.state, self.recorded) = (state, state);
     }
 
-    /// From now on this rule holds for input `number` (1–32). An input that chatters does so until
+    /// From now on this filter holds for input `number` (1–32). An input that chatters does so until
     /// it has been quiet for the new re-arm time; without a filter it ends at once.
-    pub(crate) fn set_rule(&mut self, number: u8, rule: ChatterRule) {
+    pub(crate) fn set_filter(&mut self, number: u8, filter: Option<ChatterFilter>) {
         let index = usize::from(number).wrapping_sub(1);
         let Some(input) = self.inputs.get_mut(index) else { return };
-        input.rule = match rule.changes {
-            0 => ChatterRule::default(),
-            _ => rule,
-        };
-        input.changes = 0;
-        self.on = self.on & !(1 << index) | u32::from(rule.changes > 0) << index;
-    }
-
-    /// The inputs that chatter now.
-    pub(crate) const fn chattering(&self) -> u32 {
-        self.chattering
+        if input.filter != filter {
+            input.filter = filter;
+            input.changes = 0;
+        }
+        self.on = self.on & !(1 << index) | u32::from(filter.is_some()) << index;
     }
 
     /// How many changes of input `number` (1–32) were left out since power-up. Stops at the largest
@@ -164,8 +141,9 @@ impl Chatter {
 
     fn rest_ms(&self, number: u8) -> Option<u64> {
         let input = self.inputs.get(usize::from(number).checked_sub(1)?)?;
-        // With a new rule the time may have passed already.
-        Some((input.changed_ms + u64::from(input.rule.rearm_ms)).max(self.settled_ms + 1))
+        let rearm_ms = input.filter.map_or(0, |filter| filter.rearm_ms);
+        // With a new filter the time may have passed already.
+        Some((input.changed_ms + u64::from(rearm_ms)).max(self.settled_ms + 1))
     }
 
     /// Ends the chatter of all inputs that have been quiet for long enough at this tick. Returns
@@ -195,7 +173,10 @@ impl Chatter {
 
 #[cfg(test)]
 mod tests {
+    use std::num::NonZeroU8;
+
     use proptest::prelude::*;
+    use ser_proto::InputFilter;
 
     use super::*;
 
@@ -213,18 +194,24 @@ mod tests {
 
     impl OneInput {
         /// Whether the log shows a change in this millisecond.
-        fn pass(&mut self, rule: ChatterRule, tick_ms: u64, on: bool) -> bool {
+        fn pass(&mut self, filter: Option<ChatterFilter>, tick_ms: u64, on: bool) -> bool {
             let changes = on != self.on;
             self.on = on;
             self.quiet_ms = if changes { 0 } else { self.quiet_ms + 1 };
-            if rule.changes > 0 && changes && !self.chatters {
-                let goes_on = |began: &u64| tick_ms - began < u64::from(rule.window_ms);
+            if let Some(filter) = filter
+                && changes
+                && !self.chatters
+            {
+                let goes_on = |began: &u64| tick_ms - began < u64::from(filter.window_ms);
                 if self.window_began_ms.filter(goes_on).is_none() {
                     (self.window_began_ms, self.changes) = (Some(tick_ms), 0);
                 }
                 self.changes += 1;
-                self.chatters = self.changes >= u32::from(rule.changes);
-            } else if self.chatters && self.quiet_ms >= u64::from(rule.rearm_ms) {
+                self.chatters = self.changes >= u32::from(filter.changes.get());
+            } else if let Some(filter) = filter
+                && self.chatters
+                && self.quiet_ms >= u64::from(filter.rearm_ms)
+            {
                 (self.chatters, self.window_began_ms) = (false, None);
             }
             if self.chatters {
@@ -238,13 +225,13 @@ mod tests {
     /// Lets the inputs change at these ticks, and settles after each `every` milliseconds. Returns
     /// what is recorded, and how many changes were left out.
     fn filtered(
-        rules: &[ChatterRule],
+        filters: &[Option<ChatterFilter>],
         samples: &[u32],
         every: usize,
     ) -> (Vec<(u64, u32, u32)>, Vec<u32>) {
         let mut chatter = Chatter::new();
-        for (number, rule) in (1..).zip(rules) {
-            chatter.set_rule(number, *rule);
+        for (number, filter) in (1..).zip(filters) {
+            chatter.set_filter(number, *filter);
         }
         let (mut recorded, mut state) = (Vec::new(), 0);
         for (tick_ms, &sample) in (1_u64..).zip(samples) {
@@ -262,19 +249,24 @@ mod tests {
         chatter.settle(samples.len() as u64, |change| {
             recorded.push((change.tick_ms, change.changed, change.state));
         });
-        let suppressed = (1..).zip(rules).map(|(number, _)| chatter.suppressed(number));
+        let suppressed = (1..).zip(filters).map(|(number, _)| chatter.suppressed(number));
         (recorded, suppressed.collect())
     }
 
-    fn rule() -> impl Strategy<Value = ChatterRule> {
+    fn filter(changes: u8, window_ms: u16, rearm_ms: u16) -> Option<ChatterFilter> {
+        NonZeroU8::new(changes).map(|changes| ChatterFilter { changes, window_ms, rearm_ms })
+    }
+
+    /// Also such as cannot be set: the filter does not depend on that.
+    fn any_filter() -> impl Strategy<Value = Option<ChatterFilter>> {
         (prop_oneof![Just(0_u8), 2..6_u8], 1..60_u16, 1..60_u16)
-            .prop_map(|(changes, window_ms, rearm_ms)| ChatterRule { changes, window_ms, rearm_ms })
+            .prop_map(|(changes, window_ms, rearm_ms)| filter(changes, window_ms, rearm_ms))
     }
 
     proptest! {
         #[test]
         fn all_inputs_at_once_equal_one_input_at_a_time(
-            rules in prop::collection::vec(rule(), 4),
+            filters in prop::collection::vec(any_filter(), 4),
             // Mostly quiet, so that chatter also ends.
             toggles in prop::collection::vec(
                 prop_oneof![3 => Just(0_u32), 1 => 0..16_u32], 1..400
@@ -290,12 +282,12 @@ mod tests {
                 .iter()
                 .scan(0, |state, toggle| { *state ^= toggle; Some(*state) })
                 .collect();
-            let mut inputs: Vec<OneInput> = rules.iter().map(|_| OneInput::default()).collect();
+            let mut inputs: Vec<OneInput> = filters.iter().map(|_| OneInput::default()).collect();
             let mut expected = Vec::new();
             for (tick_ms, sample) in (1_u64..).zip(&samples) {
                 let mut changed = 0;
-                for (bit, (input, rule)) in inputs.iter_mut().zip(&rules).enumerate() {
-                    let shows = input.pass(*rule, tick_ms, sample >> bit & 1 == 1);
+                for (bit, (input, filter)) in inputs.iter_mut().zip(&filters).enumerate() {
+                    let shows = input.pass(*filter, tick_ms, sample >> bit & 1 == 1);
                     changed |= u32::from(shows) << bit;
                 }
                 let state = inputs.iter().enumerate();
@@ -304,30 +296,59 @@ mod tests {
                     expected.push((tick_ms, changed, state));
                 }
             }
-            let (recorded, suppressed) = filtered(&rules, &samples, every);
+            let (recorded, suppressed) = filtered(&filters, &samples, every);
             prop_assert_eq!(recorded, expected);
             let left_out: Vec<u32> = inputs.iter().map(|input| input.suppressed).collect();
             prop_assert_eq!(suppressed, left_out);
         }
     }
 
+    proptest! {
+        #[test]
+        fn an_input_that_operates_twice_in_a_second_is_never_taken_for_chatter(
+            changes in 5..=32_u8,
+            window_ms in 1..=7000_u16,
+            rearm_ms: u16,
+            // Of each second the four moments at which it changes.
+            moments in prop::collection::vec(prop::collection::btree_set(0..1000_usize, 4), 1..20),
+        ) {
+            let chatter = filter(changes, window_ms, rearm_ms.max(window_ms));
+            prop_assume!(InputFilter { debounce_ms: 0, chatter }.check().is_ok());
+            let mut samples = vec![0; moments.len() * 1000];
+            for (second, moments) in moments.iter().enumerate() {
+                let ends: Vec<usize> = moments.iter().map(|ms| second * 1000 + ms).collect();
+                samples[ends[0]..ends[1]].fill(1);
+                samples[ends[2]..ends[3]].fill(1);
+            }
+            // No second has more than four changes, wherever it begins.
+            let ends = || (1..samples.len()).filter(|&ms| samples[ms] != samples[ms - 1]);
+            let most = ends().map(|from| ends().filter(|ms| (from..from + 1000).contains(ms)).count());
+            prop_assume!(most.max() <= Some(4));
+            let (recorded, suppressed) = filtered(&[chatter], &samples, 100);
+            prop_assert_eq!(suppressed, [0]);
+            prop_assert_eq!(recorded.len(), ends().count() + usize::from(samples[0] == 1));
+        }
+    }
+
     #[test]
-    fn an_input_that_toggles_for_an_hour_costs_two_entries_and_a_count() {
-        let rule = ChatterRule { changes: 3, window_ms: 100, rearm_ms: 1000 };
+    fn an_input_that_toggles_for_an_hour_costs_four_entries_and_a_count() {
+        // Four changes are what an input makes that operates twice. The fifth shows that it is not
+        // that.
+        let filter = filter(5, 1000, 1000);
         // Every 20 ms for an hour; the last change opens it.
         let samples: Vec<u32> =
             (0..3_600_000 + 2000).map(|ms| u32::from(ms < 3_600_000 && ms / 20 % 2 == 1)).collect();
-        let (recorded, suppressed) = filtered(&[rule], &samples, 7);
-        assert_eq!(recorded, [(21, 1, 1), (41, 1, 0)], "it came to rest as it was recorded");
-        assert_eq!(suppressed, [179_998]);
+        let (recorded, suppressed) = filtered(&[filter], &samples, 7);
+        assert_eq!(recorded, [(21, 1, 1), (41, 1, 0), (61, 1, 1), (81, 1, 0)]);
+        assert_eq!(suppressed, [179_996], "it came to rest as it was recorded");
     }
 
     #[test]
     fn where_chatter_ends_the_log_shows_the_state_again() {
-        let rule = ChatterRule { changes: 3, window_ms: 100, rearm_ms: 50 };
+        let filter = filter(3, 100, 50);
         let mut samples = vec![0, 1, 0, 1, 0, 1];
         samples.extend([1; 60]);
-        let (recorded, suppressed) = filtered(&[rule], &samples, 1);
+        let (recorded, suppressed) = filtered(&[filter], &samples, 1);
         assert_eq!(recorded, [(2, 1, 1), (3, 1, 0), (56, 1, 1)], "50 ms after the last change");
         assert_eq!(suppressed, [3]);
     }
@@ -336,7 +357,7 @@ mod tests {
     fn a_filter_that_is_switched_off_lets_everything_through_again() {
         let mut chatter = Chatter::new();
         chatter.baseline(0b10);
-        chatter.set_rule(1, ChatterRule { changes: 2, window_ms: 100, rearm_ms: 9000 });
+        chatter.set_filter(1, filter(2, 100, 9000));
         let mut seen = Vec::new();
         let mut take = |chatter: &mut Chatter, tick_ms, state| {
             let change = Change { tick_ms, changed: 1, state };
@@ -345,11 +366,11 @@ mod tests {
         take(&mut chatter, 10, 0b11);
         take(&mut chatter, 11, 0b10);
         take(&mut chatter, 12, 0b11);
-        assert_eq!((chatter.chattering(), chatter.suppressed(1)), (1, 2));
-        chatter.set_rule(1, ChatterRule::default());
+        assert_eq!((chatter.chattering, chatter.suppressed(1)), (1, 2));
+        chatter.set_filter(1, None);
         take(&mut chatter, 13, 0b10);
         take(&mut chatter, 14, 0b11);
         assert_eq!(seen, [(10, 0b11), (13, 0b10), (14, 0b11)]);
-        assert_eq!((chatter.chattering(), chatter.suppressed(1)), (0, 2));
+        assert_eq!((chatter.chattering, chatter.suppressed(1)), (0, 2));
     }
 }

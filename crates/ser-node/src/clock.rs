@@ -5,7 +5,7 @@
 //! force when it happened.
 
 use chrono::NaiveDateTime;
-use ser_proto::TimeStamp;
+use ser_proto::{ClockSource, TimeStamp};
 
 use crate::calendar::{self, Date};
 use crate::history::History;
@@ -61,18 +61,35 @@ impl Offset {
 #[derive(Clone, Debug)]
 pub(crate) struct Clock {
     offset: History<Offset>,
+    source: ClockSource,
+    /// When it was set last, or read from the battery-backed clock, or else power-up.
+    set_ms: u64,
 }
 
 impl Clock {
     /// A clock that shows `now` at `tick_ms`; 2000-01-01 when the time is not known.
     pub(crate) fn new(tick_ms: u64, now: Option<NaiveDateTime>) -> Clock {
+        let source = if now.is_some() { ClockSource::Battery } else { ClockSource::NeverSet };
         let now_ms = now.map_or(NEVER_SET_MS, to_calendar_ms);
-        Clock { offset: History::new(Offset::new(now_ms, tick_ms)) }
+        Clock { offset: History::new(Offset::new(now_ms, tick_ms)), source, set_ms: tick_ms }
     }
 
     /// Sets the clock so that it shows `now` at `tick_ms`.
-    pub(crate) fn set(&mut self, tick_ms: u64, now: NaiveDateTime) {
+    pub(crate) fn set(&mut self, tick_ms: u64, now: NaiveDateTime, source: ClockSource) {
+        if tick_ms >= self.set_ms {
+            (self.source, self.set_ms) = (source, tick_ms);
+        }
         self.offset.set(tick_ms, Offset::new(to_calendar_ms(now), tick_ms));
+    }
+
+    /// Where it has its time from.
+    pub(crate) const fn source(&self) -> ClockSource {
+        self.source
+    }
+
+    /// For how many whole seconds it has run on its own at `tick_ms`.
+    pub(crate) fn age_s(&self, tick_ms: u64) -> u32 {
+        u32::try_from(tick_ms.saturating_sub(self.set_ms) / 1000).unwrap_or(u32::MAX)
     }
 
     /// Calendar time of the sample of `tick_ms`, by the setting in force then.
@@ -137,10 +154,11 @@ mod tests {
     fn the_clock_goes_on_from_where_it_is_set() {
         let mut clock = Clock::new(5, Some(time("2026-11-22T10:00:00.000")));
         assert_eq!(shows(&clock, 5), "2026-11-22T10:00:00.000");
-        clock.set(1000, time("2026-11-22T12:00:00.250"));
+        clock.set(1000, time("2026-11-22T12:00:00.250"), ClockSource::HostOverRs232);
         assert_eq!(to_time_stamp(clock.now_ms(1000)).to_string(), "2026-11-22T12:00:00.250");
         assert_eq!(shows(&clock, 1001), "2026-11-22T12:00:00.251");
         assert_eq!(shows(&clock, 1751), "2026-11-22T12:00:01.001");
+        assert_eq!((clock.source(), clock.age_s(3999)), (ClockSource::HostOverRs232, 2));
         // Earlier samples keep the time of the old setting.
         assert_eq!(shows(&clock, 1000), "2026-11-22T10:00:00.995");
     }

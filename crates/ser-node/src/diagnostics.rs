@@ -45,6 +45,28 @@ pub struct Diagnostics {
 }
 
 impl Diagnostics {
+    /// All of them, in the order of the fields.
+    pub(crate) const fn all(&self) -> [u32; 16] {
+        [
+            self.frames_interrupted,
+            self.frames_not_hex,
+            self.frames_checksum,
+            self.frames_too_long,
+            self.frames_empty,
+            self.line_errors,
+            self.commands_unknown,
+            self.commands_wrong_length,
+            self.parameters_refused,
+            self.commands_overrun,
+            self.edges_lost,
+            self.samples_missed,
+            self.settings_late,
+            self.events_unreported,
+            self.events_unprinted,
+            self.storage_errors,
+        ]
+    }
+
     pub(crate) fn count_frame_error(&mut self, cause: FrameError) {
         let counter = match cause {
             FrameError::Interrupted | FrameError::Incomplete => &mut self.frames_interrupted,
@@ -60,9 +82,9 @@ impl Diagnostics {
         let counter = match error {
             ParseError::Empty => &mut self.frames_empty,
             ParseError::UnknownCode { .. } => &mut self.commands_unknown,
-            ParseError::WrongLength { .. } | ParseError::EntrySize { .. } => {
-                &mut self.commands_wrong_length
-            }
+            ParseError::WrongLength { .. }
+            | ParseError::TooShort { .. }
+            | ParseError::EntrySize { .. } => &mut self.commands_wrong_length,
             ParseError::BadValue { .. } => &mut self.parameters_refused,
         };
         count(counter, 1);

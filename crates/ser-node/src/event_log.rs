@@ -73,8 +73,14 @@ impl<'a> EventLog<'a> {
     #[must_use]
     pub fn total(&self) -> u16 {
         #[expect(clippy::cast_possible_truncation, reason = "the protocol's total wraps")]
-        let total = (self.next_sequence - self.erased_at) as u16;
+        let total = self.events() as u16;
         total
+    }
+
+    /// Events since the last erase or power-up.
+    #[must_use]
+    pub const fn events(&self) -> u64 {
+        self.next_sequence - self.erased_at
     }
 
     /// The slot that the next event will get; slot 0 is entry 1.

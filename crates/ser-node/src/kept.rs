@@ -1,8 +1,8 @@
 //! What a recorder keeps without power, as a record of fixed length.
 //!
 //! ```text
-//! | 'S' | 2 | sequence (4) | configuration (6) | power-ups (4) | lives (4) | filters (32 × 6) |
-//!       | unused, 0 (40) | CRC-32 (4) |                  256 bytes, numbers little-endian
+//! | 'S' | 2 | sequence (4) | configuration (6) | power-ups (4) | lives (4) | has filters |
+//!       | filters (32 × 6) | unused, 0 (39) | CRC-32 (4) |    256 bytes, numbers little-endian
 //! | 'S' | 1 | sequence (4) | configuration (6) | CRC-32 (4) |    16 bytes, read only
 //! ```
 //! Configuration and filters are stored as `C` and `F` send them. The short form comes from before
@@ -34,8 +34,8 @@ const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Kept {
     pub(crate) configuration: Configuration,
-    /// By input, input 1 first.
-    pub(crate) filters: [InputFilter; FILTERS],
+    /// By input, input 1 first; `None` until a host has set one.
+    pub(crate) filters: Option<[InputFilter; FILTERS]>,
     /// Power-ups so far.
     pub(crate) power_ups: u32,
     /// Lives of the log so far: each power-up and each erase begins one.
@@ -45,12 +45,7 @@ pub(crate) struct Kept {
 impl Kept {
     /// What a new recorder holds.
     pub(crate) fn new() -> Kept {
-        Kept {
-            configuration: Configuration::default(),
-            filters: [InputFilter::OFF; FILTERS],
-            power_ups: 0,
-            lives: 0,
-        }
+        Kept { configuration: Configuration::default(), filters: None, power_ups: 0, lives: 0 }
     }
 
     /// Writes it as the record with this sequence number.
@@ -74,7 +69,8 @@ impl Kept {
             .chain(params)
             .chain(self.power_ups.to_le_bytes())
             .chain(self.lives.to_le_bytes())
-            .chain(self.filters.iter().flat_map(|filter| filter.to_bytes()))
+            .chain([u8::from(self.filters.is_some())])
+            .chain(self.filters.iter().flatten().flat_map(|filter| filter.to_bytes()))
     }
 
     /// The sequence number of a record, and what it holds; `None` if it is not intact.
@@ -83,17 +79,14 @@ impl Kept {
             [MAGIC, FORMAT, ..] => {
                 let (sequence, configuration, rest) = begin(checked(record)?)?;
                 let (power_ups, rest) = rest.split_first_chunk()?;
-                let (lives, filters) = rest.split_first_chunk()?;
-                let mut kept = Kept {
+                let (lives, rest) = rest.split_first_chunk()?;
+                let (&has_filters, stored) = rest.split_first()?;
+                let kept = Kept {
                     configuration,
+                    filters: (has_filters != 0).then(|| filters(stored)),
                     power_ups: u32::from_le_bytes(*power_ups),
                     lives: u32::from_le_bytes(*lives),
-                    ..Kept::new()
                 };
-                let stored = filters.as_chunks::<{ InputFilter::LEN }>().0;
-                for (filter, stored) in kept.filters.iter_mut().zip(stored) {
-                    *filter = InputFilter::from_bytes(*stored);
-                }
                 Some((sequence, kept))
             }
             [MAGIC, OLD_FORMAT, ..] => {
@@ -103,6 +96,14 @@ impl Kept {
             _ => None,
         }
     }
+}
+
+fn filters(stored: &[u8]) -> [InputFilter; FILTERS] {
+    let mut filters = [InputFilter::OFF; FILTERS];
+    for (filter, stored) in filters.iter_mut().zip(stored.as_chunks::<{ InputFilter::LEN }>().0) {
+        *filter = InputFilter::from_bytes(*stored);
+    }
+    filters
 }
 
 /// The content of a record whose check is right.
@@ -141,10 +142,11 @@ pub(crate) mod tests {
             report_address: 31,
             auto_print: true,
         };
-        let mut kept = Kept { configuration, power_ups: number.into(), lives: 7, ..Kept::new() };
-        kept.filters[31] = InputFilter::from_bytes([9, 5, 0, 100, 1, 0]);
-        kept.filters[usize::from(number % 31)].debounce_ms = 3;
-        kept
+        let mut filters = [InputFilter::OFF; FILTERS];
+        filters[31] = InputFilter::from_bytes([9, 5, 0, 100, 1, 0]);
+        filters[usize::from(number % 31)].debounce_ms = 3;
+        let filters = (number % 4 != 0).then_some(filters);
+        Kept { configuration, filters, power_ups: number.into(), lives: 7 }
     }
 
     /// A record as it was before there was more to keep than the configuration.

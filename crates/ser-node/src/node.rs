@@ -49,6 +49,7 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
     /// seen.
     pub fn poll(&mut self, now_ms: u32) {
         self.recorder.record_until(now_ms);
+        self.recorder.keep_power_up();
     }
 
     /// Takes a byte that arrived from the RS-232 line at this moment, which may be the bare tick of
@@ -146,6 +147,7 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
             }
         }
         self.recorder.hold_after(port.oldest_arrival_ms());
+        self.recorder.note_genius(port.diagnostics());
         if port.can_send() {
             self.send_on_bus(port, now_ms);
         }

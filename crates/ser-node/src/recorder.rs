@@ -4,11 +4,15 @@
 //! Commands are answered in the order in which they came. Unsolicited output (print jobs, auto
 //! report, auto print) is taken from the log itself when no command is waiting.
 
+use core::num::NonZeroU8;
+
 use chrono::NaiveDateTime;
 use ser_proto::genius::ForceTable;
 use ser_proto::{
-    AutoReport, Code, Command, Configuration, Configure, Entry, FrameError, Inputs, LastBroadcast,
-    MAX_ENTRIES, Mode, Model, ParseError, ReadReply, Reply, TimeStamp,
+    AutoReport, Capabilities, ClockReading, ClockSource, Code, Command, Configuration, Configure,
+    EXTENSION_LEVEL, Entry, Filters, FrameError, Guard, Identity, InputFilter, Inputs,
+    LastBroadcast, MAX_ENTRIES, MAX_FILTERS, Mark, Mode, Model, ParseError, ReadReply, RecorderId,
+    Reply, TimeStamp,
 };
 
 use crate::arrival::{Arrival, Way};
@@ -16,16 +20,20 @@ use crate::calendar::date_time;
 use crate::capture::CaptureReader;
 use crate::changes::Changes;
 use crate::clock::{Clock, Rtc, to_time_stamp};
+use crate::counters::Counts;
 use crate::debounce::Debounce;
 use crate::diagnostics::{Diagnostics, count};
 use crate::event_log::{Event, EventLog};
+use crate::genius_port::GeniusDiagnostics;
 use crate::history::{Bits, History};
+use crate::keeper::Keeper;
+use crate::kept::FILTERS;
 use crate::owed::Owed;
 use crate::print_line::PrintLine;
 use crate::printer::Printer;
-use crate::settings::{Settings, Storage};
+use crate::settings::Storage;
 use crate::ticks::Ticks;
-use crate::version::VERSION;
+use crate::version::{FIRMWARE, VERSION};
 use crate::waiting::{Pending, Request, Waiting};
 
 /// What a recorder is made of.
@@ -40,6 +48,8 @@ pub struct NodeParts<'a, S, R> {
     pub storage: S,
     /// The battery-backed clock, or [`NoRtc`](crate::NoRtc).
     pub rtc: R,
+    /// The number that tells this recorder from all others, if it has one.
+    pub id: Option<RecorderId>,
 }
 
 /// Everything but the ports.
@@ -49,14 +59,17 @@ pub(crate) struct Recorder<'a, S, R> {
     log: EventLog<'a>,
     clock: Clock,
     recording: History<bool, Bits>,
-    configuration: Configuration,
-    settings: Settings<S>,
+    keeper: Keeper<S>,
     rtc: R,
     waiting: Waiting,
     printer: Printer,
     /// Events to report, whichever port reports.
     to_report: Owed,
     last_broadcast: Option<LastBroadcast>,
+    last_mark: Option<Mark>,
+    id: Option<RecorderId>,
+    /// What the Genius port has counted, if there is one.
+    genius: Option<GeniusDiagnostics>,
     /// Commands that have arrived on any port; wraps.
     commands: u32,
     diagnostics: Diagnostics,
@@ -65,25 +78,31 @@ pub(crate) struct Recorder<'a, S, R> {
 impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
     /// Loads the configuration and reads the clock. Recording is on.
     pub(crate) fn new(parts: NodeParts<'a, S, R>) -> Recorder<'a, S, R> {
-        let NodeParts { model, log, capture, storage, mut rtc } = parts;
+        let NodeParts { model, log, capture, storage, mut rtc, id } = parts;
         let now_ms = Ticks::new().extend(capture.tick_ms());
-        let (settings, mut configuration) = Settings::load(storage);
+        let mut keeper = Keeper::power_up(storage);
         let mut log = EventLog::new(log);
-        log.resize(configuration.size);
-        configuration.size = log.size();
+        log.resize(keeper.configuration().size);
+        keeper.set_configuration(Configuration { size: log.size(), ..*keeper.configuration() });
+        let mut changes = Changes::new(capture, model.mask());
+        if let Some(filters) = keeper.filters() {
+            changes.set_filters(filters);
+        }
         Recorder {
             model,
-            changes: Changes::new(capture, model.mask()),
+            changes,
             log,
             clock: Clock::new(now_ms, rtc.read()),
             recording: History::of_bits(true),
-            configuration,
-            settings,
+            keeper,
             rtc,
             waiting: Waiting::new(),
             printer: Printer::new(),
             to_report: Owed::ALL,
             last_broadcast: None,
+            last_mark: None,
+            id,
+            genius: None,
             commands: 0,
             diagnostics: Diagnostics::default(),
         }
@@ -94,7 +113,20 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
     }
 
     pub(crate) fn configuration(&self) -> &Configuration {
-        &self.configuration
+        self.keeper.configuration()
+    }
+
+    /// Stores that there was this power-up. A life that has been told of must never come again, so
+    /// this comes before the first reply.
+    pub(crate) fn keep_power_up(&mut self) {
+        if self.keeper.is_new() {
+            self.keep();
+        }
+    }
+
+    /// Notes what the Genius port has counted.
+    pub(crate) fn note_genius(&mut self, diagnostics: GeniusDiagnostics) {
+        self.genius = Some(diagnostics);
     }
 
     /// The tick of the latest sample.
@@ -195,7 +227,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         self.commands = self.commands.wrapping_add(1);
         let tick_ms = self.record_until(at.tick_ms);
         let pending = match command {
-            Ok(command) => Some(self.begin(&command, tick_ms)),
+            Ok(command) => Some(self.begin(&command, arrival, tick_ms)),
             Err(error) => self.refuse(error),
         };
         if way == Way::Broadcast {
@@ -238,6 +270,9 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         Some(match pending {
             Pending::ClockSet => Reply::ClockSet,
             Pending::Mode { recording } => Reply::Mode(Mode { recording, version: VERSION }),
+            Pending::Time { token, clock_us, tick_us } => {
+                Reply::Time(self.clock_reading(token, clock_us, tick_us))
+            }
             Pending::To(command) => match command {
                 Command::Configure(configure) => self.configure(&configure),
                 Command::Erase => self.erase(),
@@ -253,7 +288,12 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
                 Command::QueryConfiguration
                 | Command::QueryMode
                 | Command::SetMode { .. }
-                | Command::SetClock(_) => Reply::Configuration(self.configuration),
+                | Command::Time { .. }
+                | Command::SetClock(_) => Reply::Configuration(*self.configuration()),
+                Command::Identify => Reply::Identity(self.identity()),
+                Command::QueryFilters { first } => Reply::Filters(self.filters_from(first)),
+                Command::SetFilter { input, filter } => self.set_filter(input, filter),
+                Command::Diagnostics { first } => Reply::Diagnostics(self.counts().page(first)),
             },
         })
     }
@@ -281,7 +321,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
 
     /// The next auto report for the RS-232 line. Nobody acknowledges it.
     pub(crate) fn next_line_report(&mut self) -> Option<Reply> {
-        if self.configuration.auto_report != AutoReport::Rs232 {
+        if self.configuration().auto_report != AutoReport::Rs232 {
             return None;
         }
         let (first, report) = self.report(MAX_ENTRIES)?;
@@ -292,7 +332,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
     /// The next line of auto print.
     pub(crate) fn next_auto_line(&mut self) -> Option<PrintLine> {
         let edges_lost = self.changes.capture().edges_lost();
-        if !self.configuration.auto_print {
+        if !self.configuration().auto_print {
             self.printer.is_off(edges_lost);
             return None;
         }
@@ -321,12 +361,21 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
     }
 
     /// Carries a command out if the moment of its arrival matters.
-    fn begin(&mut self, command: &Command, tick_ms: u64) -> Pending {
+    fn begin(&mut self, command: &Command, arrival: &Arrival, tick_ms: u64) -> Pending {
         match *command {
             Command::SetClock(time) => {
                 self.count_late(tick_ms);
-                self.set_clock(time, tick_ms);
+                self.set_clock(time, arrival.way, tick_ms);
                 Pending::ClockSet
+            }
+            Command::Time { token } => {
+                let us = u64::from(arrival.at.us);
+                let clock_us = self.clock.now_ms(tick_ms) * 1000;
+                Pending::Time {
+                    token,
+                    clock_us: clock_us.saturating_add_unsigned(us),
+                    tick_us: tick_ms.saturating_mul(1000).saturating_add(us),
+                }
             }
             Command::SetMode { recording } => {
                 self.count_late(tick_ms);
@@ -360,8 +409,18 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         pending: Option<Pending>,
         tick_ms: u64,
     ) {
-        if let Some(pending @ Pending::To(Command::Configure(_) | Command::Erase)) = pending {
-            self.reply(pending, 0);
+        match pending {
+            Some(Pending::Time { token, clock_us, .. }) => {
+                self.last_mark = Some(Mark { token, clock_us });
+            }
+            Some(
+                pending @ Pending::To(
+                    Command::Configure(_) | Command::Erase | Command::SetFilter { .. },
+                ),
+            ) => {
+                self.reply(pending, 0);
+            }
+            _ => {}
         }
         let Some(command) = command else { return };
         // The time of reception, by the clock as it is now. After a broadcast that set the clock,
@@ -379,29 +438,112 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
     fn configure(&mut self, configure: &Configure) -> Reply {
         if configure.size.is_some_and(|size| size > self.log.capacity()) {
             self.count_refused(true);
-            return Reply::Configuration(self.configuration);
+            return Reply::Configuration(*self.configuration());
         }
-        let configuration = configure.apply_to(&self.configuration);
+        let before = *self.configuration();
+        let configuration = configure.apply_to(&before);
         self.log.resize(configuration.size);
-        if configuration.auto_report != self.configuration.auto_report {
+        if configuration.auto_report != before.auto_report {
             // Auto report begins with the next event when it is switched on or moved to the other
             // port.
             self.to_report = Owed::none(&self.log);
         }
-        if configuration.auto_print != self.configuration.auto_print {
+        if configuration.auto_print != before.auto_print {
             self.printer.auto_print_changed(&self.log);
         }
-        self.configuration = configuration;
-        // Stored even when nothing changes: the configuration may be in force without being stored,
-        // because storing failed earlier.
-        if !self.settings.holds(&configuration) && self.settings.save(&configuration).is_err() {
-            count(&mut self.diagnostics.storage_errors, 1);
-        }
+        self.keeper.set_configuration(configuration);
+        // Also when nothing changes: the configuration may be in force without being stored, because
+        // storing failed earlier.
+        self.keep();
         Reply::Configuration(configuration)
+    }
+
+    /// Stores what is in force and is not stored.
+    fn keep(&mut self) {
+        count(&mut self.diagnostics.storage_errors, self.keeper.keep().is_err().into());
+    }
+
+    fn identity(&self) -> Identity {
+        let served = Capabilities::TIME.with(Capabilities::FILTERS).with(Capabilities::DIAGNOSTICS);
+        let counts_last = self.keeper.counts_last();
+        Identity {
+            level: EXTENSION_LEVEL,
+            model: self.model,
+            firmware: FIRMWARE,
+            capabilities: if counts_last {
+                served.with(Capabilities::LASTING_COUNTS)
+            } else {
+                served
+            },
+            id: self.id,
+            power_ups: self.keeper.power_ups(),
+            life: self.keeper.life(),
+            log_capacity: self.log.capacity().max(1),
+            guard: Guard::None,
+        }
+    }
+
+    fn clock_reading(&self, token: u16, clock_us: i64, tick_us: u64) -> ClockReading {
+        ClockReading {
+            token,
+            clock_us,
+            source: self.clock.source(),
+            age_s: self.clock.age_s(tick_us / 1000),
+            // Nothing disciplines the clock, so nobody knows.
+            doubt_us: None,
+            drift_ppb: None,
+            tick_us,
+            life: self.keeper.life(),
+            next_sequence: self.log.events().saturating_add(1),
+            last_mark: self.last_mark,
+        }
+    }
+
+    /// The filters in force at the inputs from `first` on.
+    fn filters_from(&self, first: NonZeroU8) -> Filters {
+        let inputs = first.get()..=self.model.inputs();
+        Filters {
+            first,
+            filters: inputs.take(MAX_FILTERS).map(|input| self.filter(input)).collect(),
+        }
+    }
+
+    /// The filter of an input. Until a host sets one, the board decides its debounce time.
+    fn filter(&self, input: u8) -> InputFilter {
+        let set = usize::from(input).checked_sub(1).zip(self.keeper.filters());
+        let set = set.and_then(|(index, filters)| filters.get(index).copied());
+        let debounce_ms = self.changes.capture().debounce().time_ms(input);
+        set.unwrap_or(InputFilter { debounce_ms, chatter: None })
+    }
+
+    /// Sets the filter of one input, or of all.
+    fn set_filter(&mut self, input: Option<NonZeroU8>, filter: InputFilter) -> Reply {
+        let first = input.unwrap_or(NonZeroU8::MIN);
+        let is_meant = |number: u8| input.is_none_or(|input| input.get() == number);
+        self.count_refused(first.get() > self.model.inputs());
+        let mut filters = [InputFilter::OFF; FILTERS];
+        for (number, place) in (1..=self.model.inputs()).zip(&mut filters) {
+            *place = if is_meant(number) { filter } else { self.filter(number) };
+        }
+        self.changes.set_filters(&filters);
+        self.keeper.set_filters(filters);
+        self.keep();
+        Reply::Filters(self.filters_from(first))
+    }
+
+    fn counts(&self) -> Counts<'_> {
+        Counts {
+            recorder: self.diagnostics(),
+            genius: self.genius.as_ref(),
+            chatter: self.changes.chatter(),
+            model: self.model,
+        }
     }
 
     fn erase(&mut self) -> Reply {
         self.log.erase();
+        self.keeper.begin_life();
+        self.keep();
         // Erased events are no longer owed to anybody.
         self.to_report = Owed::none(&self.log);
         self.printer.erased(&self.log);
@@ -432,10 +574,14 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         count(&mut self.diagnostics.parameters_refused, u64::from(refused));
     }
 
-    fn set_clock(&mut self, time: TimeStamp, tick_ms: u64) {
+    fn set_clock(&mut self, time: TimeStamp, way: Way, tick_ms: u64) {
+        let source = match way {
+            Way::Line => ClockSource::HostOverRs232,
+            Way::Bus(_) | Way::Broadcast => ClockSource::HostOverGenius,
+        };
         // The parser lets no impossible date through.
         if let Ok(time) = NaiveDateTime::try_from(time) {
-            self.clock.set(tick_ms, time);
+            self.clock.set(tick_ms, time, source);
             // The battery-backed clock starts at the value it is given, at the moment it is given.
             // It therefore gets the time of now, not of the command's arrival.
             let now_ms = self.changes.now_ms();

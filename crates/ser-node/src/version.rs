@@ -1,9 +1,16 @@
 //! The firmware version as a recorder reports it.
 
+use ser_proto::FirmwareVersion;
+
+/// Firmware version in three parts.
+pub(crate) const FIRMWARE: FirmwareVersion = FirmwareVersion {
+    major: digit(env!("CARGO_PKG_VERSION_MAJOR")),
+    minor: digit(env!("CARGO_PKG_VERSION_MINOR")),
+    patch: digit(env!("CARGO_PKG_VERSION_PATCH")),
+};
+
 /// Firmware version as in the `M` reply, in hundredths: 0.1.0 is 10, 1.2.3 is 123.
-pub const VERSION: u8 = 100 * digit(env!("CARGO_PKG_VERSION_MAJOR"))
-    + 10 * digit(env!("CARGO_PKG_VERSION_MINOR"))
-    + digit(env!("CARGO_PKG_VERSION_PATCH"));
+pub const VERSION: u8 = 100 * FIRMWARE.major + 10 * FIRMWARE.minor + FIRMWARE.patch;
 
 #[expect(clippy::panic, reason = "evaluated by the compiler only")]
 const fn digit(text: &str) -> u8 {

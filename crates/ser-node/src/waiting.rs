@@ -24,6 +24,8 @@ pub(crate) enum Pending {
     ClockSet,
     /// The mode was set, or asked for, on arrival.
     Mode { recording: bool },
+    /// The clock was read on arrival: what it showed, and how long the recorder had been on.
+    Time { token: u16, clock_us: i64, tick_us: u64 },
 }
 
 /// What a device on the bus asks for. The content is looked up when the reply goes out, so that it

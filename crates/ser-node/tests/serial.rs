@@ -15,12 +15,22 @@ use ser_proto::{
 };
 
 /// Non-volatile memory and battery-backed clock that outlive the recorder.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 struct Survivors {
     copies: Rc<RefCell<[[u8; RECORD_LEN]; 2]>>,
     clock: Rc<RefCell<Option<NaiveDateTime>>>,
     /// Whether the memory refuses to be written.
     write_protected: Rc<RefCell<bool>>,
+}
+
+impl Default for Survivors {
+    fn default() -> Survivors {
+        Survivors {
+            copies: Rc::new(RefCell::new([[0; RECORD_LEN]; 2])),
+            clock: Rc::default(),
+            write_protected: Rc::default(),
+        }
+    }
 }
 
 impl Storage for Survivors {
@@ -83,6 +93,7 @@ impl Bench {
             capture: reader,
             storage: survivors.clone(),
             rtc: survivors,
+            id: None,
         });
         let mut bench = Bench { node, capture, tick_ms: 0, inputs };
         bench.pass_ms(1);
@@ -494,6 +505,41 @@ fn the_clock_goes_on_after_a_power_cycle() {
     let mut bench = Bench::with(Model::Ser160, Debounce::OFF, 2048, survivors);
     bench.contacts(1);
     assert_eq!(bench.read(1, 1).entries[0].time.to_string(), "2026-11-22T10:00:00.002");
+}
+
+// I, T, F, D: our extension
+
+#[test]
+fn commands_of_the_extension_are_met_with_silence_as_unknown_ones() {
+    let ours: [&[u8]; 9] = [
+        &[0x49],
+        &[0x49, 0],
+        &[0x54, 0xBE, 0xEF],
+        &[0x54],
+        &[0x46, 1],
+        &[0x46, 0, 5, 10, 0x03, 0xE8, 0x07, 0xD0],
+        // Input 33.
+        &[0x46, 33, 5, 10, 0x03, 0xE8, 0x07, 0xD0],
+        &[0x44, 1],
+        &[0x44, 1, 2],
+    ];
+    let mut bench = Bench::new(Model::Ser160);
+    let mut other = Bench::new(Model::Ser160);
+    for body in ours {
+        let frame = |body: &[u8]| {
+            let sum = body.iter().fold(0, |sum: u8, &byte| sum.wrapping_add(byte));
+            let digits: String =
+                body.iter().chain([&sum]).map(|byte| format!("{byte:02X}")).collect();
+            format!("\x1B{:02X}{digits}", body.len()).into_bytes()
+        };
+        bench.send(frame(body));
+        assert_eq!(bench.line(), b"", "{body:02X?}");
+        let unknown: Vec<u8> = [&[0x58], &body[1..]].concat();
+        other.send(frame(&unknown));
+        assert_eq!(bench.diagnostics(), other.diagnostics(), "{body:02X?}");
+    }
+    assert_eq!(bench.diagnostics().commands_unknown, 9);
+    assert!(matches!(bench.ask(&Command::QueryMode)[..], [Reply::Mode(_)]));
 }
 
 // C: configure

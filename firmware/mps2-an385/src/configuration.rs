@@ -22,8 +22,8 @@ use crate::external_bus;
 pub(crate) static HEALTH: FlashHealth = FlashHealth::new();
 
 const WORD_LEN: usize = size_of::<u32>();
-/// A marker and 15 records.
-const SECTOR_LEN: usize = 0x100;
+/// A marker and three records.
+const SECTOR_LEN: usize = 0x400;
 const _: () = assert!(external_bus::CONFIGURATION_LEN == 2 * SECTOR_LEN);
 
 /// Both sectors as one memory.

@@ -23,11 +23,12 @@
 //! |               | are sampled, in µs                                     |            |
 //! | 8040h–8048h   | what the clock shows in ms since 1970, less its count: | recorder   |
 //! |               | low, high, seal                                        |            |
+//! | 8050h–805Bh   | number of the recorder, 12 bytes                       | bench      |
 //! | 8080h         | length of the latest fault's last words, in bytes      | recorder   |
 //! | 8084h–80DFh   | these words, UTF-8                                     | recorder   |
 //! | 80E0h         | how many starts ago that was; 0 for never              | recorder   |
 //! | 80F0h–80F7h   | mark of the bench's file                               | bench      |
-//! | 9000h–91FFh   | configuration memory, see `configuration`              | recorder   |
+//! | 9000h–97FFh   | configuration memory, see `configuration`              | recorder   |
 //!
 //! Words have 32 bits, little-endian.
 //!
@@ -62,7 +63,7 @@ use geni_board::WindowRam;
 use ser_board::genius;
 use ser_board::last_words::{Boot, MAX_TEXT_LEN, Text};
 use ser_node::Debounce;
-use ser_proto::Model;
+use ser_proto::{Model, RecorderId};
 
 use crate::device::base;
 use crate::mmio::Word;
@@ -105,6 +106,9 @@ const BOOT_TIME_US: Word = unsafe { word(0x803C) };
 // SAFETY: see the map.
 pub(crate) const CLOCK_OFFSET_MS: SealedWords = unsafe { SealedWords::at(0x8040) };
 // SAFETY: see the map.
+const RECORDER_ID: [Word; 3] =
+    [unsafe { word(0x8050) }, unsafe { word(0x8054) }, unsafe { word(0x8058) }];
+// SAFETY: see the map.
 const LAST_WORDS_LEN: Word = unsafe { word(0x8080) };
 
 // SAFETY: see the map.
@@ -116,7 +120,7 @@ const _: () = assert!(MAX_TEXT_LEN == 0x80E0 - LAST_WORDS);
 const GENI_WINDOW: usize = 0x0000;
 const CONFIGURATION_MEMORY: usize = 0x9000;
 /// Bytes of configuration memory.
-pub(crate) const CONFIGURATION_LEN: usize = 0x200;
+pub(crate) const CONFIGURATION_LEN: usize = 0x800;
 const WORD_LEN: usize = size_of::<u32>();
 
 /// All field inputs, at once.
@@ -145,6 +149,15 @@ pub(crate) fn model() -> Model {
 pub(crate) fn debounce() -> Debounce {
     let [time_ms, ..] = DEBOUNCE_STRAP.read().to_le_bytes();
     Debounce::uniform(time_ms)
+}
+
+/// The number of the recorder.
+pub(crate) fn id() -> Option<RecorderId> {
+    let mut bytes = [0; RecorderId::LEN];
+    for (bytes, word) in bytes.as_chunks_mut().0.iter_mut().zip(&RECORDER_ID) {
+        *bytes = word.read().to_le_bytes();
+    }
+    RecorderId::new(bytes)
 }
 
 /// The node's Genius port with its board.

@@ -105,7 +105,8 @@ mod app {
         let clock = unsafe { BenchClock::open() };
         // SAFETY: as above.
         let flash = unsafe { BenchFlash::open() };
-        let parts = BoardParts { model, debounce: external_bus::debounce(), flash, clock };
+        let (debounce, id) = (external_bus::debounce(), external_bus::id());
+        let parts = BoardParts { model, debounce, flash, clock, id };
         let (capture, node) = start::start(memory, parts, &HEALTH);
         let (serial, receive, transmit) = uart::start(rings, node.baud());
         // SAFETY: as above.

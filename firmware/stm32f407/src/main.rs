@@ -18,6 +18,7 @@
 use cortex_m_rt as _;
 
 mod boot;
+mod chip;
 mod clocks;
 mod fault;
 mod flash;
@@ -62,7 +63,7 @@ mod app {
     use crate::timer::{self, Timer};
     use crate::uart::{self, Rings, SerialInterrupt, SerialLine};
     use crate::watchdog::Watchdog;
-    use crate::{boot, log, pins, protection, reset};
+    use crate::{boot, chip, log, pins, protection, reset};
 
     // RTIC takes only literals for priorities. `crates/ser-board/tests/priorities.rs` checks that
     // the tasks have these.
@@ -141,6 +142,7 @@ mod app {
             debounce: straps.debounce(),
             flash: ConfigurationFlash::new(device.FLASH, watchdog),
             clock: ChipClock::start(&device.RCC, &device.PWR, device.RTC),
+            id: chip::id(),
         };
         let (capture, node) = start::start(memory, parts, &HEALTH);
         let (serial, serial_interrupt) =

@@ -7,6 +7,10 @@ use ser_proto::{
 };
 
 use super::Kind;
+use super::extension::{
+    clock_text, counter_lines, counters_text, filter_lines, filters_text, identity_text,
+    question_text, setting_text,
+};
 use crate::values::on_off;
 
 /// Who sent a message.
@@ -24,7 +28,7 @@ pub enum Side {
 pub(crate) struct Explanation {
     pub(crate) kind: Kind,
     pub(crate) text: String,
-    /// The entries of a read reply.
+    /// The entries of a read reply, the filters or the counters.
     pub(crate) details: Vec<String>,
 }
 
@@ -49,7 +53,7 @@ pub(crate) fn explain(body: &[u8], from: Option<Side>) -> Explanation {
         (_, Some(Ok(reply))) => Explanation {
             kind: Kind::Recorder,
             text: reply_text(&reply),
-            details: entry_lines(&reply),
+            details: detail_lines(&reply),
         },
         (command, reply) => plain(
             Kind::Damage,
@@ -91,6 +95,13 @@ fn command_text(command: &Command) -> String {
             format!("read {} from entry {start}", entries(count.into()))
         }
         Command::SetClock(time) => format!("set the clock to {time}"),
+        Command::Identify => "ask what the recorder is and can do".to_string(),
+        Command::Time { token } => question_text(token),
+        Command::QueryFilters { first } => format!("query the filters from input {first} on"),
+        Command::SetFilter { input, filter } => {
+            setting_text(input.map(std::num::NonZeroU8::get), &filter)
+        }
+        Command::Diagnostics { first } => format!("query the counters from id {} on", first.id()),
     }
 }
 
@@ -106,6 +117,10 @@ fn reply_text(reply: &Reply) -> String {
         Reply::PrintAccepted => "print accepted".to_string(),
         Reply::Read(reply) => read_reply_text(reply),
         Reply::ClockSet => "clock set".to_string(),
+        Reply::Identity(identity) => identity_text(identity),
+        Reply::Time(reading) => clock_text(reading),
+        Reply::Filters(filters) => filters_text(filters),
+        Reply::Diagnostics(counters) => counters_text(counters),
     }
 }
 
@@ -147,8 +162,16 @@ fn read_reply_text(reply: &ReadReply) -> String {
     )
 }
 
-fn entry_lines(reply: &Reply) -> Vec<String> {
-    let Reply::Read(reply) = reply else { return Vec::new() };
+fn detail_lines(reply: &Reply) -> Vec<String> {
+    match reply {
+        Reply::Read(reply) => entry_lines(reply),
+        Reply::Filters(filters) => filter_lines(filters),
+        Reply::Diagnostics(counters) => counter_lines(counters),
+        _ => Vec::new(),
+    }
+}
+
+fn entry_lines(reply: &ReadReply) -> Vec<String> {
     (u32::from(reply.start)..)
         .zip(&reply.entries)
         .map(|(number, entry)| {

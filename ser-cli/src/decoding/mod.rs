@@ -3,6 +3,7 @@
 mod capture;
 mod decoder;
 mod explain;
+mod extension;
 mod hex;
 mod lines;
 mod listing;

@@ -31,7 +31,7 @@ impl Datagram {
     /// it.
     #[must_use]
     pub fn from_command(source: BusAddress, destination: Address, command: &Command) -> Datagram {
-        // No command is longer than nine bytes, so nothing is ever lost here.
+        // No command is longer than a few bytes, so nothing is ever lost here.
         let data = Data::from_slice(&command.to_body()).unwrap_or_default();
         ser_datagram(source, destination, data)
     }

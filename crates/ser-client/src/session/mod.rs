@@ -72,8 +72,8 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use ser_proto::{
-    Code, Command, Decoded, ESC, FrameDecoder, MAX_BODY_LEN, ParseError, Reply, TimeStamp,
-    encoded_len,
+    Code, Command, Decoded, ESC, FrameDecoder, LONGEST_READ_REPLY, MAX_BODY_LEN, ParseError, Reply,
+    TimeStamp, encoded_len,
 };
 
 use crate::transport::line_rate::LineRate;
@@ -91,8 +91,8 @@ use unsolicited::{Unsolicited, UnsolicitedQueue};
 const MAX_READS: usize = 2;
 
 /// How much longer than its timeout an attempt may last because a frame is just arriving: the
-/// longest frame at the lowest rate. It matters where the rate of the line is unknown, as with a
-/// terminal server.
+/// longest frame that a recorder sends, at the lowest rate. It matters where the rate of the line
+/// is unknown, as with a terminal server.
 pub(crate) const LONGEST_FRAME: Duration = Duration::from_millis(11_400);
 
 /// A time that no recorder accepts; it stands in until the attempt gets its own.
@@ -111,12 +111,12 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// How long one attempt lasts: the request on the line, a message that the recorder was just
+    /// How long one attempt lasts: the request on the line, a report that the recorder was just
     /// sending, the longest answer, and the time to think.
     #[must_use]
     pub fn attempt(&self, command: &Command) -> Duration {
         let bytes = encoded_len(command.to_body().len())
-            + encoded_len(MAX_BODY_LEN)
+            + encoded_len(LONGEST_READ_REPLY)
             + encoded_len(longest_reply(command));
         self.timeout.saturating_add(self.line_rate.time_for(bytes))
     }

@@ -1,7 +1,9 @@
 //! A request, its state, and its attempts.
 
+use std::num::NonZeroU8;
 use std::time::Duration;
 
+use ser_proto::genius::MAX_SER_DATA;
 use ser_proto::{
     Command, FrameEncoder, MAX_ENTRIES, Model, ParseError, Reply, TimeStamp, encoded_len,
 };
@@ -62,6 +64,15 @@ impl Request {
             _ if self.sent == 0 => false,
             (&Command::Read { start, count }, Reply::Read(reply)) => {
                 reply.start == start && reply.entries.len() <= usize::from(count)
+            }
+            (&Command::Time { token }, Reply::Time(reading)) => reading.token == token,
+            (&Command::QueryFilters { first }, Reply::Filters(filters)) => filters.first == first,
+            (&Command::SetFilter { input, .. }, Reply::Filters(filters)) => {
+                filters.first == input.unwrap_or(NonZeroU8::MIN)
+            }
+            // The reply passes over ids that the recorder does not have.
+            (&Command::Diagnostics { first }, Reply::Diagnostics(counters)) => {
+                counters.first >= first
             }
             (command, reply) => command.code() == reply.code(),
         }
@@ -150,18 +161,33 @@ pub(super) fn longest_reply(command: &Command) -> usize {
         // Some recorders echo the parameters of a print command.
         Command::Print { .. } => 5,
         Command::Erase | Command::SetClock(_) => 1,
+        // A reply of the extension may have grown, as long as a datagram has room for it.
+        Command::Identify
+        | Command::Time { .. }
+        | Command::QueryFilters { .. }
+        | Command::SetFilter { .. }
+        | Command::Diagnostics { .. } => MAX_SER_DATA,
     }
 }
 
 pub(super) const fn may_be_repeated(command: &Command) -> bool {
     match command {
-        Command::Erase | Command::Print { .. } | Command::SetClock(_) => false,
+        // A recorder that may not know the extension is asked once who it is. A reading of the
+        // clock is one of the moment at which this question arrived, and of no other.
+        Command::Erase
+        | Command::Print { .. }
+        | Command::SetClock(_)
+        | Command::Identify
+        | Command::Time { .. } => false,
         Command::Configure(configure) => configure.baud.is_none(),
         Command::QueryConfiguration
         | Command::LastBroadcast
         | Command::QueryMode
         | Command::SetMode { .. }
-        | Command::Read { .. } => true,
+        | Command::Read { .. }
+        | Command::QueryFilters { .. }
+        | Command::SetFilter { .. }
+        | Command::Diagnostics { .. } => true,
     }
 }
 
@@ -171,11 +197,16 @@ pub(super) const fn changes_something(command: &Command) -> bool {
         | Command::Print { .. }
         | Command::SetClock(_)
         | Command::Configure(_)
-        | Command::SetMode { .. } => true,
+        | Command::SetMode { .. }
+        | Command::SetFilter { .. } => true,
         Command::QueryConfiguration
         | Command::LastBroadcast
         | Command::QueryMode
-        | Command::Read { .. } => false,
+        | Command::Read { .. }
+        | Command::Identify
+        | Command::Time { .. }
+        | Command::QueryFilters { .. }
+        | Command::Diagnostics { .. } => false,
     }
 }
 

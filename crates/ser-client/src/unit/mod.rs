@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ser_proto::{
-    Baud, Code, Command, Configuration, Configure, LastBroadcast, MAX_BODY_LEN, Mode, Model,
+    Baud, Code, Command, Configuration, Configure, LONGEST_READ_REPLY, LastBroadcast, Mode, Model,
     ReadReply, Reply, TimeStamp, encoded_len,
 };
 
@@ -312,7 +312,7 @@ impl Unit {
         match self.session.timing().line_rate {
             _ if self.bus_address().is_some() => REPORT_ON_BUS,
             LineRate::Instant => LONGEST_FRAME,
-            rate => rate.time_for(encoded_len(MAX_BODY_LEN)),
+            rate => rate.time_for(encoded_len(LONGEST_READ_REPLY)),
         }
     }
 

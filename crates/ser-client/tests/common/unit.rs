@@ -101,6 +101,11 @@ impl Fake {
             Command::Print { .. } => Some(Reply::PrintAccepted),
             Command::Read { start, count } => Some(Reply::Read(self.recorder.read(start, count))),
             Command::SetClock(_) => Some(Reply::ClockSet),
+            Command::Identify
+            | Command::Time { .. }
+            | Command::QueryFilters { .. }
+            | Command::SetFilter { .. }
+            | Command::Diagnostics { .. } => None,
         };
         if self.swallow > 0 {
             self.swallow -= 1;

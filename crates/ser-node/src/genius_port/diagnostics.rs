@@ -26,3 +26,17 @@ pub struct GeniusDiagnostics {
     /// Auto reports that did not arrive, or whose arrival is not known. Each is sent again.
     pub reports_failed: u32,
 }
+
+impl GeniusDiagnostics {
+    /// Those of the port itself, in the order of the fields.
+    pub(crate) const fn all(&self) -> [u32; 6] {
+        [
+            self.datagrams_ignored,
+            self.broadcasts,
+            self.replies_lost,
+            self.clocks_refused,
+            self.reports_sent,
+            self.reports_failed,
+        ]
+    }
+}

@@ -1,12 +1,16 @@
-//! What a recorder keeps while its power is off: stored configuration and battery-backed clock.
+//! What a recorder keeps while its power is off: its number, stored configuration and
+//! battery-backed clock.
 //!
 //! Both are handles. Clones share the same memory, so it outlives the recorder that uses it.
 
+use std::collections::hash_map::RandomState;
 use std::convert::Infallible;
+use std::hash::BuildHasher;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use chrono::{Local, NaiveDateTime, TimeDelta};
 use ser_node::{CopyNumber, RECORD_LEN, Rtc, Storage};
+use ser_proto::RecorderId;
 
 /// Memory and clock of one recorder.
 #[derive(Clone, Debug)]
@@ -15,6 +19,8 @@ pub struct NonVolatile {
     pub storage: MemoryStorage,
     /// The battery-backed clock.
     pub rtc: SimRtc,
+    /// The number that tells the recorder from all others.
+    pub id: Option<RecorderId>,
 }
 
 impl NonVolatile {
@@ -22,8 +28,21 @@ impl NonVolatile {
     /// time.
     #[must_use]
     pub fn new() -> NonVolatile {
-        NonVolatile { storage: MemoryStorage::default(), rtc: SimRtc::host() }
+        NonVolatile {
+            storage: MemoryStorage::default(),
+            rtc: SimRtc::host(),
+            id: RecorderId::new(random_id()),
+        }
     }
+}
+
+/// A number that no other recorder has, as a factory would give it.
+pub(crate) fn random_id() -> [u8; RecorderId::LEN] {
+    let mut id = *b"sim-........";
+    // Every `RandomState` is another one.
+    let random = RandomState::new().hash_one(()).to_le_bytes();
+    id.iter_mut().skip(4).zip(random).for_each(|(place, byte)| *place = byte);
+    id
 }
 
 impl Default for NonVolatile {

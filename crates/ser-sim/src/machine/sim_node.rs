@@ -116,6 +116,7 @@ impl PoweredOff {
             capture: reader,
             storage: options.non_volatile.storage.clone(),
             rtc: options.non_volatile.rtc.clone(),
+            id: options.non_volatile.id,
         });
         node.poll(0);
         let baud = node.baud();

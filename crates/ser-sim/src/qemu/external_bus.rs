@@ -18,6 +18,8 @@ use rustix::fs::OFlags;
 use ser_board::last_words::MAX_TEXT_LEN;
 use ser_proto::Model;
 
+use crate::machine::non_volatile::random_id;
+
 /// Bytes of the external memory. QEMU is told the same number.
 pub(crate) const MEMORY_LEN: u64 = 16 << 20;
 
@@ -51,6 +53,8 @@ const FORCED_FAULT: usize = 0x802C;
 const CLOCK_COUNT_MS: usize = 0x8030;
 /// How long its last start took, in microseconds.
 const BOOT_TIME_US: usize = 0x803C;
+/// Its number, three words; written here when the file is made.
+const RECORDER_ID: usize = 0x8050;
 /// Length of what its latest fault had to say, and then the text.
 const LAST_WORDS: usize = 0x8080;
 /// How many starts ago the latest fault was; 0 for never.
@@ -115,6 +119,9 @@ impl ExternalBus {
                 file.set_len(MEMORY_LEN)?;
                 let bus = bus(file)?;
                 (0..).step_by(4).zip(MADE_BY_US).for_each(|(at, word)| bus.write(MARK + at, word));
+                for (at, word) in (0..).step_by(4).zip(random_id().as_chunks().0) {
+                    bus.write(RECORDER_ID + at, u32::from_le_bytes(*word));
+                }
                 Ok(bus)
             }
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {

@@ -33,7 +33,7 @@ impl Rules {
             return;
         };
         let length = body.len();
-        if !b"CELMPRS".contains(&code) {
+        if !b"CELMPRSITFD".contains(&code) {
             assert!(
                 matches!(parsed, Err(ParseError::UnknownCode { code: found }) if *found == code),
                 "{parsed:?}"

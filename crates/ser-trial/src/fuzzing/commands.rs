@@ -3,6 +3,7 @@
 use ser_proto::Command;
 
 use super::body_rules::{Fault, Rules, above, assert_emitted, settings_fault, time_fault};
+use super::extension_rules::{canonical_command, command_fault, command_has_length};
 
 const RULES: Rules = Rules { has_length, fault };
 
@@ -31,7 +32,7 @@ fn has_length(code: u8, length: usize) -> bool {
         b'P' => [3, 5].contains(&length),
         b'R' => length == 4,
         b'S' => length == 9,
-        _ => false,
+        _ => command_has_length(code, length),
     }
 }
 
@@ -40,7 +41,7 @@ fn fault(body: &[u8]) -> Fault {
         [b'C', _, ..] => settings_fault(body),
         [b'M', _, ..] => above(body, 1, &[1]),
         [b'S', ..] => time_fault(body, 1),
-        _ => None,
+        _ => command_fault(body),
     }
 }
 
@@ -50,6 +51,6 @@ fn canonical(body: &[u8]) -> Vec<u8> {
         [b'C', a, b, baud, 1, address, print] => vec![b'C', a, b, baud, 0, address, print],
         [b'M', mode] | [b'M', mode, _] => vec![b'M', mode, 0],
         [b'P', 0, start, 0, count] => vec![b'P', start, count],
-        _ => body.to_vec(),
+        _ => canonical_command(body),
     }
 }

@@ -1,6 +1,6 @@
 //! The frame decoder, against a second one that sees the whole stream at once.
 
-use ser_proto::{DroppedFrame, ESC, FrameDecoder, FrameError, MAX_BODY_LEN};
+use ser_proto::{DroppedFrame, ESC, FrameDecoder, FrameError, LONGEST_READ_REPLY, MAX_BODY_LEN};
 
 use super::framing::{Seen, decode, frame_of};
 
@@ -15,8 +15,8 @@ use super::framing::{Seen, decode, frame_of};
 /// When one of these does not hold.
 pub fn frames(data: &[u8]) {
     for_bodies_of_up_to::<16>(data);
+    for_bodies_of_up_to::<LONGEST_READ_REPLY>(data);
     for_bodies_of_up_to::<MAX_BODY_LEN>(data);
-    for_bodies_of_up_to::<255>(data);
 }
 
 fn for_bodies_of_up_to<const N: usize>(stream: &[u8]) {

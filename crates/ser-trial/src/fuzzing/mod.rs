@@ -14,6 +14,7 @@ mod comm_req;
 mod commands;
 mod datagrams;
 mod dribble;
+mod extension_rules;
 mod foreign_lists;
 mod frames;
 mod framing;

@@ -1,8 +1,10 @@
 //! Replies: bodies that come from a recorder.
 
-use ser_proto::{MAX_BODY_LEN, MAX_ENTRIES, Reply};
+use ser_proto::genius::MAX_SER_DATA;
+use ser_proto::{LONGEST_READ_REPLY, MAX_ENTRIES, ParseError, Reply};
 
 use super::body_rules::{Fault, Rules, above, assert_emitted, settings_fault, word};
+use super::extension_rules::{canonical_reply, is_ours, known_part};
 
 const RULES: Rules = Rules { has_length, fault };
 
@@ -10,25 +12,47 @@ const RULES: Rules = Rules { has_length, fault };
 ///
 /// - It is understood, or refused with the right cause, as the tables of `docs/protocol.md` say.
 /// - A body that was understood is sent in its canonical form, with the same meaning.
+/// - A reply of our extension has room in a datagram, also one that has grown.
 /// - A read reply has as many entries as it says, and its model has entries of this size.
 ///
 /// # Panics
 /// When one of these does not hold.
 pub fn replies(data: &[u8]) {
     let parsed = Reply::parse(data);
+    if is_ours(data) {
+        ours(data, &parsed);
+        return;
+    }
     RULES.assert_agree(data, &parsed);
     let Ok(reply) = parsed else { return };
     assert_eq!(reply.code().byte(), data[0]);
     assert_emitted(reply.to_body(), &canonical(data));
     if let Reply::Read(read) = &reply {
         assert_eq!(read.entries.len(), usize::from(data[3]));
-        assert!(read.entries.len() <= MAX_ENTRIES && data.len() <= MAX_BODY_LEN);
+        assert!(read.entries.len() <= MAX_ENTRIES && data.len() <= LONGEST_READ_REPLY);
         assert_eq!(
             read.model.map(|model| model.read_reply_len(read.entries.len())).unwrap_or(8),
             data.len()
         );
     }
     assert_eq!(Reply::parse(&reply.to_body()), Ok(reply));
+}
+
+fn ours(data: &[u8], parsed: &Result<Reply, ParseError>) {
+    let known = match (known_part(data), parsed) {
+        (Ok(known), Ok(_)) => known,
+        (Err(expected), Err(error)) => {
+            assert_eq!(*error, expected);
+            assert!(!error.to_string().is_empty());
+            return;
+        }
+        (expected, parsed) => panic!("{parsed:?}, not {expected:?}"),
+    };
+    let Ok(reply) = parsed else { return };
+    assert_eq!(reply.code().byte(), data[0]);
+    assert!(known.len() <= MAX_SER_DATA);
+    assert_emitted(reply.to_body(), &canonical_reply(known));
+    assert_eq!(Reply::parse(&reply.to_body()).as_ref(), Ok(reply));
 }
 
 fn has_length(code: u8, length: usize) -> bool {

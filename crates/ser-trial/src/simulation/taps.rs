@@ -17,6 +17,7 @@ use ser_sim::genius::{Board, BoardWindow, Read};
 
 use super::ledger::Ledger;
 use super::printout::Printout;
+use crate::served::command_in;
 
 /// What a body says.
 pub type Received = Result<Command, ParseError>;
@@ -50,9 +51,9 @@ impl Expected {
         *match error {
             ParseError::Empty => &mut counts.frames_empty,
             ParseError::UnknownCode { .. } => &mut counts.commands_unknown,
-            ParseError::WrongLength { .. } | ParseError::EntrySize { .. } => {
-                &mut counts.commands_wrong_length
-            }
+            ParseError::WrongLength { .. }
+            | ParseError::TooShort { .. }
+            | ParseError::EntrySize { .. } => &mut counts.commands_wrong_length,
             ParseError::BadValue { .. } => &mut counts.parameters_refused,
         } += 1;
     }
@@ -135,7 +136,7 @@ impl LineTap {
                 expected.frame_error(dropped.cause);
                 None
             }
-            Decoded::Frame(body) => match Command::parse(body) {
+            Decoded::Frame(body) => match command_in(body) {
                 Ok(_) if !has_room => {
                     expected.0.commands_overrun += 1;
                     None
@@ -317,7 +318,7 @@ impl SharedRam for TappedWindow {
         taking.unseen = Some(is_message);
         if is_message {
             let broadcast = self.inner.read(map::READ_DIRECTED) != 1;
-            let received = Command::parse(bytes);
+            let received = command_in(bytes);
             taking.messages.push(Taken { received, broadcast, arrived_us, seen_ms: None });
         }
     }

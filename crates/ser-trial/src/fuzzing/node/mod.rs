@@ -13,6 +13,7 @@ use ser_sim::{LineRate, MemoryStorage, NonVolatile, PoweredOff, Ram, SimNodeOpti
 
 use super::framing::frame_of;
 use super::script::Script;
+use crate::served::command_in;
 use bench::{Bench, Host};
 use model::Recorder;
 
@@ -182,7 +183,7 @@ fn body<'a>(script: &mut Script<'a>) -> &'a [u8] {
 /// Whether the log is the same whenever the command is carried out after its arrival, and everything
 /// is said without hours of waiting.
 fn is_free_of_order(body: &[u8]) -> bool {
-    match Command::parse(body) {
+    match command_in(body) {
         Ok(Command::Configure(configure)) => configure.size.is_none() && configure.baud.is_none(),
         Ok(command) => !matches!(command, Command::Erase | Command::Print { .. }),
         Err(_) => false,

@@ -10,6 +10,8 @@ use ser_proto::{
     ParseError, ReadReply, Reply, TimeStamp,
 };
 
+use crate::served::command_in;
+
 /// A hundred years, 1970–2069: what two-digit years can tell apart.
 const CENTURY_MS: i64 = 36_525 * 24 * 60 * 60 * 1000;
 
@@ -174,7 +176,7 @@ impl Recorder {
     /// Takes the body of a good frame, or of a datagram, in millisecond `tick_ms`. Returns what is
     /// said because of it, with at most `max_entries` entries in a reply.
     pub(super) fn body(&mut self, body: &[u8], tick_ms: u64, max_entries: u8) -> Vec<Said> {
-        match Command::parse(body) {
+        match command_in(body) {
             Ok(command) => self.command(&command, tick_ms, max_entries),
             Err(error) => self.refuse(error),
         }
@@ -183,7 +185,7 @@ impl Recorder {
     /// Takes the body of a datagram to everybody, which is not answered. Returns the command, if
     /// there is one.
     pub(super) fn broadcast(&mut self, body: &[u8], tick_ms: u64) -> Option<Command> {
-        match Command::parse(body) {
+        match command_in(body) {
             Ok(command) => {
                 // A command that only asks one recorder for something has no effect.
                 if matches!(
@@ -227,7 +229,9 @@ impl Recorder {
             ParseError::WrongLength { .. } => self.refused.wrong_length += 1,
             ParseError::BadValue { .. } => self.refused.parameters += 1,
             ParseError::Empty => self.refused.empty += 1,
-            ParseError::EntrySize { .. } => panic!("{error} in a command"),
+            ParseError::TooShort { .. } | ParseError::EntrySize { .. } => {
+                panic!("{error} in a command")
+            }
         }
         match error {
             ParseError::BadValue { code: b'C', .. } => vec![self.settings()],
@@ -272,6 +276,11 @@ impl Recorder {
                 self.offset_ms.0.push((tick_ms, now_ms - tick_ms.cast_signed()));
                 vec![Said::Reply(Reply::ClockSet)]
             }
+            Command::Identify
+            | Command::Time { .. }
+            | Command::QueryFilters { .. }
+            | Command::SetFilter { .. }
+            | Command::Diagnostics { .. } => panic!("{command:?} is unknown to a recorder"),
         }
     }
 

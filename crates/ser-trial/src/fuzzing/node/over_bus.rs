@@ -11,6 +11,7 @@ use super::genius::Genius;
 use super::model::Said;
 use super::prompt_board::{NUMBER, Outgoing};
 use crate::fuzzing::framing::frame_of;
+use crate::served::command_in;
 
 /// How soon everything that was brought over the bus is dealt with.
 const BUS_MS: u32 = 20;
@@ -71,7 +72,7 @@ impl Bench<'_, '_> {
         let arrives_ms = self.arrives_ms();
         let most = u8::try_from(max_entries(self.model.model)).expect("at most ten");
         let mut said = self.model.body(body, arrives_ms, most).into_iter();
-        if let Ok(Command::SetClock(_)) = Command::parse(body) {
+        if let Ok(Command::SetClock(_)) = command_in(body) {
             self.model.set_battery_clock(self.tick_ms + READ_AFTER_MS);
         }
         let expected = said.next().map(|said| match said {
@@ -140,7 +141,7 @@ impl Bench<'_, '_> {
         let is_quiet = self.model.configuration.auto_report == AutoReport::Off
             && !self.model.configuration.auto_print;
         let decides =
-            matches!(Command::parse(body), Ok(Command::SetClock(_) | Command::SetMode { .. }));
+            matches!(command_in(body), Ok(Command::SetClock(_) | Command::SetMode { .. }));
         if !self.genius.as_ref().is_some_and(|genius| genius.has_line) || !is_quiet || !decides {
             return;
         }
