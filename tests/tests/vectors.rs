@@ -86,6 +86,43 @@ fn what_is_understood_is_sent_the_same_way() {
     assert!(sent >= 35);
 }
 
+/// The bodies that a chapter of `docs/protocol.md` shows: a line without an indent begins one, and
+/// what follows two blanks is said about it.
+fn bodies_of_chapter(title: &str) -> Vec<Vec<u8>> {
+    let page = ser_tests::pages::file("docs/protocol.md").expect("docs/protocol.md");
+    let chapter =
+        page.split("\n## ").find(|chapter| chapter.starts_with(title)).expect("a chapter");
+    let blocks = chapter.split("```text\n").skip(1).filter_map(|block| block.split("```").next());
+    let mut bodies: Vec<Vec<u8>> = Vec::new();
+    for line in blocks.flat_map(str::lines) {
+        let bytes = line.trim_start().split("  ").next().unwrap_or_default();
+        let bytes = bytes.split(' ').map_while(|byte| u8::from_str_radix(byte, 16).ok());
+        if !line.starts_with(' ') {
+            bodies.push(Vec::new());
+        }
+        bodies.last_mut().expect("no block begins with an indent").extend(bytes);
+    }
+    bodies
+}
+
+#[test]
+fn the_examples_of_the_chapter_on_our_extension_are_among_these() {
+    let bodies = bodies_of_chapter("Our extension");
+    assert_eq!(bodies.iter().map(|body| body[0]).collect::<Vec<_>>(), *b"IITTFFFDD");
+    for body in bodies {
+        let length = u8::try_from(body.len()).expect("a body is short");
+        let sum = body.iter().fold(0, |sum: u8, &byte| sum.wrapping_add(byte));
+        let digits: String = [&[length], &body[..], &[sum]]
+            .concat()
+            .iter()
+            .map(|byte| format!("{byte:02X}"))
+            .collect();
+        let wire = format!("\u{1B}{digits}").into_bytes();
+        let is_it = |vector: &Vector| !vector.refused && vector.wire == wire;
+        assert!(all().iter().any(is_it), "no vector for {body:02X?}");
+    }
+}
+
 proptest! {
     #[test]
     fn every_cut_of_a_stream_gives_the_same_messages(

@@ -249,6 +249,113 @@ mod tests {
         }
     }
 
+    /// The bytes of hexadecimal digits.
+    fn bytes(digits: &str) -> Vec<u8> {
+        let digits = digits.replace(' ', "");
+        let byte = |at| u8::from_str_radix(&digits[at..at + 2], 16).unwrap();
+        (0..digits.len()).step_by(2).map(byte).collect()
+    }
+
+    #[test]
+    fn questions_of_the_extension_read_like_this() {
+        for (body, meaning) in [
+            ("49", "Host: ask what the recorder is and can do"),
+            ("54 BEEF", "Host: query the clock, token BEEFh"),
+            ("54", "Host: query the clock, token 0000h"),
+            ("46", "Host: query the filters from input 1 on"),
+            ("46 11", "Host: query the filters from input 17 on"),
+            (
+                "46 03 05 0A 03E8 07D0",
+                "Host: set the filter of input 3: debounce 5 ms, chatter from 10 changes in 1000 \
+                 ms until quiet for 2000 ms",
+            ),
+            (
+                "46 00 00 00 0000 0000",
+                "Host: set the filters of all inputs: debounce off, chatter filter off",
+            ),
+            ("44 20", "Host: query the counters from id 32 on"),
+        ] {
+            assert_eq!(text(&bytes(body), Some(Side::Host)), meaning);
+        }
+        let refused = text(&bytes("46 03 05 04 03E8 07D0"), Some(Side::Host));
+        assert!(refused.contains("message F cannot have 4 (04h) at byte 3"), "{refused}");
+    }
+
+    #[test]
+    fn replies_of_the_extension_read_like_this() {
+        let identity =
+            "49 01 20 010203 0000010F 001F002B3347511137353830 0000002A 00000103 0800 00";
+        let nameless =
+            "49 01 10 000100 00000000 000000000000000000000000 00000001 00000001 0100 02";
+        for (body, meaning) in [
+            (
+                identity,
+                "Recorder: identity: 32 inputs, firmware 1.2.3, id 001f002b3347511137353830; level \
+                 1, with time, filters, diagnostics, lasting counts, bits 00000100h; power-up 42, \
+                 life 259; a log of up to 2048 entries; no guard",
+            ),
+            (
+                nameless,
+                "Recorder: identity: 16 inputs, firmware 0.1.0, no id; level 1, with nothing; \
+                 power-up 1, life 1; a log of up to 256 entries; guard in state 2, which is not \
+                 known here",
+            ),
+            (
+                "54 BEEF 0003 5D01 3B37 E00A 02 00000E10 000007D0 FFFFCF2C 00000000D693A400 \
+                 00000103 0000000000010005 0007 00035D013B37E000",
+                "Recorder: clock: 2000-01-01T00:00:00.000010, set by a host over RS-232 3600 s \
+                 ago, doubt 2000 us, drift -12500 ppb; token BEEFh, 3600000000 us after power-up; \
+                 life 259, next sequence 65541; last mark 0007h at 2000-01-01T00:00:00.000000",
+            ),
+            (
+                "54 0000 7FFFFFFFFFFFFFFF 00 00000001 FFFFFFFF 80000000 00000000000F4240 00000001 \
+                 0000000000000001 0000 8000000000000000",
+                "Recorder: clock: 9223372036854775807 us since 1970, never set, doubt not known, \
+                 drift not known; token 0000h, 1000000 us after power-up; life 1, next sequence 1; \
+                 no mark yet",
+            ),
+        ] {
+            assert_eq!(text(&bytes(body), Some(Side::Recorder)), meaning);
+        }
+        let cut_off = text(&bytes(&identity[..33]), None);
+        assert!(
+            cut_off.contains("ends after 14 bytes, before the field at byte 10 is complete"),
+            "{cut_off}"
+        );
+    }
+
+    #[test]
+    fn filters_and_counters_are_listed() {
+        let lists = [
+            (
+                "46 10 02 05 0A 03E8 07D0 00 00 0000 0000",
+                "filters of 2 inputs from input 16 on",
+                vec![
+                    "   16  debounce 5 ms, chatter from 10 changes in 1000 ms until quiet for 2000 ms",
+                    "   17  debounce off, chatter filter off",
+                ],
+            ),
+            ("46 11 00", "filters: none from input 17 on", vec![]),
+            (
+                "44 0B 20 02 00000003 00000000",
+                "2 counters from id 11 on; more from id 32 on",
+                vec!["   11  edges_lost  3", "   12  samples_missed  0"],
+            ),
+            (
+                "44 C8 00 01 FFFFFFFF",
+                "1 counter, id 200; no more",
+                vec!["  200  not known here  4294967295"],
+            ),
+        ];
+        for (body, meaning, details) in lists {
+            let explanation = explain(&bytes(body), Some(Side::Recorder));
+            assert_eq!(
+                (&explanation.text[..], explanation.details),
+                (meaning, details.iter().map(|line| (*line).to_owned()).collect())
+            );
+        }
+    }
+
     #[test]
     fn what_both_could_have_sent_gets_both_readings() {
         assert_eq!(
