@@ -89,6 +89,11 @@ impl Chatter {
         self.on = self.on & !(1 << index) | u32::from(filter.is_some()) << index;
     }
 
+    /// The inputs that chatter now.
+    pub(crate) const fn chattering(&self) -> Inputs {
+        Inputs(self.chattering)
+    }
+
     /// How many changes of input `number` (1–32) were left out since power-up. Stops at the largest
     /// value.
     pub(crate) fn suppressed(&self, number: u8) -> u32 {

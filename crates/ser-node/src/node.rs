@@ -7,7 +7,7 @@
 
 use geni_board::SharedRam;
 use ser_proto::genius::max_entries;
-use ser_proto::{AutoReport, Baud, ReadReply};
+use ser_proto::{AutoReport, Baud, Inputs, ReadReply};
 
 use crate::arrival::Way;
 use crate::clock::Rtc;
@@ -161,6 +161,11 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
     /// Whether events are being recorded.
     pub fn is_recording(&self) -> bool {
         self.recorder.is_recording()
+    }
+
+    /// The inputs that chatter now, so that their changes are counted and not recorded.
+    pub fn chattering(&self) -> Inputs {
+        self.recorder.chattering()
     }
 
     /// Events recorded since power-up, erased ones included; wraps.

@@ -139,6 +139,11 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         Inputs(self.changes.capture().state())
     }
 
+    /// The inputs that chatter: their changes are counted and not recorded.
+    pub(crate) fn chattering(&self) -> Inputs {
+        self.changes.chatter().chattering()
+    }
+
     /// Whether changes are recorded now.
     pub(crate) fn is_recording(&self) -> bool {
         self.recording.latest()

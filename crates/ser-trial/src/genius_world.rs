@@ -167,6 +167,7 @@ impl World {
                 let non_volatile = NonVolatile {
                     storage: ser_sim::MemoryStorage::default(),
                     rtc: SimRtc::held_at(time),
+                    id: None,
                 };
                 let options =
                     SimNodeOptions { debounce, non_volatile, ..SimNodeOptions::new(model) };

@@ -11,6 +11,5 @@ pub mod fuzzing;
 pub mod genius_world;
 #[cfg(unix)]
 pub mod recorder;
-mod served;
 pub mod simulation;
 pub mod watching;

@@ -10,7 +10,8 @@ use std::collections::VecDeque;
 
 use geni_board::SharedRam;
 use ser_node::{
-    Capture, CaptureChannel, Debounce, Diagnostics, Event, GeniusPort, Node, NodeParts,
+    Capture, CaptureChannel, Debounce, DebounceTimes, Diagnostics, Event, GeniusPort, Node,
+    NodeParts, TickStamp,
 };
 use ser_proto::{Baud, Entry, MAX_SIZE, Model};
 
@@ -129,6 +130,7 @@ impl PoweredOff {
             power_up_ms: now_ms,
             moved_ms: now_ms,
             leapt_ms: 0,
+            debounce: options.debounce,
             options,
             baud,
             on_the_line: None,
@@ -150,6 +152,8 @@ pub struct SimNode<'a> {
     /// Milliseconds that were passed over. The node counts them as samples that it missed.
     leapt_ms: u64,
     options: SimNodeOptions,
+    /// The debounce times by which the inputs are sampled.
+    debounce: Debounce,
     /// The rate at which the line runs.
     baud: Baud,
     /// The byte being sent at the real rate, and when its stop bit ends, in nanoseconds.
@@ -222,6 +226,7 @@ impl<'a> SimNode<'a> {
     /// Lets every millisecond up to and including `ms` pass. An `ms` in the past changes nothing.
     pub fn advance_to(&mut self, ms: u64) {
         while self.now_ms < ms {
+            self.change_debounce();
             self.pass_ms();
             self.node.poll(self.tick_at(self.now_ms));
             self.pump();
@@ -279,14 +284,25 @@ impl<'a> SimNode<'a> {
         self.capture.sample(tick, self.player.state());
     }
 
-    /// Whether nothing is on its way through debounce or onto the line.
+    /// Whether nothing is on its way through the filters or onto the line.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
         // Debounce holds an edge back twice at most: until the change is accepted, and until no
         // earlier one can come.
-        let longest_ms = u64::from(self.options.debounce.longest_ms());
+        let longest_ms = u64::from(self.debounce.longest_ms());
         let settled = self.now_ms - self.moved_ms >= 2 * longest_ms;
-        settled && self.on_the_line.is_none()
+        let is_filtering =
+            self.node.debounce_change().is_some() || !self.node.chattering().is_empty();
+        settled && !is_filtering && self.on_the_line.is_none()
+    }
+
+    /// The main loop hands other debounce times over before the next sample.
+    fn change_debounce(&mut self) {
+        let Some(debounce) = self.node.debounce_change() else { return };
+        if self.capture.take_times(&DebounceTimes::new(&debounce)) {
+            self.node.debounce_changed(debounce);
+            self.debounce = debounce;
+        }
     }
 
     fn pass_over(&mut self, until_ms: u64) {
@@ -322,6 +338,14 @@ impl<'a> SimNode<'a> {
             self.node.serial_receive(byte, tick);
             self.pump();
         }
+    }
+
+    /// A byte has arrived on the recorder's line in millisecond `at_ms`, so many microseconds after
+    /// the sample, and its main loop takes it now.
+    pub fn receive_late(&mut self, byte: u8, at_ms: u64, us: u16) {
+        let tick_ms = self.tick_at(at_ms);
+        self.node.serial_receive(byte, TickStamp { tick_ms, us });
+        self.pump();
     }
 
     /// The recorder's UART meets a byte that it cannot read.

@@ -17,7 +17,6 @@ use ser_sim::genius::{Board, BoardWindow, Read};
 
 use super::ledger::Ledger;
 use super::printout::Printout;
-use crate::served::command_in;
 
 /// What a body says.
 pub type Received = Result<Command, ParseError>;
@@ -136,7 +135,7 @@ impl LineTap {
                 expected.frame_error(dropped.cause);
                 None
             }
-            Decoded::Frame(body) => match command_in(body) {
+            Decoded::Frame(body) => match Command::parse(body) {
                 Ok(_) if !has_room => {
                     expected.0.commands_overrun += 1;
                     None
@@ -318,7 +317,7 @@ impl SharedRam for TappedWindow {
         taking.unseen = Some(is_message);
         if is_message {
             let broadcast = self.inner.read(map::READ_DIRECTED) != 1;
-            let received = command_in(bytes);
+            let received = Command::parse(bytes);
             taking.messages.push(Taken { received, broadcast, arrived_us, seen_ms: None });
         }
     }

@@ -59,7 +59,7 @@ impl Unit {
             ledger: Ledger::new(model.mask()),
             expected: Expected::default(),
             activity: Activity::new(chance.branch(), model.inputs()),
-            non_volatile: NonVolatile { storage: MemoryStorage::default(), rtc },
+            non_volatile: NonVolatile { storage: MemoryStorage::default(), rtc, id: None },
             has_clock,
             lost_before: 0,
         }

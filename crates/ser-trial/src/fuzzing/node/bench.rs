@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use ser_proto::{Decoded, FrameDecoder, MAX_BODY_LEN, Reply};
+use ser_node::Diagnostics;
+use ser_proto::{Counter, Counters, Decoded, FrameDecoder, MAX_BODY_LEN, Reply};
 use ser_sim::{Scenario, SimNode, Step};
 
 use super::genius::Genius;
@@ -193,8 +194,34 @@ impl<'a, 'm> Bench<'a, 'm> {
                 }
                 Some(Decoded::Dropped(dropped)) => panic!("the node sent {dropped:?}"),
             };
-            if self.compares {
-                assert_eq!(Some(said), self.expected.pop_front());
+            if !self.compares {
+                continue;
+            }
+            match (self.expected.pop_front(), said) {
+                (Some(Said::Counters(first)), Said::Reply(Reply::Diagnostics(page))) => {
+                    self.check_counters(first, &page);
+                }
+                (expected, said) => assert_eq!(Some(said), expected),
+            }
+        }
+    }
+
+    /// Checks a page of counters: it begins where it was asked to, or behind ids that there are not,
+    /// and its values are those that the node shows otherwise.
+    fn check_counters(&self, first: Counter, page: &Counters) {
+        let Diagnostics { edges_lost, parameters_refused, commands_unknown, .. } =
+            self.node.diagnostics();
+        assert!(page.first >= first);
+        for (counter, value) in page.counters() {
+            match counter {
+                Counter::EDGES_LOST => assert_eq!(value, edges_lost),
+                Counter::PARAMETERS_REFUSED => assert_eq!(value, parameters_refused),
+                Counter::COMMANDS_UNKNOWN => assert_eq!(value, commands_unknown),
+                _ => {}
+            }
+            if let Some(input) = counter.suppressed_input() {
+                assert!(input <= self.model.model.inputs());
+                assert_eq!(value, self.model.suppressed(input), "of input {input}");
             }
         }
     }

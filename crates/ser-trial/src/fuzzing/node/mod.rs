@@ -13,7 +13,6 @@ use ser_sim::{LineRate, MemoryStorage, NonVolatile, PoweredOff, Ram, SimNodeOpti
 
 use super::framing::frame_of;
 use super::script::Script;
-use crate::served::command_in;
 use bench::{Bench, Host};
 use model::Recorder;
 
@@ -118,6 +117,7 @@ impl Setup {
             non_volatile: NonVolatile {
                 storage: MemoryStorage::default(),
                 rtc: SimRtc::held_at(self.rtc),
+                id: None,
             },
             ..SimNodeOptions::new(self.model)
         }
@@ -183,9 +183,11 @@ fn body<'a>(script: &mut Script<'a>) -> &'a [u8] {
 /// Whether the log is the same whenever the command is carried out after its arrival, and everything
 /// is said without hours of waiting.
 fn is_free_of_order(body: &[u8]) -> bool {
-    match command_in(body) {
+    match Command::parse(body) {
         Ok(Command::Configure(configure)) => configure.size.is_none() && configure.baud.is_none(),
-        Ok(command) => !matches!(command, Command::Erase | Command::Print { .. }),
+        Ok(command) => {
+            !matches!(command, Command::Erase | Command::Print { .. } | Command::SetFilter { .. })
+        }
         Err(_) => false,
     }
 }

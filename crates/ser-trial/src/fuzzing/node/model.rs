@@ -2,15 +2,15 @@
 //! and no limit of time.
 
 use std::collections::BTreeMap;
+use std::num::NonZeroU8;
 
 use chrono::{DateTime, NaiveDateTime};
 use ser_node::VERSION;
 use ser_proto::{
-    AutoReport, Command, Configuration, Configure, Entry, Inputs, LastBroadcast, Mode, Model,
-    ParseError, ReadReply, Reply, TimeStamp,
+    AutoReport, Capabilities, ChatterFilter, ClockReading, ClockSource, Command, Configuration,
+    Configure, Counter, Entry, Filters, FirmwareVersion, Guard, Identity, InputFilter, Inputs,
+    LastBroadcast, Mark, Mode, Model, ParseError, ReadReply, Reply, TimeStamp,
 };
-
-use crate::served::command_in;
 
 /// A hundred years, 1970–2069: what two-digit years can tell apart.
 const CENTURY_MS: i64 = 36_525 * 24 * 60 * 60 * 1000;
@@ -22,6 +22,8 @@ pub(super) enum Said {
     Line(String),
     /// An event that auto report owes to a device on the Genius bus.
     Owed(Entry),
+    /// A page of the counters, from this one on.
+    Counters(Counter),
 }
 
 /// Counts of bad input.
@@ -55,9 +57,13 @@ impl<T: Copy> History<T> {
 #[derive(Clone, Debug)]
 pub(super) struct Recorder {
     pub(super) model: Model,
-    /// Debounce time of each input, and the longest of them.
-    debounce_ms: [u64; 32],
-    hold_ms: u64,
+    /// Debounce time of each input by the board, and as it is in force.
+    strapped_ms: [u8; 32],
+    debounce_ms: [u8; 32],
+    /// The filters that a host has set.
+    filters: Option<[InputFilter; 32]>,
+    power_ups: u32,
+    life: u32,
     pub(super) configuration: Configuration,
     /// What the battery-backed clock shows at power-up.
     rtc: NaiveDateTime,
@@ -67,9 +73,12 @@ pub(super) struct Recorder {
     /// The entries in their slots. Entries that do not exist yet are not in it.
     slots: Vec<Entry>,
     next_slot: usize,
-    total: u16,
+    total: u64,
     /// Calendar time at tick 0.
     offset_ms: History<i64>,
+    pub(super) source: ClockSource,
+    set_ms: u64,
+    mark: Option<Mark>,
     recording: History<bool>,
     /// Inputs after debounce: as accepted, and as recorded.
     accepted: u32,
@@ -78,16 +87,63 @@ pub(super) struct Recorder {
     differs_since: [Option<u64>; 32],
     /// Accepted changes by the tick at which they began, until no earlier one can turn up.
     held_back: BTreeMap<u64, u32>,
+    chatter: [Chatter; 32],
+    /// All changes up to this tick have been through the filters.
+    settled_ms: u64,
+}
+
+/// The chatter filter of one input.
+#[derive(Clone, Copy, Debug, Default)]
+struct Chatter {
+    chatters: bool,
+    window_began_ms: Option<u64>,
+    changes: u8,
+    changed_ms: u64,
+    /// Whether the input is on, and what the log shows.
+    on: bool,
+    recorded: bool,
+    /// Changes that were left out.
+    suppressed: u32,
+}
+
+impl Chatter {
+    /// Whether the log shows a change in this millisecond.
+    fn pass(&mut self, filter: Option<ChatterFilter>, tick_ms: u64, changes: bool) -> bool {
+        self.on ^= changes;
+        match filter {
+            None => self.chatters = false,
+            Some(filter) if changes => {
+                self.changed_ms = tick_ms;
+                if !self.chatters {
+                    let goes_on = |began: &u64| tick_ms - began < filter.window_ms.into();
+                    if self.window_began_ms.filter(goes_on).is_none() {
+                        (self.window_began_ms, self.changes) = (Some(tick_ms), 0);
+                    }
+                    self.changes += 1;
+                    self.chatters = self.changes >= filter.changes.get();
+                }
+            }
+            Some(filter) => {
+                if self.chatters && tick_ms - self.changed_ms >= filter.rearm_ms.into() {
+                    (self.chatters, self.window_began_ms) = (false, None);
+                }
+            }
+        }
+        self.suppressed += u32::from(self.chatters && changes);
+        !self.chatters && std::mem::replace(&mut self.recorded, self.on) != self.on
+    }
 }
 
 impl Recorder {
     /// A recorder as delivered, switched on at tick 0.
     pub(super) fn new(model: Model, debounce_ms: [u8; 32], rtc: NaiveDateTime) -> Recorder {
-        let debounce_ms = debounce_ms.map(u64::from);
         let mut recorder = Recorder {
             model,
+            strapped_ms: debounce_ms,
             debounce_ms,
-            hold_ms: debounce_ms.into_iter().max().unwrap_or(0),
+            filters: None,
+            power_ups: 0,
+            life: 0,
             configuration: Configuration::default(),
             rtc,
             refused: Refused::default(),
@@ -96,13 +152,20 @@ impl Recorder {
             next_slot: 0,
             total: 0,
             offset_ms: History(Vec::new()),
+            source: ClockSource::Battery,
+            set_ms: 0,
+            mark: None,
             recording: History(Vec::new()),
             accepted: 0,
             recorded: 0,
             differs_since: [None; 32],
             held_back: BTreeMap::new(),
+            chatter: [Chatter::default(); 32],
+            settled_ms: 0,
         };
         recorder.power_cycle(0);
+        // That was making it.
+        (recorder.power_ups, recorder.life) = (0, 0);
         recorder
     }
 
@@ -111,12 +174,56 @@ impl Recorder {
     pub(super) fn power_cycle(&mut self, inputs: u32) {
         self.refused = Refused::default();
         self.last_broadcast = None;
+        self.mark = None;
+        self.power_ups += 1;
         self.erase();
+        (self.source, self.set_ms) = (ClockSource::Battery, 0);
         self.offset_ms = History(vec![(0, self.rtc.and_utc().timestamp_millis())]);
         self.recording = History(vec![(0, true)]);
         (self.accepted, self.recorded) = (inputs, inputs);
         self.differs_since = [None; 32];
         self.held_back.clear();
+        self.debounce_ms = self.strapped_ms;
+        for (bit, chatter) in self.chatter.iter_mut().enumerate() {
+            let on = inputs >> bit & 1 == 1;
+            *chatter = Chatter { on, recorded: on, ..Chatter::default() };
+        }
+        self.settled_ms = 0;
+    }
+
+    /// The filter of an input, from 0.
+    fn filter(&self, index: usize) -> InputFilter {
+        let strapped = InputFilter { debounce_ms: self.strapped_ms[index], chatter: None };
+        self.filters.map_or(strapped, |filters| filters[index])
+    }
+
+    /// The changes of an input, 1–32, that were left out since power-up.
+    pub(super) fn suppressed(&self, input: u8) -> u32 {
+        self.chatter[usize::from(input) - 1].suppressed
+    }
+
+    /// Whether no input has a debounce time, nor gets one.
+    pub(super) fn has_no_debounce(&self) -> bool {
+        (0..32).all(|index| self.filter(index).debounce_ms == 0 && self.debounce_ms[index] == 0)
+    }
+
+    /// Whether nothing is on its way through the filters.
+    pub(super) fn is_quiet(&self) -> bool {
+        self.differs_since == [None; 32]
+            && self.held_back.is_empty()
+            && !self.chatter.iter().any(|chatter| chatter.chatters)
+            && (0..32).all(|index| self.filter(index).debounce_ms == self.debounce_ms[index])
+    }
+
+    /// Other debounce times are taken over between two samples, when no input is being debounced
+    /// whose time changes.
+    fn change_debounce(&mut self) {
+        let wanted: [u8; 32] = std::array::from_fn(|index| self.filter(index).debounce_ms);
+        let is_counting = |index: usize| self.differs_since[index].is_some();
+        let changes = |index: usize| wanted[index] != self.debounce_ms[index];
+        if !(0..32).any(|index| changes(index) && is_counting(index)) {
+            self.debounce_ms = wanted;
+        }
     }
 
     /// Entries in use.
@@ -126,6 +233,7 @@ impl Recorder {
 
     /// Takes the state of the inputs in millisecond `tick_ms`. Returns what is said because of it.
     pub(super) fn sample(&mut self, tick_ms: u64, inputs: u32) -> Vec<Said> {
+        self.change_debounce();
         for index in 0..32 {
             let bit = 1 << index;
             if (inputs ^ self.accepted) & bit == 0 {
@@ -133,19 +241,26 @@ impl Recorder {
                 continue;
             }
             let began_ms = *self.differs_since[index].get_or_insert(tick_ms);
-            if tick_ms - began_ms == self.debounce_ms[index] {
+            if tick_ms - began_ms == u64::from(self.debounce_ms[index]) {
                 self.differs_since[index] = None;
                 self.accepted ^= bit;
                 *self.held_back.entry(began_ms).or_default() |= bit & self.model.mask();
             }
         }
+        let longest_ms = self.debounce_ms.into_iter().max().map_or(0, u64::from);
         let mut said = Vec::new();
-        while let Some(first) =
-            self.held_back.first_entry().filter(|first| first.key() + self.hold_ms <= tick_ms)
-        {
-            let (began_ms, changed) = first.remove_entry();
-            if changed != 0 {
-                said.extend(self.record(began_ms, changed));
+        while self.settled_ms + longest_ms < tick_ms {
+            self.settled_ms += 1;
+            let changed = self.held_back.remove(&self.settled_ms).unwrap_or(0);
+            let mut shown = 0;
+            for index in 0..32 {
+                let chatter = self.filter(index).chatter;
+                let changes = changed >> index & 1 == 1;
+                let is_shown = self.chatter[index].pass(chatter, self.settled_ms, changes);
+                shown |= u32::from(is_shown) << index;
+            }
+            if shown != 0 {
+                said.extend(self.record(self.settled_ms, shown));
             }
         }
         said
@@ -176,7 +291,7 @@ impl Recorder {
     /// Takes the body of a good frame, or of a datagram, in millisecond `tick_ms`. Returns what is
     /// said because of it, with at most `max_entries` entries in a reply.
     pub(super) fn body(&mut self, body: &[u8], tick_ms: u64, max_entries: u8) -> Vec<Said> {
-        match command_in(body) {
+        match Command::parse(body) {
             Ok(command) => self.command(&command, tick_ms, max_entries),
             Err(error) => self.refuse(error),
         }
@@ -185,7 +300,7 @@ impl Recorder {
     /// Takes the body of a datagram to everybody, which is not answered. Returns the command, if
     /// there is one.
     pub(super) fn broadcast(&mut self, body: &[u8], tick_ms: u64) -> Option<Command> {
-        match command_in(body) {
+        match Command::parse(body) {
             Ok(command) => {
                 // A command that only asks one recorder for something has no effect.
                 if matches!(
@@ -194,8 +309,16 @@ impl Recorder {
                         | Command::Erase
                         | Command::SetMode { .. }
                         | Command::SetClock(_)
+                        | Command::SetFilter { .. }
                 ) {
                     self.command(&command, tick_ms, 0);
+                }
+                if let Command::SetClock(_) = command {
+                    self.source = ClockSource::HostOverGenius;
+                }
+                if let Command::Time { token } = command {
+                    let clock_us = self.now_ms(tick_ms) * 1000;
+                    self.mark = Some(Mark { token, clock_us });
                 }
                 Some(command)
             }
@@ -274,14 +397,80 @@ impl Recorder {
                 self.rtc = NaiveDateTime::try_from(time).expect("a date that was parsed");
                 let now_ms = self.rtc.and_utc().timestamp_millis();
                 self.offset_ms.0.push((tick_ms, now_ms - tick_ms.cast_signed()));
+                (self.source, self.set_ms) = (ClockSource::HostOverRs232, tick_ms);
                 vec![Said::Reply(Reply::ClockSet)]
             }
-            Command::Identify
-            | Command::Time { .. }
-            | Command::QueryFilters { .. }
-            | Command::SetFilter { .. }
-            | Command::Diagnostics { .. } => panic!("{command:?} is unknown to a recorder"),
+            Command::Identify => vec![Said::Reply(Reply::Identity(self.identity()))],
+            Command::Time { token } => {
+                vec![Said::Reply(Reply::Time(self.reading(token, tick_ms)))]
+            }
+            Command::QueryFilters { first } => vec![self.filters_from(first)],
+            Command::SetFilter { input, filter } => {
+                self.set_filter(input, filter);
+                vec![self.filters_from(input.unwrap_or(NonZeroU8::MIN))]
+            }
+            Command::Diagnostics { first } => vec![Said::Counters(first)],
         }
+    }
+
+    fn identity(&self) -> Identity {
+        let capabilities = [
+            Capabilities::TIME,
+            Capabilities::FILTERS,
+            Capabilities::DIAGNOSTICS,
+            Capabilities::LASTING_COUNTS,
+        ];
+        Identity {
+            level: 1,
+            model: self.model,
+            firmware: FirmwareVersion {
+                major: VERSION / 100,
+                minor: VERSION / 10 % 10,
+                patch: VERSION % 10,
+            },
+            capabilities: capabilities.into_iter().fold(Capabilities(0), Capabilities::with),
+            id: None,
+            power_ups: self.power_ups,
+            life: self.life,
+            log_capacity: 2048,
+            guard: Guard::None,
+        }
+    }
+
+    fn reading(&self, token: u16, tick_ms: u64) -> ClockReading {
+        ClockReading {
+            token,
+            clock_us: self.now_ms(tick_ms) * 1000,
+            source: self.source,
+            age_s: u32::try_from((tick_ms - self.set_ms) / 1000).expect("seconds"),
+            doubt_us: None,
+            drift_ppb: None,
+            tick_us: tick_ms * 1000,
+            life: self.life,
+            next_sequence: self.total + 1,
+            last_mark: self.mark,
+        }
+    }
+
+    fn filters_from(&self, first: NonZeroU8) -> Said {
+        let inputs = first.get()..=self.model.inputs();
+        let filters = inputs.take(20).map(|number| self.filter(usize::from(number) - 1));
+        Said::Reply(Reply::Filters(Filters { first, filters: filters.collect() }))
+    }
+
+    fn set_filter(&mut self, input: Option<NonZeroU8>, filter: InputFilter) {
+        let inputs = usize::from(self.model.inputs());
+        let mut filters = [InputFilter::OFF; 32];
+        for index in 0..inputs {
+            let is_meant = input.is_none_or(|input| usize::from(input.get()) == index + 1);
+            filters[index] = if is_meant { filter } else { self.filter(index) };
+            if filters[index].chatter != self.filter(index).chatter {
+                self.chatter[index].window_began_ms = None;
+            }
+        }
+        self.refused.parameters +=
+            u32::from(input.is_some_and(|input| usize::from(input.get()) > inputs));
+        self.filters = Some(filters);
     }
 
     fn refuse_start(&mut self, start: u16) -> bool {
@@ -305,13 +494,14 @@ impl Recorder {
             self.slots[self.next_slot] = entry;
         }
         self.next_slot = (self.next_slot + 1) % usize::from(self.configuration.size);
-        self.total = self.total.wrapping_add(1);
+        self.total += 1;
     }
 
     fn erase(&mut self) {
         self.slots.clear();
         self.next_slot = 0;
         self.total = 0;
+        self.life += 1;
     }
 
     fn configure(&mut self, configure: &Configure) {
@@ -336,7 +526,7 @@ impl Recorder {
         let entries = existing.iter().copied().take(count).collect::<Vec<_>>();
         Reply::Read(ReadReply {
             start: u16::try_from(start).expect("a number of two bytes"),
-            total: self.total,
+            total: u16::try_from(self.total % (1 << 16)).expect("two bytes"),
             next_slot: u16::try_from(self.next_slot).expect("below the size"),
             model: (!entries.is_empty()).then_some(self.model),
             entries: entries.into_iter().collect(),

@@ -3,7 +3,9 @@
 use ser_proto::genius::{
     FUNCTION_GENIUS, FUNCTION_HORNER, SUBFUNCTION_SER, Subfunction, max_entries,
 };
-use ser_proto::{AutoReport, Command, Decoded, FrameDecoder, LastBroadcast, MAX_BODY_LEN, Reply};
+use ser_proto::{
+    AutoReport, ClockSource, Command, Decoded, FrameDecoder, LastBroadcast, MAX_BODY_LEN, Reply,
+};
 use ser_sim::{Scenario, Step};
 
 use super::bench::Bench;
@@ -11,7 +13,6 @@ use super::genius::Genius;
 use super::model::Said;
 use super::prompt_board::{NUMBER, Outgoing};
 use crate::fuzzing::framing::frame_of;
-use crate::served::command_in;
 
 /// How soon everything that was brought over the bus is dealt with.
 const BUS_MS: u32 = 20;
@@ -69,11 +70,21 @@ impl Bench<'_, '_> {
             return;
         }
         self.await_reports();
+        // A few milliseconds pass until a command is carried out.
+        let depends_on_the_moment = match Command::parse(body) {
+            Ok(Command::Diagnostics { .. }) => true,
+            Ok(Command::Time { .. } | Command::SetFilter { .. }) => !self.model.is_quiet(),
+            _ => false,
+        };
+        if depends_on_the_moment {
+            return;
+        }
         let arrives_ms = self.arrives_ms();
         let most = u8::try_from(max_entries(self.model.model)).expect("at most ten");
         let mut said = self.model.body(body, arrives_ms, most).into_iter();
-        if let Ok(Command::SetClock(_)) = command_in(body) {
+        if let Ok(Command::SetClock(_)) = Command::parse(body) {
             self.model.set_battery_clock(self.tick_ms + READ_AFTER_MS);
+            self.model.source = ClockSource::HostOverGenius;
         }
         let expected = said.next().map(|said| match said {
             Said::Reply(reply) => {
@@ -121,6 +132,10 @@ impl Bench<'_, '_> {
             return;
         }
         self.await_reports();
+        // It is carried out a few milliseconds later.
+        if matches!(Command::parse(body), Ok(Command::SetFilter { .. })) && !self.model.is_quiet() {
+            return;
+        }
         let expected = self.expect_broadcast(source, body, READ_AFTER_MS);
         self.bring(|genius| genius.bring_command(source, true, body));
         self.await_reply(None);
@@ -140,8 +155,9 @@ impl Bench<'_, '_> {
     ) {
         let is_quiet = self.model.configuration.auto_report == AutoReport::Off
             && !self.model.configuration.auto_print;
+        let is_quiet = is_quiet && self.model.has_no_debounce();
         let decides =
-            matches!(command_in(body), Ok(Command::SetClock(_) | Command::SetMode { .. }));
+            matches!(Command::parse(body), Ok(Command::SetClock(_) | Command::SetMode { .. }));
         if !self.genius.as_ref().is_some_and(|genius| genius.has_line) || !is_quiet || !decides {
             return;
         }
