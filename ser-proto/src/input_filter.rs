@@ -11,7 +11,7 @@ use core::num::NonZeroU8;
 
 use nom::Parser;
 use nom::combinator::map;
-use nom::number::complete::be_u8;
+use nom::number::complete::{be_u8, be_u16};
 
 use crate::Body;
 use crate::fields::{Bytes, Fault};
@@ -102,11 +102,13 @@ impl InputFilter {
     #[must_use]
     pub fn from_bytes(bytes: [u8; InputFilter::LEN]) -> InputFilter {
         let [debounce_ms, changes, a, b, c, d] = bytes;
-        let chatter = NonZeroU8::new(changes).map(|changes| ChatterFilter {
-            changes,
-            window_ms: u16::from_be_bytes([a, b]),
-            rearm_ms: u16::from_be_bytes([c, d]),
-        });
+        let (window_ms, rearm_ms) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
+        InputFilter::of_fields(debounce_ms, changes, window_ms, rearm_ms)
+    }
+
+    fn of_fields(debounce_ms: u8, changes: u8, window_ms: u16, rearm_ms: u16) -> InputFilter {
+        let chatter =
+            NonZeroU8::new(changes).map(|changes| ChatterFilter { changes, window_ms, rearm_ms });
         InputFilter { debounce_ms, chatter }
     }
 
@@ -120,8 +122,8 @@ impl InputFilter {
 
     /// Takes any values: those of a recorder are shown as they are.
     pub(crate) fn parser<'a>() -> impl Parser<Bytes<'a>, Output = InputFilter, Error = Fault> {
-        map((be_u8, be_u8, be_u8, be_u8, be_u8, be_u8), |bytes| {
-            InputFilter::from_bytes(bytes.into())
+        map((be_u8, be_u8, be_u16, be_u16), |(debounce_ms, changes, window_ms, rearm_ms)| {
+            InputFilter::of_fields(debounce_ms, changes, window_ms, rearm_ms)
         })
     }
 
