@@ -61,4 +61,5 @@ pub use transport::serial::SerialTransport;
 pub use transport::tcp::TcpTransport;
 pub use transport::transport_error::TransportError;
 pub use unit::Unit;
+pub use unit::extension::ClockLook;
 pub use unit::request_error::RequestError;

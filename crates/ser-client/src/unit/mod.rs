@@ -3,6 +3,7 @@
 //! A [`Unit`] drives a session over a link. It sends what is due, waits for what arrives, and
 //! returns an error when no answer comes. `open` has the ways to open one.
 
+pub(crate) mod extension;
 mod open;
 pub(crate) mod request_error;
 
@@ -27,6 +28,7 @@ use crate::session::{LONGEST_FRAME, NoReply, Session, Timing};
 use crate::transport::Transport;
 use crate::transport::clock::{Clock, RealTime};
 use crate::transport::line_rate::LineRate;
+use extension::Extension;
 use request_error::RequestError;
 
 /// A recorder changes its rate after the reply. It would not understand what arrives at that
@@ -44,6 +46,11 @@ const SEARCH_TIMEOUT: Duration = Duration::from_millis(250);
 pub struct Unit {
     link: Box<dyn Link>,
     session: Session,
+    /// Whether the recorder has answered a command of the manual.
+    has_answered: bool,
+    extension: Extension,
+    /// That of the last question about the clock.
+    token: u16,
     /// Where the log stood after the last reading by cursor.
     pub(crate) last_position: Option<LogPosition>,
 }
@@ -65,7 +72,19 @@ impl Unit {
         let Options { timeout, retries } = options;
         let line_rate = LineRate::from(transport.bits_per_second());
         let session = Session::new(Timing { timeout, retries, line_rate });
-        Unit { link: Box::new(SerialLink::new(transport, clock)), session, last_position: None }
+        Unit::over(Box::new(SerialLink::new(transport, clock)), session)
+    }
+
+    /// A recorder at the other end of a link.
+    fn over(link: Box<dyn Link>, session: Session) -> Unit {
+        Unit {
+            link,
+            session,
+            has_answered: false,
+            extension: Extension::default(),
+            token: 0,
+            last_position: None,
+        }
     }
 
     /// This host's own bus address, if the recorder is on a Genius bus. Auto reports can be sent
@@ -406,7 +425,10 @@ impl Unit {
         loop {
             self.send_due(time_at)?;
             match self.session.take_answer() {
-                Some(Ok(reply)) => return Ok(reply),
+                Some(Ok(reply)) => {
+                    self.has_answered |= !reply.code().is_of_extension();
+                    return Ok(reply);
+                }
                 Some(Err(no_reply)) => {
                     let diagnosis = self.link.diagnose(no_reply.diagnosis);
                     return Err(NoReply { diagnosis, ..no_reply }.into());

@@ -56,6 +56,6 @@ impl GeniHost {
         // A bus has many talkers, so two requests at once would fill no silence.
         let session = Session::new(timing).one_at_a_time();
         let link = Box::new(GeniusLink { host: self.clone(), node });
-        Unit { link, session, last_position: None }
+        Unit::over(link, session)
     }
 }
