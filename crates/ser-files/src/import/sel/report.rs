@@ -58,7 +58,8 @@ pub(in super::super) fn read(
                 }
             },
             Kind::Other if is_below_columns => {
-                let why = format!("this is no row of a list: {}", quoted(text.trim().as_bytes()));
+                let why =
+                    format!("this is not a row of a list: {}", quoted(text.trim().as_bytes()));
                 notes.leave_out(number, why);
                 numbered.tear();
             }
