@@ -321,10 +321,7 @@ fn a_list_that_was_imported_under_two_zones_is_told() {
     let first = desk.path().join("relay.jsonl").display().to_string();
     let merge = run(&format!("merge --site plant.toml --input {first} {other}"));
     let told = text(&merge.stderr);
-    assert!(
-        told.contains("relay: two lists of 7 events say the same, 6 h 00 min apart"),
-        "{told}"
-    );
+    assert!(told.contains("relay: two lists of 7 events say the same, 6 h 00 min apart"), "{told}");
     let once = run(&format!("merge --site plant.toml --input {first} {first}"));
     assert!(!text(&once.stderr).contains("say the same"), "{}", text(&once.stderr));
 }

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 use ser_evidence::history::{Collector, History};
 use ser_evidence::site::Site;
-use ser_files::report::NotReached;
+use ser_files::NotReached;
 
 use crate::connection::{ConnectionArgs, ports};
 use crate::error::{Failure, Result};

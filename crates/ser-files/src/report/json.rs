@@ -9,8 +9,8 @@ use ser_evidence::timeline::{ChangeId, Delta, EventId};
 use serde_json::{Value, json};
 
 use super::Document;
-use super::times::rfc3339;
 use super::verdict;
+use crate::digits::rfc3339;
 
 /// The version of the layout. A change that old readers would misread gets the next number.
 const SCHEMA: u32 = 1;
@@ -151,7 +151,7 @@ fn recorders(document: &Document<'_>) -> Vec<Value> {
             "read_until": of.read_until.and_then(|reading| rfc3339(reading.utc.us())),
             "missing": of.gaps.iter().map(|(gap, _)| json!({
                 "after": gap.after,
-                "what": verdict::missing(gap.lost, gap.why),
+                "what": super::missing(gap.lost, gap.why),
             })).collect::<Vec<_>>(),
             "conflicts": of.conflicts,
             "without_time": of.timeless,

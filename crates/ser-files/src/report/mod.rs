@@ -7,11 +7,9 @@
 mod elsewhere;
 mod html;
 mod json;
-pub(crate) mod names;
 mod outcome;
 mod sequence;
 mod sources;
-pub(crate) mod span;
 mod style;
 mod table;
 mod text;
@@ -24,11 +22,13 @@ pub use style::Styles;
 pub use text::write as write_text;
 pub use times::Clock;
 
-pub(crate) use times::rfc3339;
-pub(crate) use verdict::missing;
+pub use crate::missing::NotReached;
 
 use ser_evidence::incident::Report;
 use ser_evidence::timeline::Timeline;
+
+use crate::missing::missing;
+use crate::{names, span};
 
 /// A report, and what is said about where it comes from.
 #[derive(Debug)]
@@ -55,13 +55,4 @@ impl Document<'_> {
     pub fn is_incomplete(&self) -> bool {
         self.report.is_incomplete() || !self.not_reached.is_empty() || self.damaged_lines > 0
     }
-}
-
-/// A recorder that could not be read.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NotReached {
-    /// Its name.
-    pub recorder: String,
-    /// Why.
-    pub why: String,
 }

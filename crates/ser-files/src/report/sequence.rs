@@ -9,7 +9,7 @@ use ser_evidence::timeline::{ChangeId, EventId, Order, Timeline};
 
 use super::names;
 use super::span::{doubt, since};
-use super::{Clock, Document, elsewhere, verdict};
+use super::{Clock, Document, elsewhere};
 
 /// A line of the sequence.
 #[derive(Debug)]
@@ -306,6 +306,6 @@ fn remarks_ahead(
 
 fn gap(timeline: &Timeline<'_>, event: EventId, index: usize) -> Option<Remark> {
     let gap = timeline.life(event)?.gaps.get(index)?;
-    let (recorder, text) = (names::recorder(timeline, event), verdict::missing(gap.lost, gap.why));
+    let (recorder, text) = (names::recorder(timeline, event), super::missing(gap.lost, gap.why));
     Some(Remark { recorder, text, is_loss: true, bracket: Sign::None })
 }

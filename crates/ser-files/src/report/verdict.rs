@@ -10,7 +10,7 @@ use ser_evidence::timeline::{ChangeId, ContactTrouble, Timeline};
 
 use super::names::{self, harmless};
 use super::span::{doubt, duration};
-use super::{Clock, Document};
+use super::{Clock, Document, missing};
 
 /// What was first, in words.
 pub(super) fn first_out(
@@ -112,9 +112,10 @@ pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
             .map(|missed| format!("{} not reached", harmless(&missed.recorder))),
     );
     wrong.extend(damaged(document));
-    for recorder in &report.completeness {
-        wrong.extend(incompleteness(timeline, recorder));
-    }
+    // That a list of another device ends is the least of what may be wrong.
+    let (ended, others): (Vec<_>, Vec<_>) =
+        report.completeness.iter().partition(|of| is_ended_list(timeline, of));
+    wrong.extend(others.into_iter().filter_map(|of| incompleteness(timeline, of)));
     for disagreement in &report.disagreements {
         wrong.extend(disagreement_trouble(disagreement));
     }
@@ -149,8 +150,19 @@ pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
             }
         });
     }
+    wrong.extend(ended.into_iter().filter_map(|of| incompleteness(timeline, of)));
     wrong.dedup();
     wrong
+}
+
+/// Whether nothing is wrong with an imported list but that it goes no further than the incident.
+fn is_ended_list(timeline: &Timeline<'_>, of: &Completeness) -> bool {
+    let history = timeline.history().recorders.get(of.recorder as usize);
+    history.is_some_and(|history| history.stamps.is_some())
+        && of.gaps.is_empty()
+        && of.conflicts == 0
+        && of.timeless == 0
+        && !of.is_complete()
 }
 
 fn step_trouble(timeline: &Timeline<'_>, step: &StepResult) -> Option<String> {
@@ -196,7 +208,9 @@ pub(super) fn incompleteness(timeline: &Timeline<'_>, of: &Completeness) -> Opti
     if of.timeless > 0 {
         text.push(format!("{} entries without a time (the clock was never set)", of.timeless));
     }
-    if text.is_empty() && !of.is_complete() {
+    if is_ended_list(timeline, of) {
+        text.push("the imported list goes no further than the incident".to_owned());
+    } else if text.is_empty() && !of.is_complete() {
         text.push("not known to be read after the end of the incident".to_owned());
     }
     (!text.is_empty()).then(|| format!("{name}: {}", text.join(", ")))
@@ -225,26 +239,6 @@ fn missing_in_all(gaps: impl Iterator<Item = (Lost, Why)>) -> Vec<String> {
     let mut all: Vec<String> = counted.chain(others).collect();
     all.dedup();
     all
-}
-
-/// How many entries are missing, and why.
-pub(crate) fn missing(lost: Lost, why: Why) -> String {
-    let why = match why {
-        Why::Overwritten => "overwritten",
-        Why::LogBeganAnew => "the log began anew",
-        Why::NotRecorded(inputs) => {
-            return format!("inputs changed without being recorded: {}", ser_proto::Inputs(inputs));
-        }
-        Why::NotReached => "in none of the sources",
-        Why::Unreadable => "a line could not be read",
-    };
-    match lost {
-        Lost::Exactly(1) => format!("1 entry missing ({why})"),
-        Lost::Exactly(count) => format!("{count} entries missing ({why})"),
-        Lost::AtLeast(1) => format!("at least 1 entry missing ({why})"),
-        Lost::AtLeast(count) => format!("at least {count} entries missing ({why})"),
-        Lost::Unknown => format!("an unknown number of entries missing ({why})"),
-    }
 }
 
 /// Contacts that disagree while the breaker travels are as they should be.

@@ -6,7 +6,6 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::Extent;
 use super::decimal::{number, whole};
 use crate::error::quoted;
 use crate::import::calendar::{Date, DateOrder, seconds_of_day, utc_offset};
@@ -88,6 +87,15 @@ pub(super) fn counts(line: &str) -> Option<(u64, u64, u64)> {
     };
     let counts = (field("")?, field("A")?, field("D")?);
     fields.next().is_none().then_some(counts)
+}
+
+/// What a record is, apart from its rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// Analog channels that were passed over.
+    pub analog_channels: usize,
+    /// Status channels.
+    pub status_channels: usize,
 }
 
 impl Configuration {

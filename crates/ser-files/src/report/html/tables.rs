@@ -4,9 +4,10 @@ use maud::{Markup, html};
 use ser_evidence::incident::Fold;
 
 use super::picture::Lanes;
+use crate::names;
 use crate::report::sequence::{self, ChangeLine, Line, Remark, Sign};
-use crate::report::span::since;
-use crate::report::{Clock, Document, names, outcome, sources, verdict};
+use crate::report::{Clock, Document, outcome, sources, verdict};
+use crate::span::since;
 
 /// Recorders, their completeness and their clocks.
 pub(super) fn made_from(document: &Document<'_>, clock: &Clock) -> Markup {

@@ -9,7 +9,8 @@ use ser_evidence::timeline::{ChangeId, EventId, Timeline};
 use ser_proto::Inputs;
 
 use super::axis::Axis;
-use crate::report::{Clock, Document, names, sequence};
+use crate::names;
+use crate::report::{Clock, Document, sequence};
 
 /// One point over the time of the incident.
 #[derive(Debug)]
@@ -126,9 +127,8 @@ impl Lanes {
         let Some(lane) = self.lanes.get_mut(place) else { return };
         let doubt_us = sequence::doubt_us(timeline, row.change);
         let state = names::state(timeline, row.point, row.on);
-        let doubt = doubt_us.map_or("doubt not known".to_owned(), |us| {
-            format!("± {}", crate::report::span::doubt(us))
-        });
+        let doubt = doubt_us
+            .map_or("doubt not known".to_owned(), |us| format!("± {}", crate::span::doubt(us)));
         let time = timeline.time(row.change.event).map(|at| clock.time(at.us()));
         let time = time.unwrap_or_else(|| "time not known".to_owned());
         let text = format!("{} {state}, {time} {doubt}", lane.point);

@@ -5,7 +5,8 @@ use maud::{Markup, html};
 use super::axis::Axis;
 use super::frame::{FULL_PX, LANE_PX, LEFT_PX, NAMES_PX, px, shortened};
 use super::scale::Scale;
-use crate::report::{Document, names, outcome};
+use crate::names;
+use crate::report::{Document, outcome};
 use ser_evidence::incident::Verdict;
 
 /// One expected step, in microseconds after the first change.
