@@ -24,7 +24,8 @@ fn in_zone(zone: &str) -> Options {
 fn read_into(importer: &mut Importer, name: &str, bytes: &[u8]) -> Result<Read, Refusal> {
     let data = Path::new(name).with_extension("dat");
     let data = || Ok(Box::new(File::open(folder().join(data))?) as Box<dyn io::Read>);
-    importer.read("F3", bytes, data, &mut |_, _, _| Ok(()))
+    let opened = importer.open(bytes)?;
+    importer.read("F3", opened, data, &mut |_, _, _| Ok(()))
 }
 
 fn sample(name: &str) -> Vec<u8> {
@@ -519,19 +520,24 @@ fn whatever_the_length_memory_and_time_are_bounded() {
     ] {
         let long = io::Cursor::new(head).chain(io::repeat(b'x').take(LONG));
         let mut importer = Importer::new(Options { format: Some(format), ..sure() });
-        let read = importer.read("F3", long, none, &mut taken);
+        let opened = importer.open(long).expect("the format is given");
+        let read = importer.read("F3", opened, none, &mut taken);
         match read {
             Ok(read) => assert!(read.notes.left_out[0].why.contains("longer than"), "{format}"),
             Err(refusal) => assert!(matches!(refusal, Refusal::Damaged { .. }), "{refusal}"),
         }
     }
     let long = io::Cursor::new(b"{\"events\": [").chain(io::repeat(b' ').take(LONG));
-    let read = Importer::new(sure()).read("F3", long, none, &mut taken);
+    let mut importer = Importer::new(sure());
+    let opened = importer.open(long).expect("the format is known");
+    let read = importer.read("F3", opened, none, &mut taken);
     assert!(matches!(read, Err(Refusal::TooMuch { .. })));
     let (row, head) = (b"14/03/2027\n".repeat(1000), &b"OAK,FR,2013\n"[..]);
     let long = io::Cursor::new([head, &row].concat()).chain(io::repeat(b'\n').take(LONG));
     let options = Options { format: Some(Format::Comtrade), ..sure() };
-    let read = Importer::new(options).read("F3", long, none, &mut taken);
+    let mut importer = Importer::new(options);
+    let opened = importer.open(long).expect("the format is given");
+    let read = importer.read("F3", opened, none, &mut taken);
     assert!(matches!(read, Err(Refusal::TooMuch { .. })));
 }
 
@@ -708,7 +714,8 @@ fn remarks_of_our_own_lines_are_handed_on() {
     let none = || Err(io::ErrorKind::NotFound.into());
     let mut own =
         |recorder: &str, record: &Record, note: Option<&str>| output.record(recorder, record, note);
-    importer.read("", line.as_bytes(), none, &mut own).expect("it is read");
+    let opened = importer.open(line.as_bytes()).expect("the format is known");
+    importer.read("", opened, none, &mut own).expect("it is read");
     let imported = importer.finish();
     assert_eq!((imported.recorders[0].name.as_str(), imported.recorders[0].entries), ("U1", 1));
     assert!(output.finish(&imported).expect("memory has room"));

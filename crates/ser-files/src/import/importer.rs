@@ -60,6 +60,21 @@ pub struct Read {
     pub extent: Option<Extent>,
 }
 
+/// A file whose beginning was looked at.
+pub struct Opened<'i> {
+    format: Format,
+    head: Vec<u8>,
+    input: Input<'i>,
+}
+
+impl Opened<'_> {
+    /// The format in which it will be read.
+    #[must_use]
+    pub const fn format(&self) -> Format {
+        self.format
+    }
+}
+
 /// Reads files.
 #[derive(Debug, Default)]
 pub struct Importer {
@@ -107,18 +122,11 @@ impl Importer {
         Importer { options, ..Importer::default() }
     }
 
-    /// Reads a file of this recorder. `data` opens the data of a COMTRADE configuration. If the file
-    /// is one of ours, its records go to `own` at once.
+    /// Looks at the beginning of a file, and tells its format.
     ///
     /// # Errors
-    /// If nothing can be read from it, or not without being told something, or if `own` fails.
-    pub fn read(
-        &mut self,
-        recorder: &str,
-        input: impl io::Read,
-        data: impl FnOnce() -> io::Result<Box<dyn io::Read>>,
-        own: &mut Own<'_>,
-    ) -> Result<Read, Refusal> {
+    /// If nothing can be read from it, or it is in no format that is known.
+    pub fn open<'i>(&self, input: impl io::Read + 'i) -> Result<Opened<'i>, Refusal> {
         let (head, input) = opened(input)?;
         let format = match self.options.format {
             Some(format) => format,
@@ -129,6 +137,21 @@ impl Importer {
                 }
             })?,
         };
+        Ok(Opened { format, head, input })
+    }
+
+    /// Reads a file of this recorder. `data` opens the data of a COMTRADE configuration. If the file
+    /// is one of ours, its records go to `own` at once.
+    ///
+    /// # Errors
+    /// If nothing can be read from it, or not without being told something, or if `own` fails.
+    pub fn read(
+        &mut self,
+        recorder: &str,
+        Opened { format, head, input }: Opened<'_>,
+        data: impl FnOnce() -> io::Result<Box<dyn io::Read>>,
+        own: &mut Own<'_>,
+    ) -> Result<Read, Refusal> {
         let mut read = Read { format, notes: Notes::default(), extent: None };
         if matches!(format, Format::Csv | Format::Jsonl) {
             self.read_own(recorder, input, &mut read.notes, own)?;

@@ -32,7 +32,7 @@ pub use calendar::DateOrder;
 pub use comtrade::Extent;
 pub use cytime::Epoch;
 pub use format::Format;
-pub use importer::{Imported, ImportedRecorder, Importer, Options, Own, Read};
+pub use importer::{Imported, ImportedRecorder, Importer, Opened, Options, Own, Read};
 pub use map::Map;
 pub use notes::{Note, Notes, Refusal};
 pub use output::Output;

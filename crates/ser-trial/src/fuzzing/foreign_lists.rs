@@ -79,7 +79,8 @@ fn written<'d, const N: usize>(
             told.push(Told { recorder: recorder.to_owned(), record: record.clone() });
             output.record(recorder, record, note)
         };
-        importer.read("F3", file, data, &mut own).map_err(|refusal| refusal.to_string())?;
+        let opened = importer.open(file).map_err(|refusal| refusal.to_string())?;
+        importer.read("F3", opened, data, &mut own).map_err(|refusal| refusal.to_string())?;
     }
     let imported = importer.finish();
     output.finish(&imported).expect("memory has room");

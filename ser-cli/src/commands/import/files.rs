@@ -6,7 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use ser_evidence::site::Site;
-use ser_files::import::{Importer, Map, Own, Read, Refusal};
+use ser_files::import::{Format, Importer, Map, Own, Read, Refusal};
 
 use crate::error::{Failure, Result};
 use crate::outlet::NotWritten;
@@ -35,12 +35,13 @@ pub(super) fn with_data(files: &[PathBuf]) -> Vec<PathBuf> {
 /// How the data of a configuration ends.
 const DATA: [&str; 3] = ["dat", "DAT", "Dat"];
 
-/// Reads a file. Its recorder is named, or has the name of the file up to the last dot. Records of our
-/// own files go to `own` at once.
+/// Reads a file if `fits` likes its format. Its recorder is named, or has the name of the file up to the
+/// last dot. Records of our own files go to `own` at once.
 pub(super) fn read(
     importer: &mut Importer,
     path: &Path,
     recorder: Option<&str>,
+    fits: impl FnOnce(Format) -> Result<()>,
     own: &mut Own<'_>,
 ) -> std::result::Result<Read, NotWritten> {
     let file = File::open(path).map_err(|error| Failure::reading(path.display(), &error))?;
@@ -52,7 +53,9 @@ pub(super) fn read(
     let stem = stem(path);
     let recorder = recorder.unwrap_or(&stem);
     let data = || Ok(Box::new(data_beside(path)?) as Box<dyn io::Read>);
-    importer.read(recorder, file, data, own).map_err(|refusal| match refusal {
+    let opened = importer.open(file).map_err(|refusal| refused(path, &refusal))?;
+    fits(opened.format())?;
+    importer.read(recorder, opened, data, own).map_err(|refusal| match refusal {
         Refusal::NotTaken(error) => NotWritten::Io(error),
         refusal => NotWritten::Failed(refused(path, &refusal)),
     })

@@ -225,9 +225,12 @@ fn import(
         let mut own = |recorder: &str, record: &Record, note: Option<&str>| {
             output.record(recorder, record, note)
         };
-        let read = files::read(&mut importer, path, recorder, &mut own)?;
-        fits(path, read.format, args, recorder)?;
-        is_not_read(recorder.unwrap_or(&files::stem(path)), read.format, site)?;
+        // Before the rest is read, which may take a while.
+        let fits = |format| {
+            fits(path, format, args, recorder)?;
+            is_not_read(recorder.unwrap_or(&files::stem(path)), format, site)
+        };
+        let read = files::read(&mut importer, path, recorder, fits, &mut own)?;
         left_out += read.notes.left_out_count;
         lost += read.notes.lost_count;
         telling::file(path, &read);
