@@ -9,8 +9,9 @@ use ser_evidence::timeline::{ChangeId, Delta, EventId};
 use serde_json::{Value, json};
 
 use super::Document;
+use super::marks::Marks;
 use super::times::rfc3339;
-use super::verdict;
+use super::verdict::{self, Lists};
 
 /// The version of the layout. A change that old readers would misread gets the next number.
 const SCHEMA: u32 = 1;
@@ -48,13 +49,13 @@ fn object(document: &Document<'_>) -> Value {
         "is_incomplete": document.is_incomplete(),
         "damaged_lines": document.damaged_lines,
         "verdict": {
-            "first_out": verdict::first_out(timeline, report, &report.first_out, &clock),
+            "first_out": verdict::first_out(timeline, report, (&report.first_out, Lists::Whole), &clock),
             "operated": report
                 .operations
                 .iter()
                 .map(|operation| verdict::operated(timeline, operation))
                 .collect::<Vec<_>>(),
-            "wrong": verdict::wrong(document),
+            "wrong": verdict::wrong(document, Lists::Whole),
         },
         "first_out": first_out(document, &report.first_out),
         "groups": report.groups.iter().map(|(id, first)| json!({
@@ -191,6 +192,7 @@ fn sequence(document: &Document<'_>) -> Vec<Value> {
     let Document { timeline, report, .. } = *document;
     let site = timeline.site();
     let first = report.rows.first().map(|row| row.change);
+    let marks = Marks::new(document);
     let mut previous: Option<ChangeId> = None;
     let mut rows = Vec::new();
     for row in &report.rows {
@@ -224,7 +226,7 @@ fn sequence(document: &Document<'_>) -> Vec<Value> {
             "state": point.map(|point| if row.on { &point.on } else { &point.off }),
             "chatter": row.chatter,
             "shifted_us": timeline.shift_us(event),
-            "clock_was_set_before": report.incident.clock_sets.contains(&event),
+            "clock_was_set_before": marks.is_set_ahead_of(event),
         }));
         previous = Some(row.change);
     }

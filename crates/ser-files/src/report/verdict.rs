@@ -10,13 +10,48 @@ use ser_evidence::timeline::{ChangeId, ContactTrouble, Timeline};
 
 use super::names::{self, harmless};
 use super::span::{doubt, duration};
-use super::{Clock, Document};
+use super::{Clock, Document, elsewhere};
+
+/// How long lists in sentences are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Lists {
+    /// All of it.
+    Whole,
+    /// Some, and how many more: for people, who find the rest in other sections.
+    Short,
+}
+
+impl Lists {
+    /// How many names a sentence has.
+    const NAMES: usize = 8;
+    /// How many sentences there are.
+    const SENTENCES: usize = 16;
+
+    /// `a, b and c`, or `a, b and 7 more`.
+    fn names(self, items: impl Iterator<Item = String>) -> String {
+        let mut items: Vec<String> = items.collect();
+        self.shorten(&mut items, Lists::NAMES);
+        list(items.into_iter())
+    }
+
+    /// Leaves so many, if there are more than one more.
+    fn shorten(self, items: &mut Vec<String>, most: usize) {
+        if self == Lists::Short && items.len() > most + 1 {
+            let more = items.len() - most;
+            items.truncate(most);
+            items.push(format!("{more} more"));
+        }
+    }
+}
+
+/// Between so many changes it is reckoned how far apart they may be, each with each.
+const MOST_COMPARED: usize = 300;
 
 /// What was first, in words.
 pub(super) fn first_out(
     timeline: &Timeline<'_>,
     report: &Report,
-    first: &FirstOut,
+    (first, lists): (&FirstOut, Lists),
     clock: &Clock,
 ) -> String {
     let named = |change: &ChangeId| {
@@ -24,41 +59,42 @@ pub(super) fn first_out(
         row.map_or_else(String::new, |row| names::change(timeline, row))
     };
     if let Some(only) = first.known() {
-        let at = timeline
-            .time(only.event)
-            .map(ser_evidence::time::Moment::us)
-            .map(|at| clock.time(at))
-            .unwrap_or_default();
-        return format!("{}, {at}", named(&only));
+        let at = timeline.time(only.event).map(|at| clock.time(at.us()));
+        let at = at.filter(|_| !elsewhere::is_timeless(timeline, only.event));
+        return format!("{}, {}", named(&only), at.as_deref().unwrap_or("time not known"));
     }
     let mut text = match first.changes.as_slice() {
         [] => "not known".to_owned(),
         [only] => named(only),
         [one, .., other] if one.event == other.event => {
-            format!("in the same millisecond: {}", list(first.changes.iter().map(named)))
+            format!("in the same millisecond: {}", lists.names(first.changes.iter().map(named)))
         }
         several => format!(
             "not certain{}, one of: {}",
             within(timeline, several),
-            list(several.iter().map(named))
+            lists.names(several.iter().map(named))
         ),
     };
     if !first.unread.is_empty() {
         let names = first.unread.iter().map(|&recorder| recorder_name(timeline, recorder));
-        text += &format!("; or something on {}, which was not read since", list(names));
+        text += &format!("; or something on {}, which was not read since", lists.names(names));
     }
     if !first.gaps.is_empty() {
         let of = |(event, _): &(_, usize)| names::recorder(timeline, *event);
         let mut recorders: Vec<String> = first.gaps.iter().map(of).collect();
         recorders.sort_unstable();
         recorders.dedup();
-        text += &format!("; or one of the entries missing on {}", list(recorders.into_iter()));
+        text +=
+            &format!("; or one of the entries missing on {}", lists.names(recorders.into_iter()));
     }
     text
 }
 
 /// Between which bounds nobody knows which of these was first.
 fn within(timeline: &Timeline<'_>, changes: &[ChangeId]) -> String {
+    if changes.len() > MOST_COMPARED {
+        return String::new();
+    }
     let widest = changes
         .iter()
         .enumerate()
@@ -92,7 +128,7 @@ pub(super) fn operated(timeline: &Timeline<'_>, operation: &Operation) -> String
 }
 
 /// Everything that is wrong, each in a few words, the worst first.
-pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
+pub(super) fn wrong(document: &Document<'_>, lists: Lists) -> Vec<String> {
     let Document { timeline, report, .. } = *document;
     let mut wrong = Vec::new();
     for step in &report.steps {
@@ -122,7 +158,7 @@ pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
     let moved = report.abnormal.iter().filter(|abnormal| abnormal.since.is_some());
     let names: Vec<String> = moved.map(|abnormal| abnormal_name(timeline, abnormal)).collect();
     if !names.is_empty() {
-        wrong.push(format!("not returned to normal: {}", list(names.into_iter())));
+        wrong.push(format!("not returned to normal: {}", lists.names(names.into_iter())));
     }
     let contradicts = |finding: &&Finding| !matches!(finding, Finding::NotPlaced { .. });
     let clocks = timeline.findings().iter().filter(contradicts).count();
@@ -143,6 +179,7 @@ pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
         });
     }
     wrong.dedup();
+    lists.shorten(&mut wrong, Lists::SENTENCES);
     wrong
 }
 

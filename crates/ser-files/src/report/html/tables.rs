@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 use ser_evidence::incident::Fold;
+use ser_evidence::site::PointId;
 
 use super::picture::Lanes;
 use crate::report::sequence::{self, ChangeLine, Line, Remark, Sign};
@@ -108,7 +109,44 @@ fn change_row(
         @if let Some(fold) = line.fold {
             tr.folded {
                 (bracket(line.bracket.below()))
-                td colspan="9" { (chatter(document, fold, clock)) }
+                td colspan="9" { (chatter(document, (fold, line.row.point), clock)) }
+            }
+        }
+    }
+}
+
+/// Changes of which nobody knows when they were.
+pub(super) fn timeless(document: &Document<'_>) -> Markup {
+    let lines = sequence::timeless(document);
+    html! {
+        @if !lines.is_empty() {
+            section aria-labelledby="timeless" {
+                h2 #timeless { "Time not known" }
+                p { "The clock was never set. These came before the next entry of their recorder." }
+                div.scroll tabindex="0" role="group" aria-labelledby="timeless" {
+                    table {
+                        thead { tr {
+                            th scope="col" { "Its clock showed" }
+                            th scope="col" { "Recorder" }
+                            th scope="col" { "Point" }
+                            th scope="col" { "State" }
+                            th.number scope="col" { "Entry" }
+                            th scope="col" { "Notes" }
+                        } }
+                        tbody {
+                            @for line in lines {
+                                tr {
+                                    td.time { (line.showed) }
+                                    td { (line.recorder) }
+                                    td { (line.point) }
+                                    td { (line.state) }
+                                    td.number { (line.entry) }
+                                    td { (line.note) }
+                                }
+                            }
+                        }
+                    }
+                }
             }
         }
     }
@@ -120,6 +158,7 @@ fn bracket(sign: Sign) -> Markup {
         Sign::None => (None, None),
         Sign::First => (Some("bracket begins"), Some("order not known, from here")),
         Sign::Inner => (Some("bracket"), Some("order not known")),
+        Sign::Passed => (Some("bracket passed"), Some("order to some others not known")),
         Sign::Last => (Some("bracket ends"), Some("order not known, to here")),
     };
     html! {
@@ -128,11 +167,15 @@ fn bracket(sign: Sign) -> Markup {
 }
 
 /// The changes that are folded into the row above.
-fn chatter(document: &Document<'_>, fold: &Fold, clock: &Clock) -> Markup {
+fn chatter(
+    document: &Document<'_>,
+    (fold, point): (&Fold, Option<PointId>),
+    clock: &Clock,
+) -> Markup {
     let timeline = document.timeline;
     let changes = fold.changes.iter().map(|&change| {
-        let row = verdict::row_of(document.report, change);
-        let state = row.map(|row| names::state(timeline, row.point, row.on)).unwrap_or_default();
+        let on = timeline.held(change.event).map(|held| held.entry.state.contains(change.input));
+        let state = on.map(|on| names::state(timeline, point, on)).unwrap_or_default();
         let at = timeline.time(change.event).map(|at| clock.time(at.us())).unwrap_or_default();
         let after = timeline.delta(fold.first, change).middle_us().map(since).unwrap_or_default();
         (at, after, state)
