@@ -50,8 +50,8 @@ pub(super) fn notes(
     noted.collect()
 }
 
-/// Whether nobody knows when an entry was, except that it was before the next one: its clock was not
-/// yet set.
+/// Whether nobody knows when an entry was, except that it was before the next one: its clock was
+/// not yet set.
 pub(super) fn is_timeless(timeline: &Timeline<'_>, event: EventId) -> bool {
     let is_unbounded = || timeline.moved_on(event, None).values().all(|(lo, _)| lo.is_none());
     timeline.nominal(event) == Nominal::NotKnown && is_unbounded()

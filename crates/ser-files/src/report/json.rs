@@ -37,7 +37,6 @@ pub fn write(out: &mut dyn Write, document: &Document<'_>) -> io::Result<()> {
 fn object(document: &Document<'_>) -> Value {
     let Document { timeline, report, .. } = *document;
     let site = timeline.site();
-    let clock = super::outcome::clock(document);
     let digest: String = report.digest.iter().map(|byte| format!("{byte:02x}")).collect();
     json!({
         "report": "incident",
@@ -48,15 +47,7 @@ fn object(document: &Document<'_>) -> Value {
         "entries_sha256": digest,
         "is_incomplete": document.is_incomplete(),
         "damaged_lines": document.damaged_lines,
-        "verdict": {
-            "first_out": verdict::first_out(timeline, report, (&report.first_out, Lists::Whole), &clock),
-            "operated": report
-                .operations
-                .iter()
-                .map(|operation| verdict::operated(timeline, operation))
-                .collect::<Vec<_>>(),
-            "wrong": verdict::wrong(document, Lists::Whole),
-        },
+        "verdict": verdict_of(document),
         "first_out": first_out(document, &report.first_out),
         "groups": report.groups.iter().map(|(id, first)| json!({
             "group": site.groups.get(id.0).map(|group| &group.name),
@@ -83,6 +74,18 @@ fn object(document: &Document<'_>) -> Value {
             "on": abnormal.on,
             "since": abnormal.since.map(|since| change(document, since)),
         })).collect::<Vec<_>>(),
+    })
+}
+
+/// The three lines that answer, whole.
+fn verdict_of(document: &Document<'_>) -> Value {
+    let Document { timeline, report, .. } = *document;
+    let clock = super::outcome::clock(document);
+    let first = (&report.first_out, Lists::Whole);
+    json!({
+        "first_out": verdict::first_out(timeline, report, first, &clock),
+        "operated": verdict::all_operated(document, Lists::Whole),
+        "wrong": verdict::wrong(document, Lists::Whole),
     })
 }
 

@@ -12,6 +12,7 @@ use super::Document;
 pub(super) struct Marks<'d> {
     timeline: &'d Timeline<'d>,
     first_out: HashSet<ChangeId>,
+    is_first_known: bool,
     folds: HashMap<ChangeId, &'d Fold>,
     /// Gaps by the entry that comes next, each by its index in the life.
     gaps: HashMap<EventId, Vec<usize>>,
@@ -28,6 +29,7 @@ impl<'d> Marks<'d> {
         Marks {
             timeline,
             first_out: report.first_out.changes.iter().copied().collect(),
+            is_first_known: report.first_out.known().is_some(),
             folds: report.chatter.iter().map(|fold| (fold.first, fold)).collect(),
             gaps,
             clock_sets: report.incident.clock_sets.iter().copied().collect(),
@@ -38,6 +40,12 @@ impl<'d> Marks<'d> {
     pub(super) fn is_first(&self, change: ChangeId) -> bool {
         let is_here = |change: &ChangeId| self.first_out.contains(change);
         is_here(&change) || self.timeline.same_movement(change).as_ref().is_some_and(is_here)
+    }
+
+    /// What is said of a change that was first, or may have been.
+    pub(super) fn first(&self, change: ChangeId) -> Option<&'static str> {
+        let said = if self.is_first_known { "first-out" } else { "maybe first-out" };
+        self.is_first(change).then_some(said)
     }
 
     /// The chatter that begins with this change.

@@ -109,7 +109,6 @@ pub(super) fn timeless(document: &Document<'_>) -> Vec<TimelessLine> {
     rows.map(|row| {
         let ChangeId { event, input } = row.change;
         let held = timeline.held(event);
-        let is_first = marks.as_ref().is_some_and(|marks| marks.is_first(row.change));
         TimelessLine {
             recorder: names::recorder(timeline, event),
             point: names::point(timeline, row.point, input),
@@ -117,7 +116,7 @@ pub(super) fn timeless(document: &Document<'_>) -> Vec<TimelessLine> {
             entry: held.map_or(String::new(), |held| held.sequence.to_string()),
             showed: held
                 .map_or(String::new(), |held| held.entry.time.to_string().replace('T', " ")),
-            note: if is_first { "maybe first-out" } else { "" },
+            note: marks.as_ref().and_then(|marks| marks.first(row.change)).unwrap_or_default(),
         }
     })
     .collect()
@@ -186,14 +185,11 @@ impl<'d> Told<'_, 'd> {
 
     /// What else is to be said about a change.
     fn notes(&self, row: &Row, previous: Option<ChangeId>, bracket: &Bracket) -> Vec<String> {
-        let Document { timeline, report, .. } = *self.document;
+        let timeline = self.document.timeline;
         let event = row.change.event;
         let begins_entry = previous.is_none_or(|previous| previous.event != event);
         let mut notes = Vec::new();
-        if self.marks.is_first(row.change) {
-            let is_known = report.first_out.known().is_some();
-            notes.push(if is_known { "first-out" } else { "maybe first-out" }.to_owned());
-        }
+        notes.extend(self.marks.first(row.change).map(str::to_owned));
         if !begins_entry {
             notes.push("same millisecond".to_owned());
         }

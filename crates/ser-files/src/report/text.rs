@@ -49,8 +49,7 @@ fn verdict_lines(
     let Document { timeline, report, .. } = *document;
     let first = verdict::first_out(timeline, report, (&report.first_out, Lists::Short), clock);
     labelled(out, "first-out", &[first], styles.first_out)?;
-    let operated: Vec<String> =
-        report.operations.iter().map(|operation| verdict::operated(timeline, operation)).collect();
+    let operated = verdict::all_operated(document, Lists::Short);
     let operated = if operated.is_empty() { vec!["no breaker".to_owned()] } else { operated };
     labelled(out, "operated", &operated, styles.title)?;
     match verdict::wrong(document, Lists::Short) {

@@ -1,12 +1,14 @@
 //! The verdict: what was first, what operated, what is wrong.
 
+use std::collections::HashSet;
+
 use ser_evidence::clock::Finding;
 use ser_evidence::incident::{
     Abnormal, Completeness, Disagreement, Doubt, FirstOut, Operation, Report, Row, StepResult,
     Verdict,
 };
 use ser_evidence::record::{Lost, Why};
-use ser_evidence::timeline::{ChangeId, ContactTrouble, Timeline};
+use ser_evidence::timeline::{ChangeId, ContactTrouble, EventId, Timeline};
 
 use super::names::{self, harmless};
 use super::span::{doubt, duration};
@@ -127,6 +129,15 @@ pub(super) fn operated(timeline: &Timeline<'_>, operation: &Operation) -> String
     text
 }
 
+/// What all breakers did, in words.
+pub(super) fn all_operated(document: &Document<'_>, lists: Lists) -> Vec<String> {
+    let operations = document.report.operations.iter();
+    let mut all: Vec<String> =
+        operations.map(|operation| operated(document.timeline, operation)).collect();
+    lists.shorten(&mut all, Lists::SENTENCES);
+    all
+}
+
 /// Everything that is wrong, each in a few words, the worst first.
 pub(super) fn wrong(document: &Document<'_>, lists: Lists) -> Vec<String> {
     let Document { timeline, report, .. } = *document;
@@ -165,22 +176,32 @@ pub(super) fn wrong(document: &Document<'_>, lists: Lists) -> Vec<String> {
     if clocks + timeline.out_of_order().len() > 0 {
         wrong.push("what is known of the clocks does not fit together".to_owned());
     }
-    for finding in timeline.contact_findings() {
-        if !report.incident.events.contains(&finding.change.event) {
-            continue;
-        }
+    wrong.extend(contact_trouble(document));
+    wrong.dedup();
+    lists.shorten(&mut wrong, Lists::SENTENCES);
+    wrong
+}
+
+/// Contacts on two recorders that did not move alike in the incident.
+fn contact_trouble(document: &Document<'_>) -> Vec<String> {
+    let Document { timeline, report, .. } = *document;
+    let findings = timeline.contact_findings();
+    let here: HashSet<EventId> = match findings {
+        [] => HashSet::new(),
+        _ => report.incident.events.iter().copied().collect(),
+    };
+    let told = findings.iter().filter(|finding| here.contains(&finding.change.event));
+    let told = told.map(|finding| {
         let point = names::full_point(timeline, finding.point);
         let other = names::full_point(timeline, finding.other);
-        wrong.push(match finding.trouble {
+        match finding.trouble {
             ContactTrouble::Missing => format!("{point} moved and {other} did not"),
             ContactTrouble::Apart(_) => {
                 format!("{point} and {other} are one contact and moved at different times")
             }
-        });
-    }
-    wrong.dedup();
-    lists.shorten(&mut wrong, Lists::SENTENCES);
-    wrong
+        }
+    });
+    told.collect()
 }
 
 fn step_trouble(timeline: &Timeline<'_>, step: &StepResult) -> Option<String> {

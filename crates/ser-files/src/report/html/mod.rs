@@ -27,8 +27,8 @@ const LONG: usize = 160;
 
 /// What the page may do: nothing but use its own style and its own script.
 const POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; \
-     style-src 'sha256-667ccuq1LQ//6Rlz+BZA01TX3uR/BuajrACyeByAQpY='; \
-     script-src 'sha256-OIVVx06r1h7mc3x1XYY2qype8GgxynYwVZ7R3r3UW0o='";
+     style-src 'sha256-3TD87YsS7rZw1MZCi0rqL7hDnwhDoCiVKzylW02YDc8='; \
+     script-src 'sha256-B4nPhYYeaKp6dp+bY1Oygmy7txrcnNgi52xFwK6tjtE='";
 
 /// Why there is no page.
 #[derive(Debug)]
@@ -130,8 +130,7 @@ fn content(document: &Document<'_>, clock: &Clock) -> Markup {
 fn verdict(document: &Document<'_>, clock: &Clock) -> Markup {
     let Document { timeline, report, .. } = *document;
     let first = verdict::first_out(timeline, report, (&report.first_out, Lists::Short), clock);
-    let operated: Vec<String> =
-        report.operations.iter().map(|operation| verdict::operated(timeline, operation)).collect();
+    let operated = verdict::all_operated(document, Lists::Short);
     let wrong = verdict::wrong(document, Lists::Short);
     let items = |items: &[String], none: &str| match items {
         [] => html! { p { (none) } },

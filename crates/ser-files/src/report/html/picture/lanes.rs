@@ -17,8 +17,8 @@ use crate::report::{Clock, Document, names, sequence};
 pub(in crate::report::html) struct Lane {
     pub(in crate::report::html) recorder: String,
     pub(in crate::report::html) point: String,
-    /// Whether it may have moved first.
-    pub(super) is_first: bool,
+    /// What is said of it if it moved first, or may have.
+    pub(super) first: Option<&'static str>,
     pub(super) stretches: Vec<Stretch>,
     pub(super) edges: Vec<Edge>,
 }
@@ -126,7 +126,7 @@ impl Lanes {
             self.lanes.push(Lane {
                 recorder: names::recorder(timeline, row.change.event),
                 point: names::point(timeline, row.point, row.change.input),
-                is_first: false,
+                first: None,
                 stretches: Vec::new(),
                 edges: Vec::new(),
             });
@@ -141,7 +141,9 @@ impl Lanes {
         let time = timeline.time(row.change.event).map(|at| clock.time(at.us()));
         let time = time.unwrap_or_else(|| "time not known".to_owned());
         let text = format!("{} {state}, {time} {doubt}", lane.point);
-        lane.is_first |= marks.is_first(row.change);
+        if let Some(first) = marks.first(row.change) {
+            lane.first = Some(first);
+        }
         lane.edges.push(Edge { at_us, doubt_us, text });
     }
 }
