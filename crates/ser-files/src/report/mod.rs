@@ -4,9 +4,12 @@
 //! changes, what was expected, what has not returned to normal, and what is missing. All answers
 //! come from [`Report`]. The files here turn them into words; `text` and `html` draw the words.
 
+mod brackets;
+mod clock_sets;
 mod elsewhere;
 mod html;
 mod json;
+mod marks;
 mod outcome;
 mod sequence;
 mod sources;

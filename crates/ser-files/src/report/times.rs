@@ -19,8 +19,8 @@ impl Clock {
         Clock { zone, needs_date: false, needs_offset: false }
     }
 
-    /// The same for times from `first_us` to `last_us`: times of the day have a date where these are
-    /// of several days, and their offset from UTC where that changes between them.
+    /// The same for times from `first_us` to `last_us`: times of the day have a date where these
+    /// are of several days, and their offset from UTC where that changes between them.
     #[must_use]
     pub fn over(self, first_us: i64, last_us: i64) -> Clock {
         let differ = |format: &str| self.format(first_us, format) != self.format(last_us, format);

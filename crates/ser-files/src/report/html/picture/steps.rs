@@ -14,7 +14,7 @@ use ser_evidence::incident::Verdict;
 pub(super) struct StepLane {
     name: String,
     result: &'static str,
-    verdict: Verdict,
+    pub(super) verdict: Verdict,
     pub(super) after_us: i64,
     /// The window in which it was to happen.
     within_us: (i64, i64),
