@@ -106,8 +106,8 @@ pub(super) fn timed(
     Ok(Timed { rows, by_time, counts_from_beginning, overwritten, is_sampled, torn_at_end })
 }
 
-/// Puts rows in the order of their times. One millisecond has no order: it is that of the file, so that
-/// it is the same each time.
+/// Puts rows in the order of their times. One millisecond has no order: it is that of the file, so
+/// that it is the same each time.
 fn put_in_order(timed: &mut [(Utc, TimedRow)], torn_at_end: &mut Option<Vec<usize>>) {
     if let (Some((first, _)), Some((last, _))) = (timed.first(), timed.last())
         && first.ns > last.ns
@@ -382,8 +382,8 @@ impl Instant {
     }
 }
 
-/// Adds what one list says of a point to what others say: the longer account of the two if one begins
-/// as the other, else one after the other.
+/// Adds what one list says of a point to what others say: the longer account of the two if one
+/// begins as the other, else one after the other.
 fn settle((all, now): &mut (Vec<To>, Vec<To>)) {
     let now = std::mem::take(now);
     if now.starts_with(all) {

@@ -35,8 +35,8 @@ pub(super) fn with_data(files: &[PathBuf]) -> Vec<PathBuf> {
 /// How the data of a configuration ends.
 const DATA: [&str; 3] = ["dat", "DAT", "Dat"];
 
-/// Reads a file if `fits` likes its format. Its recorder is named, or has the name of the file up to the
-/// last dot. Records of our own files go to `own` at once.
+/// Reads a file if `fits` likes its format. Its recorder is named, or has the name of the file up to
+/// the last dot. Records of our own files go to `own` at once.
 pub(super) fn read(
     importer: &mut Importer,
     path: &Path,

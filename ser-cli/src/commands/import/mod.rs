@@ -210,8 +210,8 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
 }
 
-/// Reads all files, and writes what they become. Returns how many lines were left out, and at how many
-/// places something is lost.
+/// Reads all files, and writes what they become. Returns how many lines were left out, and at how
+/// many places something is lost.
 fn import(
     args: &Args,
     recorder: Option<&str>,
