@@ -246,6 +246,7 @@ mod needs_pdftotext {
             }
             assert_eq!(charts, drawn, "{name}");
             let all = pages.concat();
+            assert!(pages.len() < 20, "{name}: {} pages, for a name that is long", pages.len());
             for change in 1..=CHATTER {
                 let ms = 491 + 10 * change;
                 let time = format!("10:00:00.{ms}");

@@ -111,7 +111,7 @@ fn change_row(
             td.time { (line.time) }
             td.number { (line.since_first) }
             td.number { (line.since_previous) }
-            td { (line.recorder) }
+            (recorder(&line.recorder))
             td {
                 @match lane {
                     Some(lane) => a href={ "#lane-" (lane) } { (line.point) },
@@ -169,6 +169,20 @@ pub(super) fn timeless(document: &Document<'_>) -> Markup {
     }
 }
 
+/// The recorder of a row. The middle of a long name is left out: it stands in each row, and the table
+/// of recorders has all of it.
+fn recorder(name: &str) -> Markup {
+    const START: usize = 24;
+    const END: usize = 12;
+    let letters: Vec<char> = name.chars().collect();
+    match (letters.first_chunk::<START>(), letters.last_chunk::<END>()) {
+        (Some(start), Some(end)) if letters.len() > START + END + 1 => html! {
+            td title=(name) { (start.iter().collect::<String>()) "…" (end.iter().collect::<String>()) }
+        },
+        _ => html! { td { (name) } },
+    }
+}
+
 /// The cell of the bracket around rows whose order is not known.
 fn bracket(sign: Sign) -> Markup {
     let (class, order) = match sign {
@@ -214,7 +228,7 @@ fn remark_row(remark: &Remark) -> Markup {
         tr.remark.loss[remark.is_loss] {
             (bracket(remark.bracket))
             td colspan="3" { "– – –" }
-            td { (remark.recorder) }
+            (recorder(&remark.recorder))
             td colspan="5" { (remark.text) }
         }
     }

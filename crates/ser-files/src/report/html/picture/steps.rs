@@ -51,7 +51,7 @@ impl StepLane {
             g.step {
                 rect.back x="0" y=(y) width=(FULL_PX) height=(LANE_PX) {}
                 text.name x=(NAMES_PX) y=(y + 15.0) {
-                    title { (self.name) } (shortened(&self.name, 34))
+                    title { (self.name) } (shortened(&self.name, 28))
                 }
                 text.recorder x=(NAMES_PX) y=(y + 27.0) { "expected: " (self.result) }
                 rect.window data-a=(from) data-b=(to) x=(px(x)) y=(px(y + 7.0)) width=(px(width))
