@@ -30,7 +30,10 @@ const OFFLINE: [&str; 8] =
 /// Two of these options mean something to `import` as well.
 const OF_IMPORT: [(&str, &str); 2] = [
     ("recorder", "The recorder's name in the records; the name of the file if not given"),
-    ("site", "The site file, whose points a --map may name"),
+    (
+        "site",
+        "The site file: its points may be named in a --map, and its recorders that are read get no list",
+    ),
 ];
 
 /// Reads, configures, watches and simulates sequential event recorders (HE660SER160, HE660SER320).

@@ -167,6 +167,9 @@ fn options_of_another_format_are_refused() {
         ("--format vcd --rate 1000", "comtrade"),
         ("--format csv --data binary", "comtrade"),
         ("--format jsonl --csv-dialect excel-de", "csv"),
+        ("--format vcd --csv-dialect rfc4180", "csv"),
+        ("--format csv --data ascii", "comtrade"),
+        ("--format csv --line-frequency 50", "comtrade"),
         ("--format vcd --spreadsheet-safe", "prc002"),
     ] {
         assert!(desk.refused(arguments, 2).contains(format), "{arguments}");

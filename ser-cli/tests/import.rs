@@ -295,3 +295,70 @@ fn options_that_do_nothing_for_our_own_files_are_refused() {
     let run = run("import relay.txt --zone UTC --doubt-ms 0.5");
     assert!(text(&run.stderr).contains("a whole number of milliseconds"), "{}", text(&run.stderr));
 }
+
+#[test]
+fn a_list_is_not_the_log_of_a_recorder_that_is_read() {
+    let desk = tempfile::tempdir().expect("a folder");
+    let site = desk.path().join("site.toml");
+    let about = "site = \"OAK\"\ntime_zone = \"UTC\"\n[[recorder]]\nname = \"F3\"\n\
+                port = \"/dev/ttyUSB0\"\n[[recorder]]\nname = \"relay\"\n";
+    fs::write(&site, about).expect("written");
+    let site = site.display();
+    let list = format!("import relay.txt --zone UTC --site {site}");
+    let refused = run(&format!("{list} --recorder F3"));
+    assert_eq!(refused.status.code(), Some(2), "{}", text(&refused.stderr));
+    assert!(text(&refused.stderr).contains("F3 is a recorder of the site that is read at"));
+    assert!(refused.stdout.is_empty());
+    assert_eq!(run(&list).status.code(), Some(0), "this one has no port");
+}
+
+#[test]
+fn a_list_that_was_imported_under_two_zones_is_told() {
+    let desk = desk("");
+    let other = desk.path().join("other.jsonl").display().to_string();
+    let again = run(&format!("import relay.txt --zone Europe/Berlin -o {other}"));
+    assert_eq!(again.status.code(), Some(0), "{}", text(&again.stderr));
+    let first = desk.path().join("relay.jsonl").display().to_string();
+    let merge = run(&format!("merge --site plant.toml --input {first} {other}"));
+    let told = text(&merge.stderr);
+    assert!(told.contains("relay: two lists of 7 events say the same, 6 h 00 min apart"), "{told}");
+    let once = run(&format!("merge --site plant.toml --input {first} {first}"));
+    assert!(!text(&once.stderr).contains("say the same"), "{}", text(&once.stderr));
+}
+
+/// More than fits into memory limits of lists: our own files are passed on as they are read.
+#[test]
+fn a_file_of_our_own_may_be_long() {
+    let desk = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| desk.path().join(name).display().to_string();
+    let mut rows = String::from("entry,time,input,state,sequence,life,note\n");
+    let entries = 600_000;
+    for entry in 0..entries {
+        let (minute, second, ms) = (entry / 60_000, entry / 1000 % 60, entry % 1000);
+        let (number, state, sequence) = (entry % 2048 + 1, entry % 2, entry + 1);
+        rows += &format!(
+            "{number},2026-11-22T10:{minute:02}:{second:02}.{ms:03},3,{state},{sequence},\
+             9f3c5a7e21b04d68,\n"
+        );
+    }
+    fs::write(at("U1.csv"), rows).expect("written");
+    let import = run(&format!("import {} -o {}", at("U1.csv"), at("U1.jsonl")));
+    assert_eq!(import.status.code(), Some(0), "{}", text(&import.stderr));
+    assert!(text(&import.stderr).contains("U1: 600000 events"), "{}", text(&import.stderr));
+    let written = fs::read_to_string(at("U1.jsonl")).expect("text");
+    assert_eq!(written.lines().count(), entries + 1);
+}
+
+#[test]
+fn damaged_lines_of_sources_are_told_by_an_export_that_cannot_say_so() {
+    let desk = tempfile::tempdir().expect("a folder");
+    let rows = "entry,time,input,state\n1,2026-11-22T10:00:00.250,3,1\nx\n";
+    fs::write(desk.path().join("U1.csv"), rows).expect("written");
+    let source = desk.path().join("U1.csv").display().to_string();
+    for (format, is_told) in [("csv", true), ("jsonl", true), ("prc002", true), ("vcd", false)] {
+        let export = run(&format!("export --site plant.toml --input {source} --format {format}"));
+        let told = text(&export.stderr);
+        assert_eq!(export.status.code(), Some(0), "{told}");
+        assert_eq!(told.contains("1 damaged line of the sources"), is_told, "{format}: {told}");
+    }
+}

@@ -525,3 +525,59 @@ why = \"found 250 ms fast\"
     let change = |place: usize, input| ChangeId { event: events[place], input };
     assert_eq!(timeline.delta(change(0, 1), change(1, 2)).middle_us(), Some(20_000));
 }
+
+/// The first change of each life that nothing in the incident is proven to precede: the plain
+/// definition, which compares everything with everything.
+fn plainly_first(timeline: &Timeline<'_>, incident: &Incident) -> Vec<EventId> {
+    let life = |event: &EventId| (event.recorder, event.life);
+    let is_first = |(place, event): &(usize, &EventId)| {
+        !incident.events[..*place].iter().any(|before| life(before) == life(event))
+    };
+    let firsts = incident.events.iter().enumerate().filter(is_first).map(|(_, event)| *event);
+    let is_out = |event: EventId| {
+        incident.events.iter().any(|other| timeline.order(*other, event) == Order::Before)
+    };
+    firsts.filter(|&event| !is_out(event)).collect()
+}
+
+#[test]
+fn what_may_have_been_first_is_found_as_if_everything_was_compared() {
+    const NAMES: [&str; 6] = ["U1", "U2", "U3", "U4", "U5", "U6"];
+    let recorder = |name: &&str| format!("[[recorder]]\nname = \"{name}\"\nclock = \"utc\"\n");
+    let site = site(&NAMES.iter().map(recorder).collect::<String>());
+    let mut random = oorandom::Rand64::new(7);
+    let mut below = |end: u64| random.rand_range(0..end);
+    let mut sizes = std::collections::BTreeSet::new();
+    for _ in 0..300 {
+        let mut logs: Vec<Log> = Vec::new();
+        let broadcast = (below(2) == 0).then_some(7);
+        for life in 0..10 {
+            let name = NAMES[usize::try_from(below(6)).expect("small")];
+            let mut log = Log::of(name, 1 + life);
+            // Some clocks are well known, some badly, and some not at all.
+            let doubt_us = [500, 5_000, 50_000, 500_000][usize::try_from(below(4)).expect("small")];
+            let at = monotonic_us("2026-11-22T09:59:00.000");
+            let how = How::Set { broadcast: broadcast.filter(|_| below(3) == 0) };
+            if below(4) > 0 {
+                let bound = (at - doubt_us, at + doubt_us);
+                log.observed(how, "2026-11-22T10:00:00.000", bound, Some(1_000));
+            }
+            let mut ms = below(60);
+            for _ in 0..=below(4) {
+                log.changes(&format!("2026-11-22T10:00:05.{ms:03}"), &[1]);
+                ms += below(40);
+            }
+            logs.push(log);
+        }
+        let history = history(&site, &logs.iter().collect::<Vec<_>>());
+        let timeline = Timeline::new(&site, &history);
+        for incident in Incident::all(&timeline) {
+            let plainly = plainly_first(&timeline, &incident);
+            let report = Report::new(&timeline, incident);
+            let events = report.first_out.changes.iter().map(|change| change.event);
+            assert_eq!(events.collect::<Vec<_>>(), plainly);
+            sizes.insert(plainly.len());
+        }
+    }
+    assert!(sizes.len() > 4, "known, and not known among several: {sizes:?}");
+}

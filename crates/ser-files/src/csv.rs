@@ -445,7 +445,7 @@ fn made_plain(text: &[u8]) -> &[u8] {
 fn loss(fields: &Fields, parser: &mut Parser) -> Result<Gap, String> {
     let note = fields.field(6);
     let understood = std::str::from_utf8(note).ok().and_then(lost_and_why);
-    let (lost, why) = understood.ok_or_else(|| format!("this is no loss: {}", quoted(note)))?;
+    let (lost, why) = understood.ok_or_else(|| format!("this is not a loss: {}", quoted(note)))?;
     let (after, life) = place(fields, parser)?;
     Ok(Gap { life, after, lost, why })
 }

@@ -3,9 +3,8 @@
 
 use std::io::Write;
 
+use jiff::Timestamp;
 use ser_proto::TimeStamp;
-
-use crate::report::rfc3339;
 
 const DAY_US: i64 = 86_400_000_000;
 
@@ -124,6 +123,12 @@ impl UtcTexts {
         self.push(line, utc_us.div_euclid(1000).saturating_mul(1000));
         make_german(line, begin);
     }
+}
+
+/// As `2026-11-22T10:00:00.250000Z`; `None` if no calendar has it.
+pub(crate) fn rfc3339(utc_us: i64) -> Option<String> {
+    let at = Timestamp::from_microsecond(utc_us).ok()?;
+    Some(at.strftime("%Y-%m-%dT%H:%M:%S.%6fZ").to_string())
 }
 
 /// The date of a day, with the `T` after it; `None` if a calendar does not have all of the day.

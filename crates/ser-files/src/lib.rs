@@ -23,9 +23,12 @@ pub mod jsonl;
 mod lines;
 pub mod merged;
 mod missing;
+mod names;
 pub mod report;
 mod source;
+mod span;
 mod stamp;
 
 pub use error::{MAX_LINE_LEN, Problem, ReadError};
+pub use missing::NotReached;
 pub use source::Source;

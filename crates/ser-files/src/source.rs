@@ -68,6 +68,15 @@ impl<R: BufRead> Source<R> {
         }
     }
 
+    /// The remark for people that goes with the record that was [read](Self::read) last.
+    #[must_use]
+    pub fn note(&self) -> Option<&str> {
+        match &self.reader {
+            Reader::Jsonl(reader) => reader.note(),
+            Reader::Csv(_) | Reader::Nothing => None,
+        }
+    }
+
     /// The program that wrote the file, as it calls itself, if it has said so by now.
     #[must_use]
     pub fn program(&self) -> Option<&str> {

@@ -197,7 +197,7 @@ fn a_damaged_row_is_named_and_those_around_it_are_read() {
         ("2,2026-11-22T10:00:00.250,3,1,-2,0,", "sequence cannot be `-2`"),
         ("2,2026-11-22T10:00:00.250,3,1,2,AB,", "life cannot be `AB`"),
         ("2,2026-11-22T10:00:00.250,,,2,0,\"no input cha", "a quote is not closed"),
-        (",,,,2,0,lost some", "this is no loss: `lost some`"),
+        (",,,,2,0,lost some", "this is not a loss: `lost some`"),
         ("entry,when,input,state", "this header has other columns"),
         (&",".repeat(100), "too many fields"),
     ] {

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use ser_evidence::record::{EntryRecord, Lost, Record, Why};
 use ser_files::import::{
-    DateOrder, Epoch, Format, Imported, Importer, Map, Options, Read, Refusal, zone_named,
+    DateOrder, Epoch, Format, Imported, Importer, Map, Options, Output, Read, Refusal, zone_named,
 };
 
 fn folder() -> PathBuf {
@@ -24,7 +24,8 @@ fn in_zone(zone: &str) -> Options {
 fn read_into(importer: &mut Importer, name: &str, bytes: &[u8]) -> Result<Read, Refusal> {
     let data = Path::new(name).with_extension("dat");
     let data = || Ok(Box::new(File::open(folder().join(data))?) as Box<dyn io::Read>);
-    importer.read("F3", bytes, data)
+    let opened = importer.open(bytes)?;
+    importer.read("F3", opened, data, &mut |_, _, _| Ok(()))
 }
 
 fn sample(name: &str) -> Vec<u8> {
@@ -208,7 +209,7 @@ fn what_is_not_known_is_asked_for() {
 
 fn written(imported: &Imported) -> String {
     let mut out = Vec::new();
-    imported.write(&mut out, "ser-cli").expect("memory has room");
+    Output::new(&mut out, "ser-cli").finish(imported).expect("memory has room");
     String::from_utf8(out).expect("JSON is UTF-8")
 }
 
@@ -509,6 +510,8 @@ fn a_map_fixes_inputs_and_words() {
 #[test]
 fn whatever_the_length_memory_and_time_are_bounded() {
     const LONG: u64 = 200 << 20;
+    let none = || Err(io::ErrorKind::NotFound.into());
+    let mut taken = |_: &str, _: &Record, _: Option<&str>| Ok(());
     for (format, head) in [
         (Format::SelSer, &b"#  DATE  TIME\n1  "[..]),
         (Format::SelCser, b"\"FID\",\"0143\"\n\""),
@@ -517,19 +520,24 @@ fn whatever_the_length_memory_and_time_are_bounded() {
     ] {
         let long = io::Cursor::new(head).chain(io::repeat(b'x').take(LONG));
         let mut importer = Importer::new(Options { format: Some(format), ..sure() });
-        let read = importer.read("F3", long, || Err(io::ErrorKind::NotFound.into()));
+        let opened = importer.open(long).expect("the format is given");
+        let read = importer.read("F3", opened, none, &mut taken);
         match read {
             Ok(read) => assert!(read.notes.left_out[0].why.contains("longer than"), "{format}"),
             Err(refusal) => assert!(matches!(refusal, Refusal::Damaged { .. }), "{refusal}"),
         }
     }
     let long = io::Cursor::new(b"{\"events\": [").chain(io::repeat(b' ').take(LONG));
-    let read = Importer::new(sure()).read("F3", long, || Err(io::ErrorKind::NotFound.into()));
+    let mut importer = Importer::new(sure());
+    let opened = importer.open(long).expect("the format is known");
+    let read = importer.read("F3", opened, none, &mut taken);
     assert!(matches!(read, Err(Refusal::TooMuch { .. })));
     let (row, head) = (b"14/03/2027\n".repeat(1000), &b"OAK,FR,2013\n"[..]);
     let long = io::Cursor::new([head, &row].concat()).chain(io::repeat(b'\n').take(LONG));
     let options = Options { format: Some(Format::Comtrade), ..sure() };
-    let read = Importer::new(options).read("F3", long, || Err(io::ErrorKind::NotFound.into()));
+    let mut importer = Importer::new(options);
+    let opened = importer.open(long).expect("the format is given");
+    let read = importer.read("F3", opened, none, &mut taken);
     assert!(matches!(read, Err(Refusal::TooMuch { .. })));
 }
 
@@ -693,4 +701,47 @@ fn our_own_files_in_another_dress_are_refused_by_line_and_reason() {
     let json = b"{\"record\":\"entry\",\n{\"recorder\":\"Pr\xFCfstand\"}\n";
     let left_out = read(json).expect("it is read").notes.left_out;
     assert!(left_out[1].to_string().contains("line 2: this is not UTF-8"), "{left_out:?}");
+}
+
+#[test]
+fn remarks_of_our_own_lines_are_handed_on() {
+    let line = "{\"record\":\"entry\",\"recorder\":\"U1\",\"entry\":1,\
+                \"time\":\"2026-11-22T10:00:00.250\",\"changed\":[3],\"state\":[3],\
+                \"note\":\"looked at twice\"}\n";
+    let mut out = Vec::new();
+    let mut output = Output::new(&mut out, "ser-cli");
+    let mut importer = Importer::new(Options::default());
+    let none = || Err(io::ErrorKind::NotFound.into());
+    let mut own =
+        |recorder: &str, record: &Record, note: Option<&str>| output.record(recorder, record, note);
+    let opened = importer.open(line.as_bytes()).expect("the format is known");
+    importer.read("", opened, none, &mut own).expect("it is read");
+    let imported = importer.finish();
+    assert_eq!((imported.recorders[0].name.as_str(), imported.recorders[0].entries), ("U1", 1));
+    assert!(output.finish(&imported).expect("memory has room"));
+    let text = String::from_utf8(out).expect("UTF-8");
+    assert!(text.contains("\"note\":\"looked at twice\""), "{text}");
+    assert_eq!(text.lines().count(), 2);
+}
+
+#[test]
+fn a_part_of_a_cytime_log_says_nothing_of_what_was_before() {
+    let exact = |text: &str| {
+        let options = Options { epoch: Some(Epoch::Posix), ..Options::default() };
+        let imported = imported(&[text.as_bytes()], options);
+        let exact: Vec<bool> = imported
+            .records()
+            .filter_map(|(_, record)| match record {
+                Record::Life(life) => Some(life.is_exact),
+                _ => None,
+            })
+            .collect();
+        (exact, gaps(&imported))
+    };
+    let events = "\"events\":[{\"event_type\":1,\"channel\":1,\"status\":1,\"milliseconds\":1,\
+                  \"seconds\":1800000000,\"seq_num\":65534}]";
+    assert_eq!(exact(&format!("{{{events}}}")), (vec![false], vec![]));
+    let last = "\"NumberOfEvents\":1,\"LastSequenceNumber\":65534";
+    let gone = (Some(0), Lost::Exactly(65_533), Why::Overwritten);
+    assert_eq!(exact(&format!("{{{last},{events}}}")), (vec![true], vec![gone]));
 }

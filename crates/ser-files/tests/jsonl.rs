@@ -288,7 +288,7 @@ fn every_field_is_checked() {
             r#"{"record":"clock","how":"query","shown":"2026-02-29T00:00:00.000"}"#.to_owned(),
             "`shown` cannot be",
         ),
-        (r#"["entry","U1"]"#.to_owned(), "this is no object"),
+        (r#"["entry","U1"]"#.to_owned(), "this is not an object"),
     ] {
         assert!(problem(&line).contains(what), "{line}: {}", problem(&line));
     }

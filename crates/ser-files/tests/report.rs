@@ -41,6 +41,11 @@ impl Readings {
 
     /// The clock was set right after this entry, to within two milliseconds.
     fn set(&mut self, recorder: &str, after: u64, time: &str) {
+        self.set_within(recorder, after, time, 2_000);
+    }
+
+    /// The clock was set right after this entry, and it is known within so many microseconds.
+    fn set_within(&mut self, recorder: &str, after: u64, time: &str, width_us: i64) {
         let reading = reading(time);
         let us = reading.monotonic.us();
         let place = Place {
@@ -55,7 +60,10 @@ impl Readings {
             &Record::Clock(ClockObservation {
                 how: How::Set { broadcast: None },
                 shown: shown(&stamp(time)).expect("a date"),
-                at: Reference::Host { bound: Bound::from_us(us, us + 2_000), reading },
+                at: Reference::Host {
+                    bound: Bound::from_us(us + 1_000 - width_us / 2, us + 1_000 + width_us / 2),
+                    reading,
+                },
                 place,
             }),
         );
@@ -71,6 +79,15 @@ impl Readings {
     fn told(self) -> Told {
         let history = self.collector.finish(&self.site);
         Told { site: self.site, history }
+    }
+}
+
+/// Asserts that these follow each other in a text.
+fn in_order(text: &str, parts: &[&str]) {
+    let mut rest = text;
+    for part in parts {
+        let Some(at) = rest.find(part) else { panic!("{part} in {rest}\n\n{text}") };
+        rest = &rest[at + part.len()..];
     }
 }
 
@@ -271,4 +288,114 @@ fn a_row_at_what_its_clock_showed_says_nothing_of_it() {
     readings.watched("U1-SER1", 2, "2026-11-22T10:30:00.000");
     let text = readings.told().text();
     assert!(!text.contains("its clock showed 07:45"), "{text}");
+}
+
+#[test]
+fn the_note_of_a_long_bracket_says_which_rows_are_in_doubt() {
+    let mut readings = Readings::of(SHARED);
+    readings.set("U1-SER1", 0, "2026-11-22T09:59:59.000");
+    readings.set("U1-SER2", 0, "2026-11-22T09:59:59.000");
+    // Each is in doubt with the next one, and the first is before the last for certain.
+    readings.entry("U1-SER1", 1, "2026-11-22T10:00:01.000", (2, 2));
+    readings.entry("U1-SER2", 1, "2026-11-22T10:00:01.002", (4, 4));
+    readings.entry("U1-SER1", 2, "2026-11-22T10:00:01.004", (4, 6));
+    readings.entry("U1-SER2", 2, "2026-11-22T10:00:01.006", (8, 12));
+    let text = readings.told().text();
+    in_order(&text, &["┌ 10:00:01.001", "│ 10:00:01.003", "│ 10:00:01.005", "└ 10:00:01.007"]);
+    in_order(&text, &["└ 10:00:01.007", "order unknown of rows within ", " of each other"]);
+}
+
+#[test]
+fn a_bracket_passes_over_rows_that_are_in_order_with_their_neighbours() {
+    let mut readings = Readings::of(SHARED);
+    readings.set_within("U1-SER1", 0, "2026-11-22T09:59:59.000", 400_000);
+    readings.set("U1-SER2", 0, "2026-11-22T09:59:59.000");
+    readings.entry("U1-SER1", 1, "2026-11-22T10:00:01.000", (2, 2));
+    for (number, ms) in [(1, 10), (2, 60), (3, 110)] {
+        let change = 1 << (number + 3);
+        let time = format!("2026-11-22T10:00:01.{ms:03}");
+        readings.entry("U1-SER2", number, &time, (change, change));
+    }
+    let text = readings.told().text();
+    in_order(&text, &["┌ 10:00:01.001", "│ 10:00:01.011", "┆ 10:00:01.061", "└ 10:00:01.111"]);
+}
+
+#[test]
+fn what_is_ahead_of_a_bracket_was_earlier_than_all_of_it() {
+    let mut readings = Readings::of(SHARED);
+    readings.set("U1-SER1", 0, "2026-11-22T09:59:59.000");
+    readings.set("U1-SER2", 0, "2026-11-22T09:59:59.000");
+    // The first two are in order, and the third may be before either.
+    readings.entry("U1-SER1", 1, "2026-11-22T10:00:01.000", (2, 2));
+    readings.entry("U1-SER1", 2, "2026-11-22T10:00:01.001", (4, 6));
+    readings.entry("U1-SER2", 1, "2026-11-22T10:00:01.002", (4, 4));
+    let text = readings.told().text();
+    in_order(
+        &text,
+        &["┌ 10:00:01.001", "│ 10:00:01.002", "└ 10:00:01.003", "order unknown within"],
+    );
+}
+
+#[test]
+fn what_a_clock_showed_is_told_once_for_all_rows_in_a_row() {
+    let mut readings = Readings::of(SHARED);
+    readings.entry("U1-SER1", 1, "2026-11-22T13:45:05.588", (4, 4));
+    for (number, state) in [(2, 0), (3, 4), (4, 0), (5, 4)] {
+        readings.entry("U1-SER1", number, &format!("2026-11-22T07:45:1{number}.100"), (4, state));
+    }
+    let text = readings.told().text();
+    assert_eq!(text.matches("its clock showed").count(), 1, "{text}");
+    assert!(text.contains("its clock showed 07:45:12.100, and 07:45:15.100 at entry 5"), "{text}");
+    assert!(text.contains("the clock was set some time between entries 1 and 2"), "{text}");
+}
+
+#[test]
+fn a_setting_stands_where_it_was_in_time() {
+    let mut readings = Readings::of(SHARED);
+    readings.set("U1-SER2", 0, "2026-11-22T09:59:59.000");
+    readings.set("U1-SER1", 0, "2026-11-22T09:59:59.000");
+    readings.entry("U1-SER1", 1, "2026-11-22T10:00:01.000", (2, 2));
+    readings.entry("U1-SER2", 1, "2026-11-22T10:00:02.000", (4, 4));
+    readings.set("U1-SER1", 1, "2026-11-22T10:00:03.000");
+    readings.entry("U1-SER2", 2, "2026-11-22T10:00:04.000", (8, 12));
+    readings.entry("U1-SER1", 2, "2026-11-22T10:00:05.000", (4, 6));
+    let text = readings.told().text();
+    let set = "- - - U1-SER1 the clock was set at 10:00:03.000";
+    in_order(&text, &["10:00:02.001", set, "10:00:04.001", "10:00:05.001"]);
+}
+
+#[test]
+fn what_a_clock_recorded_before_it_was_ever_set_has_a_section_of_its_own() {
+    let mut readings = Readings::of(SHARED);
+    readings.entry("U1-SER1", 1, "1980-01-01T00:00:07.000", (4, 4));
+    readings.set("U1-SER1", 1, "2026-11-22T09:59:59.000");
+    readings.entry("U1-SER1", 2, "2026-11-22T10:00:01.000", (2, 6));
+    let text = readings.told().text();
+    in_order(&text, &["Sequence", "10:00:01.002", "Time not known", "1980-01-01 00:00:07.000"]);
+    let sequence = text.split("Time not known").next().unwrap_or_default();
+    assert!(!sequence.contains("1980"), "{text}");
+    assert!(text.starts_with("Northfield 2026-11-22 10:00:01.002 to 10:00:01.002"), "{text}");
+}
+
+#[test]
+fn long_lists_are_short_for_people_and_whole_for_programs() {
+    let points: String = (0..20)
+        .map(|input| {
+            let input = input + 1;
+            format!(
+                "[[point]]\nrecorder = \"U1\"\ninput = {input}\nname = \"Valve {input}\"\n\
+                 normal = \"off\"\n"
+            )
+        })
+        .collect();
+    let mut readings =
+        Readings::of(&format!("[[recorder]]\nname = \"U1\"\nclock = \"utc\"\n{points}"));
+    readings.entry("U1", 1, "2026-11-22T10:00:01.000", (0xf_ffff, 0xf_ffff));
+    let told = readings.told();
+    let (text, json) = (told.text(), told.json());
+    assert!(text.contains("Valve 8 ON and 12 more"), "{text}");
+    assert!(text.contains("Valve 8 ON (U1) and 12 more"), "{text}");
+    let verdict = json["verdict"].to_string();
+    assert!(verdict.contains("Valve 19 ON and Valve 20 ON"), "{verdict}");
+    assert!(!verdict.contains("more"), "{verdict}");
 }

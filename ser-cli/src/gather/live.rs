@@ -10,7 +10,7 @@ use ser_evidence::record::{
 };
 use ser_evidence::site::{Recorder, Site};
 use ser_evidence::time::{Bound, shown};
-use ser_files::report::NotReached;
+use ser_files::NotReached;
 
 use crate::buses::Buses;
 use crate::connection::{self, ConnectionArgs};

@@ -7,12 +7,13 @@ mod live;
 mod moment;
 mod names;
 mod readings;
+mod twins;
 
 use std::path::PathBuf;
 
 use ser_evidence::history::{Collector, History};
 use ser_evidence::site::Site;
-use ser_files::report::NotReached;
+use ser_files::NotReached;
 
 use crate::connection::{ConnectionArgs, ports};
 use crate::error::{Failure, Result};
@@ -118,5 +119,6 @@ pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<G
     let mut history = collector.finish(&site);
     let not_reached = readings::not_reached(missed_now, &mut history);
     readings::tell(&history);
+    twins::tell(&history);
     Ok(Gathered { site, history, site_digest, not_reached, damaged_lines })
 }

@@ -1,7 +1,7 @@
 //! What the readings of all sources say of one another.
 
 use ser_evidence::history::{History, LifeHistory};
-use ser_files::report::NotReached;
+use ser_files::NotReached;
 
 use crate::error::{advise, warn};
 

@@ -96,7 +96,7 @@ mod tests {
         assert!(drawn.ends_with(" more are not shown\n\n"), "{drawn}");
     }
 
-    /// Pieces of site files and what does not belong into one.
+    /// Pieces of site files and what does not belong in one.
     fn piece() -> impl Strategy<Value = String> {
         let pieces = [
             "[[point]]\n",

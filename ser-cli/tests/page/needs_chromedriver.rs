@@ -12,8 +12,8 @@ use super::incident::{CHATTER, HOSTILE, Incident};
 const SIZES: [(u32, u32); 2] = [(1300, 900), (360, 800)];
 
 /// The names of the times on the axis of the first chart.
-const LABELS: &str = "return [...document.querySelector('figure.picture svg').querySelectorAll('.ticks \
-     text')].map(text => text.textContent)";
+const LABELS: &str = "return [...document.querySelector('figure.picture svg')\
+     .querySelectorAll('.ticks text')].map(text => text.textContent)";
 
 fn strings(value: &Value) -> Vec<String> {
     let texts = value.as_array().expect("a list").iter();
@@ -169,7 +169,8 @@ fn colour_is_never_all_that_says_not_normal() {
     for (part, is_there) in [
         ("not normal", true),
         ("something is missing", true),
-        ("took", true),
+        ("took, and was not in time", true),
+        ("took, in time", false),
         ("nobody knows how far", false),
     ] {
         assert_eq!(legend.contains(part), is_there, "{part}: {legend}");
@@ -245,6 +246,7 @@ mod needs_pdftotext {
             }
             assert_eq!(charts, drawn, "{name}");
             let all = pages.concat();
+            assert!(pages.len() < 20, "{name}: {} pages, for a name that is long", pages.len());
             for change in 1..=CHATTER {
                 let ms = 491 + 10 * change;
                 let time = format!("10:00:00.{ms}");

@@ -73,6 +73,11 @@ impl Links {
         Links { by_pair }
     }
 
+    /// Whether there is none.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.by_pair.is_empty()
+    }
+
     /// How long after run `other` began to show `other_x` run `one` began to show `x`, by the links
     /// that are nearest to either. It is the same both ways.
     pub(crate) fn difference(

@@ -11,7 +11,7 @@ use crate::record::{
     ClockObservation, ClockStep, EntryRecord, Gap, Life, LifeRecord, PointRecord, Record,
     RecorderRecord, Watched, Why,
 };
-use crate::site::{ClockRule, Recorder, Site};
+use crate::site::{ClockRule, Delays, Recorder, Site};
 
 /// Collects the records of all sources.
 ///
@@ -245,6 +245,11 @@ impl Collected {
         let mut recorder = described.unwrap_or_else(|| Recorder::named(&self.name));
         if let Some(stamps) = self.stamps {
             recorder.clock = ClockRule::Offset(stamps.utc_offset_s);
+            // The list of another device knows nothing of our input circuits. Whoever knows that
+            // device's own delays says them in the site file.
+            if recorder.delays == Delays::default() {
+                recorder.delays = Delays::NONE;
+            }
         }
         RecorderHistory {
             recorder,

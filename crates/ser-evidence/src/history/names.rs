@@ -82,7 +82,7 @@ mod tests {
     use super::*;
     use crate::history::Collector;
     use crate::record::{Record, RecorderRecord};
-    use crate::site::ClockRule;
+    use crate::site::{ClockRule, Delays};
 
     fn told(input: u8, name: &str) -> PointRecord {
         PointRecord { input, name: name.into(), on: "Asserted".into(), off: "Deasserted".into() }
@@ -131,5 +131,6 @@ mod tests {
         collector.add("F3", &Record::Recorder(RecorderRecord { utc_offset_s: 3600 }));
         let history = collector.finish(&Site::unknown());
         assert_eq!(history.recorders[0].recorder.clock, ClockRule::Offset(3600));
+        assert_eq!(history.recorders[0].recorder.delays, Delays::NONE, "not those of our circuits");
     }
 }

@@ -1,6 +1,6 @@
 //! Contacts that move many times in a short time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use super::Row;
 use crate::timeline::{ChangeId, Timeline};
@@ -24,9 +24,9 @@ pub(super) fn folds(timeline: &Timeline<'_>, rows: &[Row]) -> Vec<Fold> {
     }
     let mut folds: Vec<Fold> =
         by_input.values().flat_map(|changes| folds_of(timeline, changes)).collect();
-    folds.sort_by_key(|fold| {
-        rows.iter().position(|row| row.change == fold.first).unwrap_or(usize::MAX)
-    });
+    let places: HashMap<ChangeId, usize> =
+        rows.iter().enumerate().map(|(place, row)| (row.change, place)).collect();
+    folds.sort_by_key(|fold| places.get(&fold.first).copied());
     folds
 }
 

@@ -1,11 +1,13 @@
 //! What moved first: a set, because it may not be known.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::completeness::is_covered_until;
 use super::pick::Incident;
 use super::points::Points;
+use crate::clock::Home;
 use crate::site::GroupId;
+use crate::time::Moment;
 use crate::timeline::{ChangeId, EventId, Order, Timeline};
 
 /// Everything that may have moved first.
@@ -76,24 +78,12 @@ fn of(timeline: &Timeline<'_>, incident: &Incident, counts: &dyn Fn(ChangeId) ->
         changes(timeline, **event).any(counts) && lives.insert((event.recorder, event.life))
     };
     let firsts: Vec<EventId> = incident.events.iter().filter(&mut is_first).copied().collect();
-    let has_begun = |event: &EventId| {
-        let is_begun_by = |first: &EventId| {
-            (first.recorder, first.life) == (event.recorder, event.life)
-                && first.place <= event.place
-        };
-        firsts.iter().any(is_begun_by)
-    };
-    let is_out = |event: EventId| {
-        let is_earlier = |other: &EventId| timeline.order(*other, event) == Order::Before;
-        incident.events.iter().any(|other| has_begun(other) && is_earlier(other))
-    };
-    let candidates: Vec<EventId> = firsts.iter().copied().filter(|&event| !is_out(event)).collect();
+    let begun = Begun::new(timeline, incident, &firsts);
+    let candidates: Vec<EventId> =
+        firsts.iter().copied().filter(|&event| !begun.is_out(event)).collect();
     let is_ahead = |gap: &(EventId, usize)| {
         let (after, _) = *gap;
-        let first = firsts
-            .iter()
-            .find(|first| (first.recorder, first.life) == (after.recorder, after.life));
-        first.is_none_or(|first| after.place <= first.place)
+        begun.first_of(after).is_none_or(|first| after.place <= first)
     };
     FirstOut {
         changes: movements(timeline, &firsts, &candidates, counts),
@@ -101,6 +91,99 @@ fn of(timeline: &Timeline<'_>, incident: &Incident, counts: &dyn Fn(ChangeId) ->
         unread: unread(timeline, incident, &candidates),
         earlier: incident.earlier,
     }
+}
+
+/// By what an instant is known: a scale, or what all scales say of UTC.
+type Scale = Option<Home>;
+
+/// The entries that rule others out: in each life the first one that counts, and all after it.
+struct Begun<'t> {
+    timeline: &'t Timeline<'t>,
+    /// The place of the first one, by recorder and life.
+    firsts: BTreeMap<(u32, u32), u32>,
+    all: Vec<EventId>,
+    by_recorder: BTreeMap<u32, Vec<EventId>>,
+    /// On each scale the one that moved earliest at the latest, and the same among other lives than
+    /// that one's. What these do not rule out, no entry rules out on that scale.
+    earliest: BTreeMap<Scale, [Option<(i64, EventId)>; 2]>,
+}
+
+impl<'t> Begun<'t> {
+    fn new(timeline: &'t Timeline<'t>, incident: &Incident, firsts: &[EventId]) -> Begun<'t> {
+        let mut begun = Begun {
+            timeline,
+            firsts: firsts.iter().map(|first| (life_of(*first), first.place)).collect(),
+            all: Vec::new(),
+            by_recorder: BTreeMap::new(),
+            earliest: BTreeMap::new(),
+        };
+        for &event in &incident.events {
+            if begun.first_of(event).is_some_and(|first| first <= event.place) {
+                begun.add(event);
+            }
+        }
+        begun
+    }
+
+    fn add(&mut self, event: EventId) {
+        self.all.push(event);
+        self.by_recorder.entry(event.recorder).or_default().push(event);
+        for (scale, (_, hi)) in scales(self.timeline, event) {
+            let Some(hi) = hi else { continue };
+            let [first, second] = self.earliest.entry(scale).or_default();
+            let is_same_life = |known: &(i64, EventId)| life_of(known.1) == life_of(event);
+            if first.is_none_or(|(least, _)| hi < least) {
+                // The one before is second, unless it is of this life.
+                *second = first.filter(|known| !is_same_life(known)).or(*second);
+                *first = Some((hi, event));
+            } else if first.is_some_and(|known| !is_same_life(&known))
+                && second.is_none_or(|(least, _)| hi < least)
+            {
+                *second = Some((hi, event));
+            }
+        }
+    }
+
+    /// The place of the first entry of this life that counts.
+    fn first_of(&self, event: EventId) -> Option<u32> {
+        self.firsts.get(&life_of(event)).copied()
+    }
+
+    /// Whether something of another life is proven to have been earlier.
+    fn is_out(&self, event: EventId) -> bool {
+        let is_earlier = |other: &EventId| self.timeline.order(*other, event) == Order::Before;
+        let mut may_be_earlier = false;
+        for (scale, (lo, _)) in scales(self.timeline, event) {
+            let ends = self.earliest.get(&scale).into_iter().flatten().flatten();
+            let others = ends.filter(|(_, other)| life_of(*other) != life_of(event));
+            for (_, other) in others.filter(|(hi, _)| lo.is_some_and(|lo| *hi < lo)) {
+                if is_earlier(other) {
+                    return true;
+                }
+                may_be_earlier = true;
+            }
+        }
+        // Without a scale, one clock says what was earlier, or a link between two.
+        match may_be_earlier || self.timeline.has_links() {
+            true => self.all.iter().any(is_earlier),
+            false => self.by_recorder.get(&event.recorder).into_iter().flatten().any(is_earlier),
+        }
+    }
+}
+
+const fn life_of(event: EventId) -> (u32, u32) {
+    (event.recorder, event.life)
+}
+
+/// When the contacts of an entry moved, on each scale on which that is known.
+fn scales(
+    timeline: &Timeline<'_>,
+    event: EventId,
+) -> impl Iterator<Item = (Scale, (Option<i64>, Option<i64>))> {
+    let utc = timeline.moved_utc(event, None);
+    let utc = (utc.lo().map(Moment::us), utc.hi().map(Moment::us));
+    let on = timeline.moved_on(event, None);
+    on.into_iter().map(|(home, ends)| (Some(home), ends)).chain([(None, utc)])
 }
 
 /// The changes of these candidates, each movement once. One is out if another recorder saw the same
@@ -140,11 +223,10 @@ fn unread(timeline: &Timeline<'_>, incident: &Incident, candidates: &[EventId]) 
     let first = candidates.first().and_then(|&first| changes(timeline, first).next());
     let Some(first) = first else { return Vec::new() };
     let recorders = 0..u32::try_from(timeline.history().recorders.len()).unwrap_or(u32::MAX);
-    let is_there = |recorder: u32| {
-        incident.events.iter().any(|event| event.recorder == recorder)
-            || incident.gaps.iter().any(|(event, _)| event.recorder == recorder)
-            || is_covered_until(timeline, recorder, first, 0)
-    };
+    let events = incident.events.iter().chain(incident.gaps.iter().map(|(event, _)| event));
+    let here: BTreeSet<u32> = events.map(|event| event.recorder).collect();
+    let is_there =
+        |recorder: u32| here.contains(&recorder) || is_covered_until(timeline, recorder, first, 0);
     recorders.filter(|&recorder| !is_there(recorder)).collect()
 }
 

@@ -76,11 +76,11 @@ impl Report {
         let points = Points::new(timeline);
         let mut rows = rows(timeline, &points, &incident);
         let chatter = chatter::folds(timeline, &rows);
-        for fold in &chatter {
-            let is_first = |row: &&mut Row| row.change == fold.first;
-            if let Some(row) = rows.iter_mut().find(is_first) {
-                row.chatter = Some(fold.changes.len());
-            }
+        let mut folds = chatter.iter().peekable();
+        for row in &mut rows {
+            // Both are in the order of the timeline.
+            let fold = folds.next_if(|fold| fold.first == row.change);
+            row.chatter = fold.map(|fold| fold.changes.len());
         }
         Report {
             first_out: first_out::of_all(timeline, &incident),

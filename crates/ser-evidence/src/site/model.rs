@@ -225,6 +225,11 @@ impl Default for IncidentRules {
     }
 }
 
+impl Delays {
+    /// Of a device whose stamps are those of the contacts.
+    pub const NONE: Delays = Delays { closing_us: (0, 0), opening_us: (0, 0) };
+}
+
 impl Default for Delays {
     /// Those of the input circuit in the hardware guide.
     fn default() -> Delays {

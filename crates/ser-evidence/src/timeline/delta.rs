@@ -91,6 +91,12 @@ impl Timeline<'_> {
         if lo <= hi || is_consistent() { order } else { Order::Unknown }
     }
 
+    /// Whether recorders may be compared without any scale that both share: by a broadcast or a
+    /// contact.
+    pub(crate) fn has_links(&self) -> bool {
+        !self.model.by_pair.is_empty()
+    }
+
     /// The time from one change to another. From a change to itself it is 0, and so it is between
     /// two that are [one movement](Self::same_movement).
     #[must_use]

@@ -3,7 +3,7 @@
 use ser_evidence::site::{Point, PointId};
 use ser_evidence::timeline::{EventId, Timeline};
 
-use crate::report::names::{self, harmless};
+use crate::names::{self, harmless};
 
 /// The inputs of a recorder.
 const INPUTS: u8 = 32;

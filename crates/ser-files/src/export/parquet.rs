@@ -27,7 +27,7 @@ use super::refused::Refused;
 use super::selection::Selection;
 use super::statement::Origin;
 use crate::digits::push_stamp;
-use crate::report::names;
+use crate::names;
 
 /// How many rows are held before they are written.
 const GROUP_ROWS: usize = 65_536;

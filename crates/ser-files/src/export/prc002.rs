@@ -15,7 +15,8 @@ use super::survey::Survey;
 use crate::digits::push_digits;
 use crate::merged::{Dialect, field};
 use crate::missing::RECORDS_MISSING;
-use crate::report::{missing, names};
+use crate::missing::missing;
+use crate::names;
 
 const HEADER: &str = "Date, Time, Local Time Code, Substation, Device, State\r\n";
 

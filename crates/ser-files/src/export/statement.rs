@@ -9,9 +9,10 @@ use super::axis::Axis;
 use super::channels::recorder_name;
 use super::selection::Selection;
 use super::survey::Survey;
-use crate::report::names::harmless;
-use crate::report::span::duration;
-use crate::report::{NotReached, missing, rfc3339};
+use crate::digits::rfc3339;
+use crate::missing::{NotReached, missing};
+use crate::names::harmless;
+use crate::span::duration;
 
 /// Where an export comes from.
 #[derive(Clone, Copy, Debug)]
@@ -128,7 +129,7 @@ fn completeness(
     Ok(())
 }
 
-/// As `MISSING: U1-SER1: 37 entries missing (overwritten), after sequence 120, between … and …`.
+/// As `MISSING: U1-SER1: 37 entries missing (overwritten), after sequence 120, from … until …`.
 fn loss(timeline: &Timeline<'_>, axis: Axis, event: EventId, index: usize) -> String {
     let name = recorder_name(timeline, event.recorder as usize);
     let gap = timeline.life(event).and_then(|life| life.gaps.get(index));

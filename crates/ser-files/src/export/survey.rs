@@ -30,6 +30,12 @@ pub(super) struct Span {
 }
 
 impl Span {
+    /// This one, made so wide that it holds an entry as well.
+    fn with(span: Option<Span>, at_us: i64) -> Span {
+        let Span { first_us, last_us } = span.unwrap_or(Span { first_us: at_us, last_us: at_us });
+        Span { first_us: first_us.min(at_us), last_us: last_us.max(at_us) }
+    }
+
     /// Where the axis begins: with the sample before the first entry.
     pub(super) const fn begins_us(self) -> i64 {
         self.first_us.saturating_sub(SAMPLE_US)
@@ -75,10 +81,7 @@ impl Survey {
                 *moved |= held.entry.changed.0;
                 *first = first.revealed_by(held);
             }
-            let (first_us, last_us) = span.map_or((at_us, at_us), |span: Span| {
-                (span.first_us.min(at_us), span.last_us.max(at_us))
-            });
-            span = Some(Span { first_us, last_us });
+            span = Some(Span::with(span, at_us));
         }
         let first_on = first.iter().map(|states| states.on).collect();
         Survey {

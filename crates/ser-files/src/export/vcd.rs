@@ -19,8 +19,9 @@ use super::selection::Selection;
 use super::statement::{self, Origin};
 use super::steps::{self, Happened, States, Step};
 use super::survey::{Span, Survey};
+use crate::digits::rfc3339;
 use crate::digits::{UtcTexts, push_number};
-use crate::report::{names, rfc3339};
+use crate::names;
 
 /// How many signs an identifier is made of, and the first of them: those of ASCII that can be seen,
 /// without the first few, which begin something else in this format.

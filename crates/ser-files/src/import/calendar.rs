@@ -29,6 +29,17 @@ impl DateOrder {
     }
 }
 
+impl DateOrder {
+    /// For people.
+    pub(super) const fn in_words(self) -> &'static str {
+        match self {
+            DateOrder::Mdy => "month, day, year",
+            DateOrder::Dmy => "day, month, year",
+            DateOrder::Ymd => "year, month, day",
+        }
+    }
+}
+
 /// As the option that chooses it.
 impl fmt::Display for DateOrder {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -25,6 +25,8 @@ use super::zone::Doubt;
 pub(super) struct Made {
     pub(super) recorder: usize,
     pub(super) record: Record,
+    /// The line of the row that it is from, where there is a note.
+    pub(super) line: Option<u64>,
     pub(super) note: Option<String>,
 }
 
@@ -50,12 +52,12 @@ impl Maker<'_> {
         let mut made = Vec::new();
         for recorder in 0..self.inputs.recorders.len() {
             let record = Record::Recorder(RecorderRecord::UTC);
-            made.push(Made { recorder, record, note: None });
+            made.push(Made { recorder, record, line: None, note: None });
             for (input, point) in self.inputs.points(recorder) {
                 let name = self.points.get(point).to_owned();
                 let [on, off] = self.meanings.texts(point);
                 let record = Record::Point(PointRecord { input, name, on, off });
-                made.push(Made { recorder, record, note: None });
+                made.push(Made { recorder, record, line: None, note: None });
             }
         }
         made
@@ -151,7 +153,10 @@ impl Writing<'_> {
     /// What is known before the first row.
     fn begin(&mut self, list: &Timed) {
         let first = list.rows.first().map_or(1, |row| row.place);
-        let counts = list.counts_from_beginning && !self.is_split;
+        // Somebody who fetches a part of a log does not get its beginning: only a device that says how
+        // much it holds, or a list that begins with the first place, tells what is missing before.
+        let tells_all = first == 1 || list.overwritten.is_some();
+        let counts = list.counts_from_beginning && tells_all && !self.is_split;
         let record =
             LifeRecord { life: self.life, is_exact: counts, model: None, size: None, erased: None };
         for recorder in 0..self.logs.len() {
@@ -169,8 +174,9 @@ impl Writing<'_> {
         }
     }
 
-    fn tell(&mut self, recorder: usize, record: Record, note: Option<String>) {
-        self.made.push(Made { recorder, record, note });
+    fn tell(&mut self, recorder: usize, record: Record, note: Option<(u64, String)>) {
+        let (line, note) = note.unzip();
+        self.made.push(Made { recorder, record, line, note });
     }
 
     fn row(&mut self, row: &TimedRow, notes: &mut Notes) {
@@ -206,7 +212,8 @@ impl Writing<'_> {
                 entry: Entry { changed: Bits(changed), state: Bits(log.on & log.known), time },
                 known: Bits(log.known),
             };
-            self.tell(recorder, Record::Entry(record), note(row, &time));
+            let note = note(row, &time).map(|note| (row.line, note));
+            self.tell(recorder, Record::Entry(record), note);
         }
         self.doubt(row.at_ms);
     }

@@ -1,10 +1,10 @@
-//! Reads any number of files, and writes what is in them as JSON lines.
+//! Reads any number of files, and makes records of what is in them.
 
 use std::collections::HashMap;
-use std::io::{self, Write};
+use std::io;
 
 use jiff::tz::TimeZone;
-use ser_evidence::record::{Record, Told};
+use ser_evidence::record::Record;
 
 use super::calendar::DateOrder;
 use super::comtrade::{self, Extent};
@@ -12,7 +12,7 @@ use super::cytime::{self, Epoch};
 use super::entries::{Made, Maker};
 use super::format::Format;
 use super::inputs::{Inputs, MOST_RECORDERS};
-use super::list::{Found, LONGEST, MOST_CHANGES, fit};
+use super::list::{Found, LONGEST, fit};
 use super::map::Map;
 use super::notes::{Note, Notes, Refusal};
 use super::states::Meanings;
@@ -21,10 +21,16 @@ use super::timed::{Timed, joined, timed};
 use super::zone::date_order;
 use super::{prc002, sel};
 use crate::Source;
-use crate::jsonl::Writer;
 
 /// The most lists of one recorder: one a day for a year, and more.
 const MOST_LISTS: usize = 500;
+
+/// The most recorders of our own files: a name for each is kept.
+const MOST_OWN_RECORDERS: usize = 65_536;
+
+/// Takes the records of our own files as they are read: whose it is, the record, and the remark for
+/// people that goes with it.
+pub type Own<'o> = dyn FnMut(&str, &Record, Option<&str>) -> io::Result<()> + 'o;
 
 /// What the user says of the files.
 #[derive(Clone, Debug, Default)]
@@ -54,13 +60,28 @@ pub struct Read {
     pub extent: Option<Extent>,
 }
 
+/// A file whose beginning was looked at.
+pub struct Opened<'i> {
+    format: Format,
+    head: Vec<u8>,
+    input: Input<'i>,
+}
+
+impl Opened<'_> {
+    /// The format in which it will be read.
+    #[must_use]
+    pub const fn format(&self) -> Format {
+        self.format
+    }
+}
+
 /// Reads files.
 #[derive(Debug, Default)]
 pub struct Importer {
     options: Options,
     groups: Vec<Group>,
-    /// Records of our own files.
-    own: Vec<Told>,
+    /// What was handed on, counted.
+    own: Imported,
 }
 
 /// What belongs to one recorder.
@@ -101,16 +122,11 @@ impl Importer {
         Importer { options, ..Importer::default() }
     }
 
-    /// Reads a file of this recorder. `data` opens the data of a COMTRADE configuration.
+    /// Looks at the beginning of a file, and tells its format.
     ///
     /// # Errors
-    /// If nothing can be read from it, or not without being told something.
-    pub fn read(
-        &mut self,
-        recorder: &str,
-        input: impl io::Read,
-        data: impl FnOnce() -> io::Result<Box<dyn io::Read>>,
-    ) -> Result<Read, Refusal> {
+    /// If nothing can be read from it, or it is in no format that is known.
+    pub fn open<'i>(&self, input: impl io::Read + 'i) -> Result<Opened<'i>, Refusal> {
         let (head, input) = opened(input)?;
         let format = match self.options.format {
             Some(format) => format,
@@ -121,9 +137,24 @@ impl Importer {
                 }
             })?,
         };
+        Ok(Opened { format, head, input })
+    }
+
+    /// Reads a file of this recorder. `data` opens the data of a COMTRADE configuration. If the file
+    /// is one of ours, its records go to `own` at once.
+    ///
+    /// # Errors
+    /// If nothing can be read from it, or not without being told something, or if `own` fails.
+    pub fn read(
+        &mut self,
+        recorder: &str,
+        Opened { format, head, input }: Opened<'_>,
+        data: impl FnOnce() -> io::Result<Box<dyn io::Read>>,
+        own: &mut Own<'_>,
+    ) -> Result<Read, Refusal> {
         let mut read = Read { format, notes: Notes::default(), extent: None };
         if matches!(format, Format::Csv | Format::Jsonl) {
-            self.read_own(recorder, input, &mut read.notes)?;
+            self.read_own(recorder, input, &mut read.notes, own)?;
             return Ok(read);
         }
         let group = self.group(recorder);
@@ -168,15 +199,20 @@ impl Importer {
         recorder: &str,
         input: Input<'_>,
         notes: &mut Notes,
+        own: &mut Own<'_>,
     ) -> Result<(), Refusal> {
-        let source = Source::new(input, recorder)
+        let mut source = Source::new(input, recorder)
             .map_err(|error| Refusal::damaged(error.line, error.problem.to_string()))?;
-        for told in source {
-            match told {
-                Ok(told) if self.own.len() < MOST_CHANGES => self.own.push(told),
-                Ok(_) => {
-                    let most = u64::try_from(MOST_CHANGES).unwrap_or(u64::MAX);
-                    return Err(Refusal::TooMuch { what: "records", most });
+        while let Some(record) = source.read() {
+            match record {
+                Ok(record) => {
+                    let recorder = self.own.recorder(source.recorder());
+                    if recorder >= MOST_OWN_RECORDERS {
+                        let most = u64::try_from(MOST_OWN_RECORDERS).unwrap_or(u64::MAX);
+                        return Err(Refusal::TooMuch { what: "recorders", most });
+                    }
+                    self.own.count(recorder, &record);
+                    own(source.recorder(), &record, source.note()).map_err(Refusal::NotTaken)?;
                 }
                 Err(error) if error.is_of_one_line() => {
                     notes.leave_out(error.line, error.problem.to_string());
@@ -190,11 +226,7 @@ impl Importer {
     /// Makes records of everything.
     #[must_use]
     pub fn finish(self) -> Imported {
-        let mut imported = Imported::default();
-        for Told { recorder, record } in self.own {
-            let recorder = imported.recorder(&recorder);
-            imported.add(recorder, record, None);
-        }
+        let mut imported = self.own;
         for group in self.groups {
             imported.add_group(group, &self.options);
         }
@@ -229,33 +261,22 @@ fn read_foreign(
         Format::Csv | Format::Jsonl | Format::Cytime => {}
     }
     if let Some(line) = lines.latin_1() {
-        notes.remark(Some(line), "this is no UTF-8; such lines are read as Latin-1");
+        notes.remark(Some(line), "this is not UTF-8; such lines are read as Latin-1");
     }
     Ok(())
 }
 
 impl Imported {
-    /// Writes all records as JSON lines. `program` is who writes them.
-    ///
-    /// # Errors
-    /// As `out`.
-    pub fn write(&self, out: impl Write, program: &str) -> io::Result<()> {
-        let mut lines = Writer::new(out);
-        lines.file(program)?;
-        for (recorder, record, note) in &self.records {
-            let name = self.recorders.get(*recorder).map_or("", |recorder| &recorder.name);
-            match record {
-                Record::Entry(entry) => lines.entry(name, entry, note.as_deref())?,
-                record => lines.record(name, record)?,
-            }
-        }
-        lines.flush()
+    /// All records of lists, and whose they are. Those of our own files have been handed on.
+    pub fn records(&self) -> impl Iterator<Item = (&str, &Record)> {
+        self.with_notes().map(|(recorder, record, _)| (recorder, record))
     }
 
-    /// All records and whose they are.
-    pub fn records(&self) -> impl Iterator<Item = (&str, &Record)> {
-        self.records.iter().map(|(recorder, record, _)| {
-            (self.recorders.get(*recorder).map_or("", |recorder| &*recorder.name), record)
+    /// The same with the remarks for people that go with them.
+    pub(super) fn with_notes(&self) -> impl Iterator<Item = (&str, &Record, Option<&str>)> {
+        self.records.iter().map(|(recorder, record, note)| {
+            let name = self.recorders.get(*recorder).map_or("", |recorder| &*recorder.name);
+            (name, record, note.as_deref())
         })
     }
 
@@ -269,13 +290,22 @@ impl Imported {
         self.recorders.len() - 1
     }
 
-    fn add(&mut self, recorder: usize, record: Record, note: Option<String>) {
+    fn count(&mut self, recorder: usize, record: &Record) {
         if let Some(recorder) = self.recorders.get_mut(recorder) {
             recorder.entries += u64::from(matches!(record, Record::Entry(_)));
             recorder.points += u64::from(matches!(record, Record::Point(_)));
         }
+    }
+
+    fn add(
+        &mut self,
+        recorder: usize,
+        record: Record,
+        (line, note): (Option<u64>, Option<String>),
+    ) {
+        self.count(recorder, &record);
         if let Some(note) = &note {
-            self.notes.remark(None, note);
+            self.notes.remark(line, note);
         }
         self.records.push((recorder, record, note));
     }
@@ -298,9 +328,9 @@ impl Imported {
         for list in &lists {
             made.extend(maker.list(list, &mut self.notes));
         }
-        for Made { recorder, record, note } in made {
+        for Made { recorder, record, line, note } in made {
             if let Some(place) = places.get(recorder) {
-                self.add(*place, record, note);
+                self.add(*place, record, (line, note));
             }
         }
         if inputs.recorders.len() > 1 {

@@ -57,7 +57,7 @@ pub(super) struct When {
 impl When {
     /// Date and time of a row, to milliseconds or finer.
     pub(super) fn parse(date: &str, time: &str) -> Result<When, String> {
-        let wrong = |what: &str, text: &str| format!("{} is no {what}", quoted(text.as_bytes()));
+        let wrong = |what: &str, text: &str| format!("{} is not a {what}", quoted(text.as_bytes()));
         let date = Date::parse(date).ok_or_else(|| wrong("date", date))?;
         let day_ns = time_of_day(time).map_err(|no_time| match no_time {
             NoTime::Wrong => wrong("time", time),

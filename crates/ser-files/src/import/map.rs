@@ -357,7 +357,7 @@ fn nearest<'c>(word: &str, candidates: &'c [String]) -> Option<&'c str> {
 fn syntax(text: &str, wrong: &toml::de::Error) -> Diagnostic {
     let span = wrong.span().unwrap_or(0..0);
     let end = span.end.min(text.len());
-    let what = wrong.message().lines().next().unwrap_or("this is no TOML").to_owned();
+    let what = wrong.message().lines().next().unwrap_or("this is not TOML").to_owned();
     error("syntax", span.start.min(end)..end, &what)
         .help("a map looks like `[[point]]`, `from = \"87T\"`, `input = 3`")
 }

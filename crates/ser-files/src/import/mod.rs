@@ -3,7 +3,9 @@
 //! A reader for each format (`sel`, `cytime`, `comtrade`, `prc002`) takes a file of any
 //! origin apart into lists of rows (`list`). What follows is the same for all: times become UTC
 //! (`zone`, `timed`), words become states (`states`), points get inputs (`inputs`), and rows
-//! become entries (`entries`). An [`Importer`] does that for any number of files.
+//! become entries (`entries`). An [`Importer`] does that for any number of files. Records of our own
+//! files are handed on as they are read, however many there are; lists of others are held in memory,
+//! because their rows are put in order and joined.
 //!
 //! Files come from outside. Whatever is in them, reading ends, memory is bounded, and what was not
 //! understood is told with its line and reason while the rest is read.
@@ -18,6 +20,7 @@ mod inputs;
 mod list;
 mod map;
 mod notes;
+mod output;
 mod prc002;
 mod sel;
 mod states;
@@ -29,7 +32,8 @@ pub use calendar::DateOrder;
 pub use comtrade::Extent;
 pub use cytime::Epoch;
 pub use format::Format;
-pub use importer::{Imported, ImportedRecorder, Importer, Options, Read};
+pub use importer::{Imported, ImportedRecorder, Importer, Opened, Options, Own, Read};
 pub use map::Map;
 pub use notes::{Note, Notes, Refusal};
+pub use output::Output;
 pub use zone::zone_named;

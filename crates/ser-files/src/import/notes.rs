@@ -104,6 +104,8 @@ pub enum Refusal {
     },
     /// Nothing tells from when the seconds count.
     NoEpoch,
+    /// What was read could not be handed on.
+    NotTaken(io::Error),
     /// There is more in it than is read at once.
     TooMuch {
         /// What.
@@ -117,6 +119,7 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Refusal::Io(error) => write!(f, "cannot be read: {error}"),
+            Refusal::NotTaken(error) => write!(f, "what it holds cannot be written: {error}"),
             Refusal::Empty => f.write_str("the file is empty"),
             Refusal::Utf16 => f.write_str("this looks like UTF-16, without the mark that says so"),
             Refusal::NoText => f.write_str("this is binary, and not text"),
@@ -141,7 +144,7 @@ impl fmt::Display for Refusal {
 impl Error for Refusal {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
-            Refusal::Io(error) | Refusal::NoData(error) => Some(error),
+            Refusal::Io(error) | Refusal::NoData(error) | Refusal::NotTaken(error) => Some(error),
             _ => None,
         }
     }

@@ -105,7 +105,7 @@ fn row(
         Err(why) => return Ok(Err(why)),
     };
     let Some(offset) = utc_offset(&code) else {
-        return Ok(Err(format!("{} is no local time code", quoted(code.as_bytes()))));
+        return Ok(Err(format!("{} is not a local time code", quoted(code.as_bytes()))));
     };
     let when = match When::parse(&date, &time) {
         Ok(when) => When { utc_offset_s: Some(offset), ..when },

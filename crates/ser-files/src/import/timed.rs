@@ -99,21 +99,23 @@ pub(super) fn timed(
     match order {
         Order::Places => {}
         Order::PlacesOrReversed => turn(&mut timed, &mut torn_at_end, notes),
-        Order::Times => {
-            let ends = (timed.first(), timed.last());
-            if let (Some((first, _)), Some((last, _))) = ends
-                && first.ns > last.ns
-            {
-                turn_tears(&mut timed, &mut torn_at_end);
-                timed.reverse();
-            }
-            // One millisecond has no order: by the file, so that it is the same each time.
-            timed.sort_by_key(|(utc, _)| utc.ns);
-        }
+        Order::Times => put_in_order(&mut timed, &mut torn_at_end),
     }
     let rows = timed.into_iter().map(|(_, row)| row).collect();
     let by_time = order == Order::Times;
     Ok(Timed { rows, by_time, counts_from_beginning, overwritten, is_sampled, torn_at_end })
+}
+
+/// Puts rows in the order of their times. One millisecond has no order: it is that of the file, so
+/// that it is the same each time.
+fn put_in_order(timed: &mut [(Utc, TimedRow)], torn_at_end: &mut Option<Vec<usize>>) {
+    if let (Some((first, _)), Some((last, _))) = (timed.first(), timed.last())
+        && first.ns > last.ns
+    {
+        turn_tears(timed, torn_at_end);
+        timed.reverse();
+    }
+    timed.sort_by_key(|(utc, _)| utc.ns);
 }
 
 /// Turns a list round whose times all say that it is upside down.
@@ -380,8 +382,8 @@ impl Instant {
     }
 }
 
-/// Adds what one list says of a point to what others say: the longer account of the two if one begins
-/// as the other, else one after the other.
+/// Adds what one list says of a point to what others say: the longer account of the two if one
+/// begins as the other, else one after the other.
 fn settle((all, now): &mut (Vec<To>, Vec<To>)) {
     let now = std::mem::take(now);
     if now.starts_with(all) {

@@ -85,7 +85,8 @@ fn tell_order(dates: &[Date], order: DateOrder, notes: &mut Notes) {
         DateOrder::ALL.iter().filter(is_possible).count() == 1
     };
     if let Some(decisive) = dates.iter().find(others).filter(|_| order != DateOrder::Ymd) {
-        notes.remark(None, format!("dates are read as {order}: {decisive} can be nothing else"));
+        let order = order.in_words();
+        notes.remark(None, format!("dates are read as {order}, because of {decisive}"));
     }
 }
 
@@ -100,8 +101,10 @@ pub(super) fn in_utc(
     for row in &list.rows {
         let time = match local_ns(&row.when, order) {
             None => {
-                notes
-                    .leave_out(row.line, format!("{} is no date from 1970 to 2069", row.when.date));
+                notes.leave_out(
+                    row.line,
+                    format!("{} is not a date from 1970 to 2069", row.when.date),
+                );
                 None
             }
             Some(local) => Some(Local { ns: local, ..Local::of(local, &row.when, zone)? }),

@@ -72,6 +72,8 @@ pub(super) struct Line<'a> {
     #[serde(borrow)]
     pub(super) off: Option<Text<'a>>,
     pub(super) utc_offset_s: Option<i32>,
+    #[serde(borrow)]
+    pub(super) note: Option<Text<'a>>,
 }
 
 /// Both clocks of a host.

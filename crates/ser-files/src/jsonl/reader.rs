@@ -23,6 +23,8 @@ pub struct Reader<R> {
     unnamed: String,
     /// The recorder of the record that was read last.
     recorder: String,
+    /// The remark that goes with it.
+    note: Option<String>,
     program: Option<String>,
     is_over: bool,
 }
@@ -33,13 +35,19 @@ impl<R: BufRead> Reader<R> {
     pub fn new(input: R, recorder: &str) -> Reader<R> {
         let lines = Lines::new(input);
         let (unnamed, recorder) = (recorder.to_owned(), recorder.to_owned());
-        Reader { lines, unnamed, recorder, program: None, is_over: false }
+        Reader { lines, unnamed, recorder, note: None, program: None, is_over: false }
     }
 
     /// The name of the recorder of the record that was [read](Self::read) last.
     #[must_use]
     pub fn recorder(&self) -> &str {
         &self.recorder
+    }
+
+    /// The remark for people that goes with the record that was [read](Self::read) last.
+    #[must_use]
+    pub fn note(&self) -> Option<&str> {
+        self.note.as_deref()
     }
 
     /// The next record, without the name of its recorder.
@@ -74,6 +82,7 @@ impl<R: BufRead> Reader<R> {
                 if self.recorder != name {
                     name.clone_into(&mut self.recorder);
                 }
+                self.note = line.note.as_ref().map(|Text(note)| note.to_string());
                 Ok(item)
             });
             let number = self.lines.number();
@@ -111,7 +120,7 @@ type Trouble = (Option<usize>, Problem);
 fn parse(line: &[u8]) -> std::result::Result<Line<'_>, Trouble> {
     // A list would be taken for the fields in their order.
     if line.trim_ascii_start().first() != Some(&b'{') {
-        return Err((None, Problem::Damaged(format!("this is no object: {}", quoted(line)))));
+        return Err((None, Problem::Damaged(format!("this is not an object: {}", quoted(line)))));
     }
     serde_json::from_slice(line).map_err(|error| match std::str::from_utf8(line) {
         Ok(_) => not_json(&error, line),

@@ -10,7 +10,7 @@ use ser_evidence::timeline::{EventId, Item, Timeline};
 use super::dialect::{Dialect, field};
 use crate::csv::loss_note;
 use crate::digits::{UtcTexts, push_german, push_number, push_stamp};
-use crate::report::names;
+use crate::names;
 
 /// The columns. The first seven are those of a reading.
 pub const HEADER: &str =

@@ -50,8 +50,8 @@ pub(crate) fn field(text: &str, dialect: Dialect, is_spreadsheet_safe: bool) -> 
     }
 }
 
-/// A text without the apostrophe that [`field`] has put in front of it. A text that nobody made safe and
-/// that looks as if somebody had loses its apostrophe as well.
+/// A text without the apostrophe that [`field`] has put in front of it. A text that nobody made
+/// safe and that looks as if somebody had loses its apostrophe as well.
 pub(crate) fn without_apostrophe(text: &str) -> &str {
     match text.strip_prefix('\'') {
         Some(rest) if is_taken_for_something_else(rest) => rest,
@@ -59,16 +59,16 @@ pub(crate) fn without_apostrophe(text: &str) -> &str {
     }
 }
 
-/// Whether a spreadsheet may take a text for something else. One that looks as if it had been made safe
-/// is made so once more, for [`without_apostrophe`].
+/// Whether a spreadsheet may take a text for something else. One that looks as if it had been made
+/// safe is made so once more, for [`without_apostrophe`].
 fn is_taken_for_something_else(text: &str) -> bool {
     let bare = text.trim_start_matches('\'');
     is_formula(bare) || is_number(bare) || is_date(bare) || is_truth(bare)
 }
 
-/// Whether a spreadsheet may take a text for a date, a time or a fraction: numbers and names of months
-/// with signs between them, such as `52-1`, `3/4`, `10:30`, `1.2.` and `3 Mar`. Also an amount of money
-/// or a percentage.
+/// Whether a spreadsheet may take a text for a date, a time or a fraction: numbers and names of
+/// months with signs between them, such as `52-1`, `3/4`, `10:30`, `1.2.` and `3 Mar`. Also an amount
+/// of money or a percentage.
 fn is_date(text: &str) -> bool {
     const MONTHS: [&str; 16] = [
         "jan", "feb", "mar", "mär", "apr", "may", "mai", "jun", "jul", "aug", "sep", "oct", "okt",

@@ -6,7 +6,9 @@ use ser_evidence::site::PointId;
 use ser_evidence::timeline::{ChangeId, EventId, Item, Order, Timeline};
 use unicode_width::UnicodeWidthStr;
 
-use super::super::report::{Clock, Styles, missing, names, span};
+use crate::missing::missing;
+use crate::report::{Clock, Styles};
+use crate::{names, span};
 
 /// Writes a row for each change and each gap. Neighbours of different recorders whose order is not
 /// known are marked with `~`.

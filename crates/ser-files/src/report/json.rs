@@ -9,8 +9,9 @@ use ser_evidence::timeline::{ChangeId, Delta, EventId};
 use serde_json::{Value, json};
 
 use super::Document;
-use super::times::rfc3339;
-use super::verdict;
+use super::marks::Marks;
+use super::verdict::{self, Lists};
+use crate::digits::rfc3339;
 
 /// The version of the layout. A change that old readers would misread gets the next number.
 const SCHEMA: u32 = 1;
@@ -36,7 +37,6 @@ pub fn write(out: &mut dyn Write, document: &Document<'_>) -> io::Result<()> {
 fn object(document: &Document<'_>) -> Value {
     let Document { timeline, report, .. } = *document;
     let site = timeline.site();
-    let clock = super::outcome::clock(document);
     let digest: String = report.digest.iter().map(|byte| format!("{byte:02x}")).collect();
     json!({
         "report": "incident",
@@ -49,15 +49,7 @@ fn object(document: &Document<'_>) -> Value {
         "damaged_lines": document.damaged_lines,
         "entries_before": report.incident.earlier,
         "entries_after": report.incident.later,
-        "verdict": {
-            "first_out": verdict::first_out(timeline, report, &report.first_out, &clock),
-            "operated": report
-                .operations
-                .iter()
-                .map(|operation| verdict::operated(timeline, operation))
-                .collect::<Vec<_>>(),
-            "wrong": verdict::wrong(document),
-        },
+        "verdict": verdict_of(document),
         "first_out": first_out(document, &report.first_out),
         "groups": report.groups.iter().map(|(id, first)| json!({
             "group": site.groups.get(id.0).map(|group| &group.name),
@@ -84,6 +76,18 @@ fn object(document: &Document<'_>) -> Value {
             "on": abnormal.on,
             "since": abnormal.since.map(|since| change(document, since)),
         })).collect::<Vec<_>>(),
+    })
+}
+
+/// The three lines that answer, whole.
+fn verdict_of(document: &Document<'_>) -> Value {
+    let Document { timeline, report, .. } = *document;
+    let clock = super::outcome::clock(document);
+    let first = (&report.first_out, Lists::Whole);
+    json!({
+        "first_out": verdict::first_out(timeline, report, first, &clock),
+        "operated": verdict::all_operated(document, Lists::Whole),
+        "wrong": verdict::wrong(document, Lists::Whole),
     })
 }
 
@@ -151,7 +155,7 @@ fn recorders(document: &Document<'_>) -> Vec<Value> {
             "read_until": of.read_until.and_then(|reading| rfc3339(reading.utc.us())),
             "missing": of.gaps.iter().map(|(gap, _)| json!({
                 "after": gap.after,
-                "what": verdict::missing(gap.lost, gap.why),
+                "what": super::missing(gap.lost, gap.why),
             })).collect::<Vec<_>>(),
             "conflicts": of.conflicts,
             "without_time": of.timeless,
@@ -193,6 +197,7 @@ fn sequence(document: &Document<'_>) -> Vec<Value> {
     let Document { timeline, report, .. } = *document;
     let site = timeline.site();
     let first = report.rows.first().map(|row| row.change);
+    let marks = Marks::new(document);
     let mut previous: Option<ChangeId> = None;
     let mut rows = Vec::new();
     for row in &report.rows {
@@ -226,7 +231,7 @@ fn sequence(document: &Document<'_>) -> Vec<Value> {
             "state": point.map(|point| if row.on { &point.on } else { &point.off }),
             "chatter": row.chatter,
             "shifted_us": timeline.shift_us(event),
-            "clock_was_set_before": report.incident.clock_sets.contains(&event),
+            "clock_was_set_before": marks.is_set_ahead_of(event),
         }));
         previous = Some(row.change);
     }

@@ -4,14 +4,15 @@
 //! changes, what was expected, what has not returned to normal, and what is missing. All answers
 //! come from [`Report`]. The files here turn them into words; `text` and `html` draw the words.
 
+mod brackets;
+mod clock_sets;
 mod elsewhere;
 mod html;
 mod json;
-pub(crate) mod names;
+mod marks;
 mod outcome;
 mod sequence;
 mod sources;
-pub(crate) mod span;
 mod style;
 mod table;
 mod text;
@@ -24,11 +25,13 @@ pub use style::Styles;
 pub use text::write as write_text;
 pub use times::Clock;
 
-pub(crate) use times::rfc3339;
-pub(crate) use verdict::missing;
+pub use crate::missing::NotReached;
 
 use ser_evidence::incident::Report;
 use ser_evidence::timeline::Timeline;
+
+use crate::missing::missing;
+use crate::{names, span};
 
 /// A report, and what is said about where it comes from.
 #[derive(Debug)]
@@ -55,13 +58,4 @@ impl Document<'_> {
     pub fn is_incomplete(&self) -> bool {
         self.report.is_incomplete() || !self.not_reached.is_empty() || self.damaged_lines > 0
     }
-}
-
-/// A recorder that could not be read.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NotReached {
-    /// Its name.
-    pub recorder: String,
-    /// Why.
-    pub why: String,
 }

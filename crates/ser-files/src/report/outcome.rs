@@ -6,7 +6,8 @@ use ser_evidence::time::Moment;
 use ser_evidence::timeline::{Delta, EventId};
 
 use super::span::{doubt, duration};
-use super::{Clock, Document, names, verdict};
+use super::verdict::{self, Lists};
+use super::{Clock, Document, elsewhere, names};
 
 /// The name of the site.
 pub(super) fn title(document: &Document<'_>) -> String {
@@ -37,12 +38,14 @@ pub(super) fn window(document: &Document<'_>, clock: &Clock) -> String {
     format!("{from} to {to} ({}){goes_on}", clock.zone(first))
 }
 
-/// When the first and the last entry were, in UTC.
+/// When the first and the last entry were, in UTC, of those whose time is known.
 fn ends(document: &Document<'_>) -> Option<(i64, i64)> {
     let Document { timeline, report, .. } = *document;
-    let at = |event: Option<&EventId>| timeline.time(*event?).map(Moment::us);
-    let events = &report.incident.events;
-    at(events.first()).zip(at(events.last()))
+    let at = |event: &EventId| timeline.time(*event).map(Moment::us);
+    let mut timed = report.incident.events.iter();
+    let is_timed = |event: &&EventId| !elsewhere::is_timeless(timeline, **event);
+    let first = timed.find(is_timed)?;
+    at(first).zip(at(timed.rfind(is_timed).unwrap_or(first)))
 }
 
 /// Each group that wants to know, and what was first in it.
@@ -51,7 +54,7 @@ pub(super) fn groups(document: &Document<'_>, clock: &Clock) -> Vec<(String, Str
     let groups = report.groups.iter().map(|(id, first)| {
         let group = timeline.site().groups.get(id.0);
         let name = group.map(|group| names::harmless(&group.name)).unwrap_or_default();
-        (name, verdict::first_out(timeline, report, first, clock))
+        (name, verdict::first_out(timeline, report, (first, Lists::Short), clock))
     });
     groups.collect()
 }

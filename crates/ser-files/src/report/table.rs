@@ -74,8 +74,8 @@ impl Table {
         Ok(())
     }
 
-    /// As wide as the cells, or narrower where these can be wrapped and the line has no room: the last
-    /// column first.
+    /// As wide as the cells, or narrower where these can be wrapped and the line has no room: the
+    /// last column first.
     fn widths(&self) -> Vec<usize> {
         let mut widths: Vec<usize> =
             (0..self.titles.len()).map(|column| self.width(column)).collect();

@@ -7,7 +7,8 @@ use std::io::{self, Write};
 
 use super::style::Styles;
 use super::table::{Align, Cell, Table, wrapped};
-use super::{Clock, Document, outcome, verdict};
+use super::verdict::{self, Lists};
+use super::{Clock, Document, outcome};
 
 /// How wide lines of sentences are.
 const WIDTH: usize = 96;
@@ -46,13 +47,12 @@ fn verdict_lines(
     clock: &Clock,
 ) -> io::Result<()> {
     let Document { timeline, report, .. } = *document;
-    let first = verdict::first_out(timeline, report, &report.first_out, clock);
+    let first = verdict::first_out(timeline, report, (&report.first_out, Lists::Short), clock);
     labelled(out, "first-out", &[first], styles.first_out)?;
-    let operated: Vec<String> =
-        report.operations.iter().map(|operation| verdict::operated(timeline, operation)).collect();
+    let operated = verdict::all_operated(document, Lists::Short);
     let operated = if operated.is_empty() { vec!["no breaker".to_owned()] } else { operated };
     labelled(out, "operated", &operated, styles.title)?;
-    match verdict::wrong(document) {
+    match verdict::wrong(document, Lists::Short) {
         wrong if wrong.is_empty() => labelled(out, "wrong", &["nothing".to_owned()], styles.title),
         wrong => labelled(out, "wrong", &wrong, styles.alarm),
     }

@@ -19,8 +19,8 @@ impl Clock {
         Clock { zone, needs_date: false, needs_offset: false }
     }
 
-    /// The same for times from `first_us` to `last_us`: times of the day have a date where these are
-    /// of several days, and their offset from UTC where that changes between them.
+    /// The same for times from `first_us` to `last_us`: times of the day have a date where these
+    /// are of several days, and their offset from UTC where that changes between them.
     #[must_use]
     pub fn over(self, first_us: i64, last_us: i64) -> Clock {
         let differ = |format: &str| self.format(first_us, format) != self.format(last_us, format);
@@ -79,12 +79,6 @@ impl Clock {
     }
 }
 
-/// As `2026-11-22T10:00:00.250000Z`; `None` if no calendar has it.
-pub(crate) fn rfc3339(utc_us: i64) -> Option<String> {
-    let at = Timestamp::from_microsecond(utc_us).ok()?;
-    Some(at.strftime("%Y-%m-%dT%H:%M:%S.%6fZ").to_string())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,7 +90,6 @@ mod tests {
         assert_eq!(clock.date_and_time(us), "2026-11-22 11:00:00.250");
         assert_eq!(clock.zone(us), "Europe/Berlin, UTC+01:00");
         assert_eq!(Clock::in_zone(TimeZone::UTC).zone(us), "UTC");
-        assert_eq!(rfc3339(us).unwrap(), "2026-11-22T10:00:00.249600Z");
         assert_eq!(clock.time(i64::MAX), "-");
         let berlin = || Clock::in_zone(TimeZone::get("Europe/Berlin").unwrap());
         assert_eq!(berlin().over(us, us + 1_000_000).time(us), "11:00:00.250");

@@ -1,22 +1,59 @@
 //! The verdict: what was first, what operated, what is wrong.
 
+use std::collections::HashSet;
+
 use ser_evidence::clock::Finding;
 use ser_evidence::incident::{
     Abnormal, Completeness, Disagreement, Doubt, FirstOut, Operation, Report, Row, StepResult,
     Verdict,
 };
 use ser_evidence::record::{Lost, Why};
-use ser_evidence::timeline::{ChangeId, ContactTrouble, Timeline};
+use ser_evidence::timeline::{ChangeId, ContactTrouble, EventId, Timeline};
 
 use super::names::{self, harmless};
 use super::span::{doubt, duration};
-use super::{Clock, Document};
+use super::{Clock, Document, elsewhere, missing};
+
+/// How long lists in sentences are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Lists {
+    /// All of it.
+    Whole,
+    /// Some, and how many more: for people, who find the rest in other sections.
+    Short,
+}
+
+impl Lists {
+    /// How many names a sentence has.
+    const NAMES: usize = 8;
+    /// How many sentences there are.
+    const SENTENCES: usize = 16;
+
+    /// `a, b and c`, or `a, b and 7 more`.
+    fn names(self, items: impl Iterator<Item = String>) -> String {
+        let mut items: Vec<String> = items.collect();
+        self.shorten(&mut items, Lists::NAMES);
+        list(items.into_iter())
+    }
+
+    /// Leaves so many, if there are more than one more.
+    fn shorten(self, items: &mut Vec<String>, most: usize) {
+        if self == Lists::Short && items.len() > most + 1 {
+            let more = items.len() - most;
+            items.truncate(most);
+            items.push(format!("{more} more"));
+        }
+    }
+}
+
+/// Between so many changes it is reckoned how far apart they may be, each with each.
+const MOST_COMPARED: usize = 300;
 
 /// What was first, in words.
 pub(super) fn first_out(
     timeline: &Timeline<'_>,
     report: &Report,
-    first: &FirstOut,
+    (first, lists): (&FirstOut, Lists),
     clock: &Clock,
 ) -> String {
     let named = |change: &ChangeId| {
@@ -24,35 +61,33 @@ pub(super) fn first_out(
         row.map_or_else(String::new, |row| names::change(timeline, row))
     };
     if let Some(only) = first.known() {
-        let at = timeline
-            .time(only.event)
-            .map(ser_evidence::time::Moment::us)
-            .map(|at| clock.time(at))
-            .unwrap_or_default();
-        return format!("{}, {at}", named(&only));
+        let at = timeline.time(only.event).map(|at| clock.time(at.us()));
+        let at = at.filter(|_| !elsewhere::is_timeless(timeline, only.event));
+        return format!("{}, {}", named(&only), at.as_deref().unwrap_or("time not known"));
     }
     let mut text = match first.changes.as_slice() {
         [] => "not known".to_owned(),
         [only] => named(only),
         [one, .., other] if one.event == other.event => {
-            format!("in the same millisecond: {}", list(first.changes.iter().map(named)))
+            format!("in the same millisecond: {}", lists.names(first.changes.iter().map(named)))
         }
         several => format!(
             "not certain{}, one of: {}",
             within(timeline, several),
-            list(several.iter().map(named))
+            lists.names(several.iter().map(named))
         ),
     };
     if !first.unread.is_empty() {
         let names = first.unread.iter().map(|&recorder| recorder_name(timeline, recorder));
-        text += &format!("; or something on {}, which was not read since", list(names));
+        text += &format!("; or something on {}, which was not read since", lists.names(names));
     }
     if !first.gaps.is_empty() {
         let of = |(event, _): &(_, usize)| names::recorder(timeline, *event);
         let mut recorders: Vec<String> = first.gaps.iter().map(of).collect();
         recorders.sort_unstable();
         recorders.dedup();
-        text += &format!("; or one of the entries missing on {}", list(recorders.into_iter()));
+        text +=
+            &format!("; or one of the entries missing on {}", lists.names(recorders.into_iter()));
     }
     match first.earlier {
         0 => {}
@@ -66,6 +101,9 @@ pub(super) fn first_out(
 
 /// Between which bounds nobody knows which of these was first.
 fn within(timeline: &Timeline<'_>, changes: &[ChangeId]) -> String {
+    if changes.len() > MOST_COMPARED {
+        return String::new();
+    }
     let widest = changes
         .iter()
         .enumerate()
@@ -98,8 +136,17 @@ pub(super) fn operated(timeline: &Timeline<'_>, operation: &Operation) -> String
     text
 }
 
+/// What all breakers did, in words.
+pub(super) fn all_operated(document: &Document<'_>, lists: Lists) -> Vec<String> {
+    let operations = document.report.operations.iter();
+    let mut all: Vec<String> =
+        operations.map(|operation| operated(document.timeline, operation)).collect();
+    lists.shorten(&mut all, Lists::SENTENCES);
+    all
+}
+
 /// Everything that is wrong, each in a few words, the worst first.
-pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
+pub(super) fn wrong(document: &Document<'_>, lists: Lists) -> Vec<String> {
     let Document { timeline, report, .. } = *document;
     let mut wrong = Vec::new();
     for step in &report.steps {
@@ -112,9 +159,10 @@ pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
             .map(|missed| format!("{} not reached", harmless(&missed.recorder))),
     );
     wrong.extend(damaged(document));
-    for recorder in &report.completeness {
-        wrong.extend(incompleteness(timeline, recorder));
-    }
+    // That a list of another device ends is the least of what may be wrong.
+    let (ended, others): (Vec<_>, Vec<_>) =
+        report.completeness.iter().partition(|of| is_ended_list(timeline, of));
+    wrong.extend(others.into_iter().filter_map(|of| incompleteness(timeline, of)));
     for disagreement in &report.disagreements {
         wrong.extend(disagreement_trouble(disagreement));
     }
@@ -129,28 +177,50 @@ pub(super) fn wrong(document: &Document<'_>) -> Vec<String> {
     let moved = report.abnormal.iter().filter(|abnormal| abnormal.since.is_some());
     let names: Vec<String> = moved.map(|abnormal| abnormal_name(timeline, abnormal)).collect();
     if !names.is_empty() {
-        wrong.push(format!("not returned to normal: {}", list(names.into_iter())));
+        wrong.push(format!("not returned to normal: {}", lists.names(names.into_iter())));
     }
     let contradicts = |finding: &&Finding| !matches!(finding, Finding::NotPlaced { .. });
     let clocks = timeline.findings().iter().filter(contradicts).count();
     if clocks + timeline.out_of_order().len() > 0 {
         wrong.push("what is known of the clocks does not fit together".to_owned());
     }
-    for finding in timeline.contact_findings() {
-        if !report.incident.events.contains(&finding.change.event) {
-            continue;
-        }
+    wrong.extend(contact_trouble(document));
+    wrong.extend(ended.into_iter().filter_map(|of| incompleteness(timeline, of)));
+    wrong.dedup();
+    lists.shorten(&mut wrong, Lists::SENTENCES);
+    wrong
+}
+
+/// Contacts on two recorders that did not move alike in the incident.
+fn contact_trouble(document: &Document<'_>) -> Vec<String> {
+    let Document { timeline, report, .. } = *document;
+    let findings = timeline.contact_findings();
+    let here: HashSet<EventId> = match findings {
+        [] => HashSet::new(),
+        _ => report.incident.events.iter().copied().collect(),
+    };
+    let told = findings.iter().filter(|finding| here.contains(&finding.change.event));
+    let told = told.map(|finding| {
         let point = names::full_point(timeline, finding.point);
         let other = names::full_point(timeline, finding.other);
-        wrong.push(match finding.trouble {
+        match finding.trouble {
             ContactTrouble::Missing => format!("{point} moved and {other} did not"),
             ContactTrouble::Apart(_) => {
                 format!("{point} and {other} are one contact and moved at different times")
             }
-        });
-    }
-    wrong.dedup();
-    wrong
+        }
+    });
+    told.collect()
+}
+
+/// Whether nothing is wrong with an imported list but that it goes no further than the incident.
+fn is_ended_list(timeline: &Timeline<'_>, of: &Completeness) -> bool {
+    let history = timeline.history().recorders.get(of.recorder as usize);
+    history.is_some_and(|history| history.stamps.is_some())
+        && of.gaps.is_empty()
+        && of.conflicts == 0
+        && of.timeless == 0
+        && !of.is_complete()
 }
 
 fn step_trouble(timeline: &Timeline<'_>, step: &StepResult) -> Option<String> {
@@ -196,7 +266,9 @@ pub(super) fn incompleteness(timeline: &Timeline<'_>, of: &Completeness) -> Opti
     if of.timeless > 0 {
         text.push(format!("{} entries without a time (the clock was never set)", of.timeless));
     }
-    if text.is_empty() && !of.is_complete() {
+    if is_ended_list(timeline, of) {
+        text.push("the imported list goes no further than the incident".to_owned());
+    } else if text.is_empty() && !of.is_complete() {
         text.push("not known to be read after the end of the incident".to_owned());
     }
     (!text.is_empty()).then(|| format!("{name}: {}", text.join(", ")))
@@ -225,26 +297,6 @@ fn missing_in_all(gaps: impl Iterator<Item = (Lost, Why)>) -> Vec<String> {
     let mut all: Vec<String> = counted.chain(others).collect();
     all.dedup();
     all
-}
-
-/// How many entries are missing, and why.
-pub(crate) fn missing(lost: Lost, why: Why) -> String {
-    let why = match why {
-        Why::Overwritten => "overwritten",
-        Why::LogBeganAnew => "the log began anew",
-        Why::NotRecorded(inputs) => {
-            return format!("inputs changed without being recorded: {}", ser_proto::Inputs(inputs));
-        }
-        Why::NotReached => "in none of the sources",
-        Why::Unreadable => "a line could not be read",
-    };
-    match lost {
-        Lost::Exactly(1) => format!("1 entry missing ({why})"),
-        Lost::Exactly(count) => format!("{count} entries missing ({why})"),
-        Lost::AtLeast(1) => format!("at least 1 entry missing ({why})"),
-        Lost::AtLeast(count) => format!("at least {count} entries missing ({why})"),
-        Lost::Unknown => format!("an unknown number of entries missing ({why})"),
-    }
 }
 
 /// Contacts that disagree while the breaker travels are as they should be.

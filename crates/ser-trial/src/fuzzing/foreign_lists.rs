@@ -2,8 +2,8 @@
 
 use std::io::Read;
 
-use ser_evidence::record::Told;
-use ser_files::import::{DateOrder, Epoch, Format, Importer, Map, Options, zone_named};
+use ser_evidence::record::{Record, Told};
+use ser_files::import::{DateOrder, Epoch, Format, Importer, Map, Options, Output, zone_named};
 use ser_files::jsonl::Reader;
 
 use super::dribble::Dribble;
@@ -70,16 +70,25 @@ fn written<'d, const N: usize>(
     beside: &[u8],
 ) -> Result<(String, Vec<Told>), String> {
     let mut importer = Importer::new(options.clone());
+    let (mut told, mut lines) = (Vec::new(), Vec::new());
+    let mut output = Output::new(&mut lines, "fuzzing");
     for file in files {
         let data = std::io::Cursor::new(beside.to_vec());
         let data = || Ok(Box::new(data) as Box<dyn Read>);
-        importer.read("F3", file, data).map_err(|refusal| refusal.to_string())?;
+        let mut own = |recorder: &str, record: &Record, note: Option<&str>| {
+            told.push(Told { recorder: recorder.to_owned(), record: record.clone() });
+            output.record(recorder, record, note)
+        };
+        let opened = importer.open(file).map_err(|refusal| refusal.to_string())?;
+        importer.read("F3", opened, data, &mut own).map_err(|refusal| refusal.to_string())?;
     }
     let imported = importer.finish();
-    let mut lines = Vec::new();
-    imported.write(&mut lines, "fuzzing").expect("memory has room");
-    let told = imported
-        .records()
-        .map(|(recorder, record)| Told { recorder: recorder.to_owned(), record: record.clone() });
-    Ok((String::from_utf8(lines).expect("JSON is UTF-8"), told.collect()))
+    output.finish(&imported).expect("memory has room");
+    told.extend(
+        imported.records().map(|(recorder, record)| Told {
+            recorder: recorder.to_owned(),
+            record: record.clone(),
+        }),
+    );
+    Ok((String::from_utf8(lines).expect("JSON is UTF-8"), told))
 }

@@ -37,6 +37,13 @@ impl Format {
     }
 }
 
+impl Format {
+    /// Whether the file itself says how many lines of its sources were damaged.
+    pub(super) const fn tells_damage(self) -> bool {
+        matches!(self, Format::Vcd | Format::Comtrade | Format::Cff | Format::Parquet)
+    }
+}
+
 /// For which program CSV is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum CsvDialect {

@@ -50,9 +50,9 @@ pub(crate) struct Args {
     #[arg(long, requires = "output")]
     force: bool,
 
-    /// With csv: for which program.
-    #[arg(long, value_enum, value_name = "DIALECT", default_value_t)]
-    csv_dialect: CsvDialect,
+    /// With csv: for which program; rfc4180 if not given.
+    #[arg(long, value_enum, value_name = "DIALECT")]
+    csv_dialect: Option<CsvDialect>,
 
     /// With csv and prc002: put an apostrophe before texts that a spreadsheet would take for a
     /// formula or a number.
@@ -64,13 +64,13 @@ pub(crate) struct Args {
     #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u16).range(1000..=1000))]
     rate: Option<u16>,
 
-    /// With comtrade and cff: how the rows are written.
-    #[arg(long, value_enum, default_value_t)]
-    data: Data,
+    /// With comtrade and cff: how the rows are written; ascii if not given.
+    #[arg(long, value_enum)]
+    data: Option<Data>,
 
-    /// With comtrade and cff: the line frequency that the file names, in hertz.
-    #[arg(long, value_name = "HZ", default_value_t = 50, value_parser = line_frequency)]
-    line_frequency: u8,
+    /// With comtrade and cff: the line frequency that the file names, in hertz; 50 if not given.
+    #[arg(long, value_name = "HZ", value_parser = line_frequency)]
+    line_frequency: Option<u8>,
 
     /// End with exit code 3 if entries are known to be missing in the file.
     #[arg(long)]
@@ -106,6 +106,9 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let selection = args.choice.selection(&timeline)?;
     let counted = write::write(args, destination, &gathered, &timeline, &selection)?;
     write::tell(counted);
+    if !args.format.tells_damage() {
+        write::tell_damaged(gathered.damaged_lines);
+    }
     if args.fail_on_loss {
         gathered.require_complete()?;
         if counted.losses > 0 {
@@ -121,11 +124,11 @@ fn fits(args: &Args) -> Result<()> {
     let is_comtrade = matches!(args.format, Format::Comtrade | Format::Cff);
     let is_table = is_csv || args.format == Format::Prc002;
     let of_others = [
-        ("--csv-dialect", args.csv_dialect != CsvDialect::default() && !is_csv, "csv"),
+        ("--csv-dialect", args.csv_dialect.is_some() && !is_csv, "csv"),
         ("--spreadsheet-safe", args.spreadsheet_safe && !is_table, "csv and prc002"),
         ("--rate", args.rate.is_some() && !is_comtrade, "comtrade and cff"),
-        ("--data", args.data != Data::default() && !is_comtrade, "comtrade and cff"),
-        ("--line-frequency", args.line_frequency != 50 && !is_comtrade, "comtrade and cff"),
+        ("--data", args.data.is_some() && !is_comtrade, "comtrade and cff"),
+        ("--line-frequency", args.line_frequency.is_some() && !is_comtrade, "comtrade and cff"),
     ];
     if let Some((option, _, formats)) = of_others.iter().find(|(_, is_wrong, _)| *is_wrong) {
         return Err(Failure::usage(format!("{option} is for --format {formats}"))

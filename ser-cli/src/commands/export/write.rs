@@ -15,6 +15,7 @@ use crate::gather::Gathered;
 use crate::new_files::NewFiles;
 use crate::outlet::{NotWritten, Outlet, Part, file_named, finish};
 use crate::output::PROGRAM;
+use crate::site_file::counted;
 
 /// Everything that is exported, and how.
 struct Export<'e> {
@@ -122,6 +123,20 @@ pub(super) fn tell(counted: Counted) {
     }
 }
 
+/// Tells of damaged lines of the sources, where the format has no place to say so.
+pub(super) fn tell_damaged(lines: u64) {
+    if lines > 0 {
+        let lines = counted(usize::try_from(lines).unwrap_or(usize::MAX), "damaged line");
+        let lines = lines.unwrap_or_default();
+        warn(format_args!(
+            "{lines} of the sources are missing in the file, which has no place for that"
+        ));
+        advise(
+            "each is in it as a loss after the entry before it; vcd and comtrade say it in words",
+        );
+    }
+}
+
 impl Export<'_> {
     fn write(&self, destination: Destination) -> Result<Counted> {
         match destination {
@@ -149,9 +164,9 @@ impl Export<'_> {
 
     fn record(&self) -> std::result::Result<Comtrade<'_>, Refused> {
         let options = Options {
-            data: self.args.data.into(),
+            data: self.args.data.unwrap_or_default().into(),
             has_rate: self.args.rate.is_some(),
-            line_hz: self.args.line_frequency,
+            line_hz: self.args.line_frequency.unwrap_or(50),
         };
         Comtrade::new(self.timeline, self.selection, options)
     }
@@ -162,7 +177,7 @@ impl Export<'_> {
         let is_spreadsheet_safe = args.spreadsheet_safe;
         match args.format {
             Format::Csv => {
-                let dialect = args.csv_dialect.into();
+                let dialect = args.csv_dialect.unwrap_or_default().into();
                 let style = CsvStyle { dialect, is_spreadsheet_safe, has_names: true };
                 export::write_csv(out, timeline, selection, style)
             }

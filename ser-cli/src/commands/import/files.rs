@@ -1,13 +1,15 @@
 //! The files that are read: lists, the data beside COMTRADE configurations, maps.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use ser_evidence::site::Site;
-use ser_files::import::{Importer, Map, Read, Refusal};
+use ser_files::import::{Format, Importer, Map, Own, Read, Refusal};
 
 use crate::error::{Failure, Result};
+use crate::outlet::NotWritten;
 use crate::site_file;
 
 /// Without the data of COMTRADE configurations that are named, too: it is read with them.
@@ -33,17 +35,35 @@ pub(super) fn with_data(files: &[PathBuf]) -> Vec<PathBuf> {
 /// How the data of a configuration ends.
 const DATA: [&str; 3] = ["dat", "DAT", "Dat"];
 
-/// Reads a file. Its recorder is named, or has the name of the file up to the last dot.
-pub(super) fn read(importer: &mut Importer, path: &Path, recorder: Option<&str>) -> Result<Read> {
+/// Reads a file if `fits` likes its format. Its recorder is named, or has the name of the file up to
+/// the last dot. Records of our own files go to `own` at once.
+pub(super) fn read(
+    importer: &mut Importer,
+    path: &Path,
+    recorder: Option<&str>,
+    fits: impl FnOnce(Format) -> Result<()>,
+    own: &mut Own<'_>,
+) -> std::result::Result<Read, NotWritten> {
     let file = File::open(path).map_err(|error| Failure::reading(path.display(), &error))?;
     if file.metadata().is_ok_and(|about| about.is_dir()) {
-        return Err(Failure::new(format!("{} is a folder", path.display()))
-            .hint(format!("name the files in it, as in {}", path.join("*.txt").display())));
+        let failure = Failure::new(format!("{} is a folder", path.display()))
+            .hint(format!("name the files in it, as in {}", path.join("*.txt").display()));
+        return Err(failure.into());
     }
-    let stem = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy();
+    let stem = stem(path);
     let recorder = recorder.unwrap_or(&stem);
     let data = || Ok(Box::new(data_beside(path)?) as Box<dyn io::Read>);
-    importer.read(recorder, file, data).map_err(|refusal| refused(path, &refusal))
+    let opened = importer.open(file).map_err(|refusal| refused(path, &refusal))?;
+    fits(opened.format())?;
+    importer.read(recorder, opened, data, own).map_err(|refusal| match refusal {
+        Refusal::NotTaken(error) => NotWritten::Io(error),
+        refusal => NotWritten::Failed(refused(path, &refusal)),
+    })
+}
+
+/// The name of a file up to its last dot.
+pub(super) fn stem(path: &Path) -> Cow<'_, str> {
+    path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy()
 }
 
 /// The data of a configuration: the same name, ending with dat.
@@ -63,7 +83,9 @@ fn refused(path: &Path, refusal: &Refusal) -> Failure {
     let failure = Failure::new(format!("{}: {refusal}", path.display()));
     match refusal {
         Refusal::Empty => failure.hint("get the list from the device anew"),
-        Refusal::Io(_) => failure.hint("check its name and your rights to it"),
+        Refusal::Io(_) | Refusal::NotTaken(_) => {
+            failure.hint("check its name and your rights to it")
+        }
         Refusal::Utf16 => {
             failure.hint("save it as UTF-8; the encoding is often in the dialogue Save As")
         }
@@ -92,7 +114,9 @@ fn refused(path: &Path, refusal: &Refusal) -> Failure {
         Refusal::NoEpoch => failure
             .hint("with /posix/ in the address that it is from, say --epoch posix")
             .hint("without, --epoch 1984, and the recorder's time zone with --zone"),
-        Refusal::TooMuch { .. } => failure.hint("divide it, or export a shorter time"),
+        Refusal::TooMuch { .. } => failure
+            .hint("a list is held in memory as a whole, to put its rows in order")
+            .hint("divide it, or export a shorter time"),
     }
 }
 

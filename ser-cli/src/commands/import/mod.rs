@@ -3,15 +3,18 @@
 mod files;
 mod telling;
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use ser_files::import::{DateOrder, Epoch, Format, Importer, Map, Options, zone_named};
+use ser_evidence::record::Record;
+use ser_evidence::site::Site;
+use ser_files::import::{DateOrder, Epoch, Format, Importer, Map, Options, Output, zone_named};
 
 use crate::connection::ConnectionArgs;
 use crate::error::{Failure, Result};
 use crate::new_files::NewFiles;
-use crate::outlet::{Outlet, file_named};
+use crate::outlet::{NotWritten, Outlet, file_named};
 use crate::output::PROGRAM;
 use crate::site_file;
 
@@ -133,7 +136,7 @@ impl Args {
 
 fn parse_zone(text: &str) -> std::result::Result<jiff::tz::TimeZone, String> {
     zone_named(text).ok_or_else(|| {
-        "no time zone like Europe/Berlin or UTC, and no offset like +05:30".to_owned()
+        "not a time zone like Europe/Berlin or UTC, nor an offset like +05:30".to_owned()
     })
 }
 
@@ -146,7 +149,7 @@ fn parse_doubt(text: &str) -> std::result::Result<u32, String> {
 
 /// Refuses options that say nothing about files of our own: these say it themselves.
 fn fits(path: &Path, format: Format, args: &Args, recorder: Option<&str>) -> Result<()> {
-    if !matches!(format, Format::Csv | Format::Jsonl) {
+    if !is_own(format) {
         return Ok(());
     }
     let given = [
@@ -168,30 +171,36 @@ fn fits(path: &Path, format: Format, args: &Args, recorder: Option<&str>) -> Res
     }
 }
 
+const fn is_own(format: Format) -> bool {
+    matches!(format, Format::Csv | Format::Jsonl)
+}
+
+/// Refuses to give the list of another device to a recorder that is read: that one has a log of its
+/// own, and its stamps are not those of the list.
+fn is_not_read(name: &str, format: Format, site: Option<&Site>) -> Result<()> {
+    let recorder = site.and_then(|site| Some((site, site.recorder(name)?)));
+    let port = recorder.and_then(|(site, id)| site.recorders.get(id.0)?.port.as_deref());
+    match port.filter(|_| !is_own(format)) {
+        Some(port) => Err(Failure::usage(format!(
+            "{name} is a recorder of the site that is read at {port}, and no list of another device \
+             can be its log"
+        ))
+        .hint("name the device with --recorder, and give it a [[recorder]] without a port")
+        .hint("say same_as of points that watch one contact")),
+        None => Ok(()),
+    }
+}
+
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let mut inputs = files::with_data(&args.files);
     inputs.extend(args.map.iter().chain(&connection.site).cloned());
-    let files = NewFiles::new(args.force).sparing(inputs);
-    let outlet = Outlet::open(file_named(args.output.as_deref()), files)?;
-    let mut importer = Importer::new(options(args, connection)?);
-    let files = files::without_data(&args.files);
-    let (mut left_out, mut lost) = (0, 0);
-    for path in &files {
-        let read = files::read(&mut importer, path, connection.recorder.as_deref())?;
-        fits(path, read.format, args, connection.recorder.as_deref())?;
-        left_out += read.notes.left_out_count;
-        lost += read.notes.lost_count;
-        telling::file(path, &read);
-    }
-    let imported = importer.finish();
-    left_out += imported.notes.left_out_count;
-    telling::all(&imported, left_out);
-    if imported.records().next().is_none() {
-        return Err(Failure::new("there is nothing in these files that could be written")
-            .hint("is the list empty? Then there is nothing to import")
-            .hint("--format says what the files are, if they were taken for something else"));
-    }
-    outlet.write(|out| Ok(imported.write(out, PROGRAM)?))?;
+    let new = NewFiles::new(args.force).sparing(inputs);
+    let outlet = Outlet::open(file_named(args.output.as_deref()), new)?;
+    let site = connection.site.as_deref().map(site_file::load).transpose()?;
+    let importer = Importer::new(options(args, site.as_ref())?);
+    let recorder = connection.recorder.as_deref();
+    let (left_out, lost) =
+        outlet.write(|out| import(args, recorder, site.as_ref(), importer, out))?;
     match (left_out, lost) {
         (1.., _) if args.fail_on_loss => Err(Failure::incomplete("not all lines were understood")),
         (_, 1..) if args.fail_on_loss => {
@@ -201,11 +210,46 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     }
 }
 
-fn options(args: &Args, connection: &ConnectionArgs) -> Result<Options> {
-    let site = connection.site.as_deref().filter(|_| args.map.is_some());
-    let site = site.map(site_file::load).transpose()?;
+/// Reads all files, and writes what they become. Returns how many lines were left out, and at how
+/// many places something is lost.
+fn import(
+    args: &Args,
+    recorder: Option<&str>,
+    site: Option<&Site>,
+    mut importer: Importer,
+    out: &mut (dyn Write + Send),
+) -> std::result::Result<(u64, u64), NotWritten> {
+    let mut output = Output::new(out, PROGRAM);
+    let (mut left_out, mut lost) = (0, 0);
+    for path in &files::without_data(&args.files) {
+        let mut own = |recorder: &str, record: &Record, note: Option<&str>| {
+            output.record(recorder, record, note)
+        };
+        // Before the rest is read, which may take a while.
+        let fits = |format| {
+            fits(path, format, args, recorder)?;
+            is_not_read(recorder.unwrap_or(&files::stem(path)), format, site)
+        };
+        let read = files::read(&mut importer, path, recorder, fits, &mut own)?;
+        left_out += read.notes.left_out_count;
+        lost += read.notes.lost_count;
+        telling::file(path, &read);
+    }
+    let imported = importer.finish();
+    left_out += imported.notes.left_out_count;
+    telling::all(&imported, left_out);
+    match output.finish(&imported)? {
+        true => Ok((left_out, lost)),
+        false => Err(Failure::new("there is nothing in these files that could be written")
+            .hint("is the list empty? Then there is nothing to import")
+            .hint("--format says what the files are, if they were taken for something else")
+            .into()),
+    }
+}
+
+fn options(args: &Args, site: Option<&Site>) -> Result<Options> {
     let map = match &args.map {
-        Some(path) => files::map(path, site.as_ref())?,
+        Some(path) => files::map(path, site)?,
         None => Map::default(),
     };
     Ok(Options {

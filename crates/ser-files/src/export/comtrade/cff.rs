@@ -2,12 +2,14 @@
 
 use std::io::{self, Write};
 
-use super::{Comtrade, Data, cfg, dat, header};
+use super::options::Data;
+use super::record::Record;
+use super::{cfg, dat, header};
 use crate::export::statement::Origin;
 
 pub(super) fn write(
     out: &mut dyn Write,
-    record: &Comtrade<'_>,
+    record: &Record<'_>,
     origin: &Origin<'_>,
 ) -> io::Result<()> {
     part(out, "CFG")?;

@@ -4,18 +4,20 @@ use std::io::{self, Write};
 
 use ser_evidence::timeline::{Item, Timeline};
 
+use super::options::Data;
+use super::quality;
+use super::record::Record;
 use super::texts::field;
-use super::{Comtrade, Data, quality};
 use crate::export::axis::doubt_us;
 use crate::export::channels::recorder_name;
 use crate::export::local::{offset_code, offset_of};
-use crate::report::names::harmless;
+use crate::names::harmless;
 
 /// Nothing tells whether a leap second is near.
 const LEAP_SECOND_UNKNOWN: &str = "3";
 
-pub(super) fn write(out: &mut dyn Write, record: &Comtrade<'_>) -> io::Result<()> {
-    let Comtrade { timeline, options, channels, span, .. } = record;
+pub(super) fn write(out: &mut dyn Write, record: &Record<'_>) -> io::Result<()> {
+    let Record { timeline, options, channels, span, .. } = record;
     let count = channels.len();
     let mut text = Vec::new();
     let mut line = |fields: &str| {
@@ -57,7 +59,7 @@ pub(super) fn station(timeline: &Timeline<'_>) -> String {
 }
 
 /// The recorder, or how many there are.
-fn device(record: &Comtrade<'_>) -> String {
+fn device(record: &Record<'_>) -> String {
     let channels = &record.survey.channels;
     match channels.all().first() {
         Some(first) if !channels.are_of_several() => {
@@ -79,8 +81,8 @@ fn date(utc_us: i64) -> String {
 }
 
 /// How far the truth may be from where any entry is drawn.
-fn worst_doubt_us(record: &Comtrade<'_>) -> Option<u64> {
-    let Comtrade { timeline, selection, survey, .. } = record;
+fn worst_doubt_us(record: &Record<'_>) -> Option<u64> {
+    let Record { timeline, selection, survey, .. } = record;
     let mut worst = 0;
     for item in selection.items(timeline) {
         let Item::Entry(event) = item else { continue };

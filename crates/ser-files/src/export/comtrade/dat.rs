@@ -2,7 +2,8 @@
 
 use std::io::{self, Write};
 
-use super::{Comtrade, Data};
+use super::options::Data;
+use super::record::Record;
 use crate::digits::push_number;
 use crate::export::channels::split_lowest;
 use crate::export::steps::{self, Happened, SAMPLE_US, Step};
@@ -19,12 +20,12 @@ pub(super) struct Made {
 }
 
 /// Counts the rows.
-pub(super) fn count(record: &Comtrade<'_>) -> io::Result<Made> {
+pub(super) fn count(record: &Record<'_>) -> io::Result<Made> {
     make(record, |_| Ok(()))
 }
 
 /// Writes the rows.
-pub(super) fn write(out: &mut dyn Write, record: &Comtrade<'_>) -> io::Result<()> {
+pub(super) fn write(out: &mut dyn Write, record: &Record<'_>) -> io::Result<()> {
     make(record, |row| out.write_all(row)).map(drop)
 }
 
@@ -33,7 +34,7 @@ pub(super) fn binary_row_len(channels: usize) -> u64 {
     u64::try_from(8 + 2 * channels.div_ceil(WORD)).unwrap_or(u64::MAX)
 }
 
-fn make(record: &Comtrade<'_>, take: impl FnMut(&[u8]) -> io::Result<()>) -> io::Result<Made> {
+fn make(record: &Record<'_>, take: impl FnMut(&[u8]) -> io::Result<()>) -> io::Result<Made> {
     let mut rows = Rows {
         row: Row::new(record.options.data, record.channels.len()),
         on: vec![0; record.timeline.history().recorders.len()],
@@ -66,7 +67,7 @@ struct Rows<F> {
 }
 
 impl<F: FnMut(&[u8]) -> io::Result<()>> Rows<F> {
-    fn step(&mut self, record: &Comtrade<'_>, step: &Step<'_>) -> io::Result<()> {
+    fn step(&mut self, record: &Record<'_>, step: &Step<'_>) -> io::Result<()> {
         // What is unknown stays as it was.
         let shown = |recorder: usize, on: u32| {
             let now = step.now.get(recorder).copied().unwrap_or_default();
@@ -91,7 +92,7 @@ impl<F: FnMut(&[u8]) -> io::Result<()>> Rows<F> {
     }
 
     /// Shows these inputs as the opposite of what they were.
-    fn show(&mut self, record: &Comtrade<'_>, recorder: usize, mut inputs: u32) {
+    fn show(&mut self, record: &Record<'_>, recorder: usize, mut inputs: u32) {
         if let Some(on) = self.on.get_mut(recorder) {
             *on ^= inputs;
         }
@@ -103,7 +104,7 @@ impl<F: FnMut(&[u8]) -> io::Result<()>> Rows<F> {
     }
 
     /// Begins the row of an instant, and ends those before.
-    fn reach(&mut self, record: &Comtrade<'_>, at_us: i64) -> io::Result<()> {
+    fn reach(&mut self, record: &Record<'_>, at_us: i64) -> io::Result<()> {
         if !record.options.has_rate {
             if self.pending.is_none_or(|(pending_us, _)| pending_us != at_us) {
                 self.end_row()?;

@@ -2,19 +2,19 @@
 
 use std::io::{self, Write};
 
-use super::Comtrade;
+use super::record::Record;
 use crate::export::channels::recorder_name;
 use crate::export::statement::{self, Origin};
-use crate::report::names::harmless;
+use crate::names::harmless;
 
 const END: &str = "\r\n";
 
 pub(super) fn write(
     out: &mut dyn Write,
-    record: &Comtrade<'_>,
+    record: &Record<'_>,
     origin: &Origin<'_>,
 ) -> io::Result<()> {
-    let Comtrade { timeline, selection, survey, channels, .. } = record;
+    let Record { timeline, selection, survey, channels, .. } = record;
     let mut lines = OneLine { out, is_new: true };
     statement::write(&mut lines, timeline, selection, survey, origin, END)?;
     let mut line = |text: &str| write!(lines, "{text}{END}");

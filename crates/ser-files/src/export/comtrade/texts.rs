@@ -4,9 +4,9 @@ use std::collections::{HashMap, HashSet};
 
 use ser_evidence::timeline::Timeline;
 
-use super::{Data, Options};
+use super::options::{Data, Options};
 use crate::export::channels::{Channel, Channels, recorder_name};
-use crate::report::names::harmless;
+use crate::names::harmless;
 
 /// The longest name, in characters.
 pub(super) const MAX_NAME: usize = 64;

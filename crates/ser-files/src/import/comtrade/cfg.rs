@@ -6,7 +6,6 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::Extent;
 use super::decimal::{number, whole};
 use crate::error::quoted;
 use crate::import::calendar::{Date, DateOrder, seconds_of_day, utc_offset};
@@ -88,6 +87,15 @@ pub(super) fn counts(line: &str) -> Option<(u64, u64, u64)> {
     };
     let counts = (field("")?, field("A")?, field("D")?);
     fields.next().is_none().then_some(counts)
+}
+
+/// What a record is, apart from its rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// Analog channels that were passed over.
+    pub analog_channels: usize,
+    /// Status channels.
+    pub status_channels: usize,
 }
 
 impl Configuration {
@@ -223,7 +231,7 @@ fn rates(lines: &mut Lines<'_>) -> Result<(Vec<Rate>, u64), Refusal> {
     let count = whole(text).filter(|count| *count <= 1000).ok_or_else(|| {
         Refusal::damaged(
             line,
-            format!("{} is no number of sampling rates", quoted(text.as_bytes())),
+            format!("{} is not a number of sampling rates", quoted(text.as_bytes())),
         )
     })?;
     let mut rates = Vec::new();
@@ -238,7 +246,7 @@ fn rates(lines: &mut Lines<'_>) -> Result<(Vec<Rate>, u64), Refusal> {
             .split_once(',')
             .and_then(|(hz, until)| Some(Rate { hz: number(hz)?, until: whole(until)? }));
         let rate = rate.ok_or_else(|| {
-            Refusal::damaged(line, format!("{} is no sampling rate", quoted(text.as_bytes())))
+            Refusal::damaged(line, format!("{} is not a sampling rate", quoted(text.as_bytes())))
         })?;
         samples = rate.until;
         if count > 0 && rate.hz > 0.0 {
@@ -257,7 +265,7 @@ fn moment(lines: &mut Lines<'_>) -> Result<(When, usize), Refusal> {
         Some((When { date, day_ns, later_ns: 0, utc_offset_s: None }, digits))
     });
     moment.ok_or_else(|| {
-        Refusal::damaged(line, format!("{} is no date and time", quoted(text.as_bytes())))
+        Refusal::damaged(line, format!("{} is not a date and time", quoted(text.as_bytes())))
     })
 }
 
@@ -270,7 +278,7 @@ fn layout(lines: &mut Lines<'_>) -> Result<Layout, Refusal> {
         _ => Err(Refusal::damaged(
             line,
             format!(
-                "{} is no kind of data: ASCII, BINARY, BINARY32, FLOAT32",
+                "{} is not a kind of data: ASCII, BINARY, BINARY32, FLOAT32",
                 quoted(text.as_bytes())
             ),
         )),
@@ -284,7 +292,7 @@ fn multiplier(lines: &mut Lines<'_>) -> Result<f64, Refusal> {
     }
     let (line, text) = lines.next("the multiplier")?;
     number(text).filter(|multiplier| *multiplier > 0.0).ok_or_else(|| {
-        Refusal::damaged(line, format!("{} is no multiplier of stamps", quoted(text.as_bytes())))
+        Refusal::damaged(line, format!("{} is not a multiplier of stamps", quoted(text.as_bytes())))
     })
 }
 
@@ -297,7 +305,7 @@ fn zone(lines: &mut Lines<'_>, year: Option<u64>, notes: &mut Notes) -> Option<i
     let code = text.split(',').next().unwrap_or_default();
     let offset = utc_offset(code);
     if offset.is_none() {
-        notes.remark(Some(line), format!("{} is no time code", quoted(code.as_bytes())));
+        notes.remark(Some(line), format!("{} is not a time code", quoted(code.as_bytes())));
     }
     if let Ok((line, text)) = lines.next("the quality of the clock") {
         let code = text.split(',').next().unwrap_or_default().trim();

@@ -111,19 +111,19 @@ fn row(
     let mut fields = text.split(',').map(str::trim);
     let number = fields.next().unwrap_or_default();
     let number = whole(number)
-        .ok_or_else(|| format!("{} is no number of a sample", quoted(number.as_bytes())))?;
-    let stamp = match fields.next().unwrap_or_default() {
-        "" => None,
-        stamp => Some(
-            whole(stamp)
-                .ok_or_else(|| format!("{} is no stamp of a sample", quoted(stamp.as_bytes())))?,
-        ),
-    };
+        .ok_or_else(|| format!("{} is not a number of a sample", quoted(number.as_bytes())))?;
+    let stamp =
+        match fields.next().unwrap_or_default() {
+            "" => None,
+            stamp => Some(whole(stamp).ok_or_else(|| {
+                format!("{} is not a stamp of a sample", quoted(stamp.as_bytes()))
+            })?),
+        };
     for (state, field) in states.iter_mut().zip(fields.skip(configuration.analogs)) {
         *state = match field {
             "0" => false,
             "1" => true,
-            _ => return Err(format!("{} is no state", quoted(field.as_bytes()))),
+            _ => return Err(format!("{} is not a state", quoted(field.as_bytes()))),
         };
     }
     Ok((number, stamp))

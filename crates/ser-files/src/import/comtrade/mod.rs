@@ -17,20 +17,13 @@ use super::text::{Input, Line, TextLines};
 use cfg::Configuration;
 use samples::Samples;
 
+pub use cfg::Extent;
+
 /// The largest configuration that is read, in bytes.
 const MOST_BYTES: usize = 16 << 20;
 
 /// How a part of a combined file begins.
 const PART: &str = "--- file type:";
-
-/// What a record is, apart from its rows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Extent {
-    /// Analog channels that were passed over.
-    pub analog_channels: usize,
-    /// Status channels.
-    pub status_channels: usize,
-}
 
 /// Whether a file begins like a configuration.
 pub(super) fn is_cfg(head: &str) -> bool {

@@ -45,24 +45,10 @@ pub(in super::super) fn read(
             // A prompt, an echo, an empty line.
             continue;
         }
-        match checked(raw, &mut fields) {
-            None => {
-                notes.leave_out(number, format!("this line has no checksum: {}", quoted(raw)));
-                numbered.tear();
-                continue;
-            }
-            Some(Err(why)) => {
-                let which = match fields.field(0) {
-                    first if first.iter().all(u8::is_ascii_digit) && !first.is_empty() => {
-                        format!("row {}: {why}", String::from_utf8_lossy(first))
-                    }
-                    _ => why,
-                };
-                notes.leave_out(number, which);
-                numbered.tear();
-                continue;
-            }
-            Some(Ok(())) => {}
+        if let Some(why) = wrong(raw, &mut fields) {
+            notes.leave_out(number, why);
+            numbered.tear();
+            continue;
         }
         if let Some(found_columns) = columns_of(&fields) {
             numbered.finish(found, notes);
@@ -82,6 +68,20 @@ pub(in super::super) fn read(
     }
     numbered.finish(found, notes);
     Ok(())
+}
+
+/// Takes a line apart. Returns what is wrong with it as a whole, with its row if it has one.
+fn wrong(raw: &[u8], fields: &mut Fields) -> Option<String> {
+    match checked(raw, fields) {
+        Some(Ok(())) => None,
+        None => Some(format!("this line has no checksum: {}", quoted(raw))),
+        Some(Err(why)) => Some(match fields.field(0) {
+            first if first.iter().all(u8::is_ascii_digit) && !first.is_empty() => {
+                format!("row {}: {why}", String::from_utf8_lossy(first))
+            }
+            _ => why,
+        }),
+    }
 }
 
 /// Where the columns are.

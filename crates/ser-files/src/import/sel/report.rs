@@ -58,7 +58,8 @@ pub(in super::super) fn read(
                 }
             },
             Kind::Other if is_below_columns => {
-                let why = format!("this is no row of a list: {}", quoted(text.trim().as_bytes()));
+                let why =
+                    format!("this is not a row of a list: {}", quoted(text.trim().as_bytes()));
                 notes.leave_out(number, why);
                 numbered.tear();
             }
@@ -68,13 +69,17 @@ pub(in super::super) fn read(
     let is_list_of_values = without_element > 0 && found.lists.is_empty() && numbered.is_empty();
     numbered.finish(found, notes);
     match is_list_of_values {
-        true => Err(Refusal::damaged(
-            notes.left_out.first().and_then(|note| note.line).unwrap_or(1),
-            "rows of this list have no element: relays such as the SEL-551 print values and dots \
-             that do not tell what changed",
-        )),
+        true => Err(list_of_values(notes)),
         false => Ok(()),
     }
+}
+
+fn list_of_values(notes: &Notes) -> Refusal {
+    Refusal::damaged(
+        notes.left_out.first().and_then(|note| note.line).unwrap_or(1),
+        "rows of this list have no element: relays such as the SEL-551 print values and dots that \
+         do not tell what changed",
+    )
 }
 
 /// What a line is.

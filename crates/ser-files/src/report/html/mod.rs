@@ -13,7 +13,8 @@ use std::io::{self, Write};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use self::picture::Lanes;
-use super::{Clock, Document, outcome, verdict};
+use super::verdict::{self, Lists};
+use super::{Clock, Document, outcome};
 
 /// The most changes that a page shows. Beyond that nobody reads a page.
 pub const MAX_ROWS: usize = 20_000;
@@ -26,8 +27,8 @@ const LONG: usize = 160;
 
 /// What the page may do: nothing but use its own style and its own script.
 const POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; \
-     style-src 'sha256-FIgWNZoSp4z648tNyzZvtvFTyPMGdHXh2uJS+j3NEqk='; \
-     script-src 'sha256-OIVVx06r1h7mc3x1XYY2qype8GgxynYwVZ7R3r3UW0o='";
+     style-src 'sha256-3TD87YsS7rZw1MZCi0rqL7hDnwhDoCiVKzylW02YDc8='; \
+     script-src 'sha256-B4nPhYYeaKp6dp+bY1Oygmy7txrcnNgi52xFwK6tjtE='";
 
 /// Why there is no page.
 #[derive(Debug)]
@@ -105,6 +106,7 @@ fn content(document: &Document<'_>, clock: &Clock) -> Markup {
             (verdict(document, clock))
             (tables::made_from(document, clock))
             (tables::sequence(document, lanes.as_ref(), clock))
+            (tables::timeless(document))
             @if let Some(lanes) = &lanes {
                 section #picture aria-labelledby="picture-title" {
                     h2 #picture-title { "Picture" }
@@ -127,10 +129,9 @@ fn content(document: &Document<'_>, clock: &Clock) -> Markup {
 /// The three lines that answer.
 fn verdict(document: &Document<'_>, clock: &Clock) -> Markup {
     let Document { timeline, report, .. } = *document;
-    let first = verdict::first_out(timeline, report, &report.first_out, clock);
-    let operated: Vec<String> =
-        report.operations.iter().map(|operation| verdict::operated(timeline, operation)).collect();
-    let wrong = verdict::wrong(document);
+    let first = verdict::first_out(timeline, report, (&report.first_out, Lists::Short), clock);
+    let operated = verdict::all_operated(document, Lists::Short);
+    let wrong = verdict::wrong(document, Lists::Short);
     let items = |items: &[String], none: &str| match items {
         [] => html! { p { (none) } },
         [only] => html! { p { (only) } },

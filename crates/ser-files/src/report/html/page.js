@@ -2,18 +2,18 @@
 // The page is whole without this. It adds zooming, shows the lane of a row that is clicked, and
 // unfolds chatter for the printer.
 (() => {
-  const MINUTE = 60e6, HOUR = 60 * MINUTE, DAY = 24 * HOUR;
-  const STEPS = [1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 5e5, 1e6, 2e6, 5e6, 10e6, 15e6, 30e6,
-    MINUTE, 2 * MINUTE, 5 * MINUTE, 10 * MINUTE, 15 * MINUTE, 30 * MINUTE, HOUR, 2 * HOUR,
-    3 * HOUR, 6 * HOUR, 12 * HOUR, DAY, 7 * DAY];
-  const MOST_TICKS = 10, SHORTEST = 5e3, SVG = "http://www.w3.org/2000/svg";
+  const SHORTEST = 5e3, SVG = "http://www.w3.org/2000/svg";
   const all = (selector, within = document) => [...within.querySelectorAll(selector)];
 
-  // As the program has drawn the axis before anybody zoomed.
+  // The axis is as the program has drawn it before anybody zoomed: it says between which marks there
+  // are no more than so many. How marks are called is said here and in `ticks.rs` alike.
+  const axis = document.querySelector("[data-steps]")?.dataset;
+  const steps = axis?.steps.split(" ").map(Number), most = Number(axis?.ticks);
   function ticks(from, to) {
     const count = (step) => Math.floor(to / step) - Math.ceil(from / step) + 1;
-    let step = STEPS.find((step) => count(step) <= MOST_TICKS);
-    step ??= 7 * DAY * (Math.floor(count(7 * DAY) / MOST_TICKS) + 1);
+    const longest = steps.at(-1);
+    const step = steps.find((step) => count(step) <= most)
+      ?? longest * (Math.floor(count(longest) / most) + 1);
     const at = [];
     for (let n = Math.ceil(from / step); n <= Math.floor(to / step); n++) at.push(n * step);
     return { step, at };

@@ -2,40 +2,57 @@
 
 use maud::{Markup, html};
 use ser_evidence::incident::Fold;
+use ser_evidence::site::PointId;
 
 use super::picture::Lanes;
+use crate::names;
 use crate::report::sequence::{self, ChangeLine, Line, Remark, Sign};
-use crate::report::span::since;
-use crate::report::{Clock, Document, names, outcome, sources, verdict};
+use crate::report::{Clock, Document, outcome, sources, verdict};
+use crate::span::since;
+
+/// A table in a box of its own, which scrolls where it has no room. `named_by` is the heading of its
+/// section; columns of numbers are [`NUMBER`].
+fn table(named_by: &str, titles: &[(&str, &str)], rows: &Markup) -> Markup {
+    html! {
+        div.scroll tabindex="0" role="group" aria-labelledby=(named_by) {
+            table {
+                thead { tr {
+                    @for (title, class) in titles { th.(class) scope="col" { (title) } }
+                } }
+                tbody { (rows) }
+            }
+        }
+    }
+}
+
+/// The classes of columns.
+const NUMBER: &str = "number";
+const TEXT: &str = "text";
 
 /// Recorders, their completeness and their clocks.
 pub(super) fn made_from(document: &Document<'_>, clock: &Clock) -> Markup {
+    let titles = [("Recorder", TEXT), ("Entries", NUMBER), ("Complete", TEXT), ("Clock", TEXT)];
+    let rows = html! {
+        @for source in sources::recorders(document, clock) {
+            tr {
+                th scope="row" { (source.recorder) }
+                td.number { (source.entries) }
+                td.alarm[!source.is_complete] { (source.complete) }
+                td { (source.clock) }
+            }
+        }
+    };
     html! {
         section aria-labelledby="made-from" {
             h2 #made-from { "Made from" }
-            div.scroll tabindex="0" role="group" aria-labelledby="made-from" {
-                table {
-                    thead { tr {
-                        th scope="col" { "Recorder" }
-                        th.number scope="col" { "Entries" }
-                        th scope="col" { "Complete" }
-                        th scope="col" { "Clock" }
-                    } }
-                    tbody {
-                        @for source in sources::recorders(document, clock) {
-                            tr {
-                                th scope="row" { (source.recorder) }
-                                td.number { (source.entries) }
-                                td.alarm[!source.is_complete] { (source.complete) }
-                                td { (source.clock) }
-                            }
-                        }
-                    }
-                }
-            }
+            (table("made-from", &titles, &rows))
             @for missed in sources::not_reached(document) { p.alarm { "Not reached: " (missed) } }
-            @for finding in sources::findings(document.timeline) { p.alarm { "Clocks: " (finding) } }
-            @for shift in sources::shifts(document.timeline, clock) { p { "Shifted by hand: " (shift) } }
+            @for finding in sources::findings(document.timeline) {
+                p.alarm { "Clocks: " (finding) }
+            }
+            @for shift in sources::shifts(document.timeline, clock) {
+                p { "Shifted by hand: " (shift) }
+            }
         }
     }
 }
@@ -61,15 +78,19 @@ pub(super) fn sequence(document: &Document<'_>, lanes: Option<&Lanes>, clock: &C
                     } }
                     tbody {
                         @for line in sequence::lines(document, clock) {
-                            @match line {
-                                Line::Change(change) => (change_row(document, &change, lanes, clock)),
-                                Line::Remark(remark) => (remark_row(&remark)),
-                            }
+                            (row(document, &line, lanes, clock))
                         }
                     }
                 }
             }
         }
+    }
+}
+
+fn row(document: &Document<'_>, line: &Line<'_>, lanes: Option<&Lanes>, clock: &Clock) -> Markup {
+    match line {
+        Line::Change(change) => change_row(document, change, lanes, clock),
+        Line::Remark(remark) => remark_row(remark),
     }
 }
 
@@ -90,7 +111,7 @@ fn change_row(
             td.time { (line.time) }
             td.number { (line.since_first) }
             td.number { (line.since_previous) }
-            td { (line.recorder) }
+            (recorder(&line.recorder))
             td {
                 @match lane {
                     Some(lane) => a href={ "#lane-" (lane) } { (line.point) },
@@ -108,9 +129,57 @@ fn change_row(
         @if let Some(fold) = line.fold {
             tr.folded {
                 (bracket(line.bracket.below()))
-                td colspan="9" { (chatter(document, fold, clock)) }
+                td colspan="9" { (chatter(document, (fold, line.row.point), clock)) }
             }
         }
+    }
+}
+
+/// Changes of which nobody knows when they were.
+pub(super) fn timeless(document: &Document<'_>) -> Markup {
+    let lines = sequence::timeless(document);
+    let titles = [
+        ("Its clock showed", TEXT),
+        ("Recorder", TEXT),
+        ("Point", TEXT),
+        ("State", TEXT),
+        ("Entry", NUMBER),
+        ("Notes", TEXT),
+    ];
+    let rows = html! {
+        @for line in &lines {
+            tr {
+                td.time { (line.showed) }
+                td { (line.recorder) }
+                td { (line.point) }
+                td { (line.state) }
+                td.number { (line.entry) }
+                td { (line.note) }
+            }
+        }
+    };
+    html! {
+        @if !lines.is_empty() {
+            section aria-labelledby="timeless" {
+                h2 #timeless { "Time not known" }
+                p { "The clock was never set. These came before the next entry of their recorder." }
+                (table("timeless", &titles, &rows))
+            }
+        }
+    }
+}
+
+/// The recorder of a row. The middle of a long name is left out: it stands in each row, and the table
+/// of recorders has all of it.
+fn recorder(name: &str) -> Markup {
+    const START: usize = 24;
+    const END: usize = 12;
+    let letters: Vec<char> = name.chars().collect();
+    match (letters.first_chunk::<START>(), letters.last_chunk::<END>()) {
+        (Some(start), Some(end)) if letters.len() > START + END + 1 => html! {
+            td title=(name) { (start.iter().collect::<String>()) "…" (end.iter().collect::<String>()) }
+        },
+        _ => html! { td { (name) } },
     }
 }
 
@@ -120,6 +189,7 @@ fn bracket(sign: Sign) -> Markup {
         Sign::None => (None, None),
         Sign::First => (Some("bracket begins"), Some("order not known, from here")),
         Sign::Inner => (Some("bracket"), Some("order not known")),
+        Sign::Passed => (Some("bracket passed"), Some("order to some others not known")),
         Sign::Last => (Some("bracket ends"), Some("order not known, to here")),
     };
     html! {
@@ -128,11 +198,15 @@ fn bracket(sign: Sign) -> Markup {
 }
 
 /// The changes that are folded into the row above.
-fn chatter(document: &Document<'_>, fold: &Fold, clock: &Clock) -> Markup {
+fn chatter(
+    document: &Document<'_>,
+    (fold, point): (&Fold, Option<PointId>),
+    clock: &Clock,
+) -> Markup {
     let timeline = document.timeline;
     let changes = fold.changes.iter().map(|&change| {
-        let row = verdict::row_of(document.report, change);
-        let state = row.map(|row| names::state(timeline, row.point, row.on)).unwrap_or_default();
+        let on = timeline.held(change.event).map(|held| held.entry.state.contains(change.input));
+        let state = on.map(|on| names::state(timeline, point, on)).unwrap_or_default();
         let at = timeline.time(change.event).map(|at| clock.time(at.us())).unwrap_or_default();
         let after = timeline.delta(fold.first, change).middle_us().map(since).unwrap_or_default();
         (at, after, state)
@@ -154,7 +228,7 @@ fn remark_row(remark: &Remark) -> Markup {
         tr.remark.loss[remark.is_loss] {
             (bracket(remark.bracket))
             td colspan="3" { "– – –" }
-            td { (remark.recorder) }
+            (recorder(&remark.recorder))
             td colspan="5" { (remark.text) }
         }
     }
@@ -176,6 +250,19 @@ pub(super) fn groups(document: &Document<'_>, clock: &Clock) -> Markup {
 /// Expected steps.
 pub(super) fn steps(document: &Document<'_>) -> Markup {
     let steps = outcome::steps(document);
+    let titles =
+        [("Result", TEXT), ("Step", TEXT), ("Took", NUMBER), ("Expected", TEXT), ("Notes", TEXT)];
+    let rows = html! {
+        @for step in &steps {
+            tr {
+                td class=(if step.is_in_time { "good" } else { "alarm" }) { (step.result) }
+                th scope="row" { (step.name) }
+                td.number { (step.took) }
+                td { (step.expected) }
+                td { (step.note) }
+            }
+        }
+    };
     html! {
         @if !document.timeline.site().expectations.is_empty() {
             section aria-labelledby="steps" {
@@ -183,28 +270,7 @@ pub(super) fn steps(document: &Document<'_>) -> Markup {
                 @if steps.is_empty() {
                     p { "Nothing in this incident begins one." }
                 } @else {
-                    div.scroll tabindex="0" role="group" aria-labelledby="steps" {
-                        table {
-                            thead { tr {
-                                th scope="col" { "Result" }
-                                th scope="col" { "Step" }
-                                th.number scope="col" { "Took" }
-                                th scope="col" { "Expected" }
-                                th scope="col" { "Notes" }
-                            } }
-                            tbody {
-                                @for step in steps {
-                                    tr {
-                                        td.good[step.is_in_time].alarm[!step.is_in_time] { (step.result) }
-                                        th scope="row" { (step.name) }
-                                        td.number { (step.took) }
-                                        td { (step.expected) }
-                                        td { (step.note) }
-                                    }
-                                }
-                            }
-                        }
-                    }
+                    (table("steps", &titles, &rows))
                 }
             }
         }

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use anstyle::Style;
 
 use super::heading;
-use crate::report::sequence::{ChangeLine, Line, Remark, Sign, lines};
+use crate::report::sequence::{ChangeLine, Line, Remark, Sign, lines, timeless as timeless_lines};
 use crate::report::style::Styles;
 use crate::report::table::{Align, Cell, Table};
 use crate::report::{Clock, Document};
@@ -43,6 +43,36 @@ pub(super) fn write(
             Line::Change(change) => add_change(&change, &mut table, styles),
             Line::Remark(remark) => add_remark(remark, &mut table, styles),
         }
+    }
+    table.write(out, styles.faint)?;
+    timeless(out, document, styles)
+}
+
+/// Changes of which nobody knows when they were.
+fn timeless(out: &mut dyn Write, document: &Document<'_>, styles: Styles) -> io::Result<()> {
+    let lines = timeless_lines(document);
+    if lines.is_empty() {
+        return Ok(());
+    }
+    heading(out, "Time not known", styles)?;
+    writeln!(out, "the clock was never set: these came before the next entry of their recorder")?;
+    let mut table = Table::new(vec![
+        ("its clock showed", Align::Left),
+        ("recorder", Align::Left),
+        ("point", Align::Left),
+        ("state", Align::Left),
+        ("entry", Align::Right),
+        ("", Align::Left),
+    ]);
+    for line in lines {
+        table.row(vec![
+            Cell::from(line.showed),
+            Cell::from(line.recorder),
+            Cell::from(line.point),
+            Cell::from(line.state),
+            Cell::from(line.entry),
+            Cell::styled(line.note, styles.first_out),
+        ]);
     }
     table.write(out, styles.faint)
 }
@@ -88,6 +118,7 @@ const fn drawn(sign: Sign) -> &'static str {
         Sign::None => "",
         Sign::First => "┌",
         Sign::Inner => "│",
+        Sign::Passed => "┆",
         Sign::Last => "└",
     }
 }

@@ -3,7 +3,7 @@
 use ser_evidence::time::Moment;
 use ser_evidence::timeline::{ChangeId, EventId, Timeline};
 
-use crate::report::Document;
+use crate::report::{Document, elsewhere};
 
 /// Where changes are on the axis: at Δ to the first one, as the table has it. That is the time
 /// between the contacts; the samples that saw them may be further apart.
@@ -23,8 +23,9 @@ impl<'a> Axis<'a> {
     }
 
     pub(super) fn of(&self, change: ChangeId) -> Option<i64> {
+        let listed = self.of_entry(change.event)?;
         let delta = self.timeline.delta(self.first, change).middle_us();
-        delta.or_else(|| self.of_entry(change.event))
+        Some(delta.unwrap_or(listed))
     }
 
     /// An entry whose own changes are not asked for.
@@ -34,5 +35,5 @@ impl<'a> Axis<'a> {
 }
 
 fn time_us(timeline: &Timeline<'_>, event: EventId) -> Option<i64> {
-    timeline.time(event).map(Moment::us)
+    timeline.time(event).filter(|_| !elsewhere::is_timeless(timeline, event)).map(Moment::us)
 }

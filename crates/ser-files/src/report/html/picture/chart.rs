@@ -14,7 +14,7 @@ use crate::report::Clock;
 const MOST_ROWS: usize = 20;
 
 /// No more names of times than this.
-const TICKS: usize = 10;
+pub(super) const TICKS: usize = 10;
 
 /// Which time a picture shows, in microseconds after the first change.
 #[derive(Clone, Copy, Debug)]
@@ -90,8 +90,9 @@ fn chart(part: &Part<'_>, window: &Window, scale: &Scale, times: &Times) -> Mark
     let title =
         part.text().map_or(window.title.to_owned(), |part| format!("{}, {part}", window.title));
     let label = format!("{title}: points over time; the table above says the same");
+    let size = format!("0 0 {FULL_PX} {}", bottom + BOTTOM_PX);
     html! {
-        svg.chart role="img" aria-label=(label) viewBox={ "0 0 " (FULL_PX) " " (bottom + BOTTOM_PX) }
+        svg.chart role="img" aria-label=(label) viewBox=(size)
             data-left=(LEFT_PX) data-width=(WIDTH_PX) data-bottom=(bottom) {
             (axis(scale, window, bottom))
             @for (row, what) in part.rows.iter().enumerate() {

@@ -36,14 +36,14 @@ pub(super) fn patterns() -> Markup {
 /// A lane whose name in links is `name` and its number.
 pub(super) fn draw(lane: &Lane, (name, number): (&str, usize), y: f64, scale: &Scale) -> Markup {
     html! {
-        g.lane.first[lane.is_first] id={ (name) "-" (number) } data-lane=(number) {
+        g.lane.first[lane.first.is_some()] id={ (name) "-" (number) } data-lane=(number) {
             rect.back x="0" y=(y) width=(FULL_PX) height=(LANE_PX) {}
             text.name x=(NAMES_PX) y=(y + 15.0) {
-                title { (lane.point) " (" (lane.recorder) ")" } (shortened(&lane.point, 34))
+                title { (lane.point) " (" (lane.recorder) ")" } (shortened(&lane.point, 28))
             }
             text.recorder x=(NAMES_PX) y=(y + 27.0) {
-                (shortened(&lane.recorder, if lane.is_first { 26 } else { 40 }))
-                @if lane.is_first { " · first-out" }
+                (shortened(&lane.recorder, if lane.first.is_some() { 17 } else { 34 }))
+                @if let Some(first) = lane.first { " · " (first) }
             }
             @for stretch in &lane.stretches {
                 (draw_stretch(stretch, y, scale))

@@ -1,5 +1,5 @@
-//! Where things are in a chart, in pixels: names on the left, time on the right of them, lanes below
-//! the axis.
+//! Where things are in a chart, in pixels: names on the left, time on the right of them, lanes
+//! below the axis.
 
 /// Where the time begins, beside the names.
 pub(super) const LEFT_PX: f64 = 250.0;

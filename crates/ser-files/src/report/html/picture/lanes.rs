@@ -1,6 +1,6 @@
 //! The lanes of a picture: for each point that moved, which state it had when, and how surely.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use ser_evidence::incident::{Incident, Row};
 use ser_evidence::record::Why;
@@ -9,15 +9,17 @@ use ser_evidence::timeline::{ChangeId, EventId, Timeline};
 use ser_proto::Inputs;
 
 use super::axis::Axis;
-use crate::report::{Clock, Document, names, sequence};
+use crate::names;
+use crate::report::marks::Marks;
+use crate::report::{Clock, Document, sequence};
 
 /// One point over the time of the incident.
 #[derive(Debug)]
 pub(in crate::report::html) struct Lane {
     pub(in crate::report::html) recorder: String,
     pub(in crate::report::html) point: String,
-    /// Whether it may have moved first.
-    pub(super) is_first: bool,
+    /// What is said of it if it moved first, or may have.
+    pub(super) first: Option<&'static str>,
     pub(super) stretches: Vec<Stretch>,
     pub(super) edges: Vec<Edge>,
 }
@@ -84,16 +86,18 @@ impl Lanes {
             timeless: report.rows.len() - placed.len(),
         };
         let mut points = BTreeMap::new();
+        let marks = Marks::new(document);
         for (row, at_us) in placed {
             points.entry(key(row.change)).or_insert(row.point);
-            lanes.add_edge(document, row, at_us, clock);
+            lanes.add_edge(&marks, timeline, row, at_us, clock);
         }
         let margin = lanes.margin_us();
         let window = (least_us.saturating_sub(margin), most_us.saturating_add(margin));
+        let (logs, nothing) = (Log::all(&report.incident), Log::default());
         for (&(recorder, input), &place) in &lanes.by_input {
             let point = points.get(&(recorder, input)).copied().flatten();
-            let incident = &report.incident;
-            let of = Track { timeline, incident, axis: &axis, recorder, input, point };
+            let log = logs.get(&recorder).unwrap_or(&nothing);
+            let of = Track { timeline, log, axis: &axis, input, point };
             if let Some(lane) = lanes.lanes.get_mut(place) {
                 lane.stretches = of.stretches(window);
             }
@@ -111,13 +115,19 @@ impl Lanes {
         self.by_input.get(&key(change)).copied()
     }
 
-    fn add_edge(&mut self, document: &Document<'_>, row: &Row, at_us: i64, clock: &Clock) {
-        let Document { timeline, report, .. } = *document;
+    fn add_edge(
+        &mut self,
+        marks: &Marks<'_>,
+        timeline: &Timeline<'_>,
+        row: &Row,
+        at_us: i64,
+        clock: &Clock,
+    ) {
         let place = *self.by_input.entry(key(row.change)).or_insert_with(|| {
             self.lanes.push(Lane {
                 recorder: names::recorder(timeline, row.change.event),
                 point: names::point(timeline, row.point, row.change.input),
-                is_first: false,
+                first: None,
                 stretches: Vec::new(),
                 edges: Vec::new(),
             });
@@ -126,13 +136,14 @@ impl Lanes {
         let Some(lane) = self.lanes.get_mut(place) else { return };
         let doubt_us = sequence::doubt_us(timeline, row.change);
         let state = names::state(timeline, row.point, row.on);
-        let doubt = doubt_us.map_or("doubt not known".to_owned(), |us| {
-            format!("± {}", crate::report::span::doubt(us))
-        });
+        let doubt = doubt_us
+            .map_or("doubt not known".to_owned(), |us| format!("± {}", crate::span::doubt(us)));
         let time = timeline.time(row.change.event).map(|at| clock.time(at.us()));
         let time = time.unwrap_or_else(|| "time not known".to_owned());
         let text = format!("{} {state}, {time} {doubt}", lane.point);
-        lane.is_first |= report.first_out.includes(timeline, row.change);
+        if let Some(first) = marks.first(row.change) {
+            lane.first = Some(first);
+        }
         lane.edges.push(Edge { at_us, doubt_us, text });
     }
 }
@@ -141,12 +152,39 @@ fn key(change: ChangeId) -> (u32, u8) {
     (change.event.recorder, change.input)
 }
 
+/// What an incident has of one recorder.
+#[derive(Debug, Default)]
+struct Log {
+    events: Vec<EventId>,
+    gaps: Vec<(EventId, usize)>,
+    /// Gaps after all entries.
+    last_gaps: Vec<(EventId, usize)>,
+}
+
+impl Log {
+    /// Of all recorders, by their indices.
+    fn all(incident: &Incident) -> BTreeMap<u32, Log> {
+        let mut logs: BTreeMap<u32, Log> = BTreeMap::new();
+        for &event in &incident.events {
+            logs.entry(event.recorder).or_default().events.push(event);
+        }
+        let events: HashSet<EventId> = incident.events.iter().copied().collect();
+        for &gap in &incident.gaps {
+            let log = logs.entry(gap.0.recorder).or_default();
+            match events.contains(&gap.0) {
+                true => log.gaps.push(gap),
+                false => log.last_gaps.push(gap),
+            }
+        }
+        logs
+    }
+}
+
 /// One input in the log of its recorder.
 struct Track<'a> {
     timeline: &'a Timeline<'a>,
-    incident: &'a Incident,
+    log: &'a Log,
     axis: &'a Axis<'a>,
-    recorder: u32,
     input: u8,
     point: Option<PointId>,
 }
@@ -164,12 +202,17 @@ impl Track<'_> {
                 _ => {}
             };
         };
-        let gaps = self.gaps();
-        let here = |event: &&EventId| event.recorder == self.recorder;
+        let gaps: BTreeSet<EventId> = self
+            .log
+            .gaps
+            .iter()
+            .filter(|gap| self.concerns(gap))
+            .map(|(event, _)| *event)
+            .collect();
         let mut at_us = from_us;
         let mut state = None;
         let mut life = None;
-        for &event in self.incident.events.iter().filter(here) {
+        for &event in &self.log.events {
             let Some(next_us) = self.place(event) else { continue };
             let is_broken = gaps.contains(&event) || life.is_some_and(|life| life != event.life);
             let before = if is_broken { None } else { state.or_else(|| self.before(event)) };
@@ -177,22 +220,18 @@ impl Track<'_> {
             (at_us, life) = (next_us.max(at_us), Some(event.life));
             state = self.after(event).or(if is_broken { None } else { state });
         }
-        let ends_in_gap = gaps.iter().any(|event| !self.incident.events.contains(event));
+        let ends_in_gap = self.log.last_gaps.iter().any(|gap| self.concerns(gap));
         add(at_us, to_us, self.state(state.filter(|_| !ends_in_gap)));
         stretches
     }
 
-    /// Entries ahead of which something is missing that may be about this input.
-    fn gaps(&self) -> BTreeSet<EventId> {
-        let concerns = |(event, index): &&(EventId, usize)| {
-            let gap = self.timeline.life(*event).and_then(|life| life.gaps.get(*index));
-            event.recorder == self.recorder
-                && gap.is_some_and(|gap| match gap.why {
-                    Why::NotRecorded(inputs) => Inputs(inputs).contains(self.input),
-                    _ => true,
-                })
-        };
-        self.incident.gaps.iter().filter(concerns).map(|(event, _)| *event).collect()
+    /// Whether what is missing may be about this input.
+    fn concerns(&self, (event, index): &(EventId, usize)) -> bool {
+        let gap = self.timeline.life(*event).and_then(|life| life.gaps.get(*index));
+        gap.is_some_and(|gap| match gap.why {
+            Why::NotRecorded(inputs) => Inputs(inputs).contains(self.input),
+            _ => true,
+        })
     }
 
     /// Where an entry is; where this input moved, if it did.

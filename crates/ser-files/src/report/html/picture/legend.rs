@@ -1,6 +1,7 @@
 //! What the marks of the picture mean: those that are in it, and no others.
 
 use maud::{Markup, html};
+use ser_evidence::incident::Verdict;
 
 use super::drawing::{STRIPED, UNKNOWN};
 use super::lanes::{Lanes, State};
@@ -16,7 +17,8 @@ struct Marks {
     doubt: bool,
     no_doubt_known: bool,
     expected: bool,
-    took: bool,
+    in_time: bool,
+    not_in_time: bool,
 }
 
 impl Marks {
@@ -34,7 +36,11 @@ impl Marks {
         marks.doubt = edges.clone().any(|edge| edge.doubt_us.is_some());
         marks.no_doubt_known = edges.any(|edge| edge.doubt_us.is_none());
         marks.expected = !steps.is_empty();
-        marks.took = steps.iter().any(|step| step.then_us.is_some());
+        let took = |in_time: bool| {
+            let mut took = steps.iter().filter(|step| step.then_us.is_some());
+            took.any(|step| (step.verdict == Verdict::InTime) == in_time)
+        };
+        (marks.in_time, marks.not_in_time) = (took(true), took(false));
         marks
     }
 }
@@ -55,15 +61,18 @@ pub(super) fn legend(lanes: &Lanes, steps: &[StepLane]) -> Markup {
                 (item(&loose_change(), "a change of which nobody knows how far its time is off"))
             }
             @if marks.expected { (item(&bar("window"), "expected within")) }
-            @if marks.took {
-                (item(&html! { rect.took x="0" y="8" width="28" height="4" {} }, "took"))
-            }
+            @if marks.in_time { (item(&took("took good"), "took, in time")) }
+            @if marks.not_in_time { (item(&took("took bad"), "took, and was not in time")) }
         }
     }
 }
 
 fn item(mark: &Markup, meaning: &str) -> Markup {
     html! { span { svg viewBox="0 0 28 20" aria-hidden="true" { (mark) } (meaning) } }
+}
+
+fn took(class: &str) -> Markup {
+    html! { rect class=(class) x="0" y="8" width="28" height="4" {} }
 }
 
 fn abnormal() -> Markup {

@@ -44,9 +44,11 @@ pub(super) fn section(document: &Document<'_>, lanes: &Lanes, clock: &Clock) -> 
     let draw = |window: &Window| picture(window, &chart::charts(lanes, &steps, window, clock));
     html! {
         (drawing::patterns())
-        (draw(&whole))
-        @if length > 3 * EARLY_US {
-            (draw(&early))
+        div data-steps=(ticks::steps_us()) data-ticks=(chart::TICKS) {
+            (draw(&whole))
+            @if length > 3 * EARLY_US {
+                (draw(&early))
+            }
         }
         (legend::legend(lanes, &steps))
         @if lanes.timeless > 0 {

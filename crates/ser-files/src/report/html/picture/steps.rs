@@ -5,7 +5,8 @@ use maud::{Markup, html};
 use super::axis::Axis;
 use super::frame::{FULL_PX, LANE_PX, LEFT_PX, NAMES_PX, px, shortened};
 use super::scale::Scale;
-use crate::report::{Document, names, outcome};
+use crate::names;
+use crate::report::{Document, outcome};
 use ser_evidence::incident::Verdict;
 
 /// One expected step, in microseconds after the first change.
@@ -13,7 +14,7 @@ use ser_evidence::incident::Verdict;
 pub(super) struct StepLane {
     name: String,
     result: &'static str,
-    verdict: Verdict,
+    pub(super) verdict: Verdict,
     pub(super) after_us: i64,
     /// The window in which it was to happen.
     within_us: (i64, i64),
@@ -50,7 +51,7 @@ impl StepLane {
             g.step {
                 rect.back x="0" y=(y) width=(FULL_PX) height=(LANE_PX) {}
                 text.name x=(NAMES_PX) y=(y + 15.0) {
-                    title { (self.name) } (shortened(&self.name, 34))
+                    title { (self.name) } (shortened(&self.name, 28))
                 }
                 text.recorder x=(NAMES_PX) y=(y + 27.0) { "expected: " (self.result) }
                 rect.window data-a=(from) data-b=(to) x=(px(x)) y=(px(y + 7.0)) width=(px(width))

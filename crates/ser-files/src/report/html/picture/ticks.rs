@@ -41,6 +41,11 @@ const STEPS_US: [i64; 28] = [
     604_800_000_000,
 ];
 
+/// All steps as a list for the script, which draws the axis anew when the reader zooms.
+pub(super) fn steps_us() -> String {
+    STEPS_US.map(|step| step.to_string()).join(" ")
+}
+
 /// The finest marks of which no more than `at_most` are in a window of times after the origin.
 pub(super) fn ticks((from_us, to_us): (i64, i64), at_most: usize) -> Ticks {
     let at_most = i64::try_from(at_most.max(1)).unwrap_or(i64::MAX);

@@ -17,7 +17,7 @@ pub(crate) fn point(timeline: &Timeline<'_>, id: Option<PointId>, input: u8) -> 
 }
 
 /// The name of a point, with that of its recorder: `U1-SER1/52-1 closed`.
-pub(super) fn full_point(timeline: &Timeline<'_>, id: PointId) -> String {
+pub(crate) fn full_point(timeline: &Timeline<'_>, id: PointId) -> String {
     let named = point_of(timeline, id);
     let recorder = named.and_then(|point| timeline.site().recorders.get(point.recorder.0));
     let recorder = recorder.map_or(String::new(), |found| harmless(&found.name));
@@ -33,7 +33,7 @@ pub(crate) fn state(timeline: &Timeline<'_>, id: Option<PointId>, on: bool) -> S
 }
 
 /// A change in a sentence: `52-1 closed OPEN (U1-SER1)`. If two recorders saw it, both are named.
-pub(super) fn change(timeline: &Timeline<'_>, row: &Row) -> String {
+pub(crate) fn change(timeline: &Timeline<'_>, row: &Row) -> String {
     let ChangeId { event, input } = row.change;
     let same = timeline.same_movement(row.change);
     let also =
@@ -47,7 +47,7 @@ pub(super) fn change(timeline: &Timeline<'_>, row: &Row) -> String {
 }
 
 /// An edge in a sentence: `52-1 closed OPEN`.
-pub(super) fn edge(timeline: &Timeline<'_>, edge: Edge) -> String {
+pub(crate) fn edge(timeline: &Timeline<'_>, edge: Edge) -> String {
     format!(
         "{} {}",
         point(timeline, Some(edge.point), 0),

@@ -1,7 +1,7 @@
 //! Durations as people read them.
 
-/// Microseconds as `12 ms`, `12.3 ms`, `1.250 s`, `2 min 5 s`, `3 h 2 min`: the longer, the coarser.
-/// Whole milliseconds have no decimals.
+/// Microseconds as `12 ms`, `12.3 ms`, `1.250 s`, `2 min 5 s`, `3 h 2 min`: the longer, the
+/// coarser. Whole milliseconds have no decimals.
 pub(crate) fn duration(us: i64) -> String {
     let sign = if us < 0 { "-" } else { "" };
     let us = us.unsigned_abs();
@@ -26,7 +26,7 @@ pub(crate) fn duration(us: i64) -> String {
 }
 
 /// Microseconds since something, as a narrow column: `+12.0 ms`, `+1.250 s`, `+2m05.0 s`.
-pub(super) fn since(us: i64) -> String {
+pub(crate) fn since(us: i64) -> String {
     let sign = if us < 0 { "-" } else { "+" };
     let us = us.unsigned_abs();
     let (tenths_of_ms, ms, tenths) = (rounded(us, 100), rounded(us, 1_000), rounded(us, 100_000));
