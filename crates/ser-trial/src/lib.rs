@@ -12,4 +12,5 @@ pub mod genius_world;
 #[cfg(unix)]
 pub mod recorder;
 pub mod simulation;
+pub mod slow_line;
 pub mod watching;
