@@ -11,7 +11,10 @@ use ser_client::{
     Cursor, Diagnosis, Disturbed, LogFollower, LogPosition, RequestError, Summary, TransportError,
     Unit, Unsolicited,
 };
-use ser_proto::{AutoReport, Baud, Command, Configure, Mode, Reply, TimeStamp};
+use ser_proto::{
+    AutoReport, Baud, Capabilities, Command, Configure, Counter, Counters, Filters,
+    FirmwareVersion, Guard, Identity, InputFilter, Mode, Model, Reply, TimeStamp,
+};
 
 const NOON: TimeStamp =
     TimeStamp { year: 26, month: 11, day: 22, hour: 12, minute: 0, second: 0, millisecond: 0 };
@@ -187,6 +190,94 @@ fn an_original_unit_is_silent_on_the_queries() {
         ));
     }
     assert!(bench.unit.set_recording(true).unwrap().recording);
+}
+
+#[test]
+fn an_original_unit_is_asked_once_who_it_is_and_only_after_it_has_answered() {
+    // One that is silent, one whose answer says nothing, and one that answers with what is no answer.
+    let answers: [fn(&Command) -> Option<Vec<u8>>; 3] = [
+        |_| None,
+        |command| (*command == Command::Identify).then(|| b"I?".to_vec()),
+        |command| (*command == Command::Identify).then(|| b"Z what".to_vec()),
+    ];
+    for beyond_the_manual in answers {
+        let mut bench = Bench::new(100);
+        bench.fake().original = true;
+        bench.fake().beyond_the_manual = beyond_the_manual;
+        assert_eq!(bench.unit.identity().unwrap(), None);
+        assert_eq!(bench.unit.clock_look().unwrap(), None);
+        assert_eq!(bench.unit.filters().unwrap(), None);
+        assert_eq!(bench.unit.recorder_counters().unwrap(), None);
+        assert_eq!(bench.unit.set_filter(None, InputFilter::OFF).unwrap(), None);
+        assert_eq!(
+            bench.fake().commands,
+            [Command::Read { start: 1, count: 1 }, Command::Identify]
+        );
+        // And it is as it was before.
+        assert!(bench.unit.set_recording(true).unwrap().recording);
+    }
+}
+
+#[test]
+fn a_unit_that_does_not_answer_the_manual_is_asked_nothing_else() {
+    let mut bench = Bench::new(100);
+    bench.fake().swallow = usize::MAX;
+    assert!(matches!(bench.unit.identity(), Err(RequestError::NoReply { .. })));
+    let read = Command::Read { start: 1, count: 1 };
+    assert!(bench.fake().commands.iter().all(|command| *command == read));
+}
+
+#[test]
+fn one_that_is_known_to_be_original_is_not_even_asked_once() {
+    let mut bench = Bench::new(100);
+    bench.unit.take_for_original();
+    assert_eq!(bench.unit.identity().unwrap(), None);
+    assert_eq!(bench.fake().commands, []);
+}
+
+#[test]
+fn a_unit_of_ours_is_asked_for_all_its_filters_and_counters() {
+    let mut bench = Bench::new(100);
+    bench.fake().beyond_the_manual = |command| {
+        let filter = |input: u8| InputFilter { debounce_ms: input, chatter: None };
+        let reply = match *command {
+            Command::Identify => Reply::Identity(Identity {
+                level: 1,
+                model: Model::Ser320,
+                firmware: FirmwareVersion { major: 1, minor: 0, patch: 0 },
+                capabilities: Capabilities::FILTERS.with(Capabilities::DIAGNOSTICS),
+                id: None,
+                power_ups: 1,
+                life: 1,
+                log_capacity: 2048,
+                guard: Guard::None,
+            }),
+            Command::QueryFilters { first } => {
+                let inputs = first.get()..=32;
+                Reply::Filters(Filters { first, filters: inputs.take(20).map(filter).collect() })
+            }
+            Command::Diagnostics { first } if first == Counter::FIRST => {
+                let next = Counter::suppressed(1);
+                Reply::Diagnostics(Counters { first, next, values: [7, 8].into_iter().collect() })
+            }
+            Command::Diagnostics { first } => Reply::Diagnostics(Counters {
+                first,
+                next: None,
+                values: [9].into_iter().collect(),
+            }),
+            _ => return None,
+        };
+        Some(reply.to_body().to_vec())
+    };
+    let filters = bench.unit.filters().unwrap().unwrap();
+    assert_eq!(
+        filters.iter().map(|filter| filter.debounce_ms).collect::<Vec<_>>(),
+        (1..=32).collect::<Vec<_>>()
+    );
+    let values: Vec<u32> =
+        bench.unit.recorder_counters().unwrap().unwrap().iter().map(|counter| counter.1).collect();
+    assert_eq!(values, [7, 8, 9]);
+    assert_eq!(bench.unit.clock_look().unwrap(), None, "it has not said that it can");
 }
 
 #[test]

@@ -16,6 +16,9 @@ use super::Recorder;
 /// What happens to a recorder without the client's knowledge.
 type Meanwhile = Box<dyn FnMut(&mut Recorder, &mut Configuration, usize) + Send>;
 
+/// What a recorder makes of a command of our extension.
+pub(crate) type Answers = fn(&Command) -> Option<Vec<u8>>;
+
 /// Everything that a test can see and change during the conversation.
 pub(crate) struct Fake {
     pub(crate) recorder: Recorder,
@@ -30,6 +33,8 @@ pub(crate) struct Fake {
     pub(crate) swallow: usize,
     /// Whether the recorder does not know the queries, as original recorders do not.
     pub(crate) original: bool,
+    /// The body of its answer to a command that the manual does not have.
+    pub(crate) beyond_the_manual: Answers,
     /// Whether a command is lost while an answer is on the line.
     pub(crate) deaf_when_talking: bool,
     /// After how many more commands the line fails.
@@ -70,6 +75,12 @@ impl Fake {
             return;
         }
         self.commands.push(command);
+        if let Some(body) = (self.beyond_the_manual)(&command) {
+            let sum = body.iter().fold(0, |sum: u8, &byte| sum.wrapping_add(byte));
+            let digits = body.iter().chain([&sum]).map(|byte| format!("{byte:02X}"));
+            let frame = format!("\x1B{:02X}{}", body.len(), digits.collect::<String>());
+            self.say(frame.as_bytes());
+        }
         let mut new_rate = None;
         let reply = match command {
             Command::QueryConfiguration | Command::QueryMode if self.original => None,
@@ -196,6 +207,7 @@ impl Bench {
             recording: true,
             swallow: 0,
             original: false,
+            beyond_the_manual: |_| None,
             deaf_when_talking: false,
             breaks_in: None,
             broken: None,
