@@ -15,7 +15,7 @@ use ser_board::main_loop::{self, Line};
 use ser_board::serial_line::ReceivedByte;
 use ser_node::{
     Capture, CaptureChannel, CopyNumber, Debounce, Event as Change, GeniusOptions, NoRtc, Node,
-    NodeParts, RECORD_LEN, Storage,
+    NodeParts, RECORD_LEN, Storage, Work,
 };
 use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
 use ser_proto::{AutoReport, Baud, Command, Configure, Entry, FrameEncoder, Model, TimeStamp};
@@ -251,8 +251,9 @@ impl Bench {
         };
         let model = Model::Ser160;
         let log = vec![Change::EMPTY; 2048].leak();
-        let node =
-            Node::new(NodeParts { model, log, capture: reader, storage, rtc: NoRtc, id: None });
+        let work = Box::leak(Box::new(Work::new()));
+        let parts = NodeParts { model, log, work, capture: reader, storage, rtc: NoRtc, id: None };
+        let node = Node::new(parts);
         let lines = || Lines { around: Rc::clone(&around), window: window(board), is_away: false };
         let options = GeniusOptions { start: RESET, ..GeniusOptions::new(model) };
         let genius = Genius::new(lines(), window(board), options);

@@ -26,8 +26,9 @@ pub struct Limits {
 /// The emulated board.
 pub const MPS2_AN385: Limits = Limits {
     board: "mps2-an385",
-    flash_budget: 48 * KIB,
-    variables_budget: 48 * KIB,
+    // With the commands beyond the manual, and what they keep and filter.
+    flash_budget: 56 * KIB,
+    variables_budget: 52 * KIB,
     stack_floor: 0x2000_0000,
     while_erasing: &[],
     forced: &[(
@@ -39,8 +40,9 @@ pub const MPS2_AN385: Limits = Limits {
 /// The board to flash.
 pub const STM32F407: Limits = Limits {
     board: "stm32f407",
-    flash_budget: 48 * KIB,
-    variables_budget: 48 * KIB,
+    // With the commands beyond the manual, and what they keep and filter.
+    flash_budget: 56 * KIB,
+    variables_budget: 52 * KIB,
     stack_floor: 0x1000_0000,
     while_erasing: &["main"],
     forced: &[],

@@ -23,11 +23,10 @@ use crate::serial_line::CHARACTER_BITS;
 /// The longest time that the main loop may be away from the rings without a loss, in milliseconds.
 ///
 /// In normal operation it is away for far less: a log record of 2 ms, a frame's worth of entries,
-/// the programming of one configuration record (16 bytes of at most 100 µs each, `STM32F40x` data
-/// sheet, "Flash memory programming"). The rest is reserve for interrupts and for future work.
+/// the programming of one stored record (64 words of at most 100 µs each, `STM32F40x` data sheet,
+/// "Flash memory programming"). The rest is reserve for interrupts and for future work.
 /// Erasing a flash sector is *not* covered: 16 KiB take up to half a second. An erase is due once
-/// in a thousand configuration changes or less (see [`flash_log`](crate::flash_log)), and what it
-/// costs is counted.
+/// in 63 records of a copy (see [`flash_log`](crate::flash_log)), and what it costs is counted.
 pub const MAIN_LOOP_STALL_MS: u32 = 100;
 
 /// Changes that capture can produce in a millisecond. It samples once per millisecond, and all

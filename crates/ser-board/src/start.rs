@@ -4,7 +4,7 @@ use core::mem::MaybeUninit;
 
 use chrono::NaiveDate;
 use embedded_storage::nor_flash::MultiwriteNorFlash;
-use ser_node::{Capture, CaptureChannel, Debounce, Event, Node, NodeParts};
+use ser_node::{Capture, CaptureChannel, Debounce, Event, Node, NodeParts, Work};
 use ser_proto::{Model, RecorderId};
 
 use crate::clock_chip::{ClockChip, KeepsTime};
@@ -24,6 +24,7 @@ pub type BoardNode<'a, F, C> = Node<'a, FlashLog<'a, F>, ClockChip<'a, C>>;
 pub struct Memory<'a, F, C> {
     channel: CaptureChannel,
     events: [Event; LOG_LEN],
+    work: Work,
     node: MaybeUninit<BoardNode<'a, F, C>>,
 }
 
@@ -34,6 +35,7 @@ impl<F, C> Memory<'_, F, C> {
         Memory {
             channel: CaptureChannel::new(),
             events: [Event::EMPTY; LOG_LEN],
+            work: Work::new(),
             node: MaybeUninit::uninit(),
         }
     }
@@ -65,11 +67,12 @@ pub fn start<'a, F: MultiwriteNorFlash, C: KeepsTime>(
     parts: BoardParts<F, C>,
     health: &Health<'a>,
 ) -> (Capture<'a>, &'a mut BoardNode<'a, F, C>) {
-    let Memory { channel, events, node } = memory;
+    let Memory { channel, events, work, node } = memory;
     let (capture, reader) = channel.split(parts.debounce);
     let node = node.write(Node::new(NodeParts {
         model: parts.model,
         log: events,
+        work,
         capture: reader,
         storage: FlashLog::new(parts.flash, health.storage),
         rtc: ClockChip::new(parts.clock, NOT_BEFORE, health.clock),

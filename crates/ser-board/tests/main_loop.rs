@@ -10,7 +10,7 @@ use ser_board::serial_line::{
 };
 use ser_node::{
     Capture, CaptureChannel, CopyNumber, Debounce, Event, NoRtc, Node, NodeParts, RECORD_LEN,
-    Storage,
+    Storage, Work,
 };
 use ser_proto::{
     AutoReport, Baud, Command, Configure, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Mode,
@@ -114,6 +114,7 @@ struct Board<'a> {
 struct Memory {
     channel: CaptureChannel,
     log: Vec<Event>,
+    work: Work,
     rings: SerialRings<RECEIVE, TRANSMIT>,
 }
 
@@ -122,6 +123,7 @@ impl Memory {
         Memory {
             channel: CaptureChannel::new(),
             log: vec![Event::EMPTY; 2048],
+            work: Work::new(),
             rings: SerialRings::new(),
         }
     }
@@ -131,6 +133,7 @@ impl Memory {
         let node = Node::new(NodeParts {
             model: Model::Ser320,
             log: &mut self.log,
+            work: &mut self.work,
             capture: reader,
             storage: NoStorage,
             rtc: NoRtc,

@@ -17,7 +17,7 @@ use ser_board::health::Health;
 use ser_board::inputs::InputHealth;
 use ser_node::{
     Capture, CaptureChannel, CopyNumber, Debounce, Event, NoRtc, Node, NodeParts, RECORD_LEN,
-    Storage,
+    Storage, Work,
 };
 use ser_proto::{
     AutoReport, Baud, Command, Configuration, Configure, Decoded, FrameDecoder, FrameEncoder,
@@ -45,11 +45,12 @@ fn configuration(number: u16) -> Configuration {
 struct Ram {
     channel: CaptureChannel,
     log: Vec<Event>,
+    work: Work,
 }
 
 impl Ram {
     fn new() -> Ram {
-        Ram { channel: CaptureChannel::new(), log: vec![Event::EMPTY; 2048] }
+        Ram { channel: CaptureChannel::new(), log: vec![Event::EMPTY; 2048], work: Work::new() }
     }
 
     fn power_up<S: Storage>(&mut self, storage: S) -> Recorder<'_, S> {
@@ -59,6 +60,7 @@ impl Ram {
         let parts = NodeParts {
             model: Model::Ser320,
             log: &mut self.log,
+            work: &mut self.work,
             capture: reader,
             storage,
             rtc: NoRtc,

@@ -4,9 +4,9 @@
 use ser_proto::InputFilter;
 
 use crate::capture::CaptureReader;
-use crate::chatter::Chatter;
+use crate::chatter::{self, Chatter};
 use crate::debounce::Debounce;
-use crate::sequencer::{Change, Sequencer};
+use crate::sequencer::{Change, Place, Sequencer, WINDOW};
 use crate::ticks::Ticks;
 
 /// The main loop's end of the capture channel, the sequencer that orders its samples, and the
@@ -14,8 +14,8 @@ use crate::ticks::Ticks;
 pub(crate) struct Changes<'a> {
     capture: CaptureReader<'a>,
     ticks: Ticks,
-    sequencer: Sequencer,
-    chatter: Chatter,
+    sequencer: Sequencer<'a>,
+    chatter: Chatter<'a>,
     /// The inputs that the recorder has.
     mask: u32,
     has_begun: bool,
@@ -31,13 +31,18 @@ struct DebounceChange {
 }
 
 impl<'a> Changes<'a> {
-    pub(crate) fn new(capture: CaptureReader<'a>, mask: u32) -> Changes<'a> {
+    pub(crate) fn new(
+        capture: CaptureReader<'a>,
+        mask: u32,
+        waiting: &'a mut [Place; WINDOW],
+        chatter: &'a mut [chatter::Input; 32],
+    ) -> Changes<'a> {
         let in_force = *capture.debounce();
         Changes {
             capture,
             ticks: Ticks::new(),
-            sequencer: Sequencer::new(in_force),
-            chatter: Chatter::new(),
+            sequencer: Sequencer::new(in_force, waiting),
+            chatter: Chatter::new(chatter),
             mask,
             has_begun: false,
             debounce: DebounceChange { in_force, taken: None, wanted: in_force },
@@ -54,7 +59,7 @@ impl<'a> Changes<'a> {
     }
 
     /// The filter for inputs that chatter.
-    pub(crate) fn chatter(&self) -> &Chatter {
+    pub(crate) fn chatter(&self) -> &Chatter<'a> {
         &self.chatter
     }
 
@@ -145,7 +150,8 @@ mod tests {
     ) -> (Vec<(u64, u32)>, usize) {
         let mut channel = CaptureChannel::new();
         let (mut capture, reader) = channel.split(debounce);
-        let mut main_loop = Changes::new(reader, u32::MAX);
+        let (mut places, mut inputs) = ([Place::EMPTY; WINDOW], [chatter::Input::NEW; 32]);
+        let mut main_loop = Changes::new(reader, u32::MAX, &mut places, &mut inputs);
         let (mut seen, mut in_force) = (Vec::new(), usize::MAX);
         let settling = std::iter::repeat_n(*samples.last().unwrap_or(&0), 3 * 256);
         for (index, inputs) in samples.iter().copied().chain(settling).enumerate() {

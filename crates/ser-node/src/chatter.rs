@@ -10,8 +10,8 @@ use ser_proto::{ChatterFilter, Inputs};
 use crate::sequencer::Change;
 
 /// The filter at work, for all inputs.
-pub(crate) struct Chatter {
-    inputs: [Input; 32],
+pub(crate) struct Chatter<'a> {
+    inputs: &'a mut [Input; 32],
     /// Inputs whose filter is on.
     on: u32,
     /// Inputs that chatter.
@@ -25,7 +25,7 @@ pub(crate) struct Chatter {
 
 /// What is known of one input.
 #[derive(Clone, Copy, Debug)]
-struct Input {
+pub(crate) struct Input {
     filter: Option<ChatterFilter>,
     /// When its window began, and how many changes there were since.
     window_began_ms: u64,
@@ -37,7 +37,7 @@ struct Input {
 }
 
 impl Input {
-    const NEW: Input =
+    pub(crate) const NEW: Input =
         Input { filter: None, window_began_ms: 0, changes: 0, changed_ms: 0, suppressed: 0 };
 
     /// Takes a change. Whether it is the one by which chatter is recognised.
@@ -60,16 +60,10 @@ impl Input {
     }
 }
 
-impl Chatter {
-    pub(crate) const fn new() -> Chatter {
-        Chatter {
-            inputs: [Input::NEW; 32],
-            on: 0,
-            chattering: 0,
-            state: 0,
-            recorded: 0,
-            settled_ms: 0,
-        }
+impl<'a> Chatter<'a> {
+    pub(crate) fn new(inputs: &'a mut [Input; 32]) -> Chatter<'a> {
+        *inputs = [Input::NEW; 32];
+        Chatter { inputs, on: 0, chattering: 0, state: 0, recorded: 0, settled_ms: 0 }
     }
 
     /// Takes the state of the inputs before any change.
@@ -234,7 +228,8 @@ mod tests {
         samples: &[u32],
         every: usize,
     ) -> (Vec<(u64, u32, u32)>, Vec<u32>) {
-        let mut chatter = Chatter::new();
+        let mut inputs = [Input::NEW; 32];
+        let mut chatter = Chatter::new(&mut inputs);
         for (number, filter) in (1..).zip(filters) {
             chatter.set_filter(number, *filter);
         }
@@ -360,11 +355,12 @@ mod tests {
 
     #[test]
     fn a_filter_that_is_switched_off_lets_everything_through_again() {
-        let mut chatter = Chatter::new();
+        let mut inputs = [Input::NEW; 32];
+        let mut chatter = Chatter::new(&mut inputs);
         chatter.baseline(0b10);
         chatter.set_filter(1, filter(2, 100, 9000));
         let mut seen = Vec::new();
-        let mut take = |chatter: &mut Chatter, tick_ms, state| {
+        let mut take = |chatter: &mut Chatter<'_>, tick_ms, state| {
             let change = Change { tick_ms, changed: 1, state };
             chatter.take(change, |change| seen.push((change.tick_ms, change.state)));
         };

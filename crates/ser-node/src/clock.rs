@@ -8,7 +8,7 @@ use chrono::NaiveDateTime;
 use ser_proto::{ClockSource, TimeStamp};
 
 use crate::calendar::{self, Date};
-use crate::history::History;
+use crate::history::{History, SPAN};
 
 /// A battery-backed clock that keeps the time while the recorder is off.
 pub trait Rtc {
@@ -41,9 +41,12 @@ const CENTURY_MS: i64 = 36_525 * 24 * 60 * 60 * 1000;
 /// Milliseconds since 1970 at tick 0, within the hundred years. Stored in 42 bits, because many
 /// offsets are remembered.
 #[derive(Clone, Copy, Debug)]
-struct Offset([u16; 3]);
+pub(crate) struct Offset([u16; 3]);
 
 impl Offset {
+    /// What unused memory holds.
+    pub(crate) const NONE: Offset = Offset([0; 3]);
+
     /// The offset of a clock that shows `now_ms` at `tick_ms`.
     fn new(now_ms: i64, tick_ms: u64) -> Offset {
         let [a, b, c, d, e, f, ..] =
@@ -58,20 +61,25 @@ impl Offset {
 }
 
 /// Turns ticks into date and time.
-#[derive(Clone, Debug)]
-pub(crate) struct Clock {
-    offset: History<Offset>,
+#[derive(Debug)]
+pub(crate) struct Clock<'a> {
+    offset: History<Offset, &'a mut [Offset; SPAN]>,
     source: ClockSource,
     /// When it was set last, or read from the battery-backed clock, or else power-up.
     set_ms: u64,
 }
 
-impl Clock {
+impl<'a> Clock<'a> {
     /// A clock that shows `now` at `tick_ms`; 2000-01-01 when the time is not known.
-    pub(crate) fn new(tick_ms: u64, now: Option<NaiveDateTime>) -> Clock {
+    pub(crate) fn new(
+        tick_ms: u64,
+        now: Option<NaiveDateTime>,
+        offsets: &'a mut [Offset; SPAN],
+    ) -> Clock<'a> {
         let source = if now.is_some() { ClockSource::Battery } else { ClockSource::NeverSet };
         let now_ms = now.map_or(NEVER_SET_MS, to_calendar_ms);
-        Clock { offset: History::new(Offset::new(now_ms, tick_ms)), source, set_ms: tick_ms }
+        let offset = History::with_places(offsets, Offset::new(now_ms, tick_ms));
+        Clock { offset, source, set_ms: tick_ms }
     }
 
     /// Sets the clock so that it shows `now` at `tick_ms`.
@@ -141,18 +149,20 @@ mod tests {
         text.parse().unwrap()
     }
 
-    fn shows(clock: &Clock, tick_ms: u64) -> String {
+    fn shows(clock: &Clock<'_>, tick_ms: u64) -> String {
         to_time_stamp(clock.stamp_ms(tick_ms)).to_string()
     }
 
     #[test]
     fn a_clock_that_was_never_set_starts_in_2000() {
-        assert_eq!(shows(&Clock::new(0, None), 0), "2000-01-01T00:00:00.000");
+        let mut offsets = [Offset::NONE; SPAN];
+        assert_eq!(shows(&Clock::new(0, None, &mut offsets), 0), "2000-01-01T00:00:00.000");
     }
 
     #[test]
     fn the_clock_goes_on_from_where_it_is_set() {
-        let mut clock = Clock::new(5, Some(time("2026-11-22T10:00:00.000")));
+        let mut offsets = [Offset::NONE; SPAN];
+        let mut clock = Clock::new(5, Some(time("2026-11-22T10:00:00.000")), &mut offsets);
         assert_eq!(shows(&clock, 5), "2026-11-22T10:00:00.000");
         clock.set(1000, time("2026-11-22T12:00:00.250"), ClockSource::HostOverRs232);
         assert_eq!(to_time_stamp(clock.now_ms(1000)).to_string(), "2026-11-22T12:00:00.250");
@@ -165,7 +175,8 @@ mod tests {
 
     #[test]
     fn after_2069_comes_1970_as_two_digits_have_it() {
-        let clock = Clock::new(0, Some(time("2069-12-31T23:59:59.999")));
+        let mut offsets = [Offset::NONE; SPAN];
+        let clock = Clock::new(0, Some(time("2069-12-31T23:59:59.999")), &mut offsets);
         assert_eq!(shows(&clock, 0), "2069-12-31T23:59:59.999");
         assert_eq!(shows(&clock, 1), "1970-01-01T00:00:00.000");
     }

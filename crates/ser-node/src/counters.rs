@@ -17,7 +17,7 @@ pub(crate) struct Counts<'c> {
     pub(crate) recorder: Diagnostics,
     /// `None` without a Genius port.
     pub(crate) genius: Option<&'c GeniusDiagnostics>,
-    pub(crate) chatter: &'c Chatter,
+    pub(crate) chatter: &'c Chatter<'c>,
     pub(crate) model: Model,
 }
 
@@ -60,8 +60,9 @@ impl Counts<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chatter::Input;
 
-    fn counts<'c>(genius: Option<&'c GeniusDiagnostics>, chatter: &'c Chatter) -> Counts<'c> {
+    fn counts<'c>(genius: Option<&'c GeniusDiagnostics>, chatter: &'c Chatter<'c>) -> Counts<'c> {
         let recorder = Diagnostics { edges_lost: 7, storage_errors: 9, ..Diagnostics::default() };
         Counts { recorder, genius, chatter, model: Model::Ser160 }
     }
@@ -80,7 +81,8 @@ mod tests {
 
     #[test]
     fn every_counter_comes_once_by_its_name() {
-        let (chatter, mut genius) = (Chatter::new(), GeniusDiagnostics::default());
+        let mut inputs = [Input::NEW; 32];
+        let (chatter, mut genius) = (Chatter::new(&mut inputs), GeniusDiagnostics::default());
         genius.reports_failed = 3;
         genius.board.failures = 5;
         let seen = all(&counts(Some(&genius), &chatter));
@@ -100,7 +102,8 @@ mod tests {
 
     #[test]
     fn without_a_genius_port_there_are_none_of_its_counters() {
-        let chatter = Chatter::new();
+        let mut inputs = [Input::NEW; 32];
+        let chatter = Chatter::new(&mut inputs);
         let counts = counts(None, &chatter);
         let page = counts.page(Counter::FIRST);
         assert_eq!((page.values.len(), page.next), (16, Counter::suppressed(1)));

@@ -8,7 +8,7 @@
 use crate::sequencer::{WINDOW, slot};
 
 /// Milliseconds that are remembered. The oldest change still to be recorded is younger than this.
-const SPAN: usize = WINDOW;
+pub(crate) const SPAN: usize = WINDOW;
 
 /// Bits of a word.
 const BITS: usize = u32::BITS as usize;
@@ -28,6 +28,16 @@ impl<T: Copy> Places<T> for [T; SPAN] {
         if let Some(at) = self.get_mut(place) {
             *at = value;
         }
+    }
+}
+
+impl<T: Copy> Places<T> for &mut [T; SPAN] {
+    fn get(&self, place: usize) -> Option<T> {
+        <[T]>::get(*self, place).copied()
+    }
+
+    fn put(&mut self, place: usize, value: T) {
+        (**self).put(place, value);
     }
 }
 
@@ -67,14 +77,17 @@ pub(crate) struct History<T, P = [T; SPAN]> {
     is_set: Bits,
 }
 
+impl<T: Copy, P: Places<T>> History<T, P> {
+    /// With these places, whatever they hold.
+    pub(crate) const fn with_places(values: P, value: T) -> History<T, P> {
+        History { before: (0, value), latest: (0, value), values, is_set: Bits::NONE }
+    }
+}
+
+#[cfg(test)]
 impl<T: Copy> History<T> {
-    pub(crate) const fn new(value: T) -> History<T> {
-        History {
-            before: (0, value),
-            latest: (0, value),
-            values: [value; SPAN],
-            is_set: Bits::NONE,
-        }
+    fn new(value: T) -> History<T> {
+        History::with_places([value; SPAN], value)
     }
 }
 

@@ -2,21 +2,21 @@
 
 use ser_proto::{Configuration, InputFilter};
 
-use crate::kept::{FILTERS, Kept};
+use crate::kept::{FILTERS, Kept, RECORD_LEN};
 use crate::settings::{NotStored, Settings, Storage};
 
 /// What is in force, whether or not it could be stored.
-pub(crate) struct Keeper<S> {
-    settings: Settings<S>,
+pub(crate) struct Keeper<'a, S> {
+    settings: Settings<'a, S>,
     kept: Kept,
     /// Whether the memory held all of it when that was tried last; `None` before the first time.
     is_stored: Option<bool>,
 }
 
-impl<S: Storage> Keeper<S> {
+impl<'a, S: Storage> Keeper<'a, S> {
     /// Loads what was stored, and counts this power-up, which begins a life of the log.
-    pub(crate) fn power_up(storage: S) -> Keeper<S> {
-        let (settings, mut kept) = Settings::load(storage);
+    pub(crate) fn power_up(storage: S, record: &'a mut [u8; RECORD_LEN]) -> Keeper<'a, S> {
+        let (settings, mut kept) = Settings::load(storage, record);
         kept.power_ups = kept.power_ups.saturating_add(1);
         kept.lives = kept.lives.saturating_add(1);
         Keeper { settings, kept, is_stored: None }

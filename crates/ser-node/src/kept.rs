@@ -73,28 +73,50 @@ impl Kept {
             .chain(self.filters.iter().flatten().flat_map(|filter| filter.to_bytes()))
     }
 
-    /// The sequence number of a record, and what it holds; `None` if it is not intact.
-    pub(crate) fn decode(record: &[u8; RECORD_LEN]) -> Option<(u32, Kept)> {
-        match *record {
-            [MAGIC, FORMAT, ..] => {
-                let (sequence, configuration, rest) = begin(checked(record)?)?;
-                let (power_ups, rest) = rest.split_first_chunk()?;
-                let (lives, rest) = rest.split_first_chunk()?;
-                let (&has_filters, stored) = rest.split_first()?;
-                let kept = Kept {
-                    configuration,
-                    filters: (has_filters != 0).then(|| filters(stored)),
-                    power_ups: u32::from_le_bytes(*power_ups),
-                    lives: u32::from_le_bytes(*lives),
-                };
-                Some((sequence, kept))
+    /// Takes what a record holds, and returns its sequence number; `None` if it is not intact, and
+    /// then nothing is taken.
+    pub(crate) fn take_from(&mut self, record: &[u8; RECORD_LEN]) -> Option<u32> {
+        let (content, has_more) = content(record)?;
+        let (sequence, configuration, rest) = begin(content)?;
+        self.configuration = configuration;
+        (self.filters, self.power_ups, self.lives) = (None, 0, 0);
+        if has_more
+            && let Some((power_ups, rest)) = rest.split_first_chunk()
+            && let Some((lives, rest)) = rest.split_first_chunk()
+            && let Some((&has_filters, stored)) = rest.split_first()
+        {
+            self.power_ups = u32::from_le_bytes(*power_ups);
+            self.lives = u32::from_le_bytes(*lives);
+            if has_filters != 0 {
+                self.filters = Some(filters(stored));
             }
-            [MAGIC, OLD_FORMAT, ..] => {
-                let (sequence, configuration, _) = begin(checked(record.get(..OLD_LEN)?)?)?;
-                Some((sequence, Kept { configuration, ..Kept::new() }))
-            }
-            _ => None,
         }
+        Some(sequence)
+    }
+
+    /// The sequence number of a record, if it holds exactly this.
+    pub(crate) fn sequence_in(&self, record: &[u8; RECORD_LEN]) -> Option<u32> {
+        let sequence = sequence(record)?;
+        let unused = core::iter::repeat(0);
+        let expected = self.content(sequence).chain(unused);
+        let content = record.split_last_chunk::<CRC_LEN>()?.0.iter().copied();
+        content.zip(expected).all(|(found, expected)| found == expected).then_some(sequence)
+    }
+}
+
+/// The sequence number of a record, if it is intact.
+pub(crate) fn sequence(record: &[u8; RECORD_LEN]) -> Option<u32> {
+    let (content, _) = content(record)?;
+    begin(content).map(|(sequence, ..)| sequence)
+}
+
+/// What a record holds before its check, if that is right, and whether it is more than a
+/// configuration.
+fn content(record: &[u8; RECORD_LEN]) -> Option<(&[u8], bool)> {
+    match record {
+        [MAGIC, FORMAT, ..] => Some((checked(record)?, true)),
+        [MAGIC, OLD_FORMAT, ..] => Some((checked(record.get(..OLD_LEN)?)?, false)),
+        _ => None,
     }
 }
 
@@ -145,7 +167,7 @@ pub(crate) mod tests {
         let mut filters = [InputFilter::OFF; FILTERS];
         filters[31] = InputFilter::from_bytes([9, 5, 0, 100, 1, 0]);
         filters[usize::from(number % 31)].debounce_ms = 3;
-        let filters = (number % 4 != 0).then_some(filters);
+        let filters = (!number.is_multiple_of(4)).then_some(filters);
         Kept { configuration, filters, power_ups: number.into(), lives: 7 }
     }
 
@@ -166,21 +188,27 @@ pub(crate) mod tests {
 
     #[test]
     fn a_record_of_the_first_format_is_read() {
-        let (sequence, kept) = Kept::decode(&old_record(9, 200)).unwrap();
-        assert_eq!((sequence, kept.configuration.size), (9, 200));
-        assert_eq!(Kept { configuration: Configuration::default(), ..kept }, Kept::new());
+        let mut found = kept(3);
+        assert_eq!(found.take_from(&old_record(9, 200)), Some(9));
+        assert_eq!(found.configuration.size, 200);
+        assert_eq!(Kept { configuration: Configuration::default(), ..found }, Kept::new());
         let mut damaged = old_record(9, 200);
         damaged[7] ^= 1;
-        assert_eq!(Kept::decode(&damaged), None);
+        let mut untouched = kept(3);
+        assert_eq!((untouched.take_from(&damaged), untouched), (None, kept(3)));
     }
 
     proptest! {
         #[test]
         fn a_record_with_any_flipped_bit_is_refused(bit in 0..RECORD_LEN * 8, number in 1..=2048_u16) {
             let mut record = encoded(7, &kept(number));
-            prop_assert_eq!(Kept::decode(&record), Some((7, kept(number))));
+            let mut found = Kept::new();
+            prop_assert_eq!((found.take_from(&record), found), (Some(7), kept(number)));
+            prop_assert_eq!(kept(number).sequence_in(&record), Some(7));
+            prop_assert_eq!(kept(number + 1).sequence_in(&record), None);
             record[bit / 8] ^= 1 << (bit % 8);
-            prop_assert_eq!(Kept::decode(&record), None);
+            prop_assert_eq!(Kept::new().take_from(&record), None);
+            prop_assert_eq!(kept(number).sequence_in(&record), None);
         }
     }
 }

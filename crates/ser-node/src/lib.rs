@@ -52,6 +52,7 @@ mod tick_stamp;
 pub mod ticks;
 mod version;
 mod waiting;
+mod work;
 
 pub use capture::{Capture, CaptureChannel, CaptureReader, DebounceTimes};
 pub use clock::{NoRtc, Rtc};
@@ -68,3 +69,4 @@ pub use settings::{CopyNumber, Storage};
 pub use tick_counter::TickCounter;
 pub use tick_stamp::TickStamp;
 pub use version::VERSION;
+pub use work::Work;

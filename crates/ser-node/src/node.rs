@@ -48,6 +48,7 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
     /// bytes. A change that came after a command is then never recorded before that command is
     /// seen.
     pub fn poll(&mut self, now_ms: u32) {
+        self.recorder.begin_filtering();
         self.recorder.record_until(now_ms);
         self.recorder.keep_power_up();
     }

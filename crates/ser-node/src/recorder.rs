@@ -35,6 +35,7 @@ use crate::settings::Storage;
 use crate::ticks::Ticks;
 use crate::version::{FIRMWARE, VERSION};
 use crate::waiting::{Pending, Request, Waiting};
+use crate::work::Work;
 
 /// What a recorder is made of.
 pub struct NodeParts<'a, S, R> {
@@ -42,6 +43,8 @@ pub struct NodeParts<'a, S, R> {
     pub model: Model,
     /// Memory of the event log: 2048 events for the full range of sizes.
     pub log: &'a mut [Event],
+    /// Memory to work in.
+    pub work: &'a mut Work,
     /// The main loop's end of the capture channel.
     pub capture: CaptureReader<'a>,
     /// Where the configuration is kept.
@@ -57,9 +60,9 @@ pub(crate) struct Recorder<'a, S, R> {
     model: Model,
     changes: Changes<'a>,
     log: EventLog<'a>,
-    clock: Clock,
+    clock: Clock<'a>,
     recording: History<bool, Bits>,
-    keeper: Keeper<S>,
+    keeper: Keeper<'a, S>,
     rtc: R,
     waiting: Waiting,
     printer: Printer,
@@ -78,21 +81,18 @@ pub(crate) struct Recorder<'a, S, R> {
 impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
     /// Loads the configuration and reads the clock. Recording is on.
     pub(crate) fn new(parts: NodeParts<'a, S, R>) -> Recorder<'a, S, R> {
-        let NodeParts { model, log, capture, storage, mut rtc, id } = parts;
+        let NodeParts { model, log, work, capture, storage, mut rtc, id } = parts;
+        let Work { waiting, offsets, chatter, record } = work;
         let now_ms = Ticks::new().extend(capture.tick_ms());
-        let mut keeper = Keeper::power_up(storage);
+        let mut keeper = Keeper::power_up(storage, record);
         let mut log = EventLog::new(log);
         log.resize(keeper.configuration().size);
         keeper.set_configuration(Configuration { size: log.size(), ..*keeper.configuration() });
-        let mut changes = Changes::new(capture, model.mask());
-        if let Some(filters) = keeper.filters() {
-            changes.set_filters(filters);
-        }
         Recorder {
             model,
-            changes,
+            changes: Changes::new(capture, model.mask(), waiting, chatter),
             log,
-            clock: Clock::new(now_ms, rtc.read()),
+            clock: Clock::new(now_ms, rtc.read(), offsets),
             recording: History::of_bits(true),
             keeper,
             rtc,
@@ -114,6 +114,15 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
 
     pub(crate) fn configuration(&self) -> &Configuration {
         self.keeper.configuration()
+    }
+
+    /// Puts the stored filters in force, before the first change is recorded.
+    pub(crate) fn begin_filtering(&mut self) {
+        if self.keeper.is_new()
+            && let Some(filters) = self.keeper.filters()
+        {
+            self.changes.set_filters(filters);
+        }
     }
 
     /// Stores that there was this power-up. A life that has been told of must never come again, so

@@ -36,7 +36,7 @@ pub struct Change {
 
 /// Inputs that changed in one millisecond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Place {
+pub(crate) struct Place {
     changed: u32,
     /// Inputs whose change capture had to drop. Their new state is in effect from here on, but in
     /// no change.
@@ -44,15 +44,15 @@ struct Place {
 }
 
 impl Place {
-    const EMPTY: Place = Place { changed: 0, dropped: 0 };
+    pub(crate) const EMPTY: Place = Place { changed: 0, dropped: 0 };
 }
 
 /// Changes on their way from capture to log.
-pub(crate) struct Sequencer {
+pub(crate) struct Sequencer<'a> {
     debounce: Debounce,
     hold_ms: u64,
     /// Changes by the low bits of the tick at which they began.
-    waiting: [Place; WINDOW],
+    waiting: &'a mut [Place; WINDOW],
     /// Number of places that are not empty.
     waiting_count: usize,
     /// Changes after this tick wait.
@@ -66,12 +66,13 @@ pub(crate) struct Sequencer {
     state: u32,
 }
 
-impl Sequencer {
-    pub(crate) fn new(debounce: Debounce) -> Sequencer {
+impl<'a> Sequencer<'a> {
+    pub(crate) fn new(debounce: Debounce, waiting: &'a mut [Place; WINDOW]) -> Sequencer<'a> {
+        *waiting = [Place::EMPTY; WINDOW];
         Sequencer {
             debounce,
             hold_ms: debounce.longest_ms().into(),
-            waiting: [Place::EMPTY; WINDOW],
+            waiting,
             waiting_count: 0,
             hold_after_ms: None,
             front_ms: 0,
@@ -187,8 +188,9 @@ mod tests {
     fn sequence(debounce: Debounce, samples: &[u32], every: usize) -> Vec<Change> {
         let mut channel = CaptureChannel::new();
         let (mut capture, mut reader) = channel.split(debounce);
+        let mut places = [Place::EMPTY; WINDOW];
         let (mut sequencer, mut ticks, mut changes) =
-            (Sequencer::new(debounce), Ticks::new(), Vec::new());
+            (Sequencer::new(debounce, &mut places), Ticks::new(), Vec::new());
         let settling = std::iter::repeat_n(*samples.last().unwrap_or(&0), 2 * 256);
         for (tick_ms, inputs) in (1_u32..).zip(samples.iter().copied().chain(settling)) {
             capture.sample(tick_ms, inputs);
@@ -270,13 +272,14 @@ mod tests {
 
     #[test]
     fn changes_after_a_datagram_wait_for_it_and_no_longer_than_there_is_room() {
-        let mut sequencer = Sequencer::new(Debounce::OFF);
+        let mut places = [Place::EMPTY; WINDOW];
+        let mut sequencer = Sequencer::new(Debounce::OFF, &mut places);
         sequencer.baseline(0);
         sequencer.hold_after(Some(10));
         for tick_ms in [9, 10, 11, 12] {
             sequencer.push(tick_ms, 1, u32::from(tick_ms % 2 == 0));
         }
-        let ticks = |sequencer: &mut Sequencer, before_ms| -> Vec<u64> {
+        let ticks = |sequencer: &mut Sequencer<'_>, before_ms| -> Vec<u64> {
             std::iter::from_fn(|| sequencer.next(before_ms)).map(|change| change.tick_ms).collect()
         };
         assert_eq!(ticks(&mut sequencer, 13), [9, 10]);
@@ -290,7 +293,8 @@ mod tests {
 
     #[test]
     fn with_the_longest_debounce_and_the_longest_hold_every_change_finds_its_place() {
-        let mut sequencer = Sequencer::new(Debounce::uniform(255).with(1, 0));
+        let mut places = [Place::EMPTY; WINDOW];
+        let mut sequencer = Sequencer::new(Debounce::uniform(255).with(1, 0), &mut places);
         sequencer.hold_after(Some(0));
         let mut seen = Vec::new();
         for tick_ms in 1..=2_000_u64 {
@@ -305,7 +309,8 @@ mod tests {
 
     #[test]
     fn changes_that_capture_dropped_do_not_falsify_the_state() {
-        let mut sequencer = Sequencer::new(Debounce::OFF);
+        let mut places = [Place::EMPTY; WINDOW];
+        let mut sequencer = Sequencer::new(Debounce::OFF, &mut places);
         sequencer.baseline(0);
         // Input 3 came on in a sample that was dropped: the next one shows it as on without a
         // change.
@@ -324,7 +329,8 @@ mod tests {
     #[test]
     fn changes_that_wait_do_not_show_what_was_dropped_after_them() {
         let change = |tick_ms, changed, state| Some(Change { tick_ms, changed, state });
-        let mut sequencer = Sequencer::new(Debounce::OFF);
+        let mut places = [Place::EMPTY; WINDOW];
+        let mut sequencer = Sequencer::new(Debounce::OFF, &mut places);
         sequencer.baseline(0);
         sequencer.hold_after(Some(8));
         sequencer.push(9, 0b0001, 0b0001);
@@ -342,7 +348,8 @@ mod tests {
     #[test]
     fn what_was_dropped_with_debounce_is_in_effect_when_it_can_have_begun_at_the_latest() {
         let change = |tick_ms, changed, state| Some(Change { tick_ms, changed, state });
-        let mut sequencer = Sequencer::new(Debounce::OFF.with(2, 10).with(3, 5));
+        let mut places = [Place::EMPTY; WINDOW];
+        let mut sequencer = Sequencer::new(Debounce::OFF.with(2, 10).with(3, 5), &mut places);
         sequencer.baseline(0);
         sequencer.push(100, 0b0010, 0b0010);
         sequencer.push(101, 0b0001, 0b0011);

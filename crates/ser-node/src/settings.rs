@@ -4,7 +4,7 @@
 //! Saving writes the older copy and leaves the newer one alone. A power cut during a write
 //! therefore costs what is new at most, never both.
 
-use crate::kept::{Kept, RECORD_LEN};
+use crate::kept::{self, Kept, RECORD_LEN};
 
 /// One of the two places for a copy. They must not share an erase unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,20 +39,20 @@ pub trait Storage {
 pub(crate) struct NotStored;
 
 /// Loads and saves what the recorder keeps.
-pub(crate) struct Settings<S> {
+pub(crate) struct Settings<'a, S> {
     storage: S,
     /// The copy that holds the newest record, and its sequence number.
     newest: Option<(CopyNumber, u32)>,
-    /// A record on its way. Here and not on the stack, which is small.
-    record: [u8; RECORD_LEN],
+    /// A record on its way.
+    record: &'a mut [u8; RECORD_LEN],
 }
 
-impl<S: Storage> Settings<S> {
-    /// Reads both copies; returns the newest intact one, or what a new recorder holds.
-    pub(crate) fn load(storage: S) -> (Settings<S>, Kept) {
-        let mut settings = Settings { storage, newest: None, record: [0; RECORD_LEN] };
-        let first = settings.read(CopyNumber::First).map(|(sequence, _)| sequence);
-        let second = settings.read(CopyNumber::Second).map(|(sequence, _)| sequence);
+impl<'a, S: Storage> Settings<'a, S> {
+    /// Reads both copies; returns what the newest intact one holds, or what a new recorder does.
+    pub(crate) fn load(storage: S, record: &'a mut [u8; RECORD_LEN]) -> (Settings<'a, S>, Kept) {
+        let mut settings = Settings { storage, newest: None, record };
+        let first = settings.read(CopyNumber::First).and_then(kept::sequence);
+        let second = settings.read(CopyNumber::Second).and_then(kept::sequence);
         settings.newest = match (first, second) {
             // The second copy is newer when it is ahead by less than half of the range, because
             // sequence numbers may wrap.
@@ -63,13 +63,19 @@ impl<S: Storage> Settings<S> {
             (None, Some(sequence)) => Some((CopyNumber::Second, sequence)),
             (None, None) => None,
         };
-        let kept = settings.stored().unwrap_or_else(Kept::new);
+        let mut kept = Kept::new();
+        if let Some((copy, _)) = settings.newest
+            && let Some(record) = settings.read(copy)
+        {
+            kept.take_from(record);
+        }
         (settings, kept)
     }
 
     /// Whether the next power-up will find this.
     pub(crate) fn holds(&mut self, kept: &Kept) -> bool {
-        self.stored().is_some_and(|stored| stored == *kept)
+        let Some((copy, sequence)) = self.newest else { return false };
+        self.read(copy).and_then(|record| kept.sequence_in(record)) == Some(sequence)
     }
 
     /// Stores it over the older copy and reads it back.
@@ -79,27 +85,18 @@ impl<S: Storage> Settings<S> {
             Some((CopyNumber::Second, sequence)) => (CopyNumber::First, sequence.wrapping_add(1)),
             None => (CopyNumber::First, 0),
         };
-        kept.encode(sequence, &mut self.record);
-        self.storage.write(copy, &self.record).map_err(|_| NotStored)?;
-        match self.read(copy) {
-            Some((found, stored)) if found == sequence && stored == *kept => {
-                self.newest = Some((copy, sequence));
-                Ok(())
-            }
-            _ => Err(NotStored),
+        kept.encode(sequence, self.record);
+        self.storage.write(copy, self.record).map_err(|_| NotStored)?;
+        if self.read(copy).and_then(|record| kept.sequence_in(record)) != Some(sequence) {
+            return Err(NotStored);
         }
+        self.newest = Some((copy, sequence));
+        Ok(())
     }
 
-    /// What the newest copy holds.
-    fn stored(&mut self) -> Option<Kept> {
-        let (copy, sequence) = self.newest?;
-        self.read(copy).filter(|(found, _)| *found == sequence).map(|(_, kept)| kept)
-    }
-
-    #[inline(never)]
-    fn read(&mut self, copy: CopyNumber) -> Option<(u32, Kept)> {
-        self.storage.read(copy, &mut self.record).ok()?;
-        Kept::decode(&self.record)
+    fn read(&mut self, copy: CopyNumber) -> Option<&[u8; RECORD_LEN]> {
+        self.storage.read(copy, self.record).ok()?;
+        Some(self.record)
     }
 }
 
@@ -163,7 +160,7 @@ mod tests {
     #[test]
     fn memory_that_was_never_written_gives_the_defaults() {
         for blank in [0x00, 0xFF] {
-            let (_, loaded) = Settings::load(Memory::new(blank));
+            let (_, loaded) = Settings::load(Memory::new(blank), &mut [0; RECORD_LEN]);
             assert_eq!(loaded, Kept::new());
         }
     }
@@ -172,10 +169,11 @@ mod tests {
     fn the_newest_of_many_configurations_survives() {
         let memory = Memory::new(0xFF);
         for size in 1..=9 {
-            let (mut settings, _) = Settings::load(memory.clone());
+            let mut record = [0; RECORD_LEN];
+            let (mut settings, _) = Settings::load(memory.clone(), &mut record);
             assert_eq!(settings.save(&kept(size)), Ok(()));
             assert!(settings.holds(&kept(size)) && !settings.holds(&kept(100)));
-            assert_eq!(Settings::load(memory.clone()).1, kept(size));
+            assert_eq!(Settings::load(memory.clone(), &mut [0; RECORD_LEN]).1, kept(size));
         }
     }
 
@@ -184,20 +182,22 @@ mod tests {
         let memory = Memory::new(0xFF);
         kept(1).encode(u32::MAX - 1, &mut memory.copies.borrow_mut()[0]);
         kept(2).encode(u32::MAX, &mut memory.copies.borrow_mut()[1]);
-        let (mut settings, loaded) = Settings::load(memory.clone());
+        let mut record = [0; RECORD_LEN];
+        let (mut settings, loaded) = Settings::load(memory.clone(), &mut record);
         assert_eq!(loaded, kept(2));
         assert_eq!(settings.save(&kept(3)), Ok(()));
-        assert_eq!(Settings::load(memory).1, kept(3));
+        assert_eq!(Settings::load(memory, &mut [0; RECORD_LEN]).1, kept(3));
     }
 
     #[test]
     fn what_an_earlier_firmware_stored_is_kept_until_something_newer_is() {
         let memory = Memory::new(0xFF);
         *memory.copies.borrow_mut() = [old_record(5, 50), old_record(4, 40)];
-        let (mut settings, loaded) = Settings::load(memory.clone());
+        let mut record = [0; RECORD_LEN];
+        let (mut settings, loaded) = Settings::load(memory.clone(), &mut record);
         assert_eq!(loaded.configuration.size, 50);
         assert_eq!(settings.save(&kept(3)), Ok(()));
-        assert_eq!(Settings::load(memory.clone()).1, kept(3));
+        assert_eq!(Settings::load(memory.clone(), &mut [0; RECORD_LEN]).1, kept(3));
         assert_eq!(memory.copies.borrow()[0], old_record(5, 50), "the newest of the old ones");
     }
 
@@ -206,7 +206,8 @@ mod tests {
         for saves_before in 0..4 {
             for cut_after in 0..=RECORD_LEN {
                 let memory = Memory::new(0xFF);
-                let (mut settings, mut before) = Settings::load(memory.clone());
+                let mut record = [0; RECORD_LEN];
+                let (mut settings, mut before) = Settings::load(memory.clone(), &mut record);
                 for size in 1..=saves_before {
                     before = kept(size);
                     assert_eq!(settings.save(&before), Ok(()));
@@ -214,7 +215,7 @@ mod tests {
                 *memory.bytes_until_power_cut.borrow_mut() = cut_after;
                 let _ = settings.save(&kept(100));
                 *memory.bytes_until_power_cut.borrow_mut() = usize::MAX;
-                let (_, after) = Settings::load(memory);
+                let (_, after) = Settings::load(memory, &mut [0; RECORD_LEN]);
                 let expected = if cut_after < RECORD_LEN { before } else { kept(100) };
                 assert_eq!(after, expected, "cut after {cut_after} bytes");
             }
@@ -238,7 +239,8 @@ mod tests {
                 Ok(())
             }
         }
-        let (mut settings, _) = Settings::load(Worn);
+        let mut record = [0; RECORD_LEN];
+        let (mut settings, _) = Settings::load(Worn, &mut record);
         assert_eq!(settings.save(&kept(5)), Err(NotStored));
     }
 }

@@ -7,7 +7,7 @@ use std::rc::Rc;
 use chrono::NaiveDateTime;
 use ser_node::{
     Capture, CaptureChannel, CopyNumber, Debounce, DebounceTimes, Diagnostics, Event, Node,
-    NodeParts, RECORD_LEN, Rtc, Storage,
+    NodeParts, RECORD_LEN, Rtc, Storage, Work,
 };
 use ser_proto::{
     Command, Configuration, Configure, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Model,
@@ -98,6 +98,7 @@ impl Bench {
         let node = Node::new(NodeParts {
             model,
             log: vec![Event::EMPTY; log_len].leak(),
+            work: Box::leak(Box::new(Work::new())),
             capture: reader,
             id: survivors.id,
             storage: survivors.clone(),

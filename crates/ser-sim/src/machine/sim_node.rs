@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 use geni_board::SharedRam;
 use ser_node::{
     Capture, CaptureChannel, Debounce, DebounceTimes, Diagnostics, Event, GeniusPort, Node,
-    NodeParts, TickStamp,
+    NodeParts, TickStamp, Work,
 };
 use ser_proto::{Baud, Entry, MAX_SIZE, Model};
 
@@ -74,13 +74,18 @@ impl SimNodeOptions {
 pub struct Ram {
     channel: CaptureChannel,
     log: Vec<Event>,
+    work: Work,
 }
 
 impl Ram {
     /// Memory for a log of the full size.
     #[must_use]
     pub fn new() -> Ram {
-        Ram { channel: CaptureChannel::new(), log: vec![Event::EMPTY; MAX_SIZE.into()] }
+        Ram {
+            channel: CaptureChannel::new(),
+            log: vec![Event::EMPTY; MAX_SIZE.into()],
+            work: Work::new(),
+        }
     }
 }
 
@@ -114,6 +119,7 @@ impl PoweredOff {
         let mut node = Node::new(NodeParts {
             model: options.model,
             log: &mut ram.log,
+            work: &mut ram.work,
             capture: reader,
             storage: options.non_volatile.storage.clone(),
             rtc: options.non_volatile.rtc.clone(),
