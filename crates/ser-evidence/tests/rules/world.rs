@@ -79,7 +79,7 @@ impl World {
         let set_takes_effect = builds[0].set_takes_effect;
         let operations = operations(&builds, &hosts, &moments, until, chance);
         let secret = matches!(trouble, Trouble::SecretSet | Trouble::SecretSetBack)
-            .then(|| (chance.below(builds.len()), chance.between(0, until)));
+            .then(|| secret(trouble, &builds, &operations, until, chance));
         let live = |(recorder, build): (usize, Build)| {
             let mut sets = sets_of(recorder, &operations);
             if let Some((_, at)) = secret.filter(|&(whose, _)| whose == recorder) {
@@ -106,6 +106,26 @@ impl World {
             operations,
             set_takes_effect,
         }
+    }
+}
+
+/// Whose clock is set in secret, and when. One that is set back is, where that can be, one that was
+/// set or asked shortly before, so that there is something to be forgotten.
+fn secret(
+    trouble: Trouble,
+    builds: &[Build],
+    operations: &[Operation],
+    until: Ps,
+    chance: &mut Chance,
+) -> (usize, Ps) {
+    let mut heard = operations.iter().rev().filter(|operation| !operation.recorders.is_empty());
+    let last = heard.next().filter(|_| trouble == Trouble::SecretSetBack);
+    match last {
+        Some(Operation { recorders, after, .. }) => {
+            let after = *after;
+            (chance.of(recorders), after + chance.between(0, (until - after).clamp(1, 10 * S)))
+        }
+        None => (chance.below(builds.len()), chance.between(0, until)),
     }
 }
 
