@@ -581,3 +581,62 @@ fn what_may_have_been_first_is_found_as_if_everything_was_compared() {
     }
     assert!(sizes.len() > 4, "known, and not known among several: {sizes:?}");
 }
+
+#[test]
+fn a_clock_that_somebody_set_back_after_it_was_set_is_not_known_any_more() {
+    let site = site(TWO_RECORDERS);
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    for log_is_empty in [false, true] {
+        let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
+        if !log_is_empty {
+            u1.changes("2026-11-22T09:50:00.000", &[1]);
+            u2.changes("2026-11-22T09:50:00.000", &[1]);
+        }
+        for log in [&mut u1, &mut u2] {
+            log.observed(HOW, "2026-11-22T10:00:00.000", (at, at + 10_000), Some(0));
+        }
+        // Somebody sets U1 back by an hour. It moved first, at 10:00:05; U2 moved at 10:00:08.
+        u1.changes("2026-11-22T09:00:05.000", &[3]);
+        u2.changes("2026-11-22T10:00:08.000", &[4]);
+        let history = history(&site, &[&u1, &u2]);
+        let timeline = Timeline::new(&site, &history);
+        let moved: Vec<EventId> = timeline
+            .entries()
+            .filter(|&event| timeline.held(event).unwrap().entry.changed.0 & 0b1100 != 0)
+            .collect();
+        let [one, other] = moved[..] else { panic!("{moved:?}") };
+        assert_eq!(timeline.order(one, other), Order::Unknown, "empty: {log_is_empty}");
+        assert_eq!(timeline.order(other, one), Order::Unknown, "empty: {log_is_empty}");
+        let last = report(&timeline, Which::Last);
+        assert!(
+            last.rows.iter().all(|row| row.change.event != one && row.change.event != other)
+                || last.first_out.known().is_none(),
+            "{:?}",
+            last.first_out
+        );
+    }
+}
+
+#[test]
+fn a_clock_that_was_asked_and_then_set_back_is_not_known_any_more_either() {
+    let site = site(TWO_RECORDERS);
+    let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
+    u1.changes("2026-11-22T10:00:00.000", &[1]);
+    u2.changes("2026-11-22T10:00:00.000", &[1]);
+    let at = monotonic_us("2026-11-22T10:05:00.000");
+    for log in [&mut u1, &mut u2] {
+        log.observed(How::Query, "2026-11-22T10:05:00.000", (at, at + 2_000), Some(0));
+    }
+    // U1 is set back by two minutes: still after its first entry, and before what it showed.
+    u1.changes("2026-11-22T10:04:00.000", &[3]);
+    u2.changes("2026-11-22T10:06:10.000", &[4]);
+    let history = history(&site, &[&u1, &u2]);
+    let timeline = Timeline::new(&site, &history);
+    let entries: Vec<EventId> = timeline.entries().collect();
+    let with = |bit: u32| {
+        let is_it = |event: &&EventId| timeline.held(**event).unwrap().entry.changed.0 & bit != 0;
+        *entries.iter().find(is_it).unwrap()
+    };
+    assert_eq!(timeline.order(with(0b100), with(0b1000)), Order::Unknown);
+    assert_eq!(timeline.order(with(0b1000), with(0b100)), Order::Unknown);
+}

@@ -2,10 +2,10 @@
 
 use super::hosts::Hosts;
 use super::placing::{self, Located, Whereabouts};
-use super::runs::{LifeRuns, Step, When};
+use super::runs::{LifeRuns, Step, When, was_set};
 use crate::history::{Held, RecorderHistory};
-use crate::record::Reference;
-use crate::time::{Bound, shown};
+use crate::record::{How, Reference};
+use crate::time::{Bound, Host, Moment, Shown, shown};
 
 /// The runs of one life.
 #[derive(Clone, Debug)]
@@ -58,7 +58,9 @@ pub(super) fn life_clocks(
         add(placing::locate(recorder, &step.place), step_then);
     }
     let mut lives: Vec<LifeClock> = Vec::new();
-    for (life, steps) in recorder.lives.iter().zip(steps) {
+    for (index, (life, mut steps)) in recorder.lives.iter().zip(steps).enumerate() {
+        let secret = secret_steps(recorder, index, &steps, hosts);
+        steps.extend(secret);
         let runs = LifeRuns::new(life, steps);
         let ids = (*next_run..*next_run + runs.count()).collect();
         *next_run += runs.count();
@@ -68,9 +70,92 @@ pub(super) fn life_clocks(
     lives
 }
 
+/// Steps that nobody told of, and that show between an observation and an entry after it, or before
+/// it: the clock showed less than before.
+fn secret_steps(
+    recorder: &RecorderHistory,
+    index: usize,
+    told: &[Step],
+    hosts: &Hosts,
+) -> Vec<Step> {
+    let Some(life) = recorder.lives.get(index) else { return Vec::new() };
+    let stamp = |held: &Held| Some((held.sequence, shown(&held.entry.time)?));
+    let mut steps: Vec<(Step, Moment<Shown>)> = Vec::new();
+    for (number, observation) in recorder.observations.iter().enumerate() {
+        let Whereabouts::Here(at) = placing::locate(recorder, &observation.place) else { continue };
+        let is_event = matches!(observation.how, How::Event | How::Hand);
+        if at.life != index || is_event || at.before == u64::MAX {
+            continue;
+        }
+        let seen = observation.shown;
+        let (at_host, at_utc) = when(observation.at, hosts);
+        let behind = life.entries.partition_point(|held| held.sequence <= at.before);
+        let next = life.entries.get(behind..).into_iter().flatten().find_map(stamp);
+        if let Some((sequence, now)) = next.filter(|&(_, now)| was_set(seen, now)) {
+            let from = |bound: Bound<Host>| Bound::new(bound.lo(), None);
+            let step = Step {
+                after: at.after,
+                before: sequence - 1,
+                is_sure: true,
+                at: at_host.map(|(boot, bound)| (boot, from(bound))),
+                utc: Bound::new(at_utc.lo(), None),
+                set: None,
+                follows: Some(number),
+                is_told: false,
+            };
+            steps.push((step, now));
+        }
+        let up_to = life.entries.partition_point(|held| held.sequence <= at.after);
+        let last = life.entries.get(..up_to).into_iter().flatten().rev().find_map(stamp);
+        let last = last.filter(|_| !observation.how.is_set());
+        if let Some((sequence, _)) = last.filter(|&(_, then)| was_set(then, seen)) {
+            let until = |bound: Bound<Host>| Bound::new(None, bound.hi());
+            let step = Step {
+                after: sequence,
+                before: at.before,
+                is_sure: true,
+                at: at_host.map(|(boot, bound)| (boot, until(bound))),
+                utc: Bound::new(None, at_utc.hi()),
+                set: None,
+                follows: None,
+                is_told: false,
+            };
+            steps.push((step, seen));
+        }
+    }
+    // A step that was told may be what shows, unless it was before the observation.
+    let is_told = |(secret, shows): &(Step, Moment<Shown>)| {
+        told.iter().any(|step| step.explains(secret, *shows) && !step.precedes(secret))
+    };
+    steps.retain(|secret| !is_told(secret));
+    let mut steps: Vec<Step> = steps.into_iter().map(|(step, _)| step).collect();
+    // Several observations show one step: the last of those before it says most.
+    steps.sort_by_key(|step| {
+        let lo = step.at.and_then(|(_, bound)| bound.lo()).map(Moment::us);
+        (step.before, lo, step.after, step.follows)
+    });
+    steps.dedup_by(|later, kept| {
+        let is_one =
+            later.before == kept.before && later.follows.is_some() == kept.follows.is_some();
+        if is_one {
+            *kept = *later;
+        }
+        is_one
+    });
+    steps
+}
+
 /// A step that may be anywhere.
-const ANYWHERE: Step =
-    Step { after: 0, before: u64::MAX, is_sure: false, at: None, utc: Bound::UNKNOWN, set: None };
+const ANYWHERE: Step = Step {
+    after: 0,
+    before: u64::MAX,
+    is_sure: false,
+    at: None,
+    utc: Bound::UNKNOWN,
+    set: None,
+    follows: None,
+    is_told: true,
+};
 
 /// When something was observed.
 pub(super) fn when(at: Reference, hosts: &Hosts) -> When {
@@ -90,11 +175,17 @@ fn continue_over_erases(recorder: &RecorderHistory, lives: &mut [LifeClock]) {
             let Some(erased) = life.erased else { continue };
             let before = recorder.lives.iter().position(|other| other.life == Some(erased));
             let last = before.and_then(|before| {
-                let before = lives.get(before)?;
-                match before.runs.at_end() {
-                    [only] => before.ids.get(*only).copied(),
-                    _ => None,
-                }
+                let (entries, clock) = (&recorder.lives.get(before)?.entries, lives.get(before)?);
+                let [last] = *clock.runs.at_end() else { return None };
+                // A clock that shows less than before the erase was set by somebody else.
+                let stamp = |held: &Held| shown(&held.entry.time);
+                let latest = entries.last().and_then(stamp);
+                let is_of_last =
+                    |held: &Held| clock.runs.of(held.sequence, latest).only() == Some(last);
+                let latest = latest.filter(|_| entries.last().is_some_and(is_of_last));
+                let first = life.entries.first().and_then(stamp);
+                let is_back = latest.zip(first).is_some_and(|(then, now)| was_set(then, now));
+                clock.ids.get(last).copied().filter(|_| !is_back)
             });
             let first = lives.get_mut(index).and_then(|life| life.ids.first_mut());
             if let (Some(last), Some(first)) = (last, first)

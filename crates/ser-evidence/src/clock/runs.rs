@@ -24,6 +24,10 @@ pub(crate) struct Step {
     pub(crate) utc: Bound<Utc>,
     /// What it was set to, and the index of the observation that says so.
     pub(crate) set: Option<(usize, Moment<Shown>)>,
+    /// The index of an observation that is known to have been before it.
+    pub(crate) follows: Option<usize>,
+    /// Whether somebody told of it. Otherwise only stamps around it do.
+    pub(crate) is_told: bool,
 }
 
 /// The runs of one life: run 0 is from its beginning to the first step, run *n* + 1 from step *n*
@@ -48,12 +52,20 @@ pub(crate) fn went_back(earlier: Moment<Shown>, later: Moment<Shown>) -> bool {
 impl Step {
     /// Whether this step is known to have been before another one.
     pub(crate) fn precedes(&self, other: &Step) -> bool {
-        self.before < other.after || is_earlier(self.when(), other.when())
+        let is_what_it_follows = self.set.is_some_and(|(index, _)| other.follows == Some(index));
+        is_what_it_follows || self.before < other.after || is_earlier(self.when(), other.when())
+    }
+
+    /// Whether this may be another step, after which the clock showed `shows`: it never shows less
+    /// than what it was set to.
+    pub(crate) fn explains(&self, other: &Step, shows: Moment<Shown>) -> bool {
+        let meets = self.after <= other.before && self.before >= other.after;
+        self.is_sure && meets && may_show(Some(self), shows)
     }
 
     /// Whether nobody told of it, and only the stamps around it do.
     pub(crate) fn is_silent(&self) -> bool {
-        self.is_sure && self.set.is_none() && self.at.is_none() && self.utc == Bound::UNKNOWN
+        self.is_sure && !self.is_told
     }
 
     /// When it was, on all scales.
@@ -76,10 +88,9 @@ pub(crate) fn is_earlier(one: When, other: When) -> bool {
 impl LifeRuns {
     /// From the steps that were told, and those that show in the stamps.
     pub(crate) fn new(life: &LifeHistory, mut steps: Vec<Step>) -> LifeRuns {
-        for back in backward_steps(&life.entries) {
-            let meets = |step: &Step| step.after <= back.before && step.before >= back.after;
+        for (back, shows) in backward_steps(&life.entries) {
             // It is one of those that were told, or one of the arrivals of one.
-            if !steps.iter().any(|step| step.is_sure && meets(step)) {
+            if !steps.iter().any(|step| step.explains(&back, shows)) {
                 steps.push(back);
             }
         }
@@ -238,25 +249,28 @@ fn may_show(step: Option<&Step>, stamp: Moment<Shown>) -> bool {
 }
 
 /// Whether a clock was set between two stamps: it went back, or it had never been set before.
-fn was_set(earlier: Moment<Shown>, later: Moment<Shown>) -> bool {
+pub(crate) fn was_set(earlier: Moment<Shown>, later: Moment<Shown>) -> bool {
     went_back(earlier, later) || (is_unset(earlier) && !is_unset(later))
 }
 
-/// Where the stamps tell it, the clock was set.
-fn backward_steps(entries: &[Held]) -> Vec<Step> {
+/// Where the stamps tell it, the clock was set, and what it showed then.
+fn backward_steps(entries: &[Held]) -> Vec<(Step, Moment<Shown>)> {
     let mut steps = Vec::new();
     let mut previous: Option<(u64, Moment<Shown>)> = None;
     for held in entries {
         let Some(now) = shown(&held.entry.time) else { continue };
         if let Some((after, _)) = previous.filter(|&(_, earlier)| was_set(earlier, now)) {
-            steps.push(Step {
+            let step = Step {
                 after,
                 before: held.sequence - 1,
                 is_sure: true,
                 at: None,
                 utc: Bound::UNKNOWN,
                 set: None,
-            });
+                follows: None,
+                is_told: false,
+            };
+            steps.push((step, now));
         }
         previous = Some((held.sequence, now));
     }

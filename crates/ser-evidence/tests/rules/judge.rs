@@ -62,13 +62,18 @@ pub(crate) fn faults_of(seed: u64) -> Vec<Fault> {
         Trouble::Conflict => judge.conflict_is_told(),
         Trouble::WrongObservation => judge.wrong_observation_is_told(),
         Trouble::SecretSet => {}
+        Trouble::SecretSetBack => {
+            judge.truth_is_inside();
+            judge.order_is_true();
+            judge.incidents_are_true();
+        }
     }
     // Where what is told is wrong, or nobody told that a clock was set, proofs may contradict each
     // other, whether that is noticed or not.
     let is_believable = match story.world.trouble {
         Trouble::None => true,
         Trouble::Conflict => judge.stamps_are_true(),
-        Trouble::WrongObservation | Trouble::SecretSet => false,
+        Trouble::WrongObservation | Trouble::SecretSet | Trouble::SecretSetBack => false,
     };
     if is_believable && story.world.are_hosts_true && said.contradictions().is_empty() {
         judge.list_respects_order();

@@ -112,7 +112,7 @@ impl Story {
         self.planted = match self.world.trouble {
             Trouble::WrongObservation => plant_wrong_observation(&mut self.sources, chance),
             Trouble::Conflict => plant_conflict(&mut self.sources, chance),
-            Trouble::None | Trouble::SecretSet => None,
+            Trouble::None | Trouble::SecretSet | Trouble::SecretSetBack => None,
         };
     }
 }
@@ -190,7 +190,10 @@ fn add_hand_observations(world: &mut World, chance: &mut Chance) {
     for recorder in 0..world.recorders.len() {
         let truth = &world.recorders[recorder];
         let is_steady = truth.lives.len() == 1 && truth.clocks[0].settings.len() == 1;
-        if !is_steady || !chance.one_in(3) || world.trouble == Trouble::SecretSet {
+        if !is_steady
+            || !chance.one_in(3)
+            || matches!(world.trouble, Trouble::SecretSet | Trouble::SecretSetBack)
+        {
             continue;
         }
         let at = chance.between(S, world.until);

@@ -24,6 +24,8 @@ pub(crate) enum Trouble {
     Conflict,
     /// Somebody set a clock, and no record tells.
     SecretSet,
+    /// Somebody set a clock back to before everything that it had shown, and no record tells.
+    SecretSetBack,
 }
 
 /// The most that the monotonic clock of a host gains or loses, in parts per billion.
@@ -51,6 +53,7 @@ impl World {
             0 => Trouble::WrongObservation,
             1 => Trouble::Conflict,
             2 => Trouble::SecretSet,
+            3 => Trouble::SecretSetBack,
             _ => Trouble::None,
         };
         let start_utc_us = chance.between(1_600_000_000, 1_900_000_000) * 1_000_000;
@@ -75,12 +78,17 @@ impl World {
         let builds = plant::with_first_states(builds, &contacts);
         let set_takes_effect = builds[0].set_takes_effect;
         let operations = operations(&builds, &hosts, &moments, until, chance);
-        let secret = (trouble == Trouble::SecretSet)
-            .then(|| (chance.below(builds.len()), chance.between(0, until)));
+        let secret = matches!(trouble, Trouble::SecretSet | Trouble::SecretSetBack)
+            .then(|| secret(trouble, &builds, &operations, until, chance));
         let live = |(recorder, build): (usize, Build)| {
             let mut sets = sets_of(recorder, &operations);
             if let Some((_, at)) = secret.filter(|&(whose, _)| whose == recorder) {
-                sets.push((at, start_utc_us / 1000 + chance.between(-5000, 5000)));
+                let about_ms = match trouble {
+                    // 1991: no clock of a world that was ever set shows as little.
+                    Trouble::SecretSetBack => 662_688_000_000,
+                    _ => start_utc_us / 1000,
+                };
+                sets.push((at, about_ms + chance.between(-5000, 5000)));
             }
             sets.sort_unstable();
             TrueRecorder::live(build, &contacts, &sets, until, chance)
@@ -98,6 +106,26 @@ impl World {
             operations,
             set_takes_effect,
         }
+    }
+}
+
+/// Whose clock is set in secret, and when. One that is set back is, where that can be, one that was
+/// set or asked shortly before, so that there is something to be forgotten.
+fn secret(
+    trouble: Trouble,
+    builds: &[Build],
+    operations: &[Operation],
+    until: Ps,
+    chance: &mut Chance,
+) -> (usize, Ps) {
+    let mut heard = operations.iter().rev().filter(|operation| !operation.recorders.is_empty());
+    let last = heard.next().filter(|_| trouble == Trouble::SecretSetBack);
+    match last {
+        Some(Operation { recorders, after, .. }) => {
+            let after = *after;
+            (chance.of(recorders), after + chance.between(0, (until - after).clamp(1, 10 * S)))
+        }
+        None => (chance.below(builds.len()), chance.between(0, until)),
     }
 }
 
