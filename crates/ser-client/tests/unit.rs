@@ -5,7 +5,7 @@ mod common;
 use std::io::ErrorKind;
 use std::time::Duration;
 
-use common::unit::Bench;
+use common::unit::{Answers, Bench};
 use common::{Told, told};
 use ser_client::{
     Cursor, Diagnosis, Disturbed, LogFollower, LogPosition, RequestError, Summary, TransportError,
@@ -195,7 +195,7 @@ fn an_original_unit_is_silent_on_the_queries() {
 #[test]
 fn an_original_unit_is_asked_once_who_it_is_and_only_after_it_has_answered() {
     // One that is silent, one whose answer says nothing, and one that answers with what is no answer.
-    let answers: [fn(&Command) -> Option<Vec<u8>>; 3] = [
+    let answers: [Answers; 3] = [
         |_| None,
         |command| (*command == Command::Identify).then(|| b"I?".to_vec()),
         |command| (*command == Command::Identify).then(|| b"Z what".to_vec()),

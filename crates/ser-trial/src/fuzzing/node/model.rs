@@ -461,10 +461,10 @@ impl Recorder {
     fn set_filter(&mut self, input: Option<NonZeroU8>, filter: InputFilter) {
         let inputs = usize::from(self.model.inputs());
         let mut filters = [InputFilter::OFF; 32];
-        for index in 0..inputs {
+        for (index, place) in filters.iter_mut().enumerate().take(inputs) {
             let is_meant = input.is_none_or(|input| usize::from(input.get()) == index + 1);
-            filters[index] = if is_meant { filter } else { self.filter(index) };
-            if filters[index].chatter != self.filter(index).chatter {
+            *place = if is_meant { filter } else { self.filter(index) };
+            if place.chatter != self.filter(index).chatter {
                 self.chatter[index].window_began_ms = None;
             }
         }
