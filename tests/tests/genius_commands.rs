@@ -5,8 +5,8 @@ use std::rc::Rc;
 use geni_board::Destination::{Broadcast, Device};
 use geni_board::{Configuration, Driver, Event, Options, ReceivedDatagram, Start};
 use ser_proto::{
-    AutoReport, Baud, Code, Command, Configure, Entry, Inputs, LastBroadcast, Mode, Model, Reply,
-    TimeStamp,
+    AutoReport, Baud, ClockSource, Code, Command, Configure, Counter, Entry, Inputs, LastBroadcast,
+    Mode, Model, Reply, TimeStamp,
 };
 use ser_sim::genius::{Board, BoardOptions, BoardWindow};
 use ser_trial::genius_world::{HOST, World};
@@ -155,9 +155,6 @@ fn a_broadcast_is_carried_out_and_not_answered() {
     // What was not a command was not a broadcast.
     world.transmit(Broadcast, 0x40, 0x50, &[0x53, 26, 2, 30, 0, 0, 0, 0, 0]);
     world.transmit(Broadcast, 0x40, 0x50, &[0x99]);
-    // Nor was a command of our extension, which is unknown to this recorder.
-    world.transmit(Broadcast, 0x40, 0x50, &[0x54, 0x00, 0x07]);
-    world.transmit(Device(UNIT), 0x40, 0x50, &[0x49]);
     world.run(50);
     assert_eq!(world.take_message(UNIT), None);
     let Reply::LastBroadcast(Some(LastBroadcast { code, .. })) =
@@ -166,6 +163,54 @@ fn a_broadcast_is_carried_out_and_not_answered() {
         panic!()
     };
     assert_eq!(code, Code::Erase.byte());
+    world.assert_lawful();
+}
+
+#[test]
+fn a_broadcast_question_for_the_time_is_a_mark_that_nobody_answers() {
+    let mut world = started(Model::Ser160);
+    world.ask(UNIT, &Command::SetClock(NOON));
+    let reading = |world: &mut World, token| match world.ask(UNIT, &Command::Time { token }) {
+        Reply::Time(reading) => reading,
+        other => panic!("{other:?}"),
+    };
+    let before = reading(&mut world, 1);
+    assert_eq!((before.token, before.last_mark), (1, None));
+    assert_eq!(before.source, ClockSource::HostOverGenius);
+    world.send(Broadcast, &Command::Time { token: 7 });
+    world.run(50);
+    assert_eq!(world.take_message(UNIT), None);
+    let after = reading(&mut world, 2);
+    let mark = after.last_mark.expect("it was broadcast");
+    assert_eq!(mark.token, 7);
+    assert!((before.clock_us..after.clock_us).contains(&mark.clock_us), "{mark:?}");
+    let Reply::LastBroadcast(Some(last)) = world.ask(UNIT, &Command::LastBroadcast) else {
+        panic!()
+    };
+    // Both say when it came, one to the millisecond.
+    assert_eq!(last.code, Code::Time.byte());
+    let ms = mark.clock_us / 1000 % 1000;
+    assert_eq!(i64::from(last.millisecond), ms);
+    world.assert_lawful();
+}
+
+#[test]
+fn a_recorder_says_over_genius_too_who_it_is_and_what_it_counted() {
+    let mut world = started(Model::Ser320);
+    let Reply::Identity(identity) = world.ask(UNIT, &Command::Identify) else { panic!() };
+    assert_eq!((identity.model, identity.life), (Model::Ser320, 1));
+    world.transmit(Broadcast, 0x40, 0x50, &[0x99]);
+    world.run(50);
+    let first = Counter::COMMANDS_UNKNOWN;
+    let Reply::Diagnostics(page) = world.ask(UNIT, &Command::Diagnostics { first }) else {
+        panic!()
+    };
+    assert_eq!(page.counters().next(), Some((first, 1)));
+    let first = Counter::DATAGRAMS_IGNORED;
+    let Reply::Diagnostics(page) = world.ask(UNIT, &Command::Diagnostics { first }) else {
+        panic!()
+    };
+    assert_eq!(page.first, first, "and those of its Genius port");
     world.assert_lawful();
 }
 

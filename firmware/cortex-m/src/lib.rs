@@ -6,6 +6,7 @@
 #![no_std]
 
 pub mod hard_fault;
+pub mod held_off;
 pub mod last_words;
 pub mod protection;
 pub mod stack;

@@ -26,6 +26,8 @@ mod watchdog;
 
 #[rtic::app(device = crate::device, peripherals = false)]
 mod app {
+    use core::mem::MaybeUninit;
+
     use ser_board::budget;
     use ser_board::health::Health;
     use ser_board::inputs::{Sample, Sampler};
@@ -34,6 +36,7 @@ mod app {
     use ser_board::main_loop;
     use ser_board::report::{self, Report};
     use ser_board::start::{self, BoardNode, BoardParts, Memory};
+    use ser_cortex_m::held_off::HeldOff;
     use ser_cortex_m::protection::{self, Region};
     use ser_cortex_m::stack;
     use ser_node::{Capture, GeniusOptions, Liveness, VERSION};
@@ -68,13 +71,13 @@ mod app {
     };
 
     #[shared]
-    struct Shared {
-        capture: Capture<'static>,
-    }
+    struct Shared {}
 
     #[local]
     struct Local {
         timer: Timer,
+        capture: &'static HeldOff<Capture<'static>>,
+        capture_in_main: &'static HeldOff<Capture<'static>>,
         sampler: Sampler<'static, InputLatch>,
         receive: ReceiveInterrupt,
         transmit: TransmitInterrupt,
@@ -87,11 +90,12 @@ mod app {
     }
 
     #[init(local = [
+        held_off: MaybeUninit<HeldOff<Capture<'static>>> = MaybeUninit::uninit(),
         memory: Memory<'static, BenchFlash, BenchClock> = Memory::new(),
         rings: Rings = Rings::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let init::LocalResources { memory, rings, .. } = cx.local;
+        let init::LocalResources { memory, rings, held_off, .. } = cx.local;
         log::start();
         // SAFETY: the program uses nothing in that region.
         unsafe { protection::enable(&cx.core.MPU, [BELOW_STACK]) };
@@ -108,6 +112,7 @@ mod app {
         let (debounce, id) = (external_bus::debounce(), external_bus::id());
         let parts = BoardParts { model, debounce, flash, clock, id };
         let (capture, node) = start::start(memory, parts, &HEALTH);
+        let capture: &_ = held_off.write(HeldOff::new(capture));
         let (serial, receive, transmit) = uart::start(rings, node.baud());
         // SAFETY: as above.
         let genius = unsafe { GeniBoard::find() };
@@ -120,9 +125,11 @@ mod app {
         let lamps = Lamps::new();
         let was_fault = boot.cause.is_fault();
         (
-            Shared { capture },
+            Shared {},
             Local {
                 timer,
+                capture,
+                capture_in_main: capture,
                 sampler,
                 receive,
                 transmit,
@@ -142,15 +149,15 @@ mod app {
     }
 
     /// Takes a sample of all inputs.
-    #[task(binds = TIMER0, priority = 3, local = [timer, sampler], shared = [capture])]
+    #[task(binds = TIMER0, priority = 3, local = [timer, sampler, capture])]
     fn capture(cx: capture::Context) {
-        let capture::LocalResources { timer, sampler, .. } = cx.local;
-        let mut capture = cx.shared.capture;
+        let capture::LocalResources { timer, sampler, capture, .. } = cx.local;
         if let Some(tick_ms) = timer.on_interrupt()
             && let Sample::Fresh(inputs) | Sample::Held(inputs) = sampler.sample()
         {
-            // Nothing is locked: no task has a higher priority.
-            capture.lock(|capture| capture.sample(tick_ms, inputs));
+            // SAFETY: this interrupt only, once in each run.
+            let capture = unsafe { capture.get() };
+            capture.sample(tick_ms, inputs);
             external_bus::mark_sample(tick_ms, inputs);
         }
     }
@@ -165,17 +172,24 @@ mod app {
         cx.local.transmit.on_interrupt();
     }
 
-    #[idle(local = [serial, node, genius, lamps, watchdog, was_fault], shared = [capture])]
+    #[idle(local = [serial, node, genius, lamps, watchdog, was_fault, capture_in_main])]
     fn idle(cx: idle::Context) -> ! {
-        let idle::LocalResources { serial, node, genius, lamps, watchdog, was_fault, .. } =
-            cx.local;
-        let mut capture = cx.shared.capture;
+        let idle::LocalResources {
+            serial,
+            node,
+            genius,
+            lamps,
+            watchdog,
+            was_fault,
+            capture_in_main,
+            ..
+        } = cx.local;
         let mut liveness = Liveness::new();
         let mut report = Report::new(node.tick_ms(), &HEALTH);
         loop {
             let now_ms = main_loop::pass(node, serial, genius.as_mut());
             main_loop::change_debounce(node, |times| {
-                capture.lock(|capture| capture.take_times(times))
+                capture_in_main.with(|capture| capture.take_times(times))
             });
             let broken = HEALTH.is_broken();
             lamps.show(

@@ -42,6 +42,8 @@ mod watchdog;
 
 #[rtic::app(device = stm32f4::stm32f407, peripherals = true)]
 mod app {
+    use core::mem::MaybeUninit;
+
     use ser_board::budget;
     use ser_board::health::Health;
     use ser_board::inputs::{InputHealth, Sample, Sampler};
@@ -50,6 +52,7 @@ mod app {
     use ser_board::main_loop;
     use ser_board::report::{self, Report};
     use ser_board::start::{self, BoardNode, BoardParts, Memory};
+    use ser_cortex_m::held_off::HeldOff;
     use ser_cortex_m::{last_words, stack};
     use ser_node::{Capture, GeniusOptions, Liveness, VERSION};
 
@@ -74,13 +77,13 @@ mod app {
     };
 
     #[shared]
-    struct Shared {
-        capture: Capture<'static>,
-    }
+    struct Shared {}
 
     #[local]
     struct Local {
         timer: Timer,
+        capture: &'static HeldOff<Capture<'static>>,
+        capture_in_main: &'static HeldOff<Capture<'static>>,
         sampler: Sampler<'static, InputPins>,
         serial_interrupt: SerialInterrupt,
         geni_line: InterruptLine,
@@ -108,13 +111,14 @@ mod app {
     };
 
     #[init(local = [
+        held_off: MaybeUninit<HeldOff<Capture<'static>>> = MaybeUninit::uninit(),
         memory: Memory<'static, ConfigurationFlash, ChipClock> = Memory::new(),
         rings: Rings = Rings::new(),
         pulses: Pulses = Pulses::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         boot::use_vectors_in_ram(&cx.core.SCB);
-        let init::LocalResources { memory, rings, pulses, .. } = cx.local;
+        let init::LocalResources { memory, rings, pulses, held_off, .. } = cx.local;
         let device = cx.device;
         let ports = pins::Ports {
             a: device.GPIOA,
@@ -145,6 +149,7 @@ mod app {
             id: chip::id(),
         };
         let (capture, node) = start::start(memory, parts, &HEALTH);
+        let capture: &_ = held_off.write(HeldOff::new(capture));
         let (serial, serial_interrupt) =
             uart::start(&device.RCC, device.USART2, rings, node.baud());
         let (pulsed, pulses) = pulses.split();
@@ -164,9 +169,11 @@ mod app {
         let sampler = Sampler::new(contacts, inputs::wiring(model), &INPUT_HEALTH);
         let timer = Timer::start(&device.RCC, device.TIM2, device.TIM3);
         (
-            Shared { capture },
+            Shared {},
             Local {
                 timer,
+                capture,
+                capture_in_main: capture,
                 sampler,
                 serial_interrupt,
                 geni_line,
@@ -194,15 +201,15 @@ mod app {
     }
 
     /// Takes a sample of all inputs.
-    #[task(binds = TIM3, priority = 3, local = [timer, sampler], shared = [capture])]
+    #[task(binds = TIM3, priority = 3, local = [timer, sampler, capture])]
     fn capture(cx: capture::Context) {
-        let capture::LocalResources { timer, sampler, .. } = cx.local;
-        let mut capture = cx.shared.capture;
+        let capture::LocalResources { timer, sampler, capture, .. } = cx.local;
         if let Some(tick_ms) = timer.on_interrupt()
             && let Sample::Fresh(inputs) | Sample::Held(inputs) = sampler.sample()
         {
-            // Nothing is locked: no task has a higher priority.
-            capture.lock(|capture| capture.sample(tick_ms, inputs));
+            // SAFETY: this interrupt only, once in each run.
+            let capture = unsafe { capture.get() };
+            capture.sample(tick_ms, inputs);
         }
     }
 
@@ -217,16 +224,24 @@ mod app {
         cx.local.geni_line.on_interrupt(timer::tick_ms());
     }
 
-    #[idle(local = [serial, node, genius, lamps, watchdog, start], shared = [capture])]
+    #[idle(local = [serial, node, genius, lamps, watchdog, start, capture_in_main])]
     fn idle(cx: idle::Context) -> ! {
-        let idle::LocalResources { serial, node, genius, lamps, watchdog, start, .. } = cx.local;
-        let mut capture = cx.shared.capture;
+        let idle::LocalResources {
+            serial,
+            node,
+            genius,
+            lamps,
+            watchdog,
+            start,
+            capture_in_main,
+            ..
+        } = cx.local;
         let mut liveness = Liveness::new();
         let mut report = Report::new(node.tick_ms(), &HEALTH);
         loop {
             let now_ms = main_loop::pass(node, serial, genius.as_mut());
             main_loop::change_debounce(node, |times| {
-                capture.lock(|capture| capture.take_times(times))
+                capture_in_main.with(|capture| capture.take_times(times))
             });
             let broken = start.clock_source != Source::Crystal || HEALTH.is_broken();
             lamps.show(
