@@ -23,7 +23,11 @@ const HOW: How = How::Set { broadcast: None };
 /// The changes of a report as `U1/3 on`.
 fn rows(timeline: &Timeline<'_>, report: &Report) -> Vec<String> {
     let name = |change: ChangeId| timeline.recorder(change.event).unwrap().recorder.name.clone();
-    let on = |on| if on { "on" } else { "off" };
+    let on = |on| match on {
+        Some(true) => "on",
+        Some(false) => "off",
+        None => "?",
+    };
     let text = |row: &ser_evidence::incident::Row| {
         format!("{}/{} {}", name(row.change), row.change.input, on(row.on))
     };
@@ -307,6 +311,53 @@ fn a_breaker_says_how_long_it_took_and_its_contacts_how_long_they_disagreed() {
     assert!(!off.both_on && off.until.is_some());
     let abnormal: Vec<usize> = report.abnormal.iter().map(|abnormal| abnormal.point.0).collect();
     assert_eq!(abnormal, [0, 1], "the trip has not reset, and the breaker is open");
+}
+
+#[test]
+fn a_state_that_no_source_tells_is_not_off() {
+    let site = site(BREAKER);
+    let mut u1 = Log::of("U1", 1);
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    u1.observed(HOW, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(1_000));
+    u1.changes("2026-11-22T10:00:01.000", &[7]).changes("2026-11-22T10:00:10.000", &[5]);
+    u1.moves("2026-11-22T10:00:10.040", &[7]);
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let report = report(&timeline, Which::LastTrip);
+    assert_eq!(rows(&timeline, &report), ["U1/5 on", "U1/7 ?"]);
+    assert_eq!(report.operations, [], "nobody knows that the breaker opened");
+    let opens = report.steps[0];
+    assert_eq!(opens.verdict, Verdict::NotDecidable(Doubt::UnknownState));
+    assert_eq!(opens.then.map(|then| then.input), Some(7), "it may be this");
+    let abnormal: Vec<usize> = report.abnormal.iter().map(|abnormal| abnormal.point.0).collect();
+    assert_eq!(abnormal, [0], "of the breaker nobody knows it");
+    // A contact that may have opened or closed has the delays of both.
+    let width = |input, place| {
+        let event = EventId { recorder: 0, life: 0, place };
+        timeline.moved_utc(event, Some(input)).width_us().unwrap()
+    };
+    assert!(width(7, 2) > width(5, 1));
+}
+
+#[test]
+fn a_step_that_may_have_begun_is_not_decidable_and_what_follows_later_neither() {
+    let site = site(&BREAKER.replace("[15, 50]", "[15, 60_000]"));
+    let mut u1 = Log::of("U1", 1);
+    u1.changes("2026-11-22T10:00:01.000", &[7]).moves("2026-11-22T10:00:10.000", &[5]);
+    u1.changes("2026-11-22T10:00:10.040", &[7]);
+    // After a quiet time.
+    u1.changes("2026-11-22T11:00:00.000", &[5, 7]).changes("2026-11-22T11:00:10.000", &[5]);
+    u1.changes("2026-11-22T11:00:20.000", &[5]).moves("2026-11-22T11:00:50.000", &[7]);
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let incidents = Incident::all(&timeline).into_iter();
+    let steps = incidents.flat_map(|incident| Report::new(&timeline, incident).steps);
+    let opens: Vec<_> = steps.filter(|step| step.expectation == 0).collect();
+    assert_eq!(opens.len(), 2, "{opens:?}");
+    for step in opens {
+        assert_eq!(step.verdict, Verdict::NotDecidable(Doubt::UnknownState));
+        assert_eq!(step.then.map(|then| then.input), Some(7));
+    }
 }
 
 const SET: How = How::Set { broadcast: None };

@@ -39,6 +39,15 @@ impl Readings {
         self.collector.add(recorder, &Record::Entry(record));
     }
 
+    /// Inputs change in the entry with this number, and nobody knows to what.
+    fn moved(&mut self, recorder: &str, number: u16, time: &str, changed: u32) {
+        let time = stamp(time);
+        let entry = Entry { changed: Inputs(changed), state: Inputs(0), time };
+        let (life, sequence) = (life(recorder), Some(number.into()));
+        let record = EntryRecord { life, sequence, number, entry, known: Inputs(0) };
+        self.collector.add(recorder, &Record::Entry(record));
+    }
+
     /// The clock was set right after this entry, to within two milliseconds.
     fn set(&mut self, recorder: &str, after: u64, time: &str) {
         self.set_within(recorder, after, time, 2_000);
@@ -398,4 +407,22 @@ fn long_lists_are_short_for_people_and_whole_for_programs() {
     let verdict = json["verdict"].to_string();
     assert!(verdict.contains("Valve 19 ON and Valve 20 ON"), "{verdict}");
     assert!(!verdict.contains("more"), "{verdict}");
+}
+
+#[test]
+fn a_state_that_nobody_knows_is_said_to_be_not_known() {
+    let mut readings = Readings::of(
+        "[[recorder]]\nname = \"U1\"\n[[point]]\ninput = 2\nname = \"52a\"\nrole = \"52a\"\n\
+         equipment = \"52-1\"\non = \"CLOSED\"\noff = \"OPEN\"\nnormal = \"on\"\n",
+    );
+    readings.set("U1", 0, "2026-11-22T10:00:00.000");
+    readings.entry("U1", 1, "2026-11-22T10:00:01.000", (1, 1));
+    readings.moved("U1", 2, "2026-11-22T10:00:01.020", 2);
+    let told = readings.told();
+    let text = told.text();
+    assert!(text.contains("U1 52a state not known 2"), "{text}");
+    assert!(!text.contains("opened") && !text.contains("OPEN"), "{text}");
+    let json = told.json();
+    let row = &json["sequence"][1];
+    assert_eq!((row["on"].is_null(), row["state"].is_null()), (true, true), "{row:#}");
 }

@@ -50,7 +50,7 @@ pub(super) fn operations(timeline: &Timeline<'_>, rows: &[Row]) -> Vec<Operation
         }
         let before = rows.iter().take_while(|other| other.change != row.change);
         let wanted = if opened { Role::Trip } else { Role::Close };
-        let command = before.filter(|other| other.on).filter(|other| {
+        let command = before.filter(|other| other.on == Some(true)).filter(|other| {
             point(other).is_some_and(|point| {
                 point.role == Some(wanted) && point.equipment.as_ref() == Some(equipment)
             })
@@ -68,8 +68,9 @@ pub(super) fn operations(timeline: &Timeline<'_>, rows: &[Row]) -> Vec<Operation
     operations
 }
 
-/// Whether a breaker opened, by one of its contacts.
-fn opened(role: Option<Role>, on: bool) -> Option<bool> {
+/// Whether a breaker opened, by one of its contacts; `None` if that contact says nothing of it.
+fn opened(role: Option<Role>, on: Option<bool>) -> Option<bool> {
+    let on = on?;
     match role? {
         Role::BreakerClosed => Some(!on),
         Role::BreakerOpen => Some(on),

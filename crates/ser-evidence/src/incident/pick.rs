@@ -149,7 +149,7 @@ impl Rank {
     }
 }
 
-/// Whether a point went on whose role trips.
+/// Whether a point went on whose role trips, or may have.
 fn has_trip(timeline: &Timeline<'_>, points: &Points, incident: &Incident) -> bool {
     let site = timeline.site();
     let trips = |event: &EventId| {
@@ -157,7 +157,7 @@ fn has_trip(timeline: &Timeline<'_>, points: &Points, incident: &Incident) -> bo
         held.entry.changed.numbers().any(|input| {
             let point = points.of(ChangeId { event: *event, input });
             let role = point.and_then(|point| site.points.get(point.0)?.role);
-            matches!(role, Some(Role::Trip | Role::Lockout)) && held.entry.state.contains(input)
+            matches!(role, Some(Role::Trip | Role::Lockout)) && held.state_of(input) != Some(false)
         })
     };
     incident.events.iter().any(trips)

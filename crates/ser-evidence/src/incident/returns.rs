@@ -29,7 +29,7 @@ pub(super) fn abnormal(
         let (id, normal) = (PointId(index), point.normal?);
         let last = rows.iter().rfind(|row| row.point == Some(id));
         let on = match last {
-            Some(row) => row.on,
+            Some(row) => row.on?,
             None => state_before(timeline, points, incident, id)?,
         };
         (on != normal).then(|| Abnormal { point: id, on, since: last.map(|row| row.change) })
@@ -49,16 +49,11 @@ pub(super) fn state_before(
     let of_recorder = |event: &&EventId| event.recorder == recorder;
     if let Some(&first) = incident.events.iter().find(of_recorder) {
         let held = timeline.held(first)?;
-        if !held.known.contains(described.input) {
-            return None;
-        }
-        let entry = held.entry;
-        let changed = entry.changed.contains(described.input);
-        return Some(entry.state.contains(described.input) != changed);
+        let changed = held.entry.changed.contains(described.input);
+        return held.state_of(described.input).map(|on| on != changed);
     }
     // Nothing happened there: it is as the last entry before left it.
     let begins = incident.events.first().and_then(|&first| timeline.sort_key(first))?;
     let last = timeline.last_before(recorder, begins)?;
-    let held = timeline.held(last)?;
-    held.known.contains(described.input).then(|| held.entry.state.contains(described.input))
+    timeline.held(last)?.state_of(described.input)
 }

@@ -71,6 +71,16 @@ impl Log {
         self
     }
 
+    /// These inputs change, and the source does not say to what.
+    pub(crate) fn moves(&mut self, time: &str, inputs: &[u8]) -> &mut Log {
+        self.changes(time, inputs);
+        if let Some(Record::Entry(record)) = self.records.last_mut() {
+            record.known.0 &= !record.entry.changed.0;
+            record.entry.state.0 &= record.known.0;
+        }
+        self
+    }
+
     /// These inputs change and no entry says so.
     pub(crate) fn forgets(&mut self, inputs: &[u8]) -> &mut Log {
         self.state ^= inputs.iter().fold(0, |bits, input| bits | 1 << (input - 1));

@@ -228,7 +228,7 @@ fn sequence(document: &Document<'_>) -> Vec<Value> {
             "input": input,
             "point": point.map(|point| &point.name),
             "on": row.on,
-            "state": point.map(|point| if row.on { &point.on } else { &point.off }),
+            "state": point.zip(row.on).map(|(point, on)| if on { &point.on } else { &point.off }),
             "chatter": row.chatter,
             "shifted_us": timeline.shift_us(event),
             "clock_was_set_before": marks.is_set_ahead_of(event),

@@ -242,6 +242,7 @@ pub(super) fn why_undecidable(why: Doubt) -> &'static str {
     match why {
         Doubt::Straddles => "the doubt reaches over an end of the window",
         Doubt::NoCommonTime => "nothing is known of the time between the two",
+        Doubt::UnknownState => "one of the two changed to a state that is not known",
         Doubt::Gap => "an entry may be missing",
         Doubt::NotReadSince => "its log was not read since",
     }
