@@ -313,6 +313,66 @@ fn a_breaker_says_how_long_it_took_and_its_contacts_how_long_they_disagreed() {
     assert_eq!(abnormal, [0, 1], "the trip has not reset, and the breaker is open");
 }
 
+/// The changes of `BREAKER` at these milliseconds, and what is said to have operated.
+fn operated(site: &str, changes: &[(u32, u8)]) -> Vec<String> {
+    let site = self::site(site);
+    let mut u1 = Log::of("U1", 1);
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    u1.observed(HOW, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(1_000));
+    for (ms, input) in changes {
+        u1.changes(&format!("2026-11-22T10:00:{:02}.{:03}", 10 + ms / 1000, ms % 1000), &[*input]);
+    }
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let ms = |delta: &ser_evidence::timeline::Delta| (delta.middle_us().unwrap() + 500) / 1000;
+    let text = |operation: &ser_evidence::incident::Operation| {
+        let mut text = (if operation.opened { "opened" } else { "closed" }).to_owned();
+        text.extend(operation.took.iter().map(|took| format!(" {}", ms(took))));
+        let bounce = operation.bounce.iter();
+        text.extend(bounce.map(|of| format!(", bounced {} in {}", of.changes, ms(&of.lasted))));
+        text.extend(operation.returned.iter().map(|after| format!(", back after {}", ms(after))));
+        text
+    };
+    report(&timeline, Which::Last).operations.iter().map(text).collect()
+}
+
+/// The close command is input 6.
+const CLOSE: &str = "
+[[point]]
+input = 6
+name = \"Close\"
+role = \"close\"
+equipment = \"52-1\"
+";
+
+#[test]
+fn a_breaker_that_does_not_stay_where_it_went_has_not_bounced() {
+    let of = |changes: &[(u32, u8)]| operated(&format!("{BREAKER}{CLOSE}"), changes);
+    // Contact 7 is 52a, and off at first; 8 is 52b.
+    assert_eq!(of(&[(0, 7), (400, 5), (430, 7), (450, 7)])[1..], ["opened 30, back after 20"]);
+    assert_eq!(of(&[(0, 6), (30, 7), (50, 7)]), ["closed 30, back after 20"]);
+    let with_52b = [(0, 7), (400, 5), (430, 7), (433, 8), (447, 8), (450, 7)];
+    assert_eq!(of(&with_52b)[1..], ["opened 30, back after 20"]);
+    let bounced = [(0, 7), (400, 5), (430, 7), (433, 7), (436, 7)];
+    assert_eq!(of(&bounced)[1..], ["opened 30, bounced 2 in 6"]);
+    let bounced_and_back = [(0, 7), (400, 5), (430, 7), (433, 7), (436, 7), (450, 7)];
+    assert_eq!(of(&bounced_and_back)[1..], ["opened 30, bounced 2 in 6, back after 20"]);
+    // Closed on a fault, and tripped at once: neither is a bounce.
+    assert_eq!(of(&[(0, 6), (50, 7), (55, 5), (75, 7)]), ["closed 50", "opened 20"]);
+    assert_eq!(of(&[(0, 6), (45, 5), (50, 7), (75, 7)]), ["closed 50", "opened 30"]);
+}
+
+#[test]
+fn an_operation_is_after_its_command_only_if_that_may_be_why() {
+    let of = |changes: &[(u32, u8)]| operated(&format!("{BREAKER}{CLOSE}"), changes);
+    let again = [(0, 7), (400, 5), (430, 7), (450, 5), (600, 7), (800, 7)];
+    assert_eq!(of(&again), ["closed", "opened 30", "closed", "opened"]);
+    // It was still on, or had just ended.
+    assert_eq!(of(&[(0, 7), (400, 5), (1500, 7)])[1..], ["opened 1100"]);
+    assert_eq!(of(&[(0, 7), (400, 5), (450, 5), (1300, 7)])[1..], ["opened 900"]);
+    assert_eq!(of(&[(0, 7), (400, 5), (450, 5), (1600, 7)])[1..], ["opened"]);
+}
+
 #[test]
 fn a_state_that_no_source_tells_is_not_off() {
     let site = site(BREAKER);

@@ -426,3 +426,26 @@ fn a_state_that_nobody_knows_is_said_to_be_not_known() {
     let row = &json["sequence"][1];
     assert_eq!((row["on"].is_null(), row["state"].is_null()), (true, true), "{row:#}");
 }
+
+#[test]
+fn a_trip_that_failed_is_wrong_and_no_bounce() {
+    let mut readings = Readings::of(
+        "[[recorder]]\nname = \"U1\"\n[[point]]\ninput = 1\nname = \"Trip\"\nrole = \"trip\"\n\
+         equipment = \"52-1\"\n[[point]]\ninput = 2\nname = \"52a\"\nrole = \"52a\"\n\
+         equipment = \"52-1\"\nnormal = \"on\"\n",
+    );
+    readings.set("U1", 0, "2026-11-22T10:00:00.000");
+    readings.entry("U1", 1, "2026-11-22T10:00:01.000", (1, 3));
+    readings.entry("U1", 2, "2026-11-22T10:00:01.030", (2, 1));
+    readings.entry("U1", 3, "2026-11-22T10:00:01.034", (2, 3));
+    readings.entry("U1", 4, "2026-11-22T10:00:01.036", (2, 1));
+    readings.entry("U1", 5, "2026-11-22T10:00:01.050", (2, 3));
+    readings.watched("U1", 5, "2026-11-22T10:01:00.000");
+    let told = readings.told();
+    let json = told.json();
+    let said = "52-1 opened 29.9 ms after its trip (bounced once in 6 ms), and closed again after \
+                20.1 ms";
+    assert_eq!(json["verdict"]["operated"][0], said);
+    assert_eq!(json["verdict"]["wrong"][0], "52-1 opened for 20.1 ms and closed again");
+    assert!(json["operations"][0]["returned"].is_object(), "{json:#}");
+}

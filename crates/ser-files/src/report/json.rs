@@ -286,6 +286,7 @@ fn operations(document: &Document<'_>) -> Vec<Value> {
                 "changes": bounce.changes,
                 "lasted": delta(bounce.lasted),
             })),
+            "returned": operation.returned.map(delta),
         })
     })
     .collect()

@@ -109,11 +109,11 @@ fn step(document: &Document<'_>, step: &StepResult) -> Option<Step> {
 
 /// What breakers did, and contact pairs that disagreed.
 pub(super) fn breakers(document: &Document<'_>) -> Vec<String> {
-    let Document { timeline, report, .. } = *document;
+    let report = document.report;
     let operated = report.operations.iter().map(|operation| {
         let off = operation.took.and_then(Delta::doubt_us);
         let off = off.map_or_else(String::new, |off| format!(", ± {}", doubt(off)));
-        format!("{}{off}", verdict::operated(timeline, operation))
+        format!("{}{off}", verdict::operated(operation))
     });
     operated.chain(report.disagreements.iter().map(disagreement)).collect()
 }
