@@ -129,6 +129,38 @@ fn what_another_source_has_is_not_missing_and_the_rest_keeps_its_reason() {
 }
 
 #[test]
+fn what_a_list_lost_is_missing_though_it_skips_no_number() {
+    let site = site("[[recorder]]\nname = \"U1\"\n");
+    let mut list = Log::of("U1", 7);
+    list.is_list().tells(0, Lost::AtLeast(1), Why::NotReached);
+    list.changes("2026-11-22T10:00:00.100", &[1]).changes("2026-11-22T10:00:00.200", &[1]);
+    list.tells(2, Lost::Unknown, Why::NotReached);
+    list.changes("2026-11-22T10:00:00.300", &[1]).tells(3, Lost::Unknown, Why::NotReached);
+    let history = history(&site, &[&list]);
+    let gaps = history.recorders[0].lives[0].gaps.iter();
+    let gaps: Vec<_> = gaps.map(|gap| (gap.place, gap.after, gap.lost)).collect();
+    let (at_least, unknown) = (Lost::AtLeast(1), Lost::Unknown);
+    assert_eq!(gaps, [(0, 0, at_least), (2, 2, unknown), (3, 3, unknown)]);
+    let timeline = Timeline::new(&site, &history);
+    let report = report(&timeline, Which::Last);
+    assert_eq!(report.first_out.known(), None, "it may have been first");
+    assert_eq!(report.first_out.gaps.len(), 1);
+    assert!(report.is_incomplete());
+}
+
+#[test]
+fn what_was_not_recorded_after_an_erase_is_missing_before_the_first_entry() {
+    let site = site("[[recorder]]\nname = \"U1\"\n");
+    let mut u1 = Log::of("U1", 7);
+    u1.tells(0, Lost::Unknown, Why::NotRecorded(0b100));
+    u1.changes("2026-11-22T10:00:00.100", &[1]).tells(1, Lost::Unknown, Why::NotRecorded(0b100));
+    u1.changes("2026-11-22T10:00:00.200", &[1]);
+    let history = history(&site, &[&u1]);
+    let gaps: Vec<u64> = history.recorders[0].lives[0].gaps.iter().map(|gap| gap.after).collect();
+    assert_eq!(gaps, [0], "two entries that show all states show that nothing changed between");
+}
+
+#[test]
 fn first_out_is_a_set_where_the_clocks_do_not_decide() {
     let site = site(TWO_RECORDERS);
     let (mut u1, mut u2) = (Log::of("U1", 1), Log::of("U2", 2));
