@@ -261,14 +261,34 @@ fn a_time_that_cuts_an_incident_leaves_it_open_what_was_first() {
     let between = |since, until| report(&timeline, Which::Between(us(since), us(until)));
 
     let whole = between("2026-11-22T10:00:00.000", "2026-11-22T10:00:20.000");
-    assert_eq!((whole.incident.earlier, whole.incident.later), (0, 0), "25 s are a quiet time");
+    assert_eq!(
+        (whole.incident.earlier.len(), whole.incident.later),
+        (0, 0),
+        "25 s are a quiet time"
+    );
     assert!(whole.first_out.known().is_some());
     let cut = between("2026-11-22T10:00:05.150", "2026-11-22T10:00:20.000");
-    assert_eq!((cut.incident.earlier, cut.incident.later), (2, 0));
+    assert_eq!((cut.incident.earlier.len(), cut.incident.later), (2, 0));
     assert_eq!((cut.first_out.changes.len(), cut.first_out.known()), (1, None));
     let cut = between("2026-11-22T10:00:00.000", "2026-11-22T10:00:05.050");
-    assert_eq!((cut.incident.earlier, cut.incident.later), (0, 2));
+    assert_eq!((cut.incident.earlier.len(), cut.incident.later), (0, 2));
     assert!(cut.first_out.known().is_some());
+}
+
+#[test]
+fn what_went_wrong_in_the_incident_before_the_time_asked_for_has_not_returned() {
+    let site = site(BREAKER);
+    let u1 = trip(40, Some("2026-11-22T10:00:10.600"));
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let us = |text| Some(Moment::from_us(seen(text).us()));
+    let cut = report(&timeline, Which::Between(us("2026-11-22T10:00:10.020"), None));
+    let since: Vec<_> =
+        cut.abnormal.iter().map(|abnormal| abnormal.since.map(|since| since.event.place)).collect();
+    assert_eq!(since, [Some(1), Some(2)], "the trip is before the time, and in the incident");
+    let rest = report(&timeline, Which::Between(us("2026-11-22T10:00:10.500"), None));
+    let input = |abnormal: &ser_evidence::incident::Abnormal| abnormal.since.map(|it| it.input);
+    assert_eq!(rest.abnormal.iter().map(input).collect::<Vec<_>>(), [Some(5), Some(7)]);
 }
 
 #[test]

@@ -109,8 +109,13 @@ struct Told {
 impl Told {
     /// The report about the last incident.
     fn write(&self, write: impl Fn(&mut Vec<u8>, &Document<'_>)) -> String {
+        self.write_of(Which::Last, write)
+    }
+
+    /// The report about another one.
+    fn write_of(&self, which: Which, write: impl Fn(&mut Vec<u8>, &Document<'_>)) -> String {
         let timeline = Timeline::new(&self.site, &self.history);
-        let incident = Incident::pick(&timeline, Which::Last).expect("an incident");
+        let incident = Incident::pick(&timeline, which).expect("an incident");
         let report = Report::new(&timeline, incident);
         let document = Document {
             timeline: &timeline,
@@ -128,7 +133,11 @@ impl Told {
 
     /// Its text in one line, blanks in a row as one.
     fn text(&self) -> String {
-        let text = self.write(|out, document| {
+        self.text_of(Which::Last)
+    }
+
+    fn text_of(&self, which: Which) -> String {
+        let text = self.write_of(which, |out, document| {
             write_text(out, document, Styles::default()).expect("it takes it");
         });
         text.split_whitespace().collect::<Vec<_>>().join(" ")
@@ -448,4 +457,22 @@ fn a_trip_that_failed_is_wrong_and_no_bounce() {
     assert_eq!(json["verdict"]["operated"][0], said);
     assert_eq!(json["verdict"]["wrong"][0], "52-1 opened for 20.1 ms and closed again");
     assert!(json["operations"][0]["returned"].is_object(), "{json:#}");
+}
+
+#[test]
+fn with_entries_before_the_time_asked_for_no_row_is_said_to_be_first() {
+    let mut readings = Readings::of(
+        "[[recorder]]\nname = \"U1\"\n[[point]]\ninput = 1\nname = \"Trip\"\nnormal = \"off\"\n",
+    );
+    readings.set("U1", 0, "2026-11-22T10:00:00.000");
+    readings.entry("U1", 1, "2026-11-22T10:00:01.000", (1, 1));
+    readings.entry("U1", 2, "2026-11-22T10:00:01.030", (2, 3));
+    let since = Some(Moment::from_us(utc_us("2026-11-22T10:00:01.020")));
+    let text = readings.told().text_of(Which::Between(since, None));
+    let first = "first-out not known: 1 entry of the incident is before the time asked for; first of \
+                 what is shown: input 2 ON (U1)";
+    assert!(text.contains(first), "{text}");
+    assert!(!text.contains("maybe first-out"), "{text}");
+    assert!(text.contains("not returned to normal: Trip ON"), "{text}");
+    assert!(!text.contains("since before the incident"), "{text}");
 }

@@ -17,7 +17,7 @@ pub struct Disagreement {
     pub equipment: String,
     /// Whether both were on.
     pub both_on: bool,
-    /// Since when; `None`: since before the incident.
+    /// Since when; `None`: since before the first row.
     pub since: Option<ChangeId>,
     /// Until when; `None`: still at its end.
     pub until: Option<ChangeId>,

@@ -13,7 +13,8 @@ pub struct Abnormal {
     pub point: PointId,
     /// Whether it is on.
     pub on: bool,
-    /// Since when; `None`: since before the incident.
+    /// Since when; `None`: since before the incident. It may be in one of its entries that came
+    /// [before the time asked for](Incident::earlier).
     pub since: Option<ChangeId>,
 }
 
@@ -32,9 +33,30 @@ pub(super) fn abnormal(
             Some(row) => row.on?,
             None => state_before(timeline, points, incident, id)?,
         };
-        (on != normal).then(|| Abnormal { point: id, on, since: last.map(|row| row.change) })
+        let since = || match last {
+            Some(row) => Some(row.change),
+            None => earlier(timeline, points, incident, id),
+        };
+        (on != normal).then(|| Abnormal { point: id, on, since: since() })
     })
     .collect()
+}
+
+/// The last change of a point in the incident, before the time that was asked for.
+fn earlier(
+    timeline: &Timeline<'_>,
+    points: &Points,
+    incident: &Incident,
+    point: PointId,
+) -> Option<ChangeId> {
+    let described = timeline.site().points.get(point.0)?;
+    let recorder = points.recorder(described.recorder)?;
+    let input = described.input;
+    let moved = |event: &&EventId| {
+        event.recorder == recorder
+            && timeline.held(**event).is_some_and(|held| held.entry.changed.contains(input))
+    };
+    incident.earlier.iter().rfind(moved).map(|&event| ChangeId { event, input })
 }
 
 /// The state of a point before the incident, if its recorder shows it.

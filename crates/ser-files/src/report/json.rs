@@ -47,7 +47,7 @@ fn object(document: &Document<'_>) -> Value {
         "entries_sha256": digest,
         "is_incomplete": document.is_incomplete(),
         "damaged_lines": document.damaged_lines,
-        "entries_before": report.incident.earlier,
+        "entries_before": report.incident.earlier.len(),
         "entries_after": report.incident.later,
         "verdict": verdict_of(document),
         "first_out": first_out(document, &report.first_out),

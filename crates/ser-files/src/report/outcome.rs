@@ -125,7 +125,7 @@ fn disagreement(of: &Disagreement) -> String {
             (Some(us), Some(off)) => format!("for {} ± {}", duration(us), doubt(off)),
             _ => "for an unknown time".to_owned(),
         },
-        (None, Some(_)) => "since before the incident, then no longer".to_owned(),
+        (None, Some(_)) => "since before what is shown, then no longer".to_owned(),
         (None, None) => "still at the end".to_owned(),
     };
     format!("{}: 52a and 52b both {what} {lasted}", names::harmless(&of.equipment))

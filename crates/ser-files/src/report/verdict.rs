@@ -89,14 +89,12 @@ pub(super) fn first_out(
         text +=
             &format!("; or one of the entries missing on {}", lists.names(recorders.into_iter()));
     }
-    match first.earlier {
-        0 => {}
-        1 => text += "; 1 entry of the incident is before the time asked for",
-        entries => {
-            text += &format!("; {entries} entries of the incident are before the time asked for");
-        }
-    }
-    text
+    let before = match first.earlier {
+        0 => return text,
+        1 => "1 entry of the incident is".to_owned(),
+        entries => format!("{entries} entries of the incident are"),
+    };
+    format!("not known: {before} before the time asked for; first of what is shown: {text}")
 }
 
 /// Between which bounds nobody knows which of these was first.
