@@ -476,3 +476,13 @@ fn with_entries_before_the_time_asked_for_no_row_is_said_to_be_first() {
     assert!(text.contains("not returned to normal: Trip ON"), "{text}");
     assert!(!text.contains("since before the incident"), "{text}");
 }
+
+#[test]
+fn a_century_that_begins_anew_is_no_clock_that_was_never_set() {
+    let mut readings = Readings::of("[[recorder]]\nname = \"U1\"\nclock = \"utc\"\n");
+    readings.entry("U1", 1, "2069-12-31T23:59:59.999", (1, 1));
+    readings.entry("U1", 2, "1970-01-01T00:00:00.001", (2, 3));
+    let text = readings.told().text();
+    assert!(!text.contains("Time not known"), "{text}");
+    assert!(text.contains("+2.0 ms"), "{text}");
+}

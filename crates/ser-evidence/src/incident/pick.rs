@@ -256,7 +256,7 @@ struct Before {
 impl Before {
     /// Those of them that an entry joins. The others are forgotten.
     fn joined_with(&mut self, key: i64, quiet: i64) -> &mut Vec<EventId> {
-        if !self.last.is_some_and(|last| key.saturating_sub(last) <= quiet) {
+        if self.last.is_none_or(|last| key.saturating_sub(last) > quiet) {
             self.entries.clear();
         }
         &mut self.entries
