@@ -7,6 +7,7 @@ mod comtrade;
 mod lossless;
 mod part;
 mod prc002;
+mod unknown_states;
 mod vcd;
 mod writing;
 
