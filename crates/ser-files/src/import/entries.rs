@@ -17,7 +17,7 @@ use sha2::{Digest, Sha256};
 use super::inputs::Inputs;
 use super::list::{Texts, To};
 use super::notes::Notes;
-use super::states::Meanings;
+use super::states::{Meanings, NoState};
 use super::timed::{Timed, TimedRow};
 use super::zone::Doubt;
 
@@ -93,6 +93,22 @@ impl Maker<'_> {
             );
         }
         life.made
+    }
+
+    /// Why the state of a point is not known.
+    fn why(&self, point: usize, no_state: NoState) -> String {
+        let point = self.points.get(point);
+        match no_state {
+            NoState::Third(word) => {
+                let word = self.words.get(word);
+                format!("{point:?} has two states already, and {word:?} is another")
+            }
+            NoState::Part(word) => format!(
+                "{:?} of {point:?} looks like a part of a word; --map can say what it means",
+                self.words.get(word)
+            ),
+            NoState::NoWord => format!("{point:?} has no state here, and has one in other rows"),
+        }
     }
 
     /// A name that the same content has each time.
@@ -270,11 +286,8 @@ impl Writing<'_> {
             let Some(place) = self.maker.inputs.of_point(change.point) else { continue };
             let state = match self.maker.meanings.state(change.point, change.to) {
                 Ok(state) => state,
-                Err(word) => {
-                    let (point, word) =
-                        (self.maker.points.get(change.point), self.maker.words.get(word));
-                    let why = format!("{point:?} has two states already, and {word:?} is another");
-                    notes.leave_out(row.line, why);
+                Err(no_state) => {
+                    notes.leave_out(row.line, self.maker.why(change.point, no_state));
                     // Something happened that no entry has.
                     self.logs.iter_mut().for_each(|log| log.missing += 1);
                     self.tear(&[]);
