@@ -1,7 +1,9 @@
 //! Lists that were cut off, as by a copy that ended early or a terminal that was closed: nothing of
 //! them is guessed, and what is missing stands where it was.
 
+use ser_evidence::history::Collector;
 use ser_evidence::record::{Lost, Record, Why};
+use ser_evidence::site::Site;
 use ser_files::import::{Epoch, Imported, Importer, Options, Read, zone_named};
 
 const HEAD: &str = "#    DATE        TIME            ELEMENT        STATE\n";
@@ -52,6 +54,15 @@ fn told(imported: &Imported) -> Vec<String> {
     records.collect()
 }
 
+/// After which sequences a timeline takes entries for missing.
+fn missing(imported: &Imported) -> Vec<u64> {
+    let mut collector = Collector::new();
+    imported.records().for_each(|(recorder, record)| collector.add(recorder, record));
+    let history = collector.finish(&Site::unknown());
+    let lives = history.recorders.iter().flat_map(|recorder| &recorder.lives);
+    lives.flat_map(|life| &life.gaps).map(|gap| gap.after).collect()
+}
+
 fn left_out(read: &Read, imported: &Imported) -> Vec<String> {
     let notes = read.notes.left_out.iter().chain(&imported.notes.left_out);
     notes.map(ToString::to_string).collect()
@@ -77,6 +88,7 @@ fn a_row_without_a_line_end_is_left_out_and_a_gap() {
         assert!(note.starts_with("line 5: "), "{note}");
         assert!(note.contains("no line end") || note.contains("not a row"), "{note}");
     }
+    assert_eq!(missing(&import(&cut[..cut.len() - 9]).1), [0]);
     // Printed the other way round it was the newest.
     let turned: Vec<&str> = ROWS.iter().rev().copied().collect();
     let cut = list(&turned);
@@ -124,6 +136,7 @@ fn numbers_that_no_row_has_are_told() {
     );
     let lost: Vec<String> = read.notes.lost.iter().map(ToString::to_string).collect();
     assert_eq!(lost, ["line 2: row 1, the newest, is not in the file"]);
+    assert_eq!(missing(&imported), [3]);
     // Without one in between: the sequence says where.
     let (read, imported) = import(&list(&[ROWS[0], ROWS[1], ROWS[3]]));
     let sequences: Vec<_> = imported

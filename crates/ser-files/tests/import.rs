@@ -8,7 +8,9 @@ use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
+use ser_evidence::history::Collector;
 use ser_evidence::record::{EntryRecord, Lost, Record, Why};
+use ser_evidence::site::Site;
 use ser_files::import::{
     DateOrder, Epoch, Format, Imported, Importer, Map, Options, Output, Read, Refusal, zone_named,
 };
@@ -293,6 +295,15 @@ fn gaps(imported: &Imported) -> Vec<(Option<u64>, Lost, Why)> {
     gaps.collect()
 }
 
+/// What a timeline takes for missing: after which sequence, how many, and why.
+fn missing_in_history(imported: &Imported) -> Vec<(u64, Lost, Why)> {
+    let mut collector = Collector::new();
+    imported.records().for_each(|(recorder, record)| collector.add(recorder, record));
+    let history = collector.finish(&Site::unknown());
+    let lives = history.recorders.iter().flat_map(|recorder| &recorder.lives);
+    lives.flat_map(|life| &life.gaps).map(|gap| (gap.after, gap.lost, gap.why)).collect()
+}
+
 /// A COMTRADE record of four channels with these samples, the last of which is the last announced.
 fn sampled(rows: &str) -> (Read, Imported) {
     let last = rows.lines().last().and_then(|row| row.split_once(','));
@@ -328,7 +339,7 @@ fn what_changed_in_samples_that_are_missing_is_a_gap() {
     let (read, imported) = sampled("1,0,1,0,0,0\n2,1000,1,0,1,0\n3,2000,x\n4,3000,0,1,1,0\n");
     assert_eq!((gaps(&imported), read.notes.left_out_count), (vec![lost(0b110)], 1));
     let (_, imported) = sampled("1,0,1,0,0,0\n2,1000,1,0,1,0\n3,2000,x\n");
-    assert_eq!(gaps(&imported), [(Some(1), Lost::Unknown, Why::NotReached)]);
+    assert_eq!(gaps(&imported), [(Some(1), Lost::Unknown, Why::Unreadable)]);
     // Nothing is missing.
     let (read, imported) = sampled("1,0,1,0,0,0\n2,1000,1,0,1,0\n3,2000,0,1,1,0\n");
     assert_eq!((gaps(&imported), read.notes.lost_count), (vec![], 0));
@@ -338,7 +349,8 @@ fn what_changed_in_samples_that_are_missing_is_a_gap() {
 fn samples_that_are_announced_and_not_there_are_lost_at_the_end() {
     let rows = "1,0,1,0,0,0\n2,1000,1,0,1,0\n";
     let (read, imported) = sampled_of(9, rows);
-    assert_eq!(gaps(&imported), [(Some(1), Lost::Unknown, Why::NotReached)]);
+    assert_eq!(gaps(&imported), [(Some(1), Lost::Unknown, Why::Unreadable)]);
+    assert_eq!(missing_in_history(&imported), [(1, Lost::Unknown, Why::Unreadable)]);
     let [note] = &read.notes.lost[..] else { panic!("{:?}", read.notes.lost) };
     assert!(note.why.starts_with("9 samples are announced, and the data ends after 2"), "{note}");
     assert_eq!(read.notes.lost_count, 1);

@@ -84,7 +84,7 @@ impl Maker<'_> {
             life.tear(points);
         }
         for recorder in 0..life.logs.len() {
-            life.tell_gap(recorder);
+            life.tell_gap(recorder, Why::Unreadable);
         }
         if life.is_doubtful && self.doubt_ms.is_some() {
             notes.remark(
@@ -184,7 +184,8 @@ impl Writing<'_> {
             let gap = Gap { life: self.life, after: Some(0), lost, why: Why::Overwritten };
             self.tell(0, Record::Gap(gap), None);
         }
-        let before = if list.counts_from_beginning { 0 } else { missing };
+        let is_torn = list.rows.first().is_some_and(|row| row.torn.is_some());
+        let before = if list.counts_from_beginning || is_torn { 0 } else { missing };
         for log in &mut self.logs {
             log.sequence = before;
         }
@@ -212,7 +213,7 @@ impl Writing<'_> {
         }
         self.look(row.at_ms, &moved);
         for (recorder, (changed, on, known)) in moved {
-            self.tell_gap(recorder);
+            self.tell_gap(recorder, Why::NotReached);
             let Some(log) = self.logs.get_mut(recorder) else { continue };
             log.sequence = match self.is_split {
                 true => log.sequence + 1 + std::mem::take(&mut log.missing),
@@ -248,18 +249,20 @@ impl Writing<'_> {
         }
     }
 
-    /// Tells what is lost since the last entry of a recorder.
-    fn tell_gap(&mut self, recorder: usize) {
+    /// Tells what is lost since the last entry of a recorder. `unknown` says why where nobody knows
+    /// whether there was an entry: behind the last one, only a reason of the file's own is a loss.
+    fn tell_gap(&mut self, recorder: usize, unknown: Why) {
         let Some(log) = self.logs.get_mut(recorder) else { return };
         let Some(inputs) = log.torn.take() else { return };
-        let why = match inputs {
-            0 => Why::NotReached,
-            inputs => Why::NotRecorded(inputs),
-        };
         // A row of a list is an entry of somebody; a sample need not be.
         let lost = match self.is_sampled || self.is_split {
             true => Lost::Unknown,
             false => Lost::AtLeast(1),
+        };
+        let why = match (inputs, lost) {
+            (0, Lost::Unknown) => unknown,
+            (0, _) => Why::NotReached,
+            (inputs, _) => Why::NotRecorded(inputs),
         };
         let gap = Gap { life: self.life, after: Some(log.sequence), lost, why };
         self.tell(recorder, Record::Gap(gap), None);

@@ -272,6 +272,11 @@ impl Numbered {
         // The oldest first; of one number, the row that comes first in the file.
         rows.sort_by_key(|(number, row)| (u64::MAX - number, row.line));
         let oldest = rows.first().map_or(0, |(number, _)| *number);
+        let newest = rows.last().map_or(1, |(number, _)| *number);
+        // Of a list that is cut off and has its newest row, the oldest ones are missing. They have a
+        // place of their own.
+        let is_begun = damaged_number <= oldest && !(self.is_cut && newest == 1);
+        let beyond = u64::from(!is_begun);
         let mut list = List {
             order: Order::PlacesOrReversed,
             other_dates: std::mem::take(&mut self.other_dates),
@@ -290,17 +295,16 @@ impl Numbered {
                 continue;
             }
             row.forgets |= before.is_some_and(|before| before != number + 1);
-            row.place = oldest - number + 1;
+            row.place = oldest - number + 1 + beyond;
             before = Some(number);
             list.rows.push(row);
         }
-        let newest = before.unwrap_or(1);
-        // Of a list that is cut off and has its newest row, the oldest ones are missing.
-        let is_begun = damaged_number <= oldest && !(self.is_cut && newest == 1);
-        if !is_begun && let Some(first) = list.rows.first_mut() {
+        if beyond > 0
+            && let Some(first) = list.rows.first_mut()
+        {
             first.torn.get_or_insert_default();
         }
-        tell_missing(&mut list, (oldest, newest), damaged, notes);
+        tell_missing(&mut list, (oldest + beyond, newest), damaged, notes);
         found.lists.push(list);
     }
 }
