@@ -510,6 +510,12 @@ fn every_mistake_is_told_with_what_to_do_next() {
         ("report --input a.jsonl none.jsonl", 1, "cannot read none.jsonl: "),
         ("merge --input other.txt", 1, "neither JSON lines nor CSV"),
         ("merge --input new.jsonl", 1, "written by a later version"),
+        ("report --input a.jsonl --recorder U1", 2, "--recorder U1 says which recorder is read"),
+        (
+            "merge --site north.toml --input a.jsonl --recorder U1",
+            2,
+            "or say it with ser-cli import",
+        ),
     ] {
         let output = desk.run(arguments);
         let error = text(&output.stderr);

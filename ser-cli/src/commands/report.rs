@@ -75,6 +75,11 @@ enum Format {
 }
 
 impl Args {
+    /// Where entries come from.
+    pub(crate) const fn sources(&self) -> &SourceArgs {
+        &self.sources
+    }
+
     /// Whether the report goes to standard output.
     pub(crate) fn prints(&self) -> bool {
         file_named(self.output.as_deref()).is_none()

@@ -29,8 +29,8 @@ pub(crate) struct SourceArgs {
     /// Files with entries, written by `read` or `watch` with --format jsonl or csv, in any order.
     ///
     /// The recorder of a CSV file is the name of the file up to its last dot. Files speak for
-    /// themselves: what this computer remembers of a recorder's clock is used where the recorder is
-    /// read. Without this option all recorders of the site file that have a port are read; those
+    /// themselves, so --recorder needs --live here, and what this computer remembers of a recorder's
+    /// clock is used where the recorder is read. Without this option all recorders of the site file that have a port are read; those
     /// that cannot be reached are named in the result.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     input: Vec<PathBuf>,
@@ -50,6 +50,22 @@ impl SourceArgs {
     }
 
     /// The files that are read, with the site file.
+    /// Refuses to name a recorder where only files are read: each of them says whose it is.
+    pub(crate) fn fit(&self, connection: &ConnectionArgs) -> Result<()> {
+        let Some(name) = connection.recorder.as_ref().filter(|_| !self.input.is_empty()) else {
+            return Ok(());
+        };
+        if self.live {
+            return Ok(());
+        }
+        Err(Failure::usage(format!(
+            "--recorder {name} says which recorder is read, and these are files"
+        ))
+        .hint("a file says whose it is; one of CSV is named after its recorder, as in U1.csv")
+        .hint(format!("or say it with ser-cli import FILE --recorder {name} -o {name}.jsonl"))
+        .hint("with --live the recorder is read as well"))
+    }
+
     pub(crate) fn files(&self, connection: &ConnectionArgs) -> Vec<PathBuf> {
         self.input.iter().chain(&connection.site).cloned().collect()
     }

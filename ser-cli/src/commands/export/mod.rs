@@ -84,6 +84,11 @@ pub(crate) struct Args {
 }
 
 impl Args {
+    /// Where entries come from.
+    pub(crate) const fn sources(&self) -> &SourceArgs {
+        &self.sources
+    }
+
     /// Whether the data goes to standard output.
     pub(crate) fn prints(&self) -> bool {
         file_named(self.output.as_deref()).is_none()
