@@ -140,7 +140,7 @@ pub(super) fn write(
         program: PROGRAM,
         site_digest: gathered.site_digest.clone(),
         not_reached: &gathered.not_reached,
-        damaged_lines: gathered.damaged_lines,
+        damaged_lines: gathered.damaged.lines,
         unfold: shown.unfold,
     };
     outlet.write(|out| match shown.format {

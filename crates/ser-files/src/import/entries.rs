@@ -368,12 +368,21 @@ fn note(row: &TimedRow, time: &TimeStamp) -> Option<String> {
     match row.doubt? {
         Doubt::Twice(ns) => {
             let minutes = ns / 60_000_000_000;
-            Some(format!(
-                "this hour came twice: it may also be {minutes} min later than {time} UTC"
-            ))
+            Some(format!("{TWICE}: it may also be {minutes} min later than {time} UTC"))
         }
-        Doubt::Missing => {
-            Some("this local time was left out when the clocks went forward".to_owned())
-        }
+        Doubt::Missing => Some(LEFT_OUT.to_owned()),
     }
+}
+
+/// How the remark about a time begins that may be another one.
+const TWICE: &str = "this hour came twice";
+
+/// The remark about a local time that no clock showed that follows its zone.
+const LEFT_OUT: &str = "this local time was left out when the clocks went forward";
+
+/// Whether the remark of an imported entry says that its time may be another one: its local hour came
+/// twice, or was left out.
+#[must_use]
+pub fn is_doubt_of_time(note: &str) -> bool {
+    note.starts_with(TWICE) || note == LEFT_OUT
 }

@@ -112,7 +112,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let counted = write::write(args, destination, &gathered, &timeline, &selection)?;
     write::tell(counted);
     if !args.format.tells_damage() {
-        write::tell_damaged(gathered.damaged_lines);
+        write::tell_damaged(gathered.damaged);
     }
     if args.fail_on_loss {
         gathered.require_complete()?;
