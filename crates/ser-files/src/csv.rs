@@ -93,7 +93,7 @@ impl<R: BufRead> Reader<R> {
             return Some(held);
         }
         while !self.is_over {
-            let row = match self.lines.next() {
+            let row = match self.lines.next_whole() {
                 None => {
                     self.is_over = true;
                     break;

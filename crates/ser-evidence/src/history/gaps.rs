@@ -136,13 +136,27 @@ fn unrecorded(before: &Held, after: &Held) -> Option<u32> {
 
 /// Entries that are missing between two that are held. What was told about the place says why.
 fn hole(life: &LifeHistory, told: &ToldGaps, place: usize, after: u64, missing: u64) -> LogGap {
-    let missing = u32::try_from(missing).unwrap_or(u32::MAX);
+    let counted = u32::try_from(missing);
+    let missing = counted.unwrap_or(u32::MAX);
     // Before the first reading nobody counted how often the total had wrapped.
-    let is_counted = after > 0 || life.is_exact;
+    let is_counted = (after > 0 || life.is_exact) && counted.is_ok();
     LogGap {
         place,
         after,
         lost: if is_counted { Lost::Exactly(missing) } else { Lost::AtLeast(missing) },
         why: told.why(life.name(), after).unwrap_or(Why::NotReached),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_than_a_gap_can_count_is_at_least_that() {
+        let life = LifeHistory { is_exact: true, ..LifeHistory::default() };
+        let lost = |missing| hole(&life, &ToldGaps::default(), 1, 5, missing).lost;
+        assert_eq!(lost(u64::from(u32::MAX)), Lost::Exactly(u32::MAX));
+        assert_eq!(lost(u64::from(u32::MAX) + 1), Lost::AtLeast(u32::MAX));
     }
 }

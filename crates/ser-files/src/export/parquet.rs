@@ -276,7 +276,8 @@ impl Rows {
 
     fn row(&mut self, event: EventId, common: &Common, change: Option<(u8, Option<bool>)>) {
         let of_recorder = self.names.get(event.recorder as usize);
-        let recorder = of_recorder.map(|(name, _)| name.clone()).unwrap_or_default();
+        // A `ByteArray` by default is no text, and cannot be written.
+        let recorder = of_recorder.map_or_else(|| ByteArray::from(""), |(name, _)| name.clone());
         let life = of_recorder.and_then(|(_, lives)| lives.get(event.life as usize).cloned());
         let texts = change.and_then(|(input, on)| {
             let of_recorder = self.points.get(event.recorder as usize)?;
@@ -286,7 +287,7 @@ impl Rows {
         let (point, meaning) = texts.unzip();
         self.kind.push(ByteArray::from(common.kind));
         self.recorder.push(recorder);
-        self.life.push(life.unwrap_or_default());
+        self.life.push(life.unwrap_or_else(|| ByteArray::from("")));
         self.sequence.push(common.sequence);
         self.entry.push(common.entry);
         self.stamp.push(common.stamp.clone());

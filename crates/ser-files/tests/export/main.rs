@@ -5,6 +5,8 @@
 mod common;
 mod comtrade;
 mod lossless;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod part;
 mod prc002;
 mod unknown_states;
