@@ -7,6 +7,7 @@ use crate::closed_stdout;
 use crate::commands;
 use crate::connection::{self, ConnectionArgs};
 use crate::error;
+use crate::gather::SourceArgs;
 use crate::site_file;
 
 const EXAMPLES: &str = "\
@@ -106,6 +107,16 @@ impl Command {
         }
     }
 
+    /// Where entries come from, if the command takes files of them.
+    const fn sources(&self) -> Option<&SourceArgs> {
+        match self {
+            Command::Report(args) => Some(args.sources()),
+            Command::Merge(args) => Some(args.sources()),
+            Command::Export(args) => Some(args.sources()),
+            _ => None,
+        }
+    }
+
     /// Whether the command is for all recorders of a bus.
     fn reaches_a_bus(&self) -> bool {
         #[cfg(unix)]
@@ -153,6 +164,9 @@ impl Cli {
 
     /// Does what the command line asks for.
     pub(crate) fn run(&self) -> error::Result<()> {
+        if let Some(sources) = self.command.sources() {
+            sources.fit(&self.connection)?;
+        }
         let connection = match self.command.reaches_a_recorder() {
             true => &site_file::choose(&self.connection, self.command.reaches_a_bus())?,
             false => &self.connection,

@@ -57,8 +57,8 @@ impl Failure {
     /// Events are missing in what was delivered: exit code 3.
     pub(crate) fn incomplete(message: impl Display) -> Failure {
         Failure::with_exit(message, EXIT_INCOMPLETE).hint(
-            "everything that could be read was delivered; each loss is in the output where \
-             it belongs",
+            "everything that could be read was delivered; what is missing is in the output, where \
+             its place is known",
         )
     }
 

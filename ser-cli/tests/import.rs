@@ -350,6 +350,54 @@ fn a_file_of_our_own_may_be_long() {
 }
 
 #[test]
+fn an_import_of_our_own_file_keeps_a_trace_of_each_damaged_line() {
+    let desk = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| desk.path().join(name).display().to_string();
+    let head = "entry,time,input,state,sequence,life,note\n";
+    let row = |sequence: u64| {
+        format!("{sequence},2026-11-22T10:00:00.{sequence:03},3,1,{sequence},9f3c5a7e21b04d68,\n")
+    };
+    // Before the first entry, between two, a damaged loss, and behind the last one.
+    let loss = ",,,,5,9f3c5a7e21b04d68,lost 3 (exactl) after 5: overwritten\n";
+    let csv = format!("{head}x\n{}x\n{}{loss}{}x\n", row(3), row(5), row(9));
+    let entries: String = [(3, 3), (5, 5), (9, 9)]
+        .map(|(entry, sequence)| {
+            format!(
+                "{{\"record\":\"entry\",\"recorder\":\"U1\",\"entry\":{entry},\
+                 \"time\":\"2026-11-22T10:00:00.00{entry}\",\"changed\":[3],\"state\":[3],\
+                 \"sequence\":{sequence},\"life\":\"9f3c5a7e21b04d68\"}}\n{{\"record\":\"st\n"
+            )
+        })
+        .concat();
+    let head = "{\"record\":\"file\",\"schema\":1,\"program\":\"x\"}\n";
+    let jsonl = format!("{head}{{\"record\":\"poi\n{entries}");
+    for (name, content) in [("U1.csv", csv), ("U1.jsonl", jsonl)] {
+        fs::write(desk.path().join(name), content).expect("written");
+        let import =
+            run(&format!("import {} --fail-on-loss -o {} --force", at(name), at("again.jsonl")));
+        assert_eq!(import.status.code(), Some(3), "{}", text(&import.stderr));
+        let report = |name: &str| {
+            let input = format!("report --site plant.toml --input {}", at(name));
+            let json = run(&format!("{input} --format json"));
+            let mut json: Value = serde_json::from_slice(&json.stdout).expect("JSON");
+            let strict = run(&format!("{input} --fail-on-loss"));
+            assert_eq!(strict.status.code(), Some(3), "{}", text(&strict.stderr));
+            assert_eq!(json["is_incomplete"], true, "{name}");
+            (json["recorders"].take(), json["damaged_lines"].as_u64().expect("a number"))
+        };
+        let (original, imported) = (report(name), report("again.jsonl"));
+        assert_eq!(imported.0, original.0, "{name}");
+        assert_eq!((original.1, imported.1), (4, 1), "{name}: only one has no place");
+        assert_eq!(
+            original.0.to_string().matches("could not be read").count(),
+            3,
+            "{}",
+            original.0
+        );
+    }
+}
+
+#[test]
 fn damaged_lines_of_sources_are_told_by_an_export_that_cannot_say_so() {
     let desk = tempfile::tempdir().expect("a folder");
     let rows = "entry,time,input,state\n1,2026-11-22T10:00:00.250,3,1\nx\n";
@@ -360,5 +408,35 @@ fn damaged_lines_of_sources_are_told_by_an_export_that_cannot_say_so() {
         let told = text(&export.stderr);
         assert_eq!(export.status.code(), Some(0), "{told}");
         assert_eq!(told.contains("1 damaged line of the sources"), is_told, "{format}: {told}");
+        // Rows of the first versions have no sequence.
+        assert_eq!(told.contains("nobody knows their place"), is_told, "{format}: {told}");
+    }
+}
+
+#[test]
+fn a_time_that_may_be_another_one_is_told_by_who_reads_it_later() {
+    let desk = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| desk.path().join(name).display().to_string();
+    let list = |time: &str| {
+        format!(
+            "#    DATE        TIME            ELEMENT   STATE\n\
+             1    2026-10-25  {time}    52A       Asserted\n"
+        )
+    };
+    for (time, is_told) in [("02:30:00.000", true), ("04:30:00.000", false)] {
+        fs::write(desk.path().join("lone.txt"), list(time)).expect("written");
+        let zone = "--zone Europe/Berlin --force -o";
+        let import = run(&format!("import {} {zone} {}", at("lone.txt"), at("lone.jsonl")));
+        assert_eq!(import.status.code(), Some(0), "{}", text(&import.stderr));
+        for command in ["report", "merge", "export --format csv"] {
+            let output = run(&format!("{command} --site plant.toml --input {}", at("lone.jsonl")));
+            assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+            let told = text(&output.stderr);
+            assert_eq!(
+                told.contains("came twice or was left out: 1"),
+                is_told,
+                "{command}: {told}"
+            );
+        }
     }
 }

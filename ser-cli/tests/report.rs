@@ -481,6 +481,8 @@ fn every_mistake_is_told_with_what_to_do_next() {
     fs::create_dir(desk.path("folder")).expect("a folder");
     let too_new = "{\"record\":\"file\",\"schema\":99,\"program\":\"x\"}\n";
     desk.file("new.jsonl", too_new);
+    let wide: Vec<u8> = "\u{FEFF}{".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    fs::write(desk.path("wide.jsonl"), wide).expect("a file");
     for (arguments, code, told) in [
         ("report", 2, "from where? There is neither --site nor --input"),
         ("merge", 2, "from where? There is neither --site nor --input"),
@@ -508,6 +510,14 @@ fn every_mistake_is_told_with_what_to_do_next() {
         ("report --site none.toml --input a.jsonl", 1, "cannot read none.toml: "),
         ("report --input folder", 1, "folder is a folder\nhint: name the files in it"),
         ("report --input a.jsonl none.jsonl", 1, "cannot read none.jsonl: "),
+        ("report --input a.jsonl --recorder U1", 2, "--recorder U1 says which recorder is read"),
+        (
+            "merge --site north.toml --input a.jsonl --recorder U1",
+            2,
+            "or say it with ser-cli import",
+        ),
+        ("report --input wide.jsonl", 1, "this is UTF-16"),
+        ("merge --input wide.jsonl", 1, "hint: make it one of ours with ser-cli import wide.jsonl"),
         ("merge --input other.txt", 1, "neither JSON lines nor CSV"),
         ("merge --input new.jsonl", 1, "written by a later version"),
     ] {

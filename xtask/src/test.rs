@@ -98,6 +98,9 @@ fn tests(demand: Demand, images: &[Checked]) -> Result<()> {
 /// What a plain build leaves out.
 fn optional_parts() -> Result<()> {
     heading("Tests of Parquet, which a plain build does not have");
+    let mut written = steps::cargo();
+    written.args(["test", "--package", "ser-files", "--features", "parquet"]);
+    steps::run(written.args(["--test", "export", "parquet"]))?;
     let mut tests = steps::cargo();
     tests.args(["test", "--package", "ser-cli", "--features", "parquet"]);
     tests.args(["--test", "other_readers", "--", "--include-ignored", "parquet"]);

@@ -23,7 +23,11 @@ const HOW: How = How::Set { broadcast: None };
 /// The changes of a report as `U1/3 on`.
 fn rows(timeline: &Timeline<'_>, report: &Report) -> Vec<String> {
     let name = |change: ChangeId| timeline.recorder(change.event).unwrap().recorder.name.clone();
-    let on = |on| if on { "on" } else { "off" };
+    let on = |on| match on {
+        Some(true) => "on",
+        Some(false) => "off",
+        None => "?",
+    };
     let text = |row: &ser_evidence::incident::Row| {
         format!("{}/{} {}", name(row.change), row.change.input, on(row.on))
     };
@@ -122,6 +126,38 @@ fn what_another_source_has_is_not_missing_and_the_rest_keeps_its_reason() {
     let gaps: Vec<_> = history.recorders[0].lives[0].gaps.iter().collect();
     let [gap] = gaps[..] else { panic!("{gaps:?}") };
     assert_eq!((gap.after, gap.lost, gap.why), (2, Lost::Exactly(1), Why::Overwritten));
+}
+
+#[test]
+fn what_a_list_lost_is_missing_though_it_skips_no_number() {
+    let site = site("[[recorder]]\nname = \"U1\"\n");
+    let mut list = Log::of("U1", 7);
+    list.is_list().tells(0, Lost::AtLeast(1), Why::NotReached);
+    list.changes("2026-11-22T10:00:00.100", &[1]).changes("2026-11-22T10:00:00.200", &[1]);
+    list.tells(2, Lost::Unknown, Why::NotReached);
+    list.changes("2026-11-22T10:00:00.300", &[1]).tells(3, Lost::Unknown, Why::NotReached);
+    let history = history(&site, &[&list]);
+    let gaps = history.recorders[0].lives[0].gaps.iter();
+    let gaps: Vec<_> = gaps.map(|gap| (gap.place, gap.after, gap.lost)).collect();
+    let (at_least, unknown) = (Lost::AtLeast(1), Lost::Unknown);
+    assert_eq!(gaps, [(0, 0, at_least), (2, 2, unknown), (3, 3, unknown)]);
+    let timeline = Timeline::new(&site, &history);
+    let report = report(&timeline, Which::Last);
+    assert_eq!(report.first_out.known(), None, "it may have been first");
+    assert_eq!(report.first_out.gaps.len(), 1);
+    assert!(report.is_incomplete());
+}
+
+#[test]
+fn what_was_not_recorded_after_an_erase_is_missing_before_the_first_entry() {
+    let site = site("[[recorder]]\nname = \"U1\"\n");
+    let mut u1 = Log::of("U1", 7);
+    u1.tells(0, Lost::Unknown, Why::NotRecorded(0b100));
+    u1.changes("2026-11-22T10:00:00.100", &[1]).tells(1, Lost::Unknown, Why::NotRecorded(0b100));
+    u1.changes("2026-11-22T10:00:00.200", &[1]);
+    let history = history(&site, &[&u1]);
+    let gaps: Vec<u64> = history.recorders[0].lives[0].gaps.iter().map(|gap| gap.after).collect();
+    assert_eq!(gaps, [0], "two entries that show all states show that nothing changed between");
 }
 
 #[test]
@@ -225,14 +261,34 @@ fn a_time_that_cuts_an_incident_leaves_it_open_what_was_first() {
     let between = |since, until| report(&timeline, Which::Between(us(since), us(until)));
 
     let whole = between("2026-11-22T10:00:00.000", "2026-11-22T10:00:20.000");
-    assert_eq!((whole.incident.earlier, whole.incident.later), (0, 0), "25 s are a quiet time");
+    assert_eq!(
+        (whole.incident.earlier.len(), whole.incident.later),
+        (0, 0),
+        "25 s are a quiet time"
+    );
     assert!(whole.first_out.known().is_some());
     let cut = between("2026-11-22T10:00:05.150", "2026-11-22T10:00:20.000");
-    assert_eq!((cut.incident.earlier, cut.incident.later), (2, 0));
+    assert_eq!((cut.incident.earlier.len(), cut.incident.later), (2, 0));
     assert_eq!((cut.first_out.changes.len(), cut.first_out.known()), (1, None));
     let cut = between("2026-11-22T10:00:00.000", "2026-11-22T10:00:05.050");
-    assert_eq!((cut.incident.earlier, cut.incident.later), (0, 2));
+    assert_eq!((cut.incident.earlier.len(), cut.incident.later), (0, 2));
     assert!(cut.first_out.known().is_some());
+}
+
+#[test]
+fn what_went_wrong_in_the_incident_before_the_time_asked_for_has_not_returned() {
+    let site = site(BREAKER);
+    let u1 = trip(40, Some("2026-11-22T10:00:10.600"));
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let us = |text| Some(Moment::from_us(seen(text).us()));
+    let cut = report(&timeline, Which::Between(us("2026-11-22T10:00:10.020"), None));
+    let since: Vec<_> =
+        cut.abnormal.iter().map(|abnormal| abnormal.since.map(|since| since.event.place)).collect();
+    assert_eq!(since, [Some(1), Some(2)], "the trip is before the time, and in the incident");
+    let rest = report(&timeline, Which::Between(us("2026-11-22T10:00:10.500"), None));
+    let input = |abnormal: &ser_evidence::incident::Abnormal| abnormal.since.map(|it| it.input);
+    assert_eq!(rest.abnormal.iter().map(input).collect::<Vec<_>>(), [Some(5), Some(7)]);
 }
 
 #[test]
@@ -307,6 +363,113 @@ fn a_breaker_says_how_long_it_took_and_its_contacts_how_long_they_disagreed() {
     assert!(!off.both_on && off.until.is_some());
     let abnormal: Vec<usize> = report.abnormal.iter().map(|abnormal| abnormal.point.0).collect();
     assert_eq!(abnormal, [0, 1], "the trip has not reset, and the breaker is open");
+}
+
+/// The changes of `BREAKER` at these milliseconds, and what is said to have operated.
+fn operated(site: &str, changes: &[(u32, u8)]) -> Vec<String> {
+    let site = self::site(site);
+    let mut u1 = Log::of("U1", 1);
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    u1.observed(HOW, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(1_000));
+    for (ms, input) in changes {
+        u1.changes(&format!("2026-11-22T10:00:{:02}.{:03}", 10 + ms / 1000, ms % 1000), &[*input]);
+    }
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let ms = |delta: &ser_evidence::timeline::Delta| (delta.middle_us().unwrap() + 500) / 1000;
+    let text = |operation: &ser_evidence::incident::Operation| {
+        let mut text = (if operation.opened { "opened" } else { "closed" }).to_owned();
+        text.extend(operation.took.iter().map(|took| format!(" {}", ms(took))));
+        let bounce = operation.bounce.iter();
+        text.extend(bounce.map(|of| format!(", bounced {} in {}", of.changes, ms(&of.lasted))));
+        text.extend(operation.returned.iter().map(|after| format!(", back after {}", ms(after))));
+        text
+    };
+    report(&timeline, Which::Last).operations.iter().map(text).collect()
+}
+
+/// The close command is input 6.
+const CLOSE: &str = "
+[[point]]
+input = 6
+name = \"Close\"
+role = \"close\"
+equipment = \"52-1\"
+";
+
+#[test]
+fn a_breaker_that_does_not_stay_where_it_went_has_not_bounced() {
+    let of = |changes: &[(u32, u8)]| operated(&format!("{BREAKER}{CLOSE}"), changes);
+    // Contact 7 is 52a, and off at first; 8 is 52b.
+    assert_eq!(of(&[(0, 7), (400, 5), (430, 7), (450, 7)])[1..], ["opened 30, back after 20"]);
+    assert_eq!(of(&[(0, 6), (30, 7), (50, 7)]), ["closed 30, back after 20"]);
+    let with_52b = [(0, 7), (400, 5), (430, 7), (433, 8), (447, 8), (450, 7)];
+    assert_eq!(of(&with_52b)[1..], ["opened 30, back after 20"]);
+    let bounced = [(0, 7), (400, 5), (430, 7), (433, 7), (436, 7)];
+    assert_eq!(of(&bounced)[1..], ["opened 30, bounced 2 in 6"]);
+    let bounced_and_back = [(0, 7), (400, 5), (430, 7), (433, 7), (436, 7), (450, 7)];
+    assert_eq!(of(&bounced_and_back)[1..], ["opened 30, bounced 2 in 6, back after 20"]);
+    // Closed on a fault, and tripped at once: neither is a bounce.
+    assert_eq!(of(&[(0, 6), (50, 7), (55, 5), (75, 7)]), ["closed 50", "opened 20"]);
+    assert_eq!(of(&[(0, 6), (45, 5), (50, 7), (75, 7)]), ["closed 50", "opened 30"]);
+}
+
+#[test]
+fn an_operation_is_after_its_command_only_if_that_may_be_why() {
+    let of = |changes: &[(u32, u8)]| operated(&format!("{BREAKER}{CLOSE}"), changes);
+    let again = [(0, 7), (400, 5), (430, 7), (450, 5), (600, 7), (800, 7)];
+    assert_eq!(of(&again), ["closed", "opened 30", "closed", "opened"]);
+    // It was still on, or had just ended.
+    assert_eq!(of(&[(0, 7), (400, 5), (1500, 7)])[1..], ["opened 1100"]);
+    assert_eq!(of(&[(0, 7), (400, 5), (450, 5), (1300, 7)])[1..], ["opened 900"]);
+    assert_eq!(of(&[(0, 7), (400, 5), (450, 5), (1600, 7)])[1..], ["opened"]);
+}
+
+#[test]
+fn a_state_that_no_source_tells_is_not_off() {
+    let site = site(BREAKER);
+    let mut u1 = Log::of("U1", 1);
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    u1.observed(HOW, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(1_000));
+    u1.changes("2026-11-22T10:00:01.000", &[7]).changes("2026-11-22T10:00:10.000", &[5]);
+    u1.moves("2026-11-22T10:00:10.040", &[7]);
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let report = report(&timeline, Which::LastTrip);
+    assert_eq!(rows(&timeline, &report), ["U1/5 on", "U1/7 ?"]);
+    assert_eq!(report.operations, [], "nobody knows that the breaker opened");
+    let opens = report.steps[0];
+    assert_eq!(opens.verdict, Verdict::NotDecidable(Doubt::UnknownState));
+    assert_eq!(opens.then.map(|then| then.input), Some(7), "it may be this");
+    let abnormal: Vec<usize> = report.abnormal.iter().map(|abnormal| abnormal.point.0).collect();
+    assert_eq!(abnormal, [0], "of the breaker nobody knows it");
+    // A contact that may have opened or closed has the delays of both.
+    let width = |input, place| {
+        let event = EventId { recorder: 0, life: 0, place };
+        timeline.moved_utc(event, Some(input)).width_us().unwrap()
+    };
+    assert!(width(7, 2) > width(5, 1));
+}
+
+#[test]
+fn a_step_that_may_have_begun_is_not_decidable_and_what_follows_later_neither() {
+    let site = site(&BREAKER.replace("[15, 50]", "[15, 60_000]"));
+    let mut u1 = Log::of("U1", 1);
+    u1.changes("2026-11-22T10:00:01.000", &[7]).moves("2026-11-22T10:00:10.000", &[5]);
+    u1.changes("2026-11-22T10:00:10.040", &[7]);
+    // After a quiet time.
+    u1.changes("2026-11-22T11:00:00.000", &[5, 7]).changes("2026-11-22T11:00:10.000", &[5]);
+    u1.changes("2026-11-22T11:00:20.000", &[5]).moves("2026-11-22T11:00:50.000", &[7]);
+    let history = history(&site, &[&u1]);
+    let timeline = Timeline::new(&site, &history);
+    let incidents = Incident::all(&timeline).into_iter();
+    let steps = incidents.flat_map(|incident| Report::new(&timeline, incident).steps);
+    let opens: Vec<_> = steps.filter(|step| step.expectation == 0).collect();
+    assert_eq!(opens.len(), 2, "{opens:?}");
+    for step in opens {
+        assert_eq!(step.verdict, Verdict::NotDecidable(Doubt::UnknownState));
+        assert_eq!(step.then.map(|then| then.input), Some(7));
+    }
 }
 
 const SET: How = How::Set { broadcast: None };

@@ -96,6 +96,9 @@ fn the_turns_of_the_centuries_are_a_millisecond_long() {
             let change = |place: usize, input| ChangeId { event: events[place], input };
             let delta = timeline.delta(change(0, 1), change(1, 2));
             assert_eq!(delta.middle_us(), Some(1000), "{before} {after}");
+            for event in &events {
+                assert_ne!(timeline.nominal(*event), Nominal::NotKnown, "{before} {after}");
+            }
         });
     }
 }

@@ -93,7 +93,7 @@ impl<R: BufRead> Reader<R> {
             return Some(held);
         }
         while !self.is_over {
-            let row = match self.lines.next() {
+            let row = match self.lines.next_whole() {
                 None => {
                     self.is_over = true;
                     break;
@@ -141,7 +141,7 @@ impl<R: BufRead> Reader<R> {
             return None;
         }
         let finished = self.finish();
-        let mut gathering = Gathering { key: change.key, changed: 0, on: 0 };
+        let mut gathering = Gathering { key: change.key, changed: 0, on: 0, told: 0 };
         gathering.add(change);
         self.gathering = Some(gathering);
         finished
@@ -245,7 +245,8 @@ struct Change {
     key: Key,
     /// The input that changed, as a bit; 0 if none did.
     input: u32,
-    is_on: bool,
+    /// Whether it is on from then; `None` if that is not known.
+    on: Option<bool>,
 }
 
 /// What the rows of one entry have in common.
@@ -263,6 +264,8 @@ struct Gathering {
     key: Key,
     changed: u32,
     on: u32,
+    /// Of the changed ones those whose state is told.
+    told: u32,
 }
 
 impl Gathering {
@@ -274,7 +277,8 @@ impl Gathering {
 
     fn add(&mut self, change: &Change) {
         self.changed |= change.input;
-        self.on |= if change.is_on { change.input } else { 0 };
+        self.on |= if change.on == Some(true) { change.input } else { 0 };
+        self.told |= if change.on.is_some() { change.input } else { 0 };
     }
 }
 
@@ -288,12 +292,12 @@ struct States {
 
 impl States {
     fn entry(&mut self, gathered: &Gathering) -> EntryRecord {
-        let Gathering { key, changed, on } = *gathered;
+        let Gathering { key, changed, on, told } = *gathered;
         if !self.last.is_some_and(|last| last.is_before(&key)) {
             (self.on, self.known) = (0, 0);
         }
         self.on = self.on & !changed | on;
-        self.known |= changed;
+        self.known = self.known & !changed | told;
         self.last = Some(key);
         let (changed, state) = (Inputs(changed), Inputs(self.on));
         EntryRecord {
@@ -406,16 +410,17 @@ fn change(recorder: usize, fields: &Fields, parser: &mut Parser) -> Result<Chang
     let key = Key { recorder, number, time, sequence, life };
     let (input, state) = (fields.field(2), fields.field(3));
     if input.is_empty() && state.is_empty() {
-        return Ok(Change { key, input: 0, is_on: false });
+        return Ok(Change { key, input: 0, on: None });
     }
     let input = self::number::<u32>(input).filter(|input| (1..=32).contains(input));
     let input = 1_u32 << (input.ok_or_else(|| wrong(2))? - 1);
-    let is_on = match state {
-        b"1" => true,
-        b"0" => false,
+    let on = match state {
+        b"1" => Some(true),
+        b"0" => Some(false),
+        b"?" => None,
         _ => return Err(wrong(3)),
     };
-    Ok(Change { key, input, is_on })
+    Ok(Change { key, input, on })
 }
 
 /// The sequence and the life of a row.

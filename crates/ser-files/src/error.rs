@@ -28,6 +28,8 @@ pub enum Problem {
     Io(io::Error),
     /// The file is neither JSON lines nor CSV of ours.
     NotOurs,
+    /// The file is UTF-16, and only UTF-8 is read.
+    Utf16,
     /// The file was written by a later version, which may say things that this one does not
     /// understand.
     NewerSchema {
@@ -76,6 +78,7 @@ impl fmt::Display for Problem {
             Problem::NotOurs => {
                 f.write_str("this is neither JSON lines nor CSV as ser-cli writes them")
             }
+            Problem::Utf16 => f.write_str("this is UTF-16; our own files are UTF-8"),
             Problem::NewerSchema { schema } => write!(
                 f,
                 "written by a later version (schema {schema}; this one reads up to {})",
@@ -99,6 +102,11 @@ impl Error for ReadError {
         }
     }
 }
+
+/// Why a last line is left out that may be a part of one. A number or a name that was cut off may
+/// look whole.
+pub(crate) const NO_LINE_END: &str = "this last line has no line end, so the file may be cut off in it; if it is whole, end it with \
+     one";
 
 /// A piece of a file, short enough for a message.
 pub(crate) fn quoted(text: &[u8]) -> String {

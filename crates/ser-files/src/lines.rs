@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, Read};
 
-use crate::error::{MAX_LINE_LEN, Problem, ReadError};
+use crate::error::{MAX_LINE_LEN, NO_LINE_END, Problem, ReadError};
 
 const LIMIT: u64 = MAX_LINE_LEN as u64 + 1;
 
@@ -11,11 +11,12 @@ pub(crate) struct Lines<R> {
     input: R,
     line: Vec<u8>,
     number: u64,
+    is_ended: bool,
 }
 
 impl<R: BufRead> Lines<R> {
     pub(crate) fn new(input: R) -> Lines<R> {
-        Lines { input, line: Vec::new(), number: 0 }
+        Lines { input, line: Vec::new(), number: 0, is_ended: true }
     }
 
     /// The number of the line that was read last, from 1.
@@ -33,12 +34,24 @@ impl<R: BufRead> Lines<R> {
                 Ok(_) => {}
                 Err(error) => return Some(Err(ReadError::at(self.number, Problem::Io(error)))),
             }
-            if self.line.len() > MAX_LINE_LEN && self.line.last() != Some(&b'\n') {
+            self.is_ended = self.line.last() == Some(&b'\n');
+            if self.line.len() > MAX_LINE_LEN && !self.is_ended {
                 return Some(Err(self.too_long()));
             }
             if !self.line.trim_ascii().is_empty() {
                 return Some(Ok(without_end(&self.line)));
             }
+        }
+    }
+
+    /// As [`next`](Self::next), where a line that has no end may be a part of one: that is an error.
+    pub(crate) fn next_whole(&mut self) -> Option<Result<&[u8], ReadError>> {
+        if let Err(error) = self.next()? {
+            return Some(Err(error));
+        }
+        match self.is_ended {
+            true => Some(Ok(without_end(&self.line))),
+            false => Some(Err(ReadError::damaged(self.number, NO_LINE_END))),
         }
     }
 

@@ -24,8 +24,16 @@ pub(crate) fn full_point(timeline: &Timeline<'_>, id: PointId) -> String {
     format!("{recorder}/{}", point(timeline, Some(id), 0))
 }
 
+/// What is said of a state that no source tells.
+pub(crate) const UNKNOWN_STATE: &str = "state not known";
+
 /// What a state is called.
-pub(crate) fn state(timeline: &Timeline<'_>, id: Option<PointId>, on: bool) -> String {
+pub(crate) fn state(
+    timeline: &Timeline<'_>,
+    id: Option<PointId>,
+    on: impl Into<Option<bool>>,
+) -> String {
+    let Some(on) = on.into() else { return UNKNOWN_STATE.to_owned() };
     match id.and_then(|id| point_of(timeline, id)) {
         Some(point) => harmless(if on { &point.on } else { &point.off }),
         None => (if on { "ON" } else { "OFF" }).to_owned(),
@@ -55,9 +63,14 @@ pub(crate) fn edge(timeline: &Timeline<'_>, edge: Edge) -> String {
     )
 }
 
-/// Whether this is not the normal state of a point; `None` if it has no normal one.
-pub(crate) fn is_abnormal(timeline: &Timeline<'_>, id: Option<PointId>, on: bool) -> Option<bool> {
-    Some(point_of(timeline, id?)?.normal? != on)
+/// Whether this is not the normal state of a point; `None` if it has no normal one, or if the state
+/// is not known.
+pub(crate) fn is_abnormal(
+    timeline: &Timeline<'_>,
+    id: Option<PointId>,
+    on: impl Into<Option<bool>>,
+) -> Option<bool> {
+    Some(point_of(timeline, id?)?.normal? != on.into()?)
 }
 
 /// A point of the site.

@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, Chain, Cursor, Read};
 
-use ser_evidence::record::{Record, Told};
+use ser_evidence::record::{EntryRecord, Gap, Life, Lost, Record, Told, Why};
 
 use crate::error::{MAX_LINE_LEN, Problem, ReadError};
 use crate::{csv, jsonl};
@@ -14,6 +14,8 @@ type Input<R> = Chain<Cursor<Vec<u8>>, R>;
 /// next.
 pub struct Source<R> {
     reader: Reader<Input<R>>,
+    /// The recorder of the last entry, and where that is.
+    last: Option<(String, Life, Option<u64>)>,
 }
 
 enum Reader<R> {
@@ -21,6 +23,16 @@ enum Reader<R> {
     Csv(Box<csv::Reader<R>>),
     /// An empty file holds no records, and says so in any format.
     Nothing,
+}
+
+impl<R: BufRead> Reader<R> {
+    fn recorder(&self) -> &str {
+        match self {
+            Reader::Jsonl(reader) => reader.recorder(),
+            Reader::Csv(reader) => reader.recorder(),
+            Reader::Nothing => "",
+        }
+    }
 }
 
 impl<R: BufRead> Source<R> {
@@ -33,6 +45,9 @@ impl<R: BufRead> Source<R> {
     pub fn new(mut input: R, recorder: &str) -> Result<Source<R>, ReadError> {
         let first = first_line(&mut input).map_err(|error| ReadError::at(1, Problem::Io(error)))?;
         let line = first.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&first).trim_ascii_start();
+        if matches!(first.get(..2), Some([0xFF, 0xFE] | [0xFE, 0xFF])) {
+            return Err(ReadError::at(1, Problem::Utf16));
+        }
         if has_lone_return(&first) {
             return Err(ReadError::at(1, Problem::LoneReturns));
         }
@@ -45,27 +60,46 @@ impl<R: BufRead> Source<R> {
             Some(_) if is_csv => Reader::Csv(Box::new(csv::Reader::new(input, recorder))),
             Some(_) => return Err(ReadError::at(1, Problem::NotOurs)),
         };
-        Ok(Source { reader })
+        Ok(Source { reader, last: None })
     }
 
     /// The next record. Whose it is, [`recorder`](Self::recorder) says: where there are millions,
     /// a name for each takes time.
     pub fn read(&mut self) -> Option<Result<Record, ReadError>> {
-        match &mut self.reader {
+        let record = match &mut self.reader {
             Reader::Jsonl(reader) => reader.read(),
             Reader::Csv(reader) => reader.read(),
             Reader::Nothing => None,
+        };
+        let recorder = self.reader.recorder();
+        if self.last.as_ref().is_some_and(|(name, ..)| name != recorder) {
+            self.last = None;
         }
+        if let Some(Ok(Record::Entry(EntryRecord { life, sequence, .. }))) = record {
+            match &mut self.last {
+                // Neighbours often have the same recorder, whose name is not copied then.
+                Some((_, of, last)) => (*of, *last) = (life, sequence),
+                None => self.last = Some((recorder.to_owned(), life, sequence)),
+            }
+        }
+        record
+    }
+
+    /// What may be missing because of the damaged line that was [read](Self::read) last: it may have
+    /// been the next entry of the log before it, of the same [recorder](Self::recorder). Where no
+    /// entry is before it, or one without a sequence, nobody knows its place, and
+    /// [`after`](Gap::after) is `None`.
+    #[must_use]
+    pub fn damage(&self) -> Gap {
+        let (life, after) =
+            self.last.as_ref().map_or((Life::UNKNOWN, None), |(_, life, after)| (*life, *after));
+        Gap { life, after, lost: Lost::Unknown, why: Why::Unreadable }
     }
 
     /// The name of the recorder of the record that was [read](Self::read) last.
     #[must_use]
     pub fn recorder(&self) -> &str {
-        match &self.reader {
-            Reader::Jsonl(reader) => reader.recorder(),
-            Reader::Csv(reader) => reader.recorder(),
-            Reader::Nothing => "",
-        }
+        self.reader.recorder()
     }
 
     /// The remark for people that goes with the record that was [read](Self::read) last.

@@ -8,7 +8,9 @@ use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
+use ser_evidence::history::Collector;
 use ser_evidence::record::{EntryRecord, Lost, Record, Why};
+use ser_evidence::site::Site;
 use ser_files::import::{
     DateOrder, Epoch, Format, Imported, Importer, Map, Options, Output, Read, Refusal, zone_named,
 };
@@ -268,7 +270,7 @@ fn what_is_in_several_files_is_there_once() {
             let (number, rest) = line.split_once(' ').expect("a number");
             format!("{} {rest}", number.parse::<u64>().expect("a number") - up)
         });
-        head.chain(kept).collect::<Vec<_>>().join("\n")
+        head.chain(kept).collect::<Vec<_>>().join("\n") + "\n"
     };
     let all = own(0..9, 0);
     let (early, late) = (own(0..5, 5), own(3..9, 0));
@@ -293,12 +295,28 @@ fn gaps(imported: &Imported) -> Vec<(Option<u64>, Lost, Why)> {
     gaps.collect()
 }
 
-/// A COMTRADE record of four channels with these samples.
+/// What a timeline takes for missing: after which sequence, how many, and why.
+fn missing_in_history(imported: &Imported) -> Vec<(u64, Lost, Why)> {
+    let mut collector = Collector::new();
+    imported.records().for_each(|(recorder, record)| collector.add(recorder, record));
+    let history = collector.finish(&Site::unknown());
+    let lives = history.recorders.iter().flat_map(|recorder| &recorder.lives);
+    lives.flat_map(|life| &life.gaps).map(|gap| (gap.after, gap.lost, gap.why)).collect()
+}
+
+/// A COMTRADE record of four channels with these samples, the last of which is the last announced.
 fn sampled(rows: &str) -> (Read, Imported) {
+    let last = rows.lines().last().and_then(|row| row.split_once(','));
+    let announced = last.and_then(|(number, _)| number.parse().ok()).expect("a number");
+    sampled_of(announced, rows)
+}
+
+/// The same where so many samples are announced.
+fn sampled_of(announced: u64, rows: &str) -> (Read, Imported) {
     let text = format!(
         "--- file type: CFG ---\nOAK,FR,2013\n4,0A,4D\n1,52A,,,0\n2,52B,,,0\n3,51P,,,0\n4,86,,,0\n\
-         60\n0\n0,9\n14/03/2027,09:05:00.000000\n14/03/2027,09:05:00.000000\nASCII\n1\n0,0\n0,0\n\
-         --- file type: DAT ASCII ---\n{rows}"
+         60\n0\n0,{announced}\n14/03/2027,09:05:00.000000\n14/03/2027,09:05:00.000000\nASCII\n1\n\
+         0,0\n0,0\n--- file type: DAT ASCII ---\n{rows}"
     );
     let mut importer = Importer::new(Options::default());
     let read = read_into(&mut importer, "x.cff", text.as_bytes()).expect("it can be read");
@@ -321,16 +339,30 @@ fn what_changed_in_samples_that_are_missing_is_a_gap() {
     let (read, imported) = sampled("1,0,1,0,0,0\n2,1000,1,0,1,0\n3,2000,x\n4,3000,0,1,1,0\n");
     assert_eq!((gaps(&imported), read.notes.left_out_count), (vec![lost(0b110)], 1));
     let (_, imported) = sampled("1,0,1,0,0,0\n2,1000,1,0,1,0\n3,2000,x\n");
-    assert_eq!(gaps(&imported), [(Some(1), Lost::Unknown, Why::NotReached)]);
+    assert_eq!(gaps(&imported), [(Some(1), Lost::Unknown, Why::Unreadable)]);
     // Nothing is missing.
     let (read, imported) = sampled("1,0,1,0,0,0\n2,1000,1,0,1,0\n3,2000,0,1,1,0\n");
     assert_eq!((gaps(&imported), read.notes.lost_count), (vec![], 0));
 }
 
 #[test]
+fn samples_that_are_announced_and_not_there_are_lost_at_the_end() {
+    let rows = "1,0,1,0,0,0\n2,1000,1,0,1,0\n";
+    let (read, imported) = sampled_of(9, rows);
+    assert_eq!(gaps(&imported), [(Some(1), Lost::Unknown, Why::Unreadable)]);
+    assert_eq!(missing_in_history(&imported), [(1, Lost::Unknown, Why::Unreadable)]);
+    let [note] = &read.notes.lost[..] else { panic!("{:?}", read.notes.lost) };
+    assert!(note.why.starts_with("9 samples are announced, and the data ends after 2"), "{note}");
+    assert_eq!(read.notes.lost_count, 1);
+    // Nothing is told twice: these are missing in between.
+    let (read, _) = sampled_of(6, "1,0,1,0,0,0\n6,1000,1,0,1,0\n");
+    assert_eq!(read.notes.lost_count, 1, "{:?}", read.notes);
+}
+
+#[test]
 fn a_row_that_is_left_out_is_a_gap_where_it_stood() {
     let in_list = |after, lines: &[&str]| {
-        let text = lines.join("\n");
+        let text = lines.join("\n") + "\n";
         let imported = imported(&[text.as_bytes()], in_zone("UTC"));
         assert_eq!(gaps(&imported), [(Some(after), Lost::AtLeast(1), Why::NotReached)], "{text}");
     };
@@ -626,7 +658,7 @@ fn numbers_that_no_recorder_has_are_told_and_nothing_overflows() {
         assert_eq!(importer.finish().records().count(), 0);
     }
     // Samples may have any number.
-    let (_, imported) = sampled(&format!("{},0,1,0,0,0\n{last},1000,1,0,1,0\n", last - 1));
+    let (_, imported) = sampled_of(2, &format!("{},0,1,0,0,0\n{last},1000,1,0,1,0\n", last - 1));
     assert_eq!(gaps(&imported), []);
     sampled(&format!("1,0,1,0,0,0\n{last},1000,1,0,1,0\n"));
 }

@@ -39,6 +39,15 @@ impl Readings {
         self.collector.add(recorder, &Record::Entry(record));
     }
 
+    /// Inputs change in the entry with this number, and nobody knows to what.
+    fn moved(&mut self, recorder: &str, number: u16, time: &str, changed: u32) {
+        let time = stamp(time);
+        let entry = Entry { changed: Inputs(changed), state: Inputs(0), time };
+        let (life, sequence) = (life(recorder), Some(number.into()));
+        let record = EntryRecord { life, sequence, number, entry, known: Inputs(0) };
+        self.collector.add(recorder, &Record::Entry(record));
+    }
+
     /// The clock was set right after this entry, to within two milliseconds.
     fn set(&mut self, recorder: &str, after: u64, time: &str) {
         self.set_within(recorder, after, time, 2_000);
@@ -100,8 +109,13 @@ struct Told {
 impl Told {
     /// The report about the last incident.
     fn write(&self, write: impl Fn(&mut Vec<u8>, &Document<'_>)) -> String {
+        self.write_of(Which::Last, write)
+    }
+
+    /// The report about another one.
+    fn write_of(&self, which: Which, write: impl Fn(&mut Vec<u8>, &Document<'_>)) -> String {
         let timeline = Timeline::new(&self.site, &self.history);
-        let incident = Incident::pick(&timeline, Which::Last).expect("an incident");
+        let incident = Incident::pick(&timeline, which).expect("an incident");
         let report = Report::new(&timeline, incident);
         let document = Document {
             timeline: &timeline,
@@ -119,7 +133,11 @@ impl Told {
 
     /// Its text in one line, blanks in a row as one.
     fn text(&self) -> String {
-        let text = self.write(|out, document| {
+        self.text_of(Which::Last)
+    }
+
+    fn text_of(&self, which: Which) -> String {
+        let text = self.write_of(which, |out, document| {
             write_text(out, document, Styles::default()).expect("it takes it");
         });
         text.split_whitespace().collect::<Vec<_>>().join(" ")
@@ -398,4 +416,73 @@ fn long_lists_are_short_for_people_and_whole_for_programs() {
     let verdict = json["verdict"].to_string();
     assert!(verdict.contains("Valve 19 ON and Valve 20 ON"), "{verdict}");
     assert!(!verdict.contains("more"), "{verdict}");
+}
+
+#[test]
+fn a_state_that_nobody_knows_is_said_to_be_not_known() {
+    let mut readings = Readings::of(
+        "[[recorder]]\nname = \"U1\"\n[[point]]\ninput = 2\nname = \"52a\"\nrole = \"52a\"\n\
+         equipment = \"52-1\"\non = \"CLOSED\"\noff = \"OPEN\"\nnormal = \"on\"\n",
+    );
+    readings.set("U1", 0, "2026-11-22T10:00:00.000");
+    readings.entry("U1", 1, "2026-11-22T10:00:01.000", (1, 1));
+    readings.moved("U1", 2, "2026-11-22T10:00:01.020", 2);
+    let told = readings.told();
+    let text = told.text();
+    assert!(text.contains("U1 52a state not known 2"), "{text}");
+    assert!(!text.contains("opened") && !text.contains("OPEN"), "{text}");
+    let json = told.json();
+    let row = &json["sequence"][1];
+    assert_eq!((row["on"].is_null(), row["state"].is_null()), (true, true), "{row:#}");
+}
+
+#[test]
+fn a_trip_that_failed_is_wrong_and_no_bounce() {
+    let mut readings = Readings::of(
+        "[[recorder]]\nname = \"U1\"\n[[point]]\ninput = 1\nname = \"Trip\"\nrole = \"trip\"\n\
+         equipment = \"52-1\"\n[[point]]\ninput = 2\nname = \"52a\"\nrole = \"52a\"\n\
+         equipment = \"52-1\"\nnormal = \"on\"\n",
+    );
+    readings.set("U1", 0, "2026-11-22T10:00:00.000");
+    readings.entry("U1", 1, "2026-11-22T10:00:01.000", (1, 3));
+    readings.entry("U1", 2, "2026-11-22T10:00:01.030", (2, 1));
+    readings.entry("U1", 3, "2026-11-22T10:00:01.034", (2, 3));
+    readings.entry("U1", 4, "2026-11-22T10:00:01.036", (2, 1));
+    readings.entry("U1", 5, "2026-11-22T10:00:01.050", (2, 3));
+    readings.watched("U1", 5, "2026-11-22T10:01:00.000");
+    let told = readings.told();
+    let json = told.json();
+    let said = "52-1 opened 29.9 ms after its trip (bounced once in 6 ms), and closed again after \
+                20.1 ms";
+    assert_eq!(json["verdict"]["operated"][0], said);
+    assert_eq!(json["verdict"]["wrong"][0], "52-1 opened for 20.1 ms and closed again");
+    assert!(json["operations"][0]["returned"].is_object(), "{json:#}");
+}
+
+#[test]
+fn with_entries_before_the_time_asked_for_no_row_is_said_to_be_first() {
+    let mut readings = Readings::of(
+        "[[recorder]]\nname = \"U1\"\n[[point]]\ninput = 1\nname = \"Trip\"\nnormal = \"off\"\n",
+    );
+    readings.set("U1", 0, "2026-11-22T10:00:00.000");
+    readings.entry("U1", 1, "2026-11-22T10:00:01.000", (1, 1));
+    readings.entry("U1", 2, "2026-11-22T10:00:01.030", (2, 3));
+    let since = Some(Moment::from_us(utc_us("2026-11-22T10:00:01.020")));
+    let text = readings.told().text_of(Which::Between(since, None));
+    let first = "first-out not known: 1 entry of the incident is before the time asked for; first of \
+                 what is shown: input 2 ON (U1)";
+    assert!(text.contains(first), "{text}");
+    assert!(!text.contains("maybe first-out"), "{text}");
+    assert!(text.contains("not returned to normal: Trip ON"), "{text}");
+    assert!(!text.contains("since before the incident"), "{text}");
+}
+
+#[test]
+fn a_century_that_begins_anew_is_no_clock_that_was_never_set() {
+    let mut readings = Readings::of("[[recorder]]\nname = \"U1\"\nclock = \"utc\"\n");
+    readings.entry("U1", 1, "2069-12-31T23:59:59.999", (1, 1));
+    readings.entry("U1", 2, "1970-01-01T00:00:00.001", (2, 3));
+    let text = readings.told().text();
+    assert!(!text.contains("Time not known"), "{text}");
+    assert!(text.contains("+2.0 ms"), "{text}");
 }

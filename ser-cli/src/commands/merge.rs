@@ -52,6 +52,13 @@ enum Format {
     Jsonl,
 }
 
+impl Args {
+    /// Where entries come from.
+    pub(crate) const fn sources(&self) -> &SourceArgs {
+        &self.sources
+    }
+}
+
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let gathered = gather::gather(&args.sources, connection)?;
     let timeline = Timeline::new(&gathered.site, &gathered.history);

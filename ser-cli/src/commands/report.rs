@@ -75,6 +75,11 @@ enum Format {
 }
 
 impl Args {
+    /// Where entries come from.
+    pub(crate) const fn sources(&self) -> &SourceArgs {
+        &self.sources
+    }
+
     /// Whether the report goes to standard output.
     pub(crate) fn prints(&self) -> bool {
         file_named(self.output.as_deref()).is_none()
@@ -135,7 +140,7 @@ pub(super) fn write(
         program: PROGRAM,
         site_digest: gathered.site_digest.clone(),
         not_reached: &gathered.not_reached,
-        damaged_lines: gathered.damaged_lines,
+        damaged_lines: gathered.damaged.lines,
         unfold: shown.unfold,
     };
     outlet.write(|out| match shown.format {

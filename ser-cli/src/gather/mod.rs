@@ -20,6 +20,7 @@ use crate::error::{Failure, Result};
 use crate::keeper::StateArgs;
 
 pub(crate) use choice::ChoiceArgs;
+pub(crate) use files::Damaged;
 pub(crate) use moment::{GivenMoment, parse_moment};
 
 /// Where entries come from.
@@ -29,8 +30,8 @@ pub(crate) struct SourceArgs {
     /// Files with entries, written by `read` or `watch` with --format jsonl or csv, in any order.
     ///
     /// The recorder of a CSV file is the name of the file up to its last dot. Files speak for
-    /// themselves: what this computer remembers of a recorder's clock is used where the recorder is
-    /// read. Without this option all recorders of the site file that have a port are read; those
+    /// themselves, so --recorder needs --live here, and what this computer remembers of a recorder's
+    /// clock is used where the recorder is read. Without this option all recorders of the site file that have a port are read; those
     /// that cannot be reached are named in the result.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     input: Vec<PathBuf>,
@@ -49,6 +50,22 @@ impl SourceArgs {
         SourceArgs { input, live: true, state }
     }
 
+    /// Refuses to name a recorder where only files are read: each of them says whose it is.
+    pub(crate) fn fit(&self, connection: &ConnectionArgs) -> Result<()> {
+        let Some(name) = connection.recorder.as_ref().filter(|_| !self.input.is_empty()) else {
+            return Ok(());
+        };
+        if self.live {
+            return Ok(());
+        }
+        Err(Failure::usage(format!(
+            "--recorder {name} says which recorder is read, and these are files"
+        ))
+        .hint("a file says whose it is; one of CSV is named after its recorder, as in U1.csv")
+        .hint(format!("or say it with ser-cli import FILE --recorder {name} -o {name}.jsonl"))
+        .hint("with --live the recorder is read as well"))
+    }
+
     /// The files that are read, with the site file.
     pub(crate) fn files(&self, connection: &ConnectionArgs) -> Vec<PathBuf> {
         self.input.iter().chain(&connection.site).cloned().collect()
@@ -64,13 +81,13 @@ pub(crate) struct Gathered {
     pub(crate) site_digest: Option<String>,
     pub(crate) not_reached: Vec<NotReached>,
     /// Lines of files that could not be read.
-    pub(crate) damaged_lines: u64,
+    pub(crate) damaged: Damaged,
 }
 
 impl Gathered {
     /// Fails if something is known to be missing.
     pub(crate) fn require_complete(&self) -> Result<()> {
-        let is_complete = self.not_reached.is_empty() && self.damaged_lines == 0;
+        let is_complete = self.not_reached.is_empty() && self.damaged.lines == 0;
         match is_complete {
             true => Ok(()),
             false => Err(Failure::incomplete("not everything could be read")),
@@ -99,7 +116,7 @@ pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<G
     let site_digest = site.as_ref().and_then(|site| Some(site.digest?.to_string()));
     let mut site = site.unwrap_or_else(|| Site { time_zone: moment::here(), ..Site::unknown() });
     let mut collector = Collector::new();
-    let damaged_lines = files::read(&args.input, &site, &mut collector)?;
+    let damaged = files::read(&args.input, &site, &mut collector)?;
     let missed_now = match reads_recorders {
         true => live::read(&site, connection, &args.state, &mut collector)?,
         false => Vec::new(),
@@ -120,5 +137,5 @@ pub(crate) fn gather(args: &SourceArgs, connection: &ConnectionArgs) -> Result<G
     let not_reached = readings::not_reached(missed_now, &mut history);
     readings::tell(&history);
     twins::tell(&history);
-    Ok(Gathered { site, history, site_digest, not_reached, damaged_lines })
+    Ok(Gathered { site, history, site_digest, not_reached, damaged })
 }

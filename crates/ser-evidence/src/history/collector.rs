@@ -238,7 +238,7 @@ impl Collected {
         }
         let told = ToldGaps::new(self.gaps);
         for life in &mut lives {
-            life.gaps = gaps::of_life(life, &told);
+            life.gaps = gaps::of_life(life, &told, self.stamps.is_some());
         }
         conflicts.sort_unstable_by_key(|conflict| (conflict.life, conflict.sequence));
         self.reach.end_source();

@@ -67,8 +67,10 @@ impl ToldGaps {
     }
 }
 
-/// Everything that is missing in a life.
-pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps) -> Vec<LogGap> {
+/// Everything that is missing in a life. Entries of a recorder are counted by it, so nothing is
+/// missing between two that follow each other. Those of a list of another device (`is_list`) are
+/// counted by whoever read the list: what was told there is in no other source.
+pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps, is_list: bool) -> Vec<LogGap> {
     if life.is_by_number {
         return Vec::new();
     }
@@ -76,6 +78,8 @@ pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps) -> Vec<LogGap> {
     let first = life.entries.first().map_or(1, |held| held.sequence);
     if first > 1 {
         gaps.push(hole(life, told, 0, 0, first - 1));
+    } else if let Some(first) = life.entries.first() {
+        gaps.extend(stays(life, told, is_list, (0, 0), (None, first)));
     }
     for (place, pair) in life.entries.windows(2).enumerate() {
         let [before, after] = pair else { continue };
@@ -85,6 +89,9 @@ pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps) -> Vec<LogGap> {
         } else if let Some(inputs) = unrecorded(before, after) {
             let (after, why) = (before.sequence, Why::NotRecorded(inputs));
             gaps.push(LogGap { place: place + 1, after, lost: Lost::Unknown, why });
+        } else {
+            let at = (place + 1, before.sequence);
+            gaps.extend(stays(life, told, is_list, at, (Some(before), after)));
         }
     }
     let last = life.entries.last().map_or(0, |held| held.sequence);
@@ -93,13 +100,31 @@ pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps) -> Vec<LogGap> {
         (Why::Unreadable, _) => !life.entries.is_empty(),
         // That a recorder was not reached is no loss yet, unless it is known that it has more.
         (Why::LogBeganAnew | Why::NotRecorded(_), _) | (_, Lost::AtLeast(1..)) => is_named,
-        _ => false,
+        _ => is_list && !life.entries.is_empty(),
     });
     for gap in ends {
         let (place, lost, why) = (life.entries.len(), gap.lost, gap.why);
         gaps.push(LogGap { place, after: last, lost, why });
     }
     gaps
+}
+
+/// What was told of a place, given with the sequence before it, though no number is skipped there.
+/// Inputs that changed without a record are known from the neighbours, if both show their states.
+fn stays(
+    life: &LifeHistory,
+    told: &ToldGaps,
+    is_list: bool,
+    (place, after): (usize, u64),
+    (before, next): (Option<&Held>, &Held),
+) -> impl Iterator<Item = LogGap> {
+    let known = before.map_or(0, |before| before.known.0 & next.known.0);
+    let is_there = move |gap: &&Gap| match gap.why {
+        Why::NotRecorded(inputs) => inputs & !known != 0,
+        _ => is_list,
+    };
+    let there = told.at(life.name(), after).iter().filter(is_there);
+    there.map(move |&Gap { lost, why, .. }| LogGap { place, after, lost, why })
 }
 
 /// Inputs that changed between neighbours without a record.
@@ -111,13 +136,27 @@ fn unrecorded(before: &Held, after: &Held) -> Option<u32> {
 
 /// Entries that are missing between two that are held. What was told about the place says why.
 fn hole(life: &LifeHistory, told: &ToldGaps, place: usize, after: u64, missing: u64) -> LogGap {
-    let missing = u32::try_from(missing).unwrap_or(u32::MAX);
+    let counted = u32::try_from(missing);
+    let missing = counted.unwrap_or(u32::MAX);
     // Before the first reading nobody counted how often the total had wrapped.
-    let is_counted = after > 0 || life.is_exact;
+    let is_counted = (after > 0 || life.is_exact) && counted.is_ok();
     LogGap {
         place,
         after,
         lost: if is_counted { Lost::Exactly(missing) } else { Lost::AtLeast(missing) },
         why: told.why(life.name(), after).unwrap_or(Why::NotReached),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_than_a_gap_can_count_is_at_least_that() {
+        let life = LifeHistory { is_exact: true, ..LifeHistory::default() };
+        let lost = |missing| hole(&life, &ToldGaps::default(), 1, 5, missing).lost;
+        assert_eq!(lost(u64::from(u32::MAX)), Lost::Exactly(u32::MAX));
+        assert_eq!(lost(u64::from(u32::MAX) + 1), Lost::AtLeast(u32::MAX));
     }
 }

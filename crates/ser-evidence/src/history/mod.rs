@@ -82,6 +82,12 @@ pub struct Held {
 }
 
 impl Held {
+    /// Whether an input is on from this entry on; `None` if the source does not say.
+    #[must_use]
+    pub fn state_of(&self, input: u8) -> Option<bool> {
+        self.known.contains(input).then(|| self.entry.state.contains(input))
+    }
+
     /// Whether two readings may be of the same entry: they agree in everything that both know.
     #[must_use]
     pub fn agrees(&self, other: &Held) -> bool {

@@ -17,7 +17,7 @@ pub struct Disagreement {
     pub equipment: String,
     /// Whether both were on.
     pub both_on: bool,
-    /// Since when; `None`: since before the incident.
+    /// Since when; `None`: since before the first row.
     pub since: Option<ChangeId>,
     /// Until when; `None`: still at its end.
     pub until: Option<ChangeId>,
@@ -85,7 +85,7 @@ fn of_pair(
     let mut moved = rows.iter().filter(of_pair).peekable();
     while let Some(row) = moved.next() {
         let contact = if row.point == Some(pair.closed) { &mut closed } else { &mut open };
-        *contact = Some(row.on);
+        *contact = row.on;
         // Both in one sample count as one.
         if moved.peek().is_some_and(|next| next.change.event == row.change.event) {
             continue;

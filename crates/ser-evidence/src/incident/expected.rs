@@ -46,6 +46,8 @@ pub enum Doubt {
     Straddles,
     /// Nothing is known of the time between the two.
     NoCommonTime,
+    /// One of the two changed, and its source does not say to what.
+    UnknownState,
     /// Something is missing in the log that should show it.
     Gap,
     /// The log that should show it was not read later than this.
@@ -62,11 +64,12 @@ pub(super) fn results(
     let mut results = Vec::new();
     for (index, expectation) in timeline.site().expectations.iter().enumerate() {
         let mut taken = BTreeSet::new();
-        let beginnings: Vec<&Row> = rows.iter().filter(|row| is(row, expectation.after)).collect();
+        let beginnings: Vec<&Row> =
+            rows.iter().filter(|row| may_be(row, expectation.after)).collect();
         for (place, after) in beginnings.iter().enumerate() {
             let next = beginnings.get(place + 1).map(|row| row.change);
-            let (after, mut followers) =
-                (after.change, rows.iter().filter(|row| is(row, expectation.then)));
+            let (has_begun, after) = (after.on.is_some(), after.change);
+            let mut followers = rows.iter().filter(|row| may_be(row, expectation.then));
             let follows = |row: &&Row| {
                 !taken.contains(&row.change) && is_between(timeline, after, row.change, next)
             };
@@ -74,9 +77,11 @@ pub(super) fn results(
             let then = then.or_else(|| outside(timeline, points, expectation, after, next));
             taken.extend(then);
             let delta = then.map(|then| timeline.delta(after, then));
-            let verdict = match delta {
-                Some(delta) => in_window(delta, expectation.within_us),
-                None => absent(timeline, points, incident, expectation, after),
+            let verdict = match (then, delta) {
+                (Some(then), _) if !is_state_known(timeline, then) => UNKNOWN_STATE,
+                _ if !has_begun => UNKNOWN_STATE,
+                (_, Some(delta)) => in_window(delta, expectation.within_us),
+                _ => absent(timeline, points, incident, expectation, after),
             };
             results.push(StepResult { expectation: index, after, then, delta, verdict });
         }
@@ -84,8 +89,15 @@ pub(super) fn results(
     results
 }
 
-fn is(row: &Row, edge: Edge) -> bool {
-    row.point == Some(edge.point) && row.on == edge.on
+const UNKNOWN_STATE: Verdict = Verdict::NotDecidable(Doubt::UnknownState);
+
+/// Whether a row shows this edge, or a change of its point to a state that nobody knows.
+fn may_be(row: &Row, edge: Edge) -> bool {
+    row.point == Some(edge.point) && row.on.is_none_or(|on| on == edge.on)
+}
+
+fn is_state_known(timeline: &Timeline<'_>, change: ChangeId) -> bool {
+    timeline.held(change.event).is_some_and(|held| held.known.contains(change.input))
 }
 
 /// Whether a change may have followed one and not yet the next of its kind.
@@ -119,7 +131,7 @@ fn outside(
     for (life, of_life) in lives {
         for (place, held) in (0_u32..).zip(&of_life.entries) {
             let is_it = held.entry.changed.contains(point.input)
-                && held.entry.state.contains(point.input) == on;
+                && held.state_of(point.input).is_none_or(|state| state == on);
             let change = ChangeId { event: EventId { recorder, life, place }, input: point.input };
             let key = is_it.then(|| timeline.sort_key(change.event)).flatten();
             found.extend(key.filter(|key| (begins..=until).contains(key)).map(|key| (key, change)));

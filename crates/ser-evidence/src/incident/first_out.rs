@@ -89,7 +89,7 @@ fn of(timeline: &Timeline<'_>, incident: &Incident, counts: &dyn Fn(ChangeId) ->
         changes: movements(timeline, &firsts, &candidates, counts),
         gaps: incident.gaps.iter().copied().filter(is_ahead).collect(),
         unread: unread(timeline, incident, &candidates),
-        earlier: incident.earlier,
+        earlier: incident.earlier.len(),
     }
 }
 

@@ -35,8 +35,8 @@ pub struct Row {
     pub change: ChangeId,
     /// Its point, if the site names it.
     pub point: Option<PointId>,
-    /// Whether it went on.
-    pub on: bool,
+    /// Whether it went on; `None` if its source shows that it changed and not to what.
+    pub on: Option<bool>,
     /// How many more changes of the same input follow as chatter: those rows are folded into this
     /// one by whoever shows it.
     pub chatter: Option<usize>,
@@ -110,8 +110,8 @@ fn rows(timeline: &Timeline<'_>, points: &Points, incident: &Incident) -> Vec<Ro
         let Some(held) = timeline.held(event) else { continue };
         for input in held.entry.changed.numbers() {
             let change = ChangeId { event, input };
-            let on = held.entry.state.contains(input);
-            rows.push(Row { change, point: points.of(change), on, chatter: None });
+            let (point, on) = (points.of(change), held.state_of(input));
+            rows.push(Row { change, point, on, chatter: None });
         }
     }
     rows

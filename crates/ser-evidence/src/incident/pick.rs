@@ -17,8 +17,8 @@ pub struct Incident {
     pub gaps: Vec<(EventId, usize)>,
     /// Entries ahead of which a clock was set, or may have been.
     pub clock_sets: Vec<EventId>,
-    /// How many entries came before the time that was asked for, with no quiet time between.
-    pub earlier: usize,
+    /// The entries that came before the time that was asked for, with no quiet time between.
+    pub earlier: Vec<EventId>,
     /// How many came after it, with no quiet time between.
     pub later: usize,
 }
@@ -149,7 +149,7 @@ impl Rank {
     }
 }
 
-/// Whether a point went on whose role trips.
+/// Whether a point went on whose role trips, or may have.
 fn has_trip(timeline: &Timeline<'_>, points: &Points, incident: &Incident) -> bool {
     let site = timeline.site();
     let trips = |event: &EventId| {
@@ -157,7 +157,7 @@ fn has_trip(timeline: &Timeline<'_>, points: &Points, incident: &Incident) -> bo
         held.entry.changed.numbers().any(|input| {
             let point = points.of(ChangeId { event: *event, input });
             let role = point.and_then(|point| site.points.get(point.0)?.role);
-            matches!(role, Some(Role::Trip | Role::Lockout)) && held.entry.state.contains(input)
+            matches!(role, Some(Role::Trip | Role::Lockout)) && held.state_of(input) != Some(false)
         })
     };
     incident.events.iter().any(trips)
@@ -209,7 +209,7 @@ fn between(
 ) -> Option<Incident> {
     let (since, until) = (since.map_or(i64::MIN, Moment::us), until.map_or(i64::MAX, Moment::us));
     let mut incident = Incident::default();
-    let (mut before, mut after) = (Outside::default(), Outside::default());
+    let (mut before, mut after) = (Before::default(), After::default());
     let quiet = timeline.site().incident.quiet_us;
     for item in timeline.items() {
         let (Item::Entry(event) | Item::Gap(event, _) | Item::ClockSet(event)) = item;
@@ -218,19 +218,20 @@ fn between(
             match item {
                 Item::Entry(event) => {
                     if incident.events.is_empty() {
-                        incident.earlier = before.joined_with(key, quiet);
+                        incident.earlier = std::mem::take(before.joined_with(key, quiet));
                     }
-                    after = Outside { last: Some(key), entries: 0 };
+                    after = After { last: Some(key), entries: 0 };
                     incident.events.push(event);
                 }
                 Item::Gap(event, index) => incident.gaps.push((event, index)),
                 Item::ClockSet(event) => incident.clock_sets.push(event),
             }
-        } else if matches!(item, Item::Entry(_)) {
+        } else if let Item::Entry(event) = item {
             if key < since {
-                before = Outside { last: Some(key), entries: before.joined_with(key, quiet) + 1 };
+                before.joined_with(key, quiet).push(event);
+                before.last = Some(key);
             } else if after.last.is_some_and(|last| key.saturating_sub(last) <= quiet) {
-                after = Outside { last: Some(key), entries: after.entries + 1 };
+                after = After { last: Some(key), entries: after.entries + 1 };
             }
         }
     }
@@ -238,17 +239,26 @@ fn between(
     (!incident.events.is_empty()).then_some(incident)
 }
 
-/// Entries that follow each other without a quiet time, on one side of a time that was asked for.
+/// Entries that follow each other without a quiet time, after a time that was asked for.
 #[derive(Clone, Copy, Debug, Default)]
-struct Outside {
+struct After {
     last: Option<i64>,
     entries: usize,
 }
 
-impl Outside {
-    /// How many of them an entry joins.
-    fn joined_with(self, key: i64, quiet: i64) -> usize {
-        let is_near = self.last.is_some_and(|last| key.saturating_sub(last) <= quiet);
-        if is_near { self.entries } else { 0 }
+/// The same before one.
+#[derive(Debug, Default)]
+struct Before {
+    last: Option<i64>,
+    entries: Vec<EventId>,
+}
+
+impl Before {
+    /// Those of them that an entry joins. The others are forgotten.
+    fn joined_with(&mut self, key: i64, quiet: i64) -> &mut Vec<EventId> {
+        if self.last.is_none_or(|last| key.saturating_sub(last) > quiet) {
+            self.entries.clear();
+        }
+        &mut self.entries
     }
 }

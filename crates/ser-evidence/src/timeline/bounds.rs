@@ -168,17 +168,18 @@ impl LifeBounds {
         next.checked_sub(1).and_then(|last| self.shifts.get(last)).map_or(0, |&(_, us)| us)
     }
 
-    /// What a stamp is in UTC by what the site says about the clock.
+    /// What a stamp is in UTC by what the site says about the clock. `stamp` is what the clock showed
+    /// at an entry, the first millisecond of 1970 being 2070 where that follows on 2069.
     pub(super) fn nominal(
-        &self,
         place: usize,
         life: &LifeHistory,
+        stamp: impl Fn(&Held) -> Option<Moment<Shown>>,
         recorder: Option<&RecorderHistory>,
         site: &Site,
     ) -> Nominal {
         let rule = recorder.map(|recorder| recorder.recorder.clock).unwrap_or_default();
         let of = |place: usize| {
-            let stamp = life.entries.get(place).and_then(|held| shown(&held.entry.time));
+            let stamp = life.entries.get(place).and_then(&stamp);
             stamp.map_or(Nominal::NotKnown, |stamp| Nominal::of(stamp, rule, &site.time_zone))
         };
         let this = of(place);

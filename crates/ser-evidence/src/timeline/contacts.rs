@@ -42,7 +42,8 @@ pub enum ContactTrouble {
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     change: ChangeId,
-    on: bool,
+    /// To which side; `None` if its source does not say.
+    on: Option<bool>,
     /// Where it is in the list: for the search only.
     key: i64,
     /// How far from there it may be.
@@ -93,6 +94,8 @@ fn pair(timeline: &Timeline<'_>, one: PointId, other: PointId, shared: &mut Shar
                 [partner] if from == one => {
                     let is_mutual = partners(timeline, partner, these).len() == 1;
                     if is_mutual
+                        && change.on.is_some()
+                        && change.on == partner.on
                         && !is_chatter(timeline, those, partner)
                         && is_one(timeline, change.change, partner.change)
                     {
@@ -131,7 +134,7 @@ fn changes_of(timeline: &Timeline<'_>, point: &Point, is_inverted: bool) -> Vec<
                 else {
                     continue;
                 };
-                let on = held.entry.state.contains(point.input) != is_inverted;
+                let on = held.state_of(point.input).map(|on| on != is_inverted);
                 let change = ChangeId { event, input: point.input };
                 seen.push(Seen { change, on, key, width });
             }
@@ -148,13 +151,22 @@ fn narrowest(timeline: &Timeline<'_>, event: EventId) -> Option<i64> {
     known.map(|(lo, hi)| hi.saturating_sub(lo)).min()
 }
 
-/// The changes in the same direction that may be the same movement.
+impl Seen {
+    /// Whether both may be movements to the same side.
+    fn may_be_alike(&self, other: &Seen) -> bool {
+        self.on.zip(other.on).is_none_or(|(one, other)| one == other)
+    }
+}
+
+/// The changes that may be the same movement. Those to the other side are none.
 fn partners(timeline: &Timeline<'_>, change: &Seen, those: &[Seen]) -> Vec<Seen> {
     let reach = WIDEST_US;
     let first = those.partition_point(|seen| seen.key < change.key.saturating_sub(reach));
     let near = those.iter().skip(first);
     near.take_while(|seen| seen.key <= change.key.saturating_add(reach))
-        .filter(|seen| seen.on == change.on && may_be_one(timeline, change.change, seen.change))
+        .filter(|seen| {
+            seen.may_be_alike(change) && may_be_one(timeline, change.change, seen.change)
+        })
         .take(2)
         .copied()
         .collect()
@@ -227,7 +239,7 @@ fn trouble(
     let nearest = those
         .iter()
         .filter(|seen| {
-            seen.on == change.on && seen.key.abs_diff(change.key) <= quiet.unsigned_abs()
+            seen.may_be_alike(change) && seen.key.abs_diff(change.key) <= quiet.unsigned_abs()
         })
         .min_by_key(|seen| (seen.key.abs_diff(change.key), seen.change));
     let trouble =

@@ -145,7 +145,7 @@ impl Timeline<'_> {
     /// this recorder.
     pub(super) fn delay_ends(&self, event: EventId, input: Option<u8>) -> (i64, i64) {
         let Some(recorder) = self.recorder(event) else { return (0, 0) };
-        let is_on = input.and_then(|input| Some(self.held(event)?.entry.state.contains(input)));
+        let is_on = input.and_then(|input| self.held(event)?.state_of(input));
         delay_ends_of(&recorder.recorder, is_on)
     }
 

@@ -205,10 +205,16 @@ impl<'a> Timeline<'a> {
     /// observed.
     #[must_use]
     pub fn nominal(&self, event: EventId) -> Nominal {
-        let (Some(life), Some(bounds)) = (self.life(event), self.bounds(event)) else {
+        let (Some(life), Some(clock)) = (self.life(event), self.clock(event)) else {
             return Nominal::NotKnown;
         };
-        bounds.nominal(event.place as usize, life, self.recorder(event), self.site)
+        let stamp = |held: &Held| {
+            let stamp = shown(&held.entry.time)?;
+            let run = clock.sure_run(held).and_then(|run| self.model.runs.get(run));
+            // Where the clock began a century anew, it goes on.
+            Some(run.map_or(stamp, |run| stamp.max(Moment::from_us(run.unwrapped(stamp)))))
+        };
+        LifeBounds::nominal(event.place as usize, life, stamp, self.recorder(event), self.site)
     }
 
     /// When the sample was taken, in UTC as well as that is known: for people, and without doubt.

@@ -54,13 +54,13 @@ impl Side {
 /// of a change of another recorder, and shows nothing on the way that may be the same movement.
 pub(super) fn reaches(timeline: &Timeline<'_>, from: ChangeId, to: ChangeId, side: Side) -> bool {
     let Some(held) = timeline.held(from.event) else { return false };
-    let is_on = held.entry.state.contains(from.input);
+    let on = held.state_of(from.input);
     for (event, held) in side.entries(timeline, from.event) {
         if timeline.order(event, to.event) == side.order() {
             return true;
         }
-        let is_alike = held.entry.changed.contains(from.input)
-            && held.entry.state.contains(from.input) == is_on;
+        let is_other = on.zip(held.state_of(from.input)).is_some_and(|(one, other)| one != other);
+        let is_alike = held.entry.changed.contains(from.input) && !is_other;
         if is_alike && may_be_one(timeline, ChangeId { event, ..from }, to) {
             return false;
         }

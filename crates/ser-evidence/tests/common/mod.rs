@@ -4,7 +4,7 @@
 use ser_evidence::history::{Collector, History};
 use ser_evidence::record::{
     Boot, ClockObservation, EntryRecord, Gap, HostReading, How, Life, Lost, Place, Record,
-    Reference, Why,
+    RecorderRecord, Reference, Why,
 };
 use ser_evidence::site::{self, Site};
 use ser_evidence::time::{Bound, Moment, Shown, shown};
@@ -71,6 +71,16 @@ impl Log {
         self
     }
 
+    /// These inputs change, and the source does not say to what.
+    pub(crate) fn moves(&mut self, time: &str, inputs: &[u8]) -> &mut Log {
+        self.changes(time, inputs);
+        if let Some(Record::Entry(record)) = self.records.last_mut() {
+            record.known.0 &= !record.entry.changed.0;
+            record.entry.state.0 &= record.known.0;
+        }
+        self
+    }
+
     /// These inputs change and no entry says so.
     pub(crate) fn forgets(&mut self, inputs: &[u8]) -> &mut Log {
         self.state ^= inputs.iter().fold(0, |bits, input| bits | 1 << (input - 1));
@@ -87,6 +97,19 @@ impl Log {
     pub(crate) fn tells_overwritten(&mut self, after: u64, count: u32) -> &mut Log {
         let (life, after, lost) = (self.life, Some(after), Lost::Exactly(count));
         self.records.push(Record::Gap(Gap { life, after, lost, why: Why::Overwritten }));
+        self
+    }
+
+    /// Somebody tells that so much is missing after this entry.
+    pub(crate) fn tells(&mut self, after: u64, lost: Lost, why: Why) -> &mut Log {
+        let (life, after) = (self.life, Some(after));
+        self.records.push(Record::Gap(Gap { life, after, lost, why }));
+        self
+    }
+
+    /// It is the list of another device, whose stamps are in UTC.
+    pub(crate) fn is_list(&mut self) -> &mut Log {
+        self.records.push(Record::Recorder(RecorderRecord { utc_offset_s: 0 }));
         self
     }
 

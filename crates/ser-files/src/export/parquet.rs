@@ -227,11 +227,8 @@ impl Rows {
     }
 
     fn entry(&mut self, timeline: &Timeline<'_>, event: EventId) {
-        let (Some(&Held { sequence, entry, number, .. }), Some(life)) =
-            (timeline.held(event), timeline.life(event))
-        else {
-            return;
-        };
+        let (Some(held), Some(life)) = (timeline.held(event), timeline.life(event)) else { return };
+        let Held { sequence, entry, number, .. } = *held;
         let mut stamp = Vec::new();
         push_stamp(&mut stamp, &entry.time);
         let bound = timeline.moved_utc(event, None);
@@ -252,7 +249,7 @@ impl Rows {
             self.row(event, &common, None);
         }
         for input in entry.changed.numbers() {
-            let change = (input, entry.state.contains(input));
+            let change = (input, held.state_of(input));
             self.row(event, &common, Some(change));
         }
     }
@@ -277,26 +274,27 @@ impl Rows {
         self.row(EventId { recorder, life: u32::MAX, place: 0 }, &common, None);
     }
 
-    fn row(&mut self, event: EventId, common: &Common, change: Option<(u8, bool)>) {
+    fn row(&mut self, event: EventId, common: &Common, change: Option<(u8, Option<bool>)>) {
         let of_recorder = self.names.get(event.recorder as usize);
-        let recorder = of_recorder.map(|(name, _)| name.clone()).unwrap_or_default();
+        // A `ByteArray` by default is no text, and cannot be written.
+        let recorder = of_recorder.map_or_else(|| ByteArray::from(""), |(name, _)| name.clone());
         let life = of_recorder.and_then(|(_, lives)| lives.get(event.life as usize).cloned());
-        let texts = change.and_then(|(input, is_on)| {
+        let texts = change.and_then(|(input, on)| {
             let of_recorder = self.points.get(event.recorder as usize)?;
             let (name, states) = of_recorder.get(usize::from(input).checked_sub(1)?)?.as_ref()?;
-            Some((name.clone(), states.get(usize::from(is_on))?.clone()))
+            Some((name.clone(), on.and_then(|on| states.get(usize::from(on)).cloned())))
         });
         let (point, meaning) = texts.unzip();
         self.kind.push(ByteArray::from(common.kind));
         self.recorder.push(recorder);
-        self.life.push(life.unwrap_or_default());
+        self.life.push(life.unwrap_or_else(|| ByteArray::from("")));
         self.sequence.push(common.sequence);
         self.entry.push(common.entry);
         self.stamp.push(common.stamp.clone());
         self.input.push(change.map(|(input, _)| input.into()));
-        self.state.push(change.map(|(_, is_on)| is_on));
+        self.state.push(change.and_then(|(_, on)| on));
         self.point.push(point);
-        self.meaning.push(meaning);
+        self.meaning.push(meaning.flatten());
         self.utc.push(common.utc);
         self.utc_earliest.push(common.ends.0);
         self.utc_latest.push(common.ends.1);

@@ -65,8 +65,8 @@ struct Rows<'t> {
     offsets: Offsets,
     /// The day since 1970 of the row before, and its date.
     day: Option<(i64, Vec<u8>)>,
-    /// By recorder and input: the last three fields, when it is off and when it is on.
-    changes: Vec<Vec<[Vec<u8>; 2]>>,
+    /// By recorder and input: the last three fields when it is off, on, and not known.
+    changes: Vec<Vec<[Vec<u8>; 3]>>,
     substation: String,
     is_spreadsheet_safe: bool,
     text: Vec<u8>,
@@ -95,11 +95,11 @@ impl<'t> Rows<'t> {
         rows
     }
 
-    /// By input of a recorder: the last three fields, off and on. Names of points need that of their
+    /// By input of a recorder: the last three fields, off, on and not known. Names of points need that of their
     /// recorder where there are several.
-    fn changes_of(&self, recorder: usize, channels: &Channels) -> Vec<[Vec<u8>; 2]> {
+    fn changes_of(&self, recorder: usize, channels: &Channels) -> Vec<[Vec<u8>; 3]> {
         let timeline = self.timeline;
-        let mut changes = vec![[Vec::new(), Vec::new()]; 32];
+        let mut changes = vec![<[Vec<u8>; 3]>::default(); 32];
         for channel in channels.of(recorder) {
             let name = match channels.are_of_several() {
                 true => format!("{}/{}", recorder_name(timeline, recorder), channel.name(timeline)),
@@ -107,7 +107,7 @@ impl<'t> Rows<'t> {
             };
             let place = usize::from(channel.input).wrapping_sub(1);
             if let Some(of_input) = changes.get_mut(place) {
-                *of_input = [false, true]
+                *of_input = [Some(false), Some(true), None]
                     .map(|on| self.fields(&name, &names::state(timeline, channel.point, on)));
             }
         }
@@ -131,7 +131,7 @@ impl<'t> Rows<'t> {
             let of_recorder = self.changes.get(event.recorder as usize);
             let fields = of_recorder.and_then(|inputs| {
                 let of_input = inputs.get(usize::from(input).checked_sub(1)?)?;
-                of_input.get(usize::from(held.entry.state.contains(input)))
+                of_input.get(held.state_of(input).map_or(2, usize::from))
             });
             self.text.extend_from_slice(fields.map_or(b"\r\n", Vec::as_slice));
         }

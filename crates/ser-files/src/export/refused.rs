@@ -30,12 +30,13 @@ impl fmt::Display for Refused {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Refused::Empty => f.write_str("no entry has a time, so none can be drawn"),
-            Refused::TooLong { is_ms, may_be_ms } => write!(
-                f,
-                "the entries are {} apart, and this format can hold {}",
-                long(*is_ms),
-                long(*may_be_ms)
-            ),
+            Refused::TooLong { is_ms, may_be_ms } => {
+                let (is, may_be) = match (long(*is_ms), long(*may_be_ms)) {
+                    (is, may_be) if is == may_be => (exactly(*is_ms), exactly(*may_be_ms)),
+                    texts => texts,
+                };
+                write!(f, "the entries are {is} apart, and this format can hold {may_be}")
+            }
             Refused::Io(error) => error.fmt(f),
         }
     }
@@ -61,9 +62,26 @@ fn long(ms: u64) -> String {
     }
 }
 
+/// The same to the millisecond.
+fn exactly(ms: u64) -> String {
+    let (seconds, minutes) = (ms / 1000, ms / 60_000);
+    format!("{} h {} min {}.{:03} s", minutes / 60, minutes % 60, seconds % 60, ms % 1000)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn two_lengths_that_look_alike_are_told_to_the_millisecond() {
+        let told = Refused::TooLong { is_ms: 3_600_001, may_be_ms: 3_600_000 }.to_string();
+        assert_eq!(
+            told,
+            "the entries are 1 h 0 min 0.001 s apart, and this format can hold 1 h 0 min 0.000 s"
+        );
+        let told = Refused::TooLong { is_ms: 7_200_000, may_be_ms: 3_600_000 }.to_string();
+        assert_eq!(told, "the entries are 2 h 0 min apart, and this format can hold 1 h 0 min");
+    }
 
     #[test]
     fn lengths_are_told_in_units_that_people_use() {

@@ -17,7 +17,7 @@ use sha2::{Digest, Sha256};
 use super::inputs::Inputs;
 use super::list::{Texts, To};
 use super::notes::Notes;
-use super::states::Meanings;
+use super::states::{Meanings, NoState};
 use super::timed::{Timed, TimedRow};
 use super::zone::Doubt;
 
@@ -84,7 +84,7 @@ impl Maker<'_> {
             life.tear(points);
         }
         for recorder in 0..life.logs.len() {
-            life.tell_gap(recorder);
+            life.tell_gap(recorder, Why::Unreadable);
         }
         if life.is_doubtful && self.doubt_ms.is_some() {
             notes.remark(
@@ -93,6 +93,22 @@ impl Maker<'_> {
             );
         }
         life.made
+    }
+
+    /// Why the state of a point is not known.
+    fn why(&self, point: usize, no_state: NoState) -> String {
+        let point = self.points.get(point);
+        match no_state {
+            NoState::Third(word) => {
+                let word = self.words.get(word);
+                format!("{point:?} has two states already, and {word:?} is another")
+            }
+            NoState::Part(word) => format!(
+                "{:?} of {point:?} looks like a part of a word; --map can say what it means",
+                self.words.get(word)
+            ),
+            NoState::NoWord => format!("{point:?} has no state here, and has one in other rows"),
+        }
     }
 
     /// A name that the same content has each time.
@@ -168,7 +184,8 @@ impl Writing<'_> {
             let gap = Gap { life: self.life, after: Some(0), lost, why: Why::Overwritten };
             self.tell(0, Record::Gap(gap), None);
         }
-        let before = if list.counts_from_beginning { 0 } else { missing };
+        let is_torn = list.rows.first().is_some_and(|row| row.torn.is_some());
+        let before = if list.counts_from_beginning || is_torn { 0 } else { missing };
         for log in &mut self.logs {
             log.sequence = before;
         }
@@ -196,7 +213,7 @@ impl Writing<'_> {
         }
         self.look(row.at_ms, &moved);
         for (recorder, (changed, on, known)) in moved {
-            self.tell_gap(recorder);
+            self.tell_gap(recorder, Why::NotReached);
             let Some(log) = self.logs.get_mut(recorder) else { continue };
             log.sequence = match self.is_split {
                 true => log.sequence + 1 + std::mem::take(&mut log.missing),
@@ -232,18 +249,20 @@ impl Writing<'_> {
         }
     }
 
-    /// Tells what is lost since the last entry of a recorder.
-    fn tell_gap(&mut self, recorder: usize) {
+    /// Tells what is lost since the last entry of a recorder. `unknown` says why where nobody knows
+    /// whether there was an entry: behind the last one, only a reason of the file's own is a loss.
+    fn tell_gap(&mut self, recorder: usize, unknown: Why) {
         let Some(log) = self.logs.get_mut(recorder) else { return };
         let Some(inputs) = log.torn.take() else { return };
-        let why = match inputs {
-            0 => Why::NotReached,
-            inputs => Why::NotRecorded(inputs),
-        };
         // A row of a list is an entry of somebody; a sample need not be.
         let lost = match self.is_sampled || self.is_split {
             true => Lost::Unknown,
             false => Lost::AtLeast(1),
+        };
+        let why = match (inputs, lost) {
+            (0, Lost::Unknown) => unknown,
+            (0, _) => Why::NotReached,
+            (inputs, _) => Why::NotRecorded(inputs),
         };
         let gap = Gap { life: self.life, after: Some(log.sequence), lost, why };
         self.tell(recorder, Record::Gap(gap), None);
@@ -270,11 +289,8 @@ impl Writing<'_> {
             let Some(place) = self.maker.inputs.of_point(change.point) else { continue };
             let state = match self.maker.meanings.state(change.point, change.to) {
                 Ok(state) => state,
-                Err(word) => {
-                    let (point, word) =
-                        (self.maker.points.get(change.point), self.maker.words.get(word));
-                    let why = format!("{point:?} has two states already, and {word:?} is another");
-                    notes.leave_out(row.line, why);
+                Err(no_state) => {
+                    notes.leave_out(row.line, self.maker.why(change.point, no_state));
                     // Something happened that no entry has.
                     self.logs.iter_mut().for_each(|log| log.missing += 1);
                     self.tear(&[]);
@@ -352,12 +368,21 @@ fn note(row: &TimedRow, time: &TimeStamp) -> Option<String> {
     match row.doubt? {
         Doubt::Twice(ns) => {
             let minutes = ns / 60_000_000_000;
-            Some(format!(
-                "this hour came twice: it may also be {minutes} min later than {time} UTC"
-            ))
+            Some(format!("{TWICE}: it may also be {minutes} min later than {time} UTC"))
         }
-        Doubt::Missing => {
-            Some("this local time was left out when the clocks went forward".to_owned())
-        }
+        Doubt::Missing => Some(LEFT_OUT.to_owned()),
     }
+}
+
+/// How the remark about a time begins that may be another one.
+const TWICE: &str = "this hour came twice";
+
+/// The remark about a local time that no clock showed that follows its zone.
+const LEFT_OUT: &str = "this local time was left out when the clocks went forward";
+
+/// Whether the remark of an imported entry says that its time may be another one: its local hour came
+/// twice, or was left out.
+#[must_use]
+pub fn is_doubt_of_time(note: &str) -> bool {
+    note.starts_with(TWICE) || note == LEFT_OUT
 }

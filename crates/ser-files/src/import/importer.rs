@@ -216,6 +216,8 @@ impl Importer {
                 }
                 Err(error) if error.is_of_one_line() => {
                     notes.leave_out(error.line, error.problem.to_string());
+                    let gap = Record::Gap(source.damage());
+                    own(source.recorder(), &gap, None).map_err(Refusal::NotTaken)?;
                 }
                 Err(error) => return Err(Refusal::damaged(error.line, error.problem.to_string())),
             }

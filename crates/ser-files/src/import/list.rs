@@ -229,6 +229,10 @@ pub(super) struct Numbered {
     pub(super) other_dates: Vec<Date>,
     /// Rows of this list that were left out.
     damaged: u64,
+    /// The largest number that one of them has.
+    damaged_number: u64,
+    /// The file ends in a line that is not whole.
+    is_cut: bool,
 }
 
 impl Numbered {
@@ -241,9 +245,15 @@ impl Numbered {
         Ok(())
     }
 
-    /// Notes that a row was left out.
-    pub(super) fn tear(&mut self) {
+    /// Notes that a row was left out: its number if that is known.
+    pub(super) fn tear(&mut self, number: Option<u64>) {
         self.damaged += 1;
+        self.damaged_number = self.damaged_number.max(number.unwrap_or_default());
+    }
+
+    /// Notes that the file ends in a line that is not whole.
+    pub(super) const fn cut(&mut self) {
+        self.is_cut = true;
     }
 
     /// Whether there is a row.
@@ -254,6 +264,7 @@ impl Numbered {
     /// The list so far; the next row begins another one.
     pub(super) fn finish(&mut self, found: &mut Found, notes: &mut Notes) {
         let damaged = std::mem::take(&mut self.damaged);
+        let damaged_number = std::mem::take(&mut self.damaged_number);
         if self.rows.is_empty() {
             return;
         }
@@ -261,6 +272,11 @@ impl Numbered {
         // The oldest first; of one number, the row that comes first in the file.
         rows.sort_by_key(|(number, row)| (u64::MAX - number, row.line));
         let oldest = rows.first().map_or(0, |(number, _)| *number);
+        let newest = rows.last().map_or(1, |(number, _)| *number);
+        // Of a list that is cut off and has its newest row, the oldest ones are missing. They have a
+        // place of their own.
+        let is_begun = damaged_number <= oldest && !(self.is_cut && newest == 1);
+        let beyond = u64::from(!is_begun);
         let mut list = List {
             order: Order::PlacesOrReversed,
             other_dates: std::mem::take(&mut self.other_dates),
@@ -279,19 +295,50 @@ impl Numbered {
                 continue;
             }
             row.forgets |= before.is_some_and(|before| before != number + 1);
-            row.place = oldest - number + 1;
+            row.place = oldest - number + 1 + beyond;
             before = Some(number);
             list.rows.push(row);
         }
-        // Numbers that are missing in between tell where a row was. What they do not account for was
-        // among the newest, if those are missing.
-        let newest = before.unwrap_or(1);
-        let kept = u64::try_from(list.rows.len()).unwrap_or(u64::MAX);
-        let holes = (oldest - newest).saturating_add(1).saturating_sub(kept);
-        if newest > 1 && damaged > holes {
-            list.torn_at_end = Some(Vec::new());
+        if beyond > 0
+            && let Some(first) = list.rows.first_mut()
+        {
+            first.torn.get_or_insert_default();
         }
+        tell_missing(&mut list, (oldest + beyond, newest), damaged, notes);
         found.lists.push(list);
+    }
+}
+
+/// Tells rows that are not there: the newest, if there is none with the number 1, and those whose
+/// numbers are skipped.
+fn tell_missing(list: &mut List, (oldest, newest): (u64, u64), damaged: u64, notes: &mut Notes) {
+    if newest > 1 {
+        list.torn_at_end = Some(Vec::new());
+    }
+    // What was left out has been told.
+    if damaged > 0 {
+        return;
+    }
+    let skipped = list.rows.windows(2).filter_map(|pair| match pair {
+        [older, newer] if older.place + 1 < newer.place => {
+            let number = |place: u64| oldest - place + 1;
+            Some((older.line, number(newer.place) + 1, number(older.place) - 1))
+        }
+        _ => None,
+    });
+    for (line, from, to) in skipped {
+        match from == to {
+            true => notes.lose(line, format!("row {from} is not in the file")),
+            false => notes.lose(line, format!("rows {from} to {to} are not in the file")),
+        }
+    }
+    match (newest, list.rows.last().map(|row| row.line)) {
+        (2, Some(line)) => notes.lose(line, "row 1, the newest, is not in the file"),
+        (3.., Some(line)) => {
+            let why = format!("rows 1 to {}, the newest, are not in the file", newest - 1);
+            notes.lose(line, why);
+        }
+        _ => {}
     }
 }
 

@@ -31,6 +31,7 @@ mod zone;
 pub use calendar::DateOrder;
 pub use comtrade::Extent;
 pub use cytime::Epoch;
+pub use entries::is_doubt_of_time;
 pub use format::Format;
 pub use importer::{Imported, ImportedRecorder, Importer, Opened, Options, Own, Read};
 pub use map::Map;

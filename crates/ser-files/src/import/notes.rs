@@ -50,6 +50,14 @@ impl Notes {
         }
     }
 
+    /// Something is missing behind everything that a file holds.
+    pub(super) fn lose_at_end(&mut self, why: impl Into<String>) {
+        self.lost_count += 1;
+        if self.lost.len() < KEPT {
+            self.lost.push(Note { line: None, why: why.into() });
+        }
+    }
+
     /// Something is to be known about a line, or about the whole.
     pub(super) fn remark(&mut self, line: Option<u64>, why: impl Into<String>) {
         let note = Note { line, why: why.into() };

@@ -7,7 +7,7 @@ use super::calendar::utc_offset;
 use super::list::{Change, Found, List, Order, Row, To, When};
 use super::notes::{Notes, Refusal};
 use super::text::{Line, TextLines};
-use crate::error::quoted;
+use crate::error::{NO_LINE_END, quoted};
 use crate::fields::Fields;
 use crate::missing::RECORDS_MISSING;
 
@@ -61,7 +61,13 @@ pub(super) fn read(
                 format!("the columns have to be {}", COLUMNS.join(", ")),
             ));
         };
-        match row(&text, columns, &mut fields, number, found)? {
+        // Where the last text stands in quotes, the second one says that it is whole.
+        let is_whole = lines.is_ended() || text.ends_with('"');
+        let understood = match is_whole {
+            true => row(&text, columns, &mut fields, number, found)?,
+            false => Err(NO_LINE_END.to_owned()),
+        };
+        match understood {
             Ok(Said::Missing(what)) => {
                 notes.lose(number, what);
                 torn = Some(Vec::new());

@@ -4,7 +4,7 @@
 //! word that a point shows is taken for on, which is told. With that, only the side is chosen: the
 //! point is shown with its own words.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::list::{Texts, To};
 use super::map::Map;
@@ -12,7 +12,7 @@ use super::notes::Notes;
 use super::timed::Timed;
 
 /// Words that belong together: on, off.
-const PAIRS: [(&str, &str); 18] = [
+const PAIRS: [(&str, &str); 20] = [
     ("asserted", "deasserted"),
     ("closed", "open"),
     ("close", "open"),
@@ -31,6 +31,8 @@ const PAIRS: [(&str, &str); 18] = [
     ("enabled", "disabled"),
     ("yes", "no"),
     ("closed", "opened"),
+    ("in", "out"),
+    ("hi", "lo"),
 ];
 
 /// What the words of each point mean.
@@ -38,10 +40,23 @@ const PAIRS: [(&str, &str); 18] = [
 pub(super) struct Meanings {
     /// Whether a word of a point means on. What is not there has no meaning.
     on: BTreeMap<(usize, usize), bool>,
+    /// Words of points that are only a part of another word.
+    parts: BTreeSet<(usize, usize)>,
     /// What is shown for on and off.
     texts: BTreeMap<usize, [Option<String>; 2]>,
     /// Points that have no state.
     events: BTreeMap<usize, ()>,
+}
+
+/// Why nobody knows what a change made of a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NoState {
+    /// This word is a third one.
+    Third(usize),
+    /// This word is only a part of another one.
+    Part(usize),
+    /// There is no word, and other rows of this point have one.
+    NoWord,
 }
 
 impl Meanings {
@@ -88,7 +103,8 @@ impl Meanings {
             .collect();
         let has = |sides: &[Option<bool>], side| sides.contains(&Some(side));
         for place in 0..sides.len() {
-            if sides.get(place) != Some(&None) {
+            let word = known.get(place).map_or("", |word| words.get(*word));
+            if sides.get(place) != Some(&None) || is_part(word, known, words) {
                 continue;
             }
             let side = match (has(&sides, true), has(&sides, false)) {
@@ -108,7 +124,12 @@ impl Meanings {
         }
         let mut texts = [None, None];
         for (side, word) in sides.iter().zip(known) {
-            let Some(side) = *side else { continue };
+            let Some(side) = *side else {
+                if is_part(words.get(*word), known, words) {
+                    self.parts.insert((point, *word));
+                }
+                continue;
+            };
             self.on.insert((point, *word), side);
             let Some(text) = texts.get_mut(usize::from(!side)) else { continue };
             let word = words.get(*word);
@@ -126,11 +147,17 @@ impl Meanings {
         self.texts.insert(point, texts);
     }
 
-    /// What a change makes of a point: on, off, or nobody knows. An error if its word means nothing.
-    pub(super) fn state(&self, point: usize, to: To) -> Result<Option<bool>, usize> {
+    /// What a change makes of a point: on, off, or something without a state. An error if its word
+    /// means nothing.
+    pub(super) fn state(&self, point: usize, to: To) -> Result<Option<bool>, NoState> {
         match to {
             To::State(is_on) => Ok(Some(is_on)),
-            To::Word(word) => self.on.get(&(point, word)).copied().map(Some).ok_or(word),
+            To::Word(word) => match self.on.get(&(point, word)) {
+                Some(is_on) => Ok(Some(*is_on)),
+                None if self.parts.contains(&(point, word)) => Err(NoState::Part(word)),
+                None => Err(NoState::Third(word)),
+            },
+            To::Event if self.texts.contains_key(&point) => Err(NoState::NoWord),
             To::Event | To::Unseen => Ok(None),
         }
     }
@@ -147,6 +174,15 @@ impl Meanings {
             _ => ["ON".to_owned(), "OFF".to_owned()],
         }
     }
+}
+
+/// Whether a word that nobody knows is the beginning of one that is known, or that the same point
+/// shows: it was cut off.
+fn is_part(word: &str, of_point: &[usize], words: &Texts) -> bool {
+    let word = word.to_lowercase();
+    let begins = |whole: &str| whole.len() > word.len() && whole.starts_with(&word);
+    PAIRS.iter().any(|(on, off)| begins(on) || begins(off))
+        || of_point.iter().any(|other| begins(&words.get(*other).to_lowercase()))
 }
 
 /// Whether everybody takes this word for on, or for off.

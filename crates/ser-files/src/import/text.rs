@@ -110,6 +110,8 @@ pub(super) struct TextLines<'a> {
     raw: Vec<u8>,
     text: String,
     number: u64,
+    /// The line that was read last has an end.
+    is_ended: bool,
     /// The last line ended with CR, so that an LF belongs to it.
     after_cr: bool,
     latin_1: Option<u64>,
@@ -132,12 +134,18 @@ impl<'a> TextLines<'a> {
     /// Lines of up to `limit` bytes.
     pub(super) fn with_limit(input: Input<'a>, limit: usize) -> TextLines<'a> {
         let (raw, text) = (Vec::new(), String::new());
-        TextLines { input, limit, raw, text, number: 0, after_cr: false, latin_1: None }
+        let (number, is_ended, after_cr, latin_1) = (0, true, false, None);
+        TextLines { input, limit, raw, text, number, is_ended, after_cr, latin_1 }
     }
 
     /// The number of the line that was read last, from 1.
     pub(super) const fn number(&self) -> u64 {
         self.number
+    }
+
+    /// Whether the line that was read last has an end. The last of a file that was cut off has none.
+    pub(super) const fn is_ended(&self) -> bool {
+        self.is_ended
     }
 
     /// Counts on from a line of the same file.
@@ -164,7 +172,7 @@ impl<'a> TextLines<'a> {
     pub(super) fn next(&mut self) -> Result<Option<Line<'_>>, Refusal> {
         self.raw.clear();
         let mut is_any = false;
-        let mut is_too_long = false;
+        let (mut is_too_long, mut is_ended) = (false, false);
         loop {
             let waiting = match self.input.fill_buf() {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
@@ -188,6 +196,7 @@ impl<'a> TextLines<'a> {
             let taken = part.len() + usize::from(end.is_some());
             self.input.consume(taken);
             if end.is_some() {
+                is_ended = true;
                 break;
             }
         }
@@ -195,6 +204,7 @@ impl<'a> TextLines<'a> {
             return Ok(None);
         }
         self.number += 1;
+        self.is_ended = is_ended;
         if is_too_long {
             self.raw.clear();
             return Ok(Some(Line::TooLong));

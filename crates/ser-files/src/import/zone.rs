@@ -101,10 +101,7 @@ pub(super) fn in_utc(
     for row in &list.rows {
         let time = match local_ns(&row.when, order) {
             None => {
-                notes.leave_out(
-                    row.line,
-                    format!("{} is not a date from 1970 to 2069", row.when.date),
-                );
+                notes.leave_out(row.line, no_date(row.when.date, order));
                 None
             }
             Some(local) => Some(Local { ns: local, ..Local::of(local, &row.when, zone)? }),
@@ -113,6 +110,16 @@ pub(super) fn in_utc(
     }
     tell_apart(&mut times);
     Ok(times.iter().zip(&list.rows).map(|(time, row)| Some((*time)?.utc(&row.when))).collect())
+}
+
+/// Why a date is none.
+fn no_date(date: Date, order: DateOrder) -> String {
+    if date.in_order(order).is_some() {
+        return format!("{date} is not a date from 1970 to 2069");
+    }
+    let other = DateOrder::ALL.into_iter().find(|other| date.in_order(*other).is_some());
+    let other = other.map(|other| format!("; it is one with --dates {other}")).unwrap_or_default();
+    format!("{date} is not a date in the order {}{other}", order.in_words())
 }
 
 /// Nanoseconds from 1970 as a clock in that place counts them.
@@ -295,6 +302,19 @@ mod tests {
                 "2026-10-25T01:20:00.000Z",
                 "2026-10-25T01:40:00.000Z"
             ]
+        );
+    }
+
+    #[test]
+    fn a_date_in_another_order_is_told_with_that_order() {
+        let told = |date, order| no_date(Date::parse(date).unwrap(), order);
+        assert_eq!(
+            told("22/11/2026", DateOrder::Mdy),
+            "22/11/2026 is not a date in the order month, day, year; it is one with --dates dmy"
+        );
+        assert_eq!(
+            told("22/11/1950", DateOrder::Dmy),
+            "22/11/1950 is not a date from 1970 to 2069"
         );
     }
 

@@ -70,8 +70,8 @@ pub(crate) fn write_items(
 struct Rows {
     style: CsvStyle,
     separator: u8,
-    /// By recorder and input: what follows the other columns, when it is off and when it is on.
-    points: Vec<Vec<[Vec<u8>; 2]>>,
+    /// By recorder and input: what follows the other columns, by [`side`].
+    points: Vec<Vec<[Vec<u8>; 3]>>,
     /// By recorder: its name as a field, and the names of its lives.
     names: Vec<(String, Vec<String>)>,
     utc: UtcTexts,
@@ -114,9 +114,8 @@ impl Rows {
     /// The rows of an entry.
     fn entry(&mut self, timeline: &Timeline<'_>, event: EventId, is_after_set: bool) -> &[u8] {
         self.rows.clear();
-        let Some(&Held { sequence, entry, number, .. }) = timeline.held(event) else {
-            return &self.rows;
-        };
+        let Some(held) = timeline.held(event) else { return &self.rows };
+        let Held { sequence, entry, number, .. } = *held;
         self.head.clear();
         push_number(&mut self.head, number.into());
         self.head.push(self.separator);
@@ -137,21 +136,22 @@ impl Rows {
         for input in entry.changed.numbers() {
             self.rows.extend_from_slice(&self.head);
             push_number(&mut self.rows, input.into());
-            let is_on = entry.state.contains(input);
-            self.rows.extend_from_slice(&[self.separator, if is_on { b'1' } else { b'0' }]);
+            let on = held.state_of(input);
+            let state = on.map_or(b'?', |on| if on { b'1' } else { b'0' });
+            self.rows.extend_from_slice(&[self.separator, state]);
             self.rows.extend_from_slice(&self.tail);
-            self.end_row(Some((event, input, is_on)));
+            self.end_row(Some((event, input, on)));
         }
         &self.rows
     }
 
     /// Ends a row with the names of what changed.
-    fn end_row(&mut self, change: Option<(EventId, u8, bool)>) {
+    fn end_row(&mut self, change: Option<(EventId, u8, Option<bool>)>) {
         if self.style.has_names {
-            let names = change.and_then(|(event, input, is_on)| {
+            let names = change.and_then(|(event, input, on)| {
                 let place = usize::from(input).checked_sub(1)?;
                 let of_input = self.points.get(event.recorder as usize)?.get(place)?;
-                of_input.get(usize::from(is_on))
+                of_input.get(side(on))
             });
             match names {
                 Some(names) => self.rows.extend_from_slice(names),
@@ -228,14 +228,19 @@ impl Rows {
     }
 }
 
-/// By recorder and input: its names as fields, each after a separator, off and on.
-fn points(timeline: &Timeline<'_>, style: CsvStyle) -> Vec<Vec<[Vec<u8>; 2]>> {
+/// Where what belongs to a state is among three: off, on, and not known.
+fn side(on: Option<bool>) -> usize {
+    on.map_or(2, usize::from)
+}
+
+/// By recorder and input: its names as fields, each after a separator, by [`side`].
+fn points(timeline: &Timeline<'_>, style: CsvStyle) -> Vec<Vec<[Vec<u8>; 3]>> {
     let site = timeline.site();
     let of_input = |id: Option<_>, input: u8| {
-        [false, true].map(|is_on| {
+        [Some(false), Some(true), None].map(|on| {
             let Some(point) = id else { return vec![style.dialect.separator(); 2] };
             let texts =
-                [names::point(timeline, Some(point), input), names::state(timeline, id, is_on)];
+                [names::point(timeline, Some(point), input), names::state(timeline, id, on)];
             let mut fields = Vec::new();
             for text in texts {
                 fields.push(style.dialect.separator());

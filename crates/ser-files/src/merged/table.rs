@@ -101,7 +101,7 @@ impl<'t> Table<'t> {
         }
         for input in held.entry.changed.numbers() {
             let point: Option<PointId> = self.points.of(ChangeId { event, input });
-            let on = held.entry.state.contains(input);
+            let on = held.state_of(input);
             let name = names::point(self.timeline, point, input);
             let state = names::state(self.timeline, point, on);
             let is_abnormal = names::is_abnormal(self.timeline, point, on) == Some(true);

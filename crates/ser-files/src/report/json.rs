@@ -47,7 +47,7 @@ fn object(document: &Document<'_>) -> Value {
         "entries_sha256": digest,
         "is_incomplete": document.is_incomplete(),
         "damaged_lines": document.damaged_lines,
-        "entries_before": report.incident.earlier,
+        "entries_before": report.incident.earlier.len(),
         "entries_after": report.incident.later,
         "verdict": verdict_of(document),
         "first_out": first_out(document, &report.first_out),
@@ -228,7 +228,7 @@ fn sequence(document: &Document<'_>) -> Vec<Value> {
             "input": input,
             "point": point.map(|point| &point.name),
             "on": row.on,
-            "state": point.map(|point| if row.on { &point.on } else { &point.off }),
+            "state": point.zip(row.on).map(|(point, on)| if on { &point.on } else { &point.off }),
             "chatter": row.chatter,
             "shifted_us": timeline.shift_us(event),
             "clock_was_set_before": marks.is_set_ahead_of(event),
@@ -286,6 +286,7 @@ fn operations(document: &Document<'_>) -> Vec<Value> {
                 "changes": bounce.changes,
                 "lasted": delta(bounce.lasted),
             })),
+            "returned": operation.returned.map(delta),
         })
     })
     .collect()

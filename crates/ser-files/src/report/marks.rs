@@ -28,7 +28,11 @@ impl<'d> Marks<'d> {
         }
         Marks {
             timeline,
-            first_out: report.first_out.changes.iter().copied().collect(),
+            first_out: match report.first_out.earlier {
+                0 => report.first_out.changes.iter().copied().collect(),
+                // What is before what is shown was first.
+                _ => HashSet::new(),
+            },
             is_first_known: report.first_out.known().is_some(),
             folds: report.chatter.iter().map(|fold| (fold.first, fold)).collect(),
             gaps,

@@ -109,11 +109,11 @@ fn step(document: &Document<'_>, step: &StepResult) -> Option<Step> {
 
 /// What breakers did, and contact pairs that disagreed.
 pub(super) fn breakers(document: &Document<'_>) -> Vec<String> {
-    let Document { timeline, report, .. } = *document;
+    let report = document.report;
     let operated = report.operations.iter().map(|operation| {
         let off = operation.took.and_then(Delta::doubt_us);
         let off = off.map_or_else(String::new, |off| format!(", ± {}", doubt(off)));
-        format!("{}{off}", verdict::operated(timeline, operation))
+        format!("{}{off}", verdict::operated(operation))
     });
     operated.chain(report.disagreements.iter().map(disagreement)).collect()
 }
@@ -125,7 +125,7 @@ fn disagreement(of: &Disagreement) -> String {
             (Some(us), Some(off)) => format!("for {} ± {}", duration(us), doubt(off)),
             _ => "for an unknown time".to_owned(),
         },
-        (None, Some(_)) => "since before the incident, then no longer".to_owned(),
+        (None, Some(_)) => "since before what is shown, then no longer".to_owned(),
         (None, None) => "still at the end".to_owned(),
     };
     format!("{}: 52a and 52b both {what} {lasted}", names::harmless(&of.equipment))

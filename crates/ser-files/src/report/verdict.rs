@@ -89,14 +89,12 @@ pub(super) fn first_out(
         text +=
             &format!("; or one of the entries missing on {}", lists.names(recorders.into_iter()));
     }
-    match first.earlier {
-        0 => {}
-        1 => text += "; 1 entry of the incident is before the time asked for",
-        entries => {
-            text += &format!("; {entries} entries of the incident are before the time asked for");
-        }
-    }
-    text
+    let before = match first.earlier {
+        0 => return text,
+        1 => "1 entry of the incident is".to_owned(),
+        entries => format!("{entries} entries of the incident are"),
+    };
+    format!("not known: {before} before the time asked for; first of what is shown: {text}")
 }
 
 /// Between which bounds nobody knows which of these was first.
@@ -121,26 +119,43 @@ fn within(timeline: &Timeline<'_>, changes: &[ChangeId]) -> String {
 }
 
 /// What breakers did, in words.
-pub(super) fn operated(timeline: &Timeline<'_>, operation: &Operation) -> String {
-    let verb = if operation.opened { "opened" } else { "closed" };
+pub(super) fn operated(operation: &Operation) -> String {
     let command = if operation.opened { "trip" } else { "close command" };
-    let mut text = format!("{} {verb}", harmless(&operation.equipment));
+    let mut text = format!("{} {}", harmless(&operation.equipment), moved(operation.opened));
     if let Some(us) = operation.took.and_then(ser_evidence::timeline::Delta::middle_us) {
         text += &format!(" {} after its {command}", duration(us));
     }
     if let Some(bounce) = operation.bounce {
         let lasted = bounce.lasted.middle_us().map(duration).unwrap_or_default();
-        text += &format!(" (bounced {} times in {lasted})", bounce.changes);
+        // Away and back again.
+        text += &match bounce.changes.div_ceil(2) {
+            1 => format!(" (bounced once in {lasted})"),
+            times => format!(" (bounced {times} times in {lasted})"),
+        };
     }
-    let _ = timeline;
+    if let Some(returned) = operation.returned {
+        let after = returned.middle_us().map(|us| format!(" after {}", duration(us)));
+        text += &format!(", and {} again{}", moved(!operation.opened), after.unwrap_or_default());
+    }
     text
+}
+
+const fn moved(opened: bool) -> &'static str {
+    if opened { "opened" } else { "closed" }
+}
+
+/// A breaker that did not stay where it was told to go.
+fn operation_trouble(operation: &Operation) -> Option<String> {
+    let lasted = operation.returned?.middle_us();
+    let lasted = lasted.map(|us| format!(" for {}", duration(us))).unwrap_or_default();
+    let (went, back) = (moved(operation.opened), moved(!operation.opened));
+    Some(format!("{} {went}{lasted} and {back} again", harmless(&operation.equipment)))
 }
 
 /// What all breakers did, in words.
 pub(super) fn all_operated(document: &Document<'_>, lists: Lists) -> Vec<String> {
     let operations = document.report.operations.iter();
-    let mut all: Vec<String> =
-        operations.map(|operation| operated(document.timeline, operation)).collect();
+    let mut all: Vec<String> = operations.map(operated).collect();
     lists.shorten(&mut all, Lists::SENTENCES);
     all
 }
@@ -152,6 +167,7 @@ pub(super) fn wrong(document: &Document<'_>, lists: Lists) -> Vec<String> {
     for step in &report.steps {
         wrong.extend(step_trouble(timeline, step));
     }
+    wrong.extend(report.operations.iter().filter_map(operation_trouble));
     wrong.extend(
         document
             .not_reached
@@ -242,6 +258,7 @@ pub(super) fn why_undecidable(why: Doubt) -> &'static str {
     match why {
         Doubt::Straddles => "the doubt reaches over an end of the window",
         Doubt::NoCommonTime => "nothing is known of the time between the two",
+        Doubt::UnknownState => "one of the two changed to a state that is not known",
         Doubt::Gap => "an entry may be missing",
         Doubt::NotReadSince => "its log was not read since",
     }

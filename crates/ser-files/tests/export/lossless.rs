@@ -78,6 +78,18 @@ fn a_reading_without_a_life_stays_one() {
 }
 
 #[test]
+fn what_a_list_lost_ahead_of_its_oldest_row_is_kept() {
+    let site = Site::unknown();
+    let mut list = Log::of("U1", 7);
+    list.is_list().tells(0, Lost::AtLeast(1), Why::NotReached);
+    list.changes("2026-11-22T10:00:00.250", &[1]).tells(1, Lost::Unknown, Why::NotReached);
+    list.changes("2026-11-22T10:00:00.350", &[1]);
+    let first = jsonl(&site, &[of(&list, "U1")]);
+    assert_eq!(first.matches("\"record\":\"gap\"").count(), 2, "{first}");
+    assert_eq!(first, jsonl(&site, &[read(&first)]));
+}
+
+#[test]
 fn csv_is_read_back_with_every_entry_and_loss() {
     let site = site(&recorder("U1", &[(1, "a, \\\"b\\\"")]));
     let mut log = Log::of("U1", 1);

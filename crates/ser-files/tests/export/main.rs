@@ -5,8 +5,11 @@
 mod common;
 mod comtrade;
 mod lossless;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod part;
 mod prc002;
+mod unknown_states;
 mod vcd;
 mod writing;
 

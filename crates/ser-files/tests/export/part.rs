@@ -145,3 +145,38 @@ fn a_table_that_is_safe_for_spreadsheets_is_read_as_it_was() {
     assert!(plain.len() == 2 && plain.iter().all(|told| told.recorder == "=52-1"));
     assert_eq!(records(true), plain);
 }
+
+#[test]
+fn a_part_that_is_read_and_written_has_gaps_at_its_ends_and_is_the_same_from_then_on() {
+    let site = set_back_site();
+    let mut log = Log::of("U1", 1);
+    log.changes("2026-11-22T09:00:01.000", &[1])
+        .changes("2026-11-22T09:10:00.000", &[1])
+        .changes("2026-11-22T09:10:00.010", &[2])
+        .changes("2026-11-22T09:20:00.000", &[1]);
+    let (first, collector) =
+        part(&site, &[&log], "2026-11-22T09:09:00.000", "2026-11-22T09:11:00.000");
+    let again = |collector: Collector| {
+        let history = collector.finish(&site);
+        let timeline = Timeline::new(&site, &history);
+        let mut out = Vec::new();
+        write_jsonl(&mut out, &timeline, &Selection::everything(), "test 1.0").expect("written");
+        let text = String::from_utf8(out).expect("UTF-8");
+        let mut collector = Collector::new();
+        collector.begin_source();
+        for told in Source::new(text.as_bytes(), "").expect("ours") {
+            let told = told.expect("a record");
+            collector.add(&told.recorder, &told.record);
+        }
+        (text, collector)
+    };
+    let (second, collector) = again(collector);
+    let (third, _) = again(collector);
+    assert_eq!(second, third);
+    let lines = |text: &str| {
+        let kept = text.lines().filter(|line| !line.contains("\"record\":\"gap\""));
+        kept.map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(lines(&second), lines(&first));
+    assert_eq!((first.matches("\"gap\"").count(), second.matches("\"gap\"").count()), (0, 1));
+}

@@ -84,6 +84,11 @@ pub(crate) struct Args {
 }
 
 impl Args {
+    /// Where entries come from.
+    pub(crate) const fn sources(&self) -> &SourceArgs {
+        &self.sources
+    }
+
     /// Whether the data goes to standard output.
     pub(crate) fn prints(&self) -> bool {
         file_named(self.output.as_deref()).is_none()
@@ -107,7 +112,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let counted = write::write(args, destination, &gathered, &timeline, &selection)?;
     write::tell(counted);
     if !args.format.tells_damage() {
-        write::tell_damaged(gathered.damaged_lines);
+        write::tell_damaged(gathered.damaged);
     }
     if args.fail_on_loss {
         gathered.require_complete()?;

@@ -11,7 +11,7 @@ use ser_files::merged::CsvStyle;
 use super::Args;
 use super::format::Format;
 use crate::error::{Failure, Result, advise, warn};
-use crate::gather::Gathered;
+use crate::gather::{Damaged, Gathered};
 use crate::new_files::NewFiles;
 use crate::outlet::{NotWritten, Outlet, Part, file_named, finish};
 use crate::output::PROGRAM;
@@ -105,7 +105,7 @@ pub(super) fn write(
         program: PROGRAM,
         site_digest: gathered.site_digest.as_deref(),
         not_reached: &gathered.not_reached,
-        damaged_lines: gathered.damaged_lines,
+        damaged_lines: gathered.damaged.lines,
     };
     Export { args, timeline, selection, origin }.write(destination)
 }
@@ -124,17 +124,26 @@ pub(super) fn tell(counted: Counted) {
 }
 
 /// Tells of damaged lines of the sources, where the format has no place to say so.
-pub(super) fn tell_damaged(lines: u64) {
-    if lines > 0 {
-        let lines = counted(usize::try_from(lines).unwrap_or(usize::MAX), "damaged line");
-        let lines = lines.unwrap_or_default();
-        warn(format_args!(
-            "{lines} of the sources are missing in the file, which has no place for that"
-        ));
-        advise(
-            "each is in it as a loss after the entry before it; vcd and comtrade say it in words",
-        );
+pub(super) fn tell_damaged(damaged: Damaged) {
+    let Damaged { lines, without_place } = damaged;
+    if lines == 0 {
+        return;
     }
+    let counted = counted(usize::try_from(lines).unwrap_or(usize::MAX), "damaged line");
+    let counted = counted.unwrap_or_default();
+    warn(format_args!(
+        "{counted} of the sources are missing in the file, which has no place for that"
+    ));
+    let of_placed = "a loss after the entry before it, if entries are missing there";
+    match (without_place, lines - without_place) {
+        (0, _) => advise(format_args!("each is in it as {of_placed}")),
+        (_, 0) => advise("the file does not say so, because nobody knows their place in a log"),
+        (without, with) => advise(format_args!(
+            "{with} are in it as {of_placed}; of {without} nobody knows the place, and the file does \
+             not say so"
+        )),
+    }
+    advise("vcd and comtrade say in words how many there were");
 }
 
 impl Export<'_> {

@@ -212,11 +212,16 @@ impl Samples {
         if self.is_torn && !self.states.is_empty() {
             self.list.torn_at_end.get_or_insert_default();
         }
-        if self.count < self.announced {
-            notes.remark(
-                None,
-                format!("{} samples are announced, and {} are there", self.announced, self.count),
-            );
+        // Those that are skipped in between have been told where they are missing.
+        let (first, last) = self.numbers.unwrap_or((1, 0));
+        let until_last = last.wrapping_sub(first).wrapping_add(1).max(self.count);
+        if until_last < self.announced {
+            self.list.torn_at_end.get_or_insert_default();
+            notes.lose_at_end(format!(
+                "{} samples are announced, and the data ends after {}: whatever changed after that \
+                 is lost",
+                self.announced, self.count
+            ));
         }
         if self.is_off_rate {
             notes.remark(None, "the stamps do not fit the sampling rate; the rate counts");

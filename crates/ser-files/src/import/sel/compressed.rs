@@ -37,7 +37,7 @@ pub(in super::super) fn read(
         let number = lines.number();
         if is_too_long {
             notes.leave_out(number, format!("longer than {} bytes", lines.limit()));
-            numbered.tear();
+            numbered.tear(None);
             continue;
         }
         let raw = bare(lines.raw());
@@ -47,7 +47,10 @@ pub(in super::super) fn read(
         }
         if let Some(why) = wrong(raw, &mut fields) {
             notes.leave_out(number, why);
-            numbered.tear();
+            numbered.tear(None);
+            if !lines.is_ended() {
+                numbered.cut();
+            }
             continue;
         }
         if let Some(found_columns) = columns_of(&fields) {
@@ -60,7 +63,7 @@ pub(in super::super) fn read(
                 Ok(()) => {}
                 Err(why) => {
                     notes.leave_out(number, why);
-                    numbered.tear();
+                    numbered.tear(Some(text));
                 }
             }
         }

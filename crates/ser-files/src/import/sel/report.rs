@@ -8,7 +8,10 @@ use super::super::calendar::Date;
 use super::super::list::{Found, Numbered, Row, When};
 use super::super::notes::{Notes, Refusal};
 use super::super::text::{Line, TextLines};
-use crate::error::quoted;
+use crate::error::{NO_LINE_END, quoted};
+
+/// What ends a message of a relay.
+const ETX: char = '\u{3}';
 
 /// Whether a file begins like such a report.
 pub(in super::super) fn is_it(head: &str) -> bool {
@@ -31,11 +34,17 @@ pub(in super::super) fn read(
         let Line::Text(text) = line else {
             let limit = lines.limit();
             notes.leave_out(lines.number(), format!("longer than {limit} bytes"));
-            numbered.tear();
+            numbered.tear(None);
             continue;
         };
+        // A relay ends what it sends with ETX.
+        let has_end = text.ends_with(ETX);
         let text = cleaned(text);
         let number = lines.number();
+        let is_whole = has_end || lines.is_ended();
+        if !is_whole && is_below_columns && !matches!(kind(&text), Kind::Nothing) {
+            numbered.cut();
+        }
         match kind(&text) {
             Kind::Columns => {
                 numbered.finish(found, notes);
@@ -47,21 +56,22 @@ pub(in super::super) fn read(
                 is_below_columns = false;
             }
             Kind::Empty => notes.remark(Some(number), "the relay says that its list is empty"),
-            Kind::Row(written) => match row(&written, number, found)?
-                .and_then(|row| numbered.add(written.number, row))
-            {
-                Ok(()) => {}
-                Err(why) => {
+            Kind::Row(written) => {
+                let understood = match is_whole {
+                    true => row(&written, number, found)?,
+                    false => Err(NO_LINE_END.to_owned()),
+                };
+                if let Err(why) = understood.and_then(|row| numbered.add(written.number, row)) {
                     without_element += u64::from(written.rest.is_empty());
-                    numbered.tear();
+                    numbered.tear(Some(written.number));
                     notes.leave_out(number, why);
                 }
-            },
+            }
             Kind::Other if is_below_columns => {
                 let why =
                     format!("this is not a row of a list: {}", quoted(text.trim().as_bytes()));
                 notes.leave_out(number, why);
-                numbered.tear();
+                numbered.tear(None);
             }
             Kind::Nothing | Kind::Other => {}
         }
@@ -185,10 +195,26 @@ fn parted(rest: &str) -> Result<(&str, Option<&str>), String> {
         (Some(_), Some(_), Some(_)) => {
             Err(format!("more than element and state: {}", quoted(rest.as_bytes())))
         }
-        (Some(only), None, _) => Ok(match only.rsplit_once(' ') {
+        (Some(only), None, _) => match only.rsplit_once(' ') {
             // Where the columns are full, a single blank is left between them.
-            Some((element, state @ ("Asserted" | "Deasserted"))) => (element, Some(state)),
-            _ => (only, None),
-        }),
+            Some((element, state)) if STATES.contains(&state) => Ok((element, Some(state))),
+            Some((element, part))
+                if is_element(element) && STATES.iter().any(|state| state.starts_with(part)) =>
+            {
+                Err(format!("{} is only a part of a state", quoted(part.as_bytes())))
+            }
+            None if is_element(only) => {
+                Err(format!("{} has no state here", quoted(only.as_bytes())))
+            }
+            _ => Ok((only, None)),
+        },
     }
+}
+
+/// What a relay calls the states of an element, unless somebody has given them other names.
+const STATES: [&str; 2] = ["Asserted", "Deasserted"];
+
+/// Whether this is the name of an element. What the relay says of itself is in words.
+fn is_element(text: &str) -> bool {
+    !text.contains(|letter: char| letter.is_lowercase() || letter == ' ')
 }

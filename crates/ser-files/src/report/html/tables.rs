@@ -205,8 +205,8 @@ fn chatter(
 ) -> Markup {
     let timeline = document.timeline;
     let changes = fold.changes.iter().map(|&change| {
-        let on = timeline.held(change.event).map(|held| held.entry.state.contains(change.input));
-        let state = on.map(|on| names::state(timeline, point, on)).unwrap_or_default();
+        let on = timeline.held(change.event).and_then(|held| held.state_of(change.input));
+        let state = names::state(timeline, point, on);
         let at = timeline.time(change.event).map(|at| clock.time(at.us())).unwrap_or_default();
         let after = timeline.delta(fold.first, change).middle_us().map(since).unwrap_or_default();
         (at, after, state)

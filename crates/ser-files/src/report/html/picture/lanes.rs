@@ -245,8 +245,7 @@ impl Track<'_> {
 
     /// The state that an entry shows.
     fn after(&self, event: EventId) -> Option<bool> {
-        let held = self.timeline.held(event)?;
-        held.known.contains(self.input).then(|| held.entry.state.contains(self.input))
+        self.timeline.held(event)?.state_of(self.input)
     }
 
     /// The state right before an entry.
