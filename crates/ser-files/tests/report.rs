@@ -9,7 +9,7 @@ use ser_evidence::record::{
 use ser_evidence::site::{self, Site};
 use ser_evidence::time::{Bound, Moment, shown};
 use ser_evidence::timeline::Timeline;
-use ser_files::report::{Document, Styles, write_json, write_text};
+use ser_files::report::{Document, Styles, write_html, write_json, write_text};
 use ser_proto::{Entry, Inputs, TimeStamp};
 use serde_json::Value;
 
@@ -485,4 +485,33 @@ fn a_century_that_begins_anew_is_no_clock_that_was_never_set() {
     let text = readings.told().text();
     assert!(!text.contains("Time not known"), "{text}");
     assert!(text.contains("+2.0 ms"), "{text}");
+}
+
+/// A trip on one recorder and a breaker on another, whose clock is known within so many microseconds.
+fn stepped(width_us: i64) -> String {
+    let mut readings = Readings::of(
+        "[[recorder]]\nname = \"U1\"\nclock = \"utc\"\n[[recorder]]\nname = \"U2\"\nclock = \"utc\"\n\
+         [[point]]\nrecorder = \"U1\"\ninput = 1\nname = \"trip\"\n\
+         [[point]]\nrecorder = \"U2\"\ninput = 1\nname = \"52\"\n\
+         [[expect]]\nname = \"52 follows\"\nafter = \"U1/trip on\"\nthen = \"U2/52 on\"\n\
+         within_ms = [5, 90]\n",
+    );
+    readings.entry("U1", 1, "2026-11-22T10:00:00.100", (1, 1));
+    readings.set("U1", 0, "2026-11-22T09:59:59.000");
+    readings.entry("U2", 1, "2026-11-22T10:00:00.140", (1, 1));
+    readings.set_within("U2", 0, "2026-11-22T09:59:59.000", width_us);
+    readings.watched("U1", 1, "2026-11-22T10:00:02.000");
+    readings.watched("U2", 1, "2026-11-22T10:00:02.000");
+    readings.told().write(|out, document| write_html(out, document).expect("it takes it"))
+}
+
+#[test]
+fn a_step_of_which_nobody_knows_is_not_drawn_as_one_that_failed() {
+    let legends = |page: &str| {
+        ["took good", "took bad", "took open", "cannot be decided", "was not in time"].map(|mark| {
+            page.contains(&format!("class=\"{mark}\"")) || page.contains(&format!("{mark}</span>"))
+        })
+    };
+    assert_eq!(legends(&stepped(2_000)), [true, false, false, false, false]);
+    assert_eq!(legends(&stepped(300_000)), [false, false, true, true, false]);
 }

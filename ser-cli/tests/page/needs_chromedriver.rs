@@ -145,6 +145,18 @@ fn only_tables_and_pictures_are_wider_than_a_telephone() {
             .eval("return document.querySelector('.first-out').getBoundingClientRect().height");
         let height = card.as_f64().expect("a number");
         assert!(height < f64::from(SIZES[1].1) / 2.0, "the first-out is {height} px high");
+        let seen = browser.eval(
+            "return [...document.querySelectorAll('.sequence th[scope=col]')].filter(head => \
+             head.offsetWidth > 1 && head.getBoundingClientRect().left + 40 < innerWidth)\
+             .map(head => head.textContent)",
+        );
+        let seen = strings(&seen);
+        assert!(
+            ["Time", "Recorder", "Point", "State"]
+                .iter()
+                .all(|head| seen.iter().any(|seen| seen == head)),
+            "{seen:?}"
+        );
     }
 }
 
@@ -245,6 +257,9 @@ mod needs_pdftotext {
                 assert!(!headings.iter().any(|heading| heading == last.trim()), "{name}: {page}");
             }
             assert_eq!(charts, drawn, "{name}");
+            let last = pages.last().map_or("", String::as_str);
+            let lines = last.lines().filter(|line| !line.trim().is_empty()).count();
+            assert!(lines > 5, "{name}: the last page has {lines} lines: {last}");
             let all = pages.concat();
             assert!(pages.len() < 20, "{name}: {} pages, for a name that is long", pages.len());
             for change in 1..=CHATTER {

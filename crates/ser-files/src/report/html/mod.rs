@@ -27,7 +27,7 @@ const LONG: usize = 160;
 
 /// What the page may do: nothing but use its own style and its own script.
 const POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; \
-     style-src 'sha256-3TD87YsS7rZw1MZCi0rqL7hDnwhDoCiVKzylW02YDc8='; \
+     style-src 'sha256-VhXaICZPYha/XRsjiq0LjFt/fdzcj6/O5MmmdMfhCJg='; \
      script-src 'sha256-B4nPhYYeaKp6dp+bY1Oygmy7txrcnNgi52xFwK6tjtE='";
 
 /// Why there is no page.

@@ -227,7 +227,9 @@ fn remark_row(remark: &Remark) -> Markup {
     html! {
         tr.remark.loss[remark.is_loss] {
             (bracket(remark.bracket))
-            td colspan="3" { "– – –" }
+            td.time { "–" }
+            td.number { "–" }
+            td.number { "–" }
             (recorder(&remark.recorder))
             td colspan="5" { (remark.text) }
         }

@@ -1,11 +1,10 @@
 //! What the marks of the picture mean: those that are in it, and no others.
 
 use maud::{Markup, html};
-use ser_evidence::incident::Verdict;
 
 use super::drawing::{STRIPED, UNKNOWN};
 use super::lanes::{Lanes, State};
-use super::steps::StepLane;
+use super::steps::{StepLane, Took};
 
 /// Which marks a picture has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,6 +18,7 @@ struct Marks {
     expected: bool,
     in_time: bool,
     not_in_time: bool,
+    not_decidable: bool,
 }
 
 impl Marks {
@@ -36,11 +36,13 @@ impl Marks {
         marks.doubt = edges.clone().any(|edge| edge.doubt_us.is_some());
         marks.no_doubt_known = edges.any(|edge| edge.doubt_us.is_none());
         marks.expected = !steps.is_empty();
-        let took = |in_time: bool| {
+        let took = |how: Took| {
             let mut took = steps.iter().filter(|step| step.then_us.is_some());
-            took.any(|step| (step.verdict == Verdict::InTime) == in_time)
+            took.any(|step| step.took() == how)
         };
-        (marks.in_time, marks.not_in_time) = (took(true), took(false));
+        marks.in_time = took(Took::InTime);
+        marks.not_in_time = took(Took::NotInTime);
+        marks.not_decidable = took(Took::NotDecidable);
         marks
     }
 }
@@ -61,8 +63,11 @@ pub(super) fn legend(lanes: &Lanes, steps: &[StepLane]) -> Markup {
                 (item(&loose_change(), "a change of which nobody knows how far its time is off"))
             }
             @if marks.expected { (item(&bar("window"), "expected within")) }
-            @if marks.in_time { (item(&took("took good"), "took, in time")) }
-            @if marks.not_in_time { (item(&took("took bad"), "took, and was not in time")) }
+            @if marks.in_time { (item(&took(Took::InTime), "took, in time")) }
+            @if marks.not_in_time { (item(&took(Took::NotInTime), "took, and was not in time")) }
+            @if marks.not_decidable {
+                (item(&took(Took::NotDecidable), "took, and whether in time cannot be decided"))
+            }
         }
     }
 }
@@ -71,8 +76,8 @@ fn item(mark: &Markup, meaning: &str) -> Markup {
     html! { span { svg viewBox="0 0 28 20" aria-hidden="true" { (mark) } (meaning) } }
 }
 
-fn took(class: &str) -> Markup {
-    html! { rect class=(class) x="0" y="8" width="28" height="4" {} }
+fn took(how: Took) -> Markup {
+    html! { rect class=(how.class()) x="0" y="8" width="28" height="4" {} }
 }
 
 fn abnormal() -> Markup {

@@ -14,7 +14,7 @@ use ser_evidence::incident::Verdict;
 pub(super) struct StepLane {
     name: String,
     result: &'static str,
-    pub(super) verdict: Verdict,
+    verdict: Verdict,
     pub(super) after_us: i64,
     /// The window in which it was to happen.
     within_us: (i64, i64),
@@ -41,12 +41,38 @@ pub(super) fn lanes(document: &Document<'_>) -> Vec<StepLane> {
     document.report.steps.iter().filter_map(lane).collect()
 }
 
+/// What is known of the time that a step took.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Took {
+    InTime,
+    NotInTime,
+    NotDecidable,
+}
+
+impl Took {
+    pub(super) const fn class(self) -> &'static str {
+        match self {
+            Took::InTime => "took good",
+            Took::NotInTime => "took bad",
+            Took::NotDecidable => "took open",
+        }
+    }
+}
+
 impl StepLane {
+    pub(super) const fn took(&self) -> Took {
+        match self.verdict {
+            Verdict::InTime => Took::InTime,
+            Verdict::NotDecidable(_) => Took::NotDecidable,
+            _ => Took::NotInTime,
+        }
+    }
+
     pub(super) fn draw(&self, y: f64, scale: &Scale) -> Markup {
         let (from, to) = self.within_us;
         let (x, width) = scale.stretch(from, to).unwrap_or((LEFT_PX, 0.0));
         let took = self.then_us.map(|then| (self.after_us.min(then), self.after_us.max(then)));
-        let class = if self.verdict == Verdict::InTime { "took good" } else { "took bad" };
+        let class = self.took().class();
         html! {
             g.step {
                 rect.back x="0" y=(y) width=(FULL_PX) height=(LANE_PX) {}
