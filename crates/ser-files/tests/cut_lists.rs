@@ -188,3 +188,18 @@ fn a_file_of_ours_that_ends_in_a_row_is_cut() {
     let read: Vec<_> = ser_files::Source::new(json.as_bytes(), "F3").expect("ours").collect();
     assert!(matches!(&read[..], [Ok(_)]), "an object is whole where its last bracket is: {read:?}");
 }
+
+#[test]
+fn a_list_of_several_recorders_shows_what_is_lost_before_it() {
+    let row = |number: usize, end: &str| {
+        format!(
+            "{number}    2027-03-14  09:05:00.{:03}    P{number}    Asserted{end}",
+            100 - number
+        )
+    };
+    let rows: String = (1..=40).map(|number| row(number, "\n")).collect();
+    let whole = import(&(HEAD.to_owned() + &rows)).1;
+    assert_eq!((whole.recorders.len(), missing(&whole)), (2, vec![]));
+    let (_, cut) = import(&(HEAD.to_owned() + &rows + &row(41, "")));
+    assert_eq!(missing(&cut), [0, 0]);
+}

@@ -188,6 +188,8 @@ impl Writing<'_> {
         let before = if list.counts_from_beginning || is_torn { 0 } else { missing };
         for log in &mut self.logs {
             log.sequence = before;
+            // Recorders of one list count for themselves, and leave out what is lost before the first.
+            log.missing = if self.is_split && is_torn { missing } else { 0 };
         }
     }
 
