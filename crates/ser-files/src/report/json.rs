@@ -47,6 +47,7 @@ fn object(document: &Document<'_>) -> Value {
         "entries_sha256": digest,
         "is_incomplete": document.is_incomplete(),
         "damaged_lines": document.damaged_lines,
+        "doubtful_hours": document.doubtful_hours,
         "entries_before": report.incident.earlier.len(),
         "entries_after": report.incident.later,
         "verdict": verdict_of(document),
