@@ -438,5 +438,17 @@ fn a_time_that_may_be_another_one_is_told_by_who_reads_it_later() {
                 "{command}: {told}"
             );
         }
+        // Also on the page and for programs, where nobody sees warnings.
+        let report = format!("report --site plant.toml --input {} --format", at("lone.jsonl"));
+        for (format, sign) in [
+            ("text", "1 entry of the sources may be at another time"),
+            ("html", "may be at another time by an hour"),
+            ("json", "\"doubtful_hours\": 1"),
+        ] {
+            let output = run(&format!("{report} {format}"));
+            let said: String =
+                text(&output.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
+            assert_eq!(said.contains(sign), is_told, "{format}: {said}");
+        }
     }
 }

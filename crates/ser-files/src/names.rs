@@ -33,11 +33,17 @@ pub(crate) fn state(
     id: Option<PointId>,
     on: impl Into<Option<bool>>,
 ) -> String {
-    let Some(on) = on.into() else { return UNKNOWN_STATE.to_owned() };
+    let on = on.into().or_else(|| either_way(point_of(timeline, id?)?));
+    let Some(on) = on else { return UNKNOWN_STATE.to_owned() };
     match id.and_then(|id| point_of(timeline, id)) {
         Some(point) => harmless(if on { &point.on } else { &point.off }),
         None => (if on { "ON" } else { "OFF" }).to_owned(),
     }
+}
+
+/// A state of a point whose states are called alike: what a device says of itself has only one word.
+pub(crate) fn either_way(point: &Point) -> Option<bool> {
+    (point.on == point.off).then_some(true)
 }
 
 /// A change in a sentence: `52-1 closed OPEN (U1-SER1)`. If two recorders saw it, both are named.

@@ -485,6 +485,7 @@ fn more_points_than_inputs_become_several_recorders_of_one_clock() {
         site_digest: None,
         not_reached: &[],
         damaged_lines: 0,
+        doubtful_hours: 0,
         unfold: true,
     };
     let mut json = Vec::new();

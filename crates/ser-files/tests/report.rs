@@ -124,6 +124,7 @@ impl Told {
             site_digest: None,
             not_reached: &[],
             damaged_lines: 0,
+            doubtful_hours: 0,
             unfold: false,
         };
         let mut out = Vec::new();

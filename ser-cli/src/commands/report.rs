@@ -141,6 +141,7 @@ pub(super) fn write(
         site_digest: gathered.site_digest.clone(),
         not_reached: &gathered.not_reached,
         damaged_lines: gathered.damaged.lines,
+        doubtful_hours: gathered.damaged.doubtful_hours,
         unfold: shown.unfold,
     };
     outlet.write(|out| match shown.format {

@@ -32,12 +32,15 @@ pub(crate) struct Damaged {
     pub(crate) lines: u64,
     /// How many of them are no loss at a place of a log, because nobody knows the place.
     pub(crate) without_place: u64,
+    /// Entries that were read and may be at either of two times.
+    pub(crate) doubtful_hours: u64,
 }
 
 impl Damaged {
     fn add(&mut self, other: Damaged) {
         self.lines += other.lines;
         self.without_place += other.without_place;
+        self.doubtful_hours += other.doubtful_hours;
     }
 }
 
@@ -124,7 +127,7 @@ fn read_one(path: &Path, names: &Names, collector: &mut Collector) -> Result<Dam
     }
     tell_damaged(path, damaged.lines, earlier);
     tell_doubtful(path, doubtful);
-    damaged.add(Damaged { lines: earlier, without_place: earlier });
+    damaged.add(Damaged { lines: earlier, without_place: earlier, doubtful_hours: doubtful });
     Ok(damaged)
 }
 

@@ -12,6 +12,7 @@ use super::Document;
 use super::marks::Marks;
 use super::verdict::{self, Lists};
 use crate::digits::rfc3339;
+use crate::names;
 
 /// The version of the layout. A change that old readers would misread gets the next number.
 const SCHEMA: u32 = 1;
@@ -47,6 +48,7 @@ fn object(document: &Document<'_>) -> Value {
         "entries_sha256": digest,
         "is_incomplete": document.is_incomplete(),
         "damaged_lines": document.damaged_lines,
+        "doubtful_hours": document.doubtful_hours,
         "entries_before": report.incident.earlier.len(),
         "entries_after": report.incident.later,
         "verdict": verdict_of(document),
@@ -228,7 +230,7 @@ fn sequence(document: &Document<'_>) -> Vec<Value> {
             "input": input,
             "point": point.map(|point| &point.name),
             "on": row.on,
-            "state": point.zip(row.on).map(|(point, on)| if on { &point.on } else { &point.off }),
+            "state": point.and_then(|point| Some((point, row.on.or(names::either_way(point))?))).map(|(point, on)| if on { &point.on } else { &point.off }),
             "chatter": row.chatter,
             "shifted_us": timeline.shift_us(event),
             "clock_was_set_before": marks.is_set_ahead_of(event),

@@ -48,6 +48,9 @@ pub struct Document<'a> {
     pub not_reached: &'a [NotReached],
     /// How many lines of the sources could not be read.
     pub damaged_lines: u64,
+    /// How many entries of the sources have a local time that came twice or was left out, of which
+    /// nothing tells which of two instants it was.
+    pub doubtful_hours: u64,
     /// Whether chatter is shown row by row.
     pub unfold: bool,
 }

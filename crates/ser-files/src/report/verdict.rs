@@ -175,6 +175,7 @@ pub(super) fn wrong(document: &Document<'_>, lists: Lists) -> Vec<String> {
             .map(|missed| format!("{} not reached", harmless(&missed.recorder))),
     );
     wrong.extend(damaged(document));
+    wrong.extend(doubtful_hours(document));
     // That a list of another device ends is the least of what may be wrong.
     let (ended, others): (Vec<_>, Vec<_>) =
         report.completeness.iter().partition(|of| is_ended_list(timeline, of));
@@ -271,6 +272,18 @@ pub(super) fn damaged(document: &Document<'_>) -> Option<String> {
         1 => Some("1 line of the sources could not be read".to_owned()),
         lines => Some(format!("{lines} lines of the sources could not be read")),
     }
+}
+
+/// Entries of imported lists that may be at either of two times.
+fn doubtful_hours(document: &Document<'_>) -> Option<String> {
+    let entries = match document.doubtful_hours {
+        0 => return None,
+        1 => "1 entry of the sources".to_owned(),
+        entries => format!("{entries} entries of the sources"),
+    };
+    Some(format!(
+        "{entries} may be at another time by an hour (the local hour came twice or was left out)"
+    ))
 }
 
 /// What is missing of a recorder, if anything.

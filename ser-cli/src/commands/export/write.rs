@@ -125,7 +125,7 @@ pub(super) fn tell(counted: Counted) {
 
 /// Tells of damaged lines of the sources, where the format has no place to say so.
 pub(super) fn tell_damaged(damaged: Damaged) {
-    let Damaged { lines, without_place } = damaged;
+    let Damaged { lines, without_place, .. } = damaged;
     if lines == 0 {
         return;
     }
