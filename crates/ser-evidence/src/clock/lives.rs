@@ -2,7 +2,7 @@
 
 use super::hosts::Hosts;
 use super::placing::{self, Located, Whereabouts};
-use super::runs::{LifeRuns, Step, When, was_set};
+use super::runs::{LifeRuns, Step, When, backward_steps, was_set};
 use crate::history::{Held, RecorderHistory};
 use crate::record::{How, Reference};
 use crate::time::{Bound, Host, Moment, Shown, shown};
@@ -107,7 +107,11 @@ fn secret_steps(
         }
         let up_to = life.entries.partition_point(|held| held.sequence <= at.after);
         let last = life.entries.get(..up_to).into_iter().flatten().rev().find_map(stamp);
-        let last = last.filter(|_| !observation.how.is_set());
+        // Where entries show it themselves, they say more exactly where it was.
+        let is_shown =
+            life.entries.get(up_to.saturating_sub(1)..(behind + 1).min(life.entries.len()));
+        let is_shown = is_shown.is_some_and(|around| !backward_steps(around).is_empty());
+        let last = last.filter(|_| !observation.how.is_set() && !is_shown);
         if let Some((sequence, _)) = last.filter(|&(_, then)| was_set(then, seen)) {
             let until = |bound: Bound<Host>| Bound::new(None, bound.hi());
             let step = Step {
@@ -184,7 +188,8 @@ fn continue_over_erases(recorder: &RecorderHistory, lives: &mut [LifeClock]) {
                     |held: &Held| clock.runs.of(held.sequence, latest).only() == Some(last);
                 let latest = latest.filter(|_| entries.last().is_some_and(is_of_last));
                 let first = life.entries.first().and_then(stamp);
-                let is_back = latest.zip(first).is_some_and(|(then, now)| was_set(then, now));
+                let is_back = latest.zip(first).is_some_and(|(then, now)| was_set(then, now))
+                    || first.is_some_and(|now| !clock.runs.may_show(last, now));
                 clock.ids.get(last).copied().filter(|_| !is_back)
             });
             let first = lives.get_mut(index).and_then(|life| life.ids.first_mut());

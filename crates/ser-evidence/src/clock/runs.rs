@@ -254,7 +254,7 @@ pub(crate) fn was_set(earlier: Moment<Shown>, later: Moment<Shown>) -> bool {
 }
 
 /// Where the stamps tell it, the clock was set, and what it showed then.
-fn backward_steps(entries: &[Held]) -> Vec<(Step, Moment<Shown>)> {
+pub(crate) fn backward_steps(entries: &[Held]) -> Vec<(Step, Moment<Shown>)> {
     let mut steps = Vec::new();
     let mut previous: Option<(u64, Moment<Shown>)> = None;
     for held in entries {

@@ -8,7 +8,7 @@ use crate::operation::{Operation, What};
 use crate::recorder::{SetTakesEffect, TrueRecorder};
 use crate::true_clock::TrueShown;
 use crate::true_time::{MS, Ps, US};
-use crate::world::World;
+use crate::world::{Trouble, World};
 
 /// An observation that was told, and the truth of it.
 #[derive(Clone, Debug)]
@@ -36,7 +36,16 @@ pub(crate) fn observe(
         (What::Look, Some(broadcast)) => How::Mark { broadcast },
         (What::Look, None) => How::Query,
     };
-    let place = place(&world.recorders[recorder], life, totals, how, chance);
+    let told = place(&world.recorders[recorder], life, totals, how, chance);
+    // What nobody can place may be of before a secret set or of after it.
+    let place = match world.trouble {
+        Trouble::SecretSetBack => {
+            let life = &world.recorders[recorder].lives[life];
+            let (after, before) = (life.sequence(totals.0), life.sequence(totals.1));
+            Place { life: life.name, after: Some(after), before: Some(before), ..told }
+        }
+        _ => told,
+    };
     let host = &world.hosts[operation.host];
     let reading = host.reading(operation.received, chance);
     if !operation.is_answered {
