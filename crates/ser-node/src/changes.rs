@@ -139,6 +139,7 @@ mod tests {
     use super::*;
     use crate::CaptureChannel;
     use crate::capture::DebounceTimes;
+    use crate::sequencer::tests::expected;
 
     /// Runs samples through capture and the main loop, which looks at every `every`-th sample only.
     /// From the sample `at` on it wants other debounce times. Returns the changes, and from which
@@ -177,25 +178,6 @@ mod tests {
         let end = u64::try_from(samples.len()).unwrap() + 3 * 256;
         main_loop.take_until(end, |change| seen.push((change.tick_ms, change.changed)));
         (seen, in_force)
-    }
-
-    /// The first moments of lasting changes, for each input alone, sorted by time.
-    fn expected(time_ms: impl Fn(usize, u8) -> u8, samples: &[u32]) -> Vec<(u64, u32)> {
-        let mut toggles = std::collections::BTreeMap::<u64, u32>::new();
-        for bit in 0..32_u8 {
-            let on = |index: usize| samples.get(index).or(samples.last()).unwrap() >> bit & 1;
-            let mut accepted = on(0);
-            for index in 0..samples.len() {
-                let lasts = usize::from(time_ms(index, bit + 1));
-                if on(index) != accepted
-                    && (index..=index + lasts).all(|later| on(later) != accepted)
-                {
-                    accepted ^= 1;
-                    *toggles.entry(index as u64 + 1).or_default() |= 1 << bit;
-                }
-            }
-        }
-        toggles.into_iter().collect()
     }
 
     proptest! {

@@ -176,7 +176,7 @@ pub(crate) fn slot(tick_ms: u64) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use proptest::prelude::*;
 
     use super::*;
@@ -211,22 +211,20 @@ mod tests {
     }
 
     /// The expected result: the first moments of lasting changes, for each input alone, sorted by
-    /// time.
-    fn expected(debounce: Debounce, samples: &[u32]) -> Vec<(u64, u32)> {
+    /// time. `time_ms` is the debounce time of an input for what it does from a sample on.
+    pub(crate) fn expected(time_ms: impl Fn(usize, u8) -> u8, samples: &[u32]) -> Vec<(u64, u32)> {
         let mut toggles = std::collections::BTreeMap::<u64, u32>::new();
         for bit in 0..32_u8 {
-            let time = usize::from(debounce.time_ms(bit + 1));
             let on = |index: usize| samples.get(index).or(samples.last()).unwrap() >> bit & 1;
             let mut accepted = on(0);
-            let mut index = 0;
-            while index < samples.len() {
+            for index in 0..samples.len() {
+                let lasts = usize::from(time_ms(index, bit + 1));
                 if on(index) != accepted
-                    && (index..=index + time).all(|later| on(later) != accepted)
+                    && (index..=index + lasts).all(|later| on(later) != accepted)
                 {
                     accepted ^= 1;
                     *toggles.entry(index as u64 + 1).or_default() |= 1 << bit;
                 }
-                index += 1;
             }
         }
         toggles.into_iter().collect()
@@ -244,7 +242,8 @@ mod tests {
                 runs.iter().flat_map(|&(inputs, times)| std::iter::repeat_n(inputs, times)).collect();
             let changes = sequence(debounce, &samples, every);
             let seen: Vec<_> = changes.iter().map(|change| (change.tick_ms, change.changed)).collect();
-            prop_assert_eq!(seen, expected(debounce, &samples));
+            let time_ms = |_, number| debounce.time_ms(number);
+            prop_assert_eq!(seen, expected(time_ms, &samples));
             let mut state = samples[0];
             for change in changes {
                 state ^= change.changed;
