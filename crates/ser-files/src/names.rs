@@ -33,17 +33,22 @@ pub(crate) fn state(
     id: Option<PointId>,
     on: impl Into<Option<bool>>,
 ) -> String {
-    let on = on.into().or_else(|| either_way(point_of(timeline, id?)?));
-    let Some(on) = on else { return UNKNOWN_STATE.to_owned() };
-    match id.and_then(|id| point_of(timeline, id)) {
-        Some(point) => harmless(if on { &point.on } else { &point.off }),
-        None => (if on { "ON" } else { "OFF" }).to_owned(),
-    }
+    let on = on.into();
+    let called = match id.and_then(|id| point_of(timeline, id)) {
+        Some(point) => state_of(point, on).map(harmless),
+        None => on.map(|on| (if on { "ON" } else { "OFF" }).to_owned()),
+    };
+    called.unwrap_or_else(|| UNKNOWN_STATE.to_owned())
 }
 
-/// A state of a point whose states are called alike: what a device says of itself has only one word.
-pub(crate) fn either_way(point: &Point) -> Option<bool> {
-    (point.on == point.off).then_some(true)
+/// What the site calls a state of a point. One that is not known has a name only where both states
+/// are called alike: what a device says of itself has one word.
+pub(crate) fn state_of(point: &Point, on: Option<bool>) -> Option<&str> {
+    match on {
+        Some(true) => Some(&point.on),
+        Some(false) => Some(&point.off),
+        None => (point.on == point.off).then_some(&point.on),
+    }
 }
 
 /// A change in a sentence: `52-1 closed OPEN (U1-SER1)`. If two recorders saw it, both are named.

@@ -31,8 +31,8 @@ pub(crate) struct SourceArgs {
     ///
     /// The recorder of a CSV file is the name of the file up to its last dot. Files speak for
     /// themselves, so --recorder needs --live here, and what this computer remembers of a recorder's
-    /// clock is used where the recorder is read. Without this option all recorders of the site file that have a port are read; those
-    /// that cannot be reached are named in the result.
+    /// clock is used where the recorder is read. Without this option all recorders of the site file
+    /// that have a port are read; those that cannot be reached are named in the result.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     input: Vec<PathBuf>,
 

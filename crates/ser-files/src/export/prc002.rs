@@ -95,8 +95,8 @@ impl<'t> Rows<'t> {
         rows
     }
 
-    /// By input of a recorder: the last three fields, off, on and not known. Names of points need that of their
-    /// recorder where there are several.
+    /// By input of a recorder: the last three fields, off, on and not known. Names of points need
+    /// that of their recorder where there are several.
     fn changes_of(&self, recorder: usize, channels: &Channels) -> Vec<[Vec<u8>; 3]> {
         let timeline = self.timeline;
         let mut changes = vec![<[Vec<u8>; 3]>::default(); 32];

@@ -230,7 +230,7 @@ fn sequence(document: &Document<'_>) -> Vec<Value> {
             "input": input,
             "point": point.map(|point| &point.name),
             "on": row.on,
-            "state": point.and_then(|point| Some((point, row.on.or(names::either_way(point))?))).map(|(point, on)| if on { &point.on } else { &point.off }),
+            "state": point.and_then(|point| names::state_of(point, row.on)),
             "chatter": row.chatter,
             "shifted_us": timeline.shift_us(event),
             "clock_was_set_before": marks.is_set_ahead_of(event),
