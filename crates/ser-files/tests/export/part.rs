@@ -30,9 +30,13 @@ fn told(timeline: &Timeline<'_>, from: &str) -> (Vec<Row>, String) {
 fn part(site: &Site, logs: &[&Log], since: &str, until: &str) -> (String, Collector) {
     let history = history(site, logs);
     let timeline = Timeline::new(site, &history);
+    written_and_read(&timeline, &between(&timeline, since, until))
+}
+
+/// These entries, written and read again.
+fn written_and_read(timeline: &Timeline, selection: &Selection) -> (String, Collector) {
     let mut out = Vec::new();
-    let selection = between(&timeline, since, until);
-    write_jsonl(&mut out, &timeline, &selection, "test 1.0").expect("written");
+    write_jsonl(&mut out, timeline, selection, "test 1.0").expect("written");
     let text = String::from_utf8(out).expect("UTF-8");
     let mut collector = Collector::new();
     collector.begin_source();
@@ -158,17 +162,7 @@ fn a_part_that_is_read_and_written_has_gaps_at_its_ends_and_is_the_same_from_the
         part(&site, &[&log], "2026-11-22T09:09:00.000", "2026-11-22T09:11:00.000");
     let again = |collector: Collector| {
         let history = collector.finish(&site);
-        let timeline = Timeline::new(&site, &history);
-        let mut out = Vec::new();
-        write_jsonl(&mut out, &timeline, &Selection::everything(), "test 1.0").expect("written");
-        let text = String::from_utf8(out).expect("UTF-8");
-        let mut collector = Collector::new();
-        collector.begin_source();
-        for told in Source::new(text.as_bytes(), "").expect("ours") {
-            let told = told.expect("a record");
-            collector.add(&told.recorder, &told.record);
-        }
-        (text, collector)
+        written_and_read(&Timeline::new(&site, &history), &Selection::everything())
     };
     let (second, collector) = again(collector);
     let (third, _) = again(collector);
