@@ -314,6 +314,28 @@ fn an_erased_log_is_noticed_whatever_its_total_is() {
 }
 
 #[test]
+fn a_reading_reaches_what_was_there_when_it_began_although_the_ring_turns() {
+    let mut recorder = Recorder::after(62, 65_575);
+    let lost = [[false; 7].as_slice(), &[true], &[false; 3], &[true], &[false]].concat();
+    let mut host = Host { window: 3, lost, rate: 40, ..Host::new() };
+    host.expected = recorder.first_serial_known();
+    for (before, meanwhile) in [(7, &[13, 70, 25, 0][..]), (21, &[33, 20, 5, 0, 3])] {
+        recorder.append_many(before);
+        let due = recorder.history.last().map(serial).unwrap();
+        let mut percents = meanwhile.iter().cycle();
+        let mut replies = 0;
+        let (told, _) = host.read(&mut recorder, |recorder| {
+            replies += 1;
+            if replies < 300 {
+                recorder.append_many(40 * percents.next().unwrap() / 100);
+            }
+        });
+        host.judge(&told, 1);
+        assert!(host.expected.unwrap() > due, "the reading ended before its time: {told:?} {due}");
+    }
+}
+
+#[test]
 fn an_empty_log_that_gets_events_has_lost_none() {
     let mut recorder = Recorder::new(10);
     let mut host = Host::new();

@@ -68,7 +68,8 @@ impl Progress {
             }
             AnchorSeen::NotAskedFor | AnchorSeen::Missing => {
                 self.keep(first, request, batch);
-                if self.overrun.is_on() {
+                // No anchor will prove these, also if events come slowly again meanwhile.
+                if self.overrun.is_on() || !self.footing.is_anchor() {
                     self.footing = Footing::Unconfirmed;
                 } else {
                     self.unproven += 1;
