@@ -197,7 +197,7 @@ fn last_byte(file: &mut File) -> io::Result<Option<u8>> {
 /// Whether a reading makes such a record each time.
 fn is_routine(record: &Record) -> bool {
     match record {
-        Record::Clock(ClockObservation { how, .. }) => matches!(how, How::Event),
+        Record::Clock(ClockObservation { how, .. }) => matches!(how, How::Event | How::Query),
         Record::Watched(_) | Record::Entry(_) | Record::Gap(_) => true,
         Record::Step(_) | Record::Life(_) | Record::Point(_) | Record::Recorder(_) => false,
     }

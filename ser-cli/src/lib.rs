@@ -5,6 +5,7 @@
 
 mod buses;
 mod cli;
+mod clock_look;
 mod closed_stdout;
 mod commands;
 mod connection;
@@ -18,6 +19,7 @@ mod keeper;
 mod kept;
 mod log_look;
 mod new_files;
+mod original;
 mod outage;
 mod outlet;
 mod output;

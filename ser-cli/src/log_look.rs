@@ -87,6 +87,12 @@ impl LogLook {
         }
     }
 
+    /// The same where it can be found again; `None` if nothing tells which log it was.
+    pub(crate) fn place_before(&self, total_after: u16) -> Option<Place> {
+        let is_found = self.life.is_known() || self.newest.is_some();
+        is_found.then(|| self.place(Some(total_after)))
+    }
+
     /// The place of something that happened after this look, and before the log had this total.
     pub(crate) fn place(&self, total_after: Option<u16>) -> Place {
         let after = self.sequence.unwrap_or(self.total.into());

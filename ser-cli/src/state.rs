@@ -292,7 +292,7 @@ fn load_from(path: &Path) -> Result<Option<Delivered>> {
 ///
 /// # Errors
 /// `InvalidData` if it cannot be one of ours.
-fn read_ours(path: &Path) -> io::Result<Option<Vec<u8>>> {
+pub(crate) fn read_ours(path: &Path) -> io::Result<Option<Vec<u8>>> {
     let file = match open_ours(path, File::options().read(true)) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         file => file?,

@@ -109,6 +109,15 @@ impl Witness {
         Ok(())
     }
 
+    /// Takes note of what the clock showed when it was asked.
+    pub(crate) fn asked(
+        &mut self,
+        outlet: &mut Outlet,
+        observation: ClockObservation,
+    ) -> Result<()> {
+        self.tell(Record::Clock(observation), outlet)
+    }
+
     /// Says now and then that nothing is missing so far; returns whether it was said.
     pub(crate) fn vouch_if_due(&mut self, outlet: &mut Outlet) -> Result<bool> {
         let is_due = |now: Moment<Host>| now.since(self.vouched_at) >= VOUCH_EVERY_US;

@@ -8,15 +8,19 @@ use std::io::{BufReader, Read, Write};
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Output, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 use common::bench::{Bench, text};
 use common::{Running, events, ser_cli};
-use ser_evidence::record::{ClockObservation, How, LifeRecord, Record, Reference, Watched};
+use ser_evidence::record::{ClockObservation, How, Life, LifeRecord, Record, Reference, Watched};
 use ser_evidence::time::{Host, Moment, shown};
 use ser_files::Source;
 use ser_proto::{Command, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, ReadReply, Reply};
 use ser_sim::testing::{Kind, PATIENCE};
+
+const SET: How = How::Set { broadcast: None };
 
 /// The records in JSON lines, all of which must be ours.
 fn records(jsonl: &str) -> Vec<Record> {
@@ -77,19 +81,28 @@ fn a_set_clock_and_the_entries_after_it_tell_of_the_same_clock() {
     let set = bench.run("clock set --at 2026-11-22T10:00:00");
     assert_eq!(text(&set.stdout), "2026-11-22T10:00:00.000\n");
     assert!(text(&set.stderr).contains("exact to ± "), "{}", text(&set.stderr));
-    let [set] = clocks(&kept(&bench))[..] else { panic!("one observation") };
-    assert_eq!(set.how, How::Set { broadcast: None });
+    let seen = clocks(&kept(&bench));
+    let [before, set, after] = seen[..] else { panic!("three observations: {seen:?}") };
+    assert_eq!([before.how, set.how, after.how], [How::Query, SET, How::Query]);
+    let (least, most) = ahead_us(&set);
+    let (at_least, at_most) = ahead_us(&after);
+    assert!(least <= at_least && at_most <= most, "asked, it is known better: {set:?} {after:?}");
+    let (earlier, _) = ahead_us(&before);
+    assert!((earlier - least).abs() > 3_600_000_000, "it showed the time of the simulator");
     assert_eq!((set.place.after, set.place.before), (Some(1), Some(1)));
     assert_eq!(set.place.newest.map(|entry| entry.changed.0), Some(0b100));
 
     // The first reading has seen nothing before. The second has.
     let first = records(&bench.ok("read --new --format jsonl"));
-    assert_eq!(clocks(&first), [set], "what clock set has seen, and nothing else");
+    let [told, now] = clocks(&first)[..] else { panic!("{first:?}") };
+    assert_eq!(told, set, "what clock set has seen");
+    assert_eq!(now.how, How::Query);
     let earlier = watched(&first);
     assert_eq!((earlier.life, earlier.through), (life(&first).life, 1));
     bench.contacts("0,3,0\n5,4,1\n9,4,0", 3);
     let second = records(&bench.ok("read --new --format jsonl"));
-    let [began, ended] = clocks(&second)[..] else { panic!("the first and the last: {second:?}") };
+    let [began, ended, now] = clocks(&second)[..] else { panic!("first, last, now: {second:?}") };
+    assert_eq!((now.how, now.place.after, now.place.before), (How::Query, Some(4), Some(4)));
     assert_eq!((began.place.after, ended.place.after), (Some(2), Some(4)));
     let (least, most) = ahead_us(&set);
     for seen in [began, ended] {
@@ -99,9 +112,12 @@ fn a_set_clock_and_the_entries_after_it_tell_of_the_same_clock() {
     }
     assert!(watched(&second).from.monotonic >= earlier.to.monotonic);
     assert_eq!(watched(&second).through, 4);
-    assert_eq!(clocks(&kept(&bench)).len(), 3);
+    assert_eq!(clocks(&kept(&bench)).len(), 3 + 1 + 3);
     let all = records(&bench.ok("read --format jsonl"));
-    assert_eq!(clocks(&all), [set], "a reading of everything tells of the setting, too");
+    assert_eq!(clocks(&all)[..1], [set], "a reading of everything tells of the setting, too");
+    let [_, unnamed] = clocks(&all)[..] else { panic!("{all:?}") };
+    assert_eq!((unnamed.how, unnamed.place.life), (How::Query, Life::UNKNOWN));
+    assert_eq!(unnamed.place.newest, ended.place.newest, "by which its life is found");
 }
 
 #[test]
@@ -128,7 +144,7 @@ fn every_line_of_a_continued_file_is_read_and_the_layout_is_told_once() {
     }
     let text = fs::read_to_string(&log).expect("text");
     assert_eq!(text.matches("\"record\":\"file\"").count(), 1, "{text}");
-    assert_eq!((events(&text).len(), records(&text).len()), (2, 2 + 2 * 2));
+    assert_eq!((events(&text).len(), records(&text).len()), (2, 2 + 2 * 3));
     let entries = records(&text).into_iter().filter_map(|record| match record {
         Record::Entry(entry) => Some(entry),
         _ => None,
@@ -149,6 +165,8 @@ fn watch_says_at_its_end_for_which_time_nothing_is_missing() {
     };
     next("file");
     next("entry");
+    let asked = next("clock");
+    assert!(matches!(clocks(&records(&asked))[..], [ClockObservation { how: How::Query, .. }]));
     // It is seen between two looks, and the clock with it.
     let input = bench.sim.0.stdin.as_mut().expect("piped");
     input.write_all(b"ms,input,state\n0,2,1\n\n").expect("the simulator reads");
@@ -156,20 +174,71 @@ fn watch_says_at_its_end_for_which_time_nothing_is_missing() {
     let seen = next("clock");
     assert!(matches!(clocks(&records(&seen))[..], [ClockObservation { how: How::Event, .. }]));
     assert_eq!(watch.interrupt(), Some(0));
+    let last = next("clock");
+    assert!(matches!(clocks(&records(&last))[..], [ClockObservation { how: How::Query, .. }]));
     let told = watched(&records(&next("watched")));
     assert_eq!((told.through, watched(&kept(&bench))), (2, told));
     assert!(told.from.monotonic < told.to.monotonic);
 }
 
+#[test]
+fn a_setting_tells_its_records_and_keeps_the_same_ones() {
+    let mut bench = Bench::start(Kind::Native, &[]);
+    bench.contacts("0,3,1", 1);
+    let told = bench.ok("clock set --format jsonl");
+    assert_eq!(records(&told), kept(&bench));
+    assert_eq!(clocks(&records(&told)).len(), 3);
+    // Together with entries it is a file that reports take.
+    let log = bench.folder.path().join("log");
+    fs::write(&log, told + &bench.ok("read --format jsonl")).expect("written");
+    let report = bench.ok(&format!("report --last --input {}", log.display()));
+    assert!(report.contains("first-out  input 3 ON"), "{report}");
+    assert!(!report.contains("contradict") && !report.contains("never observed"), "{report}");
+}
+
+#[test]
+fn a_clock_that_nobody_set_is_known_by_asking_for_it() {
+    let mut bench = Bench::start(Kind::Native, &[]);
+    bench.ok("clock set --at 2000-01-01T00:00:00");
+    let state = bench.folder.path().join("state");
+    fs::remove_dir_all(state).expect("what is remembered is forgotten");
+    bench.contacts("0,3,1", 1);
+    let log = bench.folder.path().join("log");
+    fs::write(&log, bench.ok("read --format jsonl")).expect("written");
+    let merged = bench.ok(&format!("merge --input {}", log.display()));
+    let utc = merged.lines().nth(1).expect("a row").to_owned();
+    let this_year = host_year();
+    assert!(utc.contains(&format!("{this_year}-")), "{merged}");
+}
+
+/// The year by this computer's clock.
+fn host_year() -> String {
+    let date = std::process::Command::new("date").args(["-u", "+%Y"]).output().expect("date runs");
+    text(&date.stdout).trim().to_owned()
+}
+
 /// A recorder with an empty log whose answers to the first `swallowed` settings of its clock are
 /// lost. Returns its port.
-fn unit_that_swallows(mut swallowed: u32) -> String {
+fn unit_that_swallows(swallowed: u32) -> String {
+    original(swallowed).0
+}
+
+/// The same, and how often somebody has asked who it is. It answers the commands of the manual.
+fn original(mut swallowed: u32) -> (String, Arc<AtomicUsize>) {
+    let asked = Arc::new(AtomicUsize::new(0));
+    let counted = Arc::clone(&asked);
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = format!("tcp://{}", listener.local_addr().expect("an address"));
     thread::spawn(move || {
-        let (mut client, _) = listener.accept().expect("a client");
+        let mut client = listener.accept().expect("a client").0;
         let (mut decoder, mut bytes) = (FrameDecoder::<MAX_BODY_LEN>::new(), [0; 256]);
-        while let Ok(count @ 1..) = client.read(&mut bytes) {
+        loop {
+            let count = client.read(&mut bytes).unwrap_or_default();
+            if count == 0 {
+                // The next run of the program.
+                client = listener.accept().expect("a client").0;
+                continue;
+            }
             for &byte in &bytes[..count] {
                 let Some(Decoded::Frame(body)) = decoder.push(byte) else { continue };
                 let reply = match Command::parse(body) {
@@ -185,6 +254,10 @@ fn unit_that_swallows(mut swallowed: u32) -> String {
                         model: None,
                         entries: heapless::Vec::new(),
                     }),
+                    Ok(Command::Identify) => {
+                        counted.fetch_add(1, Ordering::Relaxed);
+                        continue;
+                    }
                     _ => continue,
                 };
                 let frame: Vec<u8> = FrameEncoder::new(reply.to_body()).collect();
@@ -192,7 +265,7 @@ fn unit_that_swallows(mut swallowed: u32) -> String {
             }
         }
     });
-    port
+    (port, asked)
 }
 
 fn set_clock(port: &str, folder: &Path) -> Output {
@@ -200,6 +273,26 @@ fn set_clock(port: &str, folder: &Path) -> Output {
     command.env("SER_PORT", port).env("SER_STATE_DIR", folder);
     command.args(["--timeout", "200ms", "--retries", "1", "clock", "set"]);
     command.output().expect("ser-cli runs")
+}
+
+#[test]
+fn an_original_recorder_is_asked_once_who_it_is_and_not_in_later_runs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (port, asked) = original(0);
+    for _ in 0..3 {
+        let set = set_clock(&port, folder.path());
+        assert_eq!(set.status.code(), Some(0), "{}", text(&set.stderr));
+        assert_eq!(asked.load(Ordering::Relaxed), 1);
+    }
+    let kept = kept_in(folder.path());
+    assert!(
+        clocks(&kept).iter().all(|clock| clock.how == SET),
+        "as without the extension: {kept:?}"
+    );
+    // Of another one nothing is known.
+    let (other, asked) = original(0);
+    set_clock(&other, folder.path());
+    assert_eq!(asked.load(Ordering::Relaxed), 1);
 }
 
 #[test]

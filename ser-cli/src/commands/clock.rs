@@ -1,18 +1,23 @@
 //! `clock`: the recorder's clock.
 
 use std::io::{self, Write};
+use std::thread;
 use std::time::{Duration, Instant};
 
+use clap::ValueEnum;
 use ser_client::{RequestError, Unit};
 use ser_evidence::record::{ClockObservation, How, Record};
 use ser_evidence::time::shown;
 use ser_proto::TimeStamp;
 
+use crate::clock_look;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, advise, inform, warn};
 use crate::keeper::{self, StateArgs};
 use crate::kept::KeptRecords;
 use crate::log_look::LogLook;
+use crate::original::Originals;
+use crate::output;
 use crate::setting;
 use crate::time::{local_time_in, parse_time, time_after};
 
@@ -21,9 +26,19 @@ Examples:
   ser-cli clock set                               to the time of this computer
   ser-cli clock set --at 2026-11-22T10:00:00.250  to a given time
   ser-cli clock set --recorder U1-SER1            as the site file says
+  ser-cli clock set --format jsonl >> log         for a report elsewhere
 
 What the clock showed, and when, is remembered in the state directory, so that a report can tell \
-how exact the recorder's times are. How exact the setting was is told on standard error.";
+how exact the recorder's times are. How exact the setting was is told on standard error. A \
+recorder that can be asked for its clock is asked before and after, which takes a second.
+
+Formats:
+  text    the time that was sent
+  jsonl   what was seen of the clock, an object per record (record \"clock\": \"set\", or \"query\" where \
+it was asked; record \"step\" if nobody knows to what it was set), as read writes them";
+
+/// How long after a setting the clock is asked, so that nobody can take it for what was before.
+const AFTER_SETTING: Duration = Duration::from_millis(10);
 
 /// Set the recorder's clock.
 #[derive(Debug, clap::Args)]
@@ -48,22 +63,65 @@ enum What {
         #[arg(long, value_name = "TIME", value_parser = parse_time)]
         at: Option<TimeStamp>,
 
+        /// What is written to standard output.
+        #[arg(long, value_enum, default_value_t)]
+        format: Format,
+
         #[command(flatten)]
         state: StateArgs,
     },
 }
 
+/// What a command that sets or compares clocks writes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Format {
+    /// For people.
+    #[default]
+    Text,
+    /// One JSON object per record: what was seen of the clocks.
+    Jsonl,
+}
+
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
-    let What::Set { at, state } = &args.what;
-    let Set { sent, observed } = set_and_remember(*at, state, connection)?;
+    let What::Set { at, format, state } = &args.what;
+    let recorder = connection::recorder_name(connection)?;
+    let tells = |records: &[Record]| match format {
+        Format::Text => Ok(()),
+        Format::Jsonl => {
+            output::write_records(records.iter().map(|record| (recorder.as_str(), record)))
+        }
+    };
+    let Set { sent, observed, records } =
+        set_and_remember(*at, state, connection).or_else(|failed| {
+            tells(&failed.records)?;
+            Err(failed.failure)
+        })?;
     if let (Some(setting), None) = (connection.clock_setting(), at) {
         inform(format_args!("set to {setting} time, as the site file says"));
     }
-    let mut out = io::stdout().lock();
-    writeln!(out, "{sent}")?;
-    out.flush()?;
+    match format {
+        Format::Text => {
+            let mut out = io::stdout().lock();
+            writeln!(out, "{sent}")?;
+            out.flush()?;
+        }
+        Format::Jsonl => tells(&records)?,
+    }
     tell(observed.as_ref());
     Ok(())
+}
+
+/// A clock that may have been set, or not at all.
+pub(super) struct NotSet {
+    pub(super) failure: Failure,
+    /// What was seen of the clock nevertheless.
+    records: Vec<Record>,
+}
+
+impl<E: Into<Failure>> From<E> for NotSet {
+    fn from(error: E) -> NotSet {
+        NotSet { failure: error.into(), records: Vec::new() }
+    }
 }
 
 /// A clock that was set.
@@ -73,6 +131,8 @@ pub(super) struct Set {
     /// What the clock showed when. `None` if the command was sent again and again: then nobody knows
     /// which attempt set it last.
     pub(super) observed: Option<ClockObservation>,
+    /// Everything that was seen of the clock, in order.
+    records: Vec<Record>,
 }
 
 /// Sets the clock to a given time or to the present, and remembers what that says of it.
@@ -80,7 +140,7 @@ pub(super) fn set_and_remember(
     at: Option<TimeStamp>,
     state: &StateArgs,
     connection: &ConnectionArgs,
-) -> Result<Set> {
+) -> std::result::Result<Set, NotSet> {
     let setting = connection.clock_setting();
     let time_in = |ahead| match &setting {
         Some(setting) => setting.time_in(ahead),
@@ -101,14 +161,35 @@ pub(super) fn set_and_remember(
         || keeper::life_of_empty_log(state, connection),
         || keeper::last_delivered(state, connection),
     );
-    let sent = set(&mut unit, at, &time_in).inspect_err(|error| {
-        if matches!(error, RequestError::NoReply { may_have_been_done: true, .. }) {
-            kept.add(&[setting::step(before.place(None))]);
+    let can_be_asked = Originals::of(state, connection)?.identity(&mut unit)?.is_some();
+    let mut records = Vec::new();
+    records.extend(can_be_asked.then(|| asked(&mut unit, &before)).flatten());
+    let sent = match set(&mut unit, at, &time_in) {
+        Ok(sent) => sent,
+        Err(error) => {
+            if matches!(error, RequestError::NoReply { may_have_been_done: true, .. }) {
+                records.push(setting::step(before.place(None)));
+            }
+            kept.add(&records);
+            return Err(NotSet { failure: error.into(), records });
         }
-    })?;
+    };
     let observed = observed(&mut unit, sent, &before);
-    kept.add(&[observed.map_or_else(|| setting::step(before.place(None)), Record::Clock)]);
-    Ok(Set { sent, observed })
+    records.push(observed.map_or_else(|| setting::step(before.place(None)), Record::Clock));
+    if can_be_asked {
+        thread::sleep(AFTER_SETTING);
+        records.extend(asked(&mut unit, &before));
+    }
+    kept.add(&records);
+    Ok(Set { sent, observed, records })
+}
+
+/// What the recorder says of its clock, if it can be asked and its log has a name. A setting is
+/// worth more, so no failure is one here.
+fn asked(unit: &mut Unit, before: &LogLook) -> Option<Record> {
+    let looks = clock_look::take(unit).ok()??;
+    let place = before.place_before(looks.last_total()?)?;
+    looks.observation(place).map(Record::Clock)
 }
 
 fn set(

@@ -7,6 +7,7 @@ use std::time::Duration;
 use ser_client::{Cursor, Delivery, LogFollower, RangeReader, RequestError, Unit};
 use ser_proto::{Code, Command, MAX_SIZE, Reply};
 
+use crate::clock_look;
 use crate::connection::{self, ConnectionArgs};
 use crate::delivery::Outlet;
 use crate::error::{Failure, Result, advise, inform, warn};
@@ -14,6 +15,7 @@ use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
 use crate::kept::{KeptRecords, Since};
 use crate::log_look;
+use crate::original::Originals;
 use crate::output::{Format, Life};
 use crate::values;
 use crate::witness::Witness;
@@ -32,8 +34,8 @@ Formats:
   csv     a row per change: entry,time,input,state,sequence,life,note
   jsonl   an object per record; an event (record \"entry\"): entry, time, changed, state (inputs
           on), sequence, life, note; a loss (record \"gap\"): lost, count, after, why, inputs,
-          life; and what else is known: when the clock was set from here, for which time nothing
-          is missing
+          life; and what else is known: when the clock was set from here, what it shows where the
+          recorder can be asked, for which time nothing is missing
 
 A sequence number counts the events of a log since it was erased. The life names that log; \
 it is 0 where nothing is remembered (without --new). A file that is continued (>>) gets no \
@@ -112,7 +114,12 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let place = keeper.as_ref().and_then(Keeper::place);
     let mut witness = Witness::begin(kept, place, Duration::ZERO);
     let size = connection::log_size(&mut unit, log_size, remembered)?;
+    let originals = Originals::of(&args.state, connection)?;
     let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), &mut witness, size, &stop);
+    let result = result.and_then(|(delivered, cursor)| {
+        look_at_clock(&mut unit, &mut outlet, &mut witness, &originals, cursor)?;
+        Ok(delivered)
+    });
     // Events that reached standard output are remembered even if the recorder fell silent in
     // between, or after Ctrl-C.
     let saved = keeper.as_mut().map_or(Ok(()), Keeper::save);
@@ -132,7 +139,7 @@ fn read_by_cursor(
     witness: &mut Witness,
     size: u16,
     stop: &AtomicBool,
-) -> Result<u32> {
+) -> Result<(u32, Option<Cursor>)> {
     let cursor: Option<Cursor> = keeper.as_ref().and_then(|keeper| keeper.cursor());
     let mut follower = LogFollower::new(cursor, size);
     let summary = follower.read_new(unit, &mut |step| -> Result<()> {
@@ -151,7 +158,28 @@ fn read_by_cursor(
     };
     witness.read(outlet, cursor, follower.size(), looked_at.max(follower.complete_at()))?;
     witness.vouch(outlet)?;
-    Ok(summary.delivered)
+    Ok((summary.delivered, cursor))
+}
+
+/// Asks what the recorder's clock shows, right after a reading. The reading is whole without it, so
+/// no failure is one here.
+fn look_at_clock(
+    unit: &mut Unit,
+    outlet: &mut Outlet,
+    witness: &mut Witness,
+    originals: &Originals,
+    cursor: Option<Cursor>,
+) -> Result<()> {
+    let Some(cursor) = cursor.filter(|_| witness.is_wanted(outlet)) else { return Ok(()) };
+    if !matches!(originals.identity(unit), Ok(Some(_))) {
+        return Ok(());
+    }
+    let Ok(Some(looks)) = clock_look::take(unit) else { return Ok(()) };
+    let place = looks.place(outlet.life(), cursor);
+    match place.and_then(|place| looks.observation(place)) {
+        Some(observation) => witness.asked(outlet, observation),
+        None => Ok(()),
+    }
 }
 
 /// Reads entries by number. Needs neither cursor nor size: the recorder answers with the existing

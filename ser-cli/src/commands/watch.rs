@@ -10,12 +10,14 @@ use std::time::{Duration, Instant};
 use ser_client::{LogFollower, LogWatcher, ReportSwitch, Unit};
 use ser_proto::{AutoReport, Configuration, Configure};
 
+use crate::clock_look::{self, NowAndThen};
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::delivery::Outlet;
 use crate::error::{Failure, Result, inform};
 use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
 use crate::kept::KeptRecords;
+use crate::original::Originals;
 use crate::outage::Outage;
 use crate::output::Format;
 use crate::values;
@@ -107,8 +109,13 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let outage = Outage::new(connection::options(connection).timeout);
     let kept = KeptRecords::of(&args.state, connection)?;
     let witness = Witness::begin(Some(kept), keeper.place(), unit.report_delay());
-    let mut watch = Watch { unit, watcher, outlet, keeper, witness, stop, outage };
+    let can_be_asked = Originals::of(&args.state, connection)?.identity(&mut unit)?.is_some();
+    let clock = can_be_asked.then(NowAndThen::new);
+    let mut watch = Watch { unit, watcher, outlet, keeper, witness, clock, stop, outage };
     let result = watch.run();
+    if matches!(result, Err(Failure::Interrupted)) {
+        watch.look_at_clock()?;
+    }
     let vouched = watch.witness.vouch(&mut watch.outlet);
     let saved = vouched.and(watch.outlet.finish()).and_then(|()| watch.keeper.save());
     watch.witness.keep();
@@ -240,6 +247,8 @@ struct Watch {
     outlet: Outlet,
     keeper: Keeper,
     witness: Witness,
+    /// The questions about the clock, if the recorder can be asked.
+    clock: Option<NowAndThen>,
     stop: Arc<AtomicBool>,
     outage: Outage,
 }
@@ -263,13 +272,21 @@ impl Watch {
     }
 
     fn step(&mut self) -> Result<()> {
-        let Watch { unit, watcher, outlet, keeper, witness, stop, .. } = self;
+        let Watch { unit, watcher, outlet, keeper, witness, clock, stop, .. } = self;
+        let mut is_idle = true;
         watcher.step(unit, HEARTBEAT, &mut |step| -> Result<()> {
+            is_idle &= step.deliveries.is_empty();
             outlet.take(step.deliveries, 0, &mut |life| keeper.name(life, step.size))?;
             keeper.delivered(step.cursor, step.size, outlet.life())?;
             if stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
         })?;
         witness.read(outlet, watcher.cursor(), watcher.log_size(), watcher.complete_at())?;
+        if let (Some(clock), Some(cursor), true) = (clock, watcher.cursor(), is_idle)
+            && let Some(observation) = clock.step(unit, (outlet.life(), cursor))?
+        {
+            witness.asked(outlet, observation)?;
+            witness.keep();
+        }
         let has_vouched = witness.vouch_if_due(outlet)?;
         // A file gets its header even when there is nothing to deliver.
         outlet.flush()?;
@@ -277,6 +294,19 @@ impl Watch {
             witness.keep();
         }
         Ok(())
+    }
+
+    /// Asks for the clock once more. What was watched is whole without it, so no failure of the
+    /// recorder is one here.
+    fn look_at_clock(&mut self) -> Result<()> {
+        let Watch { unit, watcher, outlet, witness, clock, .. } = self;
+        let (Some(_), Some(cursor)) = (clock, watcher.cursor()) else { return Ok(()) };
+        let Ok(Some(looks)) = clock_look::take(unit) else { return Ok(()) };
+        let place = looks.place(outlet.life(), cursor);
+        match place.and_then(|place| looks.observation(place)) {
+            Some(observation) => witness.asked(outlet, observation),
+            None => Ok(()),
+        }
     }
 
     fn check_interrupt(&self) -> Result<()> {

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-use ser_client::{Clock, Cursor, Delivery, LogFollower, RealTime};
+use ser_client::{Clock, Cursor, Delivery, LogFollower, RealTime, Unit};
 use ser_evidence::history::Collector;
 use ser_evidence::record::{
     ClockObservation, EntryRecord, Gap, How, Life, LifeRecord, Place, Record, Reference, Watched,
@@ -13,6 +13,7 @@ use ser_evidence::time::{Bound, shown};
 use ser_files::NotReached;
 
 use crate::buses::Buses;
+use crate::clock_look;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
 use crate::host_reading;
@@ -20,6 +21,7 @@ use crate::interrupt::Caught;
 use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
 use crate::log_look;
+use crate::original::Originals;
 use crate::output::Loss;
 use crate::state::{Delivered, StateFile};
 
@@ -146,8 +148,26 @@ fn read_one(
         }
     }
     records.extend(newest(&records, read_at));
-    records.extend(kept(recorder, connection, state)?.load());
+    let kept = kept(recorder, connection, state)?;
+    let originals = Originals::of(state, connection)?;
+    let cursor = follower.cursor().map(|cursor| named.cursor(cursor));
+    if let Some(looked) =
+        cursor.and_then(|cursor| look(&mut unit, &originals, (named.life, cursor)))
+    {
+        kept.add(std::slice::from_ref(&looked));
+        records.push(looked);
+    }
+    records.extend(kept.load());
     Ok(records)
+}
+
+/// What the clock shows right after a reading, if the recorder can be asked. The reading is whole
+/// without it, so no failure is one here.
+fn look(unit: &mut Unit, originals: &Originals, (life, cursor): (Life, Cursor)) -> Option<Record> {
+    originals.identity(unit).ok()??;
+    let looks = clock_look::take(unit).ok()??;
+    let place = looks.place(life, cursor)?;
+    looks.observation(place).map(Record::Clock)
 }
 
 /// The newest entry had happened when it was read.
@@ -219,6 +239,11 @@ impl Named {
 
     fn sequence(&self, sequence: u64) -> u64 {
         sequence.saturating_add(self.shift)
+    }
+
+    fn cursor(&self, cursor: Cursor) -> Cursor {
+        let is_exact = self.is_exact || cursor.is_exact;
+        Cursor { sequence: self.sequence(cursor.sequence), is_exact, ..cursor }
     }
 
     fn record(&self, delivery: &Delivery) -> Record {

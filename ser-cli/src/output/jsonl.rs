@@ -6,7 +6,7 @@ use ser_client::Lost as Missing;
 use ser_evidence::record::{EntryRecord, Gap, Lost, Record, Why};
 use ser_files::jsonl::Writer;
 
-use super::{EventWriter, Loss};
+use super::{EventWriter, Loss, Rows};
 
 /// How this program calls itself in files.
 pub(crate) const PROGRAM: &str = concat!("ser-cli ", env!("CARGO_PKG_VERSION"));
@@ -27,6 +27,21 @@ pub(crate) struct JsonLines<W> {
 /// Whether a file with this first line need not be told its layout again.
 pub(super) fn is_file_line(line: &str) -> bool {
     line.starts_with(FILE_LINE)
+}
+
+/// Writes what was seen of recorders to standard output, each record with the recorder's name.
+pub(crate) fn write_records<'r>(
+    told: impl Iterator<Item = (&'r str, &'r Record)>,
+) -> crate::error::Result<()> {
+    let (rows, has_header) = Rows::to_stdout(&is_file_line);
+    let mut lines = Writer::new(rows);
+    if !has_header {
+        lines.file(PROGRAM)?;
+    }
+    for (recorder, record) in told {
+        lines.record(recorder, record)?;
+    }
+    Ok(lines.flush()?)
 }
 
 impl<W: Write> JsonLines<W> {

@@ -17,7 +17,7 @@ use clap::ValueEnum;
 
 pub(crate) use csv::Csv;
 pub(crate) use elapsed::Elapsed;
-pub(crate) use jsonl::{JsonLines, PROGRAM};
+pub(crate) use jsonl::{JsonLines, PROGRAM, write_records};
 pub use life::Life;
 pub(crate) use life::new_life;
 pub(crate) use palette::Palette;

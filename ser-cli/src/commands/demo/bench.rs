@@ -101,6 +101,7 @@ impl Bench {
     /// Sets the clock of a recorder, as the site file says.
     pub(super) fn set_clock(&self, recorder: &Recorder) -> Result<Set> {
         clock::set_and_remember(None, &self.state(), &self.connection(Some(recorder))?)
+            .map_err(|not_set| not_set.failure)
     }
 
     /// Lets both recorders see their part of something that happens, at the same time.

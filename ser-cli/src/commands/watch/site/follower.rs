@@ -11,12 +11,14 @@ use ser_client::{Delivery, LogFollower, LogWatcher};
 use super::super::{Args, POLL_EVERY};
 use super::Batch;
 use crate::buses::Buses;
+use crate::clock_look::NowAndThen;
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::error::{Failure, Result, inform};
 use crate::keeper::{self, Keeper};
 use crate::kept::KeptRecords;
+use crate::original::Originals;
 use crate::output::{Annotator, Event, EventWriter, Loss, Record, RecorderColumn};
-use ser_evidence::record::EntryRecord;
+use ser_evidence::record::{self as evidence, EntryRecord};
 
 /// How long a recorder that has failed is left alone.
 const ASK_AGAIN: Duration = Duration::from_secs(10);
@@ -85,6 +87,9 @@ impl Follower<'_> {
         let may_shorten = self.args.interval.is_none();
         let mut watcher = LogWatcher::polling(follower, interval, may_shorten);
         let mut annotator = Annotator::new(keeper.life()?, keeper.before());
+        let kept = KeptRecords::of(&self.args.state, &self.connection)?;
+        let originals = Originals::of(&self.args.state, &self.connection)?;
+        let mut clock = originals.identity(&mut unit)?.map(|_| NowAndThen::new());
         let result = loop {
             if self.is_stopped() {
                 break Ok(());
@@ -104,6 +109,15 @@ impl Follower<'_> {
                 inform(format_args!("{}: all is well again", self.column.name));
             }
             keeper.save_if_due()?;
+            let place = watcher.cursor().map(|cursor| (annotator.life(), cursor));
+            if let (Some(clock), Some(place)) = (&mut clock, place) {
+                let observation = clock.step(&mut unit, place);
+                match observation.map_err(Failure::from) {
+                    Ok(Some(seen)) => kept.add(&[evidence::Record::Clock(seen)]),
+                    Ok(None) => {}
+                    Err(failure) => break Err(failure),
+                }
+            }
         };
         keeper.save().and(result)
     }

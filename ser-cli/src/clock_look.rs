@@ -1,0 +1,368 @@
+//! What a recorder's clock shows, by asking it several times in a row.
+//!
+//! Each answer says between which two times of this computer the clock showed something. All of them
+//! are about one clock that runs at a steady rate, so the truth is in what they have in common. Only
+//! recorders with our extension can be asked.
+
+use std::thread;
+use std::time::Duration;
+
+use ser_client::{ClockLook, Cursor, RequestError, Unit};
+use ser_evidence::record::{ClockObservation, How, Life, Place, Reference};
+use ser_evidence::time::{Bound, Host, Moment, Shown, stamp};
+use ser_proto::ClockReading;
+
+use crate::host_reading;
+
+/// How many answers are wanted.
+const ROUNDS: u32 = 4;
+
+/// How many questions are asked at most, where answers are lost or the clock is set meanwhile.
+const MAX_QUESTIONS: u32 = 3 * ROUNDS;
+
+/// How long after a change these recorders may write its entry: they hold it back for up to 320 ms.
+/// What is not in the log at the end of the questions came after their beginning.
+const HOLD_BACK: Duration = Duration::from_millis(400);
+
+/// How often the clock of a recorder is asked for that is watched.
+const LOOK_EVERY: Duration = Duration::from_secs(300);
+
+/// How much faster or slower than this computer a clock may run, in parts per million. Crystals are
+/// better than that.
+const RATE_PPM: u64 = 200;
+
+/// What recorders count in.
+const MS_US: i64 = 1000;
+
+/// Questions about a clock, one after the other.
+#[derive(Debug, Default)]
+pub(crate) struct Questions {
+    asked: u32,
+    last_asked: Option<Duration>,
+    looks: Vec<ClockLook>,
+    is_over: bool,
+}
+
+/// Answers about one clock that was not set between them, in their order; at least one.
+#[derive(Clone, Debug)]
+pub(crate) struct Looks(Vec<ClockLook>);
+
+/// Asks until enough is known; `None` where the recorder cannot be asked or does not answer.
+pub(crate) fn take(unit: &mut Unit) -> Result<Option<Looks>, RequestError> {
+    let mut questions = Questions::default();
+    while !questions.is_over() {
+        thread::sleep(questions.wait(unit.now()));
+        questions.ask(unit)?;
+    }
+    Ok(questions.answers())
+}
+
+/// Asks now and then, a question at a time, so that nothing else waits.
+#[derive(Debug)]
+pub(crate) struct NowAndThen {
+    /// The questions under way, and how far the log had been read before the first of them.
+    under_way: Option<(Questions, (Life, Cursor))>,
+    /// When the next ones begin.
+    due: Duration,
+}
+
+impl NowAndThen {
+    /// Begins at once.
+    pub(crate) const fn new() -> NowAndThen {
+        NowAndThen { under_way: None, due: Duration::ZERO }
+    }
+
+    /// Asks if it is time to; the log has been read as far as `place` says. Returns what was
+    /// observed in the end.
+    pub(crate) fn step(
+        &mut self,
+        unit: &mut Unit,
+        (life, cursor): (Life, Cursor),
+    ) -> Result<Option<ClockObservation>, RequestError> {
+        let now = unit.now();
+        if self.under_way.is_none() && now < self.due {
+            return Ok(None);
+        }
+        let (questions, _) =
+            self.under_way.get_or_insert_with(|| (Questions::default(), (life, cursor)));
+        if questions.wait(now).is_zero() {
+            self.due = now + LOOK_EVERY;
+            let asked = questions.ask(unit);
+            if asked.is_err() {
+                self.under_way = None;
+                asked?;
+            }
+        }
+        let over = self.under_way.take_if(|(questions, _)| questions.is_over());
+        let observed = over.filter(|(_, (before, _))| *before == life).and_then(
+            |(questions, (life, cursor))| {
+                let looks = questions.answers()?;
+                looks.observation(looks.place(life, cursor)?)
+            },
+        );
+        Ok(observed)
+    }
+}
+
+impl Questions {
+    /// Whether nothing more is asked.
+    pub(crate) const fn is_over(&self) -> bool {
+        self.is_over
+    }
+
+    /// How long to wait until the next question, so that the last one comes late enough.
+    pub(crate) fn wait(&self, now: Duration) -> Duration {
+        let pause = HOLD_BACK / (ROUNDS - 1);
+        let due = self.last_asked.map_or(Duration::ZERO, |asked| asked + pause);
+        due.saturating_sub(now)
+    }
+
+    /// Asks once.
+    pub(crate) fn ask(&mut self, unit: &mut Unit) -> Result<(), RequestError> {
+        self.last_asked = Some(unit.now());
+        self.asked += 1;
+        match unit.clock_look() {
+            Ok(Some(look)) => self.take(look),
+            Ok(None) => self.is_over = true,
+            // One may have been lost. Nobody waits for more than two.
+            Err(RequestError::NoReply { .. }) => {
+                self.is_over = self.asked > 1;
+            }
+            Err(error) => return Err(error),
+        }
+        self.is_over |= self.asked >= MAX_QUESTIONS;
+        Ok(())
+    }
+
+    fn take(&mut self, look: ClockLook) {
+        if self.looks.first().is_some_and(|first| !is_same_clock(&first.reading, &look.reading)) {
+            self.looks.clear();
+        }
+        self.looks.push(look);
+        let lasted = self.looks.first().map(|first| look.between.0.saturating_sub(first.between.0));
+        self.is_over = self.looks.len() >= ROUNDS as usize && lasted >= Some(HOLD_BACK);
+    }
+
+    /// What was answered.
+    pub(crate) fn answers(self) -> Option<Looks> {
+        (!self.looks.is_empty()).then_some(Looks(self.looks))
+    }
+}
+
+/// Whether the clock was not set between two readings, and the log not begun anew. Against the
+/// counter that nobody sets, a clock moves only by what disciplines it.
+fn is_same_clock(one: &ClockReading, other: &ClockReading) -> bool {
+    let ahead = |reading: &ClockReading| i128::from(reading.clock_us) - i128::from(reading.tick_us);
+    let moved = (ahead(one) - ahead(other)).unsigned_abs();
+    let room = u128::from(rate_us(one.tick_us.abs_diff(other.tick_us)));
+    (one.life, one.source) == (other.life, other.source) && moved <= room
+}
+
+/// By how much a clock may gain or lose in this time.
+const fn rate_us(elapsed_us: u64) -> u64 {
+    elapsed_us.div_ceil(1_000_000 / RATE_PPM)
+}
+
+impl Looks {
+    /// The first answer, of whose moment the others tell more.
+    pub(crate) fn first(&self) -> Option<&ClockReading> {
+        self.0.first().map(|look| &look.reading)
+    }
+
+    /// The last answer.
+    pub(crate) fn last(&self) -> Option<&ClockReading> {
+        self.0.last().map(|look| &look.reading)
+    }
+
+    /// The recorder's total when it answered last, as other replies show it.
+    pub(crate) fn last_total(&self) -> Option<u16> {
+        // Modulo 65536 is what totals are.
+        self.last().map(|reading| total(reading.next_sequence))
+    }
+
+    /// The millisecond that the clock showed at the first answer, and when it began to show it.
+    /// `None` if a stamp cannot express it.
+    pub(crate) fn shown(&self) -> Option<(Moment<Shown>, Bound<Host>)> {
+        let first = self.first()?;
+        let shown = Moment::from_us(first.clock_us - first.clock_us.rem_euclid(MS_US));
+        stamp(shown)?;
+        let mut each = self.0.iter().map(|look| beginning(look, shown));
+        let first = each.next()?;
+        let (common, hull) = each.fold((first, first), |(common, hull), bound| {
+            (common.intersection(bound), hull.hull(bound))
+        });
+        // If two of them cannot both be right, any of them may be.
+        Some((shown, if common.is_empty() { hull } else { common }))
+    }
+
+    /// The observation that they are, at this place.
+    pub(crate) fn observation(&self, place: Place) -> Option<ClockObservation> {
+        let (shown, bound) = self.shown()?;
+        let asked = self.0.first()?.between.1;
+        let at = Reference::Host { bound, reading: host_reading::at(asked) };
+        Some(ClockObservation { how: How::Query, shown, at, place })
+    }
+
+    /// Where in a log they were made that had been read up to `cursor` a moment before. `None` if
+    /// this may be another log, or where nothing tells which log it is.
+    pub(crate) fn place(&self, life: Life, cursor: Cursor) -> Option<Place> {
+        let (first, last) = (self.first()?, self.last()?);
+        let is_earlier = first.next_sequence <= cursor.sequence;
+        let ahead = |reading: &ClockReading| {
+            u64::from(total(reading.next_sequence).wrapping_sub(cursor.total()))
+        };
+        if (cursor.is_exact && is_earlier) || ahead(last) > MAX_AHEAD || ahead(first) > ahead(last)
+        {
+            return None;
+        }
+        if !life.is_known() && cursor.anchor.is_none() {
+            return None;
+        }
+        let after = cursor.sequence;
+        Some(Place {
+            life,
+            after: Some(after),
+            before: Some(after.saturating_add(ahead(last))),
+            newest: cursor.anchor,
+            fellow: None,
+        })
+    }
+}
+
+/// How many entries may have come since the log was read. More are another log, or a busy time.
+const MAX_AHEAD: u64 = 1000;
+
+/// The total before the next entry.
+#[expect(clippy::cast_possible_truncation, reason = "the low 16 bits are what is wanted")]
+const fn total(next_sequence: u64) -> u16 {
+    next_sequence.wrapping_sub(1) as u16
+}
+
+/// When the clock began to show a millisecond, by one answer.
+fn beginning(look: &ClockLook, shown: Moment<Shown>) -> Bound<Host> {
+    let ClockLook { reading, between } = look;
+    let since_us = reading.clock_us.saturating_sub(shown.us());
+    let rate_us = i64::try_from(rate_us(since_us.unsigned_abs())).unwrap_or(i64::MAX);
+    // On a bus, and where nothing counts finer, the moment of arrival is known to the millisecond.
+    let unit_us = if reading.clock_us % MS_US == 0 { MS_US } else { 1 };
+    let moment = |time: Duration| host_reading::moment(time).after(-since_us);
+    let (from, to) = (moment(between.0), moment(between.1));
+    // Half microseconds of this computer are cut off.
+    Bound::new(Some(from.after(-unit_us - rate_us)), Some(to.after(1 + rate_us)))
+}
+
+#[cfg(test)]
+mod tests {
+    use oorandom::Rand64;
+    use ser_proto::ClockSource;
+
+    use super::*;
+
+    const NOON: i64 = 1_795_348_800_000_000;
+
+    fn look(from_us: u64, to_us: u64, clock_us: i64, tick_us: u64) -> ClockLook {
+        let reading = ClockReading {
+            token: 0,
+            clock_us,
+            source: ClockSource::HostOverRs232,
+            age_s: 1,
+            doubt_us: None,
+            drift_ppb: None,
+            tick_us,
+            life: 7,
+            next_sequence: 5,
+            last_mark: None,
+        };
+        ClockLook {
+            reading,
+            between: (Duration::from_micros(from_us), Duration::from_micros(to_us)),
+        }
+    }
+
+    fn bound(looks: &[ClockLook]) -> Bound<Host> {
+        Looks(looks.to_vec()).shown().unwrap().1
+    }
+
+    #[test]
+    fn what_several_answers_have_in_common_holds_the_truth_and_is_narrower_than_each() {
+        let mut chance = Rand64::new(7);
+        let mut below = |limit: u64| chance.rand_range(0..limit);
+        for _ in 0..2000 {
+            let (offset_us, counts_ms) = (NOON + below(1000) as i64, below(2) == 0);
+            // In parts per million of this computer's time.
+            let rate_ppm = below(2 * RATE_PPM - 1) as i64 - (RATE_PPM as i64 - 1);
+            let clock = |at_us: u64| offset_us + at_us as i64 + at_us as i64 * rate_ppm / 1_000_000;
+            let mut at_us = 0;
+            let looks: Vec<ClockLook> = (0..ROUNDS)
+                .map(|_| {
+                    at_us += 1000 + below(200_000);
+                    let clock_us = clock(at_us);
+                    let told_us = if counts_ms { clock_us - clock_us % 1000 } else { clock_us };
+                    look(at_us - below(1000), at_us + below(100_000), told_us, at_us)
+                })
+                .collect();
+            let (shown, bound) = Looks(looks.clone()).shown().unwrap();
+            // The clock began to show it when it had this much less to go.
+            let truth =
+                (0..200_001 + 1000_u64).rev().find(|at| clock(*at) < shown.us()).map(|at| at + 1);
+            let truth = truth.unwrap_or_default();
+            assert!(
+                truth == 0 || bound.contains(Moment::from_us(truth as i64)),
+                "{truth} {bound:?} {looks:?}"
+            );
+            let alone = looks.iter().map(|look| beginning(look, shown).width_us().unwrap()).min();
+            assert!(bound.width_us() <= alone);
+        }
+    }
+
+    #[test]
+    fn a_clock_that_shows_whole_milliseconds_is_known_to_one() {
+        assert_eq!(bound(&[look(5000, 6000, NOON, 0)]), Bound::from_us(4000, 6001));
+        // It showed its 250th microsecond then.
+        assert_eq!(bound(&[look(5000, 6000, NOON + 250, 0)]), Bound::from_us(4748, 5752));
+    }
+
+    #[test]
+    fn answers_that_cannot_both_be_right_are_both_allowed_for() {
+        let looks = [look(5000, 6000, NOON, 0), look(9000, 9100, NOON + 1000, 1000)];
+        assert_eq!(bound(&looks), Bound::from_us(4000, 8102));
+    }
+
+    #[test]
+    fn a_clock_that_was_set_between_two_answers_is_another_one() {
+        let (before, after) = (look(0, 100, NOON, 0), look(200, 300, NOON + 200, 200));
+        let mut questions = Questions::default();
+        questions.take(before);
+        questions.take(after);
+        assert_eq!(questions.looks.len(), 2);
+        let set = look(400, 500, NOON + 900, 400);
+        let erased = ClockReading { life: 8, ..look(0, 0, NOON + 1100, 600).reading };
+        for other in [set, ClockLook { reading: erased, ..set }] {
+            questions.take(other);
+            assert_eq!(questions.looks, [other]);
+        }
+    }
+
+    #[test]
+    fn the_place_is_between_the_log_that_was_read_and_that_at_the_last_answer() {
+        let at = |next_sequence| {
+            let mut look = look(0, 100, NOON, 0);
+            look.reading.next_sequence = next_sequence;
+            look
+        };
+        let life = Life::from_bits(9);
+        let place = |next: [u64; 2], sequence, is_exact| {
+            let cursor = Cursor { sequence, is_exact, anchor: None };
+            let place = Looks(next.map(at).to_vec()).place(life, cursor)?;
+            Some((place.after?, place.before?))
+        };
+        assert_eq!(place([5, 5], 4, true), Some((4, 4)));
+        assert_eq!(place([5, 7], 4, true), Some((4, 6)));
+        assert_eq!(place([65_541, 65_541], 4, false), Some((4, 4)), "only a host has lost count");
+        assert_eq!(place([4, 4], 4, true), None, "another log");
+        assert_eq!(place([1, 1], 70_000, true), None, "another log");
+        assert_eq!(place([5, 2000], 4, true), None, "nobody has read what came between");
+        let nowhere = Cursor { sequence: 4, is_exact: true, anchor: None };
+        assert_eq!(Looks(vec![at(5)]).place(Life::UNKNOWN, nowhere), None);
+    }
+}
