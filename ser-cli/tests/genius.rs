@@ -11,7 +11,7 @@ use std::process::{Command, Output, Stdio};
 use std::sync::mpsc::Receiver;
 
 use common::{Running, events, ser_cli, wait_until};
-use ser_evidence::record::{ClockObservation, How, Record, Reference};
+use ser_evidence::record::{ClockObservation, How, Record, Reference, Told};
 use ser_files::Source;
 use ser_sim::testing::{PATIENCE, image};
 use tempfile::TempDir;
@@ -239,28 +239,63 @@ fn kept_clocks(bench: &Bench) -> Vec<(String, ClockObservation)> {
     let mut files: Vec<_> = files.map(|file| file.expect("a file").path()).collect();
     files.retain(|path| path.extension().is_some_and(|end| end == "jsonl"));
     files.sort();
-    let records = files.iter().flat_map(|path| {
-        let file = BufReader::new(fs::File::open(path).expect("opened"));
-        Source::new(file, "").expect("JSON lines").map(|told| told.expect("a record"))
-    });
-    let clocks = records.filter_map(|told| match told.record {
-        Record::Clock(clock) => Some((told.recorder, clock)),
+    files.iter().flat_map(|path| clocks_of(&fs::read(path).expect("a file"))).collect()
+}
+
+fn clocks_of(jsonl: &[u8]) -> Vec<(String, ClockObservation)> {
+    let told = Source::new(BufReader::new(jsonl), "").expect("JSON lines");
+    let clocks = told.filter_map(|told| match told.expect("a record") {
+        Told { recorder, record: Record::Clock(clock) } => Some((recorder, clock)),
         _ => None,
     });
     clocks.collect()
 }
 
+/// Forgets what is kept of the clocks.
+fn forget(bench: &Bench) {
+    for file in fs::read_dir(bench.folder.path().join("state")).expect("a folder") {
+        let path = file.expect("a file").path();
+        if path.extension().is_some_and(|end| end == "jsonl") {
+            fs::remove_file(path).expect("forgotten");
+        }
+    }
+}
+
 #[test]
 fn clocks_of_a_bus_are_compared_without_being_set() {
     let bench = Bench::start("--node 5 --node 9:ser160");
-    // Nothing tells the day.
+    // Both tell what they showed, with its day, although nobody has set them.
+    let told = bench.on_bus("genius broadcast mark --format jsonl");
+    let marks: Vec<_> = clocks_of(told.as_bytes());
+    assert_eq!(marks, kept_clocks(&bench));
+    let [(five, one), (nine, other)] = &marks[..] else { panic!("{told}") };
+    assert_eq!((five, nine), (&bench.port(5), &bench.port(9)));
+    assert!(matches!(one.how, How::Mark { .. }) && one.how == other.how, "{told}");
+    forget(&bench);
+
+    // As soon as one may be an original one, none gets a mark with a token, and the day is not known
+    // of that one.
+    let folder = fs::read_dir(bench.folder.path().join("state")).expect("a folder");
+    let mut files = folder.map(|file| file.expect("a file").path());
+    let of_nine = files.find(|path| path.to_string_lossy().ends_with("%3D9.jsonl.lock"));
+    let original = of_nine.expect("device 9").with_extension("").with_extension("original");
+    let believed = "{\"version\":1,\"unit\":\"9\",\"answers\":false,\"asked_utc_s\":";
+    let now = std::time::UNIX_EPOCH.elapsed().expect("after 1970").as_secs();
+    fs::write(&original, format!("{believed}{now}}}\n")).expect("written");
     let mark = bench.command(&bench.bus(), "genius broadcast mark").output().expect("it runs");
     let (table, error) = (succeeded("mark", &mark), stderr(&mark));
     assert_eq!(table.lines().count(), 3, "{table}");
     assert!(table.lines().nth(2).is_some_and(|row| row.ends_with(" s ± 1 ms")), "{table}");
     assert!(error.contains("device 9: the day is not known: the log is empty"), "{error}");
-    assert!(kept_clocks(&bench).is_empty());
+    assert!(!error.contains("device 5"), "{error}");
+    assert!(bench.ok(9, "last-broadcast").contains("read"), "nothing beyond the manual");
+    fs::remove_file(&original).expect("forgotten");
+    forget(&bench);
 
+    let set = bench.on_bus("genius broadcast clock --at 2026-11-22T09:00:00 --format jsonl");
+    assert_eq!(clocks_of(set.as_bytes()), kept_clocks(&bench));
+    assert_eq!(kept_clocks(&bench).len(), 2);
+    forget(&bench);
     bench.on_bus("genius broadcast clock --at 2026-11-22T10:00:00");
     let table = bench.on_bus("genius broadcast mark");
     let row = |row: usize| table.lines().nth(row).expect("a row");

@@ -52,6 +52,7 @@ Examples:
   ser-cli genius broadcast clock
   ser-cli genius broadcast clock --at 2026-11-22T10:00:00.250
   ser-cli genius broadcast mark
+  ser-cli genius broadcast mark --format jsonl >> marks.jsonl
   ser-cli genius broadcast erase --yes
 
 A clock that was set, and what the clocks showed at a mark, is remembered in the state directory, \

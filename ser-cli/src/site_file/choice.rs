@@ -141,6 +141,13 @@ impl Chosen {
         names.join(", ")
     }
 
+    /// What the recorder at this port is called.
+    #[cfg(unix)]
+    pub(crate) fn name_at(&self, unit: &UnitName) -> Option<String> {
+        let recorder = self.site.recorders.get(self.at(unit)?.0)?;
+        Some(recorder.name.clone())
+    }
+
     /// The recorder of this name, else the only one that the name may also stand for.
     fn at(&self, unit: &UnitName) -> Option<RecorderId> {
         let name = |port: &str| Some(UnitName::of(port, &port.parse().ok()?).name);

@@ -3,15 +3,17 @@
 use std::io::{self, Write};
 
 use ser_client::{GeniHost, Recognition};
-use ser_evidence::record::How;
+use ser_evidence::record::{How, Record};
 use ser_evidence::time::shown;
 use ser_proto::{Command, TimeStamp};
 
+use super::super::clock::Format;
 use super::check::{Asked, Check, Heard};
 use super::{mark, no_recorder, silent_candidates};
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
 use crate::keeper::StateArgs;
+use crate::output;
 use crate::setting;
 use crate::site_file::ClockSetting;
 use crate::time::{local_time_in, parse_time};
@@ -23,12 +25,22 @@ pub(super) enum What {
         /// The time to set; if not given, what the site file says, or this computer's local time.
         #[arg(long, value_name = "TIME", value_parser = parse_time)]
         at: Option<TimeStamp>,
+
+        /// What is written to standard output.
+        #[arg(long, value_enum, default_value_t)]
+        format: Format,
     },
     /// Compare all clocks without setting any: what does each show at one moment?
     ///
     /// A command that does nothing is broadcast. Each recorder notes when it came, by its own
-    /// clock, and is asked for that. The times are exact to a millisecond.
-    Mark,
+    /// clock, and is asked for that. The times are exact to a millisecond. If all recorders can be
+    /// asked for their clocks, the command is a mark that is known from all others, and told with its
+    /// day.
+    Mark {
+        /// What is written to standard output.
+        #[arg(long, value_enum, default_value_t)]
+        format: Format,
+    },
     /// Start recording everywhere.
     Start,
     /// Stop recording everywhere.
@@ -44,7 +56,7 @@ pub(super) enum What {
 impl What {
     /// Whether it tells what the clocks show.
     const fn tells_time(self) -> bool {
-        matches!(self, What::Clock { .. } | What::Mark)
+        matches!(self, What::Clock { .. } | What::Mark { .. })
     }
 }
 
@@ -73,38 +85,52 @@ pub(super) fn run(
         return Err(no_recorder());
     }
     let began = host.now();
-    let command = send(what, &host, setting.as_ref())?;
+    // A mark with a token reaches all of them, and an original one must never get it.
+    let all_tell = found.silent.is_empty() && asked.iter().all(Asked::tells_clock);
+    let command = send((what, all_tell), &host, setting.as_ref())?;
     let checks: Vec<Check> = asked.iter_mut().map(|asked| asked.check(&command, began)).collect();
-    if let What::Mark = what {
-        mark::run(connection, state, &checks)?;
-    } else {
-        let mut out = io::stdout().lock();
-        writeln!(out, "node  received   last broadcast")?;
-        checks.iter().try_for_each(|check| writeln!(out, "{check}"))?;
-        out.flush()?;
-    }
-    if let Command::SetClock(time) = command {
-        remember_set(connection, state, &checks, time)?;
+    let records = match command {
+        Command::SetClock(time) => remember_set(connection, state, &checks, time)?,
+        _ => Vec::new(),
+    };
+    match what {
+        What::Mark { format } => mark::run(connection, state, &checks, format)?,
+        What::Clock { format: Format::Jsonl, .. } => {
+            output::write_records(records.iter().map(|(name, record)| (name.as_str(), record)))?;
+        }
+        _ => {
+            let mut out = io::stdout().lock();
+            writeln!(out, "node  received   last broadcast")?;
+            checks.iter().try_for_each(|check| writeln!(out, "{check}"))?;
+            out.flush()?;
+        }
     }
     conclude(&checks)
 }
 
 /// Sends the command, and tells the user the time in it, if any.
-fn send(what: What, host: &GeniHost, setting: Option<&ClockSetting>) -> Result<Command> {
+fn send(
+    (what, all_tell): (What, bool),
+    host: &GeniHost,
+    setting: Option<&ClockSetting>,
+) -> Result<Command> {
     let time_in = |ahead| match setting {
         Some(setting) => setting.time_in(ahead),
         None => local_time_in(ahead),
     };
     let command = match what {
-        What::Clock { at: Some(time) } => Command::SetClock(time),
-        What::Clock { at: None } => Command::SetClock(time_in(host.delay()).map_err(|year| {
-            Failure::new(format!(
-                "a recorder's clock runs from 1970 to 2069; this computer's says {year}"
-            ))
-            .hint("set this computer's clock, or give the time with --at")
-        })?),
+        What::Clock { at: Some(time), .. } => Command::SetClock(time),
+        What::Clock { at: None, .. } => {
+            Command::SetClock(time_in(host.delay()).map_err(|year| {
+                Failure::new(format!(
+                    "a recorder's clock runs from 1970 to 2069; this computer's says {year}"
+                ))
+                .hint("set this computer's clock, or give the time with --at")
+            })?)
+        }
+        What::Mark { .. } if all_tell => Command::Time { token: token()? },
         // Nobody answers a broadcast, so a read does nothing but being noted.
-        What::Mark => Command::Read { start: 1, count: 1 },
+        What::Mark { .. } => Command::Read { start: 1, count: 1 },
         What::Start => Command::SetMode { recording: true },
         What::Stop => Command::SetMode { recording: false },
         What::Erase { .. } => Command::Erase,
@@ -116,13 +142,20 @@ fn send(what: What, host: &GeniHost, setting: Option<&ClockSetting>) -> Result<C
     Ok(command)
 }
 
-/// Keeps that the clocks of these recorders were set, or may have been.
+/// A token that hardly any earlier mark has. Token 0 is that of no mark.
+fn token() -> Result<u16> {
+    let [low, high, ..] = getrandom::u64().map_err(io::Error::from)?.to_le_bytes();
+    Ok(u16::from_le_bytes([low, high]).max(1))
+}
+
+/// Keeps that the clocks of these recorders were set, or may have been. Returns what it keeps.
 fn remember_set(
     connection: &ConnectionArgs,
     state: &StateArgs,
     checks: &[Check],
     time: TimeStamp,
-) -> Result<()> {
+) -> Result<Vec<(String, Record)>> {
+    let mut told = Vec::new();
     let how = How::Set { broadcast: Some(getrandom::u64().map_err(io::Error::from)?) };
     for check in checks {
         let record = match (check.heard, shown(&time)) {
@@ -130,9 +163,10 @@ fn remember_set(
             (Heard::No, _) => continue,
             _ => setting::step(check.place()),
         };
-        check.kept(connection, state)?.add(&[record]);
+        check.kept(connection, state)?.add(std::slice::from_ref(&record));
+        told.push((check.name(connection)?, record));
     }
-    Ok(())
+    Ok(told)
 }
 
 /// Fails unless every recorder is known to have received it.
@@ -177,6 +211,8 @@ mod tests {
             look: None,
             total_after: None,
             came: Default::default(),
+            mark: None,
+            clock: None,
         };
         assert!(conclude(&[check(5, Heard::Yes), check(9, Heard::Yes)]).is_ok());
         let failure =

@@ -6,17 +6,21 @@ use std::time::Duration;
 use ser_client::{GeniHost, Unit};
 use ser_evidence::record::{How, Place, Record};
 use ser_evidence::time::{Moment, Shown};
-use ser_proto::{Command, LastBroadcast};
+use ser_proto::{Capabilities, ClockReading, Command, LastBroadcast, Mark};
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::Result;
 use crate::keeper::{self, StateArgs};
 use crate::kept::KeptRecords;
 use crate::log_look::LogLook;
+use crate::original::Originals;
 use crate::setting;
 
 /// What a recorder last received as a broadcast, or why that is not known.
 pub(super) type Answer = std::result::Result<Option<LastBroadcast>, String>;
+
+/// How often a recorder is asked for its clock. The mark that it has kept stays the same.
+const ASKED_FOR_MARK: usize = 3;
 
 /// A recorder that was asked before the broadcast.
 pub(super) struct Asked {
@@ -25,6 +29,8 @@ pub(super) struct Asked {
     before: Answer,
     /// Where its log stood, if that is wanted and known.
     look: Option<LogLook>,
+    /// Whether it can be asked for its clock.
+    tells_clock: bool,
 }
 
 impl Asked {
@@ -38,27 +44,53 @@ impl Asked {
         let mut unit = host.unit(node, connection::options(connection));
         // The same command may have been broadcast before.
         let before = last_broadcast(&mut unit);
-        let look = looks.filter(|_| before.is_ok()).and_then(|state| {
+        let connection = connection::to_node(connection, node).ok();
+        let wanted = looks.zip(connection).filter(|_| before.is_ok());
+        let look = wanted.as_ref().and_then(|(state, connection)| {
             let look = LogLook::take(&mut unit).ok()?;
-            let connection = connection::to_node(connection, node).ok()?;
             Some(look.named(
-                || keeper::life_of_empty_log(state, &connection),
-                || keeper::last_delivered(state, &connection),
+                || keeper::life_of_empty_log(state, connection),
+                || keeper::last_delivered(state, connection),
             ))
         });
-        Asked { node, unit, before, look }
+        let identity = wanted.and_then(|(state, connection)| {
+            Originals::of(state, &connection).ok()?.identity(&mut unit).ok()?
+        });
+        let tells_clock =
+            identity.is_some_and(|identity| identity.capabilities.contains(Capabilities::TIME));
+        Asked { node, unit, before, look, tells_clock }
+    }
+
+    /// Whether it can be asked for its clock. Only such a recorder knows a mark with a token, and no
+    /// other one must get it.
+    pub(super) const fn tells_clock(&self) -> bool {
+        self.tells_clock
     }
 
     /// Asks again, after a broadcast that was sent after `began`.
     pub(super) fn check(&mut self, command: &Command, began: Duration) -> Check {
-        let Asked { node, unit, before, look } = self;
+        let Asked { node, unit, before, look, tells_clock } = self;
         let after = last_broadcast(unit);
-        let heard = Heard::of(command, before, &after);
+        let mut heard = Heard::of(command, before, &after);
         let known_at = unit.last_exchange().map_or(began, |exchange| exchange.carried_out().1);
+        let asks_clock =
+            *tells_clock && matches!(command, Command::Read { .. } | Command::Time { .. });
+        let clock = if asks_clock { clock(unit) } else { None };
+        let mut mark = None;
+        if let Command::Time { token } = *command {
+            heard = Heard::of_mark(token, clock.as_ref());
+            mark = clock.and_then(|clock| clock.last_mark).filter(|mark| mark.token == token);
+        }
         let total_after =
             look.and_then(|_| unit.log_position().ok()).map(|position| position.total);
-        Check { node: *node, heard, after, look: *look, total_after, came: (began, known_at) }
+        let came = (began, known_at);
+        Check { node: *node, heard, after, look: *look, total_after, came, mark, clock }
     }
+}
+
+fn clock(unit: &mut Unit) -> Option<ClockReading> {
+    let look = (0..ASKED_FOR_MARK).find_map(|_| unit.clock_look().ok());
+    look.flatten().map(|look| look.reading)
 }
 
 fn last_broadcast(unit: &mut Unit) -> Answer {
@@ -75,6 +107,15 @@ pub(super) enum Heard {
 }
 
 impl Heard {
+    /// Judges by the mark that the recorder has kept.
+    fn of_mark(token: u16, clock: Option<&ClockReading>) -> Heard {
+        match clock.map(|clock| clock.last_mark) {
+            None => Heard::NotKnown,
+            Some(Some(mark)) if mark.token == token => Heard::Yes,
+            Some(_) => Heard::No,
+        }
+    }
+
     /// Judges by the last broadcast that the recorder received, before and after.
     fn of(command: &Command, before: &Answer, after: &Answer) -> Heard {
         let Ok(after) = after else { return Heard::NotKnown };
@@ -101,6 +142,10 @@ pub(super) struct Check {
     pub(super) total_after: Option<u16>,
     /// Between which times of this computer the broadcast came, if it did.
     pub(super) came: (Duration, Duration),
+    /// The mark that it was, if it was one with a token and the recorder has received it.
+    pub(super) mark: Option<Mark>,
+    /// What its clock showed afterwards, if it was asked.
+    pub(super) clock: Option<ClockReading>,
 }
 
 impl Check {
@@ -111,6 +156,14 @@ impl Check {
 
     pub(super) fn place(&self) -> Place {
         self.look.map_or(Place::UNKNOWN, |look| look.place(self.total_after))
+    }
+
+    /// The recorder's name in records: that of the site file, if it has the port.
+    pub(super) fn name(&self, connection: &ConnectionArgs) -> Result<String> {
+        let connection = connection::to_node(connection, self.node)?;
+        let unit = connection::unit_name(&connection)?;
+        let known = connection.chosen.as_deref().and_then(|chosen| chosen.name_at(&unit));
+        Ok(known.unwrap_or(unit.name))
     }
 
     /// What is kept of the recorder.
@@ -194,6 +247,27 @@ mod tests {
                 "{before:?} {after:?}"
             );
         }
+    }
+
+    #[test]
+    fn a_mark_was_received_if_it_is_the_one_that_is_kept() {
+        let clock = |last_mark| ClockReading {
+            token: 1,
+            clock_us: 0,
+            source: ser_proto::ClockSource::NeverSet,
+            age_s: 0,
+            doubt_us: None,
+            drift_ppb: None,
+            tick_us: 0,
+            life: 1,
+            next_sequence: 1,
+            last_mark,
+        };
+        let marked = clock(Some(ser_proto::Mark { token: 7, clock_us: 5 }));
+        assert_eq!(Heard::of_mark(7, Some(&marked)), Heard::Yes);
+        assert_eq!(Heard::of_mark(8, Some(&marked)), Heard::No);
+        assert_eq!(Heard::of_mark(7, Some(&clock(None))), Heard::No);
+        assert_eq!(Heard::of_mark(7, None), Heard::NotKnown);
     }
 
     #[test]

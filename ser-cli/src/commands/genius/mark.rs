@@ -1,6 +1,7 @@
 //! `genius broadcast mark`: what the clocks of all recorders showed at one moment.
 //!
-//! A recorder tells the time of day only. The day is the one that brings the time nearest to what the
+//! A recorder with our extension tells what its clock showed when the mark came. An original one
+//! tells the time of day only. The day is the one that brings the time nearest to what the
 //! clock is expected to show. Where nothing says that the expectation is right, the day is not known,
 //! and no observation is made of it.
 
@@ -10,11 +11,14 @@ use ser_evidence::record::{ClockObservation, How, Record, Reference};
 use ser_evidence::time::{Moment, Shown, shown, stamp};
 use ser_proto::{LastBroadcast, TimeStamp};
 
+use super::super::clock::Format;
 use super::check::{Check, Heard};
 use crate::connection::ConnectionArgs;
 use crate::error::{Result, advise, inform};
 use crate::host_reading;
 use crate::keeper::StateArgs;
+use crate::kept::KeptRecords;
+use crate::output;
 use crate::time::{Delta, local_time_in};
 
 const DAY_US: i64 = 86_400_000_000;
@@ -38,27 +42,59 @@ struct Row {
     shown: Option<Moment<Shown>>,
 }
 
+/// A moment with its day, or why that is not known.
+type Day = std::result::Result<Moment<Shown>, &'static str>;
+
 /// Shows what the clocks showed and remembers it.
-pub(super) fn run(connection: &ConnectionArgs, state: &StateArgs, checks: &[Check]) -> Result<()> {
+pub(super) fn run(
+    connection: &ConnectionArgs,
+    state: &StateArgs,
+    checks: &[Check],
+    format: Format,
+) -> Result<()> {
+    let mut told = Vec::new();
     let how = How::Mark { broadcast: getrandom::u64().map_err(io::Error::from)? };
     let (mut rows, mut doubts) = (Vec::new(), Vec::new());
     for check in checks {
-        let (Heard::Yes, Ok(Some(last))) = (check.heard, &check.after) else { continue };
-        let time_us = time_of_day_us(last);
+        if check.heard != Heard::Yes {
+            continue;
+        }
         let kept = check.kept(connection, state)?;
-        let shown = day(time_us, &Hints::of(check, &kept.load()));
+        let Some((time_us, shown)) = showed(check, &kept) else { continue };
         match shown {
-            Ok(shown) => kept.add(&[check.observation(how, shown)]),
+            Ok(shown) => {
+                let observation = check.observation(how, shown);
+                kept.add(std::slice::from_ref(&observation));
+                told.push((check.name(connection)?, observation));
+            }
             Err(why) => doubts.push(format!("device {}: {why}", check.node)),
         }
         rows.push(Row { node: check.node, time_us, shown: shown.ok() });
     }
-    write(&mut io::stdout().lock(), &rows)?;
+    match format {
+        Format::Text => write(&mut io::stdout().lock(), &rows)?,
+        Format::Jsonl => {
+            output::write_records(told.iter().map(|(name, record)| (name.as_str(), record)))?;
+        }
+    }
     doubts.iter().for_each(inform);
     if !doubts.is_empty() {
         advise("set a clock once (ser-cli genius broadcast clock) to have its day known");
     }
     Ok(())
+}
+
+/// What the clock showed when the mark came: its time of day, and with its day or why that is not
+/// known.
+fn showed(check: &Check, kept: &KeptRecords) -> Option<(i64, Day)> {
+    if let Some(mark) = check.mark {
+        let shown = Moment::from_us(mark.clock_us - mark.clock_us.rem_euclid(1000));
+        stamp(shown)?;
+        return Some((mark.clock_us.rem_euclid(DAY_US), Ok(shown)));
+    }
+    let Ok(Some(last)) = &check.after else { return None };
+    let time_us = time_of_day_us(last);
+    Some((time_us, day(time_us, &Hints::of(check, &kept.load()))))
 }
 
 fn write(out: &mut dyn Write, rows: &[Row]) -> Result<()> {
@@ -113,7 +149,11 @@ impl Hints {
     fn of(check: &Check, kept: &[Record]) -> Hints {
         let us = |time: &TimeStamp| shown(time).map(Moment::us);
         Hints {
-            remembered: remembered(kept),
+            // What it says itself is best; the mark came a moment before.
+            remembered: check
+                .clock
+                .map(|clock| (clock.clock_us, REMEMBERED_US))
+                .or_else(|| remembered(kept)),
             local: local_time_in(std::time::Duration::ZERO).ok().as_ref().and_then(us),
             newest: check.look.and_then(|look| look.newest).and_then(|newest| us(&newest.time)),
         }
