@@ -54,6 +54,7 @@ enum Command {
     Status(commands::status::Args),
     Config(commands::config::Args),
     Clock(commands::clock::Args),
+    Time(commands::time::Args),
     Start(commands::recording::StartArgs),
     Stop(commands::recording::StopArgs),
     Erase(commands::erase::Args),
@@ -79,9 +80,9 @@ enum Command {
 impl Command {
     /// Whether the command only prints.
     fn is_for_its_output(&self) -> bool {
-        use Command::{CommReq, Completions, Decode, Encode, Merge, Print, Read, Watch};
+        use Command::{CommReq, Completions, Decode, Encode, Merge, Print, Read, Time, Watch};
         match self {
-            Read(_) | Print(_) | Watch(_) | Merge(_) => true,
+            Read(_) | Print(_) | Watch(_) | Merge(_) | Time(_) => true,
             Decode(_) | Encode(_) | CommReq(_) | Completions(_) => true,
             Command::Export(args) => args.prints(),
             Command::Import(args) => args.prints(),
@@ -187,6 +188,7 @@ impl Cli {
             Command::Status(args) => commands::status::run(args, connection),
             Command::Config(args) => commands::config::run(args, connection),
             Command::Clock(args) => commands::clock::run(args, connection),
+            Command::Time(args) => commands::time::run(args, connection),
             Command::Start(args) => commands::recording::start(args, connection),
             Command::Stop(args) => commands::recording::stop(args, connection),
             Command::Erase(args) => commands::erase::run(args, connection),

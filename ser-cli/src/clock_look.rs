@@ -195,6 +195,36 @@ impl Looks {
         Some((shown, if common.is_empty() { hull } else { common }))
     }
 
+    /// How many answers there are.
+    pub(crate) fn rounds(&self) -> usize {
+        self.0.len()
+    }
+
+    /// How far the clock was ahead of this computer's monotonic one at each answer, at least and at
+    /// most, and when that was; in microseconds.
+    pub(crate) fn ahead(&self) -> impl Iterator<Item = (i64, (i64, i64))> {
+        self.0.iter().map(|look| {
+            let us = |time: Duration| host_reading::moment(time).us();
+            let (from, to) = (us(look.between.0), us(look.between.1).saturating_add(1));
+            let clock_us = look.reading.clock_us;
+            let most = clock_us.saturating_add(unit_us(&look.reading)).saturating_sub(from);
+            (from.midpoint(to), (clock_us.saturating_sub(to), most))
+        })
+    }
+
+    /// With later answers; without these, if the clock was set in between.
+    pub(crate) fn and(mut self, later: Looks) -> Looks {
+        let is_same = match (self.last(), later.first()) {
+            (Some(last), Some(first)) => is_same_clock(last, first),
+            _ => false,
+        };
+        if !is_same {
+            return later;
+        }
+        self.0.extend(later.0);
+        self
+    }
+
     /// The observation that they are, at this place.
     pub(crate) fn observation(&self, place: Place) -> Option<ClockObservation> {
         let (shown, bound) = self.shown()?;
@@ -243,12 +273,16 @@ fn beginning(look: &ClockLook, shown: Moment<Shown>) -> Bound<Host> {
     let ClockLook { reading, between } = look;
     let since_us = reading.clock_us.saturating_sub(shown.us());
     let rate_us = i64::try_from(rate_us(since_us.unsigned_abs())).unwrap_or(i64::MAX);
-    // On a bus, and where nothing counts finer, the moment of arrival is known to the millisecond.
-    let unit_us = if reading.clock_us % MS_US == 0 { MS_US } else { 1 };
+    let unit_us = unit_us(reading);
     let moment = |time: Duration| host_reading::moment(time).after(-since_us);
     let (from, to) = (moment(between.0), moment(between.1));
     // Half microseconds of this computer are cut off.
     Bound::new(Some(from.after(-unit_us - rate_us)), Some(to.after(1 + rate_us)))
+}
+
+/// On a bus, and where nothing counts finer, the moment of arrival is known to the millisecond.
+const fn unit_us(reading: &ClockReading) -> i64 {
+    if reading.clock_us % MS_US == 0 { MS_US } else { 1 }
 }
 
 #[cfg(test)]

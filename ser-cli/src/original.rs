@@ -29,6 +29,8 @@ const VERSION: u32 = 1;
 pub(crate) struct Originals {
     path: PathBuf,
     unit: String,
+    /// Whether the site file says so.
+    is_said: bool,
 }
 
 /// The file's content.
@@ -48,7 +50,9 @@ impl Originals {
     pub(crate) fn of(state: &StateArgs, connection: &ConnectionArgs) -> Result<Originals> {
         let unit = connection::unit_name(connection)?;
         let (path, _) = StateFile::of_unit(&unit, state.directory())?.beside("original");
-        Ok(Originals { path, unit: unit.name })
+        let recorder = connection.chosen.as_deref().and_then(|chosen| chosen.recorder());
+        let is_said = recorder.is_some_and(|recorder| recorder.is_original);
+        Ok(Originals { path, unit: unit.name, is_said })
     }
 
     /// Who the recorder is; `None` for an original one. One that is known to be original is not
@@ -64,11 +68,15 @@ impl Originals {
         self.ask(unit)
     }
 
-    /// The same, whatever is remembered.
+    /// The same, whatever is remembered. One that is original by the site file is not asked.
     pub(crate) fn ask(
         &self,
         unit: &mut Unit,
     ) -> std::result::Result<Option<Identity>, RequestError> {
+        if self.is_said {
+            unit.take_for_original();
+            return Ok(None);
+        }
         let identity = unit.identity()?;
         if identity.is_none() {
             // On a line that has failed meanwhile, every recorder is silent.
@@ -125,7 +133,7 @@ mod tests {
 
     fn originals(folder: &tempfile::TempDir) -> Originals {
         let path = folder.path().join("new").join("port-x.original");
-        Originals { path, unit: "x".to_owned() }
+        Originals { path, unit: "x".to_owned(), is_said: false }
     }
 
     #[test]

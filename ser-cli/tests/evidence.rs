@@ -289,6 +289,14 @@ fn an_original_recorder_is_asked_once_who_it_is_and_not_in_later_runs() {
         clocks(&kept).iter().all(|clock| clock.how == SET),
         "as without the extension: {kept:?}"
     );
+    // Who wants to know what it tells now has it asked again.
+    let mut time = ser_cli();
+    time.env("SER_PORT", &port).env("SER_STATE_DIR", folder.path());
+    let time = time.args(["--timeout", "200ms", "time"]).output().expect("ser-cli runs");
+    assert_eq!(time.status.code(), Some(1));
+    assert!(text(&time.stdout).contains("cannot be asked: an original recorder"), "{time:?}");
+    assert!(text(&time.stderr).contains("hint: ser-cli clock set"), "{time:?}");
+    assert_eq!(asked.load(Ordering::Relaxed), 2);
     // Of another one nothing is known.
     let (other, asked) = original(0);
     set_clock(&other, folder.path());

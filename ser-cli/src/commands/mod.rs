@@ -22,4 +22,5 @@ pub(crate) mod report;
 pub(crate) mod sim;
 pub(crate) mod site;
 pub(crate) mod status;
+pub(crate) mod time;
 pub(crate) mod watch;

@@ -28,6 +28,18 @@ impl ClockSetting {
         ClockSetting { zone }
     }
 
+    /// The local time of this computer.
+    pub(crate) fn here() -> ClockSetting {
+        ClockSetting { zone: TimeZone::system() }
+    }
+
+    /// What such a clock shows at a time in UTC; both in microseconds since 1970. `None` where the
+    /// calendar ends.
+    pub(crate) fn shown_us(&self, utc_us: i64) -> Option<i64> {
+        let offset = self.zone.to_offset(Timestamp::from_microsecond(utc_us).ok()?);
+        utc_us.checked_add(i64::from(offset.seconds()).checked_mul(1_000_000)?)
+    }
+
     /// The time `ahead` from now, as the clock should show it. An error with its year if the two
     /// digits of a stamp cannot express it.
     pub(crate) fn time_in(&self, ahead: Duration) -> Result<TimeStamp, i32> {
@@ -98,6 +110,17 @@ mod tests {
         // The clocks go forward in between.
         let shown = at(ClockRule::Local, "2026-03-29T00:59:59.900Z", 200).unwrap();
         assert_eq!(shown, "2026-03-29T03:00:00.100");
+    }
+
+    #[test]
+    fn the_zone_is_that_of_the_time_in_question() {
+        let site = Site { time_zone: TimeZone::get("Europe/Berlin").unwrap(), ..Site::unknown() };
+        let local = ClockSetting::of(ClockRule::Local, &site);
+        let us = |text: &str| text.parse::<Timestamp>().unwrap().as_microsecond();
+        for (utc, ahead_h) in [("2026-03-29T00:59:59.9Z", 1), ("2026-03-29T01:00:00Z", 2)] {
+            assert_eq!(local.shown_us(us(utc)), Some(us(utc) + ahead_h * 3_600_000_000));
+        }
+        assert_eq!(local.shown_us(i64::MAX), None);
     }
 
     #[test]

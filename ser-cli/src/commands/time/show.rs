@@ -1,0 +1,238 @@
+//! What was found about clocks, for people and for programs.
+
+use std::io::{self, Write};
+
+use ser_console::Harmless;
+use ser_evidence::time::{Moment, stamp};
+use ser_proto::{ClockReading, ClockSource};
+use serde_json::{Value, json};
+use unicode_width::UnicodeWidthStr;
+
+use super::ask::{Answer, Told};
+use super::drift::Rate;
+use crate::output::PROGRAM;
+
+/// The drift is shown where it is known to this, in parts per billion.
+const TELLING_PPB: i64 = 500_000;
+
+/// A clock is so far off because it was never set, or because its zone is another one.
+const FAR_US: i64 = 1_000_000;
+
+/// A recorder, and what came of asking it, or why it was not reached.
+pub(super) type Row = (String, Result<Answer, String>);
+
+/// This computer's doubt of UTC, and who says so.
+pub(super) type HostDoubt = Option<(u64, &'static str)>;
+
+/// As a table, with the doubt of this computer below it.
+pub(super) fn table(out: &mut dyn Write, rows: &[Row], doubt: HostDoubt) -> io::Result<()> {
+    const HEADER: [&str; 7] =
+        ["recorder", "shows", "ahead", "drift", "source", "set ago", "answers"];
+    let mut cells: Vec<Vec<String>> = vec![HEADER.map(str::to_owned).to_vec()];
+    for (name, answer) in rows {
+        let name = Harmless(name).line();
+        cells.push(match answer {
+            Ok(Answer::Told(told)) => of_told(name, told),
+            Ok(Answer::Original) => vec![name, "cannot be asked: an original recorder".to_owned()],
+            Ok(Answer::Silent) => vec![name, "does not answer".to_owned()],
+            Err(why) => vec![name, format!("not reached: {}", Harmless(why).line())],
+        });
+    }
+    let width = |column: usize| {
+        let whole = cells.iter().filter(|row| row.len() == HEADER.len() || column == 0);
+        whole.filter_map(|row| row.get(column)).map(|cell| cell.width()).max().unwrap_or_default()
+    };
+    let widths: Vec<usize> = (0..HEADER.len()).map(width).collect();
+    for row in &cells {
+        let mut line = String::new();
+        for (cell, width) in row.iter().zip(&widths) {
+            line.push_str(cell);
+            line.push_str(&" ".repeat(width.saturating_sub(cell.width()) + 2));
+        }
+        writeln!(out, "{}", line.trim_end())?;
+    }
+    match doubt {
+        Some((us, who)) => writeln!(
+            out,
+            "\nthis computer's clock is within {} ms of UTC, as {who} says",
+            us.div_ceil(1000)
+        )?,
+        None => writeln!(out, "\nhow far this computer's clock is from UTC is not known")?,
+    }
+    out.flush()
+}
+
+fn of_told(name: String, told: &Told) -> Vec<String> {
+    let Told { reading, ahead_us: (least, most), rate, .. } = told;
+    let shows = stamp(Moment::from_us(reading.clock_us))
+        .map_or_else(|| "no time".to_owned(), |stamp| stamp.to_string());
+    let drift = rate.filter(|rate| (rate.most_ppb - rate.least_ppb) / 2 <= TELLING_PPB);
+    vec![
+        name,
+        format!("{shows} {}", told.setting),
+        match reading.source {
+            ClockSource::NeverSet => "never set".to_owned(),
+            _ => ahead(*least, *most),
+        },
+        drift.map_or_else(|| "not known".to_owned(), self::drift),
+        source(reading),
+        ago(reading.age_s),
+        told.answers.to_string(),
+    ]
+}
+
+/// As `host, RS-232`, and how far from that the recorder says its clock may be.
+fn source(reading: &ClockReading) -> String {
+    let name = match reading.source {
+        ClockSource::NeverSet => "none".to_owned(),
+        ClockSource::Battery => "battery".to_owned(),
+        ClockSource::HostOverRs232 => "host, RS-232".to_owned(),
+        ClockSource::HostOverGenius => "host, Genius".to_owned(),
+        ClockSource::Pps => "PPS".to_owned(),
+        ClockSource::IrigB => "IRIG-B".to_owned(),
+        ClockSource::Other(code) => format!("code {code}"),
+    };
+    match reading.doubt_us {
+        Some(us) => format!("{name} ± {us} us"),
+        None => name,
+    }
+}
+
+/// As `+0.4 ± 0.3 ms`; far off, as `-3600.000 s ± 6 ms`.
+fn ahead(least_us: i64, most_us: i64) -> String {
+    let middle = least_us.midpoint(most_us);
+    let half_us = (most_us - middle).max(middle - least_us);
+    // Rounded up, with the rounding of the middle.
+    let tenths = (half_us + 149) / 100;
+    let doubt = format!("{}.{}", tenths / 10, tenths % 10);
+    let sign = if middle < 0 { '-' } else { '+' };
+    let size = middle.unsigned_abs();
+    if middle.saturating_abs() < FAR_US {
+        let tenths = (size + 50) / 100;
+        return format!("{sign}{}.{} ± {doubt} ms", tenths / 10, tenths % 10);
+    }
+    format!("{sign}{}.{:03} s ± {doubt} ms", size / 1_000_000, size / 1000 % 1000)
+}
+
+/// As `+12.5 ± 0.8 ppm`.
+fn drift(rate: Rate) -> String {
+    let ppm = |ppb: i64| ppb as f64 / 1000.0;
+    let middle = rate.least_ppb.midpoint(rate.most_ppb);
+    let half = (rate.most_ppb - middle).max(middle - rate.least_ppb);
+    // Rounded up, with the rounding of the middle.
+    format!("{:+.1} ± {:.1} ppm", ppm(middle), ((half + 50) as f64 / 100.0).ceil() / 10.0)
+}
+
+/// As `45 s`, `12 min`, `3 h 5 min` or `2 d 3 h`.
+fn ago(age_s: u32) -> String {
+    match (age_s / 86_400, age_s / 3600 % 24, age_s / 60 % 60) {
+        (0, 0, 0) => format!("{age_s} s"),
+        (0, 0, minutes) => format!("{minutes} min"),
+        (0, hours, minutes) => format!("{hours} h {minutes} min"),
+        (days, hours, _) => format!("{days} d {hours} h"),
+    }
+}
+
+/// As one object for programs.
+pub(super) fn json(out: &mut dyn Write, rows: &[Row], doubt: HostDoubt) -> io::Result<()> {
+    let all = json!({
+        "schema": 1,
+        "program": PROGRAM,
+        "utc_doubt_us": doubt.map(|(us, _)| us),
+        "recorders": rows.iter().map(of_row).collect::<Vec<_>>(),
+    });
+    serde_json::to_writer_pretty(&mut *out, &all)?;
+    writeln!(out)?;
+    out.flush()
+}
+
+fn of_row((name, answer): &Row) -> Value {
+    let told = match answer {
+        Ok(Answer::Told(told)) => told,
+        Ok(Answer::Original) => return json!({ "recorder": name, "answer": "original" }),
+        Ok(Answer::Silent) => return json!({ "recorder": name, "answer": "silent" }),
+        Err(why) => return json!({ "recorder": name, "answer": "not reached", "why": why }),
+    };
+    let Told { reading, utc_us, setting, ahead_us, rate, answers, .. } = &**told;
+    json!({
+        "recorder": name,
+        "answer": "told",
+        "shows": stamp(Moment::from_us(reading.clock_us)).map(|stamp| stamp.to_string()),
+        "shows_us": reading.clock_us,
+        "zone": setting.to_string(),
+        "utc_us": utc_us,
+        "ahead": { "least_us": ahead_us.0, "most_us": ahead_us.1 },
+        "drift": rate.map(|rate| json!({
+            "least_ppb": rate.least_ppb,
+            "most_ppb": rate.most_ppb,
+            "over_us": rate.over_us,
+        })),
+        "source": reading.source.to_string(),
+        "source_code": reading.source.code(),
+        "set_ago_s": reading.age_s,
+        "own_doubt_us": reading.doubt_us,
+        "own_drift_ppb": reading.drift_ppb,
+        "answers": answers,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_offset_is_rounded_and_its_doubt_rounded_up() {
+        for (least, most, text) in [
+            (100, 700, "+0.4 ± 0.4 ms"),
+            (-700, -100, "-0.4 ± 0.4 ms"),
+            (-1, 1, "+0.0 ± 0.1 ms"),
+            (999_000, 999_800, "+999.4 ± 0.5 ms"),
+            (-3_600_006_000, -3_599_994_000, "-3600.000 s ± 6.1 ms"),
+        ] {
+            assert_eq!(ahead(least, most), text);
+        }
+    }
+
+    #[test]
+    fn a_rate_is_rounded_and_its_doubt_rounded_up() {
+        let rate = |least_ppb, most_ppb| drift(Rate { least_ppb, most_ppb, over_us: 1 });
+        assert_eq!(rate(12_000, 13_000), "+12.5 ± 0.6 ppm");
+        assert_eq!(rate(-20_000, -10_000), "-15.0 ± 5.1 ppm");
+    }
+
+    #[test]
+    fn a_time_ago_is_as_coarse_as_it_is_long() {
+        for (age_s, text) in
+            [(45, "45 s"), (750, "12 min"), (11_100, "3 h 5 min"), (183_600, "2 d 3 h")]
+        {
+            assert_eq!(ago(age_s), text);
+        }
+    }
+
+    #[test]
+    fn who_cannot_be_asked_has_a_row_that_says_why() {
+        let rows: [Row; 3] = [
+            ("U1".to_owned(), Ok(Answer::Original)),
+            ("Unit 2".to_owned(), Err("nothing listens".to_owned())),
+            ("U\x1b3".to_owned(), Ok(Answer::Silent)),
+        ];
+        let mut out = Vec::new();
+        table(&mut out, &rows, Some((20_000, "the site file"))).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        assert_eq!(lines[0], "U1        cannot be asked: an original recorder");
+        assert_eq!(lines[1], "Unit 2    not reached: nothing listens");
+        assert!(lines[2].ends_with("does not answer") && !text.contains('\x1b'), "{text}");
+        assert_eq!(lines[4], "this computer's clock is within 20 ms of UTC, as the site file says");
+        let mut out = Vec::new();
+        json(&mut out, &rows, None).unwrap();
+        let all: Value = serde_json::from_slice(&out).unwrap();
+        let answers: Vec<&str> = all["recorders"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|row| row["answer"].as_str().unwrap())
+            .collect();
+        assert_eq!(answers, ["original", "not reached", "silent"]);
+    }
+}
