@@ -135,6 +135,11 @@ impl Outlet {
         })
     }
 
+    /// Says how the next life of the log is called, unless a name was drawn before.
+    pub(crate) fn name_next_life(&mut self, name: Option<Life>) {
+        self.annotator.name_next_life(name);
+    }
+
     /// Says that the following entries are unrelated to those before.
     pub(crate) fn begin_anew(&mut self) {
         self.annotator.begin_anew();

@@ -9,7 +9,7 @@ use ser_evidence::record::EntryRecord;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::Result;
 use crate::output::{self, Before, Life};
-use crate::state::{Delivered, StateFile, StateLock};
+use crate::state::{Delivered, LogIdentity, StateFile, StateLock};
 
 /// How much a crash may repeat, as a time. Writing the file after every event would wear out a
 /// memory card.
@@ -70,6 +70,8 @@ pub(crate) struct Keeper {
     saved: Option<Delivered>,
     unsaved: Option<Delivered>,
     saved_at: Instant,
+    /// How the life of the log is called that begins with this run, if the recorder tells that.
+    proposed: Option<Life>,
     /// Held until the end. Two runs that read new events at once would deliver them twice, or move
     /// the cursor back.
     _lock: StateLock,
@@ -82,7 +84,14 @@ impl Keeper {
             StateFile::of_unit(&connection::unit_name(connection)?, args.state_dir.as_deref())?;
         let lock = file.lock()?;
         let saved = file.load()?;
-        Ok(Keeper { file, saved, unsaved: None, saved_at: Instant::now(), _lock: lock })
+        Ok(Keeper {
+            file,
+            saved,
+            unsaved: None,
+            saved_at: Instant::now(),
+            proposed: None,
+            _lock: lock,
+        })
     }
 
     /// Where reading continues.
@@ -100,8 +109,34 @@ impl Keeper {
     pub(crate) fn life(&self) -> Result<Life> {
         match self.saved.and_then(|delivered| delivered.life) {
             Some(life) => Ok(life),
-            None => Ok(output::new_life()?),
+            None => Ok(self.proposed.map_or_else(output::new_life, Ok)?),
         }
+    }
+
+    /// Whether the log that was read has no name yet.
+    pub(crate) fn has_no_life(&self) -> bool {
+        self.saved.is_none_or(|delivered| delivered.life.is_none())
+    }
+
+    /// Whether a recorder that says this has another log than the one that was read. If nobody said
+    /// anything of that one, only its entries tell.
+    pub(crate) fn is_of_another_log(&self, log: LogIdentity) -> bool {
+        let read = self.saved.filter(|delivered| delivered.cursor.is_some());
+        read.and_then(|delivered| delivered.log).is_some_and(|read| read != log)
+    }
+
+    /// Says how a life is called that begins with this run. A name that was drawn before stays.
+    pub(crate) fn propose(&mut self, name: Option<Life>) {
+        self.proposed = name;
+    }
+
+    /// Notes which log it was that has been read up to the cursor.
+    pub(crate) fn read_from(&mut self, log: LogIdentity) -> Result<()> {
+        let Some(delivered) = self.unsaved.or(self.saved) else { return Ok(()) };
+        if delivered.log != Some(log) {
+            self.unsaved = Some(Delivered { log: Some(log), ..delivered });
+        }
+        self.save()
     }
 
     /// What else is known of the log.
@@ -109,6 +144,7 @@ impl Keeper {
         let Some(Delivered { cursor, next_life, erased, .. }) = self.saved else {
             return Before::default();
         };
+        let next_life = next_life.or(self.proposed);
         Before { previous: cursor.and_then(|cursor| cursor.anchor).or(erased), erased, next_life }
     }
 
@@ -120,7 +156,8 @@ impl Keeper {
     /// Saves the name of a life before any of its events is passed on, because the next run must
     /// not give the same events another name.
     pub(crate) fn name(&mut self, life: Life, size: u16) -> Result<()> {
-        let nothing = Delivered { cursor: None, size, life: None, next_life: None, erased: None };
+        let nothing =
+            Delivered { cursor: None, size, life: None, next_life: None, erased: None, log: None };
         let known = self.unsaved.or(self.saved).unwrap_or(nothing);
         if [known.life, known.next_life].contains(&Some(life)) {
             return Ok(());
@@ -145,7 +182,11 @@ impl Keeper {
         // The next event still has to continue from the last one of a log that was erased.
         let is_empty = cursor.is_some_and(|cursor| cursor.sequence == 0);
         let erased = self.saved.and_then(|saved| saved.erased).filter(|_| is_empty);
-        let delivered = Delivered { cursor, size, life: Some(life), next_life: None, erased };
+        // Whatever was said of the log was before the new entries.
+        let is_where_it_was =
+            |saved: &Delivered| (saved.cursor, saved.life) == (cursor, Some(life));
+        let log = self.saved.filter(is_where_it_was).and_then(|saved| saved.log);
+        let delivered = Delivered { cursor, size, life: Some(life), next_life: None, erased, log };
         self.unsaved = (self.saved != Some(delivered)).then_some(delivered);
         self.save_if_due()
     }
@@ -169,8 +210,14 @@ impl Keeper {
                 let cursor = Some(Cursor { sequence: 0, is_exact: true, anchor: None });
                 let next_life = None;
                 let erased = None;
-                self.unsaved =
-                    Some(Delivered { cursor, size, life: Some(life), next_life, erased });
+                self.unsaved = Some(Delivered {
+                    cursor,
+                    size,
+                    life: Some(life),
+                    next_life,
+                    erased,
+                    log: None,
+                });
                 self.save()?;
                 Ok(life)
             }
@@ -184,17 +231,20 @@ impl Keeper {
     }
 
     /// Notes that the log was erased, with its total at that time. If everything in it had been
-    /// delivered, nothing is lost, and the next reading begins a new log.
-    pub(crate) fn erased(&mut self, total: u16) -> Result<()> {
-        let Some(cursor) = self.cursor() else { return Ok(()) };
-        if self.unread(total) == 0 {
+    /// delivered, nothing is lost, and the next reading begins a new log. Returns whether that is so.
+    pub(crate) fn erased(&mut self, total: u16) -> Result<bool> {
+        let Some(cursor) = self.cursor() else { return Ok(false) };
+        let is_whole = self.unread(total) == 0;
+        if is_whole {
             let erased = cursor.anchor.or(self.saved.and_then(|saved| saved.erased));
             let cursor = Some(Cursor { sequence: 0, is_exact: true, anchor: None });
-            let (size, life) = (self.size().unwrap_or(0), Some(output::new_life()?));
-            self.unsaved = Some(Delivered { cursor, size, life, next_life: None, erased });
+            let life = self.proposed.map_or_else(output::new_life, Ok)?;
+            let (size, life) = (self.size().unwrap_or(0), Some(life));
+            self.unsaved =
+                Some(Delivered { cursor, size, life, next_life: None, erased, log: None });
             self.save()?;
         }
-        Ok(())
+        Ok(is_whole)
     }
 
     /// Writes unsaved changes, unless that was done a moment ago.

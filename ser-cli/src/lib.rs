@@ -17,6 +17,7 @@ mod host_reading;
 mod interrupt;
 mod keeper;
 mod kept;
+mod log_identity;
 mod log_look;
 mod new_files;
 mod original;
@@ -36,7 +37,7 @@ use std::process::ExitCode;
 
 pub use decoding::{CaptureFormat, CaptureOptions, Listing, Side, Tally};
 pub use output::Life;
-pub use state::{Delivered, NotDelivered};
+pub use state::{Delivered, LogIdentity, NotDelivered};
 
 /// Does what the command line says.
 #[must_use]

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use crc::{CRC_64_XZ, Crc};
 use ser_client::Cursor;
-use ser_proto::{Entry, Inputs, TimeStamp};
+use ser_proto::{Entry, Identity, Inputs, RecorderId, TimeStamp};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Failure, Result};
@@ -49,6 +49,26 @@ pub struct Delivered {
     /// The last event of the previous log, if that was erased after everything in it had been
     /// delivered.
     pub erased: Option<Entry>,
+    /// What the recorder said of the log; `None` if it says nothing, or the log may have begun anew
+    /// since.
+    pub log: Option<LogIdentity>,
+}
+
+/// What a recorder says of its log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LogIdentity {
+    /// The number that no other recorder has, all zero if it has none.
+    id: [u8; RecorderId::LEN],
+    power_ups: u32,
+    life: u32,
+}
+
+impl From<&Identity> for LogIdentity {
+    fn from(identity: &Identity) -> LogIdentity {
+        let Identity { id, power_ups, life, .. } = identity;
+        let id = id.map_or([0; RecorderId::LEN], |id| id.bytes());
+        LogIdentity { id, power_ups: *power_ups, life: *life }
+    }
 }
 
 /// A text that does not say what was delivered, and the reason.
@@ -89,6 +109,7 @@ impl Delivered {
             life,
             next_life,
             erased: content.erased.map(Entry::from),
+            log: content.log,
         })
     }
 
@@ -97,7 +118,7 @@ impl Delivered {
     /// # Errors
     /// No error is known: JSON can express everything in here.
     pub fn to_text(&self, unit: &str) -> io::Result<String> {
-        let Delivered { cursor, size, life, next_life, erased } = *self;
+        let Delivered { cursor, size, life, next_life, erased, log } = *self;
         let content = Content {
             version: VERSION,
             unit: unit.to_owned(),
@@ -109,6 +130,7 @@ impl Delivered {
             size,
             last: cursor.and_then(|cursor| cursor.anchor).as_ref().map(LastEntry::from),
             erased: erased.as_ref().map(LastEntry::from),
+            log,
         };
         Ok(serde_json::to_string(&content)? + "\n")
     }
@@ -153,6 +175,8 @@ struct Content {
     last: Option<LastEntry>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     erased: Option<LastEntry>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    log: Option<LogIdentity>,
 }
 
 fn life_named(name: Option<&str>) -> std::result::Result<Option<Life>, NotDelivered> {
@@ -434,7 +458,14 @@ mod tests {
     fn delivered(sequence: u64) -> Delivered {
         let cursor = Cursor { sequence, is_exact: false, anchor: None };
         let life = Some(Life::UNKNOWN);
-        Delivered { cursor: Some(cursor), size: 2048, life, next_life: None, erased: None }
+        Delivered {
+            cursor: Some(cursor),
+            size: 2048,
+            life,
+            next_life: None,
+            erased: None,
+            log: None,
+        }
     }
 
     #[test]
@@ -467,6 +498,10 @@ mod tests {
                 ..delivered(0)
             },
             Delivered { cursor: None, life: drawn(), ..delivered(0) },
+            Delivered {
+                log: Some(LogIdentity { id: [255; 12], power_ups: u32::MAX, life: 1 }),
+                ..delivered(7)
+            },
         ] {
             state.save(&delivered).unwrap();
             assert_eq!(state.load().unwrap(), Some(delivered));

@@ -960,3 +960,52 @@ proptest! {
         }
     }
 }
+
+/// All that a reading delivers of a log that the recorder says is another one.
+fn of_another_log(recorder: &Recorder, cursor: Cursor) -> (Vec<Told>, Option<Cursor>) {
+    let size = u16::try_from(recorder.size).unwrap();
+    let mut reader = LogReader::new(Some(cursor), size).of_another_log();
+    let mut all = Vec::new();
+    while let Some(request) = reader.request() {
+        let reply = recorder.read(request.start, request.count);
+        reader.take(&reply, &mut |delivery| all.push(told(delivery))).unwrap();
+    }
+    (all, reader.cursor())
+}
+
+proptest! {
+    #[test]
+    fn a_log_that_is_told_to_be_another_one_is_read_whole_whatever_it_looks_like(
+        size in 1_usize..40,
+        before in 0_usize..100,
+        after in 1_usize..100,
+        looks_alike in any::<bool>(),
+    ) {
+        let mut recorder = Recorder::new(size);
+        recorder.append_many(before);
+        let mut host = Host::new();
+        host.read(&mut recorder, |_| {});
+        let cursor = host.cursor.unwrap_or(Cursor { sequence: 0, is_exact: true, anchor: None });
+        // The same events once more, as far as anybody can tell from them.
+        let mut other = if looks_alike { Recorder::new(size) } else { recorder.clone() };
+        other.erase();
+        other.append_many(after);
+        let (all, new) = of_another_log(&other, cursor);
+        let held = after.min(size);
+        let mut expected = vec![Told::Restarted];
+        let lost = u32::try_from(after - held).unwrap();
+        expected.extend((lost > 0).then_some(Told::AtLeast(lost)));
+        let serials = other.history.iter().map(serial).skip(after - held);
+        expected.extend(serials.map(Told::Event));
+        prop_assert_eq!(all, expected);
+        prop_assert_eq!(new.unwrap().sequence, u64::try_from(after).unwrap());
+    }
+}
+
+#[test]
+fn a_log_that_is_another_one_and_empty_is_told_at_once() {
+    let cursor = Cursor { sequence: 7, is_exact: true, anchor: Some(common::event(7)) };
+    let (all, new) = of_another_log(&Recorder::new(20), cursor);
+    assert_eq!(all, [Told::Restarted]);
+    assert_eq!(new, Some(Cursor { sequence: 0, is_exact: true, anchor: None }));
+}

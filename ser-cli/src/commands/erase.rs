@@ -6,6 +6,8 @@ use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
 use crate::keeper::{Keeper, StateArgs};
 use crate::kept::KeptRecords;
+use crate::log_identity;
+use crate::original::Originals;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -49,10 +51,21 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             warn(format_args!("{unread} events have not been delivered by read --new or watch"));
         }
     }
+    let can_tell = Originals::of(&args.state, connection)?.identity(&mut unit)?.is_some();
     unit.erase()?;
     inform(erased(total));
+    // Whatever comes of this, the log is erased.
+    let (log, name) = match can_tell {
+        true => log_identity::begun_anew(&mut unit).unwrap_or_default(),
+        false => (None, None),
+    };
+    keeper.propose(name);
     let before = keeper.place();
-    keeper.erased(total)?;
+    if keeper.erased(total)?
+        && let Some(log) = log
+    {
+        keeper.read_from(log)?;
+    }
     if let (Some((before, _)), Some((life, _))) = (before, keeper.place())
         && before != life
     {

@@ -14,6 +14,7 @@ use crate::error::{Failure, Result, advise, inform, warn};
 use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
 use crate::kept::{KeptRecords, Since};
+use crate::log_identity::{self, Met};
 use crate::log_look;
 use crate::original::Originals;
 use crate::output::{Format, Life};
@@ -90,6 +91,11 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     };
     let stop = interrupt::catch()?;
     let mut unit = connection::open(connection)?;
+    let originals = Originals::of(&args.state, connection)?;
+    let met = match &mut keeper {
+        Some(keeper) => log_identity::meet(&mut unit, keeper, &originals)?,
+        None => Met::default(),
+    };
     let life = keeper.as_ref().map_or(Ok(Life::UNKNOWN), Keeper::life)?;
     let before = keeper.as_ref().map(Keeper::before).unwrap_or_default();
     let recorder = connection::recorder_name(connection)?;
@@ -114,9 +120,17 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let place = keeper.as_ref().and_then(Keeper::place);
     let mut witness = Witness::begin(kept, place, Duration::ZERO);
     let size = connection::log_size(&mut unit, log_size, remembered)?;
-    let originals = Originals::of(&args.state, connection)?;
-    let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), &mut witness, size, &stop);
+    let cursor = keeper.as_ref().and_then(Keeper::cursor);
+    let follower = match LogFollower::new(cursor, size) {
+        follower if met.is_another => follower.of_another_log(),
+        follower => follower,
+    };
+    let result =
+        read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), &mut witness, follower, &stop);
     let result = result.and_then(|(delivered, cursor)| {
+        if let Some(keeper) = &mut keeper {
+            log_identity::remember(&mut unit, keeper, met.log)?;
+        }
         look_at_clock(&mut unit, &mut outlet, &mut witness, &originals, cursor)?;
         Ok(delivered)
     });
@@ -137,11 +151,9 @@ fn read_by_cursor(
     outlet: &mut Outlet,
     mut keeper: Option<&mut Keeper>,
     witness: &mut Witness,
-    size: u16,
+    mut follower: LogFollower,
     stop: &AtomicBool,
 ) -> Result<(u32, Option<Cursor>)> {
-    let cursor: Option<Cursor> = keeper.as_ref().and_then(|keeper| keeper.cursor());
-    let mut follower = LogFollower::new(cursor, size);
     let summary = follower.read_new(unit, &mut |step| -> Result<()> {
         let mut remember =
             |life| keeper.as_mut().map_or(Ok(()), |keeper| keeper.name(life, step.size));

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ser_client::{LogFollower, LogWatcher, ReportSwitch, Unit};
+use ser_client::{Delivery, LogFollower, LogWatcher, Lost, ReportSwitch, Unit};
 use ser_proto::{AutoReport, Configuration, Configure};
 
 use crate::clock_look::{self, NowAndThen};
@@ -17,9 +17,11 @@ use crate::error::{Failure, Result, inform};
 use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
 use crate::kept::KeptRecords;
+use crate::log_identity;
 use crate::original::Originals;
 use crate::outage::Outage;
 use crate::output::Format;
+use crate::state::LogIdentity;
 use crate::values;
 use crate::witness::Witness;
 
@@ -85,12 +87,17 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     if let (Some(chosen), true) = (&connection.chosen, connection::ports(connection).is_empty()) {
         return site::run(args, connection, chosen);
     }
-    let keeper = Keeper::load(&args.state, connection)?;
+    let mut keeper = Keeper::load(&args.state, connection)?;
     let stop = interrupt::catch()?;
     let mut unit = connection::open(connection)?;
+    let originals = Originals::of(&args.state, connection)?;
+    let met = log_identity::meet(&mut unit, &mut keeper, &originals)?;
     let log_size = args.log_size.or_else(|| connection.known_log_size());
     let plan = plan(args, log_size, &mut unit, keeper.size())?;
-    let follower = LogFollower::new(keeper.cursor(), plan.size);
+    let follower = match LogFollower::new(keeper.cursor(), plan.size) {
+        follower if met.is_another => follower.of_another_log(),
+        follower => follower,
+    };
     let watcher = match plan.reports {
         Some(Reports { switch, found }) => {
             if !switch.is_on {
@@ -109,11 +116,13 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let outage = Outage::new(connection::options(connection).timeout);
     let kept = KeptRecords::of(&args.state, connection)?;
     let witness = Witness::begin(Some(kept), keeper.place(), unit.report_delay());
-    let can_be_asked = Originals::of(&args.state, connection)?.identity(&mut unit)?.is_some();
-    let clock = can_be_asked.then(NowAndThen::new);
-    let mut watch = Watch { unit, watcher, outlet, keeper, witness, clock, stop, outage };
+    let clock = met.log.map(|_| NowAndThen::new());
+    let (log, is_named) = (met.log, met.is_another || met.log.is_none());
+    let mut watch =
+        Watch { unit, watcher, outlet, keeper, witness, clock, log, is_named, stop, outage };
     let result = watch.run();
     if matches!(result, Err(Failure::Interrupted)) {
+        log_identity::remember(&mut watch.unit, &mut watch.keeper, watch.log)?;
         watch.look_at_clock()?;
     }
     let vouched = watch.witness.vouch(&mut watch.outlet);
@@ -241,6 +250,11 @@ fn restore(unit: &mut Unit, found: Configuration) -> Result<()> {
         .map_err(|error| Failure::from(error).hint(not_put_back(&found)))
 }
 
+/// Whether this says that another log has begun.
+fn begins_anew(delivery: &Delivery) -> bool {
+    matches!(delivery, Delivery::Lost { lost: Lost::LogRestarted, .. })
+}
+
 struct Watch {
     unit: Unit,
     watcher: LogWatcher,
@@ -249,6 +263,10 @@ struct Watch {
     witness: Witness,
     /// The questions about the clock, if the recorder can be asked.
     clock: Option<NowAndThen>,
+    /// What the recorder says of the log.
+    log: Option<LogIdentity>,
+    /// Whether the next life of the log can be named as it begins.
+    is_named: bool,
     stop: Arc<AtomicBool>,
     outage: Outage,
 }
@@ -272,14 +290,32 @@ impl Watch {
     }
 
     fn step(&mut self) -> Result<()> {
-        let Watch { unit, watcher, outlet, keeper, witness, clock, stop, .. } = self;
-        let mut is_idle = true;
-        watcher.step(unit, HEARTBEAT, &mut |step| -> Result<()> {
+        let Watch { unit, watcher, outlet, keeper, witness, clock, stop, is_named, .. } = self;
+        let (mut is_idle, mut is_unnamed) = (true, false);
+        let result = watcher.step(unit, HEARTBEAT, &mut |step| -> Result<()> {
             is_idle &= step.deliveries.is_empty();
+            if step.deliveries.iter().any(begins_anew) {
+                is_unnamed = !*is_named;
+                if is_unnamed {
+                    return Err(Failure::Interrupted);
+                }
+                *is_named = false;
+            }
             outlet.take(step.deliveries, 0, &mut |life| keeper.name(life, step.size))?;
             keeper.delivered(step.cursor, step.size, outlet.life())?;
             if stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
-        })?;
+        });
+        if is_unnamed {
+            // Before anything of the new log is passed on, the recorder says which it is. Then it is
+            // read again.
+            let name =
+                if self.log.is_some() { log_identity::begun_anew(unit)? } else { (None, None) };
+            (self.log, self.is_named) = (name.0, true);
+            outlet.name_next_life(name.1);
+            watcher.read_next();
+            return Ok(());
+        }
+        result?;
         witness.read(outlet, watcher.cursor(), watcher.log_size(), watcher.complete_at())?;
         if let (Some(clock), Some(cursor), true) = (clock, watcher.cursor(), is_idle)
             && let Some(observation) = clock.step(unit, (outlet.life(), cursor))?

@@ -23,7 +23,7 @@ use crate::kept::KeptRecords;
 use crate::log_look;
 use crate::original::Originals;
 use crate::output::Loss;
-use crate::state::{Delivered, StateFile};
+use crate::state::{Delivered, LogIdentity, StateFile};
 
 /// Reads all recorders that have a port. Returns those that could not be read.
 pub(super) fn read(
@@ -118,6 +118,14 @@ fn read_one(
     let mut unit = buses.open(connection)?;
     let known_size = remembered.map(|delivered| delivered.size).filter(|&size| size > 0);
     let size = connection::log_size(&mut unit, recorder.log_size, known_size)?;
+    let originals = Originals::of(state, connection)?;
+    // What is remembered of another log names nothing in this one.
+    let log = originals.identity(&mut unit)?.as_ref().map(LogIdentity::from);
+    let is_of_this = |delivered: &Delivered| match (delivered.log, log) {
+        (Some(read), Some(log)) => read == log,
+        _ => true,
+    };
+    let remembered = remembered.filter(is_of_this);
     let mut follower = LogFollower::new(None, size);
     let mut deliveries: Vec<Delivery> = Vec::new();
     follower.read_new(&mut unit, &mut |step| -> Result<()> {
@@ -149,7 +157,6 @@ fn read_one(
     }
     records.extend(newest(&records, read_at));
     let kept = kept(recorder, connection, state)?;
-    let originals = Originals::of(state, connection)?;
     let cursor = follower.cursor().map(|cursor| named.cursor(cursor));
     if let Some(looked) =
         cursor.and_then(|cursor| look(&mut unit, &originals, (named.life, cursor)))

@@ -134,6 +134,11 @@ impl Annotator {
         self.life
     }
 
+    /// Says how the next life of the log is called, unless a name was drawn before.
+    pub(crate) fn name_next_life(&mut self, name: Option<Life>) {
+        self.before.next_life = self.before.next_life.or(name);
+    }
+
     /// Says that the following entries are unrelated to those before.
     pub(crate) fn begin_anew(&mut self) {
         self.before.previous = None;

@@ -41,13 +41,28 @@ pub struct LogFollower {
     position: Option<LogPosition>,
     keeps_up: bool,
     complete_at: Option<Duration>,
+    is_another_log: bool,
 }
 
 impl LogFollower {
     /// Begins after `cursor`, or with the oldest event. `size` is how many entries the log holds.
     #[must_use]
     pub fn new(cursor: Option<Cursor>, size: u16) -> LogFollower {
-        LogFollower { size, cursor, position: None, keeps_up: false, complete_at: None }
+        LogFollower {
+            size,
+            cursor,
+            position: None,
+            keeps_up: false,
+            complete_at: None,
+            is_another_log: false,
+        }
+    }
+
+    /// The same follower, of which the recorder itself has told that its log is another one than that
+    /// at the cursor. That counts until something of the new log is delivered.
+    #[must_use]
+    pub fn of_another_log(self) -> LogFollower {
+        LogFollower { is_another_log: true, position: None, ..self }
     }
 
     /// How many entries the log holds, as far as is known.
@@ -134,7 +149,10 @@ impl LogFollower {
         take: &mut dyn FnMut(&Step<'_>) -> Result<(), E>,
     ) -> Result<(Summary, Result<(), Disturbed>), E> {
         let mut reader = LogReader::new(self.cursor, self.size).keeping_up(self.keeps_up);
-        if let Some(position) = self.position.take() {
+        let position = self.position.take();
+        if self.is_another_log {
+            reader = reader.of_another_log();
+        } else if let Some(position) = position {
             reader = reader.starting_near(position);
         }
         let mut deliveries = Vec::new();
@@ -155,6 +173,7 @@ impl LogFollower {
             // The next request is sent first, so that the line does not wait for `take`.
             let asked = if taken.is_ok() { unit.ask(&mut || reader.request()) } else { Ok(()) };
             take(&Step { deliveries: &deliveries, cursor, pending, size: self.size })?;
+            self.is_another_log &= deliveries.is_empty();
             self.cursor = cursor;
             if taken.is_err() {
                 return Ok((reader.summary(), taken));

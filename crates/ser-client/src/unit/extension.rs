@@ -59,6 +59,23 @@ impl Unit {
         })
     }
 
+    /// Asks a recorder that has said who it is once more, because its log may have begun anew since.
+    /// `None` for one that has not, or that does not answer.
+    ///
+    /// # Errors
+    /// If the line fails.
+    pub fn identity_again(&mut self) -> Result<Option<Identity>, RequestError> {
+        let Extension::Present(_) = self.extension else { return Ok(None) };
+        match self.request(&Command::Identify) {
+            Ok(Reply::Identity(identity)) => {
+                self.extension = Extension::Present(identity);
+                Ok(Some(identity))
+            }
+            Ok(_) | Err(RequestError::NoReply { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
     /// Says that this recorder is an original one, as an earlier connection has found.
     pub fn take_for_original(&mut self) {
         self.extension = Extension::Absent;

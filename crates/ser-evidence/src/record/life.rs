@@ -3,8 +3,10 @@
 use std::fmt;
 
 use ser_proto::Model;
+use sha2::{Digest, Sha256};
 
-/// The name of one life of a log, from power-up or erase to the next: 64 random bits.
+/// The name of one life of a log, from power-up or erase to the next: 64 bits, drawn at random or made
+/// of what [the recorder tells](Life::of_recorder).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Life(u64);
 
@@ -16,6 +18,25 @@ impl Life {
     #[must_use]
     pub const fn from_bits(bits: u64) -> Life {
         Life(bits)
+    }
+
+    /// The life that a recorder itself tells from all others: by the number that no other recorder
+    /// has, how often it was powered up, and which life of its log this is. Whoever asks it gets the
+    /// same name.
+    ///
+    /// It is the first eight bytes, high byte first, of the SHA-256 of `ser life 1`, the number, and
+    /// the two counts with four bytes each, high byte first.
+    #[must_use]
+    pub fn of_recorder(id: &[u8; 12], power_ups: u32, life: u32) -> Life {
+        let mut hash = Sha256::new();
+        hash.update(b"ser life 1");
+        hash.update(id);
+        hash.update(power_ups.to_be_bytes());
+        hash.update(life.to_be_bytes());
+        let hash: [u8; 32] = hash.finalize().into();
+        let [a, b, c, d, e, f, g, h, ..] = hash;
+        // Once in 2^64 the name is taken.
+        Life(u64::from_be_bytes([a, b, c, d, e, f, g, h]).max(1))
     }
 
     /// Its bits.
@@ -73,6 +94,22 @@ pub struct LifeRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn whoever_asks_a_recorder_gets_the_same_name_and_of_another_life_another_one() {
+        let id = *b"\x00\x1f\x00\x2b\x33\x47\x51\x11\x37\x35\x38\x30";
+        let life = Life::of_recorder(&id, 42, 259);
+        assert_eq!(life.to_string(), "b886a9e4f23bfa7d");
+        let mut other = id;
+        other[0] ^= 1;
+        for another in [
+            Life::of_recorder(&id, 42, 260),
+            Life::of_recorder(&id, 43, 259),
+            Life::of_recorder(&other, 42, 259),
+        ] {
+            assert_ne!(another, life);
+        }
+    }
 
     #[test]
     fn a_name_is_read_as_it_is_written() {

@@ -21,12 +21,14 @@ pub(super) struct Locating {
     near: Option<LogPosition>,
     asked: Option<ReadRequest>,
     pub(super) keeps_up: bool,
+    /// Whether this is known to be another log than the one at the cursor.
+    pub(super) is_another_log: bool,
 }
 
 impl Locating {
     pub(super) fn new(cursor: Option<Cursor>, size: u16) -> Locating {
         let size = size.clamp(1, MAX_SIZE).into();
-        Locating { size, cursor, near: None, asked: None, keeps_up: false }
+        Locating { size, cursor, near: None, asked: None, keeps_up: false, is_another_log: false }
     }
 
     /// Assumes that the log stands at a position or a little after it.
@@ -82,6 +84,10 @@ impl Locating {
         on: &mut dyn FnMut(Delivery),
     ) -> Result<(), Disturbed> {
         let Some(cursor) = self.cursor else { return Ok(()) };
+        if self.is_another_log {
+            progress.restart();
+            return Ok(());
+        }
         let Some(anchor) = cursor.anchor else {
             begin_without_anchor(progress, cursor, batch.entries.is_empty());
             return Ok(());

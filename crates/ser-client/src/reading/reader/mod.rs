@@ -149,6 +149,14 @@ impl LogReader {
         LogReader { locating: Locating::new(cursor, size), progress: None, fruitless: 0 }
     }
 
+    /// Says that this is another log than the one at the cursor, as the recorder itself has told. It
+    /// is read from its beginning, whatever its entries look like.
+    #[must_use]
+    pub fn of_another_log(mut self) -> LogReader {
+        self.locating.is_another_log = true;
+        self
+    }
+
     /// Uses the position in which an earlier reading ended. If nothing has happened since, one
     /// request will do instead of two.
     ///

@@ -16,6 +16,7 @@ use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::error::{Failure, Result, inform};
 use crate::keeper::{self, Keeper};
 use crate::kept::KeptRecords;
+use crate::log_identity;
 use crate::original::Originals;
 use crate::output::{Annotator, Event, EventWriter, Loss, Record, RecorderColumn};
 use ser_evidence::record::{self as evidence, EntryRecord};
@@ -82,14 +83,18 @@ impl Follower<'_> {
         let mut unit = self.buses.open(&self.connection)?;
         let known = self.connection.known_log_size();
         let size = connection::log_size(&mut unit, known, keeper.size())?;
-        let follower = LogFollower::new(keeper.cursor(), size);
+        let originals = Originals::of(&self.args.state, &self.connection)?;
+        let met = log_identity::meet(&mut unit, &mut keeper, &originals)?;
+        let follower = match LogFollower::new(keeper.cursor(), size) {
+            follower if met.is_another => follower.of_another_log(),
+            follower => follower,
+        };
         let interval = self.args.interval.unwrap_or(POLL_EVERY);
         let may_shorten = self.args.interval.is_none();
         let mut watcher = LogWatcher::polling(follower, interval, may_shorten);
         let mut annotator = Annotator::new(keeper.life()?, keeper.before());
         let kept = KeptRecords::of(&self.args.state, &self.connection)?;
-        let originals = Originals::of(&self.args.state, &self.connection)?;
-        let mut clock = originals.identity(&mut unit)?.map(|_| NowAndThen::new());
+        let mut clock = met.log.map(|_| NowAndThen::new());
         let result = loop {
             if self.is_stopped() {
                 break Ok(());
@@ -119,6 +124,9 @@ impl Follower<'_> {
                 }
             }
         };
+        if result.is_ok() {
+            log_identity::remember(&mut unit, &mut keeper, met.log)?;
+        }
         keeper.save().and(result)
     }
 }

@@ -1,0 +1,78 @@
+//! Which log this is, as the recorder itself says.
+//!
+//! A log that was erased, or lost with the power, and has filled again can look like the one before.
+//! A recorder with our extension counts the lives of its log. Where the numbers are others, the log
+//! is another one. Where they are the same, it is the same only if the counts outlive a power cut.
+
+use ser_client::{RequestError, Unit};
+use ser_evidence::record::Life;
+use ser_proto::{Capabilities, Identity};
+
+use crate::error::Result;
+use crate::keeper::Keeper;
+use crate::original::Originals;
+use crate::state::LogIdentity;
+
+/// The highest sequence at which totals have not gone round.
+const FIRST_WRAP: u64 = 1 << 16;
+
+/// A log that a run is about to read, as the recorder itself says.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Met {
+    /// What it says; `None` from an original one.
+    pub(crate) log: Option<LogIdentity>,
+    /// Whether it is another log than the one that was read last.
+    pub(crate) is_another: bool,
+}
+
+/// Asks which log this is before it is read, and tells the keeper.
+pub(crate) fn meet(unit: &mut Unit, keeper: &mut Keeper, originals: &Originals) -> Result<Met> {
+    let Some(identity) = originals.identity(unit)? else { return Ok(Met::default()) };
+    let log = LogIdentity::from(&identity);
+    let is_another = keeper.is_of_another_log(log);
+    if is_another || keeper.has_no_life() {
+        keeper.propose(name(unit, &identity)?);
+    }
+    Ok(Met { log: Some(log), is_another })
+}
+
+/// Asks which log this is that has begun anew under a reading, and how it is called.
+pub(crate) fn begun_anew(unit: &mut Unit) -> Result<(Option<LogIdentity>, Option<Life>)> {
+    let Some(identity) = unit.identity_again()? else { return Ok((None, None)) };
+    let name = name(unit, &identity)?;
+    Ok((Some(LogIdentity::from(&identity)), name))
+}
+
+/// Remembers which log it was that has been read, if it has been the same all the time. What was read
+/// is whole without it, so no silence is a failure here.
+pub(crate) fn remember(
+    unit: &mut Unit,
+    keeper: &mut Keeper,
+    log: Option<LogIdentity>,
+) -> Result<()> {
+    let Some(log) = log else { return Ok(()) };
+    match unit.identity_again() {
+        Ok(Some(identity)) if LogIdentity::from(&identity) == log => keeper.read_from(log),
+        _ => Ok(()),
+    }
+}
+
+/// The name of the life that the log of this recorder is in. `None` where it cannot have one that
+/// everybody gives it: the recorder has no number, its counts begin anew with the power, or its
+/// entries may be counted differently by who has not seen all of them.
+fn name(unit: &mut Unit, identity: &Identity) -> std::result::Result<Option<Life>, RequestError> {
+    let Some(id) = identity.id else { return Ok(None) };
+    if !identity.capabilities.contains(Capabilities::LASTING_COUNTS) {
+        return Ok(None);
+    }
+    let look = match unit.clock_look() {
+        Ok(look) => look,
+        Err(RequestError::NoReply { .. }) => None,
+        Err(error) => return Err(error),
+    };
+    let is_countable = |reading: &ser_proto::ClockReading| {
+        reading.life == identity.life && reading.next_sequence <= FIRST_WRAP
+    };
+    let is_known = look.is_some_and(|look| is_countable(&look.reading));
+    Ok(is_known.then(|| Life::of_recorder(&id.bytes(), identity.power_ups, identity.life)))
+}
