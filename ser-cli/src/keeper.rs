@@ -42,18 +42,20 @@ impl StateArgs {
     }
 }
 
-/// No entry tells which life of the log this is, so it gets its name now. Without one, as when a
-/// `watch` is running, a report cannot know that the clock was set in this life.
-pub(crate) fn life_of_empty_log(state: &StateArgs, connection: &ConnectionArgs) -> Life {
-    let life = Keeper::load(state, connection).and_then(|mut keeper| keeper.life_of_empty_log());
-    life.unwrap_or(Life::UNKNOWN)
-}
-
-/// The entry of a recorder that was delivered last, if its life has a name.
-pub(crate) fn last_delivered(args: &StateArgs, connection: &ConnectionArgs) -> Option<EntryRecord> {
+/// The entry of a recorder that was delivered last, if its life has a name, and if the recorder does
+/// not say that its log is another one now.
+pub(crate) fn last_delivered(
+    args: &StateArgs,
+    connection: &ConnectionArgs,
+    log: Option<LogIdentity>,
+) -> Option<EntryRecord> {
     let name = connection::unit_name(connection).ok()?;
     let delivered = StateFile::of_unit(&name, args.directory()).ok()?.load().ok()??;
     let cursor = delivered.cursor?;
+    let is_another = delivered.log.zip(log).is_some_and(|(read, log)| read != log);
+    if is_another {
+        return None;
+    }
     Some(EntryRecord {
         life: delivered.life?,
         sequence: Some(cursor.sequence),
@@ -191,33 +193,30 @@ impl Keeper {
         self.save_if_due()
     }
 
-    /// The name of the life of a log that is empty now. It is remembered for the entries to come.
-    pub(crate) fn life_of_empty_log(&mut self) -> Result<Life> {
+    /// The name of the life of a log that is empty now, as the recorder says that is this one. It is
+    /// remembered for the entries to come.
+    pub(crate) fn life_of_empty_log(&mut self, log: Option<LogIdentity>) -> Result<Life> {
+        let is_another = log.is_some_and(|log| self.is_of_another_log(log));
         let size = self.size().unwrap_or(0);
         let known = self.unsaved.or(self.saved);
         match known {
             Some(Delivered {
                 cursor: Some(Cursor { sequence: 0, .. }), life: Some(life), ..
-            }) => Ok(life),
+            }) if !is_another => Ok(life),
             // There is another log now than the one that was read, and the next reading says so.
             Some(Delivered { cursor: Some(_), next_life, .. }) => {
-                let life = next_life.map_or_else(output::new_life, Ok)?;
+                let life = next_life.or(self.proposed).map_or_else(output::new_life, Ok)?;
                 self.name(life, size)?;
                 Ok(life)
             }
             _ => {
-                let life = known.and_then(|known| known.life).map_or_else(output::new_life, Ok)?;
+                let life = known.and_then(|known| known.life).or(self.proposed);
+                let life = life.map_or_else(output::new_life, Ok)?;
                 let cursor = Some(Cursor { sequence: 0, is_exact: true, anchor: None });
                 let next_life = None;
                 let erased = None;
-                self.unsaved = Some(Delivered {
-                    cursor,
-                    size,
-                    life: Some(life),
-                    next_life,
-                    erased,
-                    log: None,
-                });
+                self.unsaved =
+                    Some(Delivered { cursor, size, life: Some(life), next_life, erased, log });
                 self.save()?;
                 Ok(life)
             }

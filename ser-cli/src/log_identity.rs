@@ -8,8 +8,10 @@ use ser_client::{RequestError, Unit};
 use ser_evidence::record::Life;
 use ser_proto::{Capabilities, Identity};
 
+use crate::connection::ConnectionArgs;
 use crate::error::Result;
-use crate::keeper::Keeper;
+use crate::keeper::{self, Keeper, StateArgs};
+use crate::log_look::LogLook;
 use crate::original::Originals;
 use crate::state::LogIdentity;
 
@@ -34,6 +36,29 @@ pub(crate) fn meet(unit: &mut Unit, keeper: &mut Keeper, originals: &Originals) 
         keeper.propose(name(unit, &identity)?);
     }
     Ok(Met { log: Some(log), is_another })
+}
+
+/// A look at the log of a recorder that has said who it is, with the life that it was in. No entry
+/// tells which life an empty log is, so that gets its name now. Without one, as when a `watch` is
+/// running, a report cannot know that the clock was set in this life.
+pub(crate) fn named(
+    look: LogLook,
+    unit: &mut Unit,
+    identity: Option<&Identity>,
+    (state, connection): (&StateArgs, &ConnectionArgs),
+) -> LogLook {
+    let log = identity.map(LogIdentity::from);
+    let mut life_of_empty_log = || -> Result<Life> {
+        let mut keeper = Keeper::load(state, connection)?;
+        if let Some(identity) = identity {
+            keeper.propose(name(unit, identity)?);
+        }
+        keeper.life_of_empty_log(log)
+    };
+    look.named(
+        || life_of_empty_log().unwrap_or(Life::UNKNOWN),
+        || keeper::last_delivered(state, connection, log),
+    )
 }
 
 /// Asks which log this is that has begun anew under a reading, and how it is called.

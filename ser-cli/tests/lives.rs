@@ -178,6 +178,30 @@ fn an_erase_of_ones_own_is_no_loss_and_the_new_log_has_the_name_that_the_recorde
 }
 
 #[test]
+fn a_clock_that_is_set_while_the_log_is_empty_is_that_of_the_log_to_come() {
+    let mut bench = Bench::start();
+    let set_in = |told: &str| -> BTreeSet<Life> {
+        let told = Source::new(told.as_bytes(), "").expect("JSON lines");
+        let life = |record: Record| match record {
+            Record::Clock(clock) => Some(clock.place.life),
+            _ => None,
+        };
+        told.filter_map(|told| life(told.expect("a record").record)).collect()
+    };
+    let set = bench.ok("host", "clock set --format jsonl");
+    assert_eq!(set_in(&set), [bench.life()].into());
+    // The log is empty again, and is another one.
+    bench.records(1);
+    bench.erased_by_another();
+    let set = bench.ok("host", "clock set --format jsonl");
+    assert_eq!(set_in(&set), [bench.life()].into());
+    bench.records(1);
+    let (entries, gaps) = bench.news("host");
+    assert_eq!((sequences(&entries), lives(&entries)), (vec![1], [bench.life()].into()));
+    assert!(matches!(gaps[..], [Gap { why: Why::LogBeganAnew, .. }]), "{gaps:?}");
+}
+
+#[test]
 fn two_hosts_give_one_life_one_name_and_another_one_keeps_that_which_it_had() {
     let mut bench = Bench::start();
     bench.records(2);

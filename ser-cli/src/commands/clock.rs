@@ -13,8 +13,9 @@ use ser_proto::TimeStamp;
 use crate::clock_look;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, advise, inform, warn};
-use crate::keeper::{self, StateArgs};
+use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
+use crate::log_identity;
 use crate::log_look::LogLook;
 use crate::original::Originals;
 use crate::output;
@@ -157,11 +158,10 @@ pub(super) fn set_and_remember(
     }
     let kept = KeptRecords::of(state, connection)?;
     let mut unit = connection::open(connection)?;
-    let before = LogLook::take(&mut unit)?.named(
-        || keeper::life_of_empty_log(state, connection),
-        || keeper::last_delivered(state, connection),
-    );
-    let can_be_asked = Originals::of(state, connection)?.identity(&mut unit)?.is_some();
+    let look = LogLook::take(&mut unit)?;
+    let identity = Originals::of(state, connection)?.identity(&mut unit)?;
+    let can_be_asked = identity.is_some();
+    let before = log_identity::named(look, &mut unit, identity.as_ref(), (state, connection));
     let mut records = Vec::new();
     records.extend(can_be_asked.then(|| asked(&mut unit, &before)).flatten());
     let sent = match set(&mut unit, at, &time_in) {

@@ -10,8 +10,9 @@ use ser_proto::{Capabilities, ClockReading, Command, LastBroadcast, Mark};
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::Result;
-use crate::keeper::{self, StateArgs};
+use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
+use crate::log_identity;
 use crate::log_look::LogLook;
 use crate::original::Originals;
 use crate::setting;
@@ -46,15 +47,12 @@ impl Asked {
         let before = last_broadcast(&mut unit);
         let connection = connection::to_node(connection, node).ok();
         let wanted = looks.zip(connection).filter(|_| before.is_ok());
-        let look = wanted.as_ref().and_then(|(state, connection)| {
-            let look = LogLook::take(&mut unit).ok()?;
-            Some(look.named(
-                || keeper::life_of_empty_log(state, connection),
-                || keeper::last_delivered(state, connection),
-            ))
+        let look = wanted.as_ref().and_then(|_| LogLook::take(&mut unit).ok());
+        let identity = wanted.as_ref().and_then(|(state, connection)| {
+            Originals::of(state, connection).ok()?.identity(&mut unit).ok()?
         });
-        let identity = wanted.and_then(|(state, connection)| {
-            Originals::of(state, &connection).ok()?.identity(&mut unit).ok()?
+        let look = look.zip(wanted).map(|(look, (state, connection))| {
+            log_identity::named(look, &mut unit, identity.as_ref(), (state, &connection))
         });
         let tells_clock =
             identity.is_some_and(|identity| identity.capabilities.contains(Capabilities::TIME));

@@ -7,7 +7,7 @@ use std::time::Duration;
 use ser_client::Unit;
 use ser_evidence::record::{ClockObservation, How, Record, Reference};
 use ser_evidence::time::Moment;
-use ser_proto::{Capabilities, ClockReading, ClockSource};
+use ser_proto::{Capabilities, ClockReading, ClockSource, Identity};
 
 use super::drift::{self, Rate, Sight};
 use crate::buses::Buses;
@@ -15,8 +15,9 @@ use crate::clock_look::{self, Looks};
 use crate::connection::{ConnectionArgs, HEARTBEAT};
 use crate::error::Result;
 use crate::host_reading;
-use crate::keeper::{self, StateArgs};
+use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
+use crate::log_identity;
 use crate::log_look::LogLook;
 use crate::original::Originals;
 use crate::site_file::ClockSetting;
@@ -64,15 +65,12 @@ impl Asking<'_> {
     /// Asks the recorder of a connection.
     pub(super) fn ask(&self, connection: &ConnectionArgs) -> Result<Answer> {
         let mut unit = self.buses.open(connection)?;
-        let place = LogLook::take(&mut unit)?.named(
-            || keeper::life_of_empty_log(self.state, connection),
-            || keeper::last_delivered(self.state, connection),
-        );
+        let look = LogLook::take(&mut unit)?;
         // The user wants to know what it can tell now.
-        match Originals::of(self.state, connection)?.ask(&mut unit)? {
-            Some(identity) if identity.capabilities.contains(Capabilities::TIME) => {}
-            _ => return Ok(Answer::Original),
-        }
+        let identity = Originals::of(self.state, connection)?.ask(&mut unit)?;
+        let tells = |identity: &Identity| identity.capabilities.contains(Capabilities::TIME);
+        let Some(identity) = identity.filter(tells) else { return Ok(Answer::Original) };
+        let place = log_identity::named(look, &mut unit, Some(&identity), (self.state, connection));
         let Some(looks) = self.looks(&mut unit)? else { return Ok(Answer::Silent) };
         let kept = KeptRecords::of(self.state, connection)?;
         let earlier = kept.load();

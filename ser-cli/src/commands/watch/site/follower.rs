@@ -37,7 +37,7 @@ impl Follower<'_> {
     /// Its name, what is kept of its clock, and the entry that was delivered last.
     pub(super) fn remembered(&self) -> (String, Option<KeptRecords>, Option<EntryRecord>) {
         let kept = KeptRecords::of(&self.args.state, &self.connection).ok();
-        let last = keeper::last_delivered(&self.args.state, &self.connection);
+        let last = keeper::last_delivered(&self.args.state, &self.connection, None);
         (self.column.name.clone(), kept, last)
     }
 
