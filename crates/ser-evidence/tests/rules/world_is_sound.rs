@@ -226,6 +226,7 @@ fn everything_that_can_happen_does() {
                         ser_evidence::record::Why::NotRecorded(_) => "not recorded",
                         ser_evidence::record::Why::NotReached => "not reached",
                         ser_evidence::record::Why::Unreadable => "unreadable",
+                        ser_evidence::record::Why::Expired => "expired",
                     },
                     1,
                 ),

@@ -14,6 +14,7 @@ use super::lines::{HostLine, Line, PlaceLine, Result, moment, needed, stamp, und
 use super::texts::{Text, broadcast_named, fit_to_show, life_named, model_named};
 use crate::error::{Problem, ReadError, quoted};
 use crate::lines::Lines;
+use crate::missing::why_named;
 use crate::stamp as stamps;
 
 /// Reads the records of a file. After an error in one line it goes on with the next.
@@ -199,12 +200,8 @@ fn gap(line: &Line<'_>) -> Result<Record> {
     };
     let Text(why) = needed(line.why.as_ref(), "why")?;
     let why = match &**why {
-        "overwritten" => Why::Overwritten,
-        "log began anew" => Why::LogBeganAnew,
         "not recorded" => Why::not_recorded(needed(line.inputs, "inputs")?.0),
-        "not reached" => Why::NotReached,
-        "unreadable" => Why::Unreadable,
-        other => return Err(wrong("why", other)),
+        name => why_named(name).ok_or_else(|| wrong("why", name))?,
     };
     Ok(Record::Gap(Gap { life: life_of(line)?, after: line.after, lost, why }))
 }

@@ -14,7 +14,8 @@ use serde::{Serialize, Serializer};
 use serde_json::ser::Formatter;
 
 use super::SCHEMA;
-use super::texts::{Numbers, how_name, model_name, why_name};
+use super::texts::{Numbers, how_name, model_name};
+use crate::missing::why_name;
 use crate::stamp::untold_year;
 
 /// Writes records, each as a line. The fields of a kind always come in the same order.
@@ -156,7 +157,7 @@ impl<'a> GapLine<'a> {
         };
         let inputs = match why {
             Why::NotRecorded(inputs) => Some(Numbers(Inputs(inputs))),
-            Why::Overwritten | Why::LogBeganAnew | Why::NotReached | Why::Unreadable => None,
+            _ => None,
         };
         let (why, life) = (why_name(why), AsText(life));
         GapLine { record: "gap", recorder, lost, count, after, why, inputs, life }
