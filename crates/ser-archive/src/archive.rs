@@ -8,6 +8,7 @@ use ser_proto::{Entry, Inputs};
 
 use crate::batch::Bookmark;
 use crate::error::{Error, Result, named};
+use crate::place::Place;
 use crate::schema::{self, About};
 use crate::sql::{Columns, Sql, Value, first};
 use crate::sqlite::Sqlite;
@@ -32,19 +33,19 @@ pub struct Archive {
 }
 
 impl Archive {
-    /// Opens the archive in this file.
+    /// Opens the archive at this place.
     ///
     /// # Errors
-    /// If it is no archive, another program is newer, or the system does not let us.
-    pub fn open(path: &Path, access: Access<'_>) -> Result<Archive> {
+    /// If it is no archive, another program is newer, or system or server do not let us.
+    pub fn open(place: &Place, access: Access<'_>) -> Result<Archive> {
         match access {
             Access::Read => {
-                let mut archive = Archive { sql: Box::new(Sqlite::open_to_read(path)?) };
+                let mut archive = Archive { sql: database(place, false)? };
                 archive.about()?.fit_for_reading(archive.name())?;
                 Ok(archive)
             }
             Access::Write { program } => {
-                let mut archive = Archive { sql: Box::new(Sqlite::open_to_write(path)?) };
+                let mut archive = Archive { sql: database(place, true)? };
                 archive.bring_up_to_date(program)?;
                 Ok(archive)
             }
@@ -125,7 +126,7 @@ impl Archive {
     ) -> Result<Option<(Life, u64)>> {
         const LIFE: &str = "SELECT life, sequence FROM entry \
             JOIN recorder ON recorder.id = entry.recorder \
-            WHERE recorder.name = ?1 AND stamp = ?2 AND shown_us IS ?3 AND changed = ?4 \
+            WHERE recorder.name = ?1 AND stamp = ?2 AND shown_us IS NOT DISTINCT FROM ?3 AND changed = ?4 \
             AND state = ?5 AND sequence % 65536 = ?6 ORDER BY life, sequence DESC LIMIT 1";
         let shown_us = shown(&entry.time).map(Moment::us);
         let values = [
@@ -174,6 +175,23 @@ impl Archive {
             self.sql.roll_back();
         }
         done
+    }
+}
+
+/// Opens what holds an archive.
+fn database(place: &Place, is_for_writing: bool) -> Result<Box<dyn Sql>> {
+    match place {
+        Place::File(path) if is_for_writing => Ok(Box::new(Sqlite::open_to_write(path)?)),
+        Place::File(path) => Ok(Box::new(Sqlite::open_to_read(path)?)),
+        #[cfg(feature = "postgres")]
+        Place::Postgres(address) => {
+            Ok(Box::new(crate::postgres::Postgres::open(address, is_for_writing)?))
+        }
+        #[cfg(not(feature = "postgres"))]
+        Place::Postgres(address) => Err(Error::Database {
+            archive: address.clone(),
+            source: "this program was built without PostgreSQL".into(),
+        }),
     }
 }
 

@@ -11,7 +11,7 @@
 //! is missing, `verify` whether anybody has changed something, and `retention` lets go of what is
 //! old. [`Writer`] lets many threads add to one archive. Below these, `chain` reckons digests,
 //! `stored` makes columns of records, `schema` makes tables, and `sql` is what a database must do;
-//! `sqlite` does it.
+//! `sqlite` does it, and `postgres` where the feature of this name is on.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
@@ -23,6 +23,9 @@ mod batch;
 mod chain;
 mod check;
 mod error;
+mod place;
+#[cfg(feature = "postgres")]
+mod postgres;
 mod reading;
 mod retention;
 mod schema;
@@ -36,6 +39,7 @@ pub use archive::{Access, Archive};
 pub use batch::{Appended, Batch, Bookmark};
 pub use check::{Check, Hole, RecorderCheck};
 pub use error::{Error, Result};
+pub use place::{NoPlace, Place};
 pub use reading::{Archived, Window};
 pub use retention::{Expired, Keep};
 pub use verify::{Broken, ChainHead};

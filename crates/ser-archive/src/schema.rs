@@ -50,9 +50,29 @@ impl About {
 
 /// Notes what the tables are now, and who made them so. The first time, nothing is in them.
 pub(crate) fn note(sql: &mut dyn Sql, program: &str) -> Result<()> {
-    const NOTE: &str = "INSERT INTO archive (only, schema, readable_by, program, position) \
-        VALUES (1, ?1, ?2, ?3, 0) ON CONFLICT (only) DO UPDATE SET \
+    const NOTE: &str = "INSERT INTO archive (one, schema, readable_by, program, position) \
+        VALUES (1, ?1, ?2, ?3, 0) ON CONFLICT (one) DO UPDATE SET \
         schema = excluded.schema, readable_by = excluded.readable_by, program = excluded.program";
     let values = [Value::Int(SCHEMA), Value::Int(READABLE_BY), Value::from(program)];
     sql.run(NOTE, &values).map(|_| ())
+}
+
+#[cfg(test)]
+mod tests {
+    /// What each line of a migration is about: a table, an index, a column, a key.
+    fn names(sql: &str) -> Vec<Vec<&str>> {
+        let lines = sql.lines().filter(|line| !line.starts_with("--"));
+        let words = lines.map(|line| {
+            let count = if line.starts_with("CREATE") { 3 } else { 1 };
+            line.trim_end_matches(" STRICT;").split_whitespace().take(count).collect()
+        });
+        words.filter(|words: &Vec<&str>| !words.is_empty() && !words[0].starts_with(')')).collect()
+    }
+
+    #[test]
+    fn the_databases_have_the_same_tables_and_columns() {
+        let file = names(include_str!("../migrations/sqlite/0001_first.sql"));
+        assert_eq!(file, names(include_str!("../migrations/postgres/0001_first.sql")));
+        assert!(file.len() > 50);
+    }
 }

@@ -42,6 +42,24 @@ impl From<&[u8]> for Value {
     }
 }
 
+#[cfg(feature = "postgres")]
+impl Value {
+    /// The number, if it is one.
+    pub(crate) const fn as_int(&self) -> Option<i64> {
+        if let Value::Int(value) = self { Some(*value) } else { None }
+    }
+
+    /// The text, if it is one.
+    pub(crate) fn as_text(&self) -> Option<&str> {
+        if let Value::Text(value) = self { Some(value) } else { None }
+    }
+
+    /// The bytes, if it is some.
+    pub(crate) fn as_bytes(&self) -> Option<&[u8]> {
+        if let Value::Bytes(value) = self { Some(value) } else { None }
+    }
+}
+
 /// The columns of a row. A column of another type than is asked for is damage.
 pub(crate) trait Columns {
     /// The number in this column, from 0.

@@ -1,7 +1,7 @@
 -- What this archive is. The position is that of the row that was added last, of whatever table:
 -- positions rise in the order in which rows were committed.
 CREATE TABLE archive (
-    only INTEGER PRIMARY KEY CHECK (only = 1),
+    one INTEGER PRIMARY KEY CHECK (one = 1),
     schema INTEGER NOT NULL,
     readable_by INTEGER NOT NULL,
     program TEXT NOT NULL,

@@ -3,9 +3,9 @@
 
 use std::path::PathBuf;
 
-use ser_archive::{Access, Archive, Batch, Bookmark};
+use ser_archive::{Access, Archive, Batch, Bookmark, Place};
 use ser_evidence::record::{
-    Boot, ClockObservation, EntryRecord, Gap, HostReading, How, Life, LifeRecord, Lost, Place,
+    self, Boot, ClockObservation, EntryRecord, Gap, HostReading, How, Life, LifeRecord, Lost,
     Record, Reference, Watched, Why,
 };
 use ser_evidence::time::{Bound, Moment, Utc, shown, stamp};
@@ -13,31 +13,58 @@ use ser_proto::{Entry, Inputs, Model};
 
 pub(crate) const PROGRAM: &str = "ser-cli 0.1.0";
 
-/// A folder with an archive, gone afterwards.
-pub(crate) struct Home {
-    folder: tempfile::TempDir,
+/// A place for an archive, gone afterwards.
+pub(crate) enum Home {
+    /// A folder with a file.
+    File(tempfile::TempDir),
+    /// A database, and a program that runs statements in it.
+    Database { address: String, run: Box<dyn Fn(&str)> },
 }
 
 impl Home {
     pub(crate) fn new() -> Home {
-        Home { folder: tempfile::tempdir().unwrap() }
+        Home::File(tempfile::tempdir().unwrap())
     }
 
-    pub(crate) fn path(&self) -> PathBuf {
-        self.folder.path().join("plant.db")
-    }
-
-    pub(crate) fn beside(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+    pub(crate) fn place(&self) -> Place {
+        match self {
+            Home::File(_) => Place::File(self.path()),
+            Home::Database { address, .. } => address.parse().unwrap(),
+        }
     }
 
     pub(crate) fn open(&self) -> Archive {
-        Archive::open(&self.path(), Access::Write { program: PROGRAM }).unwrap()
+        self.open_for(Access::Write { program: PROGRAM }).unwrap()
+    }
+
+    pub(crate) fn open_for(&self, access: Access<'_>) -> ser_archive::Result<Archive> {
+        Archive::open(&self.place(), access)
+    }
+
+    /// The file.
+    pub(crate) fn path(&self) -> PathBuf {
+        self.beside("plant.db")
+    }
+
+    /// Another file in the same folder.
+    pub(crate) fn beside(&self, name: &str) -> PathBuf {
+        match self {
+            Home::File(folder) => folder.path().join(name),
+            Home::Database { address, .. } => panic!("{address} is no file"),
+        }
     }
 
     /// Everybody else's way into the file.
     pub(crate) fn raw(&self) -> rusqlite::Connection {
         rusqlite::Connection::open(self.path()).unwrap()
+    }
+
+    /// Runs statements behind our back.
+    pub(crate) fn sql(&self, statements: &str) {
+        match self {
+            Home::File(_) => self.raw().execute_batch(statements).unwrap(),
+            Home::Database { run, .. } => run(statements),
+        }
     }
 }
 
@@ -128,7 +155,7 @@ pub(crate) fn observed(life: Life, after: u64) -> Record {
         how: How::Query,
         shown: shown(&newest.time).unwrap(),
         at: Reference::Host { bound, reading },
-        place: Place {
+        place: record::Place {
             life,
             after: Some(after),
             before: Some(after),

@@ -1,15 +1,12 @@
 //! Many threads add to one archive.
 
-mod common;
-
 use std::thread;
 
-use common::*;
 use ser_archive::{Error, Writer};
 
-#[test]
-fn what_many_threads_add_is_there_when_they_are_told_so() {
-    let home = Home::new();
+use crate::common::*;
+
+pub(crate) fn what_many_threads_add_is_there_when_they_are_told_so(home: &Home) {
     let writer = Writer::start(home.open(), 4).unwrap();
     thread::scope(|scope| {
         for recorder in 0..8 {
@@ -34,9 +31,7 @@ fn what_many_threads_add_is_there_when_they_are_told_so() {
     assert!(archive.verify().unwrap().1.is_empty());
 }
 
-#[test]
-fn one_that_cannot_be_written_keeps_nobody_else_from_it() {
-    let home = Home::new();
+pub(crate) fn one_that_cannot_be_written_keeps_nobody_else_from_it(home: &Home) {
     let writer = Writer::start(home.open(), 64).unwrap();
     let mut nowhere = entry(LIFE, 7);
     nowhere.sequence = None;
@@ -61,9 +56,7 @@ fn one_that_cannot_be_written_keeps_nobody_else_from_it() {
     assert_eq!(everything(&mut archive, "U1-SER1"), entries(LIFE, good));
 }
 
-#[test]
-fn who_asked_may_go_away_and_it_is_written_all_the_same() {
-    let home = Home::new();
+pub(crate) fn who_asked_may_go_away_and_it_is_written_all_the_same(home: &Home) {
     let writer = Writer::start(home.open(), 2).unwrap();
     for part in 1..=10 {
         drop(writer.append(batch(entries(LIFE, [part]))).unwrap());

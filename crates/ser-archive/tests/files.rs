@@ -1,44 +1,17 @@
-//! What is missing is said, and what somebody changed is found.
+//! What only files have: other programs' files, backups, and everybody's access to every byte.
 
 mod common;
 
+use std::path::Path;
+
 use common::*;
+use proptest::prelude::*;
 use rusqlite::types::Value;
-use ser_archive::{Archive, Hole, Keep};
-use ser_evidence::record::{Gap, Lost, Record, Why};
+use ser_archive::{Access, Archive, Error, Keep, Place};
+use ser_evidence::record::{Life, Record};
 
-#[test]
-fn a_number_that_is_not_there_is_a_hole_unless_it_was_told() {
-    let home = Home::new();
-    let mut archive = home.open();
-    let records = [vec![life(LIFE), gap(LIFE, 5, 2)], entries(LIFE, [3, 4, 5, 8, 9, 12])].concat();
-    archive.append(&[batch(records)]).unwrap();
-    let check = archive.check().unwrap();
-    let found = &check.recorders[0];
-    let hole = |after, missing| Hole { life: LIFE, after, missing, told: 0 };
-    assert_eq!(found.holes, [hole(0, 2), hole(9, 2)]);
-    assert_eq!((found.entries, found.lives, found.told.len()), (6, 1, 1));
-    archive.append(&[batch(vec![gap(LIFE, 0, 2), gap(LIFE, 9, 2)])]).unwrap();
-    assert!(archive.check().unwrap().is_sound());
-}
-
-#[test]
-fn what_was_watched_must_be_there() {
-    let home = Home::new();
-    let mut archive = home.open();
-    archive.append(&[batch([vec![watched(LIFE, 5)], entries(LIFE, 1..=4)].concat())]).unwrap();
-    let hole = Hole { life: LIFE, after: 4, missing: 1, told: 0 };
-    assert_eq!(archive.check().unwrap().recorders[0].holes, [hole]);
-    archive.append(&[batch(entries(LIFE, [5]))]).unwrap();
-    assert!(archive.check().unwrap().is_sound());
-}
-
-#[test]
-fn where_a_log_began_is_not_known_if_its_total_had_wrapped() {
-    let home = Home::new();
-    let mut archive = home.open();
-    archive.append(&[batch(entries(LIFE, 700..=705))]).unwrap();
-    assert!(archive.check().unwrap().is_sound());
+fn open_copy(path: &Path) -> ser_archive::Result<Archive> {
+    Archive::open(&Place::File(path.to_owned()), Access::Read)
 }
 
 /// An archive with rows of every kind, in which something was let go as well.
@@ -61,6 +34,57 @@ fn of_every_kind(home: &Home) -> Archive {
     let again = [entries(LIFE, 10..=12), vec![observed(LIFE, 11)]].concat();
     archive.append(&[batch(again)]).unwrap();
     archive
+}
+
+#[test]
+fn only_an_archive_of_ours_is_opened_and_nothing_else_is_touched() {
+    let home = Home::new();
+    let write = Access::Write { program: PROGRAM };
+    let refused = |access| home.open_for(access).err().expect("refused");
+    assert!(matches!(refused(Access::Read), Error::Missing { .. }));
+    assert!(!home.path().exists());
+    for content in
+        [&b"a letter to the operator, long enough to be no empty file"[..], b"SQLite format 3\0"]
+    {
+        std::fs::write(home.path(), content).unwrap();
+        for access in [Access::Read, write] {
+            let error = refused(access);
+            assert!(matches!(error, Error::NotOurs { .. }), "{error:?}");
+            assert_eq!(std::fs::read(home.path()).unwrap(), content);
+        }
+    }
+    std::fs::remove_file(home.path()).unwrap();
+    home.raw().execute_batch("CREATE TABLE theirs (a); INSERT INTO theirs VALUES (1);").unwrap();
+    let before = std::fs::read(home.path()).unwrap();
+    for access in [Access::Read, write] {
+        assert!(matches!(refused(access), Error::NotOurs { .. }));
+        assert_eq!(std::fs::read(home.path()).unwrap(), before);
+    }
+}
+
+#[test]
+fn a_backup_is_whole_and_takes_nobodys_place() {
+    let home = Home::new();
+    let mut archive = home.open();
+    archive.append(&[batch(entries(LIFE, 1..=500))]).unwrap();
+    let copy = home.beside("copy.db");
+    archive.back_up(&copy).unwrap();
+    archive.append(&[batch(entries(LIFE, [501]))]).unwrap();
+    assert!(archive.back_up(&copy).is_err(), "there is one");
+    let mut copied = open_copy(&copy).unwrap();
+    assert_eq!(everything(&mut copied, "U1-SER1"), entries(LIFE, 1..=500));
+    assert!(copied.verify().unwrap().1.is_empty());
+    let names: Vec<_> = std::fs::read_dir(copy.parent().unwrap())
+        .unwrap()
+        .map(|file| file.unwrap().file_name())
+        .collect();
+    assert!(
+        names.iter().all(|name| {
+            let name = name.to_string_lossy();
+            name.starts_with("plant.db") || name.starts_with("copy.db")
+        }),
+        "{names:?}"
+    );
 }
 
 #[test]
@@ -146,7 +170,7 @@ fn every_row_that_is_taken_away_or_put_in_is_found() {
                 format!("SELECT position FROM {table} ORDER BY position LIMIT 1 OFFSET {place}");
             let position: i64 = raw.query_row(&which, (), |row| row.get(0)).unwrap();
             raw.execute(&format!("DELETE FROM {table} WHERE position = ?1"), (position,)).unwrap();
-            let mut tried = Archive::open(&copy, ser_archive::Access::Read).unwrap();
+            let mut tried = open_copy(&copy).unwrap();
             let found =
                 tried.verify().map_or(true, |(now, broken)| !broken.is_empty() || now != heads);
             assert!(found, "{table} at {position}");
@@ -170,95 +194,31 @@ fn every_row_that_is_taken_away_or_put_in_is_found() {
     assert!(home.open().verify().unwrap().1.is_empty(), "all was put back");
 }
 
-#[test]
-fn a_tail_that_is_taken_away_shows_in_the_head_that_was_written_down() {
-    let home = Home::new();
-    let mut archive = home.open();
-    archive.append(&[batch(entries(LIFE, 1..=3))]).unwrap();
-    let middle = archive.verify().unwrap().0;
-    archive.append(&[batch(entries(LIFE, 4..=6))]).unwrap();
-    let end = archive.verify().unwrap().0;
-    assert_ne!(middle, end);
-    home.raw()
-        .execute_batch("DELETE FROM entry WHERE position > 3; DELETE FROM link WHERE position > 3")
-        .unwrap();
-    assert_eq!(archive.verify().unwrap(), (middle, Vec::new()));
-}
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
 
-#[test]
-fn what_is_let_go_is_told_and_the_rest_stays_proven() {
-    let home = Home::new();
-    let mut archive = home.open();
-    for day in 0..10 {
-        let first = u64::try_from(day).unwrap() * 100 + 1;
-        let records = [vec![observed(LIFE, first)], entries(LIFE, first..first + 100)].concat();
-        let mut batch = batch(records);
-        batch.at = at_s(day * 86_400);
-        archive.append(&[batch]).unwrap();
+    /// Whatever is added in whatever pieces, each entry is there once, as it was read.
+    #[test]
+    fn pieces_in_any_order_give_the_same_archive(
+        pieces in prop::collection::vec(
+            (prop::sample::select(vec![LIFE, NEXT_LIFE]), 0_u64..40, 0_u64..10),
+            1..12,
+        ),
+    ) {
+        let home = Home::new();
+        let mut archive = home.open();
+        let mut expected = std::collections::BTreeSet::new();
+        for (life, first, count) in pieces {
+            let sequences = first + 1..first + 1 + count;
+            expected.extend(sequences.clone().map(|sequence| (life, sequence)));
+            archive.append(&[batch(entries(life, sequences))]).unwrap();
+        }
+        // By the name of the life as a number with a sign.
+        let mut expected: Vec<(Life, u64)> = expected.into_iter().collect();
+        expected.sort_by_key(|(life, sequence)| (life.bits().cast_signed(), *sequence));
+        let expected: Vec<Record> =
+            expected.into_iter().map(|(life, at)| Record::Entry(entry(life, at))).collect();
+        prop_assert_eq!(everything(&mut archive, "U1-SER1"), expected);
+        prop_assert!(archive.verify().unwrap().1.is_empty());
     }
-    archive.append(&[batch(vec![life(LIFE)])]).unwrap();
-    let mut left = 1000;
-    for day in [3, 3, 7] {
-        let keep = Keep { since: Some(at_s(day * 86_400)), bytes: None };
-        let gone = archive.expire(keep, at_s(20 * 86_400)).unwrap();
-        let now_left = 1000 - u64::try_from(day).unwrap() * 100;
-        assert_eq!(gone.entries, left - now_left);
-        left = now_left;
-        let check = archive.check().unwrap();
-        assert!(check.is_sound(), "{check:?}");
-        assert_eq!(check.recorders[0].entries, left);
-        let told: u64 = check.recorders[0]
-            .told
-            .iter()
-            .map(|gap| match gap {
-                Gap { lost: Lost::Exactly(count), why: Why::Expired, .. } => u64::from(*count),
-                other => panic!("{other:?}"),
-            })
-            .sum();
-        assert_eq!(told, 1000 - left);
-        let (heads, broken) = archive.verify().unwrap();
-        assert_eq!(broken, []);
-        assert!(heads[0].expired_to.is_some());
-    }
-    // What is known of the clock stays.
-    let clocks = everything(&mut archive, "U1-SER1")
-        .into_iter()
-        .filter(|record| matches!(record, Record::Clock(_)))
-        .count();
-    assert_eq!(clocks, 10);
-    // Read again from the recorder, it does not come back unseen: the rest is as it was.
-    assert_eq!(archive.append(&[batch(entries(LIFE, 900..=1000))]).unwrap().known, 101);
-}
-
-#[test]
-fn all_may_be_let_go() {
-    let home = Home::new();
-    let mut archive = home.open();
-    archive.append(&[batch(entries(LIFE, 1..=50))]).unwrap();
-    let keep = Keep { since: Some(at_s(1)), bytes: None };
-    assert_eq!(archive.expire(keep, at_s(2)).unwrap().entries, 50);
-    assert_eq!(archive.verify().unwrap().1, []);
-    archive.append(&[batch(entries(LIFE, 51..=60))]).unwrap();
-    assert_eq!(archive.verify().unwrap().1, []);
-    assert!(archive.check().unwrap().is_sound());
-}
-
-#[test]
-fn an_archive_that_is_too_large_loses_its_oldest() {
-    let home = Home::new();
-    let mut archive = home.open();
-    for part in 0..40_u64 {
-        let mut batch = batch(entries(LIFE, part * 100 + 1..=part * 100 + 100));
-        batch.at = at_s(part.try_into().unwrap());
-        archive.append(&[batch]).unwrap();
-    }
-    let keep = Keep { since: None, bytes: Some(300_000) };
-    let gone = archive.expire(keep, at_s(100)).unwrap();
-    let check = archive.check().unwrap();
-    assert!(check.is_sound());
-    assert!((500..3500).contains(&gone.entries), "{gone:?}");
-    assert_eq!(check.recorders[0].entries, 4000 - gone.entries);
-    let left = everything(&mut archive, "U1-SER1");
-    assert_eq!(left.last(), entries(LIFE, [4000]).last());
-    assert_eq!(archive.expire(keep, at_s(101)).unwrap().entries, 0);
 }
