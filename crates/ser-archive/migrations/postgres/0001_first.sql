@@ -33,10 +33,12 @@ CREATE TABLE link (
 
 -- Recorder, life and sequence are what an entry is. The stamp is its eight bytes as they were read,
 -- and `shown_us` the same in microseconds since 1970 by the recorder's clock, if it is a time at all.
+-- There are so many that their chain and recorder are checked when the archive is verified, and not by
+-- the database with each row.
 CREATE TABLE entry (
     position BIGINT PRIMARY KEY,
-    chain BIGINT NOT NULL REFERENCES chain (id),
-    recorder BIGINT NOT NULL REFERENCES recorder (id),
+    chain BIGINT NOT NULL,
+    recorder BIGINT NOT NULL,
     life BIGINT NOT NULL,
     sequence BIGINT NOT NULL,
     number BIGINT NOT NULL,
@@ -53,8 +55,8 @@ CREATE INDEX entry_by_shown ON entry (recorder, shown_us);
 -- What contradicts an entry: the same place with other content. Both are kept.
 CREATE TABLE conflict (
     position BIGINT PRIMARY KEY,
-    chain BIGINT NOT NULL REFERENCES chain (id),
-    recorder BIGINT NOT NULL REFERENCES recorder (id),
+    chain BIGINT NOT NULL,
+    recorder BIGINT NOT NULL,
     life BIGINT NOT NULL,
     sequence BIGINT NOT NULL,
     number BIGINT NOT NULL,

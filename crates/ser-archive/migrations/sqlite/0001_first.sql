@@ -33,10 +33,12 @@ CREATE TABLE link (
 
 -- Recorder, life and sequence are what an entry is. The stamp is its eight bytes as they were read,
 -- and `shown_us` the same in microseconds since 1970 by the recorder's clock, if it is a time at all.
+-- There are so many that their chain and recorder are checked when the archive is verified, and not by
+-- the database with each row.
 CREATE TABLE entry (
     position INTEGER PRIMARY KEY,
-    chain INTEGER NOT NULL REFERENCES chain (id),
-    recorder INTEGER NOT NULL REFERENCES recorder (id),
+    chain INTEGER NOT NULL,
+    recorder INTEGER NOT NULL,
     life INTEGER NOT NULL,
     sequence INTEGER NOT NULL,
     number INTEGER NOT NULL,
@@ -53,8 +55,8 @@ CREATE INDEX entry_by_shown ON entry (recorder, shown_us);
 -- What contradicts an entry: the same place with other content. Both are kept.
 CREATE TABLE conflict (
     position INTEGER PRIMARY KEY,
-    chain INTEGER NOT NULL REFERENCES chain (id),
-    recorder INTEGER NOT NULL REFERENCES recorder (id),
+    chain INTEGER NOT NULL,
+    recorder INTEGER NOT NULL,
     life INTEGER NOT NULL,
     sequence INTEGER NOT NULL,
     number INTEGER NOT NULL,
