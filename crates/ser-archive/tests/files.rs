@@ -1,6 +1,7 @@
 //! What only files have: other programs' files, backups, and everybody's access to every byte.
 
 mod common;
+mod judge;
 
 use std::path::Path;
 
