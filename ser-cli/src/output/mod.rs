@@ -2,6 +2,7 @@
 
 mod csv;
 mod elapsed;
+mod grid;
 mod jsonl;
 mod life;
 mod palette;
@@ -17,6 +18,7 @@ use clap::ValueEnum;
 
 pub(crate) use csv::Csv;
 pub(crate) use elapsed::Elapsed;
+pub(crate) use grid::Grid;
 pub(crate) use jsonl::{JsonLines, PROGRAM};
 pub use life::Life;
 pub(crate) use life::new_life;

@@ -109,7 +109,7 @@ impl Unit {
     }
 
     /// Sets the filter of an input, or of all; `None` where that cannot be done. Returns those in
-    /// force from this input on.
+    /// force from this input on, as many as one reply holds.
     ///
     /// # Errors
     /// If no reply comes, the recorder has another filter in force than was asked for, or the line
@@ -125,11 +125,15 @@ impl Unit {
         let Reply::Filters(page) = self.request(&Command::SetFilter { input, filter })? else {
             return Err(unexpected(Code::Filters));
         };
-        let mut meant = page.filters.iter().take(if input.is_some() { 1 } else { usize::MAX });
-        if page.filters.is_empty() || !meant.all(|in_force| *in_force == filter) {
+        if page.filters.is_empty() {
             return Err(unexpected(Code::Filters));
         }
-        Ok(Some(page))
+        let meant = if input.is_some() { 1 } else { usize::MAX };
+        let refused = page.inputs().take(meant).find(|(_, in_force)| **in_force != filter);
+        match refused.map(|(input, &in_force)| RequestError::FilterRefused { input, in_force }) {
+            Some(refused) => Err(refused),
+            None => Ok(Some(page)),
+        }
     }
 
     /// Everything that the recorder counts; `None` where it cannot be asked for.
