@@ -11,6 +11,8 @@ mod connection;
 mod decoding;
 mod delivery;
 mod error;
+mod extension;
+mod filter_text;
 mod gather;
 mod host_reading;
 mod interrupt;

@@ -142,9 +142,9 @@ counters! {
     76 BOARD_OWN_BROADCASTS "board_own_broadcasts" Ordinary,
     /// Requests for this host's memory that were refused.
     77 BOARD_REQUESTS_REFUSED "board_requests_refused" Trouble,
-    /// Requests refused because no answer came in time; also in board_requests_refused.
+    /// Requests refused because no answer came in time; also counted as requests refused.
     78 BOARD_REQUESTS_UNANSWERED "board_requests_unanswered" Trouble,
-    /// Requests refused because of an impossible length; also in board_requests_refused.
+    /// Requests refused because of an impossible length; also counted as requests refused.
     79 BOARD_REQUESTS_MALFORMED "board_requests_malformed" Trouble,
     /// Times the request queue was found full: requests may have been lost.
     80 BOARD_REQUEST_QUEUE_FULL "board_request_queue_full" Trouble,

@@ -94,6 +94,12 @@ pub(crate) fn field(
     writeln!(out, "{name:<16}{value}")
 }
 
+/// Writes one JSON object over several lines.
+pub(crate) fn json_to(out: &mut dyn Write, json: &serde_json::Value) -> io::Result<()> {
+    serde_json::to_writer_pretty(&mut *out, json)?;
+    writeln!(out)
+}
+
 #[cfg(test)]
 pub(crate) mod testing {
     //! Events that every writer is tested with.
