@@ -16,6 +16,7 @@ ser_sim::with_both_kinds! {
     filters_are_set_and_what_is_not_given_stays,
     what_a_recorder_cannot_have_is_refused_before_anything_is_sent,
     counters_are_told_with_their_meaning,
+    status_tells_identity_clock_filters_and_losses,
 }
 
 fn json(output: &str) -> Value {
@@ -102,6 +103,36 @@ fn counters_are_told_with_their_meaning(kind: Kind) {
     assert_eq!(filters["filters"][3]["left_out"], 0);
 }
 
+fn status_tells_identity_clock_filters_and_losses(kind: Kind) {
+    let bench = Bench::start(kind, &[]);
+    let status = bench.ok("status");
+    // A board may have a battery-backed clock.
+    assert!(status.contains("\nclock source    ") && !status.contains("set by a host"), "{status}");
+    assert!(status.contains("\nfilters         off, on all inputs\n"), "{status}");
+
+    bench.ok("clock set");
+    bench.ok("filter set --input 3 --debounce 5ms");
+    let status = bench.ok("status");
+    for line in [
+        "extension       level 1: time, filters, diagnostics",
+        "clock source    set by a host over RS-232, ",
+        "                input 3: debounce 5 ms\n",
+        "counters        no loss",
+    ] {
+        assert!(status.contains(&format!("\n{line}")), "{line}: {status}");
+    }
+    let json = json(&bench.ok("status --format json"));
+    assert_eq!(json["identity"]["level"], 1);
+    assert_eq!((&json["inputs"], &json["recording"]), (&32.into(), &true.into()));
+    assert_eq!(json["filters"][2]["debounce_ms"], 5);
+    assert_eq!(json["settings"]["line_baud"], 9600);
+    assert!(json["counters"].as_array().expect("counters").len() > 40);
+    // It was set a moment ago, to within what an emulator on a busy computer takes.
+    let ahead = |place: usize| json["clock"]["ahead_us"][place].as_i64().expect("a number");
+    assert!(ahead(0) <= ahead(1), "{json}");
+    assert!(ahead(0) < 60_000_000 && ahead(1) > -60_000_000, "{json}");
+}
+
 #[test]
 fn what_grows_is_shown_until_ctrl_c() {
     let mut bench = Bench::start(Kind::Native, &["--tcp-idle", "never"]);
@@ -151,6 +182,34 @@ fn an_original_recorder_has_nothing_of_this_and_is_hardly_asked() {
     }
     // Each time a command of the manual, and then one question.
     assert_eq!(original.heard(), "RI".repeat(3));
+}
+
+#[test]
+fn the_status_of_an_original_recorder_is_what_it_can_tell() {
+    let original = Original::start();
+    let run = |arguments: &str| {
+        let mut command = ser_cli();
+        command.env("SER_PORT", original.port()).args(["--timeout", "300ms"]);
+        let output = command.args(arguments.split_whitespace()).output().expect("ser-cli runs");
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        output
+    };
+    let output = run("status");
+    assert_eq!(
+        text(&output.stdout),
+        "inputs          16\n\
+         events          3 since the last erase (modulo 65536)\n\
+         next entry      4\n\
+         latest event    2026-11-22T10:00:00.003 (entry 3)\n\
+         inputs on       1\n"
+    );
+    let told = text(&output.stderr);
+    assert!(told.contains("an original recorder does not answer"), "{told}");
+    // It has shown by its silence that it knows no queries, and is not asked who it is.
+    assert!(!original.heard().contains('I'), "{}", original.heard());
+    let json = json(&text(&run("status --format json").stdout));
+    assert_eq!((&json["total"], &json["identity"]), (&3.into(), &Value::Null));
+    assert_eq!((&json["clock"], &json["filters"]), (&Value::Null, &Value::Null));
 }
 
 #[test]

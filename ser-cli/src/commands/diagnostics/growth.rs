@@ -12,7 +12,7 @@ pub(super) struct Look {
 
 /// What has grown from one look to the next.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Growth {
+pub(in crate::commands) struct Growth {
     /// Whether the recorder was switched on in between: then all counters have grown from zero.
     pub(super) began_anew: bool,
     /// Each counter that has grown, by how much, and its value now.

@@ -13,6 +13,7 @@ use ser_proto::{Capabilities, Identity};
 
 use self::growth::{Growth, Look};
 use self::shown::Shown;
+pub(super) use self::shown::counters_json;
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::error::{Failure, Result, inform, warn};
 use crate::extension;

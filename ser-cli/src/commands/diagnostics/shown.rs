@@ -83,17 +83,6 @@ impl Shown<'_> {
 
     /// All counters; with `growth`, also by how much each has grown since the look before.
     pub(super) fn to_json(&self, look: &Look, growth: Option<&Growth>) -> Value {
-        let counter = |&(counter, value): &(Counter, u32)| {
-            json!({
-                "id": counter.id(),
-                "name": counter.name().map_or_else(|| counter.to_string(), str::to_owned),
-                "input": counter.suppressed_input(),
-                "value": value,
-                "grown_by": growth.map(|growth| growth.of(counter)),
-                "weight": counter.weight().map(weight),
-                "meaning": counter.meaning(),
-            })
-        };
         let Identity { id, power_ups, .. } = self.identity;
         json!({
             "recorder": self.recorder,
@@ -101,7 +90,7 @@ impl Shown<'_> {
             "power_ups": power_ups,
             "on_for_us": look.tick_us,
             "began_anew": growth.map(|growth| growth.began_anew),
-            "counters": look.counters.iter().map(counter).collect::<Vec<_>>(),
+            "counters": counters_json(&look.counters, growth),
         })
     }
 
@@ -128,6 +117,25 @@ impl Shown<'_> {
             None => counter.to_string(),
         }
     }
+}
+
+/// Counters for programs.
+pub(in crate::commands) fn counters_json(
+    counters: &[(Counter, u32)],
+    growth: Option<&Growth>,
+) -> Value {
+    let counter = |&(counter, value): &(Counter, u32)| {
+        json!({
+            "id": counter.id(),
+            "name": counter.to_string(),
+            "input": counter.suppressed_input(),
+            "value": value,
+            "grown_by": growth.map(|growth| growth.of(counter)),
+            "weight": counter.weight().map(weight),
+            "meaning": counter.meaning(),
+        })
+    };
+    counters.iter().map(counter).collect()
 }
 
 const fn title(group: CounterGroup) -> &'static str {

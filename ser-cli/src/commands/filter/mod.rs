@@ -11,7 +11,7 @@ use ser_client::Unit;
 use ser_proto::{Capabilities, InputFilter};
 
 use self::set::Target;
-use self::shown::Shown;
+pub(super) use self::shown::Shown;
 use self::values::{Chatter, Wish};
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result};

@@ -10,12 +10,12 @@ use crate::filter_text::{chatter, count, debounce, time};
 use crate::output::{Grid, Palette, Points};
 
 /// What is known of all inputs, input 1 first.
-pub(super) struct Shown<'a> {
-    pub(super) recorder: &'a str,
-    pub(super) filters: &'a [InputFilter],
-    pub(super) points: &'a Points,
+pub(in crate::commands) struct Shown<'a> {
+    pub(in crate::commands) recorder: &'a str,
+    pub(in crate::commands) filters: &'a [InputFilter],
+    pub(in crate::commands) points: &'a Points,
     /// The recorder's counters; none if it does not tell them.
-    pub(super) counters: &'a [(Counter, u32)],
+    pub(in crate::commands) counters: &'a [(Counter, u32)],
 }
 
 impl Shown<'_> {
@@ -40,6 +40,11 @@ impl Shown<'_> {
     }
 
     pub(super) fn to_json(&self) -> Value {
+        json!({ "recorder": self.recorder, "filters": self.filters_json() })
+    }
+
+    /// The filters, input 1 first.
+    pub(in crate::commands) fn filters_json(&self) -> Value {
         let filter = |(input, filter): (u8, &InputFilter)| {
             json!({
                 "input": input,
@@ -51,10 +56,7 @@ impl Shown<'_> {
                 "left_out": self.left_out(input),
             })
         };
-        json!({
-            "recorder": self.recorder,
-            "filters": self.inputs().map(filter).collect::<Vec<_>>(),
-        })
+        self.inputs().map(filter).collect()
     }
 
     fn inputs(&self) -> impl Iterator<Item = (u8, &InputFilter)> {
