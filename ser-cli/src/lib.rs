@@ -27,6 +27,7 @@ mod progress;
 mod setting;
 mod site_file;
 mod state;
+mod suppressed;
 mod time;
 mod unit_name;
 mod values;

@@ -17,10 +17,29 @@ ser_sim::with_both_kinds! {
     what_a_recorder_cannot_have_is_refused_before_anything_is_sent,
     counters_are_told_with_their_meaning,
     status_tells_identity_clock_filters_and_losses,
+    what_was_left_out_is_told_by_whoever_reads_the_log,
 }
 
 fn json(output: &str) -> Value {
     serde_json::from_str(output).expect("JSON")
+}
+
+/// Ten changes of input 3 in 90 ms, after this time. With 5 changes in a second, the fifth and those
+/// behind it are left out.
+fn chatter_after(ms: u32) -> String {
+    let step = |step: u32| format!("{},3,{}", ms + 10 * step, (step + 1) % 2);
+    (0..10).map(step).collect::<Vec<_>>().join("\n")
+}
+
+/// The same at once.
+fn chatter() -> String {
+    chatter_after(0)
+}
+
+/// What lines of a file say that was left out of input 3, look by look.
+fn looks(jsonl: &str) -> Vec<u64> {
+    let looks = jsonl.lines().map(json).filter(|line| line["record"] == "suppressed");
+    looks.map(|look| look["left_out"]["3"].as_u64().unwrap_or(0)).collect()
 }
 
 /// The row of an input.
@@ -85,10 +104,8 @@ fn counters_are_told_with_their_meaning(kind: Kind) {
     assert!(table.contains("Input changes that found the capture queue full."), "{table}");
     assert!(table.ends_with("Inputs\nno input has chattered\n"), "{table}");
 
-    // Ten changes in 90 ms: from the fifth on they are left out.
     bench.ok("filter set --input 3 --chatter 5/1s --rearm 1s");
-    let steps: Vec<_> = (0..10).map(|step| format!("{},3,{}", 10 * step, (step + 1) % 2)).collect();
-    bench.contacts(&steps.join("\n"), 4);
+    bench.contacts(&chatter(), 4);
     let value = |json: &Value, name: &str| {
         let counters = json["counters"].as_array().expect("counters");
         counters.iter().find(|counter| counter["name"] == name).expect("a counter")["value"].clone()
@@ -133,6 +150,72 @@ fn status_tells_identity_clock_filters_and_losses(kind: Kind) {
     assert!(ahead(0) < 60_000_000 && ahead(1) > -60_000_000, "{json}");
 }
 
+fn what_was_left_out_is_told_by_whoever_reads_the_log(kind: Kind) {
+    let mut bench = Bench::start(kind, &[]);
+    bench.ok("clock set");
+    bench.ok("filter set --input 3 --chatter 5/1s --rearm 1s");
+    let quiet = bench.run("read --format jsonl");
+    assert_eq!(
+        (text(&quiet.stderr).contains("left out"), looks(&text(&quiet.stdout))),
+        (false, vec![0])
+    );
+
+    bench.contacts(&chatter(), 4);
+    common::wait_until("all have moved", || {
+        json(&bench.ok("filter --format json"))["filters"][2]["left_out"] == 6
+    });
+    let read = bench.run("read --new --format jsonl");
+    let told = text(&read.stderr);
+    assert!(
+        told.contains("input 3: 6 changes left out by its chatter filter since its power-up"),
+        "{told}"
+    );
+    assert_eq!(looks(&text(&read.stdout)), [6]);
+    // It is known now, and not told again.
+    let again = bench.run("read --new");
+    assert!(!text(&again.stderr).contains("left out"), "{}", text(&again.stderr));
+    // A reading that remembers nothing tells all of it.
+    assert!(text(&bench.run("read").stderr).contains("input 3: 6 changes left out"));
+    assert!(!text(&bench.run("read --log-size 2048").stderr).contains("left out"), "not asked");
+
+    // Until then the input is believed again.
+    bench.contacts(&chatter_after(1500), 4);
+    common::wait_until("all have moved again", || {
+        json(&bench.ok("filter --format json"))["filters"][2]["left_out"] == 12
+    });
+    let mut watch = Running::start(
+        bench.command("watch --format jsonl").stdout(Stdio::piped()).stderr(Stdio::piped()),
+    );
+    let (lines, told) = (watch.lines(), watch.told());
+    let line = || lines.recv_timeout(PATIENCE).expect("a line of watch");
+    let seen = std::iter::repeat_with(line).find(|line| line.contains("suppressed"));
+    assert_eq!(looks(&seen.expect("a look")), [12]);
+    assert_eq!(watch.interrupt(), Some(0));
+    let told: Vec<String> = told.iter().collect();
+    let more = "input 3: 6 more changes left out by its chatter filter";
+    assert!(told.iter().any(|line| line.contains(more)), "{told:?}");
+    assert_eq!(
+        looks(&lines.iter().collect::<Vec<_>>().join("\n")),
+        [12],
+        "and once more at the end"
+    );
+
+    let site = bench.folder.path().join("north.toml");
+    let link = bench.link();
+    fs::write(
+        &site,
+        format!(
+            "site = \"N\"\ntime_zone = \"UTC\"\n\n[[recorder]]\nname = \"U1\"\nport = \"{}\"\n\n\
+             [[point]]\ninput = 3\nname = \"52-1\"\n",
+            link.display()
+        ),
+    )
+    .expect("a file");
+    let report = bench.ok(&format!("report --site {}", site.display()));
+    let report = report.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(report.contains("left out U1: input 3 (52-1), up to 12 changes"), "{report}");
+}
+
 #[test]
 fn what_grows_is_shown_until_ctrl_c() {
     let mut bench = Bench::start(Kind::Native, &["--tcp-idle", "never"]);
@@ -143,13 +226,9 @@ fn what_grows_is_shown_until_ctrl_c() {
     let told = follow.told();
     let first = told.recv_timeout(PATIENCE).expect("a line");
     assert!(first.contains("every 0.05 s, until Ctrl-C"), "{first}");
-    let steps: Vec<_> = (0..10).map(|step| format!("{},3,{}", 10 * step, (step + 1) % 2)).collect();
     let input = bench.sim.0.stdin.as_mut().expect("piped");
-    std::io::Write::write_all(
-        input,
-        format!("ms,input,state\n{}\n\n", steps.join("\n")).as_bytes(),
-    )
-    .expect("the simulator reads");
+    std::io::Write::write_all(input, format!("ms,input,state\n{}\n\n", chatter()).as_bytes())
+        .expect("the simulator reads");
     let lines = follow.lines();
     let mut seen = 0;
     while seen < 6 {

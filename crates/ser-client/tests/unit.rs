@@ -278,6 +278,7 @@ fn a_unit_of_ours_is_asked_for_all_its_filters_and_counters() {
     let values: Vec<u32> =
         bench.unit.recorder_counters().unwrap().unwrap().iter().map(|counter| counter.1).collect();
     assert_eq!(values, [7, 8, 9]);
+    assert_eq!(bench.unit.suppressed_changes().unwrap(), Some(vec![(1, 9)]));
     assert_eq!(bench.unit.clock_look().unwrap(), None, "it has not said that it can");
 }
 

@@ -813,9 +813,11 @@ fn log_of_one_incident() -> Log {
     u1
 }
 
-/// What was left out in that incident: of which inputs how much, whether since a look, and whether
-/// somebody looked afterwards.
-fn left_out(log: &Log) -> Option<(Vec<(u8, u64)>, bool, bool)> {
+/// Of which inputs how much, whether since a look, and whether somebody looked afterwards.
+type FoundLeftOut = (Vec<(u8, u64)>, bool, bool);
+
+/// What was left out in that incident.
+fn left_out(log: &Log) -> Option<FoundLeftOut> {
     let site = site(TWO_RECORDERS);
     let history = history(&site, &[log]);
     let timeline = Timeline::new(&site, &history);

@@ -15,6 +15,7 @@ use crate::keeper::{Keeper, StateArgs};
 use crate::kept::{KeptRecords, Since};
 use crate::log_look;
 use crate::output::{Format, Life};
+use crate::suppressed::LeftOut;
 use crate::values;
 use crate::witness::Witness;
 
@@ -113,6 +114,9 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let mut witness = Witness::begin(kept, place, Duration::ZERO);
     let size = connection::log_size(&mut unit, log_size, remembered)?;
     let result = read_by_cursor(&mut unit, &mut outlet, keeper.as_mut(), &mut witness, size, &stop);
+    let result = result.and_then(|delivered| {
+        left_out(args, connection, &mut unit, &mut outlet).map(|()| delivered)
+    });
     // Events that reached standard output are remembered even if the recorder fell silent in
     // between, or after Ctrl-C.
     let saved = keeper.as_mut().map_or(Ok(()), Keeper::save);
@@ -152,6 +156,25 @@ fn read_by_cursor(
     witness.read(outlet, cursor, follower.size(), looked_at.max(follower.complete_at()))?;
     witness.vouch(outlet)?;
     Ok(summary.delivered)
+}
+
+/// Looks how many changes chatter filters have left out. Who says how large the log is has an
+/// original recorder, which is not asked.
+fn left_out(
+    args: &Args,
+    connection: &ConnectionArgs,
+    unit: &mut Unit,
+    outlet: &mut Outlet,
+) -> Result<()> {
+    if args.log_size.is_some() || connection.is_original() {
+        return Ok(());
+    }
+    let kept = match args.new {
+        true => Some(KeptRecords::of(&args.state, connection)?),
+        false => None,
+    };
+    let look = LeftOut::new(kept, connection.points()).look(unit);
+    look.map_or(Ok(()), |look| outlet.evidence(&look))
 }
 
 /// Reads entries by number. Needs neither cursor nor size: the recorder answers with the existing

@@ -18,6 +18,7 @@ use crate::keeper::{Keeper, StateArgs};
 use crate::kept::KeptRecords;
 use crate::outage::Outage;
 use crate::output::Format;
+use crate::suppressed::LeftOut;
 use crate::values;
 use crate::witness::Witness;
 
@@ -107,9 +108,18 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let outage = Outage::new(connection::options(connection).timeout);
     let kept = KeptRecords::of(&args.state, connection)?;
     let witness = Witness::begin(Some(kept), keeper.place(), unit.report_delay());
-    let mut watch = Watch { unit, watcher, outlet, keeper, witness, stop, outage };
+    // Who says how large the log is has an original recorder, which is not asked.
+    let left_out = match log_size {
+        Some(_) => None,
+        None => {
+            let kept = KeptRecords::of(&args.state, connection)?;
+            Some(LeftOut::new(Some(kept), connection.points()))
+        }
+    };
+    let mut watch = Watch { unit, watcher, outlet, keeper, witness, left_out, stop, outage };
     let result = watch.run();
-    let vouched = watch.witness.vouch(&mut watch.outlet);
+    let looked = watch.look_at_left_out_at_the_end(&result);
+    let vouched = looked.and(watch.witness.vouch(&mut watch.outlet));
     let saved = vouched.and(watch.outlet.finish()).and_then(|()| watch.keeper.save());
     watch.witness.keep();
     let found = plan.reports.map(|reports| reports.found).filter(|_| watch.watcher.has_switched());
@@ -240,6 +250,8 @@ struct Watch {
     outlet: Outlet,
     keeper: Keeper,
     witness: Witness,
+    /// What is left out of the log, if the recorder may be asked.
+    left_out: Option<LeftOut>,
     stop: Arc<AtomicBool>,
     outage: Outage,
 }
@@ -263,13 +275,16 @@ impl Watch {
     }
 
     fn step(&mut self) -> Result<()> {
-        let Watch { unit, watcher, outlet, keeper, witness, stop, .. } = self;
+        let Watch { unit, watcher, outlet, keeper, witness, left_out, stop, .. } = self;
         watcher.step(unit, HEARTBEAT, &mut |step| -> Result<()> {
             outlet.take(step.deliveries, 0, &mut |life| keeper.name(life, step.size))?;
             keeper.delivered(step.cursor, step.size, outlet.life())?;
             if stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
         })?;
         witness.read(outlet, watcher.cursor(), watcher.log_size(), watcher.complete_at())?;
+        if let Some(look) = left_out.as_mut().and_then(|left_out| left_out.look_if_due(unit)) {
+            outlet.evidence(&look)?;
+        }
         let has_vouched = witness.vouch_if_due(outlet)?;
         // A file gets its header even when there is nothing to deliver.
         outlet.flush()?;
@@ -277,6 +292,15 @@ impl Watch {
             witness.keep();
         }
         Ok(())
+    }
+
+    /// Looks once more, unless the recorder has failed or nobody takes what it says.
+    fn look_at_left_out_at_the_end(&mut self, result: &Result<()>) -> Result<()> {
+        if !matches!(result, Ok(()) | Err(Failure::Interrupted)) {
+            return Ok(());
+        }
+        let look = self.left_out.as_mut().and_then(|left_out| left_out.look(&mut self.unit));
+        look.map_or(Ok(()), |look| self.outlet.evidence(&look))
     }
 
     fn check_interrupt(&self) -> Result<()> {

@@ -22,6 +22,7 @@ use crate::kept::KeptRecords;
 use crate::log_look;
 use crate::output::Loss;
 use crate::state::{Delivered, StateFile};
+use crate::suppressed;
 
 /// Reads all recorders that have a port. Returns those that could not be read.
 pub(super) fn read(
@@ -146,6 +147,11 @@ fn read_one(
         }
     }
     records.extend(newest(&records, read_at));
+    if recorder.is_original {
+        unit.take_for_original();
+    }
+    // The entries are there, whatever becomes of this.
+    records.extend(suppressed::look(&mut unit).ok().flatten().map(Record::Suppressed));
     records.extend(kept(recorder, connection, state)?.load());
     Ok(records)
 }

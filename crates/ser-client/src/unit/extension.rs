@@ -141,10 +141,30 @@ impl Unit {
     /// # Errors
     /// If no reply comes or the line fails.
     pub fn recorder_counters(&mut self) -> Result<Option<Vec<(Counter, u32)>>, RequestError> {
+        self.counters_from(Counter::FIRST)
+    }
+
+    /// How many changes of each input were left out since power-up; `None` where that cannot be
+    /// asked for.
+    ///
+    /// # Errors
+    /// If no reply comes or the line fails.
+    pub fn suppressed_changes(&mut self) -> Result<Option<Vec<(u8, u32)>>, RequestError> {
+        let first = Counter::suppressed(1).unwrap_or(Counter::FIRST);
+        let counters = self.counters_from(first)?;
+        let of_input =
+            |(counter, value): (Counter, u32)| Some((counter.suppressed_input()?, value));
+        Ok(counters.map(|counters| counters.into_iter().filter_map(of_input).collect()))
+    }
+
+    fn counters_from(
+        &mut self,
+        first: Counter,
+    ) -> Result<Option<Vec<(Counter, u32)>>, RequestError> {
         if !self.has(Capabilities::DIAGNOSTICS)? {
             return Ok(None);
         }
-        let (mut counters, mut next) = (Vec::new(), Some(Counter::FIRST));
+        let (mut counters, mut next) = (Vec::new(), Some(first));
         while let Some(first) = next {
             let Reply::Diagnostics(page) = self.request(&Command::Diagnostics { first })? else {
                 return Err(unexpected(Code::Diagnostics));

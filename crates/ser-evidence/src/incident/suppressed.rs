@@ -9,9 +9,6 @@ use crate::record::{HostReading, Suppressed};
 use crate::time::{Moment, Utc};
 use crate::timeline::{EventId, Timeline};
 
-/// How wrong a recorder may be about how long it has been on: one part in so many.
-const TICK_TOLERANCE: u64 = 1000;
-
 /// What is known of changes that were left out around an incident.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LeftOut {
@@ -37,9 +34,9 @@ pub(super) fn of(
     let mut sorted: Vec<&Suppressed> = looks.iter().collect();
     sorted.sort_by_key(|look| (look.to.utc, look.to.monotonic));
     let mut sum: Option<LeftOut> = None;
-    for power_up in sorted.chunk_by(|one, next| is_of_one_power_up(one, next)) {
+    for power_up in sorted.chunk_by(|one, next| next.continues(one)) {
         let Some(&newest) = power_up.last() else { continue };
-        if is_after(timeline, &switched_on(newest), last) {
+        if is_after(timeline, &newest.switched_on(), last) {
             break;
         }
         if is_before(timeline, &newest.to, first) {
@@ -68,32 +65,6 @@ pub(super) fn of(
         }
     }
     sum
-}
-
-/// Whether the recorder was on from one look to the next for sure. If it may not have been, all that
-/// the next look counts is new.
-fn is_of_one_power_up(one: &Suppressed, next: &Suppressed) -> bool {
-    let is_less =
-        |(input, count): (&u8, &u32)| next.left_out.get(input).is_none_or(|next| next < count);
-    let on_for_us = next.on_for_us - next.on_for_us / TICK_TOLERANCE;
-    let between_us = match one.to.boot == next.to.boot {
-        true => next.to.monotonic.since(one.to.monotonic),
-        false => next.to.utc.since(one.to.utc),
-    };
-    u64::try_from(between_us).is_ok_and(|us| us <= on_for_us) && !one.left_out.iter().any(is_less)
-}
-
-/// When the recorder was switched on, by a look; rather too early than too late.
-fn switched_on(look: &Suppressed) -> HostReading {
-    let on_for_us = look.on_for_us.saturating_add(look.on_for_us / TICK_TOLERANCE);
-    let on_for_us = i64::try_from(on_for_us).unwrap_or(i64::MAX);
-    let HostReading { monotonic, utc, .. } = look.from;
-    let before = |us: i64| us.saturating_sub(on_for_us);
-    HostReading {
-        monotonic: Moment::from_us(before(monotonic.us())),
-        utc: Moment::from_us(before(utc.us())),
-        ..look.from
-    }
 }
 
 /// Whether a reading is proven to be before an event.

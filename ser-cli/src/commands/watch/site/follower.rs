@@ -16,6 +16,7 @@ use crate::error::{Failure, Result, inform};
 use crate::keeper::{self, Keeper};
 use crate::kept::KeptRecords;
 use crate::output::{Annotator, Event, EventWriter, Loss, Record, RecorderColumn};
+use crate::suppressed::LeftOut;
 use ser_evidence::record::EntryRecord;
 
 /// How long a recorder that has failed is left alone.
@@ -85,6 +86,9 @@ impl Follower<'_> {
         let may_shorten = self.args.interval.is_none();
         let mut watcher = LogWatcher::polling(follower, interval, may_shorten);
         let mut annotator = Annotator::new(keeper.life()?, keeper.before());
+        let kept = KeptRecords::of(&self.args.state, &self.connection)?;
+        let left_out = LeftOut::new(Some(kept), self.connection.points()).of(&self.column.name);
+        let mut left_out = (!self.connection.is_original()).then_some(left_out);
         let result = loop {
             if self.is_stopped() {
                 break Ok(());
@@ -103,6 +107,8 @@ impl Follower<'_> {
             if std::mem::take(has_failed) {
                 inform(format_args!("{}: all is well again", self.column.name));
             }
+            // The list has no place for it, and it is told.
+            let _ = left_out.as_mut().and_then(|left_out| left_out.look_if_due(&mut unit));
             keeper.save_if_due()?;
         };
         keeper.save().and(result)
