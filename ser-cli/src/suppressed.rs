@@ -94,13 +94,17 @@ impl LeftOut {
     fn tell(&self, look: &Suppressed) {
         let since = look.since(self.before.as_ref());
         let is_from_power_up = self.before.as_ref().is_none_or(|before| !look.continues(before));
-        for line in lines(since, is_from_power_up, &self.points) {
+        let lines = lines(since, is_from_power_up, &self.points);
+        if lines.is_empty() {
+            return;
+        }
+        for line in lines {
             match &self.recorder {
                 Some(recorder) => warn(format_args!("{recorder}: {line}")),
                 None => warn(line),
             }
         }
-        if !self.has_looked && !look.left_out.is_empty() {
+        if !self.has_looked {
             advise("only their number is known: ser-cli filter shows what is filtered out");
         }
     }

@@ -348,6 +348,19 @@ fn what_did_not_follow_is_missing_only_if_it_would_have_been_seen() {
 }
 
 #[test]
+fn what_did_not_follow_is_not_called_missing_where_changes_of_its_input_were_left_out() {
+    let site = site(BREAKER);
+    for (input, verdict) in [(9, Verdict::Missing), (5, Verdict::NotDecidable(Doubt::LeftOut))] {
+        let mut u1 = trip(40, Some("2026-11-22T10:00:10.600"));
+        u1.left_out("2026-11-22T10:01:00.000", 4660, &[(input, 1)]);
+        let history = history(&site, &[&u1]);
+        let timeline = Timeline::new(&site, &history);
+        let report = report(&timeline, Which::LastTrip);
+        assert_eq!(report.steps[1].verdict, verdict, "input {input}");
+    }
+}
+
+#[test]
 fn a_breaker_says_how_long_it_took_and_its_contacts_how_long_they_disagreed() {
     let site = site(BREAKER);
     let u1 = trip(40, None);

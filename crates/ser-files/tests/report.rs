@@ -560,6 +560,18 @@ fn what_a_chatter_filter_left_out_is_told_with_its_input_and_is_no_gap() {
 }
 
 #[test]
+fn a_chatter_is_told_with_what_was_left_out_of_it() {
+    let mut readings = Readings::of("[[recorder]]\nname = \"U1\"\nclock = \"utc\"\n");
+    readings.set("U1", 0, "2026-11-22T09:00:00.000");
+    for (number, state) in [(1, 4), (2, 0), (3, 4), (4, 0)] {
+        readings.entry("U1", number, &format!("2026-11-22T10:00:00.00{number}"), (4, state));
+    }
+    readings.left_out("U1", "2026-11-22T10:05:00.000", &[(3, 996)]);
+    let text = readings.told().text();
+    in_order(&text, &["input 3 (U1) chattered (4 changes, and up to 996 more left out)"]);
+}
+
+#[test]
 fn where_nobody_looked_after_an_incident_more_may_have_been_left_out() {
     let mut readings = Readings::of("[[recorder]]\nname = \"U1\"\nclock = \"utc\"\n");
     readings.set("U1", 0, "2026-11-22T09:00:00.000");

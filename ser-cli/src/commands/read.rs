@@ -43,7 +43,11 @@ second header.
 Losses are reported in the output at their place, in every format, and on standard error: how \
 many events were overwritten, that the log began anew, which inputs changed while nothing was \
 recorded. The exit code is then 0. With --fail-on-loss it is 3, also for a ring that had wrapped \
-before it was first read.";
+before it was first read.
+
+Of a recorder with our firmware, standard error also tells how many changes of an input its chatter \
+filter has left out (with --new: since the last time), and JSON lines have it as a record \
+\"suppressed\". That is no loss: the recorder was told to leave them out (ser-cli filter).";
 
 /// Read events.
 #[derive(Debug, clap::Args)]

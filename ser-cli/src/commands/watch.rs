@@ -37,7 +37,8 @@ asked every second instead; so are original recorders. The log itself is also ch
 then, so that a report lost on the line delays its event and does not lose it.
 While events come faster than the line can carry reports and readings together, the recorder is \
 told not to report and is read without a pause. Events that are overwritten nevertheless are \
-counted in the output, at their place.
+counted in the output, at their place. What chatter filters leave out is told on standard error \
+once a minute.
 With --site and no port, several recorders are asked every second and shown in one list, in the \
 order of what is known of their clocks; their settings are left alone. A ~ is in front of a row \
 that is not known to have come after the one before. What is read late may even be earlier for \

@@ -67,6 +67,18 @@ pub(super) fn of(
     sum
 }
 
+/// Whether a change of an input in the incident may be one that was left out.
+pub(super) fn may_lack(
+    timeline: &Timeline<'_>,
+    incident: &Incident,
+    recorder: u32,
+    input: u8,
+) -> bool {
+    let history = timeline.history().recorders.get(recorder as usize);
+    let left_out = history.and_then(|history| of(timeline, incident, &history.suppressed));
+    left_out.is_some_and(|left_out| left_out.changes.contains_key(&input))
+}
+
 /// Whether a reading is proven to be before an event.
 fn is_before(timeline: &Timeline<'_>, reading: &HostReading, event: EventId) -> bool {
     let here =
