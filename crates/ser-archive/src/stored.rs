@@ -143,6 +143,7 @@ impl StoredEvidence {
             Record::Step(step) => ("step", step.place.life),
             Record::Life(life) => ("life", life.life),
             Record::Watched(watched) => ("watched", watched.life),
+            Record::Suppressed(_) => ("suppressed", Life::UNKNOWN),
             Record::Point(_) => ("point", Life::UNKNOWN),
             Record::Recorder(_) => ("recorder", Life::UNKNOWN),
         }
