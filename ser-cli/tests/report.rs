@@ -210,9 +210,11 @@ fn one_command_reads_both_recorders_and_asks_for_no_more_than_their_logs() {
         for command in &commands {
             match command {
                 Asked::Read { count, .. } => entries += u32::from(*count),
-                Asked::QueryConfiguration => {}
-                // Whether changes were left out of the log.
-                Asked::Identify | Asked::Time { .. } | Asked::Diagnostics { .. } => {}
+                // The last three say whether changes were left out of the log.
+                Asked::QueryConfiguration
+                | Asked::Identify
+                | Asked::Time { .. }
+                | Asked::Diagnostics { .. } => {}
                 // Nothing that is asked changes anything.
                 other => panic!("{other:?}"),
             }
