@@ -279,10 +279,14 @@ impl From<GeniusError> for Failure {
 /// stays silent.
 ///
 /// A read, which every recorder answers, goes first. An absent recorder is thus recognised, and
-/// waited for only once.
+/// waited for only once. An original one need not be asked for anything else beyond the manual.
 pub(crate) fn settings(unit: &mut Unit) -> Result<Option<Configuration>> {
     unit.log_position()?;
-    unless_unanswered(unit.configuration())
+    let settings = unless_unanswered(unit.configuration())?;
+    if settings.is_none() {
+        unit.take_for_original();
+    }
+    Ok(settings)
 }
 
 /// `None` if a recorder that is there does not answer.

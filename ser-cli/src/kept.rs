@@ -198,7 +198,7 @@ fn last_byte(file: &mut File) -> io::Result<Option<u8>> {
 fn is_routine(record: &Record) -> bool {
     match record {
         Record::Clock(ClockObservation { how, .. }) => matches!(how, How::Event | How::Query),
-        Record::Watched(_) | Record::Entry(_) | Record::Gap(_) => true,
+        Record::Watched(_) | Record::Suppressed(_) | Record::Entry(_) | Record::Gap(_) => true,
         Record::Step(_) | Record::Life(_) | Record::Point(_) | Record::Recorder(_) => false,
     }
 }

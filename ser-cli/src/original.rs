@@ -55,6 +55,11 @@ impl Originals {
         Ok(Originals { path, unit: unit.name, is_said })
     }
 
+    /// The same for a recorder that is original by the site file, or is not.
+    pub(crate) fn said(self, is_said: bool) -> Originals {
+        Originals { is_said, ..self }
+    }
+
     /// Who the recorder is; `None` for an original one. One that is known to be original is not
     /// asked.
     pub(crate) fn identity(

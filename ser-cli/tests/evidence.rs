@@ -144,7 +144,7 @@ fn every_line_of_a_continued_file_is_read_and_the_layout_is_told_once() {
     }
     let text = fs::read_to_string(&log).expect("text");
     assert_eq!(text.matches("\"record\":\"file\"").count(), 1, "{text}");
-    assert_eq!((events(&text).len(), records(&text).len()), (2, 2 + 2 * 3));
+    assert_eq!((events(&text).len(), records(&text).len()), (2, 2 + 2 * 4));
     let entries = records(&text).into_iter().filter_map(|record| match record {
         Record::Entry(entry) => Some(entry),
         _ => None,

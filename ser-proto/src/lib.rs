@@ -54,7 +54,7 @@ pub use clock_source::ClockSource;
 pub use code::Code;
 pub use command::Command;
 pub use configuration::{AutoReport, Baud, Configuration, Configure, MAX_REPORT_ADDRESS, MAX_SIZE};
-pub use counter::Counter;
+pub use counter::{Counter, CounterGroup, CounterWeight};
 pub use diagnostics::{Counters, MAX_COUNTERS};
 pub use entry::{Entry, InputNumbers, Inputs};
 pub use error::ParseError;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// Calls that create, write, follow links, replace or remove files, and calls that panic on a
 /// closed pipe.
-const CALLS: [&str; 26] = [
+const CALLS: [&str; 27] = [
     "File::create(",
     "File::create_buffered(",
     "fs::write(",
@@ -31,6 +31,7 @@ const CALLS: [&str; 26] = [
     "remove_dir(",
     "map_raw(",
     "map_mut(",
+    "open_with_flags(",
     // Another program opens what it is told by name.
     "Process::new(",
     ".persist(",
@@ -40,7 +41,14 @@ const CALLS: [&str; 26] = [
 ];
 
 /// File, call, how often, and why that is right.
-const JUDGED: [(&str, &str, usize, &str); 41] = [
+const JUDGED: [(&str, &str, usize, &str); 42] = [
+    (
+        "crates/ser-archive/src/sqlite.rs",
+        "open_with_flags(",
+        1,
+        "a database that says that it is ours, an empty one that the user names, or a copy that was \
+         made a moment before; of any other, nothing is written",
+    ),
     (
         "crates/geni-board/src/mapped_ram.rs",
         "map_raw(",

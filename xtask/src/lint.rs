@@ -47,7 +47,9 @@ pub(crate) fn host(strict: bool) -> Result<()> {
         heading("Clippy");
         let deny = ["--", "-D", "warnings"];
         steps::run(steps::cargo().args(["clippy", "--workspace", "--all-targets"]).args(deny))?;
-        for (package, feature) in [("xtask", "log"), ("ser-cli", "parquet")] {
+        for (package, feature) in
+            [("xtask", "log"), ("ser-cli", "parquet"), ("ser-archive", "postgres")]
+        {
             let with = ["clippy", "--package", package, "--features", feature, "--all-targets"];
             steps::run(steps::cargo().args(with).args(deny))?;
         }

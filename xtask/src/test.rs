@@ -104,7 +104,12 @@ fn optional_parts() -> Result<()> {
     let mut tests = steps::cargo();
     tests.args(["test", "--package", "ser-cli", "--features", "parquet"]);
     tests.args(["--test", "other_readers", "--", "--include-ignored", "parquet"]);
-    steps::run(tests.args(programs::skipped()))
+    steps::run(tests.args(programs::skipped()))?;
+    heading("Tests of archives in PostgreSQL, which a plain build does not have");
+    let mut archives = steps::cargo();
+    archives.args(["test", "--package", "ser-archive", "--features", "postgres"]);
+    archives.args(["--", "--include-ignored", "postgres"]);
+    steps::run(archives.args(programs::skipped()))
 }
 
 /// All tests except those whose programs are missing.

@@ -3,6 +3,7 @@
 mod common;
 
 use std::io::ErrorKind;
+use std::num::NonZeroU8;
 use std::time::Duration;
 
 use common::unit::{Answers, Bench};
@@ -277,7 +278,49 @@ fn a_unit_of_ours_is_asked_for_all_its_filters_and_counters() {
     let values: Vec<u32> =
         bench.unit.recorder_counters().unwrap().unwrap().iter().map(|counter| counter.1).collect();
     assert_eq!(values, [7, 8, 9]);
+    assert_eq!(bench.unit.suppressed_changes().unwrap(), Some(vec![(1, 9)]));
     assert_eq!(bench.unit.clock_look().unwrap(), None, "it has not said that it can");
+}
+
+#[test]
+fn a_filter_that_is_not_in_force_afterwards_was_refused() {
+    let mut bench = Bench::new(100);
+    bench.fake().beyond_the_manual = |command| {
+        let reply = match *command {
+            Command::Identify => Reply::Identity(Identity {
+                level: 1,
+                model: Model::Ser160,
+                firmware: FirmwareVersion { major: 1, minor: 0, patch: 0 },
+                capabilities: Capabilities::FILTERS,
+                id: None,
+                power_ups: 1,
+                life: 1,
+                log_capacity: 2048,
+                guard: Guard::None,
+            }),
+            // It takes nothing for input 2, and has no input 17.
+            Command::SetFilter { input, filter } => {
+                let first = input.unwrap_or(NonZeroU8::MIN);
+                let in_force = |number| if number == 2 { InputFilter::OFF } else { filter };
+                let filters = (first.get()..=16).map(in_force).collect();
+                Reply::Filters(Filters { first, filters })
+            }
+            _ => return None,
+        };
+        Some(reply.to_body().to_vec())
+    };
+    let filter = InputFilter { debounce_ms: 5, chatter: None };
+    let input = NonZeroU8::new;
+    assert_eq!(bench.unit.set_filter(input(1), filter).unwrap().unwrap().first.get(), 1);
+    for input in [input(2), None] {
+        let refused = bench.unit.set_filter(input, filter).unwrap_err();
+        assert!(
+            matches!(refused, RequestError::FilterRefused { input: 2, in_force: InputFilter::OFF }),
+            "{refused}"
+        );
+    }
+    let beyond = bench.unit.set_filter(input(17), filter).unwrap_err();
+    assert!(matches!(beyond, RequestError::UnexpectedReply { .. }), "{beyond}");
 }
 
 #[test]

@@ -348,6 +348,19 @@ fn what_did_not_follow_is_missing_only_if_it_would_have_been_seen() {
 }
 
 #[test]
+fn what_did_not_follow_is_not_called_missing_where_changes_of_its_input_were_left_out() {
+    let site = site(BREAKER);
+    for (input, verdict) in [(9, Verdict::Missing), (5, Verdict::NotDecidable(Doubt::LeftOut))] {
+        let mut u1 = trip(40, Some("2026-11-22T10:00:10.600"));
+        u1.left_out("2026-11-22T10:01:00.000", 4660, &[(input, 1)]);
+        let history = history(&site, &[&u1]);
+        let timeline = Timeline::new(&site, &history);
+        let report = report(&timeline, Which::LastTrip);
+        assert_eq!(report.steps[1].verdict, verdict, "input {input}");
+    }
+}
+
+#[test]
 fn a_breaker_says_how_long_it_took_and_its_contacts_how_long_they_disagreed() {
     let site = site(BREAKER);
     let u1 = trip(40, None);
@@ -802,4 +815,88 @@ fn a_clock_that_was_asked_and_then_set_back_is_not_known_any_more_either() {
     };
     assert_eq!(timeline.order(with(0b100), with(0b1000)), Order::Unknown);
     assert_eq!(timeline.order(with(0b1000), with(0b100)), Order::Unknown);
+}
+
+/// A log with an incident from 10:00:05 to 10:00:06, whose clock was set at 10:00.
+fn log_of_one_incident() -> Log {
+    let mut u1 = Log::of("U1", 1);
+    let at = monotonic_us("2026-11-22T10:00:00.000");
+    u1.observed(HOW, "2026-11-22T10:00:00.000", (at, at + 2_000), Some(1_000));
+    u1.changes("2026-11-22T10:00:05.000", &[1]).changes("2026-11-22T10:00:06.000", &[2]);
+    u1
+}
+
+/// Of which inputs how much, whether since a look, and whether somebody looked afterwards.
+type FoundLeftOut = (Vec<(u8, u64)>, bool, bool);
+
+/// What was left out in that incident.
+fn left_out(log: &Log) -> Option<FoundLeftOut> {
+    let site = site(TWO_RECORDERS);
+    let history = history(&site, &[log]);
+    let timeline = Timeline::new(&site, &history);
+    let report = report(&timeline, Which::Last);
+    let of_u1 = &report.completeness[0];
+    // It is no gap.
+    assert!(of_u1.gaps.is_empty());
+    let found = of_u1.left_out.clone()?;
+    Some((found.changes.into_iter().collect(), found.from.is_some(), found.is_to_end))
+}
+
+#[test]
+fn what_a_chatter_filter_left_out_is_counted_between_the_looks_around_the_incident() {
+    assert_eq!(left_out(&log_of_one_incident()), None, "nobody looked");
+    let mut u1 = log_of_one_incident();
+    u1.left_out("2026-11-22T09:00:00.000", 1000, &[(3, 5), (4, 1)]);
+    u1.left_out("2026-11-22T09:59:00.000", 4540, &[(3, 10), (4, 1)]);
+    // One that is after it for sure counts, and not the ones behind.
+    u1.left_out("2026-11-22T10:01:00.000", 4660, &[(3, 17), (4, 1), (5, 2)]);
+    u1.left_out("2026-11-22T10:02:00.000", 4720, &[(3, 100), (4, 9), (5, 2)]);
+    assert_eq!(left_out(&u1), Some((vec![(3, 7), (5, 2)], true, true)));
+}
+
+#[test]
+fn without_a_look_before_it_is_counted_from_the_power_up_on() {
+    let mut u1 = log_of_one_incident();
+    u1.left_out("2026-11-22T10:01:00.000", 4660, &[(3, 17)]);
+    assert_eq!(left_out(&u1), Some((vec![(3, 17)], false, true)));
+    // And without one afterwards there may be more.
+    let mut u1 = log_of_one_incident();
+    u1.left_out("2026-11-22T10:00:05.500", 4660, &[(3, 17)]);
+    assert_eq!(left_out(&u1), Some((vec![(3, 17)], false, false)));
+    // One that ended before it says nothing of it.
+    let mut u1 = log_of_one_incident();
+    u1.left_out("2026-11-22T09:59:00.000", 4660, &[(3, 17)]);
+    assert_eq!(left_out(&u1), None);
+}
+
+#[test]
+fn counts_of_another_power_up_are_not_subtracted() {
+    // It was on for half a minute only, and so all that it counted is new.
+    let mut u1 = log_of_one_incident();
+    u1.left_out("2026-11-22T09:59:00.000", 4660, &[(3, 10)]);
+    u1.left_out("2026-11-22T10:01:00.000", 90, &[(3, 12)]);
+    assert_eq!(left_out(&u1), Some((vec![(3, 12)], false, true)));
+    // Counters that went back tell it as well.
+    let mut u1 = log_of_one_incident();
+    u1.left_out("2026-11-22T09:59:00.000", 4660, &[(3, 10)]);
+    u1.left_out("2026-11-22T10:01:00.000", 4660, &[(3, 9)]);
+    assert_eq!(left_out(&u1), Some((vec![(3, 9)], false, true)));
+    // What was counted before and after a power failure within the incident is added.
+    let mut u1 = log_of_one_incident();
+    u1.left_out("2026-11-22T10:00:05.200", 4660, &[(3, 10)]);
+    u1.left_out("2026-11-22T10:01:00.000", 54, &[(3, 12)]);
+    assert_eq!(left_out(&u1), Some((vec![(3, 22)], false, true)));
+    // One that was switched on after it has nothing to do with it.
+    let mut u1 = log_of_one_incident();
+    u1.left_out("2026-11-22T10:01:00.000", 5, &[(3, 12)]);
+    assert_eq!(left_out(&u1), None);
+}
+
+#[test]
+fn looks_at_counters_are_in_any_order_and_may_come_twice() {
+    let mut u1 = log_of_one_incident();
+    u1.left_out("2026-11-22T10:01:00.000", 4660, &[(3, 17)]);
+    u1.left_out("2026-11-22T09:59:00.000", 4540, &[(3, 10)]);
+    u1.left_out("2026-11-22T10:01:00.000", 4660, &[(3, 17)]);
+    assert_eq!(left_out(&u1), Some((vec![(3, 7)], true, true)));
 }

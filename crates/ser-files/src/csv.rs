@@ -22,6 +22,7 @@ use crate::error::{ReadError, quoted};
 use crate::fields::Fields;
 use crate::lines::Lines;
 use crate::merged::without_apostrophe;
+use crate::missing::{why_named, why_text};
 use crate::stamp;
 
 /// The columns, in their order. Later versions may append more.
@@ -464,14 +465,7 @@ pub fn loss_note(gap: &Gap) -> String {
         Lost::Unknown => "lost an unknown number".to_owned(),
     };
     let after = gap.after.map(|after| format!(" after {after}")).unwrap_or_default();
-    let why = match gap.why {
-        Why::Overwritten => "overwritten".to_owned(),
-        Why::LogBeganAnew => "log began anew".to_owned(),
-        Why::NotReached => "not reached".to_owned(),
-        Why::Unreadable => "unreadable".to_owned(),
-        Why::NotRecorded(inputs) => format!("not recorded, inputs {}", Inputs(inputs)),
-    };
-    format!("{lost}{after}: {why}")
+    format!("{lost}{after}: {}", why_text(gap.why))
 }
 
 /// Understands [`loss_note`].
@@ -485,12 +479,9 @@ fn lost_and_why(note: &str) -> Option<(Lost, Why)> {
     } else {
         Lost::AtLeast(number(count.strip_suffix(" (at least)")?.as_bytes())?)
     };
-    let why = match why {
-        "overwritten" => Why::Overwritten,
-        "log began anew" => Why::LogBeganAnew,
-        "not reached" => Why::NotReached,
-        "unreadable" => Why::Unreadable,
-        _ => Why::not_recorded(inputs(why.strip_prefix("not recorded, inputs ")?)?),
+    let why = match why.strip_prefix("not recorded, inputs ") {
+        Some(list) => Why::not_recorded(inputs(list)?),
+        None => why_named(why)?,
     };
     Some((lost, why))
 }

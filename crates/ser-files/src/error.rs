@@ -105,8 +105,8 @@ impl Error for ReadError {
 
 /// Why a last line is left out that may be a part of one. A number or a name that was cut off may
 /// look whole.
-pub(crate) const NO_LINE_END: &str = "this last line has no line end, so the file may be cut off in it; if it is whole, end it with \
-     one";
+pub(crate) const NO_LINE_END: &str = "this last line has no line end, so the file may be cut off in \
+     it; if it is whole, end it with one";
 
 /// A piece of a file, short enough for a message.
 pub(crate) fn quoted(text: &[u8]) -> String {

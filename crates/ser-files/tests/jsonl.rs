@@ -3,7 +3,8 @@
 use proptest::prelude::*;
 use ser_evidence::record::{
     Boot, ClockObservation, ClockStep, EntryRecord, Fellow, Gap, HostReading, How, Life,
-    LifeRecord, Lost, Place, PointRecord, Record, RecorderRecord, Reference, Told, Watched, Why,
+    LifeRecord, Lost, Place, PointRecord, Record, RecorderRecord, Reference, Suppressed, Told,
+    Watched, Why,
 };
 use ser_evidence::time::{Bound, Moment, Scale};
 use ser_files::jsonl::{Reader, SCHEMA, Writer};
@@ -117,6 +118,15 @@ fn any_record() -> impl Strategy<Value = Record> {
         (any_life(), any_reading(), any_reading(), any::<u64>()).prop_map(
             |(life, from, to, through)| Record::Watched(Watched { life, from, to, through })
         ),
+        (
+            any_reading(),
+            any_reading(),
+            any::<u64>(),
+            proptest::collection::btree_map(1_u8..=32, any::<u32>(), 0..5),
+        )
+            .prop_map(|(from, to, on_for_us, left_out)| {
+                Record::Suppressed(Suppressed { from, to, on_for_us, left_out })
+            }),
         (1_u8..=32, any_name(), any_name(), any_name()).prop_map(|(input, name, on, off)| {
             Record::Point(PointRecord { input, name, on, off })
         }),

@@ -4,7 +4,8 @@ use jiff::Timestamp;
 use ser_evidence::history::{Collector, History};
 use ser_evidence::incident::{Incident, Report, Which};
 use ser_evidence::record::{
-    Boot, ClockObservation, EntryRecord, HostReading, How, Life, Place, Record, Reference, Watched,
+    Boot, ClockObservation, EntryRecord, HostReading, How, Life, Place, Record, Reference,
+    Suppressed, Watched,
 };
 use ser_evidence::site::{self, Site};
 use ser_evidence::time::{Bound, Moment, shown};
@@ -83,6 +84,15 @@ impl Readings {
         let (life, to) = (life(recorder), reading(until));
         let from = reading("2026-11-22T00:00:01.000");
         self.collector.add(recorder, &Record::Watched(Watched { life, from, to, through }));
+    }
+
+    /// At this time, so many changes of an input had been left out since its power-up at midnight.
+    fn left_out(&mut self, recorder: &str, at: &str, counts: &[(u8, u32)]) {
+        let to = reading(at);
+        let on_for_us = u64::try_from(to.monotonic.us()).expect("after midnight");
+        let left_out = counts.iter().copied().collect();
+        let look = Suppressed { from: to, to, on_for_us, left_out };
+        self.collector.add(recorder, &Record::Suppressed(look));
     }
 
     fn told(self) -> Told {
@@ -515,4 +525,59 @@ fn a_step_of_which_nobody_knows_is_not_drawn_as_one_that_failed() {
     };
     assert_eq!(legends(&stepped(2_000)), [true, false, false, false, false]);
     assert_eq!(legends(&stepped(300_000)), [false, false, true, true, false]);
+}
+
+#[test]
+fn what_a_chatter_filter_left_out_is_told_with_its_input_and_is_no_gap() {
+    let site = "[[recorder]]\nname = \"U1\"\nclock = \"utc\"\n[[point]]\nrecorder = \"U1\"\ninput = 3\n\
+                name = \"52-1 closed\"\n";
+    let mut readings = Readings::of(site);
+    readings.set("U1", 0, "2026-11-22T09:00:00.000");
+    readings.entry("U1", 1, "2026-11-22T10:00:00.000", (1, 1));
+    readings.watched("U1", 1, "2026-11-22T10:05:00.000");
+    readings.left_out("U1", "2026-11-22T09:59:00.000", &[(3, 7)]);
+    readings.left_out("U1", "2026-11-22T10:05:00.000", &[(3, 1241), (4, 1)]);
+    let told = readings.told();
+    let text = told.text();
+    in_order(
+        &text,
+        &[
+            "left out U1: input 3 (52-1 closed), up to 1234 changes by its chatter filter, between \
+             2026-11-22 09:59:00.000 and 2026-11-22 10:05:00.000 ",
+            "left out U1: input 4, up to 1 change by",
+        ],
+    );
+    let json = told.json();
+    assert_eq!(json["is_incomplete"], false, "the recorder did what it was told");
+    let left_out = &json["recorders"][0]["left_out"];
+    assert_eq!(left_out["changes"][0], serde_json::json!({ "input": 3, "at_most": 1234 }));
+    assert_eq!(
+        (&left_out["is_to_end"], &left_out["changes"][1]["input"]),
+        (&true.into(), &4.into())
+    );
+    let page = told.write(|out, document| write_html(out, document).expect("it takes it"));
+    assert!(page.contains("Left out: U1: input 3 (52-1 closed), up to 1234 changes"));
+}
+
+#[test]
+fn a_chatter_is_told_with_what_was_left_out_of_it() {
+    let mut readings = Readings::of("[[recorder]]\nname = \"U1\"\nclock = \"utc\"\n");
+    readings.set("U1", 0, "2026-11-22T09:00:00.000");
+    for (number, state) in [(1, 4), (2, 0), (3, 4), (4, 0)] {
+        readings.entry("U1", number, &format!("2026-11-22T10:00:00.00{number}"), (4, state));
+    }
+    readings.left_out("U1", "2026-11-22T10:05:00.000", &[(3, 996)]);
+    let text = readings.told().text();
+    in_order(&text, &["input 3 (U1) chattered (4 changes, and up to 996 more left out)"]);
+}
+
+#[test]
+fn where_nobody_looked_after_an_incident_more_may_have_been_left_out() {
+    let mut readings = Readings::of("[[recorder]]\nname = \"U1\"\nclock = \"utc\"\n");
+    readings.set("U1", 0, "2026-11-22T09:00:00.000");
+    readings.entry("U1", 1, "2026-11-22T10:00:00.000", (1, 1));
+    readings.entry("U1", 2, "2026-11-22T10:00:01.000", (1, 0));
+    readings.left_out("U1", "2026-11-22T10:00:00.500", &[(3, 7)]);
+    let text = readings.told().text();
+    in_order(&text, &["between its power-up and 2026-11-22 10:00:00.500; nobody has looked since"]);
 }

@@ -151,7 +151,7 @@ pub(crate) fn write_line_settings(
     field(out, "auto print", on_off(configuration.auto_print))
 }
 
-fn auto_report_name(auto_report: AutoReport) -> &'static str {
+pub(super) fn auto_report_name(auto_report: AutoReport) -> &'static str {
     match auto_report {
         AutoReport::Off => "off",
         AutoReport::Genius => "genius",

@@ -6,9 +6,11 @@ pub(crate) mod completions;
 pub(crate) mod config;
 pub(crate) mod decode;
 pub(crate) mod demo;
+pub(crate) mod diagnostics;
 pub(crate) mod encode;
 pub(crate) mod erase;
 pub(crate) mod export;
+pub(crate) mod filter;
 #[cfg(unix)]
 pub(crate) mod genius;
 pub(crate) mod import;

@@ -18,6 +18,7 @@ use crate::log_identity::{self, Met};
 use crate::log_look;
 use crate::original::Originals;
 use crate::output::{Format, Life};
+use crate::suppressed::LeftOut;
 use crate::values;
 use crate::witness::Witness;
 
@@ -45,7 +46,11 @@ second header.
 Losses are reported in the output at their place, in every format, and on standard error: how \
 many events were overwritten, that the log began anew, which inputs changed while nothing was \
 recorded. The exit code is then 0. With --fail-on-loss it is 3, also for a ring that had wrapped \
-before it was first read.";
+before it was first read.
+
+Of a recorder with our firmware, standard error also tells how many changes of an input its chatter \
+filter has left out (with --new: since the last time), and JSON lines have it as a record \
+\"suppressed\". That is no loss: the recorder was told to leave them out (ser-cli filter).";
 
 /// Read events.
 #[derive(Debug, clap::Args)]
@@ -132,6 +137,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             log_identity::remember(&mut unit, keeper, met.log)?;
         }
         look_at_clock(&mut unit, &mut outlet, &mut witness, &originals, cursor)?;
+        left_out(args, connection, &mut unit, &mut outlet, &originals)?;
         Ok(delivered)
     });
     // Events that reached standard output are remembered even if the recorder fell silent in
@@ -192,6 +198,29 @@ fn look_at_clock(
         Some(observation) => witness.asked(outlet, observation),
         None => Ok(()),
     }
+}
+
+/// Looks how many changes chatter filters have left out. Who says how large the log is has an
+/// original recorder, which is not asked.
+fn left_out(
+    args: &Args,
+    connection: &ConnectionArgs,
+    unit: &mut Unit,
+    outlet: &mut Outlet,
+    originals: &Originals,
+) -> Result<()> {
+    if args.log_size.is_some() || connection.is_original() {
+        return Ok(());
+    }
+    if !matches!(originals.identity(unit), Ok(Some(_))) {
+        return Ok(());
+    }
+    let kept = match args.new {
+        true => Some(KeptRecords::of(&args.state, connection)?),
+        false => None,
+    };
+    let look = LeftOut::new(kept, connection.points()).look(unit);
+    look.map_or(Ok(()), |look| outlet.evidence(&look))
 }
 
 /// Reads entries by number. Needs neither cursor nor size: the recorder answers with the existing

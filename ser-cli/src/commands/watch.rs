@@ -22,6 +22,7 @@ use crate::original::Originals;
 use crate::outage::Outage;
 use crate::output::Format;
 use crate::state::LogIdentity;
+use crate::suppressed::LeftOut;
 use crate::values;
 use crate::witness::Witness;
 
@@ -40,7 +41,8 @@ asked every second instead; so are original recorders. The log itself is also ch
 then, so that a report lost on the line delays its event and does not lose it.
 While events come faster than the line can carry reports and readings together, the recorder is \
 told not to report and is read without a pause. Events that are overwritten nevertheless are \
-counted in the output, at their place.
+counted in the output, at their place. What chatter filters leave out is told on standard error \
+once a minute.
 With --site and no port, several recorders are asked every second and shown in one list, in the \
 order of what is known of their clocks; their settings are left alone. A ~ is in front of a row \
 that is not known to have come after the one before. What is read late may even be earlier for \
@@ -116,16 +118,36 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let outage = Outage::new(connection::options(connection).timeout);
     let kept = KeptRecords::of(&args.state, connection)?;
     let witness = Witness::begin(Some(kept), keeper.place(), unit.report_delay());
+    // Who says how large the log is has an original recorder, which is not asked.
+    let left_out = match log_size {
+        Some(_) => None,
+        None => {
+            let kept = KeptRecords::of(&args.state, connection)?;
+            Some(LeftOut::new(Some(kept), connection.points()))
+        }
+    };
     let clock = met.log.map(|_| NowAndThen::new());
     let (log, is_named) = (met.log, met.is_another || met.log.is_none());
-    let mut watch =
-        Watch { unit, watcher, outlet, keeper, witness, clock, log, is_named, stop, outage };
+    let mut watch = Watch {
+        unit,
+        watcher,
+        outlet,
+        keeper,
+        witness,
+        clock,
+        log,
+        left_out,
+        is_named,
+        stop,
+        outage,
+    };
     let result = watch.run();
     if matches!(result, Err(Failure::Interrupted)) {
         log_identity::remember(&mut watch.unit, &mut watch.keeper, watch.log)?;
         watch.look_at_clock()?;
     }
-    let vouched = watch.witness.vouch(&mut watch.outlet);
+    let looked = watch.look_at_left_out_at_the_end(&result);
+    let vouched = looked.and(watch.witness.vouch(&mut watch.outlet));
     let saved = vouched.and(watch.outlet.finish()).and_then(|()| watch.keeper.save());
     watch.witness.keep();
     let found = plan.reports.map(|reports| reports.found).filter(|_| watch.watcher.has_switched());
@@ -267,6 +289,8 @@ struct Watch {
     log: Option<LogIdentity>,
     /// Whether the next life of the log can be named as it begins.
     is_named: bool,
+    /// What is left out of the log, if the recorder may be asked.
+    left_out: Option<LeftOut>,
     stop: Arc<AtomicBool>,
     outage: Outage,
 }
@@ -290,7 +314,8 @@ impl Watch {
     }
 
     fn step(&mut self) -> Result<()> {
-        let Watch { unit, watcher, outlet, keeper, witness, clock, stop, is_named, .. } = self;
+        let Watch { unit, watcher, outlet, keeper, witness, clock, left_out, stop, .. } = self;
+        let is_named = &mut self.is_named;
         let (mut is_idle, mut is_unnamed) = (true, false);
         let result = watcher.step(unit, HEARTBEAT, &mut |step| -> Result<()> {
             is_idle &= step.deliveries.is_empty();
@@ -323,6 +348,9 @@ impl Watch {
             witness.asked(outlet, observation)?;
             witness.keep();
         }
+        if let Some(look) = left_out.as_mut().and_then(|left_out| left_out.look_if_due(unit)) {
+            outlet.evidence(&look)?;
+        }
         let has_vouched = witness.vouch_if_due(outlet)?;
         // A file gets its header even when there is nothing to deliver.
         outlet.flush()?;
@@ -343,6 +371,15 @@ impl Watch {
             Some(observation) => witness.asked(outlet, observation),
             None => Ok(()),
         }
+    }
+
+    /// Looks once more, unless the recorder has failed or nobody takes what it says.
+    fn look_at_left_out_at_the_end(&mut self, result: &Result<()>) -> Result<()> {
+        if !matches!(result, Ok(()) | Err(Failure::Interrupted)) {
+            return Ok(());
+        }
+        let look = self.left_out.as_mut().and_then(|left_out| left_out.look(&mut self.unit));
+        look.map_or(Ok(()), |look| self.outlet.evidence(&look))
     }
 
     fn check_interrupt(&self) -> Result<()> {

@@ -24,6 +24,7 @@ use crate::log_look;
 use crate::original::Originals;
 use crate::output::Loss;
 use crate::state::{Delivered, LogIdentity, StateFile};
+use crate::suppressed;
 
 /// Reads all recorders that have a port. Returns those that could not be read.
 pub(super) fn read(
@@ -118,7 +119,7 @@ fn read_one(
     let mut unit = buses.open(connection)?;
     let known_size = remembered.map(|delivered| delivered.size).filter(|&size| size > 0);
     let size = connection::log_size(&mut unit, recorder.log_size, known_size)?;
-    let originals = Originals::of(state, connection)?;
+    let originals = Originals::of(state, connection)?.said(recorder.is_original);
     // What is remembered of another log names nothing in this one.
     let log = originals.identity(&mut unit)?.as_ref().map(LogIdentity::from);
     let is_of_this = |delivered: &Delivered| match (delivered.log, log) {
@@ -164,6 +165,8 @@ fn read_one(
         kept.add(std::slice::from_ref(&looked));
         records.push(looked);
     }
+    // The entries are there, whatever becomes of this.
+    records.extend(suppressed::look(&mut unit).ok().flatten().map(Record::Suppressed));
     records.extend(kept.load());
     Ok(records)
 }

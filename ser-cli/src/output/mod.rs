@@ -2,6 +2,7 @@
 
 mod csv;
 mod elapsed;
+mod grid;
 mod jsonl;
 mod life;
 mod palette;
@@ -17,6 +18,7 @@ use clap::ValueEnum;
 
 pub(crate) use csv::Csv;
 pub(crate) use elapsed::Elapsed;
+pub(crate) use grid::Grid;
 pub(crate) use jsonl::{JsonLines, PROGRAM, write_records};
 pub use life::Life;
 pub(crate) use life::new_life;
@@ -90,6 +92,12 @@ pub(crate) fn field(
     value: impl std::fmt::Display,
 ) -> io::Result<()> {
     writeln!(out, "{name:<16}{value}")
+}
+
+/// Writes one JSON object over several lines.
+pub(crate) fn json_to(out: &mut dyn Write, json: &serde_json::Value) -> io::Result<()> {
+    serde_json::to_writer_pretty(&mut *out, json)?;
+    writeln!(out)
 }
 
 #[cfg(test)]

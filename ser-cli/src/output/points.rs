@@ -17,6 +17,21 @@ impl FromIterator<Point> for Points {
 }
 
 impl Points {
+    /// The name of an input, as it is in the site file.
+    pub(crate) fn name(&self, input: u8) -> Option<&str> {
+        self.0.get(&input).map(|point| point.name.as_str())
+    }
+
+    /// The input with this name.
+    pub(crate) fn input(&self, name: &str) -> Option<u8> {
+        self.0.values().find(|point| point.name == name).map(|point| point.input)
+    }
+
+    /// The inputs that have names.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = u8> {
+        self.0.keys().copied()
+    }
+
     /// An input in a state, as `52-1 closed OPEN`, or `7 OFF` if it has no name.
     pub(crate) fn state(&self, input: u8, is_on: bool) -> String {
         match self.0.get(&input) {
@@ -67,6 +82,9 @@ mod tests {
         assert_eq!(points().state(3, true), "52-1 closed CLOSED");
         assert_eq!(points().state(3, false), "52-1 closed OPEN");
         assert_eq!(points().state(4, false), "4 OFF");
+        assert_eq!((points().name(3), points().name(4)), (Some("52-1 closed"), None));
+        assert_eq!((points().input("52-1 closed"), points().input("x")), (Some(3), None));
+        assert_eq!(points().inputs().collect::<Vec<_>>(), [3]);
     }
 
     #[test]

@@ -222,6 +222,11 @@ impl ConnectionArgs {
         recorder.log_size.filter(|_| recorder.is_original)
     }
 
+    /// Whether the recorder cannot be asked for anything beyond the manual.
+    pub(crate) fn is_original(&self) -> bool {
+        self.recorder_of_site().is_some_and(|(_, recorder)| recorder.is_original)
+    }
+
     /// What the clock is set to.
     pub(crate) fn clock_setting(&self) -> Option<ClockSetting> {
         let (chosen, recorder) = self.recorder_of_site()?;

@@ -29,15 +29,16 @@ impl ClockSetting {
     }
 
     /// The local time of this computer.
-    pub(crate) fn here() -> ClockSetting {
+    pub(crate) fn of_this_computer() -> ClockSetting {
         ClockSetting { zone: TimeZone::system() }
     }
 
-    /// What such a clock shows at a time in UTC; both in microseconds since 1970. `None` where the
-    /// calendar ends.
+    /// What the clock should show at a time in UTC, both in microseconds since 1970; `None` beyond
+    /// the years that there are.
     pub(crate) fn shown_us(&self, utc_us: i64) -> Option<i64> {
-        let offset = self.zone.to_offset(Timestamp::from_microsecond(utc_us).ok()?);
-        utc_us.checked_add(i64::from(offset.seconds()).checked_mul(1_000_000)?)
+        let time = Timestamp::from_microsecond(utc_us).ok()?;
+        let offset_s = self.zone.to_offset(time).seconds();
+        utc_us.checked_add(i64::from(offset_s) * 1_000_000)
     }
 
     /// The time `ahead` from now, as the clock should show it. An error with its year if the two
@@ -131,6 +132,16 @@ mod tests {
         );
         assert_eq!(at(ClockRule::Utc, "2069-12-31T23:59:59.999Z", 1), Err(2070));
         assert_eq!(at(ClockRule::Utc, "1969-12-31T23:59:59Z", 0), Err(1969));
+    }
+
+    #[test]
+    fn what_it_should_show_is_reckoned_to_the_microsecond() {
+        let site = Site { time_zone: TimeZone::get("Europe/Berlin").unwrap(), ..Site::unknown() };
+        let shown = |rule, utc_us| ClockSetting::of(rule, &site).shown_us(utc_us);
+        assert_eq!(shown(ClockRule::Utc, 7), Some(7));
+        assert_eq!(shown(ClockRule::Offset(-60), 60_000_007), Some(7));
+        assert_eq!(shown(ClockRule::Local, 7), Some(3_600_000_007), "in January 1970");
+        assert_eq!(shown(ClockRule::Local, i64::MAX), None);
     }
 
     #[test]

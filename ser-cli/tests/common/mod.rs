@@ -3,6 +3,8 @@
 
 #[cfg(unix)]
 pub(crate) mod bench;
+#[cfg(unix)]
+pub(crate) mod original;
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};

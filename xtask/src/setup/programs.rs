@@ -21,6 +21,8 @@ struct Program {
 enum Source {
     /// The Debian package that contains it.
     Debian(&'static str),
+    /// The Debian package of a server, whose programs are in no path.
+    Server(&'static str),
     /// Packages for Python, in an environment of their own.
     Python,
     /// A package for JavaScript, in a folder of its own.
@@ -51,7 +53,7 @@ const fn program(
 }
 
 /// All programs. Sizes are those of Debian 12.
-static PROGRAMS: [Program; 7] = [
+static PROGRAMS: [Program; 8] = [
     program(
         "sqlite3",
         "the test that imports a log into SQLite",
@@ -89,6 +91,12 @@ static PROGRAMS: [Program; 7] = [
         Source::Debian("poppler-utils"),
     ),
     program(
+        "postgres",
+        "the tests that keep archives in PostgreSQL",
+        (42, 171),
+        Source::Server("postgresql"),
+    ),
+    program(
         "axe-core",
         "the test that asks whether everybody can read that page",
         (1, 4),
@@ -112,7 +120,7 @@ pub(crate) fn install(name: &str) -> Result<()> {
     };
     heading(&format!("Installing {name} ({})", program.tool.size));
     match program.source {
-        Source::Debian(package) => install_package(program, package),
+        Source::Debian(package) | Source::Server(package) => install_package(program, package),
         Source::Python => install_python_readers(),
         Source::Npm => install_axe_core(),
     }
@@ -188,6 +196,7 @@ pub(crate) fn skipped() -> Vec<String> {
 fn is_there(program: &Program) -> bool {
     match program.source {
         Source::Debian(_) => there(program.tool.name),
+        Source::Server(_) => servers().next().is_some(),
         Source::Npm => axe_core_is_there(),
         // Of another version of this list, or half of it, is as good as nothing.
         Source::Python => {
@@ -196,6 +205,12 @@ fn is_there(program: &Program) -> bool {
                 && works(unrelated(python_of_readers()).arg("--version"))
         }
     }
+}
+
+/// The servers that Debian has installed, each in a folder of its version.
+fn servers() -> impl Iterator<Item = PathBuf> {
+    let versions = std::fs::read_dir("/usr/lib/postgresql").into_iter().flatten().flatten();
+    versions.map(|version| version.path().join("bin/postgres")).filter(|server| server.is_file())
 }
 
 fn there(name: &str) -> bool {

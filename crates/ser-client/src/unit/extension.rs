@@ -126,7 +126,7 @@ impl Unit {
     }
 
     /// Sets the filter of an input, or of all; `None` where that cannot be done. Returns those in
-    /// force from this input on.
+    /// force from this input on, as many as one reply holds.
     ///
     /// # Errors
     /// If no reply comes, the recorder has another filter in force than was asked for, or the line
@@ -142,11 +142,15 @@ impl Unit {
         let Reply::Filters(page) = self.request(&Command::SetFilter { input, filter })? else {
             return Err(unexpected(Code::Filters));
         };
-        let mut meant = page.filters.iter().take(if input.is_some() { 1 } else { usize::MAX });
-        if page.filters.is_empty() || !meant.all(|in_force| *in_force == filter) {
+        if page.filters.is_empty() {
             return Err(unexpected(Code::Filters));
         }
-        Ok(Some(page))
+        let meant = if input.is_some() { 1 } else { usize::MAX };
+        let refused = page.inputs().take(meant).find(|(_, in_force)| **in_force != filter);
+        match refused.map(|(input, &in_force)| RequestError::FilterRefused { input, in_force }) {
+            Some(refused) => Err(refused),
+            None => Ok(Some(page)),
+        }
     }
 
     /// Everything that the recorder counts; `None` where it cannot be asked for.
@@ -154,10 +158,30 @@ impl Unit {
     /// # Errors
     /// If no reply comes or the line fails.
     pub fn recorder_counters(&mut self) -> Result<Option<Vec<(Counter, u32)>>, RequestError> {
+        self.counters_from(Counter::FIRST)
+    }
+
+    /// How many changes of each input were left out since power-up; `None` where that cannot be
+    /// asked for.
+    ///
+    /// # Errors
+    /// If no reply comes or the line fails.
+    pub fn suppressed_changes(&mut self) -> Result<Option<Vec<(u8, u32)>>, RequestError> {
+        let first = Counter::suppressed(1).unwrap_or(Counter::FIRST);
+        let counters = self.counters_from(first)?;
+        let of_input =
+            |(counter, value): (Counter, u32)| Some((counter.suppressed_input()?, value));
+        Ok(counters.map(|counters| counters.into_iter().filter_map(of_input).collect()))
+    }
+
+    fn counters_from(
+        &mut self,
+        first: Counter,
+    ) -> Result<Option<Vec<(Counter, u32)>>, RequestError> {
         if !self.has(Capabilities::DIAGNOSTICS)? {
             return Ok(None);
         }
-        let (mut counters, mut next) = (Vec::new(), Some(Counter::FIRST));
+        let (mut counters, mut next) = (Vec::new(), Some(first));
         while let Some(first) = next {
             let Reply::Diagnostics(page) = self.request(&Command::Diagnostics { first })? else {
                 return Err(unexpected(Code::Diagnostics));

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::fmt;
 
-use ser_proto::{Code, Configuration, InvalidTime};
+use ser_proto::{Code, Configuration, InputFilter, InvalidTime};
 
 use crate::reading::disturbed::Disturbed;
 use crate::session::NoReply;
@@ -30,6 +30,13 @@ pub enum RequestError {
         /// The configuration in force.
         in_force: Configuration,
     },
+    /// The recorder did not take the filter.
+    FilterRefused {
+        /// The input, or the first one where all were meant.
+        input: u8,
+        /// The filter in force there.
+        in_force: InputFilter,
+    },
     /// The answer belongs to the command but does not confirm what was asked for.
     UnexpectedReply {
         /// The command.
@@ -52,6 +59,9 @@ impl RequestError {
             RequestError::Refused { .. } => {
                 Some("a recorder refuses all settings when one of them is out of range")
             }
+            RequestError::FilterRefused { .. } => Some(
+                "a recorder also refuses filters whose values it does not have, or that it guards",
+            ),
             RequestError::Disturbed(disturbed) => Some(disturbed.hint()),
             RequestError::Transport(error) => error.hint(),
             RequestError::UnexpectedReply { .. } | RequestError::InvalidTime(_) => None,
@@ -71,6 +81,9 @@ impl fmt::Display for RequestError {
                 Ok(())
             }
             RequestError::Refused { .. } => write!(f, "the recorder did not take the settings"),
+            RequestError::FilterRefused { input, in_force } => {
+                write!(f, "the recorder did not take the filter; input {input} has: {in_force}")
+            }
             RequestError::UnexpectedReply { command } => {
                 write!(f, "the answer to \"{}\" does not say what was asked for", command.name())
             }

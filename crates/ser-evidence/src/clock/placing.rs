@@ -2,7 +2,8 @@
 
 use ser_proto::Entry;
 
-use super::runs::{LifeRuns, Side, Step, When, is_earlier};
+use super::runs::{LifeRuns, Side, Step};
+use super::when::{When, is_earlier};
 use crate::history::{Held, LifeHistory, RecorderHistory};
 use crate::record::{ClockObservation, EntryRecord, Fellow, How, Place};
 use crate::time::{Bound, Moment, Shown, Utc, shown};

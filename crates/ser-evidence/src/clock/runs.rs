@@ -5,6 +5,7 @@
 //! may be, usually of one.
 
 use super::local::is_unset;
+use super::when::{When, is_earlier};
 use crate::history::{Held, LifeHistory};
 use crate::record::Boot;
 use crate::time::{AROUND_2069_US, Bound, CENTURY_US, Host, Moment, Shown, Utc, shown};
@@ -50,6 +51,21 @@ pub(crate) fn went_back(earlier: Moment<Shown>, later: Moment<Shown>) -> bool {
 }
 
 impl Step {
+    /// Somebody told of it; nobody knows where it was, or whether it was in this life.
+    pub(crate) const ANYWHERE: Step = Step {
+        after: 0,
+        before: u64::MAX,
+        is_sure: false,
+        at: None,
+        utc: Bound::UNKNOWN,
+        set: None,
+        follows: None,
+        is_told: true,
+    };
+
+    /// Nobody told of it, but stamps show that it was in this life.
+    pub(crate) const SILENT: Step = Step { is_sure: true, is_told: false, ..Step::ANYWHERE };
+
     /// Whether this step is known to have been before another one.
     pub(crate) fn precedes(&self, other: &Step) -> bool {
         let is_what_it_follows = self.set.is_some_and(|(index, _)| other.follows == Some(index));
@@ -72,17 +88,6 @@ impl Step {
     pub(crate) fn when(&self) -> When {
         (self.at, self.utc)
     }
-}
-
-/// When something was: on the clock of a host, and in UTC.
-pub(crate) type When = (Option<(Boot, Bound<Host>)>, Bound<Utc>);
-
-/// Whether one thing is known to have been earlier than another.
-pub(crate) fn is_earlier(one: When, other: When) -> bool {
-    let on_one_host = one.0.zip(other.0).is_some_and(|((boot, one), (other_boot, other))| {
-        boot == other_boot && one.is_before(other)
-    });
-    on_one_host || one.1.is_before(other.1)
 }
 
 impl LifeRuns {
@@ -260,16 +265,7 @@ pub(crate) fn backward_steps(entries: &[Held]) -> Vec<(Step, Moment<Shown>)> {
     for held in entries {
         let Some(now) = shown(&held.entry.time) else { continue };
         if let Some((after, _)) = previous.filter(|&(_, earlier)| was_set(earlier, now)) {
-            let step = Step {
-                after,
-                before: held.sequence - 1,
-                is_sure: true,
-                at: None,
-                utc: Bound::UNKNOWN,
-                set: None,
-                follows: None,
-                is_told: false,
-            };
+            let step = Step { after, before: held.sequence - 1, ..Step::SILENT };
             steps.push((step, now));
         }
         previous = Some((held.sequence, now));

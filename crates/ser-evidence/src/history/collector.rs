@@ -9,7 +9,7 @@ use super::names::{self, TwoNames};
 use super::{Held, History, LifeHistory, RecorderHistory};
 use crate::record::{
     ClockObservation, ClockStep, EntryRecord, Gap, Life, LifeRecord, PointRecord, Record,
-    RecorderRecord, Watched, Why,
+    RecorderRecord, Suppressed, Watched, Why,
 };
 use crate::site::{ClockRule, Delays, Recorder, Site};
 
@@ -40,6 +40,7 @@ struct Collected {
     observations: Vec<ClockObservation>,
     steps: Vec<ClockStep>,
     watched: Vec<Watched>,
+    suppressed: Vec<Suppressed>,
     reach: Reach,
     points: BTreeSet<PointRecord>,
     stamps: Option<RecorderRecord>,
@@ -160,6 +161,7 @@ impl Collected {
                 self.reach.read_here = true;
                 self.watched.push(watched);
             }
+            Record::Suppressed(ref look) => self.suppressed.push(look.clone()),
             Record::Point(ref point) => _ = self.points.insert(point.clone()),
             Record::Recorder(stamps) => self.stamps = self.stamps.max(Some(stamps)),
         }
@@ -185,6 +187,7 @@ impl Collected {
         self.observations.extend(other.observations);
         self.steps.extend(other.steps);
         self.watched.extend(other.watched);
+        self.suppressed.extend(other.suppressed);
         self.points.extend(other.points);
         self.stamps = self.stamps.max(other.stamps);
     }
@@ -258,6 +261,7 @@ impl Collected {
             observations: sorted(self.observations),
             steps: sorted(self.steps),
             watched: sorted(self.watched),
+            suppressed: sorted(self.suppressed),
             is_not_reached: self.reach.missed && !self.reach.read,
             points: self.points.into_iter().collect(),
             stamps: self.stamps,

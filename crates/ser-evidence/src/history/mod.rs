@@ -15,7 +15,9 @@ pub use collector::Collector;
 pub use gaps::LogGap;
 pub use names::TwoNames;
 
-use crate::record::{ClockObservation, ClockStep, Life, PointRecord, RecorderRecord, Watched};
+use crate::record::{
+    ClockObservation, ClockStep, Life, PointRecord, RecorderRecord, Suppressed, Watched,
+};
 use crate::site::{Recorder, RecorderId};
 
 /// Everything that is known of all recorders.
@@ -40,6 +42,8 @@ pub struct RecorderHistory {
     pub steps: Vec<ClockStep>,
     /// When nothing was missed.
     pub watched: Vec<Watched>,
+    /// How many changes it had left out, at each look.
+    pub suppressed: Vec<Suppressed>,
     /// Whether a source could not reach it, and no other source has read it.
     pub is_not_reached: bool,
     /// What files say that its inputs are called, by input.

@@ -1,6 +1,7 @@
 //! What is complete, and what is missing.
 
 use super::pick::Incident;
+use super::suppressed::{self, LeftOut};
 use crate::clock::Home;
 use crate::history::{LogGap, RecorderHistory};
 use crate::record::{HostReading, Why};
@@ -28,6 +29,9 @@ pub struct Completeness {
     /// Entries of which not even the day is known, because the clock was never set: they may belong
     /// to the incident.
     pub timeless: usize,
+    /// What its chatter filters left out; `None` if nobody looked. It is no gap: the recorder was
+    /// told to leave that out.
+    pub left_out: Option<LeftOut>,
     /// What is known of its clock at its last entry in the incident, or before.
     pub clock: ClockState,
 }
@@ -104,6 +108,7 @@ fn of(
         }),
         conflicts: history.conflicts.len(),
         timeless: timeless(timeline, history, recorder),
+        left_out: suppressed::of(timeline, incident, &history.suppressed),
         clock: near.map_or(ClockState::NoEntry, |event| clock(timeline, event)),
     }
 }

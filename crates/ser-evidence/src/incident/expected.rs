@@ -6,6 +6,7 @@ use super::Row;
 use super::completeness::is_covered_until;
 use super::pick::Incident;
 use super::points::Points;
+use super::suppressed;
 use crate::site::{Edge, Expectation};
 use crate::timeline::{ChangeId, Delta, EventId, Timeline};
 
@@ -50,6 +51,8 @@ pub enum Doubt {
     UnknownState,
     /// Something is missing in the log that should show it.
     Gap,
+    /// Changes of the input that should show it may have been left out, because it chattered.
+    LeftOut,
     /// The log that should show it was not read later than this.
     NotReadSince,
 }
@@ -170,6 +173,9 @@ fn absent(
     let Some(recorder) = recorder else { return Verdict::NotDecidable(Doubt::NotReadSince) };
     if incident.gaps.iter().any(|(event, _)| event.recorder == recorder) {
         return Verdict::NotDecidable(Doubt::Gap);
+    }
+    if point.is_some_and(|point| suppressed::may_lack(timeline, incident, recorder, point.input)) {
+        return Verdict::NotDecidable(Doubt::LeftOut);
     }
     match is_covered_until(timeline, recorder, after, expectation.within_us.1) {
         true => Verdict::Missing,

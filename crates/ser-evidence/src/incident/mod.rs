@@ -14,6 +14,7 @@ mod first_out;
 mod pick;
 mod points;
 mod returns;
+mod suppressed;
 
 pub use breakers::{Bounce, Operation};
 pub use chatter::Fold;
@@ -24,6 +25,7 @@ pub use first_out::FirstOut;
 pub use pick::{Incident, Which};
 pub use points::Points;
 pub use returns::Abnormal;
+pub use suppressed::LeftOut;
 
 use crate::site::{GroupId, PointId};
 use crate::timeline::{ChangeId, Timeline};

@@ -48,6 +48,8 @@ pub enum Why {
     NotReached,
     /// A line of a file could not be read. What is missing may have been in it.
     Unreadable,
+    /// An archive had them and let them go when their time there was over.
+    Expired,
 }
 
 impl Why {

@@ -8,6 +8,7 @@ mod entry;
 mod gap;
 mod life;
 mod names;
+mod suppressed;
 mod watched;
 
 pub use clock::{Boot, ClockObservation, ClockStep, Fellow, HostReading, How, Place, Reference};
@@ -15,6 +16,7 @@ pub use entry::EntryRecord;
 pub use gap::{Gap, Lost, Why};
 pub use life::{Life, LifeRecord};
 pub use names::{PointRecord, RecorderRecord};
+pub use suppressed::Suppressed;
 pub use watched::Watched;
 
 /// One piece of evidence.
@@ -32,6 +34,8 @@ pub enum Record {
     Life(LifeRecord),
     /// From when to when nothing was missed.
     Watched(Watched),
+    /// How many changes the recorder had left out.
+    Suppressed(Suppressed),
     /// What an input is called.
     Point(PointRecord),
     /// In what time the stamps are.

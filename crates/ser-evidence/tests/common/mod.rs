@@ -4,7 +4,7 @@
 use ser_evidence::history::{Collector, History};
 use ser_evidence::record::{
     Boot, ClockObservation, EntryRecord, Gap, HostReading, How, Life, Lost, Place, Record,
-    RecorderRecord, Reference, Why,
+    RecorderRecord, Reference, Suppressed, Why,
 };
 use ser_evidence::site::{self, Site};
 use ser_evidence::time::{Bound, Moment, Shown, shown};
@@ -110,6 +110,24 @@ impl Log {
     /// It is the list of another device, whose stamps are in UTC.
     pub(crate) fn is_list(&mut self) -> &mut Log {
         self.records.push(Record::Recorder(RecorderRecord { utc_offset_s: 0 }));
+        self
+    }
+
+    /// Somebody looked at this time of the same host how many changes of inputs were left out. The
+    /// recorder had been on for so many seconds.
+    pub(crate) fn left_out(&mut self, utc: &str, on_for_s: u64, counts: &[(u8, u32)]) -> &mut Log {
+        let at = |us: i64| HostReading {
+            boot: Boot(1),
+            monotonic: Moment::from_us(monotonic_us(utc) + us),
+            utc: Moment::from_us(booted_us() + monotonic_us(utc) + us),
+            utc_doubt_us: Some(1000),
+        };
+        self.records.push(Record::Suppressed(Suppressed {
+            from: at(-5000),
+            to: at(0),
+            on_for_us: on_for_s * 1_000_000,
+            left_out: counts.iter().copied().collect(),
+        }));
         self
     }
 

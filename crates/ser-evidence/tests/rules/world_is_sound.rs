@@ -226,6 +226,7 @@ fn everything_that_can_happen_does() {
                         ser_evidence::record::Why::NotRecorded(_) => "not recorded",
                         ser_evidence::record::Why::NotReached => "not reached",
                         ser_evidence::record::Why::Unreadable => "unreadable",
+                        ser_evidence::record::Why::Expired => "expired",
                     },
                     1,
                 ),
@@ -240,8 +241,13 @@ fn everything_that_can_happen_does() {
                 Record::Entry(entry) if entry.known == entry.entry.changed => {
                     count("changes only", 1);
                 }
-                // No recorder of ours knows a name, so the last two are never there.
-                Record::Entry(_) | Record::Life(_) | Record::Point(_) | Record::Recorder(_) => {}
+                // No recorder of ours knows a name, and none of this world leaves anything out: the
+                // last three are never there.
+                Record::Entry(_)
+                | Record::Life(_)
+                | Record::Point(_)
+                | Record::Recorder(_)
+                | Record::Suppressed(_) => {}
             }
         }
         count("shifts", story.world.site.shifts.len());

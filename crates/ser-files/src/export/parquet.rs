@@ -18,6 +18,7 @@ use parquet::file::writer::{
 use parquet::schema::parser::parse_message_type;
 use ser_evidence::history::Held;
 use ser_evidence::record::{Gap, Lost, Why};
+
 use ser_evidence::time::Moment;
 use ser_evidence::timeline::{EventId, Item, Timeline};
 
@@ -27,6 +28,7 @@ use super::refused::Refused;
 use super::selection::Selection;
 use super::statement::Origin;
 use crate::digits::push_stamp;
+use crate::missing::why_text;
 use crate::names;
 
 /// How many rows are held before they are written.
@@ -356,19 +358,6 @@ fn points(timeline: &Timeline<'_>) -> Vec<Vec<Option<PointTexts>>> {
     recorders
         .map(|recorder| (1..=32).map(|input| of_input(recorder.site, input)).collect())
         .collect()
-}
-
-/// Why entries are missing, as JSON lines name it; with the inputs where it is about some.
-fn why_text(why: Why) -> String {
-    match why {
-        Why::Overwritten => "overwritten".to_owned(),
-        Why::LogBeganAnew => "log began anew".to_owned(),
-        Why::NotReached => "not reached".to_owned(),
-        Why::Unreadable => "unreadable".to_owned(),
-        Why::NotRecorded(inputs) => {
-            format!("not recorded, inputs {}", ser_proto::Inputs(inputs))
-        }
-    }
 }
 
 type Group<'g, W> = SerializedRowGroupWriter<'g, W>;

@@ -307,7 +307,7 @@ fn states_of(held: &Held) -> States {
 const fn unknown_after(gap: &LogGap) -> u32 {
     match gap.why {
         Why::NotRecorded(inputs) => inputs,
-        Why::Overwritten | Why::LogBeganAnew | Why::NotReached | Why::Unreadable => u32::MAX,
+        _ => u32::MAX,
     }
 }
 

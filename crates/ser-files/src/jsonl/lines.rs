@@ -1,5 +1,7 @@
 //! Lines as they are read: one flat struct for all kinds, so that a line is gone over once.
 
+use std::collections::BTreeMap;
+
 use ser_evidence::record::{Boot, Fellow, HostReading, Place};
 use ser_evidence::time::{Moment, Scale};
 use ser_proto::{Entry, TimeStamp};
@@ -64,6 +66,8 @@ pub(super) struct Line<'a> {
     #[serde(borrow)]
     pub(super) to: Option<HostLine<'a>>,
     pub(super) through: Option<u64>,
+    pub(super) on_for_us: Option<u64>,
+    pub(super) left_out: Option<BTreeMap<u8, u32>>,
     pub(super) input: Option<u8>,
     #[serde(borrow)]
     pub(super) name: Option<Text<'a>>,

@@ -4,7 +4,7 @@ use std::io::BufRead;
 
 use ser_evidence::record::{
     ClockObservation, ClockStep, EntryRecord, Gap, How, Life, LifeRecord, Lost, Place, PointRecord,
-    Record, RecorderRecord, Reference, Told, Watched, Why,
+    Record, RecorderRecord, Reference, Suppressed, Told, Watched, Why,
 };
 use ser_evidence::time::{Bound, Scale, shown};
 use ser_proto::Entry;
@@ -14,6 +14,7 @@ use super::lines::{HostLine, Line, PlaceLine, Result, moment, needed, stamp, und
 use super::texts::{Text, broadcast_named, fit_to_show, life_named, model_named};
 use crate::error::{Problem, ReadError, quoted};
 use crate::lines::Lines;
+use crate::missing::why_named;
 use crate::stamp as stamps;
 
 /// Reads the records of a file. After an error in one line it goes on with the next.
@@ -148,6 +149,7 @@ fn item(line: &Line<'_>) -> std::result::Result<Item, Problem> {
         Some("step") => step(line),
         Some("life") => life(line),
         Some("watched") => watched(line),
+        Some("suppressed") => suppressed(line),
         Some("point") => point(line),
         Some("recorder") => recorder(line),
         // Evidence that is passed over in silence would be lost.
@@ -199,12 +201,8 @@ fn gap(line: &Line<'_>) -> Result<Record> {
     };
     let Text(why) = needed(line.why.as_ref(), "why")?;
     let why = match &**why {
-        "overwritten" => Why::Overwritten,
-        "log began anew" => Why::LogBeganAnew,
         "not recorded" => Why::not_recorded(needed(line.inputs, "inputs")?.0),
-        "not reached" => Why::NotReached,
-        "unreadable" => Why::Unreadable,
-        other => return Err(wrong("why", other)),
+        name => why_named(name).ok_or_else(|| wrong("why", name))?,
     };
     Ok(Record::Gap(Gap { life: life_of(line)?, after: line.after, lost, why }))
 }
@@ -277,6 +275,20 @@ fn watched(line: &Line<'_>) -> Result<Record> {
         from: needed(line.from.as_ref(), "from")?.reading()?,
         to: needed(line.to.as_ref(), "to")?.reading()?,
         through: needed(line.through, "through")?,
+    }))
+}
+
+fn suppressed(line: &Line<'_>) -> Result<Record> {
+    let left_out = needed(line.left_out.as_ref(), "left_out")?;
+    let is_input = |input: &u8| (1..=Suppressed::LAST_INPUT).contains(input);
+    if let Some(wrong) = left_out.keys().find(|input| !is_input(input)) {
+        return Err(format!("there is no input {wrong}"));
+    }
+    Ok(Record::Suppressed(Suppressed {
+        from: needed(line.from.as_ref(), "from")?.reading()?,
+        to: needed(line.to.as_ref(), "to")?.reading()?,
+        on_for_us: needed(line.on_for_us, "on_for_us")?,
+        left_out: left_out.clone(),
     }))
 }
 

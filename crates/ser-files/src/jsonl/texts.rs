@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::fmt;
 
 use ser_console::is_obeyed;
-use ser_evidence::record::{How, Life, PointRecord, Why};
+use ser_evidence::record::{How, Life, PointRecord};
 use ser_proto::{Inputs, Model};
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::ser::SerializeSeq;
@@ -62,16 +62,6 @@ pub(super) const fn model_name(model: Model) -> &'static str {
 
 pub(super) fn model_named(name: &str) -> Option<Model> {
     [Model::Ser160, Model::Ser320].into_iter().find(|&model| model_name(model) == name)
-}
-
-pub(super) const fn why_name(why: Why) -> &'static str {
-    match why {
-        Why::Overwritten => "overwritten",
-        Why::LogBeganAnew => "log began anew",
-        Why::NotRecorded(_) => "not recorded",
-        Why::NotReached => "not reached",
-        Why::Unreadable => "unreadable",
-    }
 }
 
 pub(super) const fn how_name(how: How) -> &'static str {

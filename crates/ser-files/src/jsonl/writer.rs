@@ -1,12 +1,13 @@
 //! From records to lines.
 
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::io::{self, Write};
 
 use ser_console::is_obeyed;
 use ser_evidence::record::{
     Boot, ClockObservation, ClockStep, EntryRecord, Fellow, Gap, HostReading, Life, LifeRecord,
-    Lost, Place, PointRecord, Record, RecorderRecord, Reference, Watched, Why,
+    Lost, Place, PointRecord, Record, RecorderRecord, Reference, Suppressed, Watched, Why,
 };
 use ser_evidence::time::{Moment, stamp};
 use ser_proto::{Entry, Inputs, TimeStamp};
@@ -14,7 +15,8 @@ use serde::{Serialize, Serializer};
 use serde_json::ser::Formatter;
 
 use super::SCHEMA;
-use super::texts::{Numbers, how_name, model_name, why_name};
+use super::texts::{Numbers, how_name, model_name};
+use crate::missing::why_name;
 use crate::stamp::untold_year;
 
 /// Writes records, each as a line. The fields of a kind always come in the same order.
@@ -48,6 +50,7 @@ impl<W: Write> Writer<W> {
             Record::Step(step) => self.line(&StepLine::of(recorder, step)),
             Record::Life(life) => self.line(&LifeLine::of(recorder, life)),
             Record::Watched(watched) => self.line(&WatchedLine::of(recorder, watched)),
+            Record::Suppressed(look) => self.line(&SuppressedLine::of(recorder, look)),
             Record::Point(point) => self.line(&PointLine::of(recorder, point)),
             Record::Recorder(stamps) => self.line(&RecorderLine::of(recorder, stamps)),
         }
@@ -156,7 +159,7 @@ impl<'a> GapLine<'a> {
         };
         let inputs = match why {
             Why::NotRecorded(inputs) => Some(Numbers(Inputs(inputs))),
-            Why::Overwritten | Why::LogBeganAnew | Why::NotReached | Why::Unreadable => None,
+            _ => None,
         };
         let (why, life) = (why_name(why), AsText(life));
         GapLine { record: "gap", recorder, lost, count, after, why, inputs, life }
@@ -323,6 +326,24 @@ impl<'a> WatchedLine<'a> {
         let (from, to) = (HostFields::from(&watched.from), HostFields::from(&watched.to));
         let (life, through) = (AsText(watched.life), watched.through);
         WatchedLine { record: "watched", recorder, life, from, to, through }
+    }
+}
+
+#[derive(Serialize)]
+struct SuppressedLine<'a> {
+    record: &'static str,
+    recorder: &'a str,
+    from: HostFields,
+    to: HostFields,
+    on_for_us: u64,
+    left_out: &'a BTreeMap<u8, u32>,
+}
+
+impl<'a> SuppressedLine<'a> {
+    fn of(recorder: &'a str, look: &'a Suppressed) -> SuppressedLine<'a> {
+        let (from, to) = (HostFields::from(&look.from), HostFields::from(&look.to));
+        let (on_for_us, left_out) = (look.on_for_us, &look.left_out);
+        SuppressedLine { record: "suppressed", recorder, from, to, on_for_us, left_out }
     }
 }
 

@@ -79,10 +79,11 @@ fn write_about<W: Write>(
         Some(Record::Step(ClockStep { place, ..*found }))
     });
     let watched = history.watched.iter().map(|found| Record::Watched(*found));
+    let suppressed = history.suppressed.iter().map(|look| Record::Suppressed(look.clone()));
     let missed = history.is_not_reached.then_some(Record::Gap(Gap::NOT_REACHED));
     let of_log = stamps.chain(points).chain(lives);
     of_log
-        .chain(observations.chain(steps).chain(watched).chain(missed))
+        .chain(observations.chain(steps).chain(watched).chain(suppressed).chain(missed))
         .try_for_each(|record| lines.record(&history.recorder.name, &record))
 }
 

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use ser_console::is_obeyed;
 use ser_evidence::clock::{Home, Nominal};
-use ser_evidence::incident::{ClockState, FirstOut, StretchEnd, Verdict};
+use ser_evidence::incident::{ClockState, FirstOut, LeftOut, StretchEnd, Verdict};
 use ser_evidence::timeline::{ChangeId, Delta, EventId};
 use serde_json::{Value, json};
 
@@ -161,10 +161,23 @@ fn recorders(document: &Document<'_>) -> Vec<Value> {
             })).collect::<Vec<_>>(),
             "conflicts": of.conflicts,
             "without_time": of.timeless,
+            "left_out": of.left_out.as_ref().map(left_out),
             "clock": clock_of(of.clock),
         })
     })
     .collect()
+}
+
+/// What chatter filters left out.
+fn left_out(found: &LeftOut) -> Value {
+    let LeftOut { changes, from, until, is_to_end } = found;
+    let input = |(&input, &at_most): (&u8, &u64)| json!({ "input": input, "at_most": at_most });
+    json!({
+        "changes": changes.iter().map(input).collect::<Vec<_>>(),
+        "from": from.and_then(|reading| rfc3339(reading.utc.us())),
+        "until": rfc3339(until.utc.us()),
+        "is_to_end": is_to_end,
+    })
 }
 
 /// An end of what is complete, with what is known of the clock there.

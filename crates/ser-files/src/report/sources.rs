@@ -2,7 +2,7 @@
 //! digests.
 
 use ser_evidence::clock::{Finding, Home, LinkReason};
-use ser_evidence::incident::{ClockState, Completeness, StretchEnd};
+use ser_evidence::incident::{ClockState, Completeness, LeftOut, StretchEnd};
 use ser_evidence::record::HostReading;
 use ser_evidence::timeline::{EventId, Timeline};
 
@@ -128,6 +128,39 @@ fn clock_text(document: &Document<'_>, of: &Completeness) -> String {
                 .map_or("UTC not known".to_owned(), |us| format!("± {} of UTC", doubt(us)));
             format!("{order}, {utc}")
         }
+    }
+}
+
+/// Changes that chatter filters left out, an input each: in no list of entries they can be seen.
+pub(super) fn left_out(document: &Document<'_>, clock: &Clock) -> Vec<String> {
+    let timeline = document.timeline;
+    let mut lines = Vec::new();
+    for of in &document.report.completeness {
+        let Some(LeftOut { changes, from, until, is_to_end }) = &of.left_out else { continue };
+        let time = |reading: &HostReading| clock.date_and_time(reading.utc.us());
+        let from = from.as_ref().map_or("its power-up".to_owned(), time);
+        let more = if *is_to_end { "" } else { "; nobody has looked since" };
+        for (&input, &count) in changes {
+            lines.push(format!(
+                "{}: {}, up to {count} {} by its chatter filter, between {from} and {}{more}",
+                verdict::recorder_name(timeline, of.recorder),
+                input_name(timeline, of.recorder, input),
+                if count == 1 { "change" } else { "changes" },
+                time(until),
+            ));
+        }
+    }
+    lines
+}
+
+/// As `input 3 (52-1 closed)`.
+fn input_name(timeline: &Timeline<'_>, recorder: u32, input: u8) -> String {
+    let history = timeline.history().recorders.get(recorder as usize);
+    let id = history.and_then(|history| history.site);
+    let mut points = timeline.site().points.iter();
+    match points.find(|point| Some(point.recorder) == id && point.input == input) {
+        Some(point) => format!("input {input} ({})", names::harmless(&point.name)),
+        None => format!("input {input}"),
     }
 }
 

@@ -188,7 +188,11 @@ pub(super) fn wrong(document: &Document<'_>, lists: Lists) -> Vec<String> {
             let point = names::point(timeline, row.point, row.change.input);
             let recorder = names::recorder(timeline, row.change.event);
             let changes = fold.changes.len();
-            wrong.push(format!("{point} ({recorder}) chattered ({changes} changes)"));
+            let more = match left_out(report, row.change) {
+                Some(more) => format!(", and up to {more} more left out"),
+                None => String::new(),
+            };
+            wrong.push(format!("{point} ({recorder}) chattered ({changes} changes{more})"));
         }
     }
     let moved = report.abnormal.iter().filter(|abnormal| abnormal.since.is_some());
@@ -254,6 +258,12 @@ fn step_trouble(timeline: &Timeline<'_>, step: &StepResult) -> Option<String> {
     }
 }
 
+/// How many changes of the same input a chatter filter may have left out, if it has.
+fn left_out(report: &Report, change: ChangeId) -> Option<u64> {
+    let of = report.completeness.iter().find(|of| of.recorder == change.event.recorder)?;
+    of.left_out.as_ref()?.changes.get(&change.input).copied()
+}
+
 /// Why a step cannot be decided.
 pub(super) fn why_undecidable(why: Doubt) -> &'static str {
     match why {
@@ -261,6 +271,7 @@ pub(super) fn why_undecidable(why: Doubt) -> &'static str {
         Doubt::NoCommonTime => "nothing is known of the time between the two",
         Doubt::UnknownState => "one of the two changed to a state that is not known",
         Doubt::Gap => "an entry may be missing",
+        Doubt::LeftOut => "changes of its input may have been left out, because it chattered",
         Doubt::NotReadSince => "its log was not read since",
     }
 }

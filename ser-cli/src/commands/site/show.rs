@@ -8,8 +8,8 @@ use std::path::Path;
 
 use clap::ValueEnum;
 
-use crate::error::{Failure, Result};
-use crate::output::Palette;
+use crate::error::Result;
+use crate::output::{Palette, json_to};
 use crate::site_file;
 
 /// How a site is shown.
@@ -27,11 +27,7 @@ pub(super) fn run(file: &Path, format: Format) -> Result<()> {
     let mut out = io::stdout().lock();
     match format {
         Format::Table => tables::write(&mut out, &site, Palette::of_stdout())?,
-        Format::Json => {
-            let json = serde_json::to_string_pretty(&json::site(&site));
-            let json = json.map_err(|error| Failure::new(error).hint("report this as a bug"))?;
-            writeln!(out, "{json}")?;
-        }
+        Format::Json => json_to(&mut out, &json::site(&site))?,
     }
     Ok(out.flush()?)
 }

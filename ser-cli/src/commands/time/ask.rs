@@ -78,7 +78,7 @@ impl Asking<'_> {
         let seen = place.and_then(|place| looks.observation(place)).map(Record::Clock);
         let records: Vec<Record> = seen.into_iter().collect();
         kept.add(&records);
-        let setting = connection.clock_setting().unwrap_or_else(ClockSetting::here);
+        let setting = connection.clock_setting().unwrap_or_else(ClockSetting::of_this_computer);
         Ok(told(&looks, &earlier, setting, records)
             .map_or(Answer::Silent, |told| Answer::Told(Box::new(told))))
     }

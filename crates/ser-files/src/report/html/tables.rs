@@ -47,6 +47,7 @@ pub(super) fn made_from(document: &Document<'_>, clock: &Clock) -> Markup {
             h2 #made-from { "Made from" }
             (table("made-from", &titles, &rows))
             @for missed in sources::not_reached(document) { p.alarm { "Not reached: " (missed) } }
+            @for changes in sources::left_out(document, clock) { p.alarm { "Left out: " (changes) } }
             @for finding in sources::findings(document.timeline) {
                 p.alarm { "Clocks: " (finding) }
             }

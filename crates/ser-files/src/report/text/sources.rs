@@ -37,6 +37,9 @@ pub(super) fn write(
     if let Some(damaged) = verdict::damaged(document) {
         writeln!(out, "{alarm}damaged{alarm:#} {damaged}: what was in them is not known")?;
     }
+    for changes in sources::left_out(document, clock) {
+        writeln!(out, "{alarm}left out{alarm:#} {changes}")?;
+    }
     for finding in sources::findings(document.timeline) {
         writeln!(out, "{alarm}clocks{alarm:#} {finding}")?;
     }

@@ -4,9 +4,8 @@ use std::io::{self, Write};
 
 use ser_console::Harmless;
 use ser_evidence::site::{ClockRule, Edge, Point, PointId, Recorder, RecorderId, Role, Site};
-use unicode_width::UnicodeWidthStr;
 
-use crate::output::Palette;
+use crate::output::{Grid, Palette};
 use crate::site_file::{model_name, role_name};
 
 /// Writes all tables that have rows.
@@ -28,46 +27,7 @@ pub(super) fn write(out: &mut dyn Write, site: &Site, palette: Palette) -> io::R
     Ok(())
 }
 
-/// A table, whose first row are the titles of its columns.
-struct Table {
-    title: Option<String>,
-    columns: Vec<&'static str>,
-    rows: Vec<Vec<String>>,
-}
-
-impl Table {
-    /// Columns that are empty are left out.
-    fn write(&self, out: &mut dyn Write, palette: Palette) -> io::Result<()> {
-        if let Some(title) = &self.title {
-            writeln!(out, "{title}")?;
-        }
-        let cell = |row: &[String], column: usize| row.get(column).map_or(0, |cell| cell.width());
-        let widths: Vec<(usize, usize)> = (0..self.columns.len())
-            .filter_map(|column| {
-                let width = self.rows.iter().map(|row| cell(row, column)).max();
-                let width = width.filter(|&width| width > 0)?;
-                let title = self.columns.get(column).map_or(0, |title| title.width());
-                Some((column, width.max(title)))
-            })
-            .collect();
-        let titles: Vec<String> = self.columns.iter().map(|&title| title.to_owned()).collect();
-        let style = palette.title;
-        writeln!(out, "{style}{}{style:#}", line(&titles, &widths))?;
-        self.rows.iter().try_for_each(|row| writeln!(out, "{}", line(row, &widths)))
-    }
-}
-
-fn line(row: &[String], widths: &[(usize, usize)]) -> String {
-    let mut line = String::new();
-    for (column, width) in widths {
-        let cell = row.get(*column).map_or("", String::as_str);
-        line += cell;
-        line.extend(std::iter::repeat_n(' ', (width + 2).saturating_sub(cell.width())));
-    }
-    line.trim_end().to_owned()
-}
-
-fn recorders(site: &Site) -> Table {
+fn recorders(site: &Site) -> Grid {
     let row = |recorder: &Recorder| {
         let Recorder { name, port, model, log_size, is_original, clock, .. } = recorder;
         vec![
@@ -79,7 +39,7 @@ fn recorders(site: &Site) -> Table {
             clock_name(*clock),
         ]
     };
-    Table {
+    Grid {
         title: None,
         columns: vec!["recorder", "port", "model", "", "log", "clock"],
         rows: site.recorders.iter().map(row).collect(),
@@ -87,7 +47,7 @@ fn recorders(site: &Site) -> Table {
 }
 
 /// How exact the recorders are.
-fn exactness(site: &Site) -> Table {
+fn exactness(site: &Site) -> Grid {
     let row = |recorder: &Recorder| {
         let Recorder { name, drift_ppb, delays, .. } = recorder;
         vec![
@@ -97,7 +57,7 @@ fn exactness(site: &Site) -> Table {
             delay(delays.opening_us),
         ]
     };
-    Table {
+    Grid {
         title: None,
         columns: vec!["recorder", "drift", "closing is seen after", "opening is seen after"],
         rows: site.recorders.iter().map(row).collect(),
@@ -105,12 +65,12 @@ fn exactness(site: &Site) -> Table {
 }
 
 /// A table for each recorder that has points.
-fn points(site: &Site) -> Vec<Table> {
+fn points(site: &Site) -> Vec<Grid> {
     let of = |index: usize, recorder: &Recorder| {
         let here = site.points.iter().filter(|point| point.recorder == RecorderId(index));
         let mut here: Vec<&Point> = here.collect();
         here.sort_by_key(|point| point.input);
-        Table {
+        Grid {
             title: Some(format!("points of {}", harmless(&recorder.name))),
             columns: vec![
                 "input",
@@ -153,7 +113,7 @@ fn point_row(site: &Site, point: &Point) -> Vec<String> {
     ]
 }
 
-fn expectations(site: &Site) -> Table {
+fn expectations(site: &Site) -> Grid {
     let rows = site.expectations.iter().map(|expect| {
         let (earliest, latest) = expect.within_us;
         vec![
@@ -163,14 +123,10 @@ fn expectations(site: &Site) -> Table {
             format!("{} to {} ms", thousandths(earliest), thousandths(latest)),
         ]
     });
-    Table {
-        title: None,
-        columns: vec!["expected", "after", "then", "within"],
-        rows: rows.collect(),
-    }
+    Grid { title: None, columns: vec!["expected", "after", "then", "within"], rows: rows.collect() }
 }
 
-fn observations(site: &Site) -> Table {
+fn observations(site: &Site) -> Grid {
     let rows = site.observations.iter().map(|seen| {
         vec![
             recorder_name(site, seen.recorder),
@@ -180,10 +136,10 @@ fn observations(site: &Site) -> Table {
         ]
     });
     let columns = vec!["clock of", "seen at", "showed", "within"];
-    Table { title: None, columns, rows: rows.collect() }
+    Grid { title: None, columns, rows: rows.collect() }
 }
 
-fn shifts(site: &Site) -> Table {
+fn shifts(site: &Site) -> Grid {
     let rows = site.shifts.iter().map(|shift| {
         vec![
             recorder_name(site, shift.recorder),
@@ -193,7 +149,7 @@ fn shifts(site: &Site) -> Table {
             harmless(&shift.why),
         ]
     });
-    Table { title: None, columns: vec!["shifted", "by", "from", "to", "why"], rows: rows.collect() }
+    Grid { title: None, columns: vec!["shifted", "by", "from", "to", "why"], rows: rows.collect() }
 }
 
 /// A change as the file has it, with the recorder, and with the text of the state.
@@ -273,21 +229,6 @@ mod tests {
         let mut out = Vec::new();
         write(&mut out, &site, Palette::plain()).unwrap();
         assert_eq!(String::from_utf8(out).unwrap(), include_str!("northfield.txt"));
-    }
-
-    #[test]
-    fn columns_are_as_wide_as_their_letters() {
-        let table = Table {
-            title: None,
-            columns: vec!["name", "empty", "on"],
-            rows: vec![
-                vec!["遮断器".to_owned(), String::new(), "入".to_owned()],
-                vec!["52-1".to_owned(), String::new(), "x".to_owned()],
-            ],
-        };
-        let mut out = Vec::new();
-        table.write(&mut out, Palette::plain()).unwrap();
-        assert_eq!(String::from_utf8(out).unwrap(), "name    on\n遮断器  入\n52-1    x\n");
     }
 
     #[test]

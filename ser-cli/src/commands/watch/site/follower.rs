@@ -19,6 +19,7 @@ use crate::kept::KeptRecords;
 use crate::log_identity;
 use crate::original::Originals;
 use crate::output::{Annotator, Event, EventWriter, Loss, Record, RecorderColumn};
+use crate::suppressed::LeftOut;
 use ser_evidence::record::{self as evidence, EntryRecord};
 
 /// How long a recorder that has failed is left alone.
@@ -95,6 +96,9 @@ impl Follower<'_> {
         let mut annotator = Annotator::new(keeper.life()?, keeper.before());
         let kept = KeptRecords::of(&self.args.state, &self.connection)?;
         let mut clock = met.log.map(|_| NowAndThen::new());
+        let left_out = KeptRecords::of(&self.args.state, &self.connection)?;
+        let left_out = LeftOut::new(Some(left_out), self.connection.points()).of(&self.column.name);
+        let mut left_out = met.log.map(|_| left_out);
         let result = loop {
             if self.is_stopped() {
                 break Ok(());
@@ -113,6 +117,8 @@ impl Follower<'_> {
             if std::mem::take(has_failed) {
                 inform(format_args!("{}: all is well again", self.column.name));
             }
+            // The list has no place for it, and it is told.
+            let _ = left_out.as_mut().and_then(|left_out| left_out.look_if_due(&mut unit));
             keeper.save_if_due()?;
             let place = watcher.cursor().map(|cursor| (annotator.life(), cursor));
             if let (Some(clock), Some(place)) = (&mut clock, place) {

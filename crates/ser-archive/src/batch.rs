@@ -1,0 +1,50 @@
+//! What is added at once, and what comes of it.
+
+use ser_evidence::record::{Life, Record};
+use ser_evidence::time::{Moment, Utc};
+use ser_proto::Entry;
+
+/// What a collector has read of one recorder, and where it goes on. All of it is written, or nothing.
+#[derive(Clone, Debug)]
+pub struct Batch {
+    /// Who has read it.
+    pub collector: String,
+    /// Whose log it is.
+    pub recorder: String,
+    /// What was read, in that order.
+    pub records: Vec<Record>,
+    /// Where reading goes on, if that has moved.
+    pub bookmark: Option<Bookmark>,
+    /// When it is written, by the clock of the computer.
+    pub at: Moment<Utc>,
+}
+
+/// Where a collector goes on reading a recorder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bookmark {
+    /// The life of the log.
+    pub life: Life,
+    /// The sequence of the last entry that was read.
+    pub sequence: u64,
+    /// Whether sequences count from the beginning of the log.
+    pub is_exact: bool,
+    /// The last entry that was read, by which the log is known again.
+    pub anchor: Option<Entry>,
+    /// How many entries the log holds, if that is known.
+    pub log_size: Option<u16>,
+}
+
+/// What was written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Appended {
+    /// The position of the last row in the archive.
+    pub position: i64,
+    /// Entries that were new.
+    pub entries: u64,
+    /// Entries that contradict others at their place.
+    pub conflicts: u64,
+    /// Other records that were new.
+    pub evidence: u64,
+    /// Records that were there already.
+    pub known: u64,
+}

@@ -1,0 +1,256 @@
+//! An archive in a file, by `SQLite`.
+//!
+//! Changes go to a log beside the file (WAL), so readers and the one writer do not wait for each
+//! other. A transaction is on the disk when it ends (`synchronous = FULL`): what a recorder is told
+//! to forget afterwards must not be lost by a power cut.
+
+use std::path::Path;
+use std::time::Duration;
+
+use rusqlite::backup::Backup;
+use rusqlite::types::ValueRef;
+use rusqlite::{Connection, ErrorCode, OpenFlags, ToSql, params_from_iter};
+
+use crate::error::{Error, Result, named};
+use crate::sql::{Columns, OnRow, Sql, Value};
+
+/// What is in the head of our files, so that nothing else is taken for one: `SERa`.
+const APPLICATION_ID: i64 = 0x5345_5261;
+
+/// How long a writer waits for another one.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// How many prepared statements are kept.
+const STATEMENTS: usize = 64;
+
+/// How far the log beside the file is cut back when nobody needs it, in bytes.
+const LOG_LEFT: i64 = 64 << 20;
+
+/// The steps from nothing to the newest schema.
+const MIGRATIONS: [&str; 1] = [include_str!("../migrations/sqlite/0001_first.sql")];
+
+/// A file.
+pub(crate) struct Sqlite {
+    connection: Connection,
+    name: String,
+}
+
+impl Sqlite {
+    /// Opens a file to read it. Nothing is made, and nothing is changed.
+    pub(crate) fn open_to_read(path: &Path) -> Result<Sqlite> {
+        // Without write access SQLite could not make the index of the log beside the file.
+        let file = Sqlite::open(path, OpenFlags::SQLITE_OPEN_READ_WRITE)
+            .or_else(|_| Sqlite::open(path, OpenFlags::SQLITE_OPEN_READ_ONLY))?;
+        file.pragma("query_only", 1)?;
+        match file.is_ours()? {
+            true => Ok(file),
+            false => Err(file.not_ours("it is empty")),
+        }
+    }
+
+    /// Opens a file to write to it, or makes it.
+    pub(crate) fn open_to_write(path: &Path) -> Result<Sqlite> {
+        let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
+        let file = Sqlite::open(path, flags)?;
+        // Another program's file stays as it is.
+        file.is_ours()?;
+        for (pragma, value) in [("journal_mode", "WAL"), ("synchronous", "FULL")] {
+            file.pragma(pragma, value)?;
+        }
+        file.pragma("foreign_keys", 1)?;
+        file.pragma("journal_size_limit", LOG_LEFT)?;
+        Ok(file)
+    }
+
+    fn open(path: &Path, flags: OpenFlags) -> Result<Sqlite> {
+        let name = named(path);
+        let flags = flags | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+        let is_there = path.exists();
+        let connection = Connection::open_with_flags(path, flags).map_err(|error| {
+            match error.sqlite_error_code() {
+                Some(ErrorCode::CannotOpen) if !is_there => {
+                    Error::Missing { archive: name.clone() }
+                }
+                _ => failed(&name, error),
+            }
+        })?;
+        connection.set_prepared_statement_cache_capacity(STATEMENTS);
+        connection.busy_timeout(PATIENCE).map_err(|error| failed(&name, error))?;
+        Ok(Sqlite { connection, name })
+    }
+
+    fn pragma(&self, pragma: &str, value: impl ToSql) -> Result<()> {
+        // Some of them answer, and the answer is of no interest.
+        let done = self.connection.pragma_update_and_check(None, pragma, value, |_| Ok(()));
+        match done {
+            Ok(()) | Err(rusqlite::Error::QueryReturnedNoRows) => Ok(()),
+            Err(error) => Err(self.failed(error)),
+        }
+    }
+
+    /// Whether this is an archive; a file without any table is none yet.
+    fn is_ours(&self) -> Result<bool> {
+        let number = |sql| self.connection.query_row(sql, (), |row| row.get::<_, i64>(0));
+        let id = number("PRAGMA application_id").map_err(|error| self.failed(error))?;
+        let tables = number("SELECT count(*) FROM sqlite_schema");
+        let tables = tables.map_err(|error| self.failed(error))?;
+        match (id, tables) {
+            (APPLICATION_ID, _) => Ok(true),
+            (0, 0) => Ok(false),
+            _ => Err(self.not_ours("it is a database of another program")),
+        }
+    }
+
+    fn not_ours(&self, what: &str) -> Error {
+        Error::NotOurs { archive: self.name.clone(), what: what.to_owned() }
+    }
+
+    fn failed(&self, error: rusqlite::Error) -> Error {
+        failed(&self.name, error)
+    }
+}
+
+/// How much of a file is copied before others may write again.
+const PAGES_AT_ONCE: std::ffi::c_int = 4096;
+
+impl Sql for Sqlite {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn has_tables(&mut self) -> Result<bool> {
+        self.is_ours()
+    }
+
+    fn migrate(&mut self, schema: i64) -> Result<()> {
+        let done = usize::try_from(schema).unwrap_or(0);
+        for step in MIGRATIONS.iter().skip(done) {
+            self.connection.execute_batch(step).map_err(|error| self.failed(error))?;
+        }
+        self.pragma("application_id", APPLICATION_ID)
+    }
+
+    fn copy_to(&mut self, path: &Path) -> Result<()> {
+        let mut copy = Sqlite::open(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
+        let copied = Backup::new(&self.connection, &mut copy.connection)
+            .and_then(|backup| backup.run_to_completion(PAGES_AT_ONCE, Duration::ZERO, None));
+        copied.map_err(|error| failed(&copy.name, error))
+    }
+
+    fn begin(&mut self) -> Result<()> {
+        self.run("BEGIN IMMEDIATE", &[]).map(|_| ())
+    }
+
+    fn commit(&mut self) -> Result<()> {
+        self.run("COMMIT", &[]).map(|_| ())
+    }
+
+    fn roll_back(&mut self) {
+        if !self.connection.is_autocommit() {
+            // SQLite has rolled back itself if this fails.
+            _ = self.run("ROLLBACK", &[]);
+        }
+    }
+
+    fn run(&mut self, sql: &'static str, values: &[Value]) -> Result<u64> {
+        let changed = self
+            .connection
+            .prepare_cached(sql)
+            .and_then(|mut statement| statement.execute(params_from_iter(values)));
+        changed.map(|changed| changed as u64).map_err(|error| self.failed(error))
+    }
+
+    fn run_each(&mut self, sql: &'static str, rows: &[Vec<Value>]) -> Result<()> {
+        let done = self.connection.prepare_cached(sql).and_then(|mut statement| {
+            rows.iter()
+                .try_for_each(|values| statement.execute(params_from_iter(values)).map(|_| ()))
+        });
+        done.map_err(|error| self.failed(error))
+    }
+
+    fn query(&mut self, sql: &'static str, values: &[Value], on: OnRow<'_>) -> Result<()> {
+        let mut statement =
+            self.connection.prepare_cached(sql).map_err(|error| self.failed(error))?;
+        let mut rows =
+            statement.query(params_from_iter(values)).map_err(|error| self.failed(error))?;
+        while let Some(row) = rows.next().map_err(|error| self.failed(error))? {
+            on(&Row { row, name: &self.name })?;
+        }
+        Ok(())
+    }
+
+    fn size(&mut self) -> Result<u64> {
+        let number = |sql| self.connection.query_row(sql, (), |row| row.get::<_, i64>(0));
+        let size = number("PRAGMA page_count")
+            .and_then(|all| Ok((all, number("PRAGMA freelist_count")?)))
+            .and_then(|(all, free)| Ok((all - free) * number("PRAGMA page_size")?));
+        size.map(|bytes| u64::try_from(bytes).unwrap_or(0)).map_err(|error| self.failed(error))
+    }
+
+    fn give_back(&mut self) -> Result<()> {
+        // Pages that are free are used again, so the file stays as it is. Only its log shrinks.
+        self.pragma("wal_checkpoint", "TRUNCATE")
+    }
+}
+
+impl ToSql for Value {
+    fn to_sql(&self) -> rusqlite::Result<rusqlite::types::ToSqlOutput<'_>> {
+        Ok(rusqlite::types::ToSqlOutput::Borrowed(match self {
+            Value::Null => ValueRef::Null,
+            Value::Int(value) => ValueRef::Integer(*value),
+            Value::Text(value) => ValueRef::Text(value.as_bytes()),
+            Value::Bytes(value) => ValueRef::Blob(value),
+        }))
+    }
+}
+
+struct Row<'r> {
+    row: &'r rusqlite::Row<'r>,
+    name: &'r str,
+}
+
+impl Row<'_> {
+    fn value(&self, column: usize) -> Result<ValueRef<'_>> {
+        self.row.get_ref(column).map_err(|error| failed(self.name, error))
+    }
+
+    fn wrong(&self, column: usize, what: &str) -> Error {
+        let name = self.row.as_ref().column_name(column).unwrap_or("?");
+        Error::damaged(self.name, format!("column {name} holds no {what}"))
+    }
+}
+
+impl Columns for Row<'_> {
+    fn int(&self, column: usize) -> Result<i64> {
+        self.maybe_int(column)?.ok_or_else(|| self.wrong(column, "number"))
+    }
+
+    fn maybe_int(&self, column: usize) -> Result<Option<i64>> {
+        match self.value(column)? {
+            ValueRef::Null => Ok(None),
+            ValueRef::Integer(value) => Ok(Some(value)),
+            _ => Err(self.wrong(column, "number")),
+        }
+    }
+
+    fn text(&self, column: usize) -> Result<&str> {
+        self.value(column)?.as_str().map_err(|_| self.wrong(column, "text"))
+    }
+
+    fn bytes(&self, column: usize) -> Result<&[u8]> {
+        self.value(column)?.as_blob().map_err(|_| self.wrong(column, "bytes"))
+    }
+}
+
+fn failed(name: &str, error: rusqlite::Error) -> Error {
+    let archive = name.to_owned();
+    match error.sqlite_error_code() {
+        Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => Error::Busy { archive },
+        Some(ErrorCode::DiskFull) => Error::Full { archive },
+        Some(ErrorCode::NotADatabase) => {
+            Error::NotOurs { archive, what: "it is no database".to_owned() }
+        }
+        Some(ErrorCode::DatabaseCorrupt) => Error::Damaged { archive, what: error.to_string() },
+        _ => Error::Database { archive, source: Box::new(error) },
+    }
+}

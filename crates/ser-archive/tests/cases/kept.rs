@@ -1,0 +1,156 @@
+//! What is added is there, once, and given back as it was.
+
+use crate::common::*;
+use ser_archive::{Access, Error, Window};
+use ser_evidence::record::Record;
+use ser_evidence::time::shown;
+use ser_proto::{Inputs, TimeStamp};
+
+pub(crate) fn what_was_added_is_given_back_and_added_again_changes_nothing(home: &Home) {
+    let mut archive = home.open();
+    let known = vec![life(LIFE), observed(LIFE, 3), gap(LIFE, 5, 2), watched(LIFE, 9)];
+    let records = [known.clone(), entries(LIFE, [1, 2, 3, 4, 5, 8, 9])].concat();
+    let appended = archive.append(&[batch(records.clone())]).unwrap();
+    assert_eq!((appended.entries, appended.evidence, appended.known), (7, 4, 0));
+    assert_eq!(everything(&mut archive, "U1-SER1"), records);
+    assert_eq!(in_order(&mut archive), records);
+
+    let again = archive.append(&[batch(records.clone())]).unwrap();
+    assert_eq!((again.entries, again.evidence, again.known), (0, 0, 11));
+    assert_eq!(again.position, appended.position);
+    drop(archive);
+    let mut archive = home.open_for(Access::Read).unwrap();
+    assert_eq!(everything(&mut archive, "U1-SER1"), records);
+    assert!(everything(&mut archive, "U1-SER2").is_empty());
+    assert_eq!(archive.recorders().unwrap(), ["U1-SER1"]);
+}
+
+pub(crate) fn two_collectors_that_read_the_same_add_it_once(home: &Home) {
+    let (mut one, mut other) = (home.open(), home.open());
+    one.append(&[batch(entries(LIFE, 1..=5))]).unwrap();
+    let mut late = batch(entries(LIFE, 3..=7));
+    late.collector = "control room".to_owned();
+    let appended = other.append(&[late]).unwrap();
+    assert_eq!((appended.entries, appended.known, appended.conflicts), (2, 3, 0));
+    assert_eq!(everything(&mut one, "U1-SER1"), entries(LIFE, 1..=7));
+}
+
+pub(crate) fn another_content_at_the_same_place_is_kept_beside_it(home: &Home) {
+    let mut archive = home.open();
+    let mut other = entry(LIFE, 2);
+    other.entry.state = Inputs(0);
+    let (first, other) = (entries(LIFE, 1..=3), vec![Record::Entry(other)]);
+    archive.append(&[batch(first.clone())]).unwrap();
+    for conflicts in [1, 0] {
+        let appended = archive.append(&[batch(other.clone())]).unwrap();
+        assert_eq!((appended.entries, appended.conflicts), (0, conflicts));
+    }
+    assert_eq!(everything(&mut archive, "U1-SER1"), [first, other].concat());
+    let check = archive.check().unwrap();
+    assert_eq!(check.recorders[0].conflicts, 1);
+    assert!(!check.is_sound());
+}
+
+pub(crate) fn a_conflict_within_one_batch_is_one_too(home: &Home) {
+    let mut archive = home.open();
+    let mut other = entry(LIFE, 1);
+    other.entry.changed = Inputs(4);
+    let records = vec![Record::Entry(entry(LIFE, 1)), Record::Entry(other)];
+    let appended = archive.append(&[batch([records.clone(), records].concat())]).unwrap();
+    assert_eq!((appended.entries, appended.conflicts, appended.known), (1, 1, 2));
+}
+
+pub(crate) fn the_number_in_the_ring_is_no_part_of_what_an_entry_is(home: &Home) {
+    let mut archive = home.open();
+    let mut resized = entry(LIFE, 1);
+    resized.number = 700;
+    archive.append(&[batch(entries(LIFE, [1]))]).unwrap();
+    assert_eq!(archive.append(&[batch(vec![Record::Entry(resized)])]).unwrap().known, 1);
+}
+
+pub(crate) fn a_bookmark_moves_with_what_was_read_or_not_at_all(home: &Home) {
+    let mut archive = home.open();
+    assert_eq!(archive.bookmark("cellar", "U1-SER1").unwrap(), None);
+    let mut good = batch(entries(LIFE, 1..=5));
+    good.bookmark = Some(bookmark(LIFE, 5));
+    archive.append(&[good]).unwrap();
+    assert_eq!(archive.bookmark("cellar", "U1-SER1").unwrap(), Some(bookmark(LIFE, 5)));
+    assert_eq!(archive.bookmark("control room", "U1-SER1").unwrap(), None);
+
+    let mut nowhere = entry(LIFE, 7);
+    nowhere.sequence = None;
+    let mut bad = batch(vec![Record::Entry(entry(LIFE, 6)), Record::Entry(nowhere)]);
+    bad.bookmark = Some(bookmark(LIFE, 7));
+    let mut fine = batch(entries(NEXT_LIFE, [1]));
+    fine.recorder = "U1-SER2".to_owned();
+    let error = archive.append(&[fine, bad]).unwrap_err();
+    assert!(matches!(error, Error::NoPlace { .. }), "{error}");
+    assert_eq!(archive.bookmark("cellar", "U1-SER1").unwrap(), Some(bookmark(LIFE, 5)));
+    assert_eq!(everything(&mut archive, "U1-SER1"), entries(LIFE, 1..=5));
+    assert_eq!(archive.recorders().unwrap(), ["U1-SER1"]);
+
+    let mut empty = batch(Vec::new());
+    empty.bookmark = Some(bookmark(NEXT_LIFE, 0));
+    let position = archive.position().unwrap();
+    archive.append(&[empty]).unwrap();
+    assert_eq!(archive.bookmark("cellar", "U1-SER1").unwrap(), Some(bookmark(NEXT_LIFE, 0)));
+    assert_eq!(archive.position().unwrap(), position);
+}
+
+pub(crate) fn a_window_is_by_what_the_recorder_showed_and_an_impossible_stamp_is_in_each(
+    home: &Home,
+) {
+    let mut archive = home.open();
+    let mut impossible = entry(LIFE, 4);
+    impossible.entry.time = TimeStamp { month: 13, ..impossible.entry.time };
+    let impossible = Record::Entry(impossible);
+    let records = [entries(LIFE, 1..=3), vec![impossible.clone()], entries(LIFE, 5..=9)].concat();
+    archive.append(&[batch(records)]).unwrap();
+    let moment = |sequence| shown(&entry(LIFE, sequence).entry.time);
+    let window = |from: Option<u64>, until: Option<u64>| Window {
+        from: from.and_then(moment),
+        until: until.and_then(moment),
+    };
+    let mut read = |window| {
+        let mut found = Vec::new();
+        archive
+            .read("U1-SER1", window, &mut |record| {
+                found.push(record.clone());
+                Ok(())
+            })
+            .unwrap();
+        found
+    };
+    let with = |before, after| [before, vec![impossible.clone()], after].concat();
+    assert_eq!(read(window(Some(6), Some(7))), with(vec![], entries(LIFE, 6..=7)));
+    assert_eq!(read(window(None, Some(2))), with(entries(LIFE, 1..=2), vec![]));
+    assert_eq!(read(window(Some(8), None)), with(vec![], entries(LIFE, 8..=9)));
+}
+
+pub(crate) fn a_life_is_found_by_an_entry_of_it(home: &Home) {
+    let mut archive = home.open();
+    let far = 3 * 65_536 + 7;
+    archive.append(&[batch(entries(LIFE, [1, 2, far]))]).unwrap();
+    let mut life_of = |sequence, entry| archive.life_of("U1-SER1", sequence, &entry).unwrap();
+    assert_eq!(life_of(2, entry(LIFE, 2).entry), Some((LIFE, 2)));
+    assert_eq!(life_of(7, entry(LIFE, far).entry), Some((LIFE, far)));
+    assert_eq!(life_of(3, entry(LIFE, 2).entry), None);
+    assert_eq!(life_of(2, entry(LIFE, 1).entry), None);
+}
+
+pub(crate) fn an_archive_of_a_newer_program_is_refused_by_name(home: &Home) {
+    home.open().append(&[batch(entries(LIFE, 1..=3))]).unwrap();
+    let set = |column: &str, value: i64| {
+        let change = format!("UPDATE archive SET {column} = {value}, program = 'ser-cli 9.0.0'");
+        home.sql(&change);
+    };
+    set("schema", 1000);
+    let error = home.open_for(Access::Write { program: PROGRAM }).err().unwrap();
+    let text = error.to_string();
+    assert!(text.contains("ser-cli 9.0.0") && text.contains("schema 1000"), "{text}");
+    let mut archive = home.open_for(Access::Read).unwrap();
+    assert_eq!(everything(&mut archive, "U1-SER1").len(), 3);
+    assert!(archive.append(&[batch(entries(LIFE, [4]))]).is_err(), "it was opened to read");
+    set("readable_by", 1000);
+    assert!(matches!(home.open_for(Access::Read), Err(Error::Newer { .. })));
+}

@@ -1,0 +1,42 @@
+//! What holds for every archive, wherever it is: small cases, each with an archive of its own.
+
+pub(crate) mod kept;
+#[cfg(all(unix, feature = "postgres"))]
+mod needs_postgres;
+pub(crate) mod sound;
+pub(crate) mod writer;
+
+use crate::common::Home;
+
+/// A case, by its name.
+pub(crate) type Case = (&'static str, fn(&Home));
+
+/// Makes a list of all cases, and a test of each with an archive in a file.
+macro_rules! cases {
+    ($($file:ident: [$($case:ident),* $(,)?],)*) => {
+        pub(crate) const ALL: &[Case] = &[$($((stringify!($case), $file::$case),)*)*];
+
+        mod in_a_file {
+            $($(
+                #[test]
+                fn $case() {
+                    super::$file::$case(&super::Home::new());
+                }
+            )*)*
+        }
+    };
+}
+
+cases! {
+    kept: [what_was_added_is_given_back_and_added_again_changes_nothing, two_collectors_that_read_the_same_add_it_once, another_content_at_the_same_place_is_kept_beside_it, a_conflict_within_one_batch_is_one_too, the_number_in_the_ring_is_no_part_of_what_an_entry_is, a_bookmark_moves_with_what_was_read_or_not_at_all, a_window_is_by_what_the_recorder_showed_and_an_impossible_stamp_is_in_each, a_life_is_found_by_an_entry_of_it, an_archive_of_a_newer_program_is_refused_by_name],
+    sound: [a_number_that_is_not_there_is_a_hole_unless_it_was_told, what_was_watched_must_be_there, where_a_log_began_is_not_known_if_its_total_had_wrapped, a_tail_that_is_taken_away_shows_in_the_head_that_was_written_down, what_is_let_go_is_told_and_the_rest_stays_proven, all_may_be_let_go, an_archive_that_is_too_large_loses_its_oldest, a_row_that_somebody_changed_is_found],
+    writer: [what_many_threads_add_is_there_when_they_are_told_so, one_that_cannot_be_written_keeps_nobody_else_from_it, who_asked_may_go_away_and_it_is_written_all_the_same],
+}
+
+/// A case that is in no list would never be tried.
+#[test]
+fn every_case_is_in_the_list() {
+    let sources = [include_str!("kept.rs"), include_str!("sound.rs"), include_str!("writer.rs")];
+    let written: usize = sources.iter().map(|source| source.matches("home: &Home").count()).sum();
+    assert_eq!(ALL.len(), written);
+}

@@ -1,0 +1,133 @@
+//! What is missing is said, and what somebody changed is found.
+
+use crate::common::*;
+use ser_archive::{Hole, Keep};
+use ser_evidence::record::{Gap, Lost, Record, Why};
+
+pub(crate) fn a_number_that_is_not_there_is_a_hole_unless_it_was_told(home: &Home) {
+    let mut archive = home.open();
+    let records = [vec![life(LIFE), gap(LIFE, 5, 2)], entries(LIFE, [3, 4, 5, 8, 9, 12])].concat();
+    archive.append(&[batch(records)]).unwrap();
+    let check = archive.check().unwrap();
+    let found = &check.recorders[0];
+    let hole = |after, missing| Hole { life: LIFE, after, missing, told: 0 };
+    assert_eq!(found.holes, [hole(0, 2), hole(9, 2)]);
+    assert_eq!((found.entries, found.lives, found.told.len()), (6, 1, 1));
+    archive.append(&[batch(vec![gap(LIFE, 0, 2), gap(LIFE, 9, 2)])]).unwrap();
+    assert!(archive.check().unwrap().is_sound());
+}
+
+pub(crate) fn what_was_watched_must_be_there(home: &Home) {
+    let mut archive = home.open();
+    archive.append(&[batch([vec![watched(LIFE, 5)], entries(LIFE, 1..=4)].concat())]).unwrap();
+    let hole = Hole { life: LIFE, after: 4, missing: 1, told: 0 };
+    assert_eq!(archive.check().unwrap().recorders[0].holes, [hole]);
+    archive.append(&[batch(entries(LIFE, [5]))]).unwrap();
+    assert!(archive.check().unwrap().is_sound());
+}
+
+pub(crate) fn where_a_log_began_is_not_known_if_its_total_had_wrapped(home: &Home) {
+    let mut archive = home.open();
+    archive.append(&[batch(entries(LIFE, 700..=705))]).unwrap();
+    assert!(archive.check().unwrap().is_sound());
+}
+
+pub(crate) fn a_tail_that_is_taken_away_shows_in_the_head_that_was_written_down(home: &Home) {
+    let mut archive = home.open();
+    archive.append(&[batch(entries(LIFE, 1..=3))]).unwrap();
+    let middle = archive.verify().unwrap().0;
+    archive.append(&[batch(entries(LIFE, 4..=6))]).unwrap();
+    let end = archive.verify().unwrap().0;
+    assert_ne!(middle, end);
+    home.sql("DELETE FROM entry WHERE position > 3; DELETE FROM link WHERE position > 3");
+    assert_eq!(archive.verify().unwrap(), (middle, Vec::new()));
+}
+
+pub(crate) fn what_is_let_go_is_told_and_the_rest_stays_proven(home: &Home) {
+    let mut archive = home.open();
+    for day in 0..10 {
+        let first = u64::try_from(day).unwrap() * 100 + 1;
+        let records = [vec![observed(LIFE, first)], entries(LIFE, first..first + 100)].concat();
+        let mut batch = batch(records);
+        batch.at = at_s(day * 86_400);
+        archive.append(&[batch]).unwrap();
+    }
+    archive.append(&[batch(vec![life(LIFE)])]).unwrap();
+    let mut left = 1000;
+    for day in [3, 3, 7] {
+        let keep = Keep { since: Some(at_s(day * 86_400)), bytes: None };
+        let gone = archive.expire(keep, at_s(20 * 86_400)).unwrap();
+        let now_left = 1000 - u64::try_from(day).unwrap() * 100;
+        assert_eq!(gone.entries, left - now_left);
+        left = now_left;
+        let check = archive.check().unwrap();
+        assert!(check.is_sound(), "{check:?}");
+        assert_eq!(check.recorders[0].entries, left);
+        let told: u64 = check.recorders[0]
+            .told
+            .iter()
+            .map(|gap| match gap {
+                Gap { lost: Lost::Exactly(count), why: Why::Expired, .. } => u64::from(*count),
+                other => panic!("{other:?}"),
+            })
+            .sum();
+        assert_eq!(told, 1000 - left);
+        let (heads, broken) = archive.verify().unwrap();
+        assert_eq!(broken, []);
+        assert!(heads[0].expired_to.is_some());
+    }
+    // What is known of the clock stays.
+    let clocks = everything(&mut archive, "U1-SER1")
+        .into_iter()
+        .filter(|record| matches!(record, Record::Clock(_)))
+        .count();
+    assert_eq!(clocks, 10);
+    // Read again from the recorder, it does not come back unseen: the rest is as it was.
+    assert_eq!(archive.append(&[batch(entries(LIFE, 900..=1000))]).unwrap().known, 101);
+}
+
+pub(crate) fn all_may_be_let_go(home: &Home) {
+    let mut archive = home.open();
+    archive.append(&[batch(entries(LIFE, 1..=50))]).unwrap();
+    let keep = Keep { since: Some(at_s(1)), bytes: None };
+    assert_eq!(archive.expire(keep, at_s(2)).unwrap().entries, 50);
+    assert_eq!(archive.verify().unwrap().1, []);
+    archive.append(&[batch(entries(LIFE, 51..=60))]).unwrap();
+    assert_eq!(archive.verify().unwrap().1, []);
+    assert!(archive.check().unwrap().is_sound());
+}
+
+pub(crate) fn an_archive_that_is_too_large_loses_its_oldest(home: &Home) {
+    let mut archive = home.open();
+    for part in 0..40_u64 {
+        let mut batch = batch(entries(LIFE, part * 100 + 1..=part * 100 + 100));
+        batch.at = at_s(part.try_into().unwrap());
+        archive.append(&[batch]).unwrap();
+    }
+    let keep = Keep { since: None, bytes: Some(300_000) };
+    let gone = archive.expire(keep, at_s(100)).unwrap();
+    let check = archive.check().unwrap();
+    assert!(check.is_sound());
+    assert!((500..3500).contains(&gone.entries), "{gone:?}");
+    assert_eq!(check.recorders[0].entries, 4000 - gone.entries);
+    let left = everything(&mut archive, "U1-SER1");
+    assert_eq!(left.last(), entries(LIFE, [4000]).last());
+    assert_eq!(archive.expire(keep, at_s(101)).unwrap().entries, 0);
+}
+
+pub(crate) fn a_row_that_somebody_changed_is_found(home: &Home) {
+    let mut archive = home.open();
+    for part in 0..3 {
+        archive.append(&[batch(entries(LIFE, part * 3 + 1..=part * 3 + 3))]).unwrap();
+    }
+    for change in [
+        "UPDATE entry SET state = state + 1 WHERE sequence = 5",
+        "UPDATE entry SET stamp = stamp - 1 WHERE sequence = 5",
+        "DELETE FROM entry WHERE sequence = 4",
+    ] {
+        home.sql(change);
+        let broken = archive.verify().unwrap().1;
+        assert_eq!((broken.len(), broken[0].good_to), (1, 3), "{change}");
+        assert!(broken[0].until.is_some_and(|until| (5..=6).contains(&until)), "{broken:?}");
+    }
+}

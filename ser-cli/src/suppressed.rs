@@ -1,0 +1,157 @@
+//! Changes that chatter filters leave out, told while a log is read: no entry tells of them, and an
+//! input that chattered must not be taken for a quiet one.
+//!
+//! A recorder counts them from its power-up on. What earlier runs saw is kept with the records of
+//! its clock, so that a reading of what is new tells what is new of this, too.
+
+use std::time::{Duration, Instant};
+
+use ser_client::{RequestError, Unit};
+use ser_evidence::record::{Record, Suppressed};
+
+use crate::error::{advise, warn};
+use crate::filter_text;
+use crate::host_reading;
+use crate::kept::KeptRecords;
+use crate::output::Points;
+
+/// How often a reading without end looks.
+const LOOK_EVERY: Duration = Duration::from_secs(60);
+
+/// A look must not take a larger part of the line than one in so many, however slow that is.
+const PART_OF_LINE: u32 = 30;
+
+/// What the recorder counts now; `None` where it cannot be asked.
+pub(crate) fn look(unit: &mut Unit) -> Result<Option<Suppressed>, RequestError> {
+    let Some(clock) = unit.clock_look()? else { return Ok(None) };
+    let Some(counts) = unit.suppressed_changes()? else { return Ok(None) };
+    Ok(Some(Suppressed {
+        from: host_reading::at(clock.between.0),
+        to: host_reading::now(),
+        on_for_us: clock.reading.tick_us,
+        left_out: counts.into_iter().filter(|(_, count)| *count > 0).collect(),
+    }))
+}
+
+/// Looks during the readings of one log.
+pub(crate) struct LeftOut {
+    kept: Option<KeptRecords>,
+    before: Option<Suppressed>,
+    points: Points,
+    /// The recorder's name, where several are told of.
+    recorder: Option<String>,
+    due: Instant,
+    has_looked: bool,
+}
+
+impl LeftOut {
+    /// Nobody has looked in this run. `kept` is what earlier runs have left, if this one remembers.
+    pub(crate) fn new(kept: Option<KeptRecords>, points: Points) -> LeftOut {
+        let records = kept.as_ref().map(KeptRecords::load).unwrap_or_default();
+        let before = records.into_iter().rev().find_map(|record| match record {
+            Record::Suppressed(look) => Some(look),
+            _ => None,
+        });
+        let due = Instant::now();
+        LeftOut { kept, before, points, recorder: None, due, has_looked: false }
+    }
+
+    /// The same of one of several recorders.
+    pub(crate) fn of(self, recorder: &str) -> LeftOut {
+        LeftOut { recorder: Some(recorder.to_owned()), ..self }
+    }
+
+    /// Looks now and then. Returns a look that says something new.
+    pub(crate) fn look_if_due(&mut self, unit: &mut Unit) -> Option<Record> {
+        let began = Instant::now();
+        if began < self.due {
+            return None;
+        }
+        let (is_first, before) = (!self.has_looked, self.before.clone());
+        let record = self.look(unit);
+        self.due = Instant::now() + LOOK_EVERY.max(began.elapsed() * PART_OF_LINE);
+        record.filter(|record| match record {
+            Record::Suppressed(look) => is_first || !look.since(before.as_ref()).is_empty(),
+            _ => false,
+        })
+    }
+
+    /// Looks and tells what is new. The entries are what the recorder was read for, so a look that
+    /// fails ends nothing.
+    pub(crate) fn look(&mut self, unit: &mut Unit) -> Option<Record> {
+        let look = look(unit).ok().flatten()?;
+        self.tell(&look);
+        self.has_looked = true;
+        let record = Record::Suppressed(look.clone());
+        // Of recorders that leave nothing out, nothing need be kept.
+        if let Some(kept) = self.kept.as_ref().filter(|_| !look.left_out.is_empty()) {
+            kept.add(std::slice::from_ref(&record));
+        }
+        self.before = Some(look);
+        Some(record)
+    }
+
+    fn tell(&self, look: &Suppressed) {
+        let since = look.since(self.before.as_ref());
+        let is_from_power_up = self.before.as_ref().is_none_or(|before| !look.continues(before));
+        let lines = lines(since, is_from_power_up, &self.points);
+        if lines.is_empty() {
+            return;
+        }
+        for line in lines {
+            match &self.recorder {
+                Some(recorder) => warn(format_args!("{recorder}: {line}")),
+                None => warn(line),
+            }
+        }
+        if !self.has_looked {
+            advise("only their number is known: ser-cli filter shows what is filtered out");
+        }
+    }
+}
+
+/// A line for each input of which changes were left out.
+fn lines(
+    since: impl IntoIterator<Item = (u8, u32)>,
+    is_from_power_up: bool,
+    points: &Points,
+) -> Vec<String> {
+    let line = |(input, count): (u8, u32)| {
+        let input = filter_text::inputs(&[input], points);
+        let changes = match (count, is_from_power_up) {
+            (1, true) => "1 change".to_owned(),
+            (1, false) => "1 more change".to_owned(),
+            (_, true) => format!("{} changes", filter_text::count(count.into())),
+            (_, false) => format!("{} more changes", filter_text::count(count.into())),
+        };
+        let since = if is_from_power_up { " since its power-up" } else { "" };
+        format!("{input}: {changes} left out by its chatter filter{since}")
+    };
+    since.into_iter().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::testing::points;
+
+    #[test]
+    fn an_input_is_told_with_its_name_and_since_when() {
+        assert_eq!(
+            lines([(3, 1234), (4, 1)], true, &points()),
+            [
+                "input 3 (52-1 closed): 1,234 changes left out by its chatter filter since its \
+                 power-up",
+                "input 4: 1 change left out by its chatter filter since its power-up",
+            ]
+        );
+        assert_eq!(
+            lines([(3, 2), (4, 1)], false, &points()),
+            [
+                "input 3 (52-1 closed): 2 more changes left out by its chatter filter",
+                "input 4: 1 more change left out by its chatter filter",
+            ]
+        );
+        assert!(lines([], true, &points()).is_empty());
+    }
+}
