@@ -2,10 +2,10 @@
 //! compares all clocks at one instant. Each recorder keeps what its clock showed then, whenever its
 //! board hands the broadcast over, and one that did not get it says nothing of it.
 
-use chrono::NaiveDateTime;
-use geni_board::Destination::Broadcast;
+use chrono::{DateTime, Datelike, NaiveDateTime};
+use geni_board::Destination::{Broadcast, Device};
 use geni_board::{SharedRam, map};
-use ser_proto::{ClockReading, Command, Entry, Inputs, Mark, Model, Reply, TimeStamp};
+use ser_proto::{ClockReading, ClockSource, Command, Entry, Inputs, Mark, Model, Reply, TimeStamp};
 use ser_sim::genius::{Board, DeviceFault, Fault, Noise, Read};
 use ser_sim::{Scenario, Step};
 use ser_trial::genius_world::{Recorder, World};
@@ -145,7 +145,7 @@ impl Plant {
 
 /// Whether its board holds a datagram for it.
 fn is_unread(recorder: &mut Recorder) -> bool {
-    recorder.port.window().look(|board| board.unread_since_us()).is_some()
+    recorder.port.window().look(Board::unread_since_us).is_some()
 }
 
 /// What the clock of a recorder shows at this time of the bus. Nobody has set it, and it shows a
@@ -264,4 +264,36 @@ fn a_mark_whose_arrival_nobody_saw_is_not_claimed() {
     let found_us = world.now_ms * 1000 - arrived_us;
     assert!(found_us > 30_000, "it was late by {found_us} us: nothing was put to the test");
     assert_eq!(unseen, seen);
+}
+
+/// The clock is set over the line while a mark and a question wait in the recorder's board. What
+/// they are told is what it showed when they came, as a change of that millisecond is stamped.
+#[test]
+fn what_waited_while_the_clock_was_set_is_told_what_it_showed_before() {
+    const SET: TimeStamp =
+        TimeStamp { year: 0, month: 11, day: 22, hour: 10, minute: 0, second: 0, millisecond: 0 };
+    let mut world = World::started(&[(1, Model::Ser160)]);
+    let device = world.recorders[0].board.id();
+    let fault = DeviceFault::AnswerLate { by_us: 40_000 };
+    world.bus.borrow_mut().inject(Fault::Inside { device, fault });
+    world.run(500);
+    // Asked by one host, then marked; the clock is set to 2026, then to 2027.
+    for (to, token, year) in [(Device(1), 8, 26), (Broadcast, 7, 27)] {
+        world.until("the host's board", |world| world.host.driver.can_transmit().then_some(()));
+        world.send(to, &Command::Time { token });
+        world.until("the datagram", |world| is_unread(&mut world.recorders[0]).then_some(()));
+        world.run(2);
+        world.recorders[0].serial_ask(&Command::SetClock(TimeStamp { year, ..SET }));
+        assert!(is_unread(&mut world.recorders[0]), "it was read too soon: nothing was tested");
+        world.run(500);
+    }
+    let (_, reply) = world.take_message(1).expect("a reply");
+    let of_year = |us: i64| DateTime::from_timestamp_micros(us).expect("a date").year();
+    let Ok(Reply::Time(reading)) = Reply::parse(&reply) else { panic!("{reply:?}") };
+    assert_eq!((reading.token, of_year(reading.clock_us)), (8, 1971));
+    assert_eq!(reading.source, ClockSource::Battery);
+    let ask = Command::Time { token: 0 };
+    let Reply::Time(reading) = world.recorders[0].serial_ask(&ask) else { panic!("no time") };
+    assert_eq!(reading.last_mark.map(|mark| (mark.token, of_year(mark.clock_us))), Some((7, 2026)));
+    assert_eq!(of_year(reading.clock_us), 2027);
 }
