@@ -153,6 +153,11 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         self.changes.chatter().chattering()
     }
 
+    /// How many changes of an input were left out as chatter since power-up.
+    pub(crate) fn suppressed(&self, input: u8) -> u32 {
+        self.changes.chatter().suppressed(input)
+    }
+
     /// Whether changes are recorded now.
     pub(crate) fn is_recording(&self) -> bool {
         self.recording.latest()
