@@ -202,9 +202,6 @@ fn plain(debounce_ms: u8, filter: ChatterFilter, toggled: &[u32], end_ms: u32) -
         if on != accepted && until_ms - at_ms > debounce_ms.into() {
             accepted = on;
             counts.push(at_ms);
-        } else if on != accepted && debounce_ms == 0 {
-            accepted = on;
-            counts.push(at_ms);
         }
     }
     let (mut shown, mut left_out) = (Vec::new(), 0);
