@@ -107,8 +107,8 @@ counters! {
     /// Replies that the board could not send, or that were lost when it failed, before or after
     /// their commands were carried out.
     34 REPLIES_LOST "replies_lost" Trouble,
-    /// Set-clock commands that were not carried out, because the time of their arrival is not
-    /// known.
+    /// Set-clock commands that were not carried out, and marks that were not kept, because the time
+    /// of their arrival is not known.
     35 CLOCKS_REFUSED "clocks_refused" Lost,
     /// Auto reports that arrived.
     36 REPORTS_SENT "reports_sent" Ordinary,

@@ -4,6 +4,7 @@
 //! `cargo xtask simulate` goes on for as long as one likes.
 
 use ser_trial::simulation::account::Tally;
+use ser_trial::simulation::questions::Answers;
 use ser_trial::simulation::{Options, Report, run, run_flat_out};
 
 const HOUR_MS: u64 = 3_600_000;
@@ -26,6 +27,7 @@ fn assert_accounted(report: &Report) {
         let in_columns = edges.recorded
             + edges.stopped
             + edges.filtered
+            + edges.chatter
             + edges.queue_full
             + edges.cut_off
             + edges.undecided;
@@ -34,6 +36,25 @@ fn assert_accounted(report: &Report) {
     for (tally, recorder) in report.tallies.iter().map(|(_, tally)| tally).zip([0, 0, 1]) {
         assert_eq!(report.recorded[recorder], tally.accounted(), "{report}");
     }
+}
+
+/// Checks that recorders were asked, and told to filter, and that chatter was left out and came to
+/// rest. Each answer and each count was compared with the ledger.
+fn assert_asked(reports: &[Report], recorder: usize) {
+    let sum = |count: fn(&Answers) -> u64| {
+        reports.iter().map(|report| count(&report.answers[recorder])).sum::<u64>()
+    };
+    let counts = [
+        sum(|answers| answers.times),
+        sum(|answers| answers.identities),
+        sum(|answers| answers.counters),
+        sum(|answers| answers.filters),
+        reports.iter().map(|report| report.filters_set[recorder]).sum(),
+    ];
+    assert!(counts.iter().all(|&count| count >= 20), "{counts:?}");
+    let edges = || reports.iter().map(|report| report.edges[recorder]);
+    assert!(edges().map(|edges| edges.chatter).sum::<u64>() > 1_000);
+    assert!(edges().map(|edges| edges.rests).sum::<u64>() > 10);
 }
 
 /// What became of the events of all these runs, for one of the readers.
@@ -70,6 +91,7 @@ fn days_without_a_bus() {
             && tally.unrecorded > 0,
         "{tally:?}"
     );
+    assert_asked(&reports, 0);
     let edges = || reports.iter().flat_map(|report| &report.edges);
     assert!(edges().any(|edges| edges.filtered > 0) && edges().any(|edges| edges.stopped > 0));
 }
@@ -88,6 +110,11 @@ fn minutes_on_a_bus() {
     for report in &reports {
         assert_accounted(report);
         assert_eq!(report.hours.bus_ms, report.hours.total_ms);
+    }
+    for recorder in 0..2 {
+        assert_asked(&reports, recorder);
+        let marks = reports.iter().map(|report| report.answers[recorder].marks).sum::<u64>();
+        assert!(marks >= 10, "{marks}");
     }
     for reader in 0..3 {
         let tally = sum(&reports, reader);

@@ -91,6 +91,8 @@ pub struct Bench<'p> {
     /// Whether the board had nothing to send when a byte from it was due.
     silent: bool,
     carried: Carried,
+    /// The tick of the latest sample when the board got its latest byte.
+    brought_ms: u64,
 }
 
 /// Bytes that the serial line has carried.
@@ -140,6 +142,7 @@ impl<'p> Bench<'p> {
             sent: Vec::new(),
             silent: true,
             carried: Carried::default(),
+            brought_ms: 0,
         })
     }
 
@@ -216,6 +219,7 @@ impl<'p> Bench<'p> {
         if self.credit_to.is_due() && self.board.receive(byte)? {
             self.credit_to.carry();
             self.carried.to += 1;
+            self.brought_ms = self.now_ms;
             self.to_board.pop_front();
         }
         Ok(())
@@ -263,6 +267,13 @@ impl<'p> Bench<'p> {
     #[must_use]
     pub fn carried(&self) -> Carried {
         self.carried
+    }
+
+    /// In which of its milliseconds the board got its latest byte, by the tick that its receive
+    /// interrupt then reads.
+    #[must_use]
+    pub fn brought_ms(&self) -> u64 {
+        self.brought_ms
     }
 
     /// Bytes that wait for the line.

@@ -219,6 +219,88 @@ fn an_original_unit_is_asked_once_who_it_is_and_only_after_it_has_answered() {
     }
 }
 
+/// What a host does with a recorder, in this order.
+const ERRANDS: [fn(&mut Unit) -> String; 9] = [
+    |unit| format!("{:?}", unit.set_recording(true)),
+    |unit| format!("{:?}", read_new(unit, &mut None, 100)),
+    |unit| format!("{:?}", unit.set_clock(|_| NOON)),
+    |unit| format!("{:?}", unit.last_broadcast()),
+    |unit| format!("{:?}", unit.configure(keep_everything())),
+    |unit| format!("{:?}", unit.mode()),
+    |unit| format!("{:?}", unit.print(1, 1)),
+    |unit| format!("{:?}", unit.log_position()),
+    |unit| format!("{:?}", unit.erase()),
+];
+
+/// Everything that only our recorders can be asked, over and over.
+fn ask_beyond_the_manual(unit: &mut Unit) {
+    for _ in 0..3 {
+        assert_eq!(unit.identity().unwrap(), None);
+        assert_eq!(unit.clock_look().unwrap(), None);
+        assert_eq!(unit.filters().unwrap(), None);
+        assert_eq!(unit.recorder_counters().unwrap(), None);
+        assert_eq!(unit.set_filter(None, InputFilter::OFF).unwrap(), None);
+    }
+}
+
+/// Does all errands, and asks for more before the one of this number. Returns what came of them, and
+/// the bytes that were sent.
+fn errands(says: Option<&'static [u8]>, asks_before: usize) -> (Vec<String>, Vec<u8>) {
+    let mut bench = Bench::in_virtual_time(100);
+    bench.fake().original = true;
+    bench.fake().recorder.append_many(25);
+    match says {
+        Some(says) => bench.fake().says_beyond_the_manual = says,
+        None => bench.unit.take_for_original(),
+    }
+    let mut done = Vec::new();
+    for (number, errand) in ERRANDS.iter().enumerate() {
+        if number == asks_before {
+            ask_beyond_the_manual(&mut bench.unit);
+        }
+        done.push(errand(&mut bench.unit));
+    }
+    let sent = bench.fake().sent.clone();
+    (done, sent)
+}
+
+#[test]
+fn an_original_unit_gets_the_bytes_of_the_manual_and_one_question_whatever_it_makes_of_that() {
+    const IDENTIFY: &[u8] = b"\x1B014949";
+    let (as_before, manual) = errands(None, 0);
+    assert!(!manual.windows(IDENTIFY.len()).any(|bytes| bytes == IDENTIFY));
+    let answers: [&[u8]; 9] = [
+        b"",
+        // Noise, text, a frame that does not end, and one whose checksum is wrong.
+        b"\xFF\x00\x80\x7F",
+        b"?SYNTAX ERROR",
+        b"\x1B2149",
+        b"\x1B01494A",
+        // The command itself, an identity that is cut off, one of no recorder, and another reply.
+        b"\x1B014949",
+        b"\x1B0549011000015B",
+        b"\x1B0249004952\x1B",
+        b"\x1B014545",
+    ];
+    for says in answers {
+        for asks_before in 0..ERRANDS.len() {
+            let (done, mut sent) = errands(Some(says), asks_before);
+            let told = String::from_utf8_lossy(says);
+            assert_eq!(done, as_before, "{told:?} before errand {asks_before}");
+            let at = sent.windows(IDENTIFY.len()).position(|bytes| bytes == IDENTIFY);
+            let at = at.expect("it was asked");
+            sent.drain(at..at + IDENTIFY.len());
+            if asks_before == 0 {
+                // Nothing was answered yet, so a command of the manual comes first.
+                assert!(at > 0, "nothing was answered");
+                sent.drain(..at);
+            }
+            let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).replace('\x1B', "\n");
+            assert_eq!(text(&sent), text(&manual), "{told:?} before errand {asks_before}");
+        }
+    }
+}
+
 #[test]
 fn a_unit_that_does_not_answer_the_manual_is_asked_nothing_else() {
     let mut bench = Bench::new(100);

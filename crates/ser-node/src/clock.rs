@@ -64,8 +64,16 @@ impl Offset {
 #[derive(Debug)]
 pub(crate) struct Clock<'a> {
     offset: History<Offset, &'a mut [Offset; SPAN]>,
+    latest: Setting,
+    /// The one before it, for questions that came before the latest and are read after it.
+    before: Setting,
+}
+
+/// Where the clock has its time from, and since when.
+#[derive(Clone, Copy, Debug)]
+struct Setting {
     source: ClockSource,
-    /// When it was set last, or read from the battery-backed clock, or else power-up.
+    /// When it was set, or read from the battery-backed clock, or else power-up.
     set_ms: u64,
 }
 
@@ -79,30 +87,36 @@ impl<'a> Clock<'a> {
         let source = if now.is_some() { ClockSource::Battery } else { ClockSource::NeverSet };
         let now_ms = now.map_or(NEVER_SET_MS, to_calendar_ms);
         let offset = History::with_places(offsets, Offset::new(now_ms, tick_ms));
-        Clock { offset, source, set_ms: tick_ms }
+        let setting = Setting { source, set_ms: tick_ms };
+        Clock { offset, latest: setting, before: setting }
     }
 
     /// Sets the clock so that it shows `now` at `tick_ms`.
     pub(crate) fn set(&mut self, tick_ms: u64, now: NaiveDateTime, source: ClockSource) {
-        if tick_ms >= self.set_ms {
-            (self.source, self.set_ms) = (source, tick_ms);
+        if tick_ms >= self.latest.set_ms {
+            self.before = self.latest;
+            self.latest = Setting { source, set_ms: tick_ms };
         }
         self.offset.set(tick_ms, Offset::new(to_calendar_ms(now), tick_ms));
     }
 
-    /// Where it has its time from.
-    pub(crate) const fn source(&self) -> ClockSource {
-        self.source
-    }
-
-    /// For how many whole seconds it has run on its own at `tick_ms`.
-    pub(crate) fn age_s(&self, tick_ms: u64) -> u32 {
-        u32::try_from(tick_ms.saturating_sub(self.set_ms) / 1000).unwrap_or(u32::MAX)
+    /// Where it had its time from at `tick_ms`, and for how many whole seconds it had run on its
+    /// own. Of the past, two settings are known.
+    pub(crate) fn source_and_age_s(&self, tick_ms: u64) -> (ClockSource, u32) {
+        let is_later = self.latest.set_ms > tick_ms;
+        let Setting { source, set_ms } = if is_later { self.before } else { self.latest };
+        let age_s = tick_ms.saturating_sub(set_ms) / 1000;
+        (source, u32::try_from(age_s).unwrap_or(u32::MAX))
     }
 
     /// Calendar time of the sample of `tick_ms`, by the setting in force then.
     pub(crate) fn stamp_ms(&self, tick_ms: u64) -> i64 {
         within_century(self.offset.at_sample(tick_ms).ms(), tick_ms)
+    }
+
+    /// Calendar time at `tick_ms`, by the setting in force then. One in this very millisecond counts.
+    pub(crate) fn at_ms(&self, tick_ms: u64) -> i64 {
+        within_century(self.offset.at_sample(tick_ms.saturating_add(1)).ms(), tick_ms)
     }
 
     /// Calendar time at `tick_ms`, by the present setting.
@@ -168,9 +182,14 @@ mod tests {
         assert_eq!(to_time_stamp(clock.now_ms(1000)).to_string(), "2026-11-22T12:00:00.250");
         assert_eq!(shows(&clock, 1001), "2026-11-22T12:00:00.251");
         assert_eq!(shows(&clock, 1751), "2026-11-22T12:00:01.001");
-        assert_eq!((clock.source(), clock.age_s(3999)), (ClockSource::HostOverRs232, 2));
+        assert_eq!(clock.source_and_age_s(3999), (ClockSource::HostOverRs232, 2));
         // Earlier samples keep the time of the old setting.
         assert_eq!(shows(&clock, 1000), "2026-11-22T10:00:00.995");
+        let at = |tick_ms| to_time_stamp(clock.at_ms(tick_ms)).to_string();
+        assert_eq!(at(1000), "2026-11-22T12:00:00.250");
+        assert_eq!(at(999), "2026-11-22T10:00:00.994");
+        assert_eq!(clock.source_and_age_s(1000), (ClockSource::HostOverRs232, 0));
+        assert_eq!(clock.source_and_age_s(999), (ClockSource::Battery, 0));
     }
 
     #[test]

@@ -244,8 +244,12 @@ impl<W: SharedRam> GeniusPort<W> {
 
     fn receive_message(&mut self, datagram: &ReceivedDatagram, now_ms: u32) -> FromBus {
         let command = Command::parse(&datagram.data);
-        // The time in it was right at its arrival, and the tick of its arrival is not known.
-        if datagram.arrived_ms.is_none() && matches!(command, Ok(Command::SetClock(_))) {
+        // The time in it was right at its arrival, or is asked for as of that, and nobody saw the
+        // arrival. The reply to a question that is not broadcast is right nevertheless: its moment
+        // is between question and reply.
+        let is_mark = datagram.broadcast && matches!(command, Ok(Command::Time { .. }));
+        let is_clock = matches!(command, Ok(Command::SetClock(_)));
+        if datagram.arrived_ms.is_none() && (is_clock || is_mark) {
             count(&mut self.diagnostics.clocks_refused, 1);
             return FromBus::DealtWith;
         }

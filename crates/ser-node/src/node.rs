@@ -169,6 +169,12 @@ impl<'a, S: Storage, R: Rtc> Node<'a, S, R> {
         self.recorder.chattering()
     }
 
+    /// How many changes of an input (1–32) were left out as chatter since power-up. Stops at the
+    /// largest value.
+    pub fn suppressed(&self, input: u8) -> u32 {
+        self.recorder.suppressed(input)
+    }
+
     /// Events recorded since power-up, erased ones included; wraps.
     pub fn events(&self) -> u32 {
         self.recorder.events()

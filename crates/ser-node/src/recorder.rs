@@ -34,7 +34,7 @@ use crate::printer::Printer;
 use crate::settings::Storage;
 use crate::ticks::Ticks;
 use crate::version::{FIRMWARE, VERSION};
-use crate::waiting::{Pending, Request, Waiting};
+use crate::waiting::{Pending, ReadClock, Request, Waiting};
 use crate::work::Work;
 
 /// What a recorder is made of.
@@ -151,6 +151,11 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
     /// The inputs that chatter: their changes are counted and not recorded.
     pub(crate) fn chattering(&self) -> Inputs {
         self.changes.chatter().chattering()
+    }
+
+    /// How many changes of an input were left out as chatter since power-up.
+    pub(crate) fn suppressed(&self, input: u8) -> u32 {
+        self.changes.chatter().suppressed(input)
     }
 
     /// Whether changes are recorded now.
@@ -284,9 +289,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         Some(match pending {
             Pending::ClockSet => Reply::ClockSet,
             Pending::Mode { recording } => Reply::Mode(Mode { recording, version: VERSION }),
-            Pending::Time { token, clock_us, tick_us } => {
-                Reply::Time(self.clock_reading(token, clock_us, tick_us))
-            }
+            Pending::Time(read) => Reply::Time(self.clock_reading(read)),
             Pending::To(command) => match command {
                 Command::Configure(configure) => self.configure(&configure),
                 Command::Erase => self.erase(),
@@ -384,12 +387,18 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
             }
             Command::Time { token } => {
                 let us = u64::from(arrival.at.us);
-                let clock_us = self.clock.now_ms(tick_ms) * 1000;
-                Pending::Time {
+                // The clock may have been set over the other port since it arrived.
+                let clock_us = self.clock.at_ms(tick_ms) * 1000;
+                let (source, age_s) = self.clock.source_and_age_s(tick_ms);
+                Pending::Time(ReadClock {
                     token,
                     clock_us: clock_us.saturating_add_unsigned(us),
+                    source,
+                    age_s,
                     tick_us: tick_ms.saturating_mul(1000).saturating_add(us),
-                }
+                    life: self.keeper.life(),
+                    events: self.log.events(),
+                })
             }
             Command::SetMode { recording } => {
                 self.count_late(tick_ms);
@@ -424,7 +433,7 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         tick_ms: u64,
     ) {
         match pending {
-            Some(Pending::Time { token, clock_us, .. }) => {
+            Some(Pending::Time(ReadClock { token, clock_us, .. })) => {
                 self.last_mark = Some(Mark { token, clock_us });
             }
             Some(
@@ -497,18 +506,19 @@ impl<'a, S: Storage, R: Rtc> Recorder<'a, S, R> {
         }
     }
 
-    fn clock_reading(&self, token: u16, clock_us: i64, tick_us: u64) -> ClockReading {
+    fn clock_reading(&self, read: ReadClock) -> ClockReading {
+        let ReadClock { token, clock_us, source, age_s, tick_us, life, events } = read;
         ClockReading {
             token,
             clock_us,
-            source: self.clock.source(),
-            age_s: self.clock.age_s(tick_us / 1000),
+            source,
+            age_s,
             // Nothing disciplines the clock, so nobody knows.
             doubt_us: None,
             drift_ppb: None,
             tick_us,
-            life: self.keeper.life(),
-            next_sequence: self.log.events().saturating_add(1),
+            life,
+            next_sequence: events.saturating_add(1),
             last_mark: self.last_mark,
         }
     }

@@ -1,8 +1,8 @@
 //! Requests that have arrived and whose replies wait for their turn, in order of arrival.
 
 use heapless::Deque;
-use ser_proto::Command;
 use ser_proto::genius::ForceTable;
+use ser_proto::{ClockSource, Command};
 
 use crate::arrival::Way;
 
@@ -24,8 +24,24 @@ pub(crate) enum Pending {
     ClockSet,
     /// The mode was set, or asked for, on arrival.
     Mode { recording: bool },
-    /// The clock was read on arrival: what it showed, and how long the recorder had been on.
-    Time { token: u16, clock_us: i64, tick_us: u64 },
+    /// The clock was read on arrival.
+    Time(ReadClock),
+}
+
+/// What there was to say of the clock when a question for it arrived. The reply adds nothing of its
+/// own moment but the last mark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) struct ReadClock {
+    pub(crate) token: u16,
+    pub(crate) clock_us: i64,
+    pub(crate) source: ClockSource,
+    pub(crate) age_s: u32,
+    /// How long the recorder had been on.
+    pub(crate) tick_us: u64,
+    pub(crate) life: u32,
+    /// Events of this life.
+    pub(crate) events: u64,
 }
 
 /// What a device on the bus asks for. The content is looked up when the reply goes out, so that it

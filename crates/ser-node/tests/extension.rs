@@ -109,6 +109,39 @@ fn the_clock_is_told_as_of_the_arrival_of_the_last_byte_however_late_the_reply_i
     assert_eq!(reading.tick_us, u64::from(arrived.tick_ms) * 1000 + 345);
 }
 
+/// Whatever happens while the reply waits is behind the moment that the reply is about.
+#[test]
+fn all_of_a_reading_is_as_of_the_arrival_of_the_question() {
+    let mut bench = Bench::new(Model::Ser160);
+    bench.events(3);
+    bench.pass_ms(1000);
+    let question = |token| FrameEncoder::new(Command::Time { token }.to_body());
+    bench.send(question(1));
+    bench.events(7);
+    bench.pass_ms(2000);
+    bench.send(FrameEncoder::new(Command::SetClock(TEN_O_CLOCK).to_body()));
+    bench.send(question(2));
+    bench.send(FrameEncoder::new(Command::Erase.to_body()));
+    bench.events(2);
+    bench.send(question(3));
+    let replies = bench::replies(&bench.line());
+    let [
+        Reply::Time(first),
+        Reply::ClockSet,
+        Reply::Time(second),
+        Reply::Erased,
+        Reply::Time(third),
+    ] = replies[..]
+    else {
+        panic!("{replies:?}")
+    };
+    let told = |of: ClockReading| (of.token, of.source, of.age_s, of.life, of.next_sequence);
+    assert_eq!(told(first), (1, ClockSource::NeverSet, 1, 1, 4));
+    assert_eq!(told(second), (2, ClockSource::HostOverRs232, 0, 1, 11));
+    // The erase is done before this reply, and its two events are still the old life's.
+    assert_eq!(told(third), (3, ClockSource::HostOverRs232, 0, 1, 13));
+}
+
 #[test]
 fn a_reading_tells_where_the_time_is_from_and_where_the_log_stands() {
     let mut bench = Bench::new(Model::Ser160);

@@ -16,7 +16,7 @@ use ser_proto::{
     AutoReport, Command, Configure, Decoded, FrameDecoder, FrameEncoder, MAX_BODY_LEN, Model, Reply,
 };
 use ser_sim::genius::{
-    Board, BoardOptions, BoardWindow, Bus, BusTiming, Handle, Noise, ViolationKind,
+    Board, BoardOptions, BoardWindow, Bus, BusTiming, Handle, Noise, ViolationKind, tick_ms,
 };
 use ser_sim::{NonVolatile, Ram, Scenario, SimNode, SimNodeOptions, SimRtc, Step};
 
@@ -55,6 +55,10 @@ pub struct Recorder {
     pub port: GeniusPort<BoardWindow>,
     /// Its board.
     pub board: Handle<Board>,
+    /// Whether it gets the pulses of its board's interrupt line.
+    pub has_line: bool,
+    /// Until when its main loop is away, while its interrupts go on.
+    pub away_until_ms: u64,
     frames: FrameDecoder<MAX_BODY_LEN>,
 }
 
@@ -66,6 +70,25 @@ impl Recorder {
     #[must_use]
     pub fn read_arrived_us(&mut self) -> u64 {
         self.port.window().look(Board::latest_read).expect("a datagram").arrived_us
+    }
+
+    /// Lets a millisecond of the recorder pass whose bus has come to its end.
+    fn pass_ms(&mut self, now_ms: u64) {
+        let Recorder { node, port, has_line, away_until_ms, .. } = self;
+        if *has_line {
+            let pulses = port.window().take_interrupts();
+            pulses.into_iter().for_each(|at_us| node.interrupt(port, tick_ms(at_us)));
+        }
+        if now_ms < *away_until_ms {
+            return;
+        }
+        if std::mem::take(away_until_ms) > 0 {
+            node.hold_up_to(now_ms);
+        }
+        node.advance_to(now_ms);
+        node.serve(port);
+        let held = port.reset_held();
+        port.window().drive_reset(held);
     }
 
     /// Opens or closes a contact in the next millisecond.
@@ -175,7 +198,8 @@ impl World {
                 let node = SimNode::new(options, Box::leak(Box::new(Ram::new())));
                 let options = GeniusOptions { start: RESET, ..GeniusOptions::new(model) };
                 let port = GeniusPort::new(window, options);
-                Recorder { number, node, port, board, frames: FrameDecoder::new() }
+                let frames = FrameDecoder::new();
+                Recorder { number, node, port, board, has_line: false, away_until_ms: 0, frames }
             })
             .collect();
         let (board, window) = connect(HOST);
@@ -192,6 +216,15 @@ impl World {
     #[must_use]
     pub fn started(recorders: &[(u8, Model)]) -> World {
         World::new(recorders).when_started()
+    }
+
+    /// Recorders and a host on a noisy bus, once everybody is on it.
+    ///
+    /// # Panics
+    /// When somebody is not on the bus within five minutes.
+    #[must_use]
+    pub fn started_with_noise(recorders: &[(u8, Model)], noise: Noise) -> World {
+        World::with_noise(recorders, noise).when_started()
     }
 
     /// Recorders with debounce and a host, once everybody is on the bus.
@@ -241,12 +274,7 @@ impl World {
     pub fn step_without_host(&mut self) {
         self.now_ms += 1;
         self.bus.borrow_mut().advance_to(self.now_ms * 1000);
-        for Recorder { node, port, .. } in &mut self.recorders {
-            node.advance_to(self.now_ms);
-            node.serve(port);
-            let held = port.reset_held();
-            port.window().drive_reset(held);
-        }
+        self.recorders.iter_mut().for_each(|recorder| recorder.pass_ms(self.now_ms));
     }
 
     /// Lets time pass.

@@ -4,6 +4,7 @@
 
 mod desk;
 mod failures;
+mod questions;
 mod stale;
 mod stations;
 mod timing;

@@ -2,16 +2,19 @@
 
 use std::collections::VecDeque;
 use std::io;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
-use ser_client::{Options, Transport, Unit};
+use ser_client::{Clock, Options, Transport, Unit};
 use ser_proto::{
     Baud, Command, Configuration, Decoded, FrameDecoder, FrameEncoder, LastBroadcast, Mode,
     ParseError, Reply,
 };
 
 use super::Recorder;
+
+const PATIENCE: Options = Options { timeout: Duration::from_millis(1), retries: 2 };
 
 /// What happens to a recorder without the client's knowledge.
 type Meanwhile = Box<dyn FnMut(&mut Recorder, &mut Configuration, usize) + Send>;
@@ -35,6 +38,10 @@ pub(crate) struct Fake {
     pub(crate) original: bool,
     /// The body of its answer to a command that the manual does not have.
     pub(crate) beyond_the_manual: Answers,
+    /// Bytes that it says to such a command, whatever they are.
+    pub(crate) says_beyond_the_manual: &'static [u8],
+    /// Every byte that the client has sent.
+    pub(crate) sent: Vec<u8>,
     /// Whether a command is lost while an answer is on the line.
     pub(crate) deaf_when_talking: bool,
     /// After how many more commands the line fails.
@@ -116,7 +123,10 @@ impl Fake {
             | Command::Time { .. }
             | Command::QueryFilters { .. }
             | Command::SetFilter { .. }
-            | Command::Diagnostics { .. } => None,
+            | Command::Diagnostics { .. } => {
+                self.say(self.says_beyond_the_manual);
+                None
+            }
         };
         if self.swallow > 0 {
             self.swallow -= 1;
@@ -138,14 +148,32 @@ impl Fake {
     }
 }
 
-/// The client's end.
-struct FakeTransport(Arc<Mutex<Fake>>);
+/// Time that passes only while the client waits.
+#[derive(Default)]
+struct Waited(AtomicU64);
+
+impl Clock for Waited {
+    fn now(&self) -> Duration {
+        Duration::from_nanos(self.0.load(Ordering::Relaxed))
+    }
+
+    fn wait(&self, time: Duration) {
+        let ns = u64::try_from(time.as_nanos()).unwrap();
+        self.0.fetch_add(ns, Ordering::Relaxed);
+    }
+}
+
+/// The client's end, and its time where that is not real.
+struct FakeTransport(Arc<Mutex<Fake>>, Option<Arc<Waited>>);
 
 impl Transport for FakeTransport {
-    fn read(&mut self, buf: &mut [u8], _: Duration) -> io::Result<usize> {
+    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
         let mut fake = self.0.lock().unwrap();
         if let Some(kind) = fake.broken {
             return Err(kind.into());
+        }
+        if let Some(time) = self.1.as_ref().filter(|_| fake.to_client.is_empty()) {
+            time.wait(timeout);
         }
         let count = buf.len().min(fake.to_client.len());
         let line_rate = fake.line_rate;
@@ -160,6 +188,7 @@ impl Transport for FakeTransport {
         if let Some(kind) = fake.broken {
             return Err(kind.into());
         }
+        fake.sent.extend_from_slice(bytes);
         if fake.line_rate == fake.unit_rate {
             bytes.iter().for_each(|&byte| fake.hear(byte));
         } else {
@@ -191,6 +220,14 @@ impl Bench {
         Bench::with(size, false)
     }
 
+    /// The same in virtual time, so that nothing that is answered is ever given up.
+    pub(crate) fn in_virtual_time(size: u16) -> Bench {
+        let Bench { fake, .. } = Bench::new(size);
+        let time = Arc::new(Waited::default());
+        let end = FakeTransport(Arc::clone(&fake), Some(Arc::clone(&time)));
+        Bench { unit: Unit::with_clock(Box::new(end), PATIENCE, time), fake }
+    }
+
     /// Over a line with a rate.
     pub(crate) fn serial(size: u16) -> Bench {
         Bench::with(size, true)
@@ -208,6 +245,8 @@ impl Bench {
             swallow: 0,
             original: false,
             beyond_the_manual: |_| None,
+            says_beyond_the_manual: b"",
+            sent: Vec::new(),
             deaf_when_talking: false,
             breaks_in: None,
             broken: None,
@@ -216,8 +255,8 @@ impl Bench {
             to_client: VecDeque::new(),
             decoder: FrameDecoder::new(),
         }));
-        let options = Options { timeout: Duration::from_millis(1), retries: 2 };
-        Bench { unit: Unit::new(Box::new(FakeTransport(Arc::clone(&fake))), options), fake }
+        let end = FakeTransport(Arc::clone(&fake), None);
+        Bench { unit: Unit::new(Box::new(end), PATIENCE), fake }
     }
 
     pub(crate) fn fake(&self) -> MutexGuard<'_, Fake> {

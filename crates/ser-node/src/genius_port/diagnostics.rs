@@ -18,8 +18,8 @@ pub struct GeniusDiagnostics {
     /// Replies that the board could not send, or that were lost when it failed, before or after
     /// their commands were carried out.
     pub replies_lost: u32,
-    /// Set-clock commands that were not carried out, because the time of their arrival is not
-    /// known.
+    /// Set-clock commands that were not carried out, and marks that were not kept, because the time
+    /// of their arrival is not known.
     pub clocks_refused: u32,
     /// Auto reports that arrived.
     pub reports_sent: u32,

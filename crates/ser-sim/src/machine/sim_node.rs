@@ -404,6 +404,12 @@ impl<'a> SimNode<'a> {
         Diagnostics { samples_missed: seen.samples_missed.saturating_sub(leapt_ms), ..seen }
     }
 
+    /// How many changes of an input (1–32) were left out as chatter since power-up.
+    #[must_use]
+    pub fn suppressed(&self, input: u8) -> u32 {
+        self.node.suppressed(input)
+    }
+
     /// The log as it is now: the total since the last erase, modulo 65536, and the entries from the
     /// oldest to the newest. Nothing goes over the line for it.
     #[must_use]

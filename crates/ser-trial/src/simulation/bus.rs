@@ -104,7 +104,7 @@ impl BusHost {
                     self.next_order_ms[index] = now_ms + self.chance.spread(1..=4_000);
                     orders::next_order(&mut self.chance, Way::Bus)
                 }
-                Errand::Any => continue,
+                Errand::Any | Errand::Nothing { .. } => continue,
             };
             if !matches!(order, Order::Read) {
                 trail.note(format_args!("{}: {order:?}", talk.account().name()));
@@ -299,6 +299,13 @@ impl BusLife {
                 }
                 Ok(Command::SetMode { recording }) => {
                     ledger.set_recording(arrived_ms.unwrap_or(now_ms), recording);
+                }
+                Ok(Command::Time { token }) if taken.broadcast => {
+                    // A mark is worthless as well.
+                    arrived_ms.into_iter().for_each(|at_ms| ledger.marked(token, at_ms));
+                }
+                Ok(Command::Time { token }) => {
+                    ledger.time_asked(Port::Bus, token, arrived_ms.unwrap_or(now_ms));
                 }
                 Ok(command) if taken.broadcast => ledger.command_done(&command),
                 Ok(command) => {

@@ -10,12 +10,18 @@
 mod tests;
 
 use std::collections::{BTreeMap, VecDeque};
+use std::num::NonZeroU8;
 
 use ser_node::capture::QUEUE_LEN;
 use ser_node::{Debounce, HELD_BACK_MS};
-use ser_proto::{Command, Configuration, Entry, MAX_SIZE, Reply, TimeStamp};
+use ser_proto::{
+    Command, Configuration, Entry, Filters, Identity, InputFilter, MAX_FILTERS, MAX_SIZE, Mark,
+    Model, Reply, TimeStamp,
+};
 
+use super::chatter_model::ChatterModel;
 use super::debounce_model::{Accepted, DebounceModel};
+use super::questions::{Answers, Questions, TimeQuestion};
 use super::recorded::{Erase, Recorded, stamp_ms};
 use super::wrong::{Numbered, Told, Wrong, erases};
 
@@ -40,12 +46,16 @@ pub struct Edges {
     pub stopped: u64,
     /// Too short for debounce.
     pub filtered: u64,
+    /// Chatter, left out and counted by the recorder.
+    pub chatter: u64,
     /// Beyond the capture queue, while the main loop was held up.
     pub queue_full: u64,
     /// Not processed when the power was cut.
     pub cut_off: u64,
     /// Not processed yet.
     pub undecided: u64,
+    /// Not edges, but places at which the log shows where an input came to rest after chatter.
+    pub rests: u64,
 }
 
 /// The port that a command came by.
@@ -95,12 +105,31 @@ pub struct Ledger {
     wait_after_ms: Option<u64>,
     /// Inputs whose changes did not fit the capture queue since the latest accepted change.
     dropped: u32,
-    /// The contacts now, and the inputs as of the latest event.
+    chatter: ChatterModel,
+    /// The contacts now, the inputs after the changes that were decided, and those as the log has
+    /// to show them.
     contacts: u32,
+    inputs: u32,
     state: u32,
-    /// Inputs that changed since the latest event while recording was stopped, or beyond the
-    /// capture queue.
-    unrecorded: u32,
+    /// What the latest event shows. What has changed since without an event was recorded nowhere.
+    shown: u32,
+    /// When the power came on, and for how much longer the recorder has been on since.
+    power_up_ms: u64,
+    older_ms: u64,
+    model: Model,
+    /// The filters in force, by input.
+    filters: Vec<InputFilter>,
+    /// Those in force before, which a reply may tell that comes late.
+    filters_before: Vec<InputFilter>,
+    /// Those that a host is setting, from which input on the answer tells them, and whether the
+    /// recorder has answered.
+    filters_wanted: Option<(NonZeroU8, Vec<InputFilter>)>,
+    filters_told: bool,
+    questions: Questions,
+    /// How many erases had certainly happened when somebody asked for the identity.
+    identity_asked: VecDeque<(Port, u64)>,
+    /// Erases that arrived and that certainly happened, in earlier lives.
+    erases_before: (u64, u64),
     /// From which millisecond on the clock is ahead of the simulation's time, and by how much.
     clock: Vec<(u64, i64)>,
     recording: Vec<(u64, bool)>,
@@ -129,17 +158,29 @@ pub struct Ledger {
 impl Ledger {
     /// A recorder without power, whose contacts are open.
     #[must_use]
-    pub fn new(mask: u32) -> Ledger {
+    pub fn new(model: Model) -> Ledger {
         Ledger {
-            mask,
+            mask: model.mask(),
             hold_ms: 0,
             debounce: DebounceModel::new(Debounce::OFF, 0),
             waiting: BTreeMap::new(),
             wait_after_ms: None,
             dropped: 0,
+            chatter: ChatterModel::default(),
             contacts: 0,
+            inputs: 0,
             state: 0,
-            unrecorded: 0,
+            shown: 0,
+            power_up_ms: 0,
+            older_ms: 0,
+            model,
+            filters: Vec::new(),
+            filters_before: Vec::new(),
+            filters_wanted: None,
+            filters_told: false,
+            questions: Questions::default(),
+            identity_asked: VecDeque::new(),
+            erases_before: (0, 0),
             clock: Vec::new(),
             recording: Vec::new(),
             events: VecDeque::new(),
@@ -159,16 +200,22 @@ impl Ledger {
     }
 
     /// Switches the power on; the clock shows `time_ms`.
-    pub fn power_up(&mut self, now_ms: u64, time_ms: i64, size: u16, debounce: Debounce) {
+    pub fn power_up(&mut self, now_ms: u64, time_ms: i64, size: u16, filters: Vec<InputFilter>) {
         self.edges.cut_off += self.undecided();
-        self.filtered_before += self.debounce.filtered();
-        self.hold_ms = debounce.longest_ms().into();
-        self.debounce = DebounceModel::new(debounce, self.contacts);
+        self.chatter = ChatterModel::default();
+        self.set_filters(filters);
+        (self.filters_wanted, self.filters_told) = (None, false);
+        (self.power_up_ms, self.older_ms) = (now_ms, 0);
+        self.questions.power_up();
+        self.identity_asked.clear();
+        let certain = self.erases.iter().filter(|erase| erase.certain).count();
+        self.erases_before.0 += self.erases.len() as u64;
+        self.erases_before.1 += certain as u64;
         self.waiting.clear();
         self.wait_after_ms = None;
         self.dropped = 0;
-        self.state = self.contacts & self.mask;
-        self.unrecorded = 0;
+        self.inputs = self.contacts & self.mask;
+        (self.state, self.shown) = (self.inputs, self.inputs);
         self.clock = vec![(0, time_ms - signed(now_ms))];
         self.recording = vec![(0, true)];
         self.events.clear();
@@ -180,8 +227,63 @@ impl Ledger {
         self.life += 1;
     }
 
+    /// From now on these filters are in force, by input. No input may be moving or chattering.
+    pub fn set_filters(&mut self, filters: Vec<InputFilter>) {
+        self.filtered_before += self.debounce.filtered();
+        let times = (1..).zip(&filters);
+        let debounce =
+            times.fold(Debounce::OFF, |all, (number, filter)| all.with(number, filter.debounce_ms));
+        self.hold_ms = debounce.longest_ms().into();
+        self.debounce = DebounceModel::new(debounce, self.contacts);
+        for (bit, filter) in filters.iter().enumerate() {
+            self.chatter.set(bit, filter.chatter);
+        }
+        self.filters = filters;
+    }
+
+    /// A host begins to set these filters. It goes on until the recorder has answered.
+    pub fn begin_filters(&mut self, first: NonZeroU8, filters: Vec<InputFilter>) {
+        (self.filters_wanted, self.filters_told) = (Some((first, filters)), false);
+    }
+
+    /// Whether the recorder has answered. The filters are then in force.
+    pub fn filters_are_set(&mut self) -> bool {
+        if self.filters_told
+            && let Some((_, filters)) = self.filters_wanted.take()
+        {
+            self.filters_before.clone_from(&self.filters);
+            self.set_filters(filters);
+        }
+        self.filters_told
+    }
+
+    /// The filters in force, by input.
+    #[must_use]
+    pub fn filters(&self) -> &[InputFilter] {
+        &self.filters
+    }
+
+    /// Inputs that chatter.
+    #[must_use]
+    pub fn chattering(&self) -> u32 {
+        self.chatter.chattering()
+    }
+
+    /// How many changes of each input were left out since power-up.
+    #[must_use]
+    pub fn left_out(&self) -> [u32; 32] {
+        self.chatter.left_out()
+    }
+
+    /// What became of questions.
+    #[must_use]
+    pub fn answers(&self) -> Answers {
+        self.questions.answers
+    }
+
     /// Ages the recorder: it has been on for that much longer, and its clock has gone on.
     pub fn grow_older(&mut self, by_ms: u64) {
+        self.older_ms += by_ms;
         for (_, ahead_ms) in &mut self.clock {
             *ahead_ms += signed(by_ms);
         }
@@ -242,16 +344,46 @@ impl Ledger {
 
     /// Records what has nothing to wait for once the sample of this millisecond has been taken.
     fn record_until(&mut self, now_ms: u64) {
-        while let Some(first) = self.waiting.first_entry() {
-            let at_ms = *first.key();
-            let waits = self.wait_after_ms.is_some_and(|arrived_ms| at_ms > arrived_ms);
-            if at_ms + self.hold_ms > now_ms || waits && at_ms + HELD_BACK_MS > now_ms {
-                return;
+        let (in_order_ms, held_ms) =
+            (now_ms.saturating_sub(self.hold_ms), now_ms.saturating_sub(HELD_BACK_MS));
+        let decided_ms = self
+            .wait_after_ms
+            .map_or(in_order_ms, |arrived_ms| in_order_ms.min(arrived_ms.max(held_ms)));
+        while let Some(first) = self.waiting.first_entry()
+            && *first.key() <= decided_ms
+        {
+            let (at_ms, Waiting { changed, dropped }) = first.remove_entry();
+            self.rest_until(at_ms.saturating_sub(1));
+            let chattered = self.chatter.chattering();
+            self.inputs ^= dropped ^ changed;
+            self.state ^= dropped & !chattered;
+            self.decide(at_ms, changed);
+        }
+        self.rest_until(decided_ms);
+    }
+
+    /// Lets inputs come to rest that have been quiet for long enough by this millisecond.
+    fn rest_until(&mut self, until_ms: u64) {
+        while let Some(at_ms) = self.chatter.next_rest_ms().filter(|&at_ms| at_ms <= until_ms) {
+            self.decide(at_ms, 0);
+        }
+    }
+
+    /// Decides what is recorded of inputs that changed in this millisecond, and of those that come
+    /// to rest in it.
+    fn decide(&mut self, at_ms: u64, changed: u32) {
+        let mut recorded = changed;
+        for bit in (0..32_usize).filter(|bit| changed >> bit & 1 == 1) {
+            if !self.chatter.change(bit, at_ms) {
+                recorded &= !(1 << bit);
+                self.edges.chatter += 1;
             }
-            let (at_ms, waiting) = first.remove_entry();
-            self.state ^= waiting.dropped;
-            self.unrecorded ^= waiting.dropped;
-            self.record(at_ms, waiting.changed);
+        }
+        let edges = u64::from(recorded.count_ones());
+        let rests = self.chatter.rest(at_ms) & (self.inputs ^ self.state);
+        self.state ^= recorded | rests;
+        if recorded | rests != 0 {
+            self.record(at_ms, recorded | rests, edges);
         }
     }
 
@@ -265,17 +397,16 @@ impl Ledger {
         }
     }
 
-    fn record(&mut self, at_ms: u64, changed: u32) {
-        self.state ^= changed;
-        let edges = u64::from(changed.count_ones());
+    fn record(&mut self, at_ms: u64, changed: u32, edges: u64) {
         if !in_force(&self.recording, at_ms) {
             self.edges.stopped += edges;
-            self.unrecorded ^= changed;
             return;
         }
         self.edges.recorded += edges;
+        self.edges.rests += u64::from(changed.count_ones()) - edges;
         let stamp_ms = (in_force(&self.clock, at_ms) + signed(at_ms)).rem_euclid(CENTURY_MS);
-        let unrecorded = std::mem::take(&mut self.unrecorded);
+        let unrecorded = self.shown ^ self.state ^ changed;
+        self.shown = self.state;
         self.events.push_back(Recorded { stamp_ms, changed, state: self.state, at_ms, unrecorded });
         self.note_overwritten();
     }
@@ -337,8 +468,44 @@ impl Ledger {
                 ));
                 self.note_overwritten();
             }
+            Command::Identify => {
+                let certain = self.erases.iter().filter(|erase| erase.certain).count();
+                self.identity_asked.push_back((port, certain as u64));
+            }
+            Command::Diagnostics { first } => {
+                self.questions.ask_counters(port, *first, self.chatter.left_out());
+            }
             _ => {}
         }
+    }
+
+    /// A question for the time has arrived in this millisecond.
+    pub fn time_asked(&mut self, port: Port, token: u16, at_ms: u64) {
+        let counted = |from: usize| (self.len() - from) as u64;
+        let events = match port {
+            Port::Line => {
+                self.may_count_from().map(counted).map(|events| events..=events).collect()
+            }
+            // It may have waited in the board, with events after it that wait as well.
+            Port::Bus => vec![0..=u64::MAX],
+        };
+        let (clock_us, tick_us) = (self.clock_us(at_ms), self.tick_us(at_ms));
+        self.questions.ask_time(TimeQuestion { port, token, clock_us, tick_us, events });
+    }
+
+    /// A mark has arrived in this millisecond.
+    pub fn marked(&mut self, token: u16, at_ms: u64) {
+        let clock_us = self.clock_us(at_ms);
+        self.questions.mark(Mark { token, clock_us });
+    }
+
+    /// What the clock shows in this millisecond. A setting in it counts.
+    fn clock_us(&self, at_ms: u64) -> i64 {
+        (in_force(&self.clock, at_ms + 1) + signed(at_ms)).rem_euclid(CENTURY_MS) * 1000
+    }
+
+    fn tick_us(&self, at_ms: u64) -> u64 {
+        (at_ms - self.power_up_ms + self.older_ms) * 1000
     }
 
     /// A command has arrived and been carried out at once.
@@ -388,8 +555,48 @@ impl Ledger {
                     self.see_configuration(*configuration)?;
                 }
             }
+            Reply::Time(reading) => self.questions.check_time(port, reading)?,
+            Reply::Diagnostics(page) => {
+                self.questions.check_counters(port, page, self.chatter.left_out())?;
+            }
+            Reply::Identity(identity) => self.see_identity(port, identity)?,
+            Reply::Filters(page) => self.see_filters(page)?,
             _ => {}
         }
+        Ok(())
+    }
+
+    fn see_identity(&mut self, port: Port, identity: &Identity) -> Result<(), String> {
+        // Until the reply is seen, other commands may have been carried out.
+        let of_port = |(of, _): &(Port, u64)| *of == port;
+        let asked = self.identity_asked.iter().position(of_port);
+        let asked = asked.and_then(|place| self.identity_asked.remove(place));
+        let certain = asked.map_or(0, |(_, certain)| certain);
+        let (arrived_before, certain_before) = self.erases_before;
+        let least = self.life + certain_before + certain;
+        let most = self.life + arrived_before + self.erases.len() as u64;
+        self.questions.check_identity(identity, self.model, self.life, least..=most)
+    }
+
+    /// The filters in force, or those that are just being set.
+    fn see_filters(&mut self, page: &Filters) -> Result<(), String> {
+        let from = usize::from(page.first.get()) - 1;
+        let are = |filters: &[InputFilter]| {
+            let inputs = filters.iter().take(self.model.inputs().into());
+            inputs.skip(from).take(MAX_FILTERS).eq(&page.filters)
+        };
+        let wanted = self.filters_wanted.as_ref();
+        let set = wanted.is_some_and(|(first, filters)| *first == page.first && are(filters));
+        let late = are(&self.filters_before);
+        if !set && !are(&self.filters) && !late {
+            return Wrong::new("the recorder tells of filters that are not in force")
+                .fact("told", format_args!("{page:?}"))
+                .fact("in force", format_args!("{:?}", self.filters))
+                .fact("being set", format_args!("{:?}", self.filters_wanted))
+                .err();
+        }
+        self.filters_told |= set;
+        self.questions.answers.filters += 1;
         Ok(())
     }
 

@@ -42,6 +42,11 @@ pub enum Errand {
         /// When everything has come to rest.
         since_ms: u64,
     },
+    /// Nothing, up to this time.
+    Nothing {
+        /// Until then.
+        until_ms: u64,
+    },
 }
 
 /// A byte on its way to the recorder, its rate, and when it arrives.
@@ -214,11 +219,14 @@ impl LineHost {
             _ if self.is_searching() => self.search_again_ms,
             Errand::Any if !self.talk.is_behind() => self.next_order_ms,
             Errand::CatchUp { since_ms } if self.talk.has_read_since(since_ms) => NEVER,
+            Errand::Nothing { .. } => NEVER,
             Errand::Any | Errand::CatchUp { .. } => 0,
         }
     }
 
-    fn is_searching(&self) -> bool {
+    /// Whether the host looks for the rate at which the recorder talks.
+    #[must_use]
+    pub fn is_searching(&self) -> bool {
         self.seeking.is_some() || self.talk.failures() >= 2
     }
 
@@ -259,6 +267,7 @@ impl LineHost {
         match self.tap.goes_in(byte, node.has_room(), expected) {
             Some(Command::SetClock(time)) => ledger.set_clock(now_ms, time),
             Some(Command::SetMode { recording }) => ledger.set_recording(now_ms, recording),
+            Some(Command::Time { token }) => ledger.time_asked(Port::Line, token, now_ms),
             Some(command) => ledger.command_arrived(Port::Line, &command, NEVER),
             None => {}
         }
@@ -338,7 +347,7 @@ impl LineHost {
             Errand::Any if !self.talk.is_behind() => {
                 orders::next_order(&mut self.chance, Way::Line)
             }
-            Errand::Any | Errand::CatchUp { .. } => Order::Read,
+            _ => Order::Read,
         };
         if !matches!(order, Order::Read) {
             trail.note(format_args!("line: {order:?}"));

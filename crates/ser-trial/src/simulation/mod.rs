@@ -8,6 +8,8 @@
 //! - [`ledger`] works out which events a recorder must have recorded, and with which stamps, from
 //!   what was done to it. [`taps`] tell it what the recorder was given, and [`debounce_model`]
 //!   which input changes count.
+//! - [`chatter_model`] says which of them the chatter filter leaves out, and [`questions`] what a
+//!   recorder must answer to the questions of our extension.
 //! - [`printout`] reads what a recorder prints.
 //! - [`account`] compares what a reader was told with the ledger: every event once and in order, or
 //!   reported as lost with the right count.
@@ -19,6 +21,7 @@ pub mod account;
 pub mod activity;
 pub mod bus;
 pub mod chance;
+pub mod chatter_model;
 pub mod conversation;
 pub mod debounce_model;
 pub mod digest;
@@ -28,6 +31,7 @@ pub mod noise;
 pub mod orders;
 pub mod pace;
 pub mod printout;
+pub mod questions;
 pub mod recorded;
 pub mod report;
 pub mod taps;

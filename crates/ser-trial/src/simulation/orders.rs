@@ -1,6 +1,10 @@
 //! What hosts want from recorders.
 
-use ser_proto::{AutoReport, Baud, Command, Configure, TimeStamp};
+use std::num::NonZeroU8;
+
+use ser_proto::{
+    AutoReport, Baud, ChatterFilter, Command, Configure, Counter, InputFilter, Model, TimeStamp,
+};
 
 use super::chance::Chance;
 use super::conversation::Order;
@@ -19,7 +23,7 @@ pub enum Way {
 
 /// What a host asks for next, which is most often the log.
 pub fn next_order(chance: &mut Chance, way: Way) -> Order {
-    match chance.below(100) {
+    match chance.below(112) {
         0..60 => Order::Read,
         60..67 => set_clock(chance),
         67..77 => Order::Ask(Command::Configure(configure(chance, way))),
@@ -30,18 +34,50 @@ pub fn next_order(chance: &mut Chance, way: Way) -> Order {
         92..94 => Order::Ask(Command::QueryConfiguration),
         94..96 => Order::Ask(Command::LastBroadcast),
         96..98 => Order::Ask(odd_read(chance)),
-        _ => Order::Ask(Command::QueryMode),
+        98..100 => Order::Ask(Command::QueryMode),
+        100..106 => Order::Ask(time(chance)),
+        106..108 => Order::Ask(Command::Identify),
+        108..110 => Order::Ask(Command::Diagnostics { first: any_counter(chance) }),
+        _ => Order::Ask(Command::QueryFilters { first: any_input(chance) }),
     }
+}
+
+/// A question for the time, or a mark where it is said to all.
+fn time(chance: &mut Chance) -> Command {
+    Command::Time { token: u16::from_be_bytes([chance.byte(), chance.byte()]) }
+}
+
+fn any_counter(chance: &mut Chance) -> Counter {
+    let suppressed = Counter::suppressed(small(chance, 1, 32)).unwrap_or(Counter::FIRST);
+    chance.pick(&[Counter::FIRST, Counter::DATAGRAMS_IGNORED, suppressed, suppressed])
+}
+
+fn any_input(chance: &mut Chance) -> NonZeroU8 {
+    NonZeroU8::new(small(chance, 1, 33)).unwrap_or(NonZeroU8::MIN)
+}
+
+/// A filter for an input, or for all: most often one that takes a loose contact for chatter.
+pub fn any_filter(chance: &mut Chance, model: Model) -> (Option<NonZeroU8>, InputFilter) {
+    let debounce_ms = if chance.one_in(3) { small(chance, 0, 255) } else { 0 };
+    let window_ms = u16::try_from(chance.spread(1..=7000)).unwrap_or(1000);
+    let least = 1 + 4 * u64::from(window_ms.div_ceil(1000));
+    let changes = NonZeroU8::new(small(chance, least, 32));
+    let rearm_ms = u16::try_from(u64::from(window_ms) + chance.below(3_000)).unwrap_or(window_ms);
+    let chatter = changes.map(|changes| ChatterFilter { changes, window_ms, rearm_ms });
+    let chatter = chatter.filter(|_| !chance.one_in(5));
+    let input = NonZeroU8::new(small(chance, 1, model.inputs().into()));
+    (input.filter(|_| chance.one_in(3)), InputFilter { debounce_ms, chatter })
 }
 
 /// What is said to all recorders.
 pub fn next_broadcast(chance: &mut Chance) -> Command {
-    match chance.below(10) {
+    match chance.below(13) {
         0..5 => Command::SetClock(valid_time(chance)),
         5 => Command::Erase,
         6 => Command::SetMode { recording: false },
         7..9 => Command::SetMode { recording: true },
-        _ => Command::Configure(configure(chance, Way::Bus)),
+        9 => Command::Configure(configure(chance, Way::Bus)),
+        _ => time(chance),
     }
 }
 

@@ -5,6 +5,7 @@ use std::fmt;
 use super::account::Tally;
 use super::conversation::Talk;
 use super::ledger::Edges;
+use super::questions::Answers;
 use crate::digits::grouped;
 
 /// How much time passed, and how.
@@ -42,6 +43,10 @@ pub struct Report {
     pub edges: Vec<Edges>,
     /// How many events there were, per recorder.
     pub recorded: Vec<u64>,
+    /// What questions of our extension were answered, per recorder.
+    pub answers: Vec<Answers>,
+    /// How often filters were set, per recorder.
+    pub filters_set: Vec<u64>,
     /// What became of the events, per reader.
     pub tallies: Vec<(&'static str, Tally)>,
     /// What was talked about on the line.
@@ -69,9 +74,11 @@ impl Report {
             row("= recorded", |edges| edges.recorded),
             row("+ while stopped", |edges| edges.stopped),
             row("+ shorter than debounce", |edges| edges.filtered),
+            row("+ chatter, left out and counted", |edges| edges.chatter),
             row("+ beyond the queue, counted", |edges| edges.queue_full),
             row("+ cut off by the power", |edges| edges.cut_off),
             row("+ not decided yet", |edges| edges.undecided),
+            row("where inputs came to rest, shown", |edges| edges.rests),
         ]
     }
 
@@ -92,6 +99,18 @@ impl Report {
             row("log restarts reported", |tally| tally.restarts),
             row("log restarts without a trace", |tally| tally.traceless),
             row("total wrapped unseen", |tally| tally.wrapped),
+        ]
+    }
+
+    fn answer_rows(&self) -> Vec<Row> {
+        let row = |what, count: fn(&Answers) -> u64| Row::new(what, self.answers.iter().map(count));
+        vec![
+            row("times told, each true", |answers| answers.times),
+            row("  with a mark", |answers| answers.marks),
+            row("identities", |answers| answers.identities),
+            row("pages of counters", |answers| answers.counters),
+            row("pages of filters", |answers| answers.filters),
+            Row::new("filters set", self.filters_set.iter().copied()),
         ]
     }
 
@@ -149,6 +168,7 @@ impl fmt::Display for Report {
             grouped(self.operations),
         )?;
         table(f, ["recorder 1", "recorder 2"].into_iter(), &self.edge_rows())?;
+        table(f, ["recorder 1", "recorder 2"].into_iter(), &self.answer_rows())?;
         table(f, self.tallies.iter().map(|&(name, _)| name), &self.event_rows())?;
         writeln!(f, "  why some of what is gone leaves no trace: docs/guarantees.md, \"Losses\"")?;
         table(f, self.tallies.iter().map(|&(name, _)| name), &self.talk_rows())?;

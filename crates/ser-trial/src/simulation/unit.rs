@@ -2,7 +2,7 @@
 
 use chrono::{DateTime, NaiveDateTime};
 use ser_node::{Debounce, HELD_BACK_MS, Rtc};
-use ser_proto::{MAX_SIZE, Model};
+use ser_proto::{InputFilter, MAX_SIZE, Model};
 use ser_sim::{LineRate, MemoryStorage, NonVolatile, SimNode, SimNodeOptions, SimRtc};
 
 use super::activity::{Activity, Tempo};
@@ -24,8 +24,12 @@ pub const SETTLING_MS: u64 = 2 * (HELD_BACK_MS + 1);
 pub struct Unit {
     /// Which one.
     pub model: Model,
-    /// Its debounce times, which are part of the image.
+    /// The debounce times that the board decides, until a host sets a filter.
     pub debounce: Debounce,
+    /// The filters that a host has set, by input. They are kept with the configuration.
+    filters: Option<Vec<InputFilter>>,
+    /// How often one was set.
+    pub filters_set: u64,
     /// Its ledger.
     pub ledger: Ledger,
     /// What it must have counted.
@@ -56,7 +60,9 @@ impl Unit {
         Unit {
             model,
             debounce,
-            ledger: Ledger::new(model.mask()),
+            filters: None,
+            filters_set: 0,
+            ledger: Ledger::new(model),
             expected: Expected::default(),
             activity: Activity::new(chance.branch(), model.inputs()),
             non_volatile: NonVolatile { storage: MemoryStorage::default(), rtc, id: None },
@@ -76,6 +82,27 @@ impl Unit {
         }
     }
 
+    /// The filters in force, by input. The board has debounce times also for inputs that there are
+    /// not, and changes wait for the longest of all.
+    #[must_use]
+    pub fn filters(&self) -> Vec<InputFilter> {
+        let of_board =
+            |input| InputFilter { debounce_ms: self.debounce.time_ms(input), chatter: None };
+        self.filters.clone().unwrap_or_else(|| (1..=32).map(of_board).collect())
+    }
+
+    /// These filters are in force now, and stay so.
+    pub fn keep_filters(&mut self, filters: Vec<InputFilter>) {
+        self.filters_set += 1;
+        self.filters = Some(filters);
+    }
+
+    /// Whether every change counts at once.
+    #[must_use]
+    pub fn is_undebounced(&self) -> bool {
+        self.ledger.filters().iter().all(|filter| filter.debounce_ms == 0)
+    }
+
     /// The power will come on after `off_ms`. The battery-backed clock has gone on meanwhile.
     pub fn power_comes_on(&mut self, now_ms: u64, off_ms: u64) {
         let first = self.ledger.life() == 0;
@@ -90,7 +117,7 @@ impl Unit {
         if self.has_clock {
             self.non_volatile.rtc.write(date_time(time_ms));
         }
-        self.ledger.power_up(now_ms, time_ms, size, self.debounce);
+        self.ledger.power_up(now_ms, time_ms, size, self.filters());
         self.expected = Expected::default();
         self.lost_before = self.ledger.edges().queue_full;
     }
@@ -99,7 +126,7 @@ impl Unit {
     pub fn follow(&mut self, node: &mut SimNode<'_>, now_ms: u64, held_up: bool) {
         let moves = node.take_played();
         let moves = moves.iter().map(|played| (played.start_ms + played.at_ms, played.changed.0));
-        if held_up && self.debounce == Debounce::OFF {
+        if held_up && self.is_undebounced() {
             self.ledger.contacts_moved_unseen(moves);
         } else {
             moves.for_each(|(at_ms, changed)| self.ledger.contacts_moved(at_ms, changed));
@@ -126,6 +153,15 @@ impl Unit {
         let lost = self.ledger.edges().queue_full - self.lost_before;
         self.expected.0.edges_lost = u32::try_from(lost).unwrap_or(u32::MAX);
         self.expected.check(&node.diagnostics())?;
+        for (input, left_out) in (1..=self.model.inputs()).zip(self.ledger.left_out()) {
+            let counted = node.suppressed(input);
+            if counted != left_out {
+                return Err(format!(
+                    "{left_out} changes of input {input} were chatter, and the recorder has counted \
+                     {counted}"
+                ));
+            }
+        }
         let (total, entries) = node.log();
         self.ledger.check_log(total, &entries)
     }

@@ -1,6 +1,7 @@
 //! Recorders, hosts, lines and bus in one virtual time, life after life. A life lasts from power-up
 //! to power cut.
 
+use std::num::NonZeroU8;
 use std::time::Instant;
 
 use ser_node::Debounce;
@@ -13,6 +14,7 @@ use super::bus::{BusHost, BusLife, HOST, any_noise};
 use super::chance::Chance;
 use super::conversation::{Conversation, Order};
 use super::line_host::{Errand, LineHost};
+use super::orders::any_filter;
 use super::pace::{Pace, Paces};
 use super::report::{Hours, Report};
 use super::trail::Trail;
@@ -33,6 +35,9 @@ const PRINT_AND_REPORT: Configure = Configure {
 
 /// The time in which a capture queue does not fill, whatever the inputs do.
 const MAX_DEBOUNCED_HOLD_UP_MS: u64 = 200;
+
+/// How often a host looks whether it has set a filter.
+const ASK_EVERY_MS: u64 = 100;
 
 /// The number of ticks after which the tick wraps.
 const TICKS: u64 = 1 << 32;
@@ -176,6 +181,8 @@ impl World {
             hours,
             edges: units.iter().map(|unit| unit.ledger.edges()).collect(),
             recorded,
+            answers: units.iter().map(|unit| unit.ledger.answers()).collect(),
+            filters_set: units.iter().map(|unit| unit.filters_set).collect(),
             tallies: accounts.map(|account| (account.name(), account.tally())).collect(),
             line: line.talk.talk(),
             bus: bus_host.talks.iter().map(Conversation::talk).collect(),
@@ -187,7 +194,15 @@ impl World {
 
     fn live(&mut self, off: Vec<PoweredOff>, rams: &mut [Ram]) -> Result<Vec<PoweredOff>, String> {
         let mut life = self.power_up(off, rams);
+        let mut next_filters_ms = self.now_ms + self.chance.spread(1_000..=4 * 3_600_000);
+        if self.chance.one_in(2) {
+            next_filters_ms = self.now_ms;
+        }
         while self.now_ms < life.end_ms {
+            if self.now_ms >= next_filters_ms {
+                self.set_filters(&mut life)?;
+                next_filters_ms = self.now_ms + self.chance.spread(60_000..=24 * 3_600_000);
+            }
             self.step(&mut life, Errand::Any)?;
             self.suffer(&mut life);
         }
@@ -253,8 +268,11 @@ impl World {
         let scenes = self.units.iter().map(|unit| unit.activity.next_ms());
         let scenes = scenes.filter(|_| errand == Errand::Any);
         let next_ms = moves.chain(scenes).fold(self.line.next_ms(self.now_ms, errand), u64::min);
-        let end_ms =
-            if errand == Errand::Any { life.end_ms.min(life.next_fault_ms) } else { u64::MAX };
+        let end_ms = match errand {
+            Errand::Any => life.end_ms.min(life.next_fault_ms),
+            Errand::CatchUp { .. } => u64::MAX,
+            Errand::Nothing { until_ms } => until_ms,
+        };
         // Nobody waits longer than that in vain.
         next_ms.min(end_ms).clamp(soon_ms, self.now_ms + CATCH_UP_MS)
     }
@@ -366,7 +384,7 @@ impl World {
                 unit.play(node, self.now_ms, Tempo::Flat);
             }
             // With debounce, the ledger cannot tell what a full queue drops.
-            let held_up = unit.debounce == Debounce::OFF || for_ms <= MAX_DEBOUNCED_HOLD_UP_MS;
+            let held_up = unit.is_undebounced() || for_ms <= MAX_DEBOUNCED_HOLD_UP_MS;
             let until_ms = self.now_ms + for_ms;
             if held_up {
                 node.hold_up_to(until_ms);
@@ -377,6 +395,56 @@ impl World {
         }
         self.now_ms += for_ms;
         self.trail.set_now(self.now_ms);
+    }
+
+    /// Lets the contacts come to rest and has hosts set filters, over the line and over the bus. The
+    /// moment at which a recorder takes a filter over is not known, so nothing moves meanwhile.
+    fn set_filters(&mut self, life: &mut Life<'_>) -> Result<(), String> {
+        let mut quiet_ms = self.now_ms;
+        while self.now_ms < quiet_ms + SETTLING_MS {
+            if self.is_moving(life) {
+                quiet_ms = self.now_ms;
+            }
+            self.step(life, Errand::Nothing { until_ms: self.now_ms + SETTLING_MS })?;
+        }
+        let over_bus = life.bus.is_some();
+        for index in if over_bus { vec![0, 1] } else { vec![0] } {
+            let over_bus = over_bus && (index == 1 || self.chance.one_in(2));
+            self.set_filter(life, index, over_bus)?;
+        }
+        Ok(())
+    }
+
+    /// Has a host set a filter until the recorder has answered.
+    fn set_filter(
+        &mut self,
+        life: &mut Life<'_>,
+        index: usize,
+        over_bus: bool,
+    ) -> Result<(), String> {
+        let unit = &mut self.units[index];
+        let (input, filter) = any_filter(&mut self.chance, unit.model);
+        let mut filters = unit.filters();
+        filters.truncate(unit.model.inputs().into());
+        let is_meant = |number: u8| input.is_none_or(|input| input.get() == number);
+        let meant = (1..).zip(&mut filters).filter(|(number, _)| is_meant(*number));
+        meant.for_each(|(_, place)| *place = filter);
+        unit.ledger.begin_filters(input.unwrap_or(NonZeroU8::MIN), filters.clone());
+        self.trail.note(format_args!("recorder {}: {input:?} {filter:?}", index + 1));
+        let deadline_ms = self.now_ms + CATCH_UP_MS;
+        while !self.units[index].ledger.filters_are_set() {
+            if self.now_ms > deadline_ms {
+                return Err(format!("recorder {} cannot be told a filter", index + 1));
+            }
+            let searches = !over_bus && self.line.is_searching();
+            let talk = if over_bus { &mut self.bus_host.talks[index] } else { &mut self.line.talk };
+            if talk.is_resting() && !searches {
+                talk.begin(Order::Ask(Command::SetFilter { input, filter }), self.now_ms);
+            }
+            self.step(life, Errand::Nothing { until_ms: self.now_ms + ASK_EVERY_MS })?;
+        }
+        self.units[index].keep_filters(filters);
+        Ok(())
     }
 
     /// Lets everything come to rest and all hosts read everything, and checks that nothing is
@@ -400,9 +468,9 @@ impl World {
                     behind.join(", ")
                 ));
             }
-            let moving = life.nodes.iter().any(|node| node.next_move_ms().is_some());
+            let moves = self.is_moving(life);
             self.step(life, Errand::CatchUp { since_ms: quiet_ms })?;
-            if moving {
+            if moves {
                 quiet_ms = self.now_ms + SETTLING_MS;
             }
         }
@@ -418,6 +486,12 @@ impl World {
             unit.check(node)?;
         }
         Ok(())
+    }
+
+    /// Whether contacts move, or still count as if they did.
+    fn is_moving(&self, life: &Life<'_>) -> bool {
+        let moves = life.nodes.iter().any(|node| node.next_move_ms().is_some());
+        moves || self.units.iter().any(|unit| unit.ledger.chattering() != 0)
     }
 
     fn has_settled(&self, life: &Life<'_>, quiet_ms: u64) -> bool {

@@ -6,7 +6,7 @@ use ser_console::Harmless;
 use ser_proto::{ChatterFilter, Counter, InputFilter};
 use serde_json::{Value, json};
 
-use crate::filter_text::{chatter, count, debounce, time};
+use crate::filter_text::{chatter, count, debounce, numbers, time};
 use crate::output::{Grid, Palette, Points};
 
 /// What is known of all inputs, input 1 first.
@@ -19,24 +19,36 @@ pub(in crate::commands) struct Shown<'a> {
 }
 
 impl Shown<'_> {
+    /// Neighbours that are alike in everything that is shown share a row.
     pub(super) fn write_table(&self, out: &mut dyn Write, palette: Palette) -> io::Result<()> {
-        let row = |(input, filter): (u8, &InputFilter)| {
-            let name = self.points.name(input).map(|name| Harmless(name).line());
-            let left_out = self.left_out(input).filter(|&left_out| left_out > 0);
-            let left_out = left_out.map(|left_out| count(left_out.into()));
-            vec![
-                format!("{input:>5}"),
-                name.unwrap_or_default(),
-                debounce(filter),
-                filter.chatter.as_ref().map_or("off".to_owned(), chatter),
-                filter.chatter.map(|filter| time(filter.rearm_ms)).unwrap_or_default(),
-                left_out.unwrap_or_default(),
-            ]
-        };
+        let mut rows: Vec<(Vec<u8>, Vec<String>)> = Vec::new();
+        for (input, filter) in self.inputs() {
+            let cells = self.cells(input, filter);
+            match rows.last_mut() {
+                Some((inputs, alike)) if *alike == cells => inputs.push(input),
+                _ => rows.push((vec![input], cells)),
+            }
+        }
         let columns =
             vec!["input", "name", "debounce", "chatter from", "re-arm", "left out since power-up"];
-        let rows = self.inputs().map(row).collect();
+        let row = |(inputs, cells): (Vec<u8>, Vec<String>)| {
+            std::iter::once(format!("{:>5}", numbers(&inputs))).chain(cells).collect()
+        };
+        let rows = rows.into_iter().map(row).collect();
         Grid { title: None, columns, rows }.write(out, palette)
+    }
+
+    /// What is shown of an input, besides its number.
+    fn cells(&self, input: u8, filter: &InputFilter) -> Vec<String> {
+        let name = self.points.name(input).map(|name| Harmless(name).line());
+        let left_out = self.left_out(input).filter(|&left_out| left_out > 0);
+        vec![
+            name.unwrap_or_default(),
+            debounce(filter),
+            filter.chatter.as_ref().map_or("off".to_owned(), chatter),
+            filter.chatter.map(|filter| time(filter.rearm_ms)).unwrap_or_default(),
+            left_out.map(|left_out| count(left_out.into())).unwrap_or_default(),
+        ]
     }
 
     pub(super) fn to_json(&self) -> Value {
@@ -81,14 +93,15 @@ mod tests {
         let changes = NonZeroU8::new(10).unwrap();
         let chatter = Some(ChatterFilter { changes, window_ms: 1000, rearm_ms: 2000 });
         let debounced = InputFilter { debounce_ms: 5, chatter: None };
-        let filters = [InputFilter::OFF, debounced, InputFilter { debounce_ms: 5, chatter }];
+        let chattering = InputFilter { debounce_ms: 5, chatter };
+        let filters = [InputFilter::OFF, debounced, chattering, debounced, debounced, debounced];
         let counters = [(Counter::EDGES_LOST, 9), (Counter::suppressed(3).unwrap(), 1234)];
         let points = points();
         test(&Shown { recorder: "R", filters: &filters, points: &points, counters: &counters });
     }
 
     #[test]
-    fn filters_are_a_row_for_each_input() {
+    fn inputs_that_are_alike_share_a_row() {
         with(|shown| {
             let mut out = Vec::new();
             shown.write_table(&mut out, Palette::plain()).unwrap();
@@ -97,7 +110,8 @@ mod tests {
                 "input  name         debounce  chatter from       re-arm  left out since power-up\n    \
                  1               off       off\n    \
                  2               5 ms      off\n    \
-                 3  52-1 closed  5 ms      10 changes in 1 s  2 s     1,234\n"
+                 3  52-1 closed  5 ms      10 changes in 1 s  2 s     1,234\n  \
+                 4-6               5 ms      off\n"
             );
         });
     }

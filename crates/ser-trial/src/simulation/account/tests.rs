@@ -1,7 +1,6 @@
 //! The checker checked: what a reader must be told, and what must be refused.
 
-use ser_node::Debounce;
-use ser_proto::{Command, Inputs, Model, Reply};
+use ser_proto::{Command, InputFilter, Inputs, Model, Reply};
 
 use super::*;
 use crate::simulation::ledger::Port;
@@ -20,8 +19,8 @@ struct Case {
 
 impl Case {
     fn new() -> Case {
-        let mut ledger = Ledger::new(Model::Ser160.mask());
-        ledger.power_up(0, 0, SIZE, Debounce::OFF);
+        let mut ledger = Ledger::new(Model::Ser160);
+        ledger.power_up(0, 0, SIZE, vec![InputFilter::OFF; 16]);
         Case { ledger, account: Account::new("reader"), now_ms: 0, entries: Vec::new() }
     }
 
@@ -51,7 +50,7 @@ impl Case {
         self.account.power_goes(&self.ledger, true);
         self.now_ms += 1000;
         let time_ms = i64::try_from(self.now_ms).expect("early");
-        self.ledger.power_up(self.now_ms, time_ms, SIZE, Debounce::OFF);
+        self.ledger.power_up(self.now_ms, time_ms, SIZE, vec![InputFilter::OFF; 16]);
     }
 
     /// Begins a reading with these deliveries.
@@ -361,7 +360,7 @@ fn nothing_else_excuses_silence() {
     let erase = case.ledger.erases()[0];
     assert_refused(case.account.count_gone(3..6, erase, &case.ledger), "nothing excuses that");
     case.account.power_goes(&case.ledger, true);
-    case.ledger.power_up(case.now_ms, 0, SIZE, Debounce::OFF);
+    case.ledger.power_up(case.now_ms, 0, SIZE, vec![InputFilter::OFF; 16]);
     assert_refused(case.account.count_cut_off(&case.ledger), "nothing excuses that");
 }
 
