@@ -13,6 +13,7 @@ use ser_evidence::time::{Bound, Host, Moment, Shown, stamp};
 use ser_proto::ClockReading;
 
 use crate::host_reading;
+use crate::site_file::ClockSetting;
 
 /// How many answers are wanted.
 const ROUNDS: u32 = 4;
@@ -212,6 +213,26 @@ impl Looks {
         })
     }
 
+    /// How far the clock was ahead of what it should show when it was asked last, at least and at
+    /// most, in microseconds. `None` where that cannot be told.
+    pub(crate) fn ahead_of(&self, setting: &ClockSetting) -> Option<(i64, i64)> {
+        let (asked_us, last) = self.ahead().last()?;
+        let known = |(least, most): (i64, i64)| Bound::<Host>::from_us(least, most);
+        let each = self.ahead().map(|(at_us, (least, most))| {
+            let room = i64::try_from(rate_us(asked_us.abs_diff(at_us))).unwrap_or(i64::MAX);
+            known((least.saturating_sub(room), most.saturating_add(room)))
+        });
+        let (common, hull) = each.fold((known(last), known(last)), |(common, hull), bound| {
+            (common.intersection(bound), hull.hull(bound))
+        });
+        let bound = if common.is_empty() { hull } else { common };
+        let (least, most) = (bound.lo()?.us(), bound.hi()?.us());
+        let asked = Duration::from_micros(u64::try_from(asked_us).ok()?);
+        // From this computer's monotonic clock to what the recorder's should show.
+        let zone_us = setting.shown_us(host_reading::at(asked).utc.us())?.checked_sub(asked_us)?;
+        Some((least.checked_sub(zone_us)?, most.checked_sub(zone_us)?))
+    }
+
     /// With later answers; without these, if the clock was set in between.
     pub(crate) fn and(mut self, later: Looks) -> Looks {
         let is_same = match (self.last(), later.first()) {
@@ -288,6 +309,7 @@ const fn unit_us(reading: &ClockReading) -> i64 {
 #[cfg(test)]
 mod tests {
     use oorandom::Rand64;
+    use ser_evidence::site::{ClockRule, Site};
     use ser_proto::ClockSource;
 
     use super::*;
@@ -354,6 +376,26 @@ mod tests {
         assert_eq!(bound(&[look(5000, 6000, NOON, 0)]), Bound::from_us(4000, 6001));
         // It showed its 250th microsecond then.
         assert_eq!(bound(&[look(5000, 6000, NOON + 250, 0)]), Bound::from_us(4748, 5752));
+    }
+
+    #[test]
+    fn a_clock_is_ahead_by_what_all_answers_allow() {
+        let utc = ClockSetting::of(ClockRule::Utc, &Site::unknown());
+        let here = host_reading::now();
+        let (asked_us, utc_us) = (here.monotonic.us(), here.utc.us());
+        let seen = |from: i64, to: i64| {
+            let us = |offset: i64| u64::try_from(asked_us + offset).unwrap();
+            // It counts microseconds, and is five milliseconds fast.
+            let clock_us = (utc_us + from + 5000) / 2 * 2 + 1;
+            look(us(from), us(to), clock_us, us(from))
+        };
+        let looks = Looks(vec![seen(-30_000, -10_000), seen(-8000, -7600), seen(-1000, 0)]);
+        let (least, most) = looks.ahead_of(&utc).unwrap();
+        // The second answer says most. This computer's clocks may part by some microseconds.
+        assert!((4500..=4650).contains(&least) && (4990..=5100).contains(&most), "{least} {most}");
+        let never = ClockReading { clock_us: i64::MIN, ..*looks.last().unwrap() };
+        let between = (Duration::ZERO, Duration::ZERO);
+        assert_eq!(Looks(vec![ClockLook { reading: never, between }]).ahead_of(&utc), None);
     }
 
     #[test]

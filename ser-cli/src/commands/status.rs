@@ -25,8 +25,8 @@ Examples:
 
 A recorder with our firmware also tells who it is, what its clock shows and how far that is from \
 this computer's time (or from what `clock` in the site file says), what it filters out, and whether \
-it has lost anything: filter and diagnostics show the rest. The offset is measured in three \
-questions; it holds for this computer's clock, whatever that is worth.";
+it has lost anything: filter and diagnostics show the rest. The offset is measured in several \
+questions; it holds for this computer's clock, whatever that is worth: ser-cli time says more.";
 
 /// Ask the recorder what it is doing: recording or not, log, settings, latest event, clock.
 ///

@@ -10,13 +10,10 @@ use unicode_width::UnicodeWidthStr;
 
 use super::ask::{Answer, Told};
 use super::drift::Rate;
-use crate::output::PROGRAM;
+use crate::output::{PROGRAM, ago, offset};
 
 /// The drift is shown where it is known to this, in parts per billion.
 const TELLING_PPB: i64 = 500_000;
-
-/// A clock is so far off because it was never set, or because its zone is another one.
-const FAR_US: i64 = 1_000_000;
 
 /// A recorder, and what came of asking it, or why it was not reached.
 pub(super) type Row = (String, Result<Answer, String>);
@@ -63,7 +60,7 @@ pub(super) fn table(out: &mut dyn Write, rows: &[Row], doubt: HostDoubt) -> io::
 }
 
 fn of_told(name: String, told: &Told) -> Vec<String> {
-    let Told { reading, ahead_us: (least, most), rate, .. } = told;
+    let Told { reading, ahead_us, rate, .. } = told;
     let shows = stamp(Moment::from_us(reading.clock_us))
         .map_or_else(|| "no time".to_owned(), |stamp| stamp.to_string());
     let drift = rate.filter(|rate| (rate.most_ppb - rate.least_ppb) / 2 <= TELLING_PPB);
@@ -72,7 +69,7 @@ fn of_told(name: String, told: &Told) -> Vec<String> {
         format!("{shows} {}", told.setting),
         match reading.source {
             ClockSource::NeverSet => "never set".to_owned(),
-            _ => ahead(*least, *most),
+            _ => offset(*ahead_us),
         },
         drift.map_or_else(|| "not known".to_owned(), self::drift),
         source(reading),
@@ -98,22 +95,6 @@ fn source(reading: &ClockReading) -> String {
     }
 }
 
-/// As `+0.4 ± 0.3 ms`; far off, as `-3600.000 s ± 6 ms`.
-fn ahead(least_us: i64, most_us: i64) -> String {
-    let middle = least_us.midpoint(most_us);
-    let half_us = (most_us - middle).max(middle - least_us);
-    // Rounded up, with the rounding of the middle.
-    let tenths = (half_us + 149) / 100;
-    let doubt = format!("{}.{}", tenths / 10, tenths % 10);
-    let sign = if middle < 0 { '-' } else { '+' };
-    let size = middle.unsigned_abs();
-    if middle.saturating_abs() < FAR_US {
-        let tenths = (size + 50) / 100;
-        return format!("{sign}{}.{} ± {doubt} ms", tenths / 10, tenths % 10);
-    }
-    format!("{sign}{}.{:03} s ± {doubt} ms", size / 1_000_000, size / 1000 % 1000)
-}
-
 /// As `+12.5 ± 0.8 ppm`.
 fn drift(rate: Rate) -> String {
     let ppm = |ppb: i64| ppb as f64 / 1000.0;
@@ -121,16 +102,6 @@ fn drift(rate: Rate) -> String {
     let half = (rate.most_ppb - middle).max(middle - rate.least_ppb);
     // Rounded up, with the rounding of the middle.
     format!("{:+.1} ± {:.1} ppm", ppm(middle), ((half + 50) as f64 / 100.0).ceil() / 10.0)
-}
-
-/// As `45 s`, `12 min`, `3 h 5 min` or `2 d 3 h`.
-fn ago(age_s: u32) -> String {
-    match (age_s / 86_400, age_s / 3600 % 24, age_s / 60 % 60) {
-        (0, 0, 0) => format!("{age_s} s"),
-        (0, 0, minutes) => format!("{minutes} min"),
-        (0, hours, minutes) => format!("{hours} h {minutes} min"),
-        (days, hours, _) => format!("{days} d {hours} h"),
-    }
 }
 
 /// As one object for programs.
@@ -181,32 +152,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_offset_is_rounded_and_its_doubt_rounded_up() {
-        for (least, most, text) in [
-            (100, 700, "+0.4 ± 0.4 ms"),
-            (-700, -100, "-0.4 ± 0.4 ms"),
-            (-1, 1, "+0.0 ± 0.1 ms"),
-            (999_000, 999_800, "+999.4 ± 0.5 ms"),
-            (-3_600_006_000, -3_599_994_000, "-3600.000 s ± 6.1 ms"),
-        ] {
-            assert_eq!(ahead(least, most), text);
-        }
-    }
-
-    #[test]
     fn a_rate_is_rounded_and_its_doubt_rounded_up() {
         let rate = |least_ppb, most_ppb| drift(Rate { least_ppb, most_ppb, over_us: 1 });
         assert_eq!(rate(12_000, 13_000), "+12.5 ± 0.6 ppm");
         assert_eq!(rate(-20_000, -10_000), "-15.0 ± 5.1 ppm");
-    }
-
-    #[test]
-    fn a_time_ago_is_as_coarse_as_it_is_long() {
-        for (age_s, text) in
-            [(45, "45 s"), (750, "12 min"), (11_100, "3 h 5 min"), (183_600, "2 d 3 h")]
-        {
-            assert_eq!(ago(age_s), text);
-        }
     }
 
     #[test]
