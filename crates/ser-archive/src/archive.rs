@@ -176,6 +176,18 @@ impl Archive {
         }
         done
     }
+
+    /// Reads with several statements what was there at one moment. Otherwise what is added between
+    /// them would be passed over, or contradict what was read before.
+    pub(crate) fn in_snapshot<T>(
+        &mut self,
+        act: impl FnOnce(&mut Archive) -> Result<T>,
+    ) -> Result<T> {
+        self.sql.begin_reading()?;
+        let done = act(self);
+        self.sql.roll_back();
+        done
+    }
 }
 
 /// Opens what holds an archive.

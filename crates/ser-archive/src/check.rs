@@ -74,11 +74,13 @@ impl Archive {
     /// # Errors
     /// If the archive cannot be read.
     pub fn check(&mut self) -> Result<Check> {
-        let mut check = Check::default();
-        for recorder in self.recorders()? {
-            check.recorders.push(self.check_recorder(recorder)?);
-        }
-        Ok(check)
+        self.in_snapshot(|archive| {
+            let mut check = Check::default();
+            for recorder in archive.recorders()? {
+                check.recorders.push(archive.check_recorder(recorder)?);
+            }
+            Ok(check)
+        })
     }
 
     fn check_recorder(&mut self, recorder: String) -> Result<RecorderCheck> {

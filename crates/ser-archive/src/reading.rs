@@ -56,6 +56,15 @@ impl Archive {
         window: Window,
         on: &mut dyn FnMut(&Record) -> Result<()>,
     ) -> Result<()> {
+        self.in_snapshot(|archive| archive.read_now(recorder, window, on))
+    }
+
+    fn read_now(
+        &mut self,
+        recorder: &str,
+        window: Window,
+        on: &mut dyn FnMut(&Record) -> Result<()>,
+    ) -> Result<()> {
         const EVIDENCE: &str = "SELECT position, line FROM evidence \
             JOIN recorder ON recorder.id = evidence.recorder \
             WHERE recorder.name = ?1 ORDER BY position";
@@ -96,6 +105,10 @@ impl Archive {
     /// # Errors
     /// If the archive cannot be read.
     pub fn since(&mut self, position: i64, limit: u32) -> Result<Vec<Archived>> {
+        self.in_snapshot(|archive| archive.since_now(position, limit))
+    }
+
+    fn since_now(&mut self, position: i64, limit: u32) -> Result<Vec<Archived>> {
         const ENTRIES: &str = "SELECT life, sequence, number, stamp, shown_us, changed, state, \
             known, position, recorder.name FROM entry \
             JOIN recorder ON recorder.id = entry.recorder \

@@ -92,6 +92,9 @@ pub(crate) trait Sql: Send {
     /// Begins a transaction in which nobody else writes.
     fn begin(&mut self) -> Result<()>;
 
+    /// Begins a transaction that sees what is there now, whatever others write meanwhile.
+    fn begin_reading(&mut self) -> Result<()>;
+
     /// Ends the transaction; what was written is there to stay.
     fn commit(&mut self) -> Result<()>;
 

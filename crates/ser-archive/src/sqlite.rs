@@ -141,6 +141,10 @@ impl Sql for Sqlite {
         self.run("BEGIN IMMEDIATE", &[]).map(|_| ())
     }
 
+    fn begin_reading(&mut self) -> Result<()> {
+        self.run("BEGIN", &[]).map(|_| ())
+    }
+
     fn commit(&mut self) -> Result<()> {
         self.run("COMMIT", &[]).map(|_| ())
     }

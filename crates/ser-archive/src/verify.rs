@@ -77,6 +77,10 @@ impl Archive {
     /// # Errors
     /// If the archive cannot be read. What cannot be understood is damage.
     pub fn verify(&mut self) -> Result<(Vec<ChainHead>, Vec<Broken>)> {
+        self.in_snapshot(Archive::verify_now)
+    }
+
+    fn verify_now(&mut self) -> Result<(Vec<ChainHead>, Vec<Broken>)> {
         let mut walks = self.walks()?;
         let archive = self.sql.name().to_owned();
         self.for_each_step(&mut |chain, position, step| {

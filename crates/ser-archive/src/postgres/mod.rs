@@ -203,6 +203,14 @@ impl Sql for Postgres {
         locked
     }
 
+    fn begin_reading(&mut self) -> Result<()> {
+        // Whoever takes the rows may be slow.
+        self.batch(
+            "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY; \
+             SET LOCAL idle_in_transaction_session_timeout = 0",
+        )
+    }
+
     fn commit(&mut self) -> Result<()> {
         self.batch("COMMIT")
     }

@@ -1,7 +1,7 @@
 //! What is added is there, once, and given back as it was.
 
 use crate::common::*;
-use ser_archive::{Access, Error, Window};
+use ser_archive::{Access, Archive, Error, Window};
 use ser_evidence::record::Record;
 use ser_evidence::time::shown;
 use ser_proto::{Inputs, TimeStamp};
@@ -136,6 +136,41 @@ pub(crate) fn a_life_is_found_by_an_entry_of_it(home: &Home) {
     assert_eq!(life_of(7, entry(LIFE, far).entry), Some((LIFE, far)));
     assert_eq!(life_of(3, entry(LIFE, 2).entry), None);
     assert_eq!(life_of(2, entry(LIFE, 1).entry), None);
+}
+
+pub(crate) fn who_reads_while_others_write_misses_nothing_and_sees_no_contradiction(home: &Home) {
+    home.open().append(&[batch(vec![life(LIFE)])]).unwrap();
+    let place = home.place();
+    let writes = move || {
+        let mut archive = Archive::open(&place, Access::Write { program: PROGRAM }).unwrap();
+        for number in 0..400 {
+            let mut batch =
+                batch([vec![gap(LIFE, 2 * number, 1)], entries(LIFE, [2 * number + 2])].concat());
+            batch.collector = format!("collector {}", number / 10);
+            archive.append(&[batch]).unwrap();
+        }
+    };
+    let mut archive = home.open_for(Access::Read).unwrap();
+    let (mut seen, mut last) = (0, 0);
+    std::thread::scope(|scope| {
+        let writer = scope.spawn(writes);
+        loop {
+            let is_over = writer.is_finished();
+            let some = archive.since(last, 1000).unwrap();
+            let Some(newest) = some.last() else {
+                if is_over {
+                    break;
+                }
+                continue;
+            };
+            last = newest.position;
+            seen += some.len();
+            let check = archive.check().unwrap();
+            assert!(check.is_sound(), "{check:?}");
+            assert_eq!(archive.verify().unwrap().1, []);
+        }
+    });
+    assert_eq!((seen, last), (801, 801));
 }
 
 pub(crate) fn an_archive_of_a_newer_program_is_refused_by_name(home: &Home) {
