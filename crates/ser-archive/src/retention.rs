@@ -36,6 +36,18 @@ pub struct Expired {
 /// How much of an archive that is too large goes at a time: a part in this many.
 const PART: u64 = 16;
 
+/// The last position of each chain before the first batch that was added at a time or later. What was
+/// added after something that is to be kept stays, too, whatever the computer's clock showed then.
+const OLD: &str = "SELECT id, CASE WHEN kept IS NULL \
+    THEN (SELECT max(position) FROM link WHERE chain = id) \
+    ELSE (SELECT max(position) FROM link WHERE chain = id AND position < kept) END \
+    FROM (SELECT id, (SELECT min(position) FROM link WHERE chain = id AND archived_us >= ?1) AS kept \
+    FROM chain) AS chains";
+
+/// The last position of each chain up to a position.
+const FIRST: &str = "SELECT id, (SELECT max(position) FROM link \
+    WHERE chain = id AND position <= ?1) FROM chain";
+
 impl Archive {
     /// Lets go of what is not to be kept, as of now. Each step is one transaction.
     ///
@@ -44,12 +56,12 @@ impl Archive {
     pub fn expire(&mut self, keep: Keep, now: Moment<Utc>) -> Result<Expired> {
         let mut expired = Expired::default();
         if let Some(since) = keep.since {
-            expired.add(self.expire_before(since, now)?);
+            expired.add(self.expire_to(OLD, since.us(), now)?);
         }
         if let Some(bytes) = keep.bytes {
             while self.sql.size()? > bytes {
-                let Some(since) = self.oldest_part()? else { break };
-                let gone = self.expire_before(since, now)?;
+                let Some(position) = self.oldest_part()? else { break };
+                let gone = self.expire_to(FIRST, position, now)?;
                 expired.add(gone);
                 if gone.entries == 0 {
                     break;
@@ -62,38 +74,31 @@ impl Archive {
         Ok(expired)
     }
 
-    /// A time such that about one part of the entries was added before it.
-    fn oldest_part(&mut self) -> Result<Option<Moment<Utc>>> {
-        const ENTRIES: &str = "SELECT count(*), min(position) FROM entry";
+    /// The end of the batch up to which there is about one part of the entries.
+    fn oldest_part(&mut self) -> Result<Option<i64>> {
+        const ENTRIES: &str = "SELECT count(*) FROM entry";
         const PLACE: &str = "SELECT position FROM entry ORDER BY position LIMIT 1 OFFSET ?1";
-        const NEXT: &str = "SELECT max(archived_us) FROM link WHERE position IN \
-            (SELECT min(position) FROM link WHERE position >= ?1)";
+        const END: &str = "SELECT min(position) FROM link WHERE position >= ?1";
         let sql = &mut *self.sql;
         let count = first(sql, ENTRIES, &[], |row| row.int(0))?.unwrap_or(0);
         let place = (count.cast_unsigned() / PART).cast_signed();
         let Some(place) = first(sql, PLACE, &[Value::Int(place)], |row| row.int(0))? else {
             return Ok(None);
         };
-        let archived = first(sql, NEXT, &[Value::Int(place)], |row| row.maybe_int(0))?.flatten();
-        Ok(archived.map(|us| Moment::from_us(us.saturating_add(1))))
+        Ok(first(sql, END, &[Value::Int(place)], |row| row.maybe_int(0))?.flatten())
     }
 
-    fn expire_before(&mut self, since: Moment<Utc>, now: Moment<Utc>) -> Result<Expired> {
-        // What was added after something that is to be kept stays, too, whatever the computer's
-        // clock showed then.
-        const CHAINS: &str = "SELECT chain, max(position) FROM link WHERE position < \
-            coalesce((SELECT min(kept.position) FROM link AS kept \
-            WHERE kept.chain = link.chain AND kept.archived_us >= ?1), ?2) GROUP BY chain";
+    /// Lets go of what each chain has up to the position that a statement says for a value.
+    fn expire_to(&mut self, ends: &'static str, value: i64, now: Moment<Utc>) -> Result<Expired> {
         self.in_transaction(|archive| {
             let mut chains = Vec::new();
-            let values = [Value::Int(since.us()), Value::Int(i64::MAX)];
-            archive.sql.query(CHAINS, &values, &mut |row| {
-                chains.push((row.int(0)?, row.int(1)?));
+            archive.sql.query(ends, &[Value::Int(value)], &mut |row| {
+                chains.extend(row.maybe_int(1)?.map(|to| (row.int(0), to)));
                 Ok(())
             })?;
             let mut expired = Expired::default();
             for (chain, to) in chains {
-                expired.add(archive.expire_chain(chain, to, now)?);
+                expired.add(archive.expire_chain(chain?, to, now)?);
             }
             Ok(expired)
         })

@@ -115,6 +115,40 @@ pub(crate) fn an_archive_that_is_too_large_loses_its_oldest(home: &Home) {
     assert_eq!(archive.expire(keep, at_s(101)).unwrap().entries, 0);
 }
 
+pub(crate) fn a_clock_that_was_wrong_takes_no_more_than_is_too_much(home: &Home) {
+    let mut archive = home.open();
+    for part in 0..40_u64 {
+        let mut batch = batch(entries(LIFE, part * 100 + 1..=part * 100 + 100));
+        let is_wrong = [0, 2, 20].contains(&part);
+        batch.at = at_s(if is_wrong { 4_000_000_000 } else { part.try_into().unwrap() });
+        archive.append(&[batch]).unwrap();
+    }
+    let keep = Keep { since: None, bytes: Some(300_000) };
+    let gone = archive.expire(keep, at_s(100)).unwrap();
+    assert!((500..3500).contains(&gone.entries), "{gone:?}");
+    let left = everything(&mut archive, "U1-SER1");
+    assert_eq!(left.last(), entries(LIFE, [4000]).last());
+    assert!(archive.check().unwrap().is_sound());
+    assert_eq!(archive.verify().unwrap().1, []);
+}
+
+pub(crate) fn many_small_batches_are_let_go_in_time(home: &Home) {
+    let mut archive = home.open();
+    let batches: Vec<_> = (1..=20_000)
+        .map(|number| {
+            let mut batch = batch(entries(LIFE, [number]));
+            batch.at = at_s(number.try_into().unwrap());
+            batch
+        })
+        .collect();
+    archive.append(&batches).unwrap();
+    let began = std::time::Instant::now();
+    let keep = Keep { since: Some(at_s(10_001)), bytes: None };
+    assert_eq!(archive.expire(keep, at_s(20_000)).unwrap().entries, 10_000);
+    assert!(began.elapsed().as_secs() < 5, "{:?}", began.elapsed());
+    assert_eq!(archive.verify().unwrap().1, []);
+}
+
 pub(crate) fn a_row_that_somebody_changed_is_found(home: &Home) {
     let mut archive = home.open();
     for part in 0..3 {
