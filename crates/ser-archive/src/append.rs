@@ -42,7 +42,7 @@ impl Archive {
             match record {
                 Record::Entry(entry) => {
                     let entry = placed(entry, &batch.recorder)?;
-                    rows.entry(&before, entry);
+                    rows.entry(&before, entry, archive)?;
                 }
                 record => {
                     let stored = StoredEvidence::of(&batch.recorder, record, archive)?;
@@ -125,6 +125,11 @@ impl Chain {
             numbers.into_iter().chain([Value::from(&self.digest[..])]).collect();
         sql.run(LINK, &values).map(|_| ())
     }
+}
+
+/// The next position or number of rows. No archive ever comes to the last one.
+pub(crate) fn next(number: i64, archive: &str) -> Result<i64> {
+    number.checked_add(1).ok_or_else(|| Error::damaged(archive, "it counts too far"))
 }
 
 fn id(sql: &mut dyn Sql, statement: &'static str, values: &[Value]) -> Result<i64> {
@@ -215,19 +220,24 @@ impl NewRows {
         }
     }
 
-    fn entry(&mut self, before: &Before, entry: StoredEntry) {
+    fn entry(&mut self, before: &Before, entry: StoredEntry, archive: &str) -> Result<()> {
         let place = (entry.life.bits(), entry.sequence);
         let there = before.0.get(&place).into_iter().flatten();
         let mut there = there.chain(self.added.get(&place).into_iter().flatten()).peekable();
         let is_first = there.peek().is_none();
         if there.any(|there| there.is_same(&entry)) {
             self.known += 1;
-            return;
+            return Ok(());
         }
         self.added.entry(place).or_default().push(entry);
         let link = if is_first { Link::Entry(&entry) } else { Link::Conflict(&entry) };
-        let row = self.row(link, entry.columns());
-        if is_first { self.entries.push(row) } else { self.conflicts.push(row) }
+        let row = self.row(link, entry.columns(), archive)?;
+        if is_first {
+            self.entries.push(row)
+        } else {
+            self.conflicts.push(row)
+        }
+        Ok(())
     }
 
     fn evidence(&mut self, sql: &mut dyn Sql, stored: &StoredEvidence) -> Result<()> {
@@ -243,18 +253,23 @@ impl NewRows {
         let life = Value::Int(life.bits().cast_signed());
         let of_row =
             [Value::from(*kind), life, Value::from(line.as_str()), Value::from(&content[..])];
-        let row = self.row(Link::Evidence(line), of_row);
+        let row = self.row(Link::Evidence(line), of_row, sql.name())?;
         self.evidence.push(row);
         Ok(())
     }
 
     /// The next row of the chain: position, chain, recorder, and what is its own.
-    fn row<const N: usize>(&mut self, link: Link<'_>, own: [Value; N]) -> Vec<Value> {
-        self.position += 1;
-        self.chain.rows += 1;
+    fn row<const N: usize>(
+        &mut self,
+        link: Link<'_>,
+        own: [Value; N],
+        archive: &str,
+    ) -> Result<Vec<Value>> {
+        self.position = next(self.position, archive)?;
+        self.chain.rows = next(self.chain.rows, archive)?;
         self.chain.digest = link.after(&self.chain.digest);
         let of_all = [self.position, self.chain.id, self.chain.recorder].map(Value::Int);
-        of_all.into_iter().chain(own).collect()
+        Ok(of_all.into_iter().chain(own).collect())
     }
 
     fn write(self, sql: &mut dyn Sql, archived_us: i64, appended: &mut Appended) -> Result<()> {

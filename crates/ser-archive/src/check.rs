@@ -11,7 +11,7 @@ use ser_evidence::record::{Gap, Life, LifeRecord, Lost, Record, Watched};
 use crate::archive::Archive;
 use crate::error::Result;
 use crate::sql::Value;
-use crate::stored::StoredEvidence;
+use crate::stored::{StoredEvidence, sequence};
 
 /// What is there of all recorders, and what is missing.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -97,10 +97,11 @@ impl Archive {
             JOIN recorder ON recorder.id = entry.recorder WHERE recorder.name = ?1 GROUP BY life";
         const CONFLICTS: &str = "SELECT count(*) FROM conflict \
             JOIN recorder ON recorder.id = conflict.recorder WHERE recorder.name = ?1";
+        let archive = self.sql.name().to_owned();
         let mut breaks = Vec::new();
         self.sql.query(STRETCHES, &name, &mut |row| {
             let life = Life::from_bits(row.int(0)?.cast_unsigned());
-            breaks.push((life, row.int(1)?.cast_unsigned(), row.maybe_int(2)?));
+            breaks.push((life, sequence(row, 1, &archive)?, row.maybe_int(2)?));
             Ok(())
         })?;
         self.sql.query(ENDS, &name, &mut |row| {

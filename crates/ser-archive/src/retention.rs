@@ -9,11 +9,13 @@ use std::collections::BTreeMap;
 use ser_evidence::record::{Gap, Life, Lost, Record, Why};
 use ser_evidence::time::{Moment, Utc};
 
+use crate::append::next;
 use crate::archive::Archive;
 use crate::batch::Batch;
 use crate::chain::{Checkpoint, Digest, Link, NOTHING_KEPT};
 use crate::error::{Error, Result};
 use crate::sql::{Sql, Value, first};
+use crate::stored::sequence;
 
 /// What is kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -171,13 +173,13 @@ impl Archive {
         const ADD: &str = "INSERT INTO checkpoint (position, chain, to_position, rows, digest, \
             kept, entries, expired_us) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
         const POSITION: &str = "UPDATE archive SET position = ?1";
-        let position = self.position()? + 1;
+        let position = next(self.position()?, self.name())?;
         let mut chain = self.chain(collector, recorder)?;
         // Where all links are gone, the chain goes on from here.
         if chain.rows == 0 {
             (chain.rows, chain.digest) = (checkpoint.rows, checkpoint.digest);
         }
-        chain.rows += 1;
+        chain.rows = next(chain.rows, self.name())?;
         chain.digest = Link::Checkpoint(checkpoint).after(&chain.digest);
         let Checkpoint { to_position, rows, digest, kept, entries, expired_us } = checkpoint;
         let values = [
@@ -249,9 +251,10 @@ impl Stretch {
 fn stretches(sql: &mut dyn Sql, chain: i64, to: i64) -> Result<Vec<Stretch>> {
     const ENTRIES: &str = "SELECT life, sequence FROM entry \
         WHERE chain = ?1 AND position <= ?2 ORDER BY life, sequence";
+    let archive = sql.name().to_owned();
     let mut by_life: BTreeMap<u64, Vec<Stretch>> = BTreeMap::new();
     sql.query(ENTRIES, &[Value::Int(chain), Value::Int(to)], &mut |row| {
-        let (life, sequence) = (row.int(0)?.cast_unsigned(), row.int(1)?.cast_unsigned());
+        let (life, sequence) = (row.int(0)?.cast_unsigned(), sequence(row, 1, &archive)?);
         let of_life = by_life.entry(life).or_default();
         match of_life.last_mut() {
             Some(stretch) if stretch.last + 1 == sequence => stretch.last = sequence,

@@ -22,7 +22,7 @@ impl StoredEntry {
     /// Of a record whose place is known.
     pub(crate) fn of(record: &EntryRecord) -> Option<StoredEntry> {
         let EntryRecord { life, sequence, number, entry, known } = *record;
-        let sequence = sequence.filter(|&sequence| life.is_known() && sequence <= MAX_SEQUENCE)?;
+        let sequence = sequence.filter(|at| life.is_known() && SEQUENCES.contains(at))?;
         Some(StoredEntry { life, sequence, number, entry, known })
     }
 
@@ -79,7 +79,7 @@ impl StoredEntry {
         let number = row.int(first + 2)?;
         Ok(StoredEntry {
             life: Life::from_bits(row.int(first)?.cast_unsigned()),
-            sequence: row.int(first + 1)?.cast_unsigned(),
+            sequence: sequence(row, first + 1, archive)?,
             number: u16::try_from(number).map_err(|_| wrong("number in the ring"))?,
             entry: Entry {
                 time: stamp_of(row.int(first + 3)?),
@@ -91,8 +91,15 @@ impl StoredEntry {
     }
 }
 
-/// No log counts further, and a database's numbers do.
-const MAX_SEQUENCE: u64 = 1 << 62;
+/// The sequence of an entry in this column.
+pub(crate) fn sequence(row: &dyn Columns, column: usize, archive: &str) -> Result<u64> {
+    let sequence = row.int(column)?.cast_unsigned();
+    let wrong = || Error::damaged(archive, format!("an entry is number {sequence} of its log"));
+    SEQUENCES.contains(&sequence).then_some(sequence).ok_or_else(wrong)
+}
+
+/// A log counts from 1. None counts further than this, and a database's numbers do.
+const SEQUENCES: std::ops::RangeInclusive<u64> = 1..=1 << 62;
 
 /// A stamp as the eight bytes that it has on the wire. They rise with time within a century.
 pub(crate) fn stamp_number(stamp: &TimeStamp) -> i64 {
@@ -202,5 +209,6 @@ mod tests {
         assert!(StoredEntry::of(&at(life, None)).is_none());
         assert!(StoredEntry::of(&at(Life::UNKNOWN, Some(1))).is_none());
         assert!(StoredEntry::of(&at(life, Some(u64::MAX))).is_none());
+        assert!(StoredEntry::of(&at(life, Some(0))).is_none());
     }
 }

@@ -219,7 +219,7 @@ impl Walk {
         match step {
             Step::Row(link) => {
                 self.position = position;
-                self.rows += 1;
+                self.rows = self.rows.saturating_add(1);
                 self.digest = link.after(&self.digest);
             }
             Step::Contradiction => self.fail(Some(position)),

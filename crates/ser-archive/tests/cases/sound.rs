@@ -1,7 +1,7 @@
 //! What is missing is said, and what somebody changed is found.
 
 use crate::common::*;
-use ser_archive::{Hole, Keep};
+use ser_archive::{Error, Hole, Keep};
 use ser_evidence::record::{Gap, Lost, Record, Why};
 
 pub(crate) fn a_number_that_is_not_there_is_a_hole_unless_it_was_told(home: &Home) {
@@ -147,6 +147,28 @@ pub(crate) fn many_small_batches_are_let_go_in_time(home: &Home) {
     assert_eq!(archive.expire(keep, at_s(20_000)).unwrap().entries, 10_000);
     assert!(began.elapsed().as_secs() < 5, "{:?}", began.elapsed());
     assert_eq!(archive.verify().unwrap().1, []);
+}
+
+pub(crate) fn numbers_that_no_log_has_are_damage_and_no_more(home: &Home) {
+    let mut archive = home.open();
+    let mut first = entry(LIFE, 1);
+    first.sequence = Some(0);
+    let error = archive.append(&[batch(vec![Record::Entry(first)])]).unwrap_err();
+    assert!(matches!(error, Error::NoPlace { .. }), "{error}");
+    archive.append(&[batch([vec![life(LIFE)], entries(LIFE, 1..=3)].concat())]).unwrap();
+    let keep = Keep { since: Some(at_s(1)), bytes: None };
+    for number in [0, -1, i64::MIN, i64::MAX] {
+        home.sql(&format!("UPDATE entry SET sequence = {number} WHERE position = 2"));
+        assert!(archive.check().is_err(), "{number}");
+        assert!(archive.expire(keep, at_s(2)).is_err(), "{number}");
+        assert!(archive.verify().is_err(), "{number}");
+    }
+    home.sql("UPDATE entry SET sequence = 1 WHERE position = 2");
+    assert_eq!(archive.verify().unwrap().1, []);
+    home.sql(&format!("UPDATE link SET rows = {}", i64::MAX));
+    assert!(archive.append(&[batch(entries(LIFE, 4..=5))]).is_err());
+    home.sql(&format!("UPDATE link SET rows = 4; UPDATE archive SET position = {}", i64::MAX));
+    assert!(archive.append(&[batch(entries(LIFE, 4..=5))]).is_err());
 }
 
 pub(crate) fn a_row_that_somebody_changed_is_found(home: &Home) {
