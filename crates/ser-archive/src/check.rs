@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use ser_evidence::record::{Gap, Life, LifeRecord, Lost, Record, Watched};
+use ser_evidence::record::{Gap, Life, LifeRecord, Lost, Record, Watched, Why};
 
 use crate::archive::Archive;
 use crate::error::Result;
@@ -128,7 +128,7 @@ impl Archive {
             found.holes.extend(notes.hole(life, after, sequence - 1));
         }
         for (life, notes) in &lives {
-            let end = ends.get(life).copied().unwrap_or(0);
+            let end = ends.get(life).copied().unwrap_or_else(|| notes.begin());
             if life.is_known() && notes.watched_through > end {
                 found.holes.extend(notes.hole(*life, end, notes.watched_through));
             }
@@ -168,6 +168,14 @@ impl Archive {
 }
 
 impl LifeNotes {
+    /// After which number a life begins of which no entry is left. Nobody knows how many there were
+    /// before the first that was let go, if its total had wrapped when it was first seen.
+    fn begin(&self) -> u64 {
+        let expired = self.gaps.iter().filter(|gap| gap.why == Why::Expired);
+        let first = expired.filter_map(|gap| gap.after).min();
+        first.filter(|_| !self.is_exact).unwrap_or(0)
+    }
+
     /// What is missing after one entry up to another number, unless that was told.
     fn hole(&self, life: Life, after: u64, through: u64) -> Option<Hole> {
         let missing = through.checked_sub(after).filter(|&missing| missing > 0)?;
@@ -189,8 +197,6 @@ impl LifeNotes {
 
 #[cfg(test)]
 mod tests {
-    use ser_evidence::record::Why;
-
     use super::*;
 
     #[test]

@@ -97,6 +97,18 @@ pub(crate) fn all_may_be_let_go(home: &Home) {
     assert!(archive.check().unwrap().is_sound());
 }
 
+pub(crate) fn a_life_of_which_nothing_is_left_has_no_hole_before_its_first_entry(home: &Home) {
+    let mut archive = home.open();
+    let records = [entries(LIFE, 700..=705), vec![watched(LIFE, 705)]].concat();
+    archive.append(&[batch(records)]).unwrap();
+    archive.expire(Keep { since: Some(at_s(1)), bytes: None }, at_s(2)).unwrap();
+    let check = archive.check().unwrap();
+    assert!(check.is_sound(), "{check:?}");
+    archive.append(&[batch(vec![watched(LIFE, 706)])]).unwrap();
+    let hole = Hole { life: LIFE, after: 699, missing: 7, told: 6 };
+    assert_eq!(archive.check().unwrap().recorders[0].holes, [hole]);
+}
+
 pub(crate) fn an_archive_that_is_too_large_loses_its_oldest(home: &Home) {
     let mut archive = home.open();
     for part in 0..40_u64 {
