@@ -138,6 +138,12 @@ impl StoredEvidence {
         jsonl::Writer::new(&mut line).record(recorder, record).map_err(|error| failed(&error))?;
         line.pop_if(|last| *last == b'\n');
         let line = String::from_utf8(line).map_err(|error| failed(&error))?;
+        // What could not be read again would keep everything else from being read, too.
+        match jsonl::Reader::new(line.as_bytes(), "").read() {
+            Some(Ok(_)) => {}
+            Some(Err(error)) => return Err(failed(&error)),
+            None => return Err(failed(&"nothing")),
+        }
         Ok(StoredEvidence { kind, life, line })
     }
 

@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use ser_archive::{Access, Archive, Error, Window};
-use ser_evidence::record::Record;
+use ser_evidence::record::{PointRecord, Record};
 use ser_evidence::time::shown;
 use ser_proto::{Inputs, TimeStamp};
 
@@ -95,6 +95,26 @@ pub(crate) fn a_bookmark_moves_with_what_was_read_or_not_at_all(home: &Home) {
     archive.append(&[empty]).unwrap();
     assert_eq!(archive.bookmark("cellar", "U1-SER1").unwrap(), Some(bookmark(NEXT_LIFE, 0)));
     assert_eq!(archive.position().unwrap(), position);
+}
+
+pub(crate) fn what_could_not_be_read_again_is_not_added(home: &Home) {
+    let mut archive = home.open();
+    let named = |name: &str| {
+        Record::Point(PointRecord {
+            input: 1,
+            name: name.into(),
+            on: "on".into(),
+            off: "off".into(),
+        })
+    };
+    for bad in [named("two\nlines"), named(&"long ".repeat(20_000))] {
+        let mut batch = batch([entries(LIFE, [1]), vec![bad]].concat());
+        batch.bookmark = Some(bookmark(LIFE, 1));
+        assert!(archive.append(&[batch]).is_err());
+    }
+    assert_eq!(archive.bookmark("cellar", "U1-SER1").unwrap(), None);
+    archive.append(&[batch(vec![named("pump")])]).unwrap();
+    assert_eq!(everything(&mut archive, "U1-SER1"), [named("pump")]);
 }
 
 pub(crate) fn a_window_is_by_what_the_recorder_showed_and_an_impossible_stamp_is_in_each(
