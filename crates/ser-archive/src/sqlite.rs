@@ -7,7 +7,8 @@
 use std::path::Path;
 use std::time::Duration;
 
-use rusqlite::backup::Backup;
+use rusqlite::backup::{Backup, StepResult};
+use rusqlite::config::DbConfig;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, ErrorCode, OpenFlags, ToSql, params_from_iter};
 
@@ -54,6 +55,7 @@ impl Sqlite {
         let file = Sqlite::open(path, flags)?;
         // Another program's file stays as it is.
         file.is_ours()?;
+        file.keep_log(false)?;
         for (pragma, value) in [("journal_mode", "WAL"), ("synchronous", "FULL")] {
             file.pragma(pragma, value)?;
         }
@@ -64,19 +66,30 @@ impl Sqlite {
 
     fn open(path: &Path, flags: OpenFlags) -> Result<Sqlite> {
         let name = named(path);
+        // To SQLite `:memory:` is no file, nor is what an address says that begins with `file:`.
+        let path = std::path::absolute(path)
+            .map_err(|error| Error::Database { archive: name.clone(), source: error.into() })?;
         let flags = flags | OpenFlags::SQLITE_OPEN_NO_MUTEX;
         let is_there = path.exists();
-        let connection = Connection::open_with_flags(path, flags).map_err(|error| {
-            match error.sqlite_error_code() {
-                Some(ErrorCode::CannotOpen) if !is_there => {
-                    Error::Missing { archive: name.clone() }
-                }
-                _ => failed(&name, error),
-            }
+        let connection = Connection::open_with_flags(&path, flags).map_err(|error| match error
+            .sqlite_error_code()
+        {
+            Some(ErrorCode::CannotOpen) if !is_there => Error::Missing { archive: name.clone() },
+            _ => failed(&name, error),
         })?;
         connection.set_prepared_statement_cache_capacity(STATEMENTS);
         connection.busy_timeout(PATIENCE).map_err(|error| failed(&name, error))?;
-        Ok(Sqlite { connection, name })
+        let opened = Sqlite { connection, name };
+        opened.keep_log(true)?;
+        Ok(opened)
+    }
+
+    /// Whether the log stays beside the file when nobody has it open any more. Who only reads leaves
+    /// both as they are.
+    fn keep_log(&self, is_kept: bool) -> Result<()> {
+        let keep = DbConfig::SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE;
+        let set = self.connection.set_db_config(keep, is_kept);
+        set.map(|_| ()).map_err(|error| self.failed(error))
     }
 
     fn pragma(&self, pragma: &str, value: impl ToSql) -> Result<()> {
@@ -95,9 +108,23 @@ impl Sqlite {
         let tables = number("SELECT count(*) FROM sqlite_schema");
         let tables = tables.map_err(|error| self.failed(error))?;
         match (id, tables) {
-            (APPLICATION_ID, _) => Ok(true),
+            (APPLICATION_ID, _) => self.has_only_tables().map(|()| true),
             (0, 0) => Ok(false),
             _ => Err(self.not_ours("it is a database of another program")),
+        }
+    }
+
+    /// Refuses a file that brings statements of its own: they may take away what is added, or never
+    /// end. No archive has any.
+    fn has_only_tables(&self) -> Result<()> {
+        const OTHERS: &str = "SELECT (SELECT count(*) FROM sqlite_schema \
+            WHERE type NOT IN ('table', 'index') OR sql LIKE 'CREATE VIRTUAL%') + \
+            (SELECT count(*) FROM sqlite_schema AS made, pragma_table_xinfo(made.name) AS has \
+            WHERE made.type = 'table' AND has.hidden > 0)";
+        let others = self.connection.query_row(OTHERS, (), |row| row.get::<_, i64>(0));
+        match others.map_err(|error| self.failed(error))? {
+            0 => Ok(()),
+            _ => Err(Error::damaged(&self.name, "somebody has put views or triggers into it")),
         }
     }
 
@@ -110,8 +137,8 @@ impl Sqlite {
     }
 }
 
-/// How much of a file is copied before others may write again.
-const PAGES_AT_ONCE: std::ffi::c_int = 4096;
+/// What a backup means by all.
+const ALL_PAGES: std::ffi::c_int = -1;
 
 impl Sql for Sqlite {
     fn name(&self) -> &str {
@@ -132,9 +159,13 @@ impl Sql for Sqlite {
 
     fn copy_to(&mut self, path: &Path) -> Result<()> {
         let mut copy = Sqlite::open(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
+        // All at once: others may write meanwhile, but a copy in pieces begins anew when they do.
         let copied = Backup::new(&self.connection, &mut copy.connection)
-            .and_then(|backup| backup.run_to_completion(PAGES_AT_ONCE, Duration::ZERO, None));
-        copied.map_err(|error| failed(&copy.name, error))
+            .and_then(|backup| backup.step(ALL_PAGES));
+        match copied.map_err(|error| failed(&copy.name, error))? {
+            StepResult::Done => Ok(()),
+            _ => Err(Error::Busy { archive: self.name.clone() }),
+        }
     }
 
     fn begin(&mut self) -> Result<()> {

@@ -89,6 +89,82 @@ fn a_backup_is_whole_and_takes_nobodys_place() {
 }
 
 #[test]
+fn a_backup_is_made_while_others_write_all_the_time() {
+    let home = Home::new();
+    let mut archive = home.open();
+    for number in 0..40 {
+        let first = number * 10_000 + 1;
+        archive.append(&[batch(entries(LIFE, first..first + 10_000))]).unwrap();
+    }
+    let is_over = std::sync::atomic::AtomicBool::new(false);
+    let order = std::sync::atomic::Ordering::Relaxed;
+    let mut other = home.open();
+    let commits = std::thread::scope(|scope| {
+        let writer = scope.spawn(|| {
+            let sequences = (1..100_000).take_while(|_| !is_over.load(order));
+            sequences.map(|at| other.append(&[batch(entries(NEXT_LIFE, [at]))]).unwrap()).count()
+        });
+        archive.back_up(&home.beside("copy.db")).unwrap();
+        is_over.store(true, order);
+        writer.join().unwrap()
+    });
+    assert!(commits < 2000, "{commits} commits");
+    assert_eq!(open_copy(&home.beside("copy.db")).unwrap().verify().unwrap().1, []);
+}
+
+#[test]
+fn who_reads_changes_no_byte() {
+    let home = Home::new();
+    let mut archive = home.open();
+    archive.append(&[batch(entries(LIFE, 1..=100))]).unwrap();
+    // As a crash leaves them.
+    let folder = tempfile::tempdir().unwrap();
+    let names = ["plant.db", "plant.db-wal"];
+    for name in names {
+        std::fs::copy(home.beside(name), folder.path().join(name)).unwrap();
+    }
+    let bytes = || names.map(|name| std::fs::read(folder.path().join(name)).unwrap());
+    let before = bytes();
+    let mut left = open_copy(&folder.path().join("plant.db")).unwrap();
+    assert_eq!(everything(&mut left, "U1-SER1"), entries(LIFE, 1..=100));
+    drop(left);
+    assert!(bytes() == before);
+}
+
+#[test]
+fn a_file_in_which_somebody_has_put_statements_is_refused() {
+    for put in [
+        "CREATE TRIGGER taken BEFORE INSERT ON entry BEGIN SELECT RAISE(IGNORE); END",
+        "ALTER TABLE entry RENAME TO theirs; CREATE VIEW entry AS WITH RECURSIVE counted (n) AS \
+         (SELECT 1 UNION ALL SELECT n + 1 FROM counted) SELECT theirs.* FROM counted, theirs",
+        "ALTER TABLE evidence ADD COLUMN large TEXT AS (hex(zeroblob(400000000)))",
+    ] {
+        let home = Home::new();
+        home.open().append(&[batch(vec![life(LIFE)])]).unwrap();
+        home.sql(put);
+        for access in [Access::Read, Access::Write { program: PROGRAM }] {
+            let error = home.open_for(access).err().expect(put);
+            assert!(matches!(error, Error::Damaged { .. }), "{error:?}");
+        }
+    }
+}
+
+#[test]
+fn a_name_is_that_of_a_file_whatever_it_is() {
+    // Nothing else in this program changes the folder.
+    let folder = tempfile::tempdir().unwrap();
+    std::env::set_current_dir(folder.path()).unwrap();
+    for name in [":memory:", "file:plant.db?mode=memory"] {
+        let place = Place::File(name.into());
+        let write = Access::Write { program: PROGRAM };
+        Archive::open(&place, write).unwrap().append(&[batch(entries(LIFE, [1]))]).unwrap();
+        assert_eq!(Archive::open(&place, Access::Read).unwrap().position().unwrap(), 1);
+        assert!(folder.path().join(name).exists());
+    }
+    assert!(Archive::open(&Place::File("".into()), Access::Write { program: PROGRAM }).is_err());
+}
+
+#[test]
 fn every_change_of_a_row_is_found() {
     let home = Home::new();
     let (heads, broken) = of_every_kind(&home).verify().unwrap();
