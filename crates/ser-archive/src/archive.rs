@@ -126,18 +126,23 @@ impl Archive {
     ) -> Result<Option<(Life, u64)>> {
         const LIFE: &str = "SELECT life, sequence FROM entry \
             JOIN recorder ON recorder.id = entry.recorder \
-            WHERE recorder.name = ?1 AND stamp = ?2 AND shown_us IS NOT DISTINCT FROM ?3 AND changed = ?4 \
+            WHERE recorder.name = ?1 AND stamp = ?2 AND shown_us = ?3 AND changed = ?4 \
             AND state = ?5 AND sequence % 65536 = ?6 ORDER BY life, sequence DESC LIMIT 1";
+        // PostgreSQL uses the index for either form, and for none that says both.
+        const LIFE_WITHOUT_TIME: &str = "SELECT life, sequence FROM entry \
+            JOIN recorder ON recorder.id = entry.recorder \
+            WHERE recorder.name = ?1 AND stamp = ?2 AND shown_us IS NULL AND changed = ?3 \
+            AND state = ?4 AND sequence % 65536 = ?5 ORDER BY life, sequence DESC LIMIT 1";
         let shown_us = shown(&entry.time).map(Moment::us);
-        let values = [
-            Value::from(recorder),
-            Value::Int(stamp_number(&entry.time)),
-            Value::from(shown_us),
+        let mut values = vec![Value::from(recorder), Value::Int(stamp_number(&entry.time))];
+        values.extend(shown_us.map(Value::Int));
+        values.extend([
             Value::Int(entry.changed.0.into()),
             Value::Int(entry.state.0.into()),
             Value::Int((sequence % WRAP).cast_signed()),
-        ];
-        first(&mut *self.sql, LIFE, &values, |row| {
+        ]);
+        let statement = if shown_us.is_some() { LIFE } else { LIFE_WITHOUT_TIME };
+        first(&mut *self.sql, statement, &values, |row| {
             Ok((Life::from_bits(row.int(0)?.cast_unsigned()), row.int(1)?.cast_unsigned()))
         })
     }

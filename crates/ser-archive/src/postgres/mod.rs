@@ -21,9 +21,12 @@ use crate::sql::{Columns, OnRow, Sql, Value};
 /// The steps from nothing to the newest schema.
 const MIGRATIONS: [&str; 1] = [include_str!("../../migrations/postgres/0001_first.sql")];
 
-/// What is set in every connection: how long to wait for another writer, and what names mean.
+/// What is set in every connection: how long to wait for another writer, what names mean, and that a
+/// transaction that has ended is on the disk, whatever user or database have as their default.
 const SETTINGS: &str = "SET search_path = ser_archive; SET lock_timeout = '10s'; \
-    SET client_min_messages = warning; SET idle_in_transaction_session_timeout = '60s'";
+    SET client_min_messages = warning; SET idle_in_transaction_session_timeout = '60s'; \
+    SELECT set_config('synchronous_commit', 'on', false) \
+    WHERE current_setting('synchronous_commit') = 'off'";
 
 /// The oldest server with everything that is used here, as `server_version_num`.
 const OLDEST_SERVER: i32 = 150_000;
@@ -191,7 +194,8 @@ impl Sql for Postgres {
     }
 
     fn begin(&mut self) -> Result<()> {
-        self.batch("BEGIN")?;
+        // Each statement must see what was committed before the lock was had.
+        self.batch("BEGIN ISOLATION LEVEL READ COMMITTED")?;
         if !self.is_for_writing {
             return Ok(());
         }

@@ -156,6 +156,12 @@ pub(crate) fn a_life_is_found_by_an_entry_of_it(home: &Home) {
     assert_eq!(life_of(7, entry(LIFE, far).entry), Some((LIFE, far)));
     assert_eq!(life_of(3, entry(LIFE, 2).entry), None);
     assert_eq!(life_of(2, entry(LIFE, 1).entry), None);
+    let mut impossible = entry(LIFE, 3);
+    impossible.entry.time.month = 13;
+    archive.append(&[batch(vec![Record::Entry(impossible)])]).unwrap();
+    let mut life_of = |sequence, entry| archive.life_of("U1-SER1", sequence, &entry).unwrap();
+    assert_eq!(life_of(3, impossible.entry), Some((LIFE, 3)));
+    assert_eq!(life_of(3, entry(LIFE, 3).entry), None);
 }
 
 pub(crate) fn who_reads_while_others_write_misses_nothing_and_sees_no_contradiction(home: &Home) {

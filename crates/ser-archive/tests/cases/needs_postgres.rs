@@ -131,6 +131,33 @@ fn every_case_holds_in_a_database_too() {
     assert!(failed.is_empty(), "{failed:#?}");
 }
 
+/// What a user has as default weakens no promise: what has ended is on the disk, and who waited for
+/// others sees what they have written.
+#[test]
+#[ignore = "needs postgres: cargo xtask test"]
+fn other_defaults_of_a_user_change_nothing() {
+    let server = Server::start(&[], |_| {});
+    let home = server.home("plant");
+    home.open().append(&[batch(entries(LIFE, [1]))]).unwrap();
+    home.sql(
+        "ALTER ROLE ser SET synchronous_commit = off; \
+         ALTER ROLE ser SET default_transaction_isolation = 'serializable'; \
+         ALTER TABLE entry ADD COLUMN commits text DEFAULT current_setting('synchronous_commit')",
+    );
+    std::thread::scope(|scope| {
+        for part in 1..=4 {
+            let mut archive = home.open();
+            scope.spawn(move || {
+                for number in 1..=20 {
+                    archive.append(&[batch(entries(LIFE, [part * 100 + number]))]).unwrap();
+                }
+            });
+        }
+    });
+    home.sql("ALTER TABLE entry ADD CONSTRAINT durable CHECK (sequence = 1 OR commits = 'on')");
+    assert_eq!(home.open().verify().unwrap().1, []);
+}
+
 /// Makes an authority, and a certificate of it for this computer, which the server may read.
 fn make_certificates(folder: &Path) {
     let authority = Certified::authority();
