@@ -109,18 +109,25 @@ fn write_all(mut archive: Archive, orders: &Receiver<Order>) -> Archive {
         while records < AT_ONCE
             && let Ok(order) = orders.try_recv()
         {
-            records += order.batch.records.len();
+            // A batch that only moves a bookmark counts as well, or this might never end.
+            records += order.batch.records.len().max(1);
             batches.push(order.batch);
             answers.push(order.answer);
         }
         let together = match batches.len() {
             1 => None,
-            _ => archive.append(&batches).ok(),
+            _ => match archive.append(&batches) {
+                Ok(appended) => Some(Ok(appended)),
+                // Each alone would wait as long again.
+                Err(Error::Busy { archive }) => Some(Err(archive)),
+                Err(_) => None,
+            },
         };
         for (batch, answer) in batches.iter().zip(answers) {
             // Alone, a batch that cannot be written keeps nobody else from being written.
-            let appended = match together {
-                Some(appended) => Ok(appended),
+            let appended = match &together {
+                Some(Ok(appended)) => Ok(*appended),
+                Some(Err(archive)) => Err(Error::Busy { archive: archive.clone() }),
                 None => archive.append(std::slice::from_ref(batch)),
             };
             // Who asked may have gone away meanwhile. It is written all the same.

@@ -8,7 +8,7 @@ use std::path::Path;
 use common::*;
 use proptest::prelude::*;
 use rusqlite::types::Value;
-use ser_archive::{Access, Archive, Error, Keep, Place};
+use ser_archive::{Access, Archive, Error, Keep, Place, Writer};
 use ser_evidence::record::{Life, Record};
 
 fn open_copy(path: &Path) -> ser_archive::Result<Archive> {
@@ -147,6 +147,24 @@ fn a_file_in_which_somebody_has_put_statements_is_refused() {
             assert!(matches!(error, Error::Damaged { .. }), "{error:?}");
         }
     }
+}
+
+#[test]
+fn who_waits_for_another_program_waits_once_for_all() {
+    let home = Home::new();
+    let writer = Writer::start(home.open(), 16).unwrap();
+    let raw = home.raw();
+    raw.execute_batch("BEGIN IMMEDIATE").unwrap();
+    let began = std::time::Instant::now();
+    let tickets: Vec<_> =
+        (1..=6).map(|at| writer.append(batch(entries(LIFE, [at]))).unwrap()).collect();
+    for ticket in tickets {
+        assert!(matches!(ticket.wait(), Err(Error::Busy { .. })));
+    }
+    // The first alone, and all the others.
+    assert!(began.elapsed().as_secs() < 30, "{:?}", began.elapsed());
+    raw.execute_batch("COMMIT").unwrap();
+    writer.append(batch(entries(LIFE, [1]))).unwrap().wait().unwrap();
 }
 
 #[test]
