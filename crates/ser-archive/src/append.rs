@@ -233,9 +233,9 @@ impl NewRows {
         let link = if is_first { Link::Entry(&entry) } else { Link::Conflict(&entry) };
         let row = self.row(link, entry.columns(), archive)?;
         if is_first {
-            self.entries.push(row)
+            self.entries.push(row);
         } else {
-            self.conflicts.push(row)
+            self.conflicts.push(row);
         }
         Ok(())
     }
