@@ -109,10 +109,14 @@ impl<'a> Chatter<'a> {
         let off = self.chattering & !self.on;
         self.chattering &= self.on;
         let mut changed = change.changed & !off | (state ^ self.recorded) & off;
-        for number in Inputs(change.changed & self.on).numbers() {
+        // Its change back to what the log shows is left out like those before.
+        let back = change.changed & off & !changed;
+        for number in Inputs(change.changed & self.on | back).numbers() {
             let bit = 1 << (number - 1);
             let Some(input) = self.inputs.get_mut(usize::from(number) - 1) else { continue };
-            if self.chattering & bit != 0 || input.count(tick_ms) {
+            if back & bit != 0 {
+                input.suppress(tick_ms);
+            } else if self.chattering & bit != 0 || input.count(tick_ms) {
                 self.chattering |= bit;
                 input.suppress(tick_ms);
                 changed &= !bit;
@@ -372,6 +376,27 @@ mod tests {
         take(&mut chatter, 13, 0b10);
         take(&mut chatter, 14, 0b11);
         assert_eq!(seen, [(10, 0b11), (13, 0b10), (14, 0b11)]);
+        assert_eq!((chatter.chattering, chatter.suppressed(1)), (0, 2));
+    }
+
+    #[test]
+    fn a_change_back_to_what_the_log_shows_is_counted_when_the_filter_is_switched_off() {
+        let mut inputs = [Input::NEW; 32];
+        let mut chatter = Chatter::new(&mut inputs);
+        chatter.set_filter(1, filter(2, 100, 9000));
+        let mut seen = Vec::new();
+        let mut take = |chatter: &mut Chatter<'_>, tick_ms, state| {
+            let change = Change { tick_ms, changed: 1, state };
+            chatter.take(change, |change| seen.push((change.tick_ms, change.state)));
+        };
+        take(&mut chatter, 10, 1);
+        take(&mut chatter, 11, 0);
+        chatter.settle(11, |_| {});
+        chatter.set_filter(1, None);
+        // The log shows the input as on, and on it is: of two changes it shows neither.
+        take(&mut chatter, 12, 1);
+        take(&mut chatter, 13, 0);
+        assert_eq!(seen, [(10, 1), (13, 0)]);
         assert_eq!((chatter.chattering, chatter.suppressed(1)), (0, 2));
     }
 }

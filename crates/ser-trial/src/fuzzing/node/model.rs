@@ -129,8 +129,9 @@ impl Chatter {
                 }
             }
         }
-        self.suppressed += u32::from(self.chatters && changes);
-        !self.chatters && std::mem::replace(&mut self.recorded, self.on) != self.on
+        let is_shown = !self.chatters && std::mem::replace(&mut self.recorded, self.on) != self.on;
+        self.suppressed += u32::from(changes && !is_shown);
+        is_shown
     }
 }
 
