@@ -8,7 +8,7 @@ use crate::lockstep::INSTRUCTIONS_PER_MS;
 use ser_board::budget::MAX_BITS_PER_SECOND;
 use ser_client::LineRate;
 
-use ser_proto::{Command, InputFilter, MAX_SIZE, Model, Reply};
+use ser_proto::{ClockSource, Command, InputFilter, MAX_SIZE, Model, Reply};
 
 use super::bench::{Bench, Carried, Parts, Setup};
 use super::costs::beginnings;
@@ -99,7 +99,12 @@ impl<'p> Load<'p> {
             bench.pass_ms()?;
         }
         let mut ledger = Ledger::new(Model::Ser320);
-        ledger.power_up(0, NEVER_SET_MS, MAX_SIZE, vec![InputFilter::OFF; 32]);
+        ledger.power_up(
+            0,
+            (ClockSource::NeverSet, NEVER_SET_MS),
+            MAX_SIZE,
+            &[InputFilter::OFF; 32],
+        );
         let mut line = Conversation::new("RS-232", LineRate::BitsPerSecond(MAX_BITS_PER_SECOND));
         // The recorder also reports every event to the host on the bus.
         line.begin(Order::Ask(Command::Configure(REPORT)), bench.now_ms());

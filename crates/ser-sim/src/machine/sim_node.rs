@@ -393,6 +393,13 @@ impl<'a> SimNode<'a> {
         self.options.line_rate == LineRate::Real
     }
 
+    /// How many milliseconds were passed over since power-up, which the recorder's own count of missed
+    /// samples has. Like that, it stops at the largest value.
+    #[must_use]
+    pub fn passed_over(&self) -> u32 {
+        u32::try_from(self.leapt_ms).unwrap_or(u32::MAX)
+    }
+
     /// What the recorder dropped, refused or lost since power-up. Milliseconds that were passed
     /// over do not count as missed.
     #[must_use]
@@ -400,8 +407,10 @@ impl<'a> SimNode<'a> {
         let seen = self.node.diagnostics();
         // The node's own count stops at its largest value, reached when 49 days were passed over.
         // From then on it says nothing.
-        let leapt_ms = u32::try_from(self.leapt_ms).unwrap_or(u32::MAX);
-        Diagnostics { samples_missed: seen.samples_missed.saturating_sub(leapt_ms), ..seen }
+        Diagnostics {
+            samples_missed: seen.samples_missed.saturating_sub(self.passed_over()),
+            ..seen
+        }
     }
 
     /// How many changes of an input (1–32) were left out as chatter since power-up.

@@ -13,8 +13,8 @@ use geni_board::{
     Completion, Configuration, Data, Destination, Driver, Event, Options, Start, Transmission,
     TransmitPriority,
 };
-use ser_node::{GeniusOptions, GeniusPort};
-use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
+use ser_node::{GeniusDiagnostics, GeniusOptions, GeniusPort};
+use ser_proto::genius::{FUNCTION_GENIUS, FUNCTION_HORNER, SUBFUNCTION_SER, Subfunction};
 use ser_proto::{Command, Model, Reply};
 use ser_sim::SimNode;
 use ser_sim::genius::{
@@ -27,7 +27,7 @@ use super::conversation::{Conversation, Order};
 use super::ledger::{Ledger, Port};
 use super::line_host::Errand;
 use super::orders::{self, Way};
-use super::taps::{BusTap, Expected, Taken, TappedWindow, answered_as};
+use super::taps::{BusTap, Taken, TappedWindow, answered_as};
 use super::trail::Trail;
 
 /// Bus addresses.
@@ -58,6 +58,8 @@ struct UnitPort {
     /// Since when datagrams had waited that were lost when the board started anew. The recorder
     /// waits for them until it finds that out.
     gone_since_ms: Option<u64>,
+    /// Whether the recorder holds the board's reset line low.
+    held: bool,
 }
 
 /// The host's conversations, over all lives.
@@ -93,6 +95,23 @@ impl BusHost {
         self.talks.iter_mut().for_each(|talk| talk.give_up(now_ms));
     }
 
+    /// A datagram that is no command, or none for a recorder, to one of them or to all.
+    fn any_odd_datagram(&mut self) -> Transmission {
+        let first = Destination::Device(FIRST_UNIT);
+        let to = self.chance.pick(&[Destination::Broadcast, first, first]);
+        let odd = message_of(to, &orders::odd_body(&mut self.chance));
+        match self.chance.below(4) {
+            0 => Transmission { subfunction: SUBFUNCTION_SER + 1, ..odd },
+            1 => Transmission {
+                function: FUNCTION_GENIUS,
+                subfunction: Subfunction::ReadIoForces.code(),
+                data: Data::from_slice(&[self.chance.byte() & 7]).unwrap_or_default(),
+                ..odd
+            },
+            _ => odd,
+        }
+    }
+
     fn begin_next(&mut self, now_ms: u64, errand: Errand, trail: &Trail) {
         for (index, talk) in self.talks.iter_mut().enumerate().filter(|(_, talk)| talk.is_resting())
         {
@@ -104,7 +123,7 @@ impl BusHost {
                     self.next_order_ms[index] = now_ms + self.chance.spread(1..=4_000);
                     orders::next_order(&mut self.chance, Way::Bus)
                 }
-                Errand::Any | Errand::Nothing { .. } => continue,
+                Errand::Any => continue,
             };
             if !matches!(order, Order::Read) {
                 trail.note(format_args!("{}: {order:?}", talk.account().name()));
@@ -116,11 +135,17 @@ impl BusHost {
             let command = orders::next_broadcast(&mut self.chance);
             trail.note(format_args!("broadcast: {command:?}"));
             self.outgoing.push_back(message(Destination::Broadcast, &command));
+            let odd = self.any_odd_datagram();
+            self.outgoing.push_back(odd);
         }
     }
 }
 
 fn message(destination: Destination, command: &Command) -> Transmission {
+    message_of(destination, &command.to_body())
+}
+
+fn message_of(destination: Destination, body: &[u8]) -> Transmission {
     Transmission {
         destination,
         function: FUNCTION_HORNER,
@@ -128,7 +153,43 @@ fn message(destination: Destination, command: &Command) -> Transmission {
         priority: TransmitPriority::Normal,
         completion: Completion::Acknowledged,
         // No command is longer than a datagram.
-        data: Data::from_slice(&command.to_body()).unwrap_or_default(),
+        data: Data::from_slice(body).unwrap_or_default(),
+    }
+}
+
+/// Tells the ledger of a message that a recorder has taken, and of what the recorder counts then.
+fn process(taken: &Taken, arrived_ms: Option<u64>, now_ms: u64, ledger: &mut Ledger) {
+    let Taken { received, broadcast, .. } = *taken;
+    let is_time = match received {
+        Ok(Command::SetClock(_)) => true,
+        Ok(Command::Time { .. }) => broadcast,
+        _ => false,
+    };
+    let counts = ledger.expected.genius.get_or_insert_default();
+    if is_time && arrived_ms.is_none() {
+        // A time is worthless if nobody knows when it arrived, and a mark as well.
+        counts.clocks_refused += 1;
+        return;
+    }
+    counts.broadcasts += u32::from(broadcast && received.is_ok());
+    counts.requests += u32::from(!broadcast);
+    let at_ms = arrived_ms.unwrap_or(now_ms);
+    match received {
+        Err(error) => {
+            ledger.expected.parse_error(error);
+            if let Some(command) = answered_as(error).filter(|_| !broadcast) {
+                ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS);
+            }
+        }
+        Ok(Command::SetClock(time)) => ledger.set_clock(Port::Bus, at_ms, time),
+        Ok(Command::SetMode { recording }) => {
+            ledger.expected.exact.settings_late += u32::from(arrived_ms.is_none());
+            ledger.set_recording(at_ms, recording);
+        }
+        Ok(Command::Time { token }) if broadcast => ledger.marked(token, at_ms),
+        Ok(Command::Time { token }) => ledger.time_asked(Port::Bus, token, at_ms),
+        Ok(command) if broadcast => ledger.command_done(&command),
+        Ok(command) => ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS),
     }
 }
 
@@ -172,8 +233,18 @@ impl BusLife {
             let options = GeniusOptions { start: RESET, ..GeniusOptions::new(model) };
             let port = GeniusPort::new(TappedWindow::new(window, Rc::clone(&tap)), options);
             let has_line = chance.one_in(2);
-            let (restarted, gone_since_ms) = (false, None);
-            UnitPort { number, port, board, tap, has_line, failures: 0, restarted, gone_since_ms }
+            let (restarted, gone_since_ms, held) = (false, None, false);
+            UnitPort {
+                number,
+                port,
+                board,
+                tap,
+                has_line,
+                failures: 0,
+                restarted,
+                gone_since_ms,
+                held,
+            }
         });
         let units: Vec<UnitPort> = units.collect();
         let (host, window) = connect(HOST);
@@ -272,46 +343,24 @@ impl BusLife {
         now_ms: u64,
         node: &mut SimNode<'_>,
         ledger: &mut Ledger,
-        expected: &mut Expected,
     ) -> Result<(), String> {
-        let UnitPort { port, tap, failures, .. } = &mut self.units[index];
+        let UnitPort { port, tap, failures, held, .. } = &mut self.units[index];
         tap.borrow_mut().begin(now_ms);
         node.serve(port);
-        let held = port.reset_held();
-        port.window().inner().drive_reset(held);
+        let was_held = std::mem::replace(held, port.reset_held());
+        port.window().inner().drive_reset(*held);
         let messages = tap.borrow_mut().end();
+        let counts = ledger.expected.genius.get_or_insert_default();
+        counts.resets += u32::from(*held && !was_held);
+        counts.ignored = tap.borrow().ignored;
+        counts.requests += tap.borrow_mut().take_forces_asked();
         let failed = port.diagnostics().board.failures;
         if std::mem::replace(failures, failed) != failed {
             tap.borrow_mut().board_failed();
         }
         for taken in messages {
             let arrived_ms = self.arrived_ms(index, &taken, now_ms)?;
-            match taken.received {
-                Err(error) => {
-                    expected.parse_error(error);
-                    if let Some(command) = answered_as(error).filter(|_| !taken.broadcast) {
-                        ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS);
-                    }
-                }
-                // A time is worthless if nobody knows when it arrived.
-                Ok(Command::SetClock(time)) => {
-                    arrived_ms.into_iter().for_each(|at_ms| ledger.set_clock(at_ms, time));
-                }
-                Ok(Command::SetMode { recording }) => {
-                    ledger.set_recording(arrived_ms.unwrap_or(now_ms), recording);
-                }
-                Ok(Command::Time { token }) if taken.broadcast => {
-                    // A mark is worthless as well.
-                    arrived_ms.into_iter().for_each(|at_ms| ledger.marked(token, at_ms));
-                }
-                Ok(Command::Time { token }) => {
-                    ledger.time_asked(Port::Bus, token, arrived_ms.unwrap_or(now_ms));
-                }
-                Ok(command) if taken.broadcast => ledger.command_done(&command),
-                Ok(command) => {
-                    ledger.command_arrived(Port::Bus, &command, now_ms + REPLIED_WITHIN_MS);
-                }
-            }
+            process(&taken, arrived_ms, now_ms, ledger);
         }
         ledger.wait_after(self.untaken_since_ms(index));
         Ok(())
@@ -421,6 +470,12 @@ impl BusLife {
         for device in self.units.iter().map(|unit| unit.board.id()).chain([self.host.id()]) {
             bus.inject(Fault::Inside { device, fault: DeviceFault::AnswerLate { by_us: 0 } });
         }
+    }
+
+    /// What the Genius port of a recorder has counted.
+    #[must_use]
+    pub fn counted(&self, index: usize) -> GeniusDiagnostics {
+        self.units[index].port.diagnostics()
     }
 
     /// Checks that all hosts have kept to the rules of their boards.

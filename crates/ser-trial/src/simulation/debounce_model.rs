@@ -37,6 +37,21 @@ impl DebounceModel {
         DebounceModel { debounce, inputs, unsettled: 0, filtered: 0 }
     }
 
+    /// The times in force.
+    #[must_use]
+    pub fn times(&self) -> &Debounce {
+        &self.debounce
+    }
+
+    /// Takes these times over, unless an input has begun to change whose time would be another one.
+    pub fn take_times(&mut self, debounce: &Debounce) {
+        let other = |bit: u8| debounce.time_ms(bit + 1) != self.debounce.time_ms(bit + 1);
+        let is_counting = |bit: u8| self.unsettled >> bit & 1 == 1;
+        if !(0..32).any(|bit| is_counting(bit) && other(bit)) {
+            self.debounce = *debounce;
+        }
+    }
+
     /// Inputs change in this millisecond. `out` gets what was accepted before.
     pub fn change(&mut self, at_ms: u64, changed: u32, out: &mut Vec<Accepted>) {
         self.settle(at_ms.saturating_sub(1), out);

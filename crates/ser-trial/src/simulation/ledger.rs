@@ -11,16 +11,19 @@ mod tests;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::num::NonZeroU8;
+use std::ops::RangeInclusive;
 
 use ser_node::capture::QUEUE_LEN;
 use ser_node::{Debounce, HELD_BACK_MS};
 use ser_proto::{
-    Command, Configuration, Entry, Filters, Identity, InputFilter, MAX_FILTERS, MAX_SIZE, Mark,
+    ClockSource, Command, Configuration, Entry, Filters, Identity, InputFilter, MAX_SIZE, Mark,
     Model, Reply, TimeStamp,
 };
 
 use super::chatter_model::ChatterModel;
+use super::counts::{Bounds, Expected};
 use super::debounce_model::{Accepted, DebounceModel};
+use super::filter_orders::{FilterOrder, FilterTable, FiltersQuestion, times};
 use super::questions::{Answers, Questions, TimeQuestion};
 use super::recorded::{Erase, Recorded, stamp_ms};
 use super::wrong::{Numbered, Told, Wrong, erases};
@@ -92,9 +95,27 @@ struct Waiting {
     dropped: u32,
 }
 
+/// How the clock is set.
+#[derive(Clone, Copy, Debug)]
+struct Setting {
+    /// How far it is ahead of the simulation's time.
+    ahead_ms: i64,
+    source: ClockSource,
+    /// When it was set, in microseconds since power-up.
+    tick_us: u64,
+}
+
+impl Default for Setting {
+    fn default() -> Setting {
+        Setting { ahead_ms: 0, source: ClockSource::NeverSet, tick_us: 0 }
+    }
+}
+
 /// The ledger of one recorder, over all its lives.
 #[derive(Clone, Debug)]
 pub struct Ledger {
+    /// What it must have counted since power-up, as far as that is counted where it happens.
+    pub expected: Expected,
     mask: u32,
     hold_ms: u64,
     debounce: DebounceModel,
@@ -117,21 +138,17 @@ pub struct Ledger {
     power_up_ms: u64,
     older_ms: u64,
     model: Model,
-    /// The filters in force, by input.
-    filters: Vec<InputFilter>,
-    /// Those in force before, which a reply may tell that comes late.
-    filters_before: Vec<InputFilter>,
-    /// Those that a host is setting, from which input on the answer tells them, and whether the
-    /// recorder has answered.
-    filters_wanted: Option<(NonZeroU8, Vec<InputFilter>)>,
-    filters_told: bool,
+    /// The filters since power-up, by input; the last are in force.
+    filters: Vec<FilterTable>,
+    /// How often they were set, in all lives.
+    filters_set: u64,
     questions: Questions,
     /// How many erases had certainly happened when somebody asked for the identity.
     identity_asked: VecDeque<(Port, u64)>,
     /// Erases that arrived and that certainly happened, in earlier lives.
     erases_before: (u64, u64),
-    /// From which millisecond on the clock is ahead of the simulation's time, and by how much.
-    clock: Vec<(u64, i64)>,
+    /// From which millisecond on the clock is set how.
+    clock: Vec<(u64, Setting)>,
     recording: Vec<(u64, bool)>,
     events: VecDeque<Recorded>,
     /// How many events at the beginning of the list were dropped because nobody can be told of
@@ -150,6 +167,12 @@ pub struct Ledger {
     overwritten_before: usize,
     life: u64,
     edges: Edges,
+    /// Edges beyond the capture queue in earlier lives.
+    queue_full_before: u64,
+    /// When the latest change happened that was decided.
+    decided_ms: u64,
+    /// How many configurations arrived since power-up.
+    configurations: u64,
     /// Edges that debounce filtered in earlier lives.
     filtered_before: u64,
     accepted: Vec<Accepted>,
@@ -160,6 +183,7 @@ impl Ledger {
     #[must_use]
     pub fn new(model: Model) -> Ledger {
         Ledger {
+            expected: Expected::default(),
             mask: model.mask(),
             hold_ms: 0,
             debounce: DebounceModel::new(Debounce::OFF, 0),
@@ -174,10 +198,8 @@ impl Ledger {
             power_up_ms: 0,
             older_ms: 0,
             model,
-            filters: Vec::new(),
-            filters_before: Vec::new(),
-            filters_wanted: None,
-            filters_told: false,
+            filters: vec![[InputFilter::OFF; 32]],
+            filters_set: 0,
             questions: Questions::default(),
             identity_asked: VecDeque::new(),
             erases_before: (0, 0),
@@ -194,17 +216,28 @@ impl Ledger {
             overwritten_before: 0,
             life: 0,
             edges: Edges::default(),
+            queue_full_before: 0,
+            decided_ms: 0,
+            configurations: 0,
             filtered_before: 0,
             accepted: Vec::new(),
         }
     }
 
-    /// Switches the power on; the clock shows `time_ms`.
-    pub fn power_up(&mut self, now_ms: u64, time_ms: i64, size: u16, filters: Vec<InputFilter>) {
+    /// Switches the power on. The clock shows `time_ms`, which it has from `source`.
+    pub fn power_up(
+        &mut self,
+        now_ms: u64,
+        (source, time_ms): (ClockSource, i64),
+        size: u16,
+        filters: &FilterTable,
+    ) {
+        self.expected = Expected::default();
+        self.queue_full_before = self.edges.queue_full;
+        (self.decided_ms, self.configurations) = (0, 0);
         self.edges.cut_off += self.undecided();
         self.chatter = ChatterModel::default();
-        self.set_filters(filters);
-        (self.filters_wanted, self.filters_told) = (None, false);
+        self.begin_filters(filters);
         (self.power_up_ms, self.older_ms) = (now_ms, 0);
         self.questions.power_up();
         self.identity_asked.clear();
@@ -216,7 +249,7 @@ impl Ledger {
         self.dropped = 0;
         self.inputs = self.contacts & self.mask;
         (self.state, self.shown) = (self.inputs, self.inputs);
-        self.clock = vec![(0, time_ms - signed(now_ms))];
+        self.clock = vec![(0, Setting { ahead_ms: time_ms - signed(now_ms), source, tick_us: 0 })];
         self.recording = vec![(0, true)];
         self.events.clear();
         self.forgotten = 0;
@@ -227,40 +260,93 @@ impl Ledger {
         self.life += 1;
     }
 
-    /// From now on these filters are in force, by input. No input may be moving or chattering.
-    pub fn set_filters(&mut self, filters: Vec<InputFilter>) {
+    /// At power-up these filters are in force, by input.
+    fn begin_filters(&mut self, filters: &FilterTable) {
         self.filtered_before += self.debounce.filtered();
-        let times = (1..).zip(&filters);
-        let debounce =
-            times.fold(Debounce::OFF, |all, (number, filter)| all.with(number, filter.debounce_ms));
-        self.hold_ms = debounce.longest_ms().into();
-        self.debounce = DebounceModel::new(debounce, self.contacts);
+        self.debounce = DebounceModel::new(times(filters), self.contacts);
+        self.hold_ms = self.debounce.times().longest_ms().into();
         for (bit, filter) in filters.iter().enumerate() {
             self.chatter.set(bit, filter.chatter);
         }
-        self.filters = filters;
+        self.filters = vec![*filters];
     }
 
-    /// A host begins to set these filters. It goes on until the recorder has answered.
-    pub fn begin_filters(&mut self, first: NonZeroU8, filters: Vec<InputFilter>) {
-        (self.filters_wanted, self.filters_told) = (Some((first, filters)), false);
+    /// A host orders a filter. The recorder sets it at once or later, or never.
+    fn filters_ordered(&mut self, port: Port, order: FilterOrder) {
+        let first = order.input.unwrap_or(NonZeroU8::MIN);
+        let since = self.filters.len() - 1;
+        let question = FiltersQuestion { first, order: Some(order), since };
+        self.questions.ask_filters(port, self.now_ms, question);
     }
 
-    /// Whether the recorder has answered. The filters are then in force.
-    pub fn filters_are_set(&mut self) -> bool {
-        if self.filters_told
-            && let Some((_, filters)) = self.filters_wanted.take()
-        {
-            self.filters_before.clone_from(&self.filters);
-            self.set_filters(filters);
+    /// Whether a host has ordered a filter that the recorder may still set.
+    #[must_use]
+    pub fn may_set_filters(&self) -> bool {
+        self.questions.filters_ordered(self.now_ms).next().is_some()
+    }
+
+    /// The recorder has stored these filters since the sample of this millisecond, and changes that
+    /// it has not recorded yet go by them. Debounce follows before the next sample that it can.
+    ///
+    /// # Errors
+    /// When nobody has ordered them.
+    pub fn filters_stored(&mut self, stored: &FilterTable) -> Result<(), String> {
+        let before = *self.filters();
+        if *stored == before {
+            return Ok(());
         }
-        self.filters_told
+        let inputs = self.model.inputs();
+        let ordered = || self.questions.filters_ordered(self.now_ms);
+        // Both ports may have set one in the same millisecond.
+        let is_ordered = ordered().any(|one| {
+            let once = one.applied_to(&before, inputs);
+            once == *stored || ordered().any(|other| other.applied_to(&once, inputs) == *stored)
+        });
+        if !is_ordered {
+            return Wrong::new("the recorder has filters that nobody has ordered")
+                .fact("stored", format_args!("{stored:?}"))
+                .fact("before", format_args!("{before:?}"))
+                .fact("ordered", format_args!("{:?}", ordered().collect::<Vec<_>>()))
+                .err();
+        }
+        for (bit, filter) in stored.iter().enumerate() {
+            self.chatter.set(bit, filter.chatter);
+        }
+        self.filters.push(*stored);
+        self.filters_set += 1;
+        Ok(())
+    }
+
+    /// Before the next sample, debounce takes over the times that are ordered, if it can.
+    pub fn take_debounce_times(&mut self) {
+        let wanted = times(self.filters());
+        if wanted == *self.debounce.times() {
+            return;
+        }
+        self.debounce.take_times(&wanted);
+        if wanted == *self.debounce.times() {
+            // Changes that only waited for a datagram are recorded as if nothing had happened.
+            self.record_until(self.now_ms.saturating_sub(1));
+            self.hold_ms = self.debounce.times().longest_ms().into();
+        }
+    }
+
+    /// Whether every change counts at once.
+    #[must_use]
+    pub fn is_undebounced(&self) -> bool {
+        *self.debounce.times() == Debounce::OFF
+    }
+
+    /// How often filters were set, in all lives.
+    #[must_use]
+    pub fn filters_set(&self) -> u64 {
+        self.filters_set
     }
 
     /// The filters in force, by input.
     #[must_use]
-    pub fn filters(&self) -> &[InputFilter] {
-        &self.filters
+    pub fn filters(&self) -> &FilterTable {
+        self.filters.last().unwrap_or(&[InputFilter::OFF; 32])
     }
 
     /// Inputs that chatter.
@@ -284,8 +370,8 @@ impl Ledger {
     /// Ages the recorder: it has been on for that much longer, and its clock has gone on.
     pub fn grow_older(&mut self, by_ms: u64) {
         self.older_ms += by_ms;
-        for (_, ahead_ms) in &mut self.clock {
-            *ahead_ms += signed(by_ms);
+        for (_, setting) in &mut self.clock {
+            setting.ahead_ms += signed(by_ms);
         }
     }
 
@@ -353,13 +439,16 @@ impl Ledger {
             && *first.key() <= decided_ms
         {
             let (at_ms, Waiting { changed, dropped }) = first.remove_entry();
+            self.decided_ms = at_ms;
             self.rest_until(at_ms.saturating_sub(1));
+            self.chatter.settled(at_ms.saturating_sub(1));
             let chattered = self.chatter.chattering();
             self.inputs ^= dropped ^ changed;
             self.state ^= dropped & !chattered;
             self.decide(at_ms, changed);
         }
         self.rest_until(decided_ms);
+        self.chatter.settled(decided_ms);
     }
 
     /// Lets inputs come to rest that have been quiet for long enough by this millisecond.
@@ -372,15 +461,21 @@ impl Ledger {
     /// Decides what is recorded of inputs that changed in this millisecond, and of those that come
     /// to rest in it.
     fn decide(&mut self, at_ms: u64, changed: u32) {
+        let ended = self.chatter.end_switched_off();
+        let shown_anew = ended & (self.inputs ^ self.state);
         let mut recorded = changed;
         for bit in (0..32_usize).filter(|bit| changed >> bit & 1 == 1) {
-            if !self.chatter.change(bit, at_ms) {
+            if (ended & !shown_anew) >> bit & 1 == 1 {
+                self.chatter.leave_out(bit);
+                recorded &= !(1 << bit);
+                self.edges.chatter += 1;
+            } else if !self.chatter.change(bit, at_ms) {
                 recorded &= !(1 << bit);
                 self.edges.chatter += 1;
             }
         }
         let edges = u64::from(recorded.count_ones());
-        let rests = self.chatter.rest(at_ms) & (self.inputs ^ self.state);
+        let rests = (self.chatter.rest(at_ms) | ended) & (self.inputs ^ self.state) & !recorded;
         self.state ^= recorded | rests;
         if recorded | rests != 0 {
             self.record(at_ms, recorded | rests, edges);
@@ -404,7 +499,8 @@ impl Ledger {
         }
         self.edges.recorded += edges;
         self.edges.rests += u64::from(changed.count_ones()) - edges;
-        let stamp_ms = (in_force(&self.clock, at_ms) + signed(at_ms)).rem_euclid(CENTURY_MS);
+        let stamp_ms =
+            (in_force(&self.clock, at_ms).ahead_ms + signed(at_ms)).rem_euclid(CENTURY_MS);
         let unrecorded = self.shown ^ self.state ^ changed;
         self.shown = self.state;
         self.events.push_back(Recorded { stamp_ms, changed, state: self.state, at_ms, unrecorded });
@@ -429,27 +525,41 @@ impl Ledger {
 
     /// The clock was set in this millisecond. Samples after it have the new time, except for those
     /// that have been recorded since.
-    pub fn set_clock(&mut self, at_ms: u64, time: TimeStamp) {
-        if let Some(time_ms) = stamp_ms(time) {
-            set(&mut self.clock, at_ms, time_ms - signed(at_ms));
-        }
+    pub fn set_clock(&mut self, port: Port, at_ms: u64, time: TimeStamp) {
+        let Some(time_ms) = stamp_ms(time) else { return };
+        self.count_late(at_ms);
+        let source = match port {
+            Port::Line => ClockSource::HostOverRs232,
+            Port::Bus => ClockSource::HostOverGenius,
+        };
+        let tick_us = self.tick_us(at_ms);
+        let setting = Setting { ahead_ms: time_ms - signed(at_ms), source, tick_us };
+        set(&mut self.clock, at_ms, setting);
+    }
+
+    /// Counts a setting of this millisecond that comes after a later change was decided.
+    fn count_late(&mut self, at_ms: u64) {
+        self.expected.exact.settings_late += u32::from(self.decided_ms > at_ms);
     }
 
     /// Recording was started or stopped in this millisecond, after its sample.
     pub fn set_recording(&mut self, at_ms: u64, recording: bool) {
+        self.count_late(at_ms);
         set(&mut self.recording, at_ms, recording);
     }
 
     /// The time that the clock shows.
     #[must_use]
     pub fn time_ms(&self, now_ms: u64) -> i64 {
-        let ahead_ms = self.clock.last().map_or(0, |&(_, ahead_ms)| ahead_ms);
+        let ahead_ms = self.clock.last().map_or(0, |(_, setting)| setting.ahead_ms);
         (ahead_ms + signed(now_ms)).rem_euclid(CENTURY_MS)
     }
 
     /// A command has arrived that waits for its turn. What it changes is done by `until_ms`, or
     /// never.
     pub fn command_arrived(&mut self, port: Port, command: &Command, until_ms: u64) {
+        let size = self.smallest_size();
+        self.expected.command(port, command, self.model.inputs(), size);
         match command {
             Command::Erase => {
                 self.erases.push(Erase { from: self.len(), to: usize::MAX, certain: false });
@@ -460,6 +570,7 @@ impl Ledger {
                 self.due.push_back((port, until_ms, Due::Size { to: None, doubtful: false }));
             }
             Command::Configure(configure) => {
+                self.configurations += 1;
                 self.forget_configuration(port);
                 self.due.push_back((
                     port,
@@ -468,12 +579,21 @@ impl Ledger {
                 ));
                 self.note_overwritten();
             }
+            Command::SetFilter { input, filter } => {
+                self.filters_ordered(port, FilterOrder { input: *input, filter: *filter });
+            }
+            Command::QueryFilters { first } => {
+                let since = self.filters.len() - 1;
+                let question = FiltersQuestion { first: *first, order: None, since };
+                self.questions.ask_filters(port, self.now_ms, question);
+            }
             Command::Identify => {
                 let certain = self.erases.iter().filter(|erase| erase.certain).count();
                 self.identity_asked.push_back((port, certain as u64));
             }
             Command::Diagnostics { first } => {
-                self.questions.ask_counters(port, *first, self.chatter.left_out());
+                let bounds = self.counter_bounds(port);
+                self.questions.ask_counters(port, self.now_ms, *first, bounds);
             }
             _ => {}
         }
@@ -481,16 +601,26 @@ impl Ledger {
 
     /// A question for the time has arrived in this millisecond.
     pub fn time_asked(&mut self, port: Port, token: u16, at_ms: u64) {
-        let counted = |from: usize| (self.len() - from) as u64;
-        let events = match port {
-            Port::Line => {
-                self.may_count_from().map(counted).map(|events| events..=events).collect()
-            }
-            // It may have waited in the board, with events after it that wait as well.
-            Port::Bus => vec![0..=u64::MAX],
+        let counted = |place: usize| (self.len() - place) as u64;
+        let places = self.may_count_from();
+        let events = places.map(|places| counted(*places.end())..=counted(*places.start()));
+        let certain = self.erases.iter().filter(|erase| erase.certain).count() as u64;
+        let question = TimeQuestion {
+            token,
+            clock_us: self.clock_us(at_ms),
+            source: self.source_and_age_s(at_ms),
+            tick_us: self.tick_us(at_ms),
+            lives: self.lives(certain),
+            events: events.collect(),
         };
-        let (clock_us, tick_us) = (self.clock_us(at_ms), self.tick_us(at_ms));
-        self.questions.ask_time(TimeQuestion { port, token, clock_us, tick_us, events });
+        self.questions.ask_time(port, self.now_ms, question);
+    }
+
+    /// Which lives of the log it can be, when so many erases since power-up were certain.
+    fn lives(&self, certain: u64) -> RangeInclusive<u64> {
+        let (arrived_before, certain_before) = self.erases_before;
+        let most = self.life + arrived_before + self.erases.len() as u64;
+        self.life + certain_before + certain..=most
     }
 
     /// A mark has arrived in this millisecond.
@@ -501,7 +631,32 @@ impl Ledger {
 
     /// What the clock shows in this millisecond. A setting in it counts.
     fn clock_us(&self, at_ms: u64) -> i64 {
-        (in_force(&self.clock, at_ms + 1) + signed(at_ms)).rem_euclid(CENTURY_MS) * 1000
+        let ahead_ms = in_force(&self.clock, at_ms + 1).ahead_ms;
+        (ahead_ms + signed(at_ms)).rem_euclid(CENTURY_MS) * 1000
+    }
+
+    /// Where the clock has its time from in this millisecond, and for how many seconds.
+    fn source_and_age_s(&self, at_ms: u64) -> (ClockSource, u32) {
+        let Setting { source, tick_us, .. } = in_force(&self.clock, at_ms + 1);
+        let age_s = (self.tick_us(at_ms) - tick_us) / 1_000_000;
+        (source, u32::try_from(age_s).unwrap_or(u32::MAX))
+    }
+
+    /// What the recorder must have counted by now.
+    #[must_use]
+    pub fn expected_by_now(&self) -> Expected {
+        let mut expected = self.expected;
+        expected.exact.edges_lost = narrow(self.edges.queue_full - self.queue_full_before);
+        expected.overwritten = narrow(self.overwritten_before as u64);
+        let events = (self.len() + self.erases.len()) as u64;
+        expected.reportable = narrow(events + self.configurations);
+        expected
+    }
+
+    /// The least and the most that each counter can be now that is asked for by this port.
+    fn counter_bounds(&self, asked_by: Port) -> Bounds {
+        let left_out = &self.chatter.left_out()[..self.model.inputs().into()];
+        self.expected_by_now().all_bounds(asked_by, left_out)
     }
 
     fn tick_us(&self, at_ms: u64) -> u64 {
@@ -515,12 +670,16 @@ impl Ledger {
                 self.erases.push(Erase { from: self.len(), to: self.len(), certain: true });
             }
             Command::Configure(configure) => {
+                self.configurations += 1;
                 self.forget_configuration(Port::Bus);
                 if let Some(size) = configure.size {
                     self.size = size;
                     self.doubt_answers(|_| true);
                 }
                 self.note_overwritten();
+            }
+            Command::SetFilter { input, filter } => {
+                self.filters_ordered(Port::Bus, FilterOrder { input: *input, filter: *filter });
             }
             _ => {}
         }
@@ -555,12 +714,13 @@ impl Ledger {
                     self.see_configuration(*configuration)?;
                 }
             }
-            Reply::Time(reading) => self.questions.check_time(port, reading)?,
+            Reply::Time(reading) => self.questions.check_time(port, self.now_ms, reading)?,
             Reply::Diagnostics(page) => {
-                self.questions.check_counters(port, page, self.chatter.left_out())?;
+                let bounds = self.counter_bounds(port);
+                self.questions.check_counters(port, self.now_ms, page, &bounds)?;
             }
             Reply::Identity(identity) => self.see_identity(port, identity)?,
-            Reply::Filters(page) => self.see_filters(page)?,
+            Reply::Filters(page) => self.see_filters(port, page)?,
             _ => {}
         }
         Ok(())
@@ -572,32 +732,13 @@ impl Ledger {
         let asked = self.identity_asked.iter().position(of_port);
         let asked = asked.and_then(|place| self.identity_asked.remove(place));
         let certain = asked.map_or(0, |(_, certain)| certain);
-        let (arrived_before, certain_before) = self.erases_before;
-        let least = self.life + certain_before + certain;
-        let most = self.life + arrived_before + self.erases.len() as u64;
-        self.questions.check_identity(identity, self.model, self.life, least..=most)
+        let lives = self.lives(certain);
+        self.questions.check_identity(identity, self.model, self.life, lives)
     }
 
-    /// The filters in force, or those that are just being set.
-    fn see_filters(&mut self, page: &Filters) -> Result<(), String> {
-        let from = usize::from(page.first.get()) - 1;
-        let are = |filters: &[InputFilter]| {
-            let inputs = filters.iter().take(self.model.inputs().into());
-            inputs.skip(from).take(MAX_FILTERS).eq(&page.filters)
-        };
-        let wanted = self.filters_wanted.as_ref();
-        let set = wanted.is_some_and(|(first, filters)| *first == page.first && are(filters));
-        let late = are(&self.filters_before);
-        if !set && !are(&self.filters) && !late {
-            return Wrong::new("the recorder tells of filters that are not in force")
-                .fact("told", format_args!("{page:?}"))
-                .fact("in force", format_args!("{:?}", self.filters))
-                .fact("being set", format_args!("{:?}", self.filters_wanted))
-                .err();
-        }
-        self.filters_told |= set;
-        self.questions.answers.filters += 1;
-        Ok(())
+    fn see_filters(&mut self, port: Port, page: &Filters) -> Result<(), String> {
+        let (inputs, now_ms) = (self.model.inputs(), self.now_ms);
+        self.questions.check_filters(port, now_ms, page, &self.filters, inputs)
     }
 
     fn see_configuration(&mut self, configuration: Configuration) -> Result<(), String> {
@@ -668,7 +809,7 @@ impl Ledger {
                 .err();
         }
         let counts_from = |from: usize| from <= first && low_16(len - from) == total;
-        let Some(from) = self.may_count_from().find(|&from| counts_from(from)) else {
+        let Some(from) = self.may_count_from().flatten().find(|&from| counts_from(from)) else {
             return Wrong::new(format!(
                 "the log counts {total} events, and cannot have had so many"
             ))
@@ -692,14 +833,15 @@ impl Ledger {
     }
 
     /// Indices from which on the total may count, which are all places where the latest erase can
-    /// have been. Erases are not done in the order in which they arrive, because each port has its
+    /// have been, erase by erase. Erases are not done in the order in which they arrive, because each port has its
     /// own queue.
-    fn may_count_from(&self) -> impl Iterator<Item = usize> {
+    fn may_count_from(&self) -> impl Iterator<Item = RangeInclusive<usize>> {
         let certain = self.erases.iter().filter(|erase| erase.certain);
         let earliest = certain.map(|erase| erase.from).max().unwrap_or(0);
         let len = self.len();
         let erases = self.erases.iter().copied().chain([Erase::POWER_UP]);
-        erases.flat_map(move |erase| erase.from.max(earliest)..=erase.to.min(len))
+        let places = erases.map(move |erase| erase.from.max(earliest)..=erase.to.min(len));
+        places.filter(|places| !places.is_empty())
     }
 
     /// How many events there were since power-up.
@@ -783,6 +925,10 @@ fn in_force<T: Copy + Default>(settings: &[(u64, T)], at_ms: u64) -> T {
 #[expect(clippy::cast_possible_truncation, reason = "the total wraps")]
 fn low_16(count: usize) -> u16 {
     count as u16
+}
+
+fn narrow(count: u64) -> u32 {
+    u32::try_from(count).unwrap_or(u32::MAX)
 }
 
 fn signed(ms: u64) -> i64 {

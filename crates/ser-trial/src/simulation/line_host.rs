@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use ser_client::LineRate;
-use ser_proto::{Baud, Command, FrameEncoder, Model, encoded_len};
+use ser_proto::{Baud, Command, ESC, FrameEncoder, Model, encoded_len};
 use ser_sim::SimNode;
 
 use super::activity::Tempo;
@@ -13,7 +13,7 @@ use super::conversation::{Conversation, Order};
 use super::ledger::{Ledger, Port};
 use super::noise::{FrameGuard, Heard, OneIn, travel};
 use super::orders::{self, Way};
-use super::taps::{Expected, LineTap};
+use super::taps::LineTap;
 use super::trail::Trail;
 
 const NS_PER_MS: u64 = 1_000_000;
@@ -41,11 +41,6 @@ pub enum Errand {
     CatchUp {
         /// When everything has come to rest.
         since_ms: u64,
-    },
-    /// Nothing, up to this time.
-    Nothing {
-        /// Until then.
-        until_ms: u64,
     },
 }
 
@@ -167,6 +162,10 @@ impl LineHost {
             .map(|_| if self.chance.one_in(4) { 0x1B } else { self.chance.byte() })
             .collect();
         self.send(now_ms, &bytes);
+        for _ in 0..self.chance.below(4) {
+            let odd = framed(&orders::odd_body(&mut self.chance));
+            self.send(now_ms, &odd);
+        }
     }
 
     /// Sends many commands at once without waiting for an answer.
@@ -219,7 +218,6 @@ impl LineHost {
             _ if self.is_searching() => self.search_again_ms,
             Errand::Any if !self.talk.is_behind() => self.next_order_ms,
             Errand::CatchUp { since_ms } if self.talk.has_read_since(since_ms) => NEVER,
-            Errand::Nothing { .. } => NEVER,
             Errand::Any | Errand::CatchUp { .. } => 0,
         }
     }
@@ -231,13 +229,7 @@ impl LineHost {
     }
 
     /// Hands the recorder what has arrived by now.
-    pub fn deliver(
-        &mut self,
-        now_ms: u64,
-        node: &mut SimNode<'_>,
-        ledger: &mut Ledger,
-        expected: &mut Expected,
-    ) {
+    pub fn deliver(&mut self, now_ms: u64, node: &mut SimNode<'_>, ledger: &mut Ledger) {
         while self.on_the_way.front().is_some_and(|first| first.tick_ms() <= now_ms) {
             let Some(OnTheWay { byte, baud, .. }) = self.on_the_way.pop_front() else { break };
             let one_in = self.one_in.filter(|_| now_ms < self.bad_until_ms);
@@ -245,9 +237,9 @@ impl LineHost {
             travel(byte, one_in, baud != node.baud(), &mut self.chance, &mut heard);
             for heard in heard.drain(..) {
                 match heard {
-                    Heard::Byte(byte) => self.hand_in(byte, now_ms, node, ledger, expected),
+                    Heard::Byte(byte) => self.hand_in(byte, now_ms, node, ledger),
                     Heard::Error => {
-                        expected.0.line_errors += 1;
+                        ledger.expected.exact.line_errors += 1;
                         node.line_error();
                     }
                 }
@@ -256,16 +248,9 @@ impl LineHost {
         }
     }
 
-    fn hand_in(
-        &mut self,
-        byte: u8,
-        now_ms: u64,
-        node: &mut SimNode<'_>,
-        ledger: &mut Ledger,
-        expected: &mut Expected,
-    ) {
-        match self.tap.goes_in(byte, node.has_room(), expected) {
-            Some(Command::SetClock(time)) => ledger.set_clock(now_ms, time),
+    fn hand_in(&mut self, byte: u8, now_ms: u64, node: &mut SimNode<'_>, ledger: &mut Ledger) {
+        match self.tap.goes_in(byte, node.has_room(), &mut ledger.expected) {
+            Some(Command::SetClock(time)) => ledger.set_clock(Port::Line, now_ms, time),
             Some(Command::SetMode { recording }) => ledger.set_recording(now_ms, recording),
             Some(Command::Time { token }) => ledger.time_asked(Port::Line, token, now_ms),
             Some(command) => ledger.command_arrived(Port::Line, &command, NEVER),
@@ -294,6 +279,7 @@ impl LineHost {
         let mut heard = std::mem::take(&mut self.heard);
         for byte in &bytes {
             if let Some(reply) = self.tap.comes_out(*byte, ledger)? {
+                ledger.expected.unprinted = narrow(self.tap.printout.unprinted());
                 ledger.replied(Port::Line, &reply)?;
             }
             self.guard.said(*byte);
@@ -393,4 +379,17 @@ impl LineHost {
         self.set_baud(baud);
         self.talk.session().set_patience(USUAL_TIMEOUT, USUAL_RETRIES);
     }
+}
+
+/// The frame around a body that need not be a command.
+fn framed(body: &[u8]) -> Vec<u8> {
+    let len = u8::try_from(body.len()).unwrap_or(u8::MAX);
+    let sum = body.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
+    let bytes = [len].into_iter().chain(body.iter().copied()).chain([sum]);
+    let digits: String = bytes.map(|byte| format!("{byte:02X}")).collect();
+    [&[ESC], digits.as_bytes()].concat()
+}
+
+fn narrow(count: u64) -> u32 {
+    u32::try_from(count).unwrap_or(u32::MAX)
 }

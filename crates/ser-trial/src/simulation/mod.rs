@@ -10,6 +10,8 @@
 //!   which input changes count.
 //! - [`chatter_model`] says which of them the chatter filter leaves out, and [`questions`] what a
 //!   recorder must answer to the questions of our extension.
+//! - [`counts`] says what a recorder must have counted, exactly or within bounds.
+//! - [`filter_orders`] knows when a recorder has set a filter.
 //! - [`printout`] reads what a recorder prints.
 //! - [`account`] compares what a reader was told with the ledger: every event once and in order, or
 //!   reported as lost with the right count.
@@ -23,8 +25,10 @@ pub mod bus;
 pub mod chance;
 pub mod chatter_model;
 pub mod conversation;
+pub mod counts;
 pub mod debounce_model;
 pub mod digest;
+pub mod filter_orders;
 pub mod ledger;
 pub mod line_host;
 pub mod noise;

@@ -3,7 +3,7 @@
 use std::num::NonZeroU8;
 
 use ser_proto::{
-    AutoReport, Baud, ChatterFilter, Command, Configure, Counter, InputFilter, Model, TimeStamp,
+    AutoReport, Baud, ChatterFilter, Code, Command, Configure, Counter, InputFilter, TimeStamp,
 };
 
 use super::chance::Chance;
@@ -23,7 +23,7 @@ pub enum Way {
 
 /// What a host asks for next, which is most often the log.
 pub fn next_order(chance: &mut Chance, way: Way) -> Order {
-    match chance.below(112) {
+    match chance.below(116) {
         0..60 => Order::Read,
         60..67 => set_clock(chance),
         67..77 => Order::Ask(Command::Configure(configure(chance, way))),
@@ -38,7 +38,8 @@ pub fn next_order(chance: &mut Chance, way: Way) -> Order {
         100..106 => Order::Ask(time(chance)),
         106..108 => Order::Ask(Command::Identify),
         108..110 => Order::Ask(Command::Diagnostics { first: any_counter(chance) }),
-        _ => Order::Ask(Command::QueryFilters { first: any_input(chance) }),
+        110..112 => Order::Ask(Command::QueryFilters { first: any_input(chance) }),
+        _ => Order::Ask(set_filter(chance)),
     }
 }
 
@@ -56,8 +57,9 @@ fn any_input(chance: &mut Chance) -> NonZeroU8 {
     NonZeroU8::new(small(chance, 1, 33)).unwrap_or(NonZeroU8::MIN)
 }
 
-/// A filter for an input, or for all: most often one that takes a loose contact for chatter.
-pub fn any_filter(chance: &mut Chance, model: Model) -> (Option<NonZeroU8>, InputFilter) {
+/// A filter for an input, or for all: most often one that takes a loose contact for chatter. Not
+/// every recorder has the input.
+fn set_filter(chance: &mut Chance) -> Command {
     let debounce_ms = if chance.one_in(3) { small(chance, 0, 255) } else { 0 };
     let window_ms = u16::try_from(chance.spread(1..=7000)).unwrap_or(1000);
     let least = 1 + 4 * u64::from(window_ms.div_ceil(1000));
@@ -65,18 +67,31 @@ pub fn any_filter(chance: &mut Chance, model: Model) -> (Option<NonZeroU8>, Inpu
     let rearm_ms = u16::try_from(u64::from(window_ms) + chance.below(3_000)).unwrap_or(window_ms);
     let chatter = changes.map(|changes| ChatterFilter { changes, window_ms, rearm_ms });
     let chatter = chatter.filter(|_| !chance.one_in(5));
-    let input = NonZeroU8::new(small(chance, 1, model.inputs().into()));
-    (input.filter(|_| chance.one_in(3)), InputFilter { debounce_ms, chatter })
+    let input = NonZeroU8::new(small(chance, 1, 32));
+    let input = input.filter(|_| chance.one_in(2));
+    Command::SetFilter { input, filter: InputFilter { debounce_ms, chatter } }
+}
+
+/// A body that is no command: nothing at all, a command byte that there is not, a command of a wrong
+/// length, or one with a value that there is not.
+pub fn odd_body(chance: &mut Chance) -> Vec<u8> {
+    match chance.below(4) {
+        0 => vec![],
+        1 => vec![chance.byte() | 0x80; usize::from(small(chance, 1, 12))],
+        2 => vec![Code::Erase.byte(), 0, 0, 0],
+        _ => vec![Code::Filters.byte(), 0x7F],
+    }
 }
 
 /// What is said to all recorders.
 pub fn next_broadcast(chance: &mut Chance) -> Command {
-    match chance.below(13) {
+    match chance.below(14) {
         0..5 => Command::SetClock(valid_time(chance)),
         5 => Command::Erase,
         6 => Command::SetMode { recording: false },
         7..9 => Command::SetMode { recording: true },
         9 => Command::Configure(configure(chance, Way::Bus)),
+        10 => set_filter(chance),
         _ => time(chance),
     }
 }

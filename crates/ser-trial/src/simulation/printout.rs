@@ -15,6 +15,8 @@ pub struct Printout {
     events: u64,
     /// Events and edges for which there is no line.
     missing: u64,
+    /// Events among them.
+    unprinted: u64,
 }
 
 impl Printout {
@@ -29,8 +31,9 @@ impl Printout {
         }
         let line = std::mem::take(&mut self.line);
         let line = line.trim_end_matches('\r');
-        if let Some(count) = count_missing(line) {
+        if let Some((count, what)) = count_missing(line) {
             self.missing += count;
+            self.unprinted += if what == UNPRINTED { count } else { 0 };
             return Ok(());
         }
         self.events += 1;
@@ -43,6 +46,12 @@ impl Printout {
         if known { Ok(()) } else { Err(format!("this line is printed and no event: {line:?}")) }
     }
 
+    /// How many events were reported as not printed.
+    #[must_use]
+    pub fn unprinted(&self) -> u64 {
+        self.unprinted
+    }
+
     /// The number of events printed, by command or automatically, and the number of events and
     /// edges reported as not printed.
     #[must_use]
@@ -51,11 +60,14 @@ impl Printout {
     }
 }
 
-/// `*** 12 EVENTS NOT PRINTED ***`
-fn count_missing(line: &str) -> Option<u64> {
+/// What a line says of events that have none.
+const UNPRINTED: &str = "EVENTS NOT PRINTED";
+
+/// `*** 12 EVENTS NOT PRINTED ***`: how many, and what.
+fn count_missing(line: &str) -> Option<(u64, &str)> {
     let (count, what) = line.strip_prefix("*** ")?.strip_suffix(" ***")?.split_once(' ')?;
-    let known = matches!(what, "EVENTS NOT PRINTED" | "INPUT CHANGES NOT RECORDED");
-    count.parse().ok().filter(|_| known)
+    let known = matches!(what, UNPRINTED | "INPUT CHANGES NOT RECORDED");
+    Some((count.parse().ok().filter(|_| known)?, what))
 }
 
 /// `0001 2026-11-22 10:00:00.250  3 ON  17 OFF`: its stamp, the inputs, and those that are on.

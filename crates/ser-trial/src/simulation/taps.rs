@@ -8,13 +8,13 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 
 use geni_board::{SharedRam, map};
-use ser_node::Diagnostics;
-use ser_proto::genius::{FUNCTION_HORNER, SUBFUNCTION_SER};
-use ser_proto::{
-    Code, Command, Decoded, FrameDecoder, FrameError, MAX_BODY_LEN, ParseError, Reply,
+use ser_proto::genius::{
+    FUNCTION_GENIUS, FUNCTION_HORNER, ForceTable, SUBFUNCTION_SER, Subfunction,
 };
+use ser_proto::{Code, Command, Decoded, FrameDecoder, MAX_BODY_LEN, ParseError, Reply};
 use ser_sim::genius::{Board, BoardWindow, Read};
 
+use super::counts::Expected;
 use super::ledger::Ledger;
 use super::printout::Printout;
 
@@ -26,81 +26,6 @@ const RECEIVE_QUEUE_FLAG: u16 = map::INTERRUPT_STATUS.at(map::INTERRUPT_FIRST + 
 
 /// Bytes of the longest command that a recorder has room for.
 const MAX_COMMAND_LEN: usize = 16;
-
-/// What the recorder must have counted by now. Some counts are lower bounds: see
-/// [`Expected::check`].
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Expected(pub Diagnostics);
-
-impl Expected {
-    fn frame_error(&mut self, cause: FrameError) {
-        let counts = &mut self.0;
-        *match cause {
-            FrameError::Interrupted | FrameError::Incomplete => &mut counts.frames_interrupted,
-            FrameError::NotHex { .. } => &mut counts.frames_not_hex,
-            FrameError::Checksum { .. } => &mut counts.frames_checksum,
-            FrameError::TooLong { .. } => &mut counts.frames_too_long,
-            FrameError::Empty => &mut counts.frames_empty,
-        } += 1;
-    }
-
-    /// Counts a body that is not a command.
-    pub fn parse_error(&mut self, error: ParseError) {
-        let counts = &mut self.0;
-        *match error {
-            ParseError::Empty => &mut counts.frames_empty,
-            ParseError::UnknownCode { .. } => &mut counts.commands_unknown,
-            ParseError::WrongLength { .. }
-            | ParseError::TooShort { .. }
-            | ParseError::EntrySize { .. } => &mut counts.commands_wrong_length,
-            ParseError::BadValue { .. } => &mut counts.parameters_refused,
-        } += 1;
-    }
-
-    /// Checks what a recorder has counted.
-    ///
-    /// # Errors
-    /// The first difference.
-    pub fn check(&self, counted: &Diagnostics) -> Result<(), String> {
-        let expected = &self.0;
-        let exact = [
-            ("interrupted frames", expected.frames_interrupted, counted.frames_interrupted),
-            ("frames with a wrong digit", expected.frames_not_hex, counted.frames_not_hex),
-            ("frames with a wrong checksum", expected.frames_checksum, counted.frames_checksum),
-            ("frames too long", expected.frames_too_long, counted.frames_too_long),
-            ("empty frames", expected.frames_empty, counted.frames_empty),
-            ("line errors", expected.line_errors, counted.line_errors),
-            ("unknown commands", expected.commands_unknown, counted.commands_unknown),
-            (
-                "commands of a wrong length",
-                expected.commands_wrong_length,
-                counted.commands_wrong_length,
-            ),
-            ("lost edges", expected.edges_lost, counted.edges_lost),
-            ("missed samples", 0, counted.samples_missed),
-            ("storage errors", 0, counted.storage_errors),
-        ];
-        for (what, expected, counted) in exact {
-            if expected != counted {
-                return Err(format!("{expected} {what}, and the recorder has counted {counted}"));
-            }
-        }
-        // A read beyond the end is refused as well, and a print job that finds no room is one more
-        // overrun.
-        let least = [
-            ("refused parameters", expected.parameters_refused, counted.parameters_refused),
-            ("overruns", expected.commands_overrun, counted.commands_overrun),
-        ];
-        for (what, expected, counted) in least {
-            if expected > counted {
-                return Err(format!(
-                    "at least {expected} {what}, and the recorder has counted {counted}"
-                ));
-            }
-        }
-        Ok(())
-    }
-}
 
 /// What goes into a recorder's RS-232 port, and what comes out.
 pub struct LineTap {
@@ -137,7 +62,7 @@ impl LineTap {
             }
             Decoded::Frame(body) => match Command::parse(body) {
                 Ok(_) if !has_room => {
-                    expected.0.commands_overrun += 1;
+                    expected.exact.commands_overrun += 1;
                     None
                 }
                 Ok(command) => Some(command),
@@ -203,6 +128,10 @@ pub struct Taken {
 pub struct Taking {
     /// Messages that have been taken and not yet processed.
     pub messages: Vec<Taken>,
+    /// How many datagrams were taken that are not for a recorder.
+    pub ignored: u32,
+    /// How many questions for force tables were taken that nobody has counted yet.
+    forces_asked: u32,
     /// How many datagrams the board had handed over when one was last taken.
     handed_over: u64,
     looks: Looks,
@@ -234,6 +163,11 @@ impl Taking {
     pub fn end(&mut self) -> Vec<Taken> {
         self.put_to_a_look();
         std::mem::take(&mut self.messages)
+    }
+
+    /// How many questions for force tables were taken since this was last asked.
+    pub fn take_forces_asked(&mut self) -> u32 {
+        std::mem::take(&mut self.forces_asked)
     }
 
     /// The recorder has given up its board, and has forgotten what it saw there.
@@ -283,6 +217,13 @@ impl TappedWindow {
         TappedWindow { inner, tap }
     }
 
+    fn asks_for_forces(&self, data: &[u8]) -> bool {
+        let (function, subfunction) =
+            (self.inner.read(map::READ_FUNCTION), self.inner.read(map::READ_SUBFUNCTION));
+        (function, subfunction) == (FUNCTION_GENIUS, Subfunction::ReadIoForces.code())
+            && matches!(*data, [code] if ForceTable::from_code(code).is_some())
+    }
+
     /// The window itself.
     #[must_use]
     pub fn inner(&self) -> &BoardWindow {
@@ -315,8 +256,11 @@ impl SharedRam for TappedWindow {
         let is_message = self.inner.read(map::READ_FUNCTION) == FUNCTION_HORNER
             && self.inner.read(map::READ_SUBFUNCTION) == SUBFUNCTION_SER;
         taking.unseen = Some(is_message);
-        if is_message {
-            let broadcast = self.inner.read(map::READ_DIRECTED) != 1;
+        let broadcast = self.inner.read(map::READ_DIRECTED) != 1;
+        if !is_message {
+            let asks = !broadcast && self.asks_for_forces(bytes);
+            *(if asks { &mut taking.forces_asked } else { &mut taking.ignored }) += 1;
+        } else {
             let received = Command::parse(bytes);
             taking.messages.push(Taken { received, broadcast, arrived_us, seen_ms: None });
         }

@@ -1,14 +1,15 @@
 //! One recorder with everything that outlives a power cut: its contacts, its ledger, what it keeps.
 
 use chrono::{DateTime, NaiveDateTime};
-use ser_node::{Debounce, HELD_BACK_MS, Rtc};
-use ser_proto::{InputFilter, MAX_SIZE, Model};
+use ser_node::{Debounce, GeniusDiagnostics, HELD_BACK_MS, Rtc};
+use ser_proto::{ClockSource, InputFilter, MAX_SIZE, Model};
 use ser_sim::{LineRate, MemoryStorage, NonVolatile, SimNode, SimNodeOptions, SimRtc};
 
 use super::activity::{Activity, Tempo};
 use super::chance::Chance;
+use super::filter_orders::{FilterTable, stored};
 use super::ledger::Ledger;
-use super::taps::Expected;
+use super::trail::Trail;
 
 /// 2000-01-01 00:00, where a recorder without a battery-backed clock begins.
 const NEVER_SET_MS: i64 = 946_684_800_000;
@@ -26,20 +27,12 @@ pub struct Unit {
     pub model: Model,
     /// The debounce times that the board decides, until a host sets a filter.
     pub debounce: Debounce,
-    /// The filters that a host has set, by input. They are kept with the configuration.
-    filters: Option<Vec<InputFilter>>,
-    /// How often one was set.
-    pub filters_set: u64,
     /// Its ledger.
     pub ledger: Ledger,
-    /// What it must have counted.
-    pub expected: Expected,
     /// Its contacts.
     pub activity: Activity,
     non_volatile: NonVolatile,
     has_clock: bool,
-    /// Edges lost in earlier lives, because the recorder's own count begins anew.
-    lost_before: u64,
 }
 
 impl Unit {
@@ -60,14 +53,10 @@ impl Unit {
         Unit {
             model,
             debounce,
-            filters: None,
-            filters_set: 0,
             ledger: Ledger::new(model),
-            expected: Expected::default(),
             activity: Activity::new(chance.branch(), model.inputs()),
             non_volatile: NonVolatile { storage: MemoryStorage::default(), rtc, id: None },
             has_clock,
-            lost_before: 0,
         }
     }
 
@@ -82,25 +71,31 @@ impl Unit {
         }
     }
 
-    /// The filters in force, by input. The board has debounce times also for inputs that there are
-    /// not, and changes wait for the longest of all.
-    #[must_use]
-    pub fn filters(&self) -> Vec<InputFilter> {
+    /// The filters that a host has set, or that the board has. The board has debounce times also for
+    /// inputs that there are not, and changes wait for the longest of all.
+    fn filters_at_power_up(&self) -> FilterTable {
         let of_board =
             |input| InputFilter { debounce_ms: self.debounce.time_ms(input), chatter: None };
-        self.filters.clone().unwrap_or_else(|| (1..=32).map(of_board).collect())
+        stored(&self.non_volatile.storage).unwrap_or_else(|| {
+            std::array::from_fn(|bit| of_board(u8::try_from(bit + 1).unwrap_or(0)))
+        })
     }
 
-    /// These filters are in force now, and stay so.
-    pub fn keep_filters(&mut self, filters: Vec<InputFilter>) {
-        self.filters_set += 1;
-        self.filters = Some(filters);
-    }
-
-    /// Whether every change counts at once.
-    #[must_use]
-    pub fn is_undebounced(&self) -> bool {
-        self.ledger.filters().iter().all(|filter| filter.debounce_ms == 0)
+    /// Looks whether the recorder has set filters in this step.
+    ///
+    /// # Errors
+    /// When nobody has ordered them.
+    pub fn look_at_filters(&mut self, trail: &Trail) -> Result<(), String> {
+        if !self.ledger.may_set_filters() {
+            return Ok(());
+        }
+        let Some(filters) = stored(&self.non_volatile.storage) else { return Ok(()) };
+        let before = self.ledger.filters_set();
+        self.ledger.filters_stored(&filters)?;
+        if self.ledger.filters_set() != before {
+            trail.note("filters set");
+        }
+        Ok(())
     }
 
     /// The power will come on after `off_ms`. The battery-backed clock has gone on meanwhile.
@@ -117,22 +112,25 @@ impl Unit {
         if self.has_clock {
             self.non_volatile.rtc.write(date_time(time_ms));
         }
-        self.ledger.power_up(now_ms, time_ms, size, self.filters());
-        self.expected = Expected::default();
-        self.lost_before = self.ledger.edges().queue_full;
+        let source = if self.has_clock { ClockSource::Battery } else { ClockSource::NeverSet };
+        self.ledger.power_up(now_ms, (source, time_ms), size, &self.filters_at_power_up());
     }
 
     /// The node has come to the present. Notes what its contacts have done on the way.
     pub fn follow(&mut self, node: &mut SimNode<'_>, now_ms: u64, held_up: bool) {
         let moves = node.take_played();
         let moves = moves.iter().map(|played| (played.start_ms + played.at_ms, played.changed.0));
-        if held_up && self.is_undebounced() {
+        if !held_up {
+            self.ledger.take_debounce_times();
+        }
+        if held_up && self.ledger.is_undebounced() {
             self.ledger.contacts_moved_unseen(moves);
         } else {
             moves.for_each(|(at_ms, changed)| self.ledger.contacts_moved(at_ms, changed));
         }
         self.ledger.settle(now_ms);
         self.ledger.expire(now_ms);
+        self.ledger.expected.exact.samples_missed = node.passed_over();
     }
 
     /// Lets contacts begin what they do next if it is time, or all at once if nothing else is under
@@ -149,10 +147,13 @@ impl Unit {
     ///
     /// # Errors
     /// When it is not what it must be.
-    pub fn check(&mut self, node: &SimNode<'_>) -> Result<(), String> {
-        let lost = self.ledger.edges().queue_full - self.lost_before;
-        self.expected.0.edges_lost = u32::try_from(lost).unwrap_or(u32::MAX);
-        self.expected.check(&node.diagnostics())?;
+    pub fn check(
+        &self,
+        node: &SimNode<'_>,
+        genius: Option<GeniusDiagnostics>,
+    ) -> Result<(), String> {
+        let expected = self.ledger.expected_by_now();
+        expected.check(&node.diagnostics(), genius.as_ref())?;
         for (input, left_out) in (1..=self.model.inputs()).zip(self.ledger.left_out()) {
             let counted = node.suppressed(input);
             if counted != left_out {

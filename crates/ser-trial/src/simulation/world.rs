@@ -1,7 +1,6 @@
 //! Recorders, hosts, lines and bus in one virtual time, life after life. A life lasts from power-up
 //! to power cut.
 
-use std::num::NonZeroU8;
 use std::time::Instant;
 
 use ser_node::Debounce;
@@ -14,7 +13,6 @@ use super::bus::{BusHost, BusLife, HOST, any_noise};
 use super::chance::Chance;
 use super::conversation::{Conversation, Order};
 use super::line_host::{Errand, LineHost};
-use super::orders::any_filter;
 use super::pace::{Pace, Paces};
 use super::report::{Hours, Report};
 use super::trail::Trail;
@@ -35,9 +33,6 @@ const PRINT_AND_REPORT: Configure = Configure {
 
 /// The time in which a capture queue does not fill, whatever the inputs do.
 const MAX_DEBOUNCED_HOLD_UP_MS: u64 = 200;
-
-/// How often a host looks whether it has set a filter.
-const ASK_EVERY_MS: u64 = 100;
 
 /// The number of ticks after which the tick wraps.
 const TICKS: u64 = 1 << 32;
@@ -182,7 +177,7 @@ impl World {
             edges: units.iter().map(|unit| unit.ledger.edges()).collect(),
             recorded,
             answers: units.iter().map(|unit| unit.ledger.answers()).collect(),
-            filters_set: units.iter().map(|unit| unit.filters_set).collect(),
+            filters_set: units.iter().map(|unit| unit.ledger.filters_set()).collect(),
             tallies: accounts.map(|account| (account.name(), account.tally())).collect(),
             line: line.talk.talk(),
             bus: bus_host.talks.iter().map(Conversation::talk).collect(),
@@ -194,17 +189,9 @@ impl World {
 
     fn live(&mut self, off: Vec<PoweredOff>, rams: &mut [Ram]) -> Result<Vec<PoweredOff>, String> {
         let mut life = self.power_up(off, rams);
-        let mut next_filters_ms = self.now_ms + self.chance.spread(1_000..=4 * 3_600_000);
-        if self.chance.one_in(2) {
-            next_filters_ms = self.now_ms;
-        }
         while self.now_ms < life.end_ms {
-            if self.now_ms >= next_filters_ms {
-                self.set_filters(&mut life)?;
-                next_filters_ms = self.now_ms + self.chance.spread(60_000..=24 * 3_600_000);
-            }
             self.step(&mut life, Errand::Any)?;
-            self.suffer(&mut life);
+            self.suffer(&mut life)?;
         }
         let is_last = self.now_ms >= self.options.duration_ms;
         if is_last || self.chance.one_in(2) {
@@ -271,7 +258,6 @@ impl World {
         let end_ms = match errand {
             Errand::Any => life.end_ms.min(life.next_fault_ms),
             Errand::CatchUp { .. } => u64::MAX,
-            Errand::Nothing { until_ms } => until_ms,
         };
         // Nobody waits longer than that in vain.
         next_ms.min(end_ms).clamp(soon_ms, self.now_ms + CATCH_UP_MS)
@@ -294,6 +280,9 @@ impl World {
             unit.follow(node, to_ms, false);
         }
         self.pass_on(life, errand)?;
+        for unit in &mut self.units {
+            unit.look_at_filters(&self.trail)?;
+        }
         if errand == Errand::Any {
             for (unit, node) in self.units.iter_mut().zip(&mut life.nodes) {
                 unit.play(node, to_ms, life.tempo);
@@ -310,10 +299,10 @@ impl World {
         let World { units, line, bus_host, now_ms, trail, .. } = self;
         let [first, second] = &mut units[..] else { return Err("two recorders".to_owned()) };
         let [node, other] = &mut life.nodes[..] else { return Err("two nodes".to_owned()) };
-        line.deliver(*now_ms, node, &mut first.ledger, &mut first.expected);
+        line.deliver(*now_ms, node, &mut first.ledger);
         if let Some(bus) = &mut life.bus {
-            bus.serve(0, *now_ms, node, &mut first.ledger, &mut first.expected)?;
-            bus.serve(1, *now_ms, other, &mut second.ledger, &mut second.expected)?;
+            bus.serve(0, *now_ms, node, &mut first.ledger)?;
+            bus.serve(1, *now_ms, other, &mut second.ledger)?;
         }
         line.listen(*now_ms, node, &mut first.ledger, trail)?;
         line.act(*now_ms, errand, &first.ledger, trail)?;
@@ -328,12 +317,12 @@ impl World {
     }
 
     /// Lets something go wrong, if it is time.
-    fn suffer(&mut self, life: &mut Life<'_>) {
+    fn suffer(&mut self, life: &mut Life<'_>) -> Result<(), String> {
         if let Some(bus) = &mut life.bus {
             bus.suffer(self.now_ms, &self.trail);
         }
         if self.now_ms < life.next_fault_ms {
-            return;
+            return Ok(());
         }
         let pause_ms = match life.tempo {
             Tempo::Busy | Tempo::Flat => self.chance.spread(500..=60_000),
@@ -361,13 +350,14 @@ impl World {
                 self.trail.note("line: many commands at once");
                 self.line.flood(self.now_ms);
             }
-            _ => self.hold_up(life),
+            _ => self.hold_up(life)?,
         }
         life.next_fault_ms = self.now_ms + pause_ms;
+        Ok(())
     }
 
     /// Something keeps the main loops of the recorders busy.
-    fn hold_up(&mut self, life: &mut Life<'_>) {
+    fn hold_up(&mut self, life: &mut Life<'_>) -> Result<(), String> {
         let for_ms = self.chance.spread(1..=2_000);
         self.trail.note(format_args!("main loops held up for {for_ms} ms"));
         self.hours.count(for_ms, life.bus.is_some());
@@ -384,66 +374,21 @@ impl World {
                 unit.play(node, self.now_ms, Tempo::Flat);
             }
             // With debounce, the ledger cannot tell what a full queue drops.
-            let held_up = unit.is_undebounced() || for_ms <= MAX_DEBOUNCED_HOLD_UP_MS;
             let until_ms = self.now_ms + for_ms;
-            if held_up {
+            if unit.ledger.is_undebounced() || for_ms <= MAX_DEBOUNCED_HOLD_UP_MS {
                 node.hold_up_to(until_ms);
-            } else {
-                node.leap_to(until_ms);
+                unit.follow(node, until_ms, true);
+                unit.look_at_filters(&self.trail)?;
+                continue;
             }
-            unit.follow(node, until_ms, held_up);
+            for ms in self.now_ms + 1..=until_ms {
+                node.leap_to(ms);
+                unit.follow(node, ms, false);
+                unit.look_at_filters(&self.trail)?;
+            }
         }
         self.now_ms += for_ms;
         self.trail.set_now(self.now_ms);
-    }
-
-    /// Lets the contacts come to rest and has hosts set filters, over the line and over the bus. The
-    /// moment at which a recorder takes a filter over is not known, so nothing moves meanwhile.
-    fn set_filters(&mut self, life: &mut Life<'_>) -> Result<(), String> {
-        let mut quiet_ms = self.now_ms;
-        while self.now_ms < quiet_ms + SETTLING_MS {
-            if self.is_moving(life) {
-                quiet_ms = self.now_ms;
-            }
-            self.step(life, Errand::Nothing { until_ms: self.now_ms + SETTLING_MS })?;
-        }
-        let over_bus = life.bus.is_some();
-        for index in if over_bus { vec![0, 1] } else { vec![0] } {
-            let over_bus = over_bus && (index == 1 || self.chance.one_in(2));
-            self.set_filter(life, index, over_bus)?;
-        }
-        Ok(())
-    }
-
-    /// Has a host set a filter until the recorder has answered.
-    fn set_filter(
-        &mut self,
-        life: &mut Life<'_>,
-        index: usize,
-        over_bus: bool,
-    ) -> Result<(), String> {
-        let unit = &mut self.units[index];
-        let (input, filter) = any_filter(&mut self.chance, unit.model);
-        let mut filters = unit.filters();
-        filters.truncate(unit.model.inputs().into());
-        let is_meant = |number: u8| input.is_none_or(|input| input.get() == number);
-        let meant = (1..).zip(&mut filters).filter(|(number, _)| is_meant(*number));
-        meant.for_each(|(_, place)| *place = filter);
-        unit.ledger.begin_filters(input.unwrap_or(NonZeroU8::MIN), filters.clone());
-        self.trail.note(format_args!("recorder {}: {input:?} {filter:?}", index + 1));
-        let deadline_ms = self.now_ms + CATCH_UP_MS;
-        while !self.units[index].ledger.filters_are_set() {
-            if self.now_ms > deadline_ms {
-                return Err(format!("recorder {} cannot be told a filter", index + 1));
-            }
-            let searches = !over_bus && self.line.is_searching();
-            let talk = if over_bus { &mut self.bus_host.talks[index] } else { &mut self.line.talk };
-            if talk.is_resting() && !searches {
-                talk.begin(Order::Ask(Command::SetFilter { input, filter }), self.now_ms);
-            }
-            self.step(life, Errand::Nothing { until_ms: self.now_ms + ASK_EVERY_MS })?;
-        }
-        self.units[index].keep_filters(filters);
         Ok(())
     }
 
@@ -482,8 +427,8 @@ impl World {
             }
             bus.check()?;
         }
-        for (unit, node) in self.units.iter_mut().zip(&life.nodes) {
-            unit.check(node)?;
+        for (index, (unit, node)) in self.units.iter_mut().zip(&life.nodes).enumerate() {
+            unit.check(node, life.bus.as_ref().map(|bus| bus.counted(index)))?;
         }
         Ok(())
     }
@@ -507,10 +452,9 @@ impl World {
         if let Some(bus) = &life.bus {
             bus.check()?;
         }
-        for ((unit, node), recorded) in
-            self.units.iter_mut().zip(&life.nodes).zip(&mut self.recorded)
-        {
-            unit.check(node)?;
+        let units = self.units.iter_mut().zip(&life.nodes).zip(&mut self.recorded);
+        for (index, ((unit, node), recorded)) in units.enumerate() {
+            unit.check(node, life.bus.as_ref().map(|bus| bus.counted(index)))?;
             *recorded += unit.ledger.len() as u64;
         }
         self.line.talk.account_mut().power_goes(&self.units[0].ledger, true);

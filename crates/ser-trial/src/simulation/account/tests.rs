@@ -1,11 +1,12 @@
 //! The checker checked: what a reader must be told, and what must be refused.
 
-use ser_proto::{Command, InputFilter, Inputs, Model, Reply};
+use ser_proto::{ClockSource, Command, InputFilter, Inputs, Model, Reply};
 
 use super::*;
 use crate::simulation::ledger::Port;
 
 const SIZE: u16 = 100;
+const NEVER_SET: (ClockSource, i64) = (ClockSource::NeverSet, 0);
 const RESTARTED: Delivery = Delivery::Lost { after: None, lost: Lost::LogRestarted };
 
 /// A recorder's ledger with a reader's account. The events are numbered over all lives.
@@ -20,7 +21,7 @@ struct Case {
 impl Case {
     fn new() -> Case {
         let mut ledger = Ledger::new(Model::Ser160);
-        ledger.power_up(0, 0, SIZE, vec![InputFilter::OFF; 16]);
+        ledger.power_up(0, NEVER_SET, SIZE, &[InputFilter::OFF; 32]);
         Case { ledger, account: Account::new("reader"), now_ms: 0, entries: Vec::new() }
     }
 
@@ -50,7 +51,12 @@ impl Case {
         self.account.power_goes(&self.ledger, true);
         self.now_ms += 1000;
         let time_ms = i64::try_from(self.now_ms).expect("early");
-        self.ledger.power_up(self.now_ms, time_ms, SIZE, vec![InputFilter::OFF; 16]);
+        self.ledger.power_up(
+            self.now_ms,
+            (ClockSource::NeverSet, time_ms),
+            SIZE,
+            &[InputFilter::OFF; 32],
+        );
     }
 
     /// Begins a reading with these deliveries.
@@ -360,7 +366,7 @@ fn nothing_else_excuses_silence() {
     let erase = case.ledger.erases()[0];
     assert_refused(case.account.count_gone(3..6, erase, &case.ledger), "nothing excuses that");
     case.account.power_goes(&case.ledger, true);
-    case.ledger.power_up(case.now_ms, 0, SIZE, vec![InputFilter::OFF; 16]);
+    case.ledger.power_up(case.now_ms, NEVER_SET, SIZE, &[InputFilter::OFF; 32]);
     assert_refused(case.account.count_cut_off(&case.ledger), "nothing excuses that");
 }
 

@@ -6,11 +6,12 @@ use ser_proto::{AutoReport, Configure, Inputs, Model};
 use super::*;
 
 const SIZE: u16 = 8;
+const NEVER_SET: (ClockSource, i64) = (ClockSource::NeverSet, 0);
 
 /// A ledger with `count` events, and the same events as entries of a log.
 fn recorded(count: u64) -> (Ledger, Vec<Entry>) {
     let mut ledger = Ledger::new(Model::Ser160);
-    ledger.power_up(0, 0, SIZE, vec![InputFilter::OFF; 16]);
+    ledger.power_up(0, NEVER_SET, SIZE, &[InputFilter::OFF; 32]);
     record(&mut ledger, 1..=count);
     let entries = ledger.events.iter().map(|event| event.to_entry()).collect();
     (ledger, entries)
@@ -133,7 +134,7 @@ fn an_answer_that_waited_in_its_queue_does_not_undo_a_resize_over_the_other_port
 #[test]
 fn events_that_wait_do_not_show_what_was_dropped_after_them() {
     let mut ledger = Ledger::new(Model::Ser160);
-    ledger.power_up(0, 0, MAX_SIZE, vec![InputFilter::OFF; 16]);
+    ledger.power_up(0, NEVER_SET, MAX_SIZE, &[InputFilter::OFF; 32]);
     // A datagram of millisecond 1 is read late, while the main loop is held up.
     ledger.wait_after(Some(1));
     let queue_ms = QUEUE_LEN as u64;
