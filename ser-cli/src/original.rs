@@ -92,8 +92,9 @@ impl Originals {
     }
 
     fn is_known(&self, now_s: i64) -> bool {
-        let is_recent =
-            |content: &Content| (0..BELIEVED_FOR_S).contains(&(now_s - content.asked_utc_s));
+        let is_recent = |content: &Content| {
+            (0..BELIEVED_FOR_S).contains(&now_s.saturating_sub(content.asked_utc_s))
+        };
         self.load().filter(|content| !content.answers).is_some_and(|content| is_recent(&content))
     }
 
@@ -159,6 +160,18 @@ mod tests {
         assert!(!originals.is_known(2000), "another recorder is behind that port now");
         originals.remember(false, 3000);
         assert!(originals.is_known(3000));
+    }
+
+    #[test]
+    fn a_time_that_cannot_be_is_no_reason_to_believe_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let originals = originals(&folder);
+        for asked_utc_s in [i64::MIN, i64::MAX] {
+            originals.remember(false, 1000);
+            let content = Content { asked_utc_s, ..originals.load().unwrap() };
+            originals.write(&content).unwrap();
+            assert!(!originals.is_known(2000), "{asked_utc_s}");
+        }
     }
 
     #[test]
