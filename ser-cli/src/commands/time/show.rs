@@ -61,8 +61,7 @@ pub(super) fn table(out: &mut dyn Write, rows: &[Row], doubt: HostDoubt) -> io::
 
 fn of_told(name: String, told: &Told) -> Vec<String> {
     let Told { reading, ahead_us, rate, .. } = told;
-    let shows = stamp(Moment::from_us(reading.clock_us))
-        .map_or_else(|| "no time".to_owned(), |stamp| stamp.to_string());
+    let shows = stamp_of(reading.clock_us).unwrap_or_else(|| "no time".to_owned());
     let drift = rate.filter(|rate| (rate.most_ppb - rate.least_ppb) / 2 <= TELLING_PPB);
     vec![
         name,
@@ -76,6 +75,12 @@ fn of_told(name: String, told: &Told) -> Vec<String> {
         ago(reading.age_s),
         told.answers.to_string(),
     ]
+}
+
+/// The stamp that a clock gives, which is its time cut to milliseconds; `None` outside 1970–2069.
+fn stamp_of(clock_us: i64) -> Option<String> {
+    let cut_us = clock_us.checked_sub(clock_us.rem_euclid(1000))?;
+    stamp(Moment::from_us(cut_us)).map(|stamp| stamp.to_string())
 }
 
 /// As `host, RS-232`, and how far from that the recorder says its clock may be.
@@ -128,7 +133,7 @@ fn of_row((name, answer): &Row) -> Value {
     json!({
         "recorder": name,
         "answer": "told",
-        "shows": stamp(Moment::from_us(reading.clock_us)).map(|stamp| stamp.to_string()),
+        "shows": stamp_of(reading.clock_us),
         "shows_us": reading.clock_us,
         "zone": setting.to_string(),
         "utc_us": utc_us,
@@ -150,6 +155,13 @@ fn of_row((name, answer): &Row) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_clock_that_counts_microseconds_shows_the_stamp_that_it_would_give() {
+        assert_eq!(stamp_of(1_795_348_800_250_123).as_deref(), Some("2026-11-22T12:00:00.250"));
+        assert_eq!(stamp_of(i64::MIN), None);
+        assert_eq!(stamp_of(i64::MAX), None);
+    }
 
     #[test]
     fn a_rate_is_rounded_and_its_doubt_rounded_up() {
