@@ -5,7 +5,7 @@ use std::thread;
 use std::time::Duration;
 
 use ser_client::Unit;
-use ser_evidence::record::{ClockObservation, How, Record, Reference};
+use ser_evidence::record::{ClockObservation, How, Life, Record, Reference};
 use ser_evidence::time::Moment;
 use ser_proto::{Capabilities, ClockReading, ClockSource, Identity};
 
@@ -78,8 +78,9 @@ impl Asking<'_> {
         let seen = place.and_then(|place| looks.observation(place)).map(Record::Clock);
         let records: Vec<Record> = seen.into_iter().collect();
         kept.add(&records);
+        let life = place.as_ref().map_or(Life::UNKNOWN, |place| place.life);
         let setting = connection.clock_setting().unwrap_or_else(ClockSetting::of_this_computer);
-        Ok(told(&looks, &earlier, setting, records)
+        Ok(told(&looks, (&earlier, life), setting, records)
             .map_or(Answer::Silent, |told| Answer::Told(Box::new(told))))
     }
 
@@ -107,7 +108,7 @@ impl Asking<'_> {
 
 fn told(
     looks: &Looks,
-    earlier: &[Record],
+    earlier: (&[Record], Life),
     setting: ClockSetting,
     records: Vec<Record>,
 ) -> Option<Told> {
@@ -133,8 +134,13 @@ fn told(
     Some(Told { reading, utc_us, setting, ahead_us, rate, answers, records })
 }
 
-/// Earlier sights of the clock since it was last set, by this boot of this computer.
-fn remembered(earlier: &[Record], reading: &ClockReading, at_us: i64) -> Vec<Sight> {
+/// Earlier sights of the clock since it was last set, by this boot of this computer. What was seen
+/// in another life of a log may be of another recorder, if somebody has exchanged them.
+fn remembered(
+    (earlier, life): (&[Record], Life),
+    reading: &ClockReading,
+    at_us: i64,
+) -> Vec<Sight> {
     // One that is disciplined has no rate of its own.
     if matches!(reading.source, ClockSource::Pps | ClockSource::IrigB) {
         return Vec::new();
@@ -150,10 +156,11 @@ fn remembered(earlier: &[Record], reading: &ClockReading, at_us: i64) -> Vec<Sig
     };
     let last_step = earlier.iter().rposition(is_step).unwrap_or_default();
     let sight = |record: &Record| {
-        let Record::Clock(ClockObservation { how, shown, at, .. }) = record else { return None };
+        let Record::Clock(ClockObservation { how, shown, at, place }) = record else { return None };
+        let is_another = life.is_known() && place.life.is_known() && place.life != life;
         let Reference::Host { bound, reading } = at else { return None };
         let (lo, hi) = (bound.lo()?, bound.hi()?);
-        let is_known = reading.boot == boot && lo > since && *how != How::Event;
+        let is_known = !is_another && reading.boot == boot && lo > since && *how != How::Event;
         is_known.then(|| Sight {
             at_us: lo.us().midpoint(hi.us()),
             least_us: shown.us().saturating_sub(hi.us()),
@@ -201,7 +208,7 @@ mod tests {
             seen(How::Event, 40_000_000),
         ];
         let ages = |source, age_s| -> Vec<i64> {
-            let sights = remembered(&earlier, &reading(source, age_s), at_us);
+            let sights = remembered((&earlier, Life::UNKNOWN), &reading(source, age_s), at_us);
             assert!(sights.iter().all(|sight| (sight.least_us, sight.most_us) == (5_000, 5_100)));
             sights.iter().map(|sight| (at_us - sight.at_us) / 1_000_000).collect()
         };
@@ -209,5 +216,15 @@ mod tests {
         assert_eq!(ages(ClockSource::HostOverRs232, 55), [50], "somebody else has set it");
         assert_eq!(ages(ClockSource::HostOverRs232, 30), [0_i64; 0]);
         assert_eq!(ages(ClockSource::Pps, 60), [0_i64; 0]);
+        let reading = reading(ClockSource::HostOverRs232, 60);
+        let in_life = |bits| Place { life: Life::from_bits(bits), ..Place::UNKNOWN };
+        let seen = [4, 5].map(|bits| match seen(How::Query, 50_000_000) {
+            Record::Clock(seen) => Record::Clock(ClockObservation { place: in_life(bits), ..seen }),
+            other => other,
+        });
+        for (life, count) in [(4, 1), (5, 1), (6, 0)] {
+            let sights = remembered((&seen, Life::from_bits(life)), &reading, at_us);
+            assert_eq!(sights.len(), count, "life {life}");
+        }
     }
 }
