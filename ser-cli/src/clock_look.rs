@@ -185,7 +185,8 @@ impl Looks {
     /// `None` if a stamp cannot express it.
     pub(crate) fn shown(&self) -> Option<(Moment<Shown>, Bound<Host>)> {
         let first = self.first()?;
-        let shown = Moment::from_us(first.clock_us - first.clock_us.rem_euclid(MS_US));
+        let into_ms = first.clock_us.rem_euclid(MS_US);
+        let shown = Moment::from_us(first.clock_us.checked_sub(into_ms)?);
         stamp(shown)?;
         let mut each = self.0.iter().map(|look| beginning(look, shown));
         let first = each.next()?;
@@ -396,6 +397,16 @@ mod tests {
         let never = ClockReading { clock_us: i64::MIN, ..*looks.last().unwrap() };
         let between = (Duration::ZERO, Duration::ZERO);
         assert_eq!(Looks(vec![ClockLook { reading: never, between }]).ahead_of(&utc), None);
+    }
+
+    #[test]
+    fn a_clock_at_the_end_of_its_range_shows_nothing_and_is_no_observation() {
+        for clock_us in [i64::MIN, i64::MIN + 1, i64::MAX] {
+            let looks = Looks(vec![look(5000, 6000, clock_us, 0)]);
+            assert_eq!(looks.shown(), None, "{clock_us}");
+            assert_eq!(looks.ahead().count(), 1);
+            assert_eq!(looks.observation(Place::UNKNOWN), None);
+        }
     }
 
     #[test]
