@@ -65,12 +65,16 @@ pub(crate) struct NowAndThen {
     under_way: Option<(Questions, (Life, Cursor))>,
     /// When the next ones begin.
     due: Duration,
+    /// The number that the recorder gives to the life of the log that is read, as it said last.
+    said: u32,
+    /// How that life is called, once there was an answer in it.
+    called: Option<Life>,
 }
 
 impl NowAndThen {
-    /// Begins at once.
-    pub(crate) const fn new() -> NowAndThen {
-        NowAndThen { under_way: None, due: Duration::ZERO }
+    /// Begins at once, in the life of which the recorder `said` this number.
+    pub(crate) const fn new(said: u32) -> NowAndThen {
+        NowAndThen { under_way: None, due: Duration::ZERO, said, called: None }
     }
 
     /// Asks if it is time to; the log has been read as far as `place` says. Returns what was
@@ -98,10 +102,21 @@ impl NowAndThen {
         let observed = over.filter(|(_, (before, _))| *before == life).and_then(
             |(questions, (life, cursor))| {
                 let looks = questions.answers()?;
-                looks.observation(looks.place(life, cursor)?)
+                let said = self.number_of(life, &looks)?;
+                looks.observation(looks.place(life, cursor, Some(said))?)
             },
         );
         Ok(observed)
+    }
+
+    /// The number of the life that is called so. A log that was found to have begun anew has the
+    /// number of the first answer after that.
+    fn number_of(&mut self, life: Life, looks: &Looks) -> Option<u32> {
+        if self.called.is_some_and(|called| called != life) {
+            self.said = looks.last()?.life;
+        }
+        self.called = Some(life);
+        Some(self.said)
     }
 }
 
@@ -255,10 +270,15 @@ impl Looks {
         Some(ClockObservation { how: How::Query, shown, at, place })
     }
 
-    /// Where in a log they were made that had been read up to `cursor` a moment before. `None` if
-    /// this may be another log, or where nothing tells which log it is.
-    pub(crate) fn place(&self, life: Life, cursor: Cursor) -> Option<Place> {
+    /// Where in a log they were made that had been read up to `cursor` a moment before, and of which
+    /// the recorder had `said` which life it is. `None` if this may be another log, or where nothing
+    /// tells which log it is.
+    pub(crate) fn place(&self, life: Life, cursor: Cursor, said: Option<u32>) -> Option<Place> {
         let (first, last) = (self.first()?, self.last()?);
+        // Erased and filled again, a log can look like more of the same.
+        if said.is_some_and(|said| said != first.life) {
+            return None;
+        }
         let is_earlier = first.next_sequence <= cursor.sequence;
         let ahead = |reading: &ClockReading| {
             u64::from(total(reading.next_sequence).wrapping_sub(cursor.total()))
@@ -440,7 +460,7 @@ mod tests {
         let life = Life::from_bits(9);
         let place = |next: [u64; 2], sequence, is_exact| {
             let cursor = Cursor { sequence, is_exact, anchor: None };
-            let place = Looks(next.map(at).to_vec()).place(life, cursor)?;
+            let place = Looks(next.map(at).to_vec()).place(life, cursor, Some(7))?;
             Some((place.after?, place.before?))
         };
         assert_eq!(place([5, 5], 4, true), Some((4, 4)));
@@ -450,6 +470,24 @@ mod tests {
         assert_eq!(place([1, 1], 70_000, true), None, "another log");
         assert_eq!(place([5, 2000], 4, true), None, "nobody has read what came between");
         let nowhere = Cursor { sequence: 4, is_exact: true, anchor: None };
-        assert_eq!(Looks(vec![at(5)]).place(Life::UNKNOWN, nowhere), None);
+        assert_eq!(Looks(vec![at(5)]).place(Life::UNKNOWN, nowhere, None), None);
+        let again = |said| Looks(vec![at(7)]).place(life, nowhere, said).is_some();
+        assert!(again(Some(7)) && again(None));
+        assert!(!again(Some(6)), "erased and filled again since it was read");
+    }
+
+    #[test]
+    fn an_answer_from_a_life_that_nobody_has_read_is_of_no_life_that_is_watched() {
+        let answered = |number| {
+            let mut look = look(0, 100, NOON, 0);
+            look.reading.life = number;
+            Looks(vec![look])
+        };
+        let (read, next) = (Life::from_bits(1), Life::from_bits(2));
+        let mut watched = NowAndThen::new(7);
+        assert_eq!(watched.number_of(read, &answered(7)), Some(7));
+        assert_eq!(watched.number_of(read, &answered(8)), Some(7), "erased, and not read yet");
+        assert_eq!(watched.number_of(next, &answered(8)), Some(8), "found to have begun anew");
+        assert_eq!(watched.number_of(next, &answered(9)), Some(8));
     }
 }

@@ -63,6 +63,13 @@ pub struct LogIdentity {
     life: u32,
 }
 
+impl LogIdentity {
+    /// The number of the life, as the recorder counts them.
+    pub(crate) const fn life(&self) -> u32 {
+        self.life
+    }
+}
+
 impl From<&Identity> for LogIdentity {
     fn from(identity: &Identity) -> LogIdentity {
         let Identity { id, power_ups, life, .. } = identity;

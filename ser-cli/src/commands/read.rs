@@ -18,6 +18,7 @@ use crate::log_identity::{self, Met};
 use crate::log_look;
 use crate::original::Originals;
 use crate::output::{Format, Life};
+use crate::state::LogIdentity;
 use crate::suppressed::LeftOut;
 use crate::values;
 use crate::witness::Witness;
@@ -136,7 +137,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         if let Some(keeper) = &mut keeper {
             log_identity::remember(&mut unit, keeper, met.log)?;
         }
-        look_at_clock(&mut unit, &mut outlet, &mut witness, &originals, cursor)?;
+        look_at_clock(&mut unit, &mut outlet, &mut witness, &originals, (cursor, met.log))?;
         left_out(args, connection, &mut unit, &mut outlet, &originals)?;
         Ok(delivered)
     });
@@ -186,14 +187,14 @@ fn look_at_clock(
     outlet: &mut Outlet,
     witness: &mut Witness,
     originals: &Originals,
-    cursor: Option<Cursor>,
+    (cursor, log): (Option<Cursor>, Option<LogIdentity>),
 ) -> Result<()> {
     let Some(cursor) = cursor.filter(|_| witness.is_wanted(outlet)) else { return Ok(()) };
     if !matches!(originals.identity(unit), Ok(Some(_))) {
         return Ok(());
     }
     let Ok(Some(looks)) = clock_look::take(unit) else { return Ok(()) };
-    let place = looks.place(outlet.life(), cursor);
+    let place = looks.place(outlet.life(), cursor, log.map(|log| log.life()));
     match place.and_then(|place| looks.observation(place)) {
         Some(observation) => witness.asked(outlet, observation),
         None => Ok(()),

@@ -126,7 +126,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             Some(LeftOut::new(Some(kept), connection.points()))
         }
     };
-    let clock = met.log.map(|_| NowAndThen::new());
+    let clock = met.log.map(|log| NowAndThen::new(log.life()));
     let (log, is_named) = (met.log, met.is_another || met.log.is_none());
     let mut watch = Watch {
         unit,
@@ -363,10 +363,10 @@ impl Watch {
     /// Asks for the clock once more. What was watched is whole without it, so no failure of the
     /// recorder is one here.
     fn look_at_clock(&mut self) -> Result<()> {
-        let Watch { unit, watcher, outlet, witness, clock, .. } = self;
+        let Watch { unit, watcher, outlet, witness, clock, log, .. } = self;
         let (Some(_), Some(cursor)) = (clock, watcher.cursor()) else { return Ok(()) };
         let Ok(Some(looks)) = clock_look::take(unit) else { return Ok(()) };
-        let place = looks.place(outlet.life(), cursor);
+        let place = looks.place(outlet.life(), cursor, log.map(|log| log.life()));
         match place.and_then(|place| looks.observation(place)) {
             Some(observation) => witness.asked(outlet, observation),
             None => Ok(()),

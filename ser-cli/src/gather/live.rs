@@ -160,7 +160,7 @@ fn read_one(
     let kept = kept(recorder, connection, state)?;
     let cursor = follower.cursor().map(|cursor| named.cursor(cursor));
     if let Some(looked) =
-        cursor.and_then(|cursor| look(&mut unit, &originals, (named.life, cursor)))
+        cursor.and_then(|cursor| look(&mut unit, &originals, (named.life, cursor), log))
     {
         kept.add(std::slice::from_ref(&looked));
         records.push(looked);
@@ -173,10 +173,15 @@ fn read_one(
 
 /// What the clock shows right after a reading, if the recorder can be asked. The reading is whole
 /// without it, so no failure is one here.
-fn look(unit: &mut Unit, originals: &Originals, (life, cursor): (Life, Cursor)) -> Option<Record> {
+fn look(
+    unit: &mut Unit,
+    originals: &Originals,
+    (life, cursor): (Life, Cursor),
+    log: Option<LogIdentity>,
+) -> Option<Record> {
     originals.identity(unit).ok()??;
     let looks = clock_look::take(unit).ok()??;
-    let place = looks.place(life, cursor)?;
+    let place = looks.place(life, cursor, log.map(|log| log.life()))?;
     looks.observation(place).map(Record::Clock)
 }
 
