@@ -271,6 +271,26 @@ fn an_original_recorder_has_nothing_of_this_and_is_hardly_asked() {
 }
 
 #[test]
+fn what_a_recorder_does_not_answer_takes_nothing_else_away() {
+    let of_ours = Original::that_says_who_it_is();
+    let run = |arguments: &str| {
+        let mut command = ser_cli();
+        command.env("SER_PORT", of_ours.port()).args(["--timeout", "300ms"]);
+        let output = command.args(arguments.split_whitespace()).output().expect("ser-cli runs");
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let status = run("status");
+    let has = |line: &str| status.lines().any(|found| found == line);
+    assert!(has("events          3 since the last erase (modulo 65536)"), "{status}");
+    assert!(has("firmware        1.2.3"), "{status}");
+    let told = |fact: &str| status.lines().any(|line| line.starts_with(fact));
+    assert_eq!(["clock", "filters", "counters"].map(told), [false, false, true], "{status}");
+    let counters = run("diagnostics");
+    assert!(counters.contains("frames_interrupted         7"), "{counters}");
+}
+
+#[test]
 fn the_status_of_an_original_recorder_is_what_it_can_tell() {
     let original = Original::start();
     let run = |arguments: &str| {

@@ -14,7 +14,7 @@ use ser_proto::{Capabilities, Identity};
 use self::growth::{Growth, Look};
 use self::shown::Shown;
 pub(super) use self::shown::counters_json;
-use crate::connection::{self, ConnectionArgs, HEARTBEAT};
+use crate::connection::{self, ConnectionArgs, HEARTBEAT, unless_unanswered};
 use crate::error::{Failure, Result, inform, warn};
 use crate::extension;
 use crate::interrupt;
@@ -73,7 +73,9 @@ fn look(unit: &mut Unit) -> Result<Look> {
     let counters = unit
         .recorder_counters()?
         .ok_or_else(|| Failure::new("the recorder does not tell its counters").hint("try again"))?;
-    let tick_us = unit.clock_look()?.map(|look| look.reading.tick_us);
+    // The counters are there without it. It is asked for once, and a line may lose an answer.
+    let looked = unless_unanswered(unit.clock_look())?.flatten();
+    let tick_us = looked.map(|look| look.reading.tick_us);
     Ok(Look { counters, tick_us })
 }
 

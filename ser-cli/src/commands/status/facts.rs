@@ -43,8 +43,8 @@ impl Facts {
             latest,
             identity: extension::identity(unit, connection)?,
             clock: Clock::of(unit, connection)?,
-            filters: unit.filters()?,
-            counters: unit.recorder_counters()?,
+            filters: unless_unanswered(unit.filters())?.flatten(),
+            counters: unless_unanswered(unit.recorder_counters())?.flatten(),
         })
     }
 
