@@ -5,7 +5,7 @@ use std::thread;
 use std::time::Duration;
 
 use ser_client::Unit;
-use ser_evidence::record::{ClockObservation, How, Life, Record, Reference};
+use ser_evidence::record::{ClockObservation, How, Place, Record, Reference};
 use ser_evidence::time::Moment;
 use ser_proto::{Capabilities, ClockReading, ClockSource, Identity};
 
@@ -78,9 +78,9 @@ impl Asking<'_> {
         let seen = place.and_then(|place| looks.observation(place)).map(Record::Clock);
         let records: Vec<Record> = seen.into_iter().collect();
         kept.add(&records);
-        let life = place.as_ref().map_or(Life::UNKNOWN, |place| place.life);
+        let place = place.unwrap_or(Place::UNKNOWN);
         let setting = connection.clock_setting().unwrap_or_else(ClockSetting::of_this_computer);
-        Ok(told(&looks, (&earlier, life), setting, records)
+        Ok(told(&looks, (&earlier, &place), setting, records)
             .map_or(Answer::Silent, |told| Answer::Told(Box::new(told))))
     }
 
@@ -108,7 +108,7 @@ impl Asking<'_> {
 
 fn told(
     looks: &Looks,
-    earlier: (&[Record], Life),
+    earlier: (&[Record], &Place),
     setting: ClockSetting,
     records: Vec<Record>,
 ) -> Option<Told> {
@@ -135,9 +135,9 @@ fn told(
 }
 
 /// Earlier sights of the clock since it was last set, by this boot of this computer. What was seen
-/// in another life of a log may be of another recorder, if somebody has exchanged them.
+/// at another log may be of another recorder, if somebody has exchanged them.
 fn remembered(
-    (earlier, life): (&[Record], Life),
+    (earlier, here): (&[Record], &Place),
     reading: &ClockReading,
     at_us: i64,
 ) -> Vec<Sight> {
@@ -157,7 +157,7 @@ fn remembered(
     let last_step = earlier.iter().rposition(is_step).unwrap_or_default();
     let sight = |record: &Record| {
         let Record::Clock(ClockObservation { how, shown, at, place }) = record else { return None };
-        let is_another = life.is_known() && place.life.is_known() && place.life != life;
+        let is_another = !is_same_log(place, here);
         let Reference::Host { bound, reading } = at else { return None };
         let (lo, hi) = (bound.lo()?, bound.hi()?);
         let is_known = !is_another && reading.boot == boot && lo > since && *how != How::Event;
@@ -170,9 +170,18 @@ fn remembered(
     earlier.iter().skip(last_step).filter_map(sight).collect()
 }
 
+/// Whether two places are in the same log. Where nobody has named its life, that is known only as
+/// long as nothing has come to it.
+fn is_same_log(one: &Place, other: &Place) -> bool {
+    match one.life.is_known() && other.life.is_known() {
+        true => one.life == other.life,
+        false => (one.newest, one.after) == (other.newest, other.after),
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use ser_evidence::record::Place;
+    use ser_evidence::record::Life;
     use ser_evidence::time::Bound;
 
     use super::*;
@@ -208,7 +217,7 @@ mod tests {
             seen(How::Event, 40_000_000),
         ];
         let ages = |source, age_s| -> Vec<i64> {
-            let sights = remembered((&earlier, Life::UNKNOWN), &reading(source, age_s), at_us);
+            let sights = remembered((&earlier, &Place::UNKNOWN), &reading(source, age_s), at_us);
             assert!(sights.iter().all(|sight| (sight.least_us, sight.most_us) == (5_000, 5_100)));
             sights.iter().map(|sight| (at_us - sight.at_us) / 1_000_000).collect()
         };
@@ -223,8 +232,12 @@ mod tests {
             other => other,
         });
         for (life, count) in [(4, 1), (5, 1), (6, 0)] {
-            let sights = remembered((&seen, Life::from_bits(life)), &reading, at_us);
+            let sights = remembered((&seen, &in_life(life)), &reading, at_us);
             assert_eq!(sights.len(), count, "life {life}");
         }
+        let unnamed = Place { after: Some(5), ..Place::UNKNOWN };
+        assert!(remembered((&seen, &unnamed), &reading, at_us).is_empty(), "of which log?");
+        assert!(is_same_log(&unnamed, &unnamed));
+        assert!(!is_same_log(&unnamed, &Place { after: Some(6), ..unnamed }));
     }
 }
