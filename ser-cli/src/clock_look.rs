@@ -270,9 +270,10 @@ impl Looks {
         Some(ClockObservation { how: How::Query, shown, at, place })
     }
 
-    /// Where in a log they were made that had been read up to `cursor` a moment before, and of which
-    /// the recorder had `said` which life it is. `None` if this may be another log, or where nothing
-    /// tells which log it is.
+    /// Where in a log they were made that had been read up to `cursor` a moment before. The
+    /// recorder had `said` which life that is.
+    ///
+    /// `None` if this may be another log, or where nothing tells which log it is.
     pub(crate) fn place(&self, life: Life, cursor: Cursor, said: Option<u32>) -> Option<Place> {
         let (first, last) = (self.first()?, self.last()?);
         // Erased and filled again, a log can look like more of the same.
