@@ -1,5 +1,10 @@
-//! Detects a standard output that was closed before this program started.
+//! Detects a standard output that nobody reads: one whose reader has gone away, and one that was
+//! closed before this program started.
 //!
+//! Who writes now and then only finds out late that the reader has gone, and keeps the line until
+//! then. So commands without end ask.
+//!
+//! Of an output that was closed before, no write tells.
 //! Rust then opens `/dev/null` in its place, for reading and writing, before `main`, and writing
 //! there succeeds. A user who sends output there on purpose (`> /dev/null`) opens it for writing
 //! only. A few programs open it for both for their children, so only commands whose purpose is
@@ -33,5 +38,23 @@ fn was_closed() -> bool {
 /// Other systems do not let closed outputs be told apart.
 #[cfg(not(unix))]
 fn was_closed() -> bool {
+    false
+}
+
+/// Whether the program at the other end of a pipe has ended.
+#[cfg(unix)]
+pub(crate) fn reader_is_gone() -> bool {
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
+    let stdout = std::io::stdout();
+    let mut asked = [PollFd::new(&stdout, PollFlags::empty())];
+    let at_once = Timespec { tv_sec: 0, tv_nsec: 0 };
+    let is_told = poll(&mut asked, Some(&at_once)).is_ok_and(|told| told > 0);
+    is_told && asked.iter().any(|asked| asked.revents().contains(PollFlags::ERR))
+}
+
+/// Other systems tell with the next write.
+#[cfg(not(unix))]
+pub(crate) const fn reader_is_gone() -> bool {
     false
 }

@@ -72,3 +72,29 @@ fn a_pipe_is_no_image() {
         assert!(told.contains("it is not a regular file") && told.contains("hint: "), "{told}");
     }
 }
+
+/// What grows or happens may take days. Until then the line would be kept from others.
+#[test]
+fn who_has_no_reader_any_more_ends_without_anything_happening() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut sim = ser_cli();
+    sim.args(["sim", "--tcp", "127.0.0.1:0"]).stdout(Stdio::piped()).stderr(Stdio::null());
+    let mut sim = Running::start(&mut sim);
+    let port = sim.lines().recv_timeout(ser_sim::testing::PATIENCE).expect("the simulator answers");
+    let site = folder.path().join("plant.toml");
+    fs::write(&site, format!("site = \"S\"\n[[recorder]]\nname = \"R\"\nport = \"{port}\"\n"))
+        .expect("written");
+    let site = site.display().to_string();
+    for arguments in [
+        vec!["-p", &port, "watch"],
+        vec!["watch", "--site", &site],
+        vec!["-p", &port, "diagnostics", "--every", "1h"],
+    ] {
+        let mut child = ser_cli();
+        child.args(&arguments).env("SER_STATE_DIR", folder.path().join("state"));
+        let mut child = Running::start(child.stdout(Stdio::piped()).stderr(Stdio::null()));
+        drop(child.0.stdout.take());
+        wait_until("it has ended", || child.0.try_wait().expect("a process").is_some());
+    }
+    assert_eq!(sim.interrupt(), Some(0));
+}

@@ -11,6 +11,7 @@ use ser_client::{Delivery, LogFollower, LogWatcher, Lost, ReportSwitch, Unit};
 use ser_proto::{AutoReport, Configuration, Configure};
 
 use crate::clock_look::{self, NowAndThen};
+use crate::closed_stdout;
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::delivery::Outlet;
 use crate::error::{Failure, Result, inform};
@@ -383,6 +384,10 @@ impl Watch {
     }
 
     fn check_interrupt(&self) -> Result<()> {
-        if self.stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
+        match () {
+            () if self.stop.load(Ordering::Relaxed) => Err(Failure::Interrupted),
+            () if closed_stdout::reader_is_gone() => Err(Failure::OutputClosed),
+            () => Ok(()),
+        }
     }
 }

@@ -14,6 +14,7 @@ use ser_proto::{Capabilities, Identity};
 use self::growth::{Growth, Look};
 use self::shown::Shown;
 pub(super) use self::shown::counters_json;
+use crate::closed_stdout;
 use crate::connection::{self, ConnectionArgs, HEARTBEAT, unless_unanswered};
 use crate::error::{Failure, Result, inform, warn};
 use crate::extension;
@@ -148,11 +149,11 @@ fn write_line(json: &serde_json::Value) -> Result<()> {
     Ok(out.flush()?)
 }
 
-/// Waits for the next look; false at an interrupt. Reports that come meanwhile are for others.
+/// Waits for the next look; false at an interrupt, or when nobody reads any more. Reports that come meanwhile are for others.
 fn wait(unit: &mut Unit, every: Duration, stop: &AtomicBool, outage: &mut Outage) -> Result<bool> {
     let until = Instant::now() + every;
     loop {
-        if stop.load(Ordering::Relaxed) {
+        if stop.load(Ordering::Relaxed) || closed_stdout::reader_is_gone() {
             return Ok(false);
         }
         let left = until.saturating_duration_since(Instant::now());

@@ -12,6 +12,7 @@ use super::super::{Args, POLL_EVERY};
 use super::Batch;
 use crate::buses::Buses;
 use crate::clock_look::NowAndThen;
+use crate::closed_stdout;
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::error::{Failure, Result, inform};
 use crate::keeper::{self, Keeper};
@@ -63,7 +64,7 @@ impl Follower<'_> {
     }
 
     fn is_stopped(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
+        self.stop.load(Ordering::Relaxed) || closed_stdout::reader_is_gone()
     }
 
     fn pause(&self) {
