@@ -155,8 +155,9 @@ impl Questions {
             self.looks.clear();
         }
         self.looks.push(look);
-        let lasted = self.looks.first().map(|first| look.between.0.saturating_sub(first.between.0));
-        self.is_over = self.looks.len() >= ROUNDS as usize && lasted >= Some(HOLD_BACK);
+        let first = self.looks.first().map_or(look.between.0, |first| first.between.0);
+        let lasted = look.between.0.saturating_sub(first);
+        self.is_over = self.looks.len() >= ROUNDS as usize && lasted >= HOLD_BACK;
     }
 
     /// What was answered.
@@ -190,10 +191,24 @@ impl Looks {
         self.0.last().map(|look| &look.reading)
     }
 
-    /// The recorder's total when it answered last, as other replies show it.
-    pub(crate) fn last_total(&self) -> Option<u16> {
+    /// The recorder's total in this life when it answered last, as other replies show it. `None` if
+    /// the log is another one by then, or if that was so soon that changes from before the first
+    /// answer may not have been in the log yet.
+    pub(crate) fn last_total(&self, life: u32) -> Option<u16> {
         // Modulo 65536 is what totals are.
-        self.last().map(|reading| total(reading.next_sequence))
+        let last = self.last().filter(|_| self.lasted() >= HOLD_BACK)?;
+        if last.life != life {
+            return None;
+        }
+        Some(total(last.next_sequence))
+    }
+
+    /// From the first question to the last.
+    fn lasted(&self) -> Duration {
+        let (Some(first), Some(last)) = (self.0.first(), self.0.last()) else {
+            return Duration::ZERO;
+        };
+        last.between.0.saturating_sub(first.between.0)
     }
 
     /// The millisecond that the clock showed at the first answer, and when it began to show it.
@@ -273,9 +288,13 @@ impl Looks {
     /// Where in a log they were made that had been read up to `cursor` a moment before. The
     /// recorder had `said` which life that is.
     ///
-    /// `None` if this may be another log, or where nothing tells which log it is.
+    /// `None` if this may be another log, where nothing tells which log it is, or if the last answer
+    /// came too soon: an entry from before the first one may then have been held back beyond it.
     pub(crate) fn place(&self, life: Life, cursor: Cursor, said: Option<u32>) -> Option<Place> {
         let (first, last) = (self.first()?, self.last()?);
+        if self.lasted() < HOLD_BACK {
+            return None;
+        }
         // Erased and filled again, a log can look like more of the same.
         if said.is_some_and(|said| said != first.life) {
             return None;
@@ -453,15 +472,16 @@ mod tests {
 
     #[test]
     fn the_place_is_between_the_log_that_was_read_and_that_at_the_last_answer() {
-        let at = |next_sequence| {
-            let mut look = look(0, 100, NOON, 0);
+        let at = |ms: u64, next_sequence| {
+            let mut look = look(ms * 1000, ms * 1000 + 100, NOON, 0);
             look.reading.next_sequence = next_sequence;
             look
         };
         let life = Life::from_bits(9);
-        let place = |next: [u64; 2], sequence, is_exact| {
+        let looks = |last_ms, [first, last]: [u64; 2]| Looks(vec![at(0, first), at(last_ms, last)]);
+        let place = |next, sequence, is_exact| {
             let cursor = Cursor { sequence, is_exact, anchor: None };
-            let place = Looks(next.map(at).to_vec()).place(life, cursor, Some(7))?;
+            let place = looks(400, next).place(life, cursor, Some(7))?;
             Some((place.after?, place.before?))
         };
         assert_eq!(place([5, 5], 4, true), Some((4, 4)));
@@ -471,10 +491,17 @@ mod tests {
         assert_eq!(place([1, 1], 70_000, true), None, "another log");
         assert_eq!(place([5, 2000], 4, true), None, "nobody has read what came between");
         let nowhere = Cursor { sequence: 4, is_exact: true, anchor: None };
-        assert_eq!(Looks(vec![at(5)]).place(Life::UNKNOWN, nowhere, None), None);
-        let again = |said| Looks(vec![at(7)]).place(life, nowhere, said).is_some();
+        assert_eq!(looks(400, [5, 5]).place(Life::UNKNOWN, nowhere, None), None);
+        let again = |said| looks(400, [7, 7]).place(life, nowhere, said).is_some();
         assert!(again(Some(7)) && again(None));
         assert!(!again(Some(6)), "erased and filled again since it was read");
+        // A change from before the first answer may be held back beyond the last one.
+        assert_eq!(looks(399, [5, 7]).place(life, nowhere, None), None);
+        assert_eq!(
+            (looks(399, [5, 7]).last_total(7), looks(400, [5, 7]).last_total(7)),
+            (None, Some(6))
+        );
+        assert_eq!(looks(400, [5, 7]).last_total(6), None, "another log");
     }
 
     #[test]

@@ -68,7 +68,8 @@ impl LeftOut {
             return None;
         }
         let (is_first, before) = (!self.has_looked, self.before.clone());
-        let record = self.look(unit);
+        // What fails now may be an outage, of which others tell; the next look comes soon.
+        let record = look(unit).ok().flatten().map(|look| self.take(look));
         self.due = Instant::now() + LOOK_EVERY.max(began.elapsed() * PART_OF_LINE);
         record.filter(|record| match record {
             Record::Suppressed(look) => is_first || !look.since(before.as_ref()).is_empty(),
@@ -79,7 +80,17 @@ impl LeftOut {
     /// Looks and tells what is new. The entries are what the recorder was read for, so a look that
     /// fails ends nothing.
     pub(crate) fn look(&mut self, unit: &mut Unit) -> Option<Record> {
-        let look = look(unit).ok().flatten()?;
+        match look(unit) {
+            Ok(look) => look.map(|look| self.take(look)),
+            Err(error) => {
+                self.tell_failure(&error);
+                None
+            }
+        }
+    }
+
+    /// Tells what is new and keeps it.
+    fn take(&mut self, look: Suppressed) -> Record {
         self.tell(&look);
         self.has_looked = true;
         let record = Record::Suppressed(look.clone());
@@ -88,7 +99,16 @@ impl LeftOut {
             kept.add(std::slice::from_ref(&record));
         }
         self.before = Some(look);
-        Some(record)
+        record
+    }
+
+    /// Says that nothing is known of this. Of a line or a board that fails, the reading tells.
+    fn tell_failure(&self, error: &RequestError) {
+        if matches!(error, RequestError::NoReply { .. }) {
+            let of = self.recorder.as_ref().map(|recorder| format!("{recorder}: "));
+            let of = of.unwrap_or_default();
+            warn(format_args!("{of}how many changes its filters left out is not known: {error}"));
+        }
     }
 
     fn tell(&self, look: &Suppressed) {

@@ -158,12 +158,13 @@ pub(super) fn set_and_remember(
     }
     let kept = KeptRecords::of(state, connection)?;
     let mut unit = connection::open(connection)?;
-    let look = LogLook::take(&mut unit)?;
+    // It says which life this is before the look at the log and with each answer after it.
     let identity = Originals::of(state, connection)?.identity(&mut unit)?;
-    let can_be_asked = identity.is_some();
+    let look = LogLook::take(&mut unit)?;
+    let life = identity.as_ref().map(|identity| identity.life);
     let before = log_identity::named(look, &mut unit, identity.as_ref(), (state, connection));
     let mut records = Vec::new();
-    records.extend(can_be_asked.then(|| asked(&mut unit, &before)).flatten());
+    records.extend(life.and_then(|life| asked(&mut unit, &before, life)));
     let sent = match set(&mut unit, at, &time_in) {
         Ok(sent) => sent,
         Err(error) => {
@@ -176,9 +177,9 @@ pub(super) fn set_and_remember(
     };
     let observed = observed(&mut unit, sent, &before);
     records.push(observed.map_or_else(|| setting::step(before.place(None)), Record::Clock));
-    if can_be_asked {
+    if let Some(life) = life {
         thread::sleep(AFTER_SETTING);
-        records.extend(asked(&mut unit, &before));
+        records.extend(asked(&mut unit, &before, life));
     }
     kept.add(&records);
     Ok(Set { sent, observed, records })
@@ -186,9 +187,9 @@ pub(super) fn set_and_remember(
 
 /// What the recorder says of its clock, if it can be asked and its log has a name. A setting is
 /// worth more, so no failure is one here.
-fn asked(unit: &mut Unit, before: &LogLook) -> Option<Record> {
+fn asked(unit: &mut Unit, before: &LogLook, life: u32) -> Option<Record> {
     let looks = clock_look::take(unit).ok()??;
-    let place = before.place_before(looks.last_total()?)?;
+    let place = before.place_before(looks.last_total(life)?)?;
     looks.observation(place).map(Record::Clock)
 }
 

@@ -8,6 +8,10 @@ use crate::time::Moment;
 /// How wrong a recorder may be about how long it has been on: one part in so many.
 const TICK_TOLERANCE: u64 = 1000;
 
+/// How much the clocks of two boots of a host may disagree. A recorder that was switched on so much
+/// earlier or later than another one is not taken for it.
+const BOOTS_APART_US: u64 = 60_000_000;
+
 /// What a recorder had counted when it was looked at.
 ///
 /// It counts from its power-up on, whatever becomes of its log meanwhile, and nobody can reset that.
@@ -29,19 +33,29 @@ impl Suppressed {
     /// The last input that there can be.
     pub const LAST_INPUT: u8 = 32;
 
-    /// Whether the recorder was on from an earlier look to this one for sure. Otherwise it may have
-    /// begun to count anew in between.
+    /// Whether the recorder was on from an earlier look to this one for sure, and is the same one.
+    /// Otherwise it may have begun to count anew in between. One that was put in its place has been
+    /// on for another time.
     #[must_use]
     pub fn continues(&self, earlier: &Suppressed) -> bool {
         let is_less =
             |(input, count): (&u8, &u32)| self.left_out.get(input).is_none_or(|now| now < count);
-        let on_for_us = self.on_for_us - self.on_for_us / TICK_TOLERANCE;
-        let between_us = match earlier.to.boot == self.to.boot {
-            true => self.to.monotonic.since(earlier.to.monotonic),
-            false => self.to.utc.since(earlier.to.utc),
+        let is_one_boot = earlier.to.boot == self.to.boot;
+        let between = |one: &HostReading, other: &HostReading| match is_one_boot {
+            true => other.monotonic.since(one.monotonic),
+            false => other.utc.since(one.utc),
         };
-        u64::try_from(between_us).is_ok_and(|us| us <= on_for_us)
-            && !earlier.left_out.iter().filter(|(_, count)| **count > 0).any(is_less)
+        // The counts and the time are of some moment of each look.
+        let least = u64::try_from(between(&earlier.to, &self.from));
+        let (Ok(least), Ok(most)) = (least, u64::try_from(between(&earlier.from, &self.to))) else {
+            return false;
+        };
+        let tolerance = most / TICK_TOLERANCE + if is_one_boot { 0 } else { BOOTS_APART_US };
+        let more_us = self.on_for_us.checked_sub(earlier.on_for_us);
+        let is_on_since = more_us.is_some_and(|more| {
+            (least.saturating_sub(tolerance)..=most.saturating_add(tolerance)).contains(&more)
+        });
+        is_on_since && !earlier.left_out.iter().filter(|(_, count)| **count > 0).any(is_less)
     }
 
     /// How many changes were left out since an earlier look, of inputs with any; since the power-up
@@ -106,6 +120,7 @@ mod tests {
         assert_eq!(since(&earlier, &look(1100, 99, &[(3, 9)])), [(3, 9)], "on for too short");
         assert_eq!(since(&earlier, &look(1100, 600, &[(3, 6)])), [(3, 6)], "a counter went back");
         assert_eq!(since(&earlier, &look(1100, 600, &[(4, 1)])), [(4, 1)]);
+        assert_eq!(since(&earlier, &look(1100, 900, &[(3, 9)])), [(3, 9)], "another recorder");
         // An earlier look that was later is none.
         assert_eq!(since(&earlier, &look(900, 600, &[(3, 9)])), [(3, 9)]);
     }

@@ -65,16 +65,17 @@ impl Asking<'_> {
     /// Asks the recorder of a connection.
     pub(super) fn ask(&self, connection: &ConnectionArgs) -> Result<Answer> {
         let mut unit = self.buses.open(connection)?;
-        let look = LogLook::take(&mut unit)?;
-        // The user wants to know what it can tell now.
+        // The user wants to know what it can tell now. It says which life this is before the look
+        // at the log and with each answer after it.
         let identity = Originals::of(self.state, connection)?.ask(&mut unit)?;
         let tells = |identity: &Identity| identity.capabilities.contains(Capabilities::TIME);
         let Some(identity) = identity.filter(tells) else { return Ok(Answer::Original) };
+        let look = LogLook::take(&mut unit)?;
         let place = log_identity::named(look, &mut unit, Some(&identity), (self.state, connection));
         let Some(looks) = self.looks(&mut unit)? else { return Ok(Answer::Silent) };
         let kept = KeptRecords::of(self.state, connection)?;
         let earlier = kept.load();
-        let place = looks.last_total().and_then(|total| place.place_before(total));
+        let place = looks.last_total(identity.life).and_then(|total| place.place_before(total));
         let seen = place.and_then(|place| looks.observation(place)).map(Record::Clock);
         let records: Vec<Record> = seen.into_iter().collect();
         kept.add(&records);

@@ -61,14 +61,15 @@ pub(super) fn table(out: &mut dyn Write, rows: &[Row], doubt: HostDoubt) -> io::
 
 fn of_told(name: String, told: &Told) -> Vec<String> {
     let Told { reading, ahead_us, rate, .. } = told;
-    let shows = stamp_of(reading.clock_us).unwrap_or_else(|| "no time".to_owned());
+    let shows = stamp_of(reading.clock_us);
     let drift = rate.filter(|rate| (rate.most_ppb - rate.least_ppb) / 2 <= TELLING_PPB);
     vec![
         name,
-        format!("{shows} {}", told.setting),
-        match reading.source {
-            ClockSource::NeverSet => "never set".to_owned(),
-            _ => offset(*ahead_us),
+        format!("{} {}", shows.as_deref().unwrap_or("no time"), told.setting),
+        match (reading.source, &shows) {
+            (ClockSource::NeverSet, _) => "never set".to_owned(),
+            (_, None) => "not comparable".to_owned(),
+            (_, Some(_)) => offset(*ahead_us),
         },
         drift.map_or_else(|| "not known".to_owned(), self::drift),
         source(reading),
