@@ -1,6 +1,7 @@
 //! The way in: opening an archive.
 
 use std::path::Path;
+use std::time::Duration;
 
 use ser_evidence::record::Life;
 use ser_evidence::time::{Moment, shown};
@@ -74,6 +75,15 @@ impl Archive {
     fn about(&mut self) -> Result<About> {
         let about = schema::about(&mut *self.sql)?;
         about.ok_or_else(|| Error::damaged(self.name(), "it does not say what it is"))
+    }
+
+    /// Says how long this archive waits for others that write before it gives up with
+    /// [`Error::Busy`]. Without a word it is ten seconds.
+    ///
+    /// # Errors
+    /// If the server does not take it.
+    pub fn set_patience(&mut self, patience: Duration) -> Result<()> {
+        self.sql.set_patience(patience)
     }
 
     /// The archive's name, for messages.

@@ -1,7 +1,7 @@
 //! Whether anything is missing that nobody has told, and what was told.
 //!
 //! Entries of a life are numbered. A number that is not there is a hole; it is explained by gaps that
-//! were told, and proves a loss where it is not. What was watched up to an entry must be there up to
+//! were told of it, whoever told them, and proves a loss where it is not. What was watched up to an entry must be there up to
 //! that entry.
 
 use std::collections::BTreeMap;
@@ -48,7 +48,7 @@ pub struct Hole {
     pub after: u64,
     /// How many are missing in all.
     pub missing: u64,
-    /// How many of them were told; more than are missing is a contradiction, too.
+    /// How many of them were told.
     pub told: u64,
 }
 
@@ -64,8 +64,36 @@ impl Check {
 #[derive(Default)]
 struct LifeNotes {
     is_exact: bool,
-    gaps: Vec<Gap>,
+    /// The numbers that were told to be missing. Another collector may have found some of them.
+    told: Numbers,
+    /// Where more may be missing than was told: from the place of a gap to where it ends at least.
+    open: Numbers,
+    /// After which number the first entry was that was let go.
+    first_expired: Option<u64>,
     watched_through: u64,
+}
+
+/// Some of the numbers of a life, as ranges that neither touch nor overlap: by the first, the last.
+#[derive(Default)]
+struct Numbers(BTreeMap<u64, u64>);
+
+impl Numbers {
+    fn add(&mut self, mut first: u64, mut last: u64) {
+        while let Some((&from, &to)) = self.0.range(..=last.saturating_add(1)).next_back()
+            && to.saturating_add(1) >= first
+        {
+            self.0.remove(&from);
+            (first, last) = (first.min(from), last.max(to));
+        }
+        self.0.insert(first, last);
+    }
+
+    /// How many there are among these.
+    fn count(&self, first: u64, last: u64) -> u64 {
+        let reaching = self.0.range(..=last).rev();
+        let within = reaching.take_while(|&(_, &to)| to >= first);
+        within.map(|(&from, &to)| to.min(last) - from.max(first) + 1).sum()
+    }
 }
 
 impl Archive {
@@ -148,7 +176,7 @@ impl Archive {
         self.sql.query(NOTES, &name, &mut |row| {
             match StoredEvidence::record(row.text(1)?, row.int(0)?, &archive)? {
                 Record::Gap(gap) => {
-                    lives.entry(gap.life).or_default().gaps.push(gap);
+                    lives.entry(gap.life).or_default().add(&gap);
                     found.told.push(gap);
                 }
                 Record::Life(LifeRecord { life, is_exact, .. }) => {
@@ -168,29 +196,36 @@ impl Archive {
 }
 
 impl LifeNotes {
+    fn add(&mut self, gap: &Gap) {
+        // No log counts so far that this would wrap.
+        let Some(after) = gap.after.filter(|after| *after < u64::MAX / 2) else { return };
+        let count = match gap.lost {
+            Lost::Exactly(count) | Lost::AtLeast(count) => u64::from(count),
+            Lost::Unknown => 0,
+        };
+        if count > 0 {
+            self.told.add(after + 1, after + count);
+        }
+        if !matches!(gap.lost, Lost::Exactly(_)) {
+            self.open.add(after, after + count);
+        }
+        if gap.why == Why::Expired {
+            let first = self.first_expired.get_or_insert(after);
+            *first = after.min(*first);
+        }
+    }
+
     /// After which number a life begins of which no entry is left. Nobody knows how many there were
     /// before the first that was let go, if its total had wrapped when it was first seen.
     fn begin(&self) -> u64 {
-        let expired = self.gaps.iter().filter(|gap| gap.why == Why::Expired);
-        let first = expired.filter_map(|gap| gap.after).min();
-        first.filter(|_| !self.is_exact).unwrap_or(0)
+        self.first_expired.filter(|_| !self.is_exact).unwrap_or(0)
     }
 
     /// What is missing after one entry up to another number, unless that was told.
     fn hole(&self, life: Life, after: u64, through: u64) -> Option<Hole> {
         let missing = through.checked_sub(after).filter(|&missing| missing > 0)?;
-        let here = || {
-            let is_here = |gap: &&Gap| {
-                gap.after.is_some_and(|place| (after..through.max(after + 1)).contains(&place))
-            };
-            self.gaps.iter().filter(is_here)
-        };
-        let told = here().fold(0_u64, |sum, gap| match gap.lost {
-            Lost::Exactly(count) | Lost::AtLeast(count) => sum.saturating_add(count.into()),
-            Lost::Unknown => sum,
-        });
-        let is_open = here().any(|gap| !matches!(gap.lost, Lost::Exactly(_)));
-        let is_told = told == missing || is_open && told <= missing;
+        let told = self.told.count(after + 1, through);
+        let is_told = told == missing || self.open.count(after, through - 1) > 0;
         (!is_told).then_some(Hole { life, after, missing, told })
     }
 }
@@ -204,7 +239,8 @@ mod tests {
         let life = Life::from_bits(1);
         let gap = |after, lost| Gap { life, after: Some(after), lost, why: Why::Overwritten };
         let of = |gaps: &[Gap]| {
-            let notes = LifeNotes { gaps: gaps.to_vec(), ..LifeNotes::default() };
+            let mut notes = LifeNotes::default();
+            gaps.iter().for_each(|gap| notes.add(gap));
             notes.hole(life, 10, 20)
         };
         let hole = |told| Some(Hole { life, after: 10, missing: 10, told });
@@ -212,9 +248,14 @@ mod tests {
         assert_eq!(of(&[gap(10, Lost::Exactly(10))]), None);
         assert_eq!(of(&[gap(10, Lost::Exactly(4)), gap(14, Lost::Exactly(6))]), None);
         assert_eq!(of(&[gap(10, Lost::Exactly(9))]), hole(9));
-        assert_eq!(of(&[gap(10, Lost::Exactly(11))]), hole(11));
+        // Another collector has found some of what this one has told.
+        assert_eq!(of(&[gap(8, Lost::Exactly(13))]), None);
+        assert_eq!(of(&[gap(10, Lost::Exactly(6)), gap(14, Lost::Exactly(6))]), None);
+        assert_eq!(of(&[gap(14, Lost::Exactly(6)), gap(10, Lost::Exactly(3))]), hole(9));
         assert_eq!(of(&[gap(10, Lost::AtLeast(3))]), None);
         assert_eq!(of(&[gap(10, Lost::Unknown)]), None);
-        assert_eq!(of(&[gap(9, Lost::Exactly(10)), gap(20, Lost::Exactly(10))]), hole(0));
+        assert_eq!(of(&[gap(10, Lost::AtLeast(30))]), None);
+        assert_eq!(of(&[gap(9, Lost::Exactly(1)), gap(20, Lost::Exactly(10))]), hole(0));
+        assert_eq!(of(&[gap(9, Lost::Exactly(3)), gap(20, Lost::Unknown)]), hole(2));
     }
 }

@@ -2,6 +2,7 @@
 //! on for their values.
 
 use std::path::Path;
+use std::time::Duration;
 
 use crate::error::Result;
 
@@ -79,6 +80,9 @@ pub(crate) type OnRow<'f> = &'f mut dyn FnMut(&dyn Columns) -> Result<()>;
 pub(crate) trait Sql: Send {
     /// Its name, for messages.
     fn name(&self) -> &str;
+
+    /// How long a writer waits for another one from now on.
+    fn set_patience(&mut self, patience: Duration) -> Result<()>;
 
     /// Whether there are tables of ours.
     fn has_tables(&mut self) -> Result<bool>;

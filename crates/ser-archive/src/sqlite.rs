@@ -18,7 +18,7 @@ use crate::sql::{Columns, OnRow, Sql, Value};
 /// What is in the head of our files, so that nothing else is taken for one: `SERa`.
 const APPLICATION_ID: i64 = 0x5345_5261;
 
-/// How long a writer waits for another one.
+/// How long a writer waits for another one, unless somebody says otherwise.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// How many prepared statements are kept.
@@ -143,6 +143,10 @@ const ALL_PAGES: std::ffi::c_int = -1;
 impl Sql for Sqlite {
     fn name(&self) -> &str {
         &self.name
+    }
+
+    fn set_patience(&mut self, patience: Duration) -> Result<()> {
+        self.connection.busy_timeout(patience).map_err(|error| self.failed(error))
     }
 
     fn has_tables(&mut self) -> Result<bool> {

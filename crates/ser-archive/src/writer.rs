@@ -135,3 +135,99 @@ fn write_all(mut archive: Archive, orders: &Receiver<Order>) -> Archive {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::Duration;
+
+    use ser_evidence::time::Moment;
+
+    use super::*;
+    use crate::sql::{OnRow, Sql, Value};
+
+    /// A database to which another program writes for ever. It counts how often somebody waited.
+    struct Taken(Arc<AtomicUsize>);
+
+    impl Sql for Taken {
+        fn name(&self) -> &str {
+            "plant.db"
+        }
+
+        fn begin(&mut self) -> Result<()> {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            Err(Error::Busy { archive: "plant.db".to_owned() })
+        }
+
+        fn roll_back(&mut self) {}
+
+        fn set_patience(&mut self, _: Duration) -> Result<()> {
+            unreachable!()
+        }
+
+        fn has_tables(&mut self) -> Result<bool> {
+            unreachable!()
+        }
+
+        fn migrate(&mut self, _: i64) -> Result<()> {
+            unreachable!()
+        }
+
+        fn copy_to(&mut self, _: &Path) -> Result<()> {
+            unreachable!()
+        }
+
+        fn begin_reading(&mut self) -> Result<()> {
+            unreachable!()
+        }
+
+        fn commit(&mut self) -> Result<()> {
+            unreachable!()
+        }
+
+        fn run(&mut self, _: &'static str, _: &[Value]) -> Result<u64> {
+            unreachable!()
+        }
+
+        fn query(&mut self, _: &'static str, _: &[Value], _: OnRow<'_>) -> Result<()> {
+            unreachable!()
+        }
+
+        fn size(&mut self) -> Result<u64> {
+            unreachable!()
+        }
+
+        fn give_back(&mut self) -> Result<()> {
+            unreachable!()
+        }
+    }
+
+    #[test]
+    fn who_waits_for_another_program_waits_once_for_all() {
+        let waited = Arc::new(AtomicUsize::new(0));
+        let archive = Archive { sql: Box::new(Taken(Arc::clone(&waited))) };
+        let (queue, orders) = sync_channel(6);
+        let tickets: Vec<_> = (0..6)
+            .map(|number| {
+                let (answer, ticket) = channel();
+                let batch = Batch {
+                    collector: "cellar".to_owned(),
+                    recorder: format!("SER{number}"),
+                    records: Vec::new(),
+                    bookmark: None,
+                    at: Moment::from_us(0),
+                };
+                queue.send(Order { batch, answer }).unwrap();
+                Ticket(ticket)
+            })
+            .collect();
+        drop(queue);
+        write_all(archive, &orders);
+        for ticket in tickets {
+            assert!(matches!(ticket.wait(), Err(Error::Busy { .. })));
+        }
+        assert_eq!(waited.load(Ordering::Relaxed), 1);
+    }
+}

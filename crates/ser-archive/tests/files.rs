@@ -150,19 +150,18 @@ fn a_file_in_which_somebody_has_put_statements_is_refused() {
 }
 
 #[test]
-fn who_waits_for_another_program_waits_once_for_all() {
+fn who_has_waited_long_enough_for_another_program_is_told_so() {
     let home = Home::new();
-    let writer = Writer::start(home.open(), 16).unwrap();
+    let mut archive = home.open();
+    archive.set_patience(std::time::Duration::from_millis(20)).unwrap();
+    let writer = Writer::start(archive, 16).unwrap();
     let raw = home.raw();
     raw.execute_batch("BEGIN IMMEDIATE").unwrap();
-    let began = std::time::Instant::now();
     let tickets: Vec<_> =
         (1..=6).map(|at| writer.append(batch(entries(LIFE, [at]))).unwrap()).collect();
     for ticket in tickets {
         assert!(matches!(ticket.wait(), Err(Error::Busy { .. })));
     }
-    // The first alone, and all the others.
-    assert!(began.elapsed().as_secs() < 30, "{:?}", began.elapsed());
     raw.execute_batch("COMMIT").unwrap();
     writer.append(batch(entries(LIFE, [1]))).unwrap().wait().unwrap();
 }

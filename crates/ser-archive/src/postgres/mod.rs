@@ -8,6 +8,7 @@ mod tls;
 
 use std::collections::HashMap;
 use std::path::Path;
+use std::time::Duration;
 
 use futures_util::TryStreamExt;
 use tokio::runtime::{Builder, Runtime};
@@ -165,6 +166,12 @@ impl<'r> Column<'r> {
 impl Sql for Postgres {
     fn name(&self) -> &str {
         &self.name
+    }
+
+    fn set_patience(&mut self, patience: Duration) -> Result<()> {
+        // To the server, none at all would mean for ever.
+        let patience_ms = patience.as_millis().clamp(1, 1_000_000_000);
+        self.batch(&format!("SET lock_timeout = '{patience_ms}ms'"))
     }
 
     fn has_tables(&mut self) -> Result<bool> {
