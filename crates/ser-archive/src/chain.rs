@@ -46,6 +46,8 @@ pub(crate) struct Checkpoint {
     pub(crate) kept: Digest,
     /// How many entries are gone, conflicts included.
     pub(crate) entries: i64,
+    /// How many conflicts are gone, those of earlier checkpoints included.
+    pub(crate) conflicts: i64,
     /// When that was, in microseconds of UTC.
     pub(crate) expired_us: i64,
 }
@@ -70,10 +72,10 @@ impl Link<'_> {
                 hash.update(line);
             }
             Link::Checkpoint(checkpoint) => {
-                let Checkpoint { to_position, rows, digest, kept, entries, expired_us } =
+                let Checkpoint { to_position, rows, digest, kept, entries, conflicts, expired_us } =
                     checkpoint;
                 hash.update(b"K");
-                for number in [to_position, rows, entries, expired_us] {
+                for number in [to_position, rows, entries, conflicts, expired_us] {
                     hash.update(number.to_be_bytes());
                 }
                 hash.update(digest);

@@ -10,6 +10,7 @@ use ser_evidence::record::{Gap, Life, LifeRecord, Lost, Record, Watched, Why};
 
 use crate::archive::Archive;
 use crate::error::Result;
+use crate::numbers::Numbers;
 use crate::sql::Value;
 use crate::stored::{StoredEvidence, sequence};
 
@@ -31,6 +32,8 @@ pub struct RecorderCheck {
     pub entries: u64,
     /// Entries that contradict others.
     pub conflicts: u64,
+    /// Entries that contradicted others and were let go since.
+    pub expired_conflicts: u64,
     /// What is known to be missing, and why.
     pub told: Vec<Gap>,
     /// What is missing without anybody having told.
@@ -53,10 +56,13 @@ pub struct Hole {
 }
 
 impl Check {
-    /// Whether everything that is missing was told, and nothing contradicts.
+    /// Whether everything that is missing was told, and nothing contradicts or ever did.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        self.recorders.iter().all(|found| found.holes.is_empty() && found.conflicts == 0)
+        let is_sound = |found: &RecorderCheck| {
+            found.holes.is_empty() && found.conflicts == 0 && found.expired_conflicts == 0
+        };
+        self.recorders.iter().all(is_sound)
     }
 }
 
@@ -71,29 +77,6 @@ struct LifeNotes {
     /// After which number the first entry was that was let go.
     first_expired: Option<u64>,
     watched_through: u64,
-}
-
-/// Some of the numbers of a life, as ranges that neither touch nor overlap: by the first, the last.
-#[derive(Default)]
-struct Numbers(BTreeMap<u64, u64>);
-
-impl Numbers {
-    fn add(&mut self, mut first: u64, mut last: u64) {
-        while let Some((&from, &to)) = self.0.range(..=last.saturating_add(1)).next_back()
-            && to.saturating_add(1) >= first
-        {
-            self.0.remove(&from);
-            (first, last) = (first.min(from), last.max(to));
-        }
-        self.0.insert(first, last);
-    }
-
-    /// How many there are among these.
-    fn count(&self, first: u64, last: u64) -> u64 {
-        let reaching = self.0.range(..=last).rev();
-        let within = reaching.take_while(|&(_, &to)| to >= first);
-        within.map(|(&from, &to)| to.min(last) - from.max(first) + 1).sum()
-    }
 }
 
 impl Archive {
@@ -125,6 +108,12 @@ impl Archive {
             JOIN recorder ON recorder.id = entry.recorder WHERE recorder.name = ?1 GROUP BY life";
         const CONFLICTS: &str = "SELECT count(*) FROM conflict \
             JOIN recorder ON recorder.id = conflict.recorder WHERE recorder.name = ?1";
+        // The newest checkpoint of a chain counts all.
+        const EXPIRED: &str = "SELECT CAST(coalesce(sum(most), 0) AS BIGINT) FROM \
+            (SELECT max(conflicts) AS most FROM checkpoint \
+            JOIN chain ON chain.id = checkpoint.chain \
+            JOIN recorder ON recorder.id = chain.recorder WHERE recorder.name = ?1 \
+            GROUP BY chain.id) AS of_chains";
         let archive = self.sql.name().to_owned();
         let mut breaks = Vec::new();
         self.sql.query(STRETCHES, &name, &mut |row| {
@@ -139,6 +128,10 @@ impl Archive {
         })?;
         self.sql.query(CONFLICTS, &name, &mut |row| {
             found.conflicts = row.int(0)?.cast_unsigned();
+            Ok(())
+        })?;
+        self.sql.query(EXPIRED, &name, &mut |row| {
+            found.expired_conflicts = row.int(0)?.cast_unsigned();
             Ok(())
         })?;
         for life in ends.keys() {

@@ -9,7 +9,7 @@
 //!
 //! [`Archive`] is the way in: `archive` opens, `append` adds, `reading` gives back, `check` says what
 //! is missing, `verify` whether anybody has changed something, and `retention` lets go of what is
-//! old. [`Writer`] lets many threads add to one archive. Below these, `chain` reckons digests,
+//! old; `numbers` are ranges of entries. [`Writer`] lets many threads add to one archive. Below these, `chain` reckons digests,
 //! `stored` makes columns of records, `schema` makes tables, and `sql` is what a database must do;
 //! `sqlite` does it, and `postgres` where the feature of this name is on.
 #![cfg_attr(
@@ -23,6 +23,7 @@ mod batch;
 mod chain;
 mod check;
 mod error;
+mod numbers;
 mod place;
 #[cfg(feature = "postgres")]
 mod postgres;

@@ -137,7 +137,8 @@ impl Archive {
             rows AS life, 0 AS sequence, 0 AS number, 0 AS stamp, 0 AS shown_us, 0 AS changed, \
             0 AS state, 0 AS known, '' AS kind, '' AS line, digest AS content, digest, \
             digest AS kept FROM link \
-            UNION ALL SELECT position, 3, chain, 0, to_position, rows, entries, expired_us, 0, 0, \
+            UNION ALL SELECT position, 3, chain, 0, to_position, rows, entries, expired_us, \
+            conflicts, 0, \
             0, 0, '', '', digest, digest, kept FROM checkpoint \
             UNION ALL SELECT position, 2, chain, recorder, life, 0, 0, 0, 0, 0, 0, 0, kind, line, \
             content, content, content FROM evidence \
@@ -183,6 +184,7 @@ impl Archive {
                         rows: row.int(5)?,
                         entries: row.int(6)?,
                         expired_us: row.int(7)?,
+                        conflicts: row.int(8)?,
                         digest: digest(15)?,
                         kept: digest(16)?,
                     };

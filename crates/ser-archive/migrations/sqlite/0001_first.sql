@@ -83,6 +83,7 @@ CREATE TABLE evidence (
 ) STRICT;
 
 CREATE INDEX evidence_by_kind ON evidence (kind, recorder, life);
+CREATE INDEX evidence_by_chain ON evidence (chain, position);
 
 -- Where a collector goes on reading a recorder. It moves in the transaction that holds what was read
 -- up to there.
@@ -98,7 +99,8 @@ CREATE TABLE bookmark (
 ) STRICT;
 
 -- Where rows were let go by retention: those of a chain up to `to_position`. `rows` and `digest` are
--- where the chain was by then, and `kept` is a digest over the evidence that is left of them.
+-- where the chain was by then, and `kept` is a digest over the evidence that is left of them. `conflicts`
+-- counts all that were ever let go of the chain.
 CREATE TABLE checkpoint (
     position INTEGER PRIMARY KEY,
     chain INTEGER NOT NULL REFERENCES chain (id),
@@ -107,5 +109,6 @@ CREATE TABLE checkpoint (
     digest BLOB NOT NULL,
     kept BLOB NOT NULL,
     entries INTEGER NOT NULL,
+    conflicts INTEGER NOT NULL,
     expired_us INTEGER NOT NULL
 ) STRICT;

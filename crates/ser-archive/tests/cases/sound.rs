@@ -1,7 +1,7 @@
 //! What is missing is said, and what somebody changed is found.
 
 use crate::common::*;
-use ser_archive::{Error, Hole, Keep};
+use ser_archive::{Access, Error, Hole, Keep};
 use ser_evidence::record::{Gap, Lost, Record, Why};
 
 pub(crate) fn a_number_that_is_not_there_is_a_hole_unless_it_was_told(home: &Home) {
@@ -102,6 +102,60 @@ pub(crate) fn what_another_collector_adds_late_is_no_contradiction(home: &Home) 
     assert_eq!(archive.check().unwrap().recorders[0].holes, [hole(60, 2, 1), hole(63, 6, 1)]);
 }
 
+pub(crate) fn entries_that_collectors_add_in_turn_become_one_gap(home: &Home) {
+    let mut archive = home.open();
+    for number in 1..=200 {
+        let mut batch = batch(entries(LIFE, [number]));
+        batch.collector = format!("collector {}", number % 2);
+        archive.append(&[batch]).unwrap();
+    }
+    let gone = archive.expire(Keep { since: Some(at_s(1)), bytes: None }, at_s(2)).unwrap();
+    assert_eq!((gone.entries, gone.gaps), (200, 1));
+    let whole = Gap { life: LIFE, after: Some(0), lost: Lost::Exactly(200), why: Why::Expired };
+    assert_eq!(everything(&mut archive, "U1-SER1"), [Record::Gap(whole)]);
+    assert!(archive.check().unwrap().is_sound());
+    let (heads, broken) = archive.verify().unwrap();
+    assert_eq!((heads.len(), broken.len()), (2, 0));
+}
+
+pub(crate) fn neighbouring_gaps_become_one_in_time(home: &Home) {
+    let mut archive = home.open();
+    for day in 0..40_u64 {
+        let seconds = i64::try_from(day).unwrap() * 86_400;
+        let records = [vec![observed(LIFE, day + 1)], entries(LIFE, day * 5 + 1..=day * 5 + 5)];
+        let mut batch = batch(records.concat());
+        batch.collector = format!("collector {}", day % 2);
+        batch.at = at_s(seconds);
+        archive.append(&[batch]).unwrap();
+        let keep = Keep { since: Some(at_s(seconds - 3 * 86_400)), bytes: None };
+        archive.expire(keep, at_s(seconds + 1)).unwrap();
+        let check = archive.check().unwrap();
+        assert!(check.is_sound(), "{check:?}");
+        assert!(check.recorders[0].told.len() <= 12, "{day}: {:?}", check.recorders[0].told);
+        assert_eq!(archive.verify().unwrap().1, []);
+    }
+}
+
+pub(crate) fn a_conflict_that_was_let_go_is_one_still(home: &Home) {
+    let mut archive = home.open();
+    for (second, sequence) in [(0, 1), (10, 2), (20, 3)] {
+        let mut other = entry(LIFE, sequence);
+        other.entry.state.0 ^= 2;
+        let records = vec![Record::Entry(entry(LIFE, sequence)), Record::Entry(other)];
+        let mut batch = batch(records);
+        batch.at = at_s(second);
+        archive.append(&[batch]).unwrap();
+    }
+    for (since, left) in [(5, 2), (15, 1), (25, 0)] {
+        archive.expire(Keep { since: Some(at_s(since)), bytes: None }, at_s(30)).unwrap();
+        let check = archive.check().unwrap();
+        let found = &check.recorders[0];
+        assert_eq!((found.conflicts, found.expired_conflicts), (left, 3 - left));
+        assert!(!check.is_sound());
+        assert_eq!(archive.verify().unwrap().1, []);
+    }
+}
+
 pub(crate) fn all_may_be_let_go(home: &Home) {
     let mut archive = home.open();
     archive.append(&[batch(entries(LIFE, 1..=50))]).unwrap();
@@ -171,8 +225,22 @@ pub(crate) fn many_small_batches_are_let_go(home: &Home) {
         .collect();
     archive.append(&batches).unwrap();
     let keep = Keep { since: Some(at_s(10_001)), bytes: None };
-    assert_eq!(archive.expire(keep, at_s(20_000)).unwrap().entries, 10_000);
-    assert_eq!(archive.verify().unwrap().1, []);
+    // Who looks meanwhile finds everything told after each step.
+    let mut reader = home.open_for(Access::Read).unwrap();
+    let gone = std::thread::scope(|scope| {
+        let expiry = scope.spawn(move || archive.expire(keep, at_s(20_000)).unwrap());
+        loop {
+            let is_over = expiry.is_finished();
+            let check = reader.check().unwrap();
+            assert!(check.is_sound(), "{check:?}");
+            assert_eq!(reader.verify().unwrap().1, []);
+            if is_over {
+                break expiry.join().unwrap();
+            }
+        }
+    });
+    // Each step has a gap of its own, and there are few.
+    assert_eq!((gone.entries, gone.gaps), (10_000, 3));
 }
 
 pub(crate) fn numbers_that_no_log_has_are_damage_and_no_more(home: &Home) {

@@ -33,7 +33,7 @@ def rows(archive, chain):
             found.append((position, of_entry(letter, row)))
     for position, line in archive.execute("SELECT position, line FROM evidence WHERE chain = ?", (chain,)):
         found.append((position, b"L" + line.encode()))
-    query = "SELECT position, to_position, rows, entries, expired_us, digest, kept FROM checkpoint WHERE chain = ?"
+    query = "SELECT position, to_position, rows, entries, conflicts, expired_us, digest, kept FROM checkpoint WHERE chain = ?"
     for position, *numbers, digest, kept in archive.execute(query, (chain,)):
         found.append((position, b"K" + b"".join(map(signed, numbers)) + digest + kept))
     return sorted(found)
