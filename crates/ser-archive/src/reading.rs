@@ -31,6 +31,18 @@ pub struct Archived {
     pub record: Record,
 }
 
+/// The entries of a window. Two statements in one, since the index has no place at which a stamp is
+/// either in the window or no time; and an order that no index has, since the one of all entries by
+/// place would be taken for it.
+const OF_WINDOW: &str = "SELECT * FROM (\
+    SELECT life, sequence, number, stamp, shown_us, changed, state, known FROM entry \
+    JOIN recorder ON recorder.id = entry.recorder \
+    WHERE recorder.name = ?1 AND shown_us BETWEEN ?2 AND ?3 \
+    UNION ALL \
+    SELECT life, sequence, number, stamp, shown_us, changed, state, known FROM entry \
+    JOIN recorder ON recorder.id = entry.recorder \
+    WHERE recorder.name = ?1 AND shown_us IS NULL) AS wanted ORDER BY life + 0, sequence";
+
 impl Archive {
     /// The recorders of which anything is kept, by name.
     ///
@@ -71,10 +83,6 @@ impl Archive {
         const ENTRIES: &str = "SELECT life, sequence, number, stamp, shown_us, changed, state, \
             known FROM entry JOIN recorder ON recorder.id = entry.recorder \
             WHERE recorder.name = ?1 ORDER BY life, sequence";
-        const OF_WINDOW: &str = "SELECT life, sequence, number, stamp, shown_us, changed, state, \
-            known FROM entry JOIN recorder ON recorder.id = entry.recorder \
-            WHERE recorder.name = ?1 AND (shown_us BETWEEN ?2 AND ?3 OR shown_us IS NULL) \
-            ORDER BY life, sequence";
         const CONFLICTS: &str = "SELECT life, sequence, number, stamp, shown_us, changed, state, \
             known FROM conflict JOIN recorder ON recorder.id = conflict.recorder \
             WHERE recorder.name = ?1 AND (shown_us BETWEEN ?2 AND ?3 OR shown_us IS NULL) \
@@ -139,5 +147,24 @@ impl Archive {
         })?;
         let limit = usize::try_from(limit).unwrap_or(usize::MAX);
         Ok(found.into_values().take(limit).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::OF_WINDOW;
+
+    #[test]
+    fn a_window_is_found_by_an_index_and_not_among_all_entries() {
+        let connection = rusqlite::Connection::open_in_memory().unwrap();
+        connection.execute_batch(include_str!("../migrations/sqlite/0001_first.sql")).unwrap();
+        let mut plan = connection.prepare(&format!("EXPLAIN QUERY PLAN {OF_WINDOW}")).unwrap();
+        let steps = plan.query_map(("SER1", 1, 2), |row| row.get::<_, String>(3)).unwrap();
+        let of_entries: Vec<String> =
+            steps.map(Result::unwrap).filter(|step| step.contains(" entry ")).collect();
+        let by = |condition| format!("SEARCH entry USING INDEX entry_by_shown ({condition})");
+        let expected =
+            [by("recorder=? AND shown_us>? AND shown_us<?"), by("recorder=? AND shown_us=?")];
+        assert_eq!(of_entries, expected);
     }
 }
