@@ -13,30 +13,48 @@ use crate::stored::{StoredEntry, StoredEvidence, stamp_number};
 
 impl Archive {
     /// Adds what was read, in one transaction. Records that are there already change nothing, and an
-    /// entry that contradicts one is kept beside it.
+    /// entry that contradicts one is kept beside it. Returns what has come of each batch.
     ///
     /// # Errors
     /// If anything cannot be written, nothing is. [`Error::NoPlace`] for an entry whose life or
     /// sequence is not known.
-    pub fn append(&mut self, batches: &[Batch]) -> Result<Appended> {
-        self.in_transaction(|archive| archive.append_within(batches))
+    pub fn append(&mut self, batches: &[Batch]) -> Result<Vec<Appended>> {
+        self.in_transaction(|archive| {
+            let mut position = archive.position()?;
+            let mut appended = Vec::with_capacity(batches.len());
+            for batch in batches {
+                let of_batch = archive.append_one(batch, position)?;
+                position = of_batch.position;
+                appended.push(of_batch);
+            }
+            archive.set_position(position)?;
+            Ok(appended)
+        })
     }
 
-    /// The same within a transaction.
-    pub(crate) fn append_within(&mut self, batches: &[Batch]) -> Result<Appended> {
-        const POSITION: &str = "UPDATE archive SET position = ?1";
-        let mut appended = Appended { position: self.position()?, ..Appended::default() };
-        for batch in batches {
-            self.append_one(batch, &mut appended)?;
-        }
-        self.sql.run(POSITION, &[Value::Int(appended.position)])?;
+    /// Adds one batch in a transaction of its own.
+    pub(crate) fn append_alone(&mut self, batch: &Batch) -> Result<Appended> {
+        self.in_transaction(|archive| archive.append_within(batch))
+    }
+
+    /// Adds one batch within a transaction.
+    pub(crate) fn append_within(&mut self, batch: &Batch) -> Result<Appended> {
+        let position = self.position()?;
+        let appended = self.append_one(batch, position)?;
+        self.set_position(appended.position)?;
         Ok(appended)
     }
 
-    fn append_one(&mut self, batch: &Batch, appended: &mut Appended) -> Result<()> {
+    fn set_position(&mut self, position: i64) -> Result<()> {
+        const POSITION: &str = "UPDATE archive SET position = ?1";
+        self.sql.run(POSITION, &[Value::Int(position)]).map(|_| ())
+    }
+
+    /// Adds a batch behind a position.
+    fn append_one(&mut self, batch: &Batch, position: i64) -> Result<Appended> {
         let chain = self.chain(&batch.collector, &batch.recorder)?;
         let before = Before::find(&mut *self.sql, chain, &batch.records, &batch.recorder)?;
-        let mut rows = NewRows::new(chain, appended.position);
+        let mut rows = NewRows::new(chain, position);
         for record in &batch.records {
             let archive = self.sql.name();
             match record {
@@ -50,11 +68,11 @@ impl Archive {
                 }
             }
         }
-        rows.write(&mut *self.sql, batch.at.us(), appended)?;
-        match &batch.bookmark {
-            Some(bookmark) => self.set_bookmark(chain.id, bookmark),
-            None => Ok(()),
+        let appended = rows.write(&mut *self.sql, batch.at.us())?;
+        if let Some(bookmark) = &batch.bookmark {
+            self.set_bookmark(chain.id, bookmark)?;
         }
+        Ok(appended)
     }
 
     /// The chain of a collector and a recorder, which is made if it is not there.
@@ -272,7 +290,7 @@ impl NewRows {
         Ok(of_all.into_iter().chain(own).collect())
     }
 
-    fn write(self, sql: &mut dyn Sql, archived_us: i64, appended: &mut Appended) -> Result<()> {
+    fn write(self, sql: &mut dyn Sql, archived_us: i64) -> Result<Appended> {
         const ENTRY: &str = "INSERT INTO entry (position, chain, recorder, life, sequence, number, \
             stamp, shown_us, changed, state, known) \
             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
@@ -281,17 +299,21 @@ impl NewRows {
             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
         const EVIDENCE: &str = "INSERT INTO evidence (position, chain, recorder, kind, life, line, \
             content) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
-        let is_empty = self.position == appended.position;
         let count = |rows: &[Vec<Value>]| rows.len() as u64;
-        appended.entries += count(&self.entries);
-        appended.conflicts += count(&self.conflicts);
-        appended.evidence += count(&self.evidence);
-        appended.known += self.known;
-        appended.position = self.position;
+        let appended = Appended {
+            position: self.position,
+            entries: count(&self.entries),
+            conflicts: count(&self.conflicts),
+            evidence: count(&self.evidence),
+            known: self.known,
+        };
         sql.run_each(ENTRY, &self.entries)?;
         sql.run_each(CONFLICT, &self.conflicts)?;
         sql.run_each(EVIDENCE, &self.evidence)?;
-        if is_empty { Ok(()) } else { self.chain.note(sql, self.position, archived_us) }
+        if appended.entries + appended.conflicts + appended.evidence > 0 {
+            self.chain.note(sql, self.position, archived_us)?;
+        }
+        Ok(appended)
     }
 }
 

@@ -34,10 +34,10 @@ pub struct Bookmark {
     pub log_size: Option<u16>,
 }
 
-/// What was written.
+/// What was written of a batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Appended {
-    /// The position of the last row in the archive.
+    /// The position of the last row in the archive by then.
     pub position: i64,
     /// Entries that were new.
     pub entries: u64,

@@ -168,7 +168,7 @@ impl Archive {
         let (collector, recorder) =
             names.ok_or_else(|| Error::damaged(self.name(), "a recorder has no chain"))?;
         let batch = Batch { collector, recorder, records, bookmark: None, at: now };
-        Ok(self.append_within(&[batch])?.evidence)
+        Ok(self.append_within(&batch)?.evidence)
     }
 
     /// The chains that have batches which are old and end no later than a range.

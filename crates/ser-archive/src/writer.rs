@@ -31,7 +31,8 @@ pub struct Writer {
 pub struct Ticket(Receiver<Result<Appended>>);
 
 impl Ticket {
-    /// Waits until the batch is on the disk, or cannot be written.
+    /// Waits until the batch is on the disk, or cannot be written. What was written of others at the
+    /// same time does not count.
     ///
     /// # Errors
     /// Those of [`Archive::append`], and [`Error::WriterGone`].
@@ -117,18 +118,21 @@ fn write_all(mut archive: Archive, orders: &Receiver<Order>) -> Archive {
         let together = match batches.len() {
             1 => None,
             _ => match archive.append(&batches) {
-                Ok(appended) => Some(Ok(appended)),
+                Ok(appended) => Some(appended.into_iter().map(Ok).collect::<Vec<_>>()),
                 // Each alone would wait as long again.
-                Err(Error::Busy { archive }) => Some(Err(archive)),
+                Err(Error::Busy { archive }) => {
+                    let busy = |_| Err(Error::Busy { archive: archive.clone() });
+                    Some(batches.iter().map(busy).collect())
+                }
                 Err(_) => None,
             },
         };
+        let mut together = together.map(Vec::into_iter);
         for (batch, answer) in batches.iter().zip(answers) {
             // Alone, a batch that cannot be written keeps nobody else from being written.
-            let appended = match &together {
-                Some(Ok(appended)) => Ok(*appended),
-                Some(Err(archive)) => Err(Error::Busy { archive: archive.clone() }),
-                None => archive.append(std::slice::from_ref(batch)),
+            let appended = match together.as_mut().and_then(Iterator::next) {
+                Some(appended) => appended,
+                None => archive.append_alone(batch),
             };
             // Who asked may have gone away meanwhile. It is written all the same.
             _ = answer.send(appended);
@@ -143,9 +147,12 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::time::Duration;
 
+    use ser_evidence::record::{PointRecord, Record};
     use ser_evidence::time::Moment;
 
     use super::*;
+    use crate::archive::Access;
+    use crate::place::Place;
     use crate::sql::{OnRow, Sql, Value};
 
     /// A database to which another program writes for ever. It counts how often somebody waited.
@@ -204,26 +211,56 @@ mod tests {
         }
     }
 
+    /// The batches of six recorders, which wait all together. The first has no record, the next has
+    /// one, and so on.
+    fn waiting() -> (Receiver<Order>, Vec<Ticket>) {
+        let (queue, orders) = sync_channel(6);
+        let tickets = (0..6).map(|number| {
+            let (answer, ticket) = channel();
+            let point = |input| {
+                Record::Point(PointRecord {
+                    input,
+                    name: "pump".into(),
+                    on: "on".into(),
+                    off: "off".into(),
+                })
+            };
+            let batch = Batch {
+                collector: "cellar".to_owned(),
+                recorder: format!("SER{number}"),
+                records: (1..=number).map(point).collect(),
+                bookmark: None,
+                at: Moment::from_us(0),
+            };
+            queue.send(Order { batch, answer }).unwrap();
+            Ticket(ticket)
+        });
+        let tickets = tickets.collect();
+        (orders, tickets)
+    }
+
+    #[test]
+    fn each_is_told_what_was_written_of_its_own_batch() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = Place::File(folder.path().join("plant.db"));
+        let archive = Archive::open(&place, Access::Write { program: "a test" }).unwrap();
+        let (orders, tickets) = waiting();
+        write_all(archive, &orders);
+        let answers: Vec<_> = tickets
+            .into_iter()
+            .map(|ticket| {
+                let appended = ticket.wait().unwrap();
+                (appended.evidence, appended.position)
+            })
+            .collect();
+        assert_eq!(answers, [(0, 0), (1, 1), (2, 3), (3, 6), (4, 10), (5, 15)]);
+    }
+
     #[test]
     fn who_waits_for_another_program_waits_once_for_all() {
         let waited = Arc::new(AtomicUsize::new(0));
         let archive = Archive { sql: Box::new(Taken(Arc::clone(&waited))) };
-        let (queue, orders) = sync_channel(6);
-        let tickets: Vec<_> = (0..6)
-            .map(|number| {
-                let (answer, ticket) = channel();
-                let batch = Batch {
-                    collector: "cellar".to_owned(),
-                    recorder: format!("SER{number}"),
-                    records: Vec::new(),
-                    bookmark: None,
-                    at: Moment::from_us(0),
-                };
-                queue.send(Order { batch, answer }).unwrap();
-                Ticket(ticket)
-            })
-            .collect();
-        drop(queue);
+        let (orders, tickets) = waiting();
         write_all(archive, &orders);
         for ticket in tickets {
             assert!(matches!(ticket.wait(), Err(Error::Busy { .. })));

@@ -10,12 +10,12 @@ pub(crate) fn what_was_added_is_given_back_and_added_again_changes_nothing(home:
     let mut archive = home.open();
     let known = vec![life(LIFE), observed(LIFE, 3), gap(LIFE, 5, 2), watched(LIFE, 9)];
     let records = [known.clone(), entries(LIFE, [1, 2, 3, 4, 5, 8, 9])].concat();
-    let appended = archive.append(&[batch(records.clone())]).unwrap();
+    let appended = archive.append(&[batch(records.clone())]).unwrap()[0];
     assert_eq!((appended.entries, appended.evidence, appended.known), (7, 4, 0));
     assert_eq!(everything(&mut archive, "U1-SER1"), records);
     assert_eq!(in_order(&mut archive), records);
 
-    let again = archive.append(&[batch(records.clone())]).unwrap();
+    let again = archive.append(&[batch(records.clone())]).unwrap()[0];
     assert_eq!((again.entries, again.evidence, again.known), (0, 0, 11));
     assert_eq!(again.position, appended.position);
     drop(archive);
@@ -30,7 +30,7 @@ pub(crate) fn two_collectors_that_read_the_same_add_it_once(home: &Home) {
     one.append(&[batch(entries(LIFE, 1..=5))]).unwrap();
     let mut late = batch(entries(LIFE, 3..=7));
     late.collector = "control room".to_owned();
-    let appended = other.append(&[late]).unwrap();
+    let appended = other.append(&[late]).unwrap()[0];
     assert_eq!((appended.entries, appended.known, appended.conflicts), (2, 3, 0));
     assert_eq!(everything(&mut one, "U1-SER1"), entries(LIFE, 1..=7));
 }
@@ -42,7 +42,7 @@ pub(crate) fn another_content_at_the_same_place_is_kept_beside_it(home: &Home) {
     let (first, other) = (entries(LIFE, 1..=3), vec![Record::Entry(other)]);
     archive.append(&[batch(first.clone())]).unwrap();
     for conflicts in [1, 0] {
-        let appended = archive.append(&[batch(other.clone())]).unwrap();
+        let appended = archive.append(&[batch(other.clone())]).unwrap()[0];
         assert_eq!((appended.entries, appended.conflicts), (0, conflicts));
     }
     assert_eq!(everything(&mut archive, "U1-SER1"), [first, other].concat());
@@ -56,7 +56,7 @@ pub(crate) fn a_conflict_within_one_batch_is_one_too(home: &Home) {
     let mut other = entry(LIFE, 1);
     other.entry.changed = Inputs(4);
     let records = vec![Record::Entry(entry(LIFE, 1)), Record::Entry(other)];
-    let appended = archive.append(&[batch([records.clone(), records].concat())]).unwrap();
+    let appended = archive.append(&[batch([records.clone(), records].concat())]).unwrap()[0];
     assert_eq!((appended.entries, appended.conflicts, appended.known), (1, 1, 2));
 }
 
@@ -65,7 +65,7 @@ pub(crate) fn the_number_in_the_ring_is_no_part_of_what_an_entry_is(home: &Home)
     let mut resized = entry(LIFE, 1);
     resized.number = 700;
     archive.append(&[batch(entries(LIFE, [1]))]).unwrap();
-    assert_eq!(archive.append(&[batch(vec![Record::Entry(resized)])]).unwrap().known, 1);
+    assert_eq!(archive.append(&[batch(vec![Record::Entry(resized)])]).unwrap()[0].known, 1);
 }
 
 pub(crate) fn a_bookmark_moves_with_what_was_read_or_not_at_all(home: &Home) {

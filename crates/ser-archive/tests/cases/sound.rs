@@ -83,7 +83,7 @@ pub(crate) fn what_is_let_go_is_told_and_the_rest_stays_proven(home: &Home) {
         .count();
     assert_eq!(clocks, 10);
     // Read again from the recorder, it does not come back unseen: the rest is as it was.
-    assert_eq!(archive.append(&[batch(entries(LIFE, 900..=1000))]).unwrap().known, 101);
+    assert_eq!(archive.append(&[batch(entries(LIFE, 900..=1000))]).unwrap()[0].known, 101);
 }
 
 pub(crate) fn what_another_collector_adds_late_is_no_contradiction(home: &Home) {
