@@ -37,6 +37,21 @@ pub enum Error {
         /// The archive.
         archive: String,
     },
+    /// The connection to the server is lost. What was being written is there whole or not at all,
+    /// and adding it again changes nothing. This archive stays lost: open it anew.
+    Lost {
+        /// The archive.
+        archive: String,
+    },
+    /// What retention never lets go takes more than is to be kept in all.
+    KeepsTooLittle {
+        /// The archive.
+        archive: String,
+        /// How many bytes were to be kept.
+        bytes: u64,
+        /// About how many everything besides entries takes.
+        evidence: u64,
+    },
     /// The disk, or the quota, is full.
     Full {
         /// The archive.
@@ -71,10 +86,11 @@ impl Error {
         Error::Damaged { archive: archive.to_owned(), what: what.into() }
     }
 
-    /// Whether the same may succeed later, without anybody doing anything about this archive.
+    /// Whether the same may succeed later, without anybody doing anything about this archive. After
+    /// [`Error::Lost`] it may in one that is opened anew.
     #[must_use]
     pub const fn may_pass(&self) -> bool {
-        matches!(self, Error::Busy { .. } | Error::Full { .. })
+        matches!(self, Error::Busy { .. } | Error::Full { .. } | Error::Lost { .. })
     }
 }
 
@@ -89,6 +105,12 @@ impl fmt::Display for Error {
                  this program knows schemas up to {known}"
             ),
             Error::Busy { archive } => write!(f, "another program is writing to {archive}"),
+            Error::Lost { archive } => write!(f, "the connection to {archive} is lost"),
+            Error::KeepsTooLittle { archive, bytes, evidence } => write!(
+                f,
+                "{bytes} bytes are too few for {archive}: what is known besides entries stays, and \
+                 takes about {evidence}"
+            ),
             Error::Full { archive } => write!(f, "there is no room left for {archive}"),
             Error::Damaged { archive, what } => write!(f, "{archive} is damaged: {what}"),
             Error::NoPlace { recorder } => write!(

@@ -12,6 +12,9 @@ pub enum Place {
     /// In a database of `PostgreSQL`, by its address: `postgres://user@host/database`. The schema
     /// `ser_archive` there is ours. A password comes from `PGPASSWORD`, or from the file that
     /// `PGPASSFILE` names, or from `~/.pgpass`; never from the address, which everybody sees.
+    ///
+    /// Such an archive must not be used within an async runtime: it waits for its server. Give it a
+    /// thread of its own, as [`Writer`](crate::Writer) does.
     Postgres(String),
 }
 

@@ -60,7 +60,15 @@ impl Archive {
     ///
     /// # Errors
     /// If anything cannot be written. What was let go before that is told in the archive.
+    /// [`Error::KeepsTooLittle`] before anything is let go, if all entries would have to go.
     pub fn expire(&mut self, keep: Keep, now: Moment<Utc>) -> Result<Expired> {
+        if let Some(bytes) = keep.bytes {
+            let evidence = self.sql.evidence_size()?;
+            if evidence >= bytes {
+                let archive = self.name().to_owned();
+                return Err(Error::KeepsTooLittle { archive, bytes, evidence });
+            }
+        }
         let mut expired = Expired::default();
         if let Some(since) = keep.since {
             expired.add(self.expire_to(OLD, since.us(), now)?);
@@ -81,10 +89,13 @@ impl Archive {
         Ok(expired)
     }
 
-    /// The end of the batch up to which there is about one part of the entries.
+    /// The end of the batch up to which there is about one part of the entries and conflicts.
     fn oldest_part(&mut self) -> Result<Option<i64>> {
-        const ENTRIES: &str = "SELECT count(*) FROM entry";
-        const PLACE: &str = "SELECT position FROM entry ORDER BY position LIMIT 1 OFFSET ?1";
+        const ENTRIES: &str =
+            "SELECT (SELECT count(*) FROM entry) + (SELECT count(*) FROM conflict)";
+        const PLACE: &str = "SELECT position FROM (SELECT position FROM entry \
+            UNION ALL SELECT position FROM conflict) AS both_tables \
+            ORDER BY position LIMIT 1 OFFSET ?1";
         let sql = &mut *self.sql;
         let count = first(sql, ENTRIES, &[], |row| row.int(0))?.unwrap_or(0);
         let place = (count.cast_unsigned() / PART).cast_signed();

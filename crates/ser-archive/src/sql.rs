@@ -119,6 +119,9 @@ pub(crate) trait Sql: Send {
     /// How much room it takes, in bytes.
     fn size(&mut self) -> Result<u64>;
 
+    /// About how much of that is evidence, which retention never lets go.
+    fn evidence_size(&mut self) -> Result<u64>;
+
     /// Gives back to the system what deleted rows took, where that takes doing.
     fn give_back(&mut self) -> Result<()>;
 }

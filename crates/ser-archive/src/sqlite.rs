@@ -226,6 +226,13 @@ impl Sql for Sqlite {
         size.map(|bytes| u64::try_from(bytes).unwrap_or(0)).map_err(|error| self.failed(error))
     }
 
+    fn evidence_size(&mut self) -> Result<u64> {
+        // The line, and what the other columns and the indexes take of a row.
+        const SIZE: &str = "SELECT coalesce(sum(length(line) + 160), 0) FROM evidence";
+        let size = self.connection.query_row(SIZE, (), |row| row.get::<_, i64>(0));
+        size.map(|bytes| u64::try_from(bytes).unwrap_or(0)).map_err(|error| self.failed(error))
+    }
+
     fn give_back(&mut self) -> Result<()> {
         // Pages that are free are used again, so the file stays as it is. Only its log shrinks.
         self.pragma("wal_checkpoint", "TRUNCATE")

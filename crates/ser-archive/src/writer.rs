@@ -206,6 +206,10 @@ mod tests {
             unreachable!()
         }
 
+        fn evidence_size(&mut self) -> Result<u64> {
+            unreachable!()
+        }
+
         fn give_back(&mut self) -> Result<()> {
             unreachable!()
         }

@@ -13,6 +13,9 @@ use crate::error::{Error, Result};
 /// How long a server may take to answer.
 const PATIENCE: Duration = Duration::from_secs(10);
 
+/// After how much silence the other side is asked whether it is still there.
+const SILENCE: Duration = Duration::from_secs(30);
+
 /// Everything that a connection needs.
 pub(super) struct Login {
     config: Config,
@@ -38,7 +41,10 @@ impl Login {
             wrong(format!("this is no address: {}", super::said(&error)))
         })?;
         config.connect_timeout(PATIENCE).application_name("ser-archive");
-        let is_near = config.get_hosts().iter().all(is_on_this_computer);
+        notice_a_dead_network(&mut config);
+        // Where both are said, the number is where it goes, whatever the name.
+        let is_near = config.get_hosts().iter().all(is_on_this_computer)
+            && config.get_hostaddrs().iter().all(std::net::IpAddr::is_loopback);
         let encryption = match mode.as_deref() {
             Some("disable") => Encryption::None,
             // Without a word, passwords and records leave the computer only to a server that is known.
@@ -82,6 +88,17 @@ impl Login {
             }
         }
     }
+}
+
+/// Lets the system ask whether the other side is still there, also while a statement takes long, and
+/// give up when nothing of what was sent arrives.
+fn notice_a_dead_network(config: &mut Config) {
+    config
+        .keepalives(true)
+        .keepalives_idle(SILENCE)
+        .keepalives_interval(SILENCE / 3)
+        .keepalives_retries(3)
+        .tcp_user_timeout(2 * SILENCE);
 }
 
 fn is_on_this_computer(host: &Host) -> bool {
@@ -205,6 +222,10 @@ mod tests {
         let encryption = |address: &str| Login::of(address).map(|login| login.encryption).ok();
         assert_eq!(encryption("postgres://ser@localhost/plant"), Some(Encryption::None));
         assert_eq!(encryption("postgres://ser@127.0.0.1/plant"), Some(Encryption::None));
+        let elsewhere = "postgres://ser@localhost/plant?hostaddr=192.0.2.7";
+        assert_eq!(encryption(elsewhere), Some(Encryption::Verified(None)));
+        let here = "postgres://ser@localhost/plant?hostaddr=127.0.0.2";
+        assert_eq!(encryption(here), Some(Encryption::None));
         let far = "postgres://ser@db.example/plant";
         assert_eq!(encryption(far), Some(Encryption::Verified(None)));
         assert_eq!(encryption(&format!("{far}?sslmode=disable")), Some(Encryption::None));
@@ -213,5 +234,16 @@ mod tests {
         assert_eq!(encryption(&format!("{far}?sslmode=prefer")), None);
         let named = Login::of(&format!("{far}?sslmode=require&application_name=x"));
         assert_eq!(named.unwrap().config.get_application_name(), Some("ser-archive"));
+    }
+
+    #[test]
+    fn a_dead_network_is_noticed_in_minutes() {
+        let login = Login::of("postgres://ser@db.example/plant?keepalives=0").unwrap();
+        let config = login.config;
+        assert!(config.get_keepalives());
+        assert_eq!(config.get_keepalives_idle(), Duration::from_secs(30));
+        assert_eq!(config.get_keepalives_interval(), Some(Duration::from_secs(10)));
+        assert_eq!(config.get_keepalives_retries(), Some(3));
+        assert_eq!(config.get_tcp_user_timeout(), Some(&Duration::from_secs(60)));
     }
 }

@@ -49,6 +49,14 @@ pub(crate) struct Postgres {
 impl Postgres {
     /// Connects to read, or to write as well.
     pub(crate) fn open(address: &str, is_for_writing: bool) -> Result<Postgres> {
+        if tokio::runtime::Handle::try_current().is_ok() {
+            return Err(Error::Database {
+                archive: address.to_owned(),
+                source: "an archive in PostgreSQL is not used within an async runtime: give it a \
+                         thread of its own"
+                    .into(),
+            });
+        }
         let runtime = Builder::new_current_thread().enable_all().build().map_err(|error| {
             Error::Database { archive: address.to_owned(), source: error.into() }
         })?;
@@ -88,7 +96,17 @@ impl Postgres {
     }
 
     fn failed(&self, error: &tokio_postgres::Error) -> Error {
-        failed(&self.name, error)
+        failed_later(&self.name, error)
+    }
+
+    /// The number that a statement answers; 0 if it is none.
+    fn number(&mut self, sql: &'static str) -> Result<u64> {
+        let mut number = 0;
+        self.query(sql, &[], &mut |row| {
+            number = u64::try_from(row.int(0)?).unwrap_or(0);
+            Ok(())
+        })?;
+        Ok(number)
     }
 
     fn prepared(&mut self, sql: &'static str) -> Result<Statement> {
@@ -248,9 +266,11 @@ impl Sql for Postgres {
         let name = self.name.as_str();
         self.runtime.block_on(async {
             let rows = self.client.query_raw(&statement, values).await;
-            let rows = rows.map_err(|error| failed(name, &error))?;
+            let rows = rows.map_err(|error| failed_later(name, &error))?;
             let mut rows = std::pin::pin!(rows);
-            while let Some(row) = rows.try_next().await.map_err(|error| failed(name, &error))? {
+            while let Some(row) =
+                rows.try_next().await.map_err(|error| failed_later(name, &error))?
+            {
                 on(&Row { row: &row, name })?;
             }
             Ok(())
@@ -260,15 +280,18 @@ impl Sql for Postgres {
     fn size(&mut self) -> Result<u64> {
         // What tables take does not shrink when rows are deleted, so the rows are counted. An index
         // takes about as much again.
-        const SIZE: &str = "SELECT coalesce(2 * sum(pg_column_size(entry.*)), 0)::bigint + \
-            (SELECT coalesce(2 * sum(pg_column_size(evidence.*)), 0)::bigint FROM evidence) \
-            FROM entry";
-        let mut size = 0;
-        self.query(SIZE, &[], &mut |row| {
-            size = u64::try_from(row.int(0)?).unwrap_or(0);
-            Ok(())
-        })?;
-        Ok(size)
+        const SIZE: &str = "SELECT (2 * (\
+            (SELECT coalesce(sum(pg_column_size(entry.*)), 0) FROM entry) + \
+            (SELECT coalesce(sum(pg_column_size(conflict.*)), 0) FROM conflict) + \
+            (SELECT coalesce(sum(pg_column_size(link.*)), 0) FROM link) + \
+            (SELECT coalesce(sum(pg_column_size(evidence.*)), 0) FROM evidence)))::bigint";
+        self.number(SIZE)
+    }
+
+    fn evidence_size(&mut self) -> Result<u64> {
+        const SIZE: &str = "SELECT coalesce(2 * sum(pg_column_size(evidence.*)), 0)::bigint \
+            FROM evidence";
+        self.number(SIZE)
     }
 
     fn give_back(&mut self) -> Result<()> {
@@ -330,6 +353,31 @@ impl Columns for Row<'_> {
     fn bytes(&self, column: usize) -> Result<&[u8]> {
         self.row.try_get(column).map_err(|_| self.wrong(column, "bytes"))
     }
+}
+
+/// Why something failed for which there was a connection.
+fn failed_later(name: &str, error: &tokio_postgres::Error) -> Error {
+    match is_lost(error) {
+        true => Error::Lost { archive: name.to_owned() },
+        false => failed(name, error),
+    }
+}
+
+/// Whether the connection is gone: it is closed, the system says that it does not work, or the server
+/// has ended it.
+fn is_lost(error: &tokio_postgres::Error) -> bool {
+    let source = std::error::Error::source(error);
+    let is_of_system = source.is_some_and(<dyn std::error::Error>::is::<std::io::Error>);
+    let is_ended = matches!(
+        error.code(),
+        Some(
+            &SqlState::ADMIN_SHUTDOWN
+                | &SqlState::CRASH_SHUTDOWN
+                | &SqlState::CANNOT_CONNECT_NOW
+                | &SqlState::IDLE_IN_TRANSACTION_SESSION_TIMEOUT
+        )
+    );
+    error.is_closed() || is_of_system || is_ended
 }
 
 fn failed(name: &str, error: &tokio_postgres::Error) -> Error {

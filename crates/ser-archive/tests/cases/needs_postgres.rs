@@ -5,10 +5,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use ser_archive::{Access, Archive, Place};
+use ser_archive::{Access, Archive, Error, Keep, Place};
+use ser_evidence::record::Record;
 
 use super::ALL;
-use crate::common::{Home, LIFE, batch, entries};
+use crate::common::{Home, LIFE, at_s, batch, entries, entry};
 
 /// A server that stops when this is dropped.
 struct Server {
@@ -156,6 +157,55 @@ fn other_defaults_of_a_user_change_nothing() {
     });
     home.sql("ALTER TABLE entry ADD CONSTRAINT durable CHECK (sequence = 1 OR commits = 'on')");
     assert_eq!(home.open().verify().unwrap().1, []);
+}
+
+#[test]
+#[ignore = "needs postgres: cargo xtask test"]
+fn a_lost_connection_is_said_and_another_one_goes_on() {
+    let server = Server::start(&[], |_| {});
+    let home = server.home("plant");
+    let mut archive = home.open();
+    archive.append(&[batch(entries(LIFE, 1..=3))]).unwrap();
+    home.sql(
+        "SELECT pg_terminate_backend(pid, 60000) FROM pg_stat_activity \
+         WHERE application_name = 'ser-archive'",
+    );
+    for _ in 0..2 {
+        let error = archive.append(&[batch(entries(LIFE, 4..=5))]).unwrap_err();
+        assert!(matches!(error, Error::Lost { .. }), "{error:?}");
+        assert!(error.may_pass());
+    }
+    let appended = home.open().append(&[batch(entries(LIFE, 1..=5))]).unwrap()[0];
+    assert_eq!((appended.entries, appended.known), (2, 3));
+}
+
+#[test]
+#[ignore = "needs postgres: cargo xtask test"]
+fn within_an_async_runtime_it_is_refused() {
+    let server = Server::start(&[], |_| {});
+    let place: Place = server.address("postgres").parse().unwrap();
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    let opened = runtime.block_on(async { Archive::open(&place, Access::Read) });
+    let text = opened.err().expect("refused").to_string();
+    assert!(text.contains("async"), "{text}");
+}
+
+#[test]
+#[ignore = "needs postgres: cargo xtask test"]
+fn what_conflicts_take_counts_as_well() {
+    let server = Server::start(&[], |_| {});
+    let home = server.home("plant");
+    let mut archive = home.open();
+    for state in 0..2000 {
+        let mut other = entry(LIFE, 1);
+        other.entry.state.0 = state;
+        archive.append(&[batch(vec![Record::Entry(other)])]).unwrap();
+    }
+    // The one entry alone takes no more than this.
+    let keep = Keep { since: None, bytes: Some(200_000) };
+    let gone = archive.expire(keep, at_s(1)).unwrap();
+    assert!((500..2000).contains(&gone.entries), "{gone:?}");
+    assert_eq!(archive.verify().unwrap().1, []);
 }
 
 /// Makes an authority, and a certificate of it for this computer, which the server may read.

@@ -197,6 +197,16 @@ pub(crate) fn an_archive_that_is_too_large_loses_its_oldest(home: &Home) {
     assert_eq!(archive.expire(keep, at_s(101)).unwrap().entries, 0);
 }
 
+pub(crate) fn evidence_that_is_too_large_alone_takes_no_entry_with_it(home: &Home) {
+    let mut archive = home.open();
+    let clocks = (1..=400).map(|after| observed(LIFE, after)).collect();
+    archive.append(&[batch(clocks), batch(entries(LIFE, 1..=400))]).unwrap();
+    let keep = Keep { since: Some(at_s(1)), bytes: Some(60_000) };
+    let error = archive.expire(keep, at_s(2)).unwrap_err();
+    assert!(matches!(error, Error::KeepsTooLittle { bytes: 60_000, .. }), "{error}");
+    assert_eq!(archive.check().unwrap().recorders[0].entries, 400);
+}
+
 pub(crate) fn a_clock_that_was_wrong_takes_no_more_than_is_too_much(home: &Home) {
     let mut archive = home.open();
     for part in 0..40_u64 {
