@@ -41,7 +41,7 @@ const PART: u64 = 16;
 
 /// How many positions a step goes over, or as many as the last batch has. Others may write between
 /// steps, and a step that is interrupted is as if it had not begun.
-const STEP: i64 = 4096;
+const STEP: i64 = 32_768;
 
 /// The last position of each chain before the first batch that was added at a time or later. What was
 /// added after something that is to be kept stays, too, whatever the computer's clock showed then.

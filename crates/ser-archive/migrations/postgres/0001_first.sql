@@ -112,3 +112,5 @@ CREATE TABLE checkpoint (
     conflicts BIGINT NOT NULL,
     expired_us BIGINT NOT NULL
 );
+
+CREATE INDEX checkpoint_by_chain ON checkpoint (chain, to_position);

@@ -112,3 +112,5 @@ CREATE TABLE checkpoint (
     conflicts INTEGER NOT NULL,
     expired_us INTEGER NOT NULL
 ) STRICT;
+
+CREATE INDEX checkpoint_by_chain ON checkpoint (chain, to_position);
