@@ -24,9 +24,10 @@ use ser_sim::genius::{
 
 use super::chance::Chance;
 use super::conversation::{Conversation, Order};
-use super::ledger::{Ledger, Port};
+use super::ledger::Ledger;
 use super::line_host::Errand;
 use super::orders::{self, Way};
+use super::port::Port;
 use super::taps::{BusTap, Taken, TappedWindow, answered_as};
 use super::trail::Trail;
 

@@ -9,7 +9,7 @@ use ser_proto::{
     Command, Configure, Counter, Counters, FrameError, MAX_ENTRIES, MAX_SIZE, Model, ParseError,
 };
 
-use super::ledger::Port;
+use super::port::Port;
 
 /// The most counters that one page has room for.
 const ROOM: usize = (MAX_SER_DATA - 4) / 4;

@@ -24,6 +24,7 @@ use super::chatter_model::ChatterModel;
 use super::counts::{Bounds, Expected};
 use super::debounce_model::{Accepted, DebounceModel};
 use super::filter_orders::{FilterOrder, FilterTable, FiltersQuestion, times};
+use super::port::Port;
 use super::questions::{Answers, Questions, TimeQuestion};
 use super::recorded::{Erase, Recorded, stamp_ms};
 use super::wrong::{Numbered, Told, Wrong, erases};
@@ -59,15 +60,6 @@ pub struct Edges {
     pub undecided: u64,
     /// Not edges, but places at which the log shows where an input came to rest after chatter.
     pub rests: u64,
-}
-
-/// The port that a command came by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Port {
-    /// RS-232.
-    Line,
-    /// Genius.
-    Bus,
 }
 
 /// A change of the log that was asked for, while it is not known when it is done.

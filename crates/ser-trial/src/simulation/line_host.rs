@@ -10,9 +10,10 @@ use ser_sim::SimNode;
 use super::activity::Tempo;
 use super::chance::Chance;
 use super::conversation::{Conversation, Order};
-use super::ledger::{Ledger, Port};
+use super::ledger::Ledger;
 use super::noise::{FrameGuard, Heard, OneIn, travel};
 use super::orders::{self, Way};
+use super::port::Port;
 use super::taps::LineTap;
 use super::trail::Trail;
 

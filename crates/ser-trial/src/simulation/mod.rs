@@ -34,6 +34,7 @@ pub mod line_host;
 pub mod noise;
 pub mod orders;
 pub mod pace;
+pub mod port;
 pub mod printout;
 pub mod questions;
 pub mod recorded;

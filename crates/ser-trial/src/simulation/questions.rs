@@ -9,7 +9,7 @@ use ser_proto::{
 
 use super::counts::Bounds;
 use super::filter_orders::{FilterOrder, FilterTable, FiltersQuestion};
-use super::ledger::Port;
+use super::port::Port;
 use super::wrong::Wrong;
 
 /// How long an answer may be on its way over the bus, where not every question gets one.

@@ -3,7 +3,7 @@
 use ser_proto::{ClockSource, Command, InputFilter, Inputs, Model, Reply};
 
 use super::*;
-use crate::simulation::ledger::Port;
+use crate::simulation::port::Port;
 
 const SIZE: u16 = 100;
 const NEVER_SET: (ClockSource, i64) = (ClockSource::NeverSet, 0);
