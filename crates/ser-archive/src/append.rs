@@ -45,7 +45,7 @@ impl Archive {
         Ok(appended)
     }
 
-    fn set_position(&mut self, position: i64) -> Result<()> {
+    pub(crate) fn set_position(&mut self, position: i64) -> Result<()> {
         const POSITION: &str = "UPDATE archive SET position = ?1";
         self.sql.run(POSITION, &[Value::Int(position)]).map(|_| ())
     }

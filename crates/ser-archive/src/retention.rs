@@ -268,7 +268,6 @@ impl Archive {
     ) -> Result<()> {
         const ADD: &str = "INSERT INTO checkpoint (position, chain, to_position, rows, digest, \
             kept, entries, conflicts, expired_us) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)";
-        const POSITION: &str = "UPDATE archive SET position = ?1";
         let position = next(self.position()?, self.name())?;
         let mut chain = self.chain(collector, recorder)?;
         // Where all links are gone, the chain goes on from here.
@@ -291,7 +290,7 @@ impl Archive {
             Value::Int(*expired_us),
         ];
         self.sql.run(ADD, &values)?;
-        self.sql.run(POSITION, &[Value::Int(position)])?;
+        self.set_position(position)?;
         chain.note(&mut *self.sql, position, *expired_us)
     }
 
