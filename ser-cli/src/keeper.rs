@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use ser_client::Cursor;
 use ser_evidence::record::EntryRecord;
+use ser_observer::new_life;
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::Result;
@@ -111,7 +112,7 @@ impl Keeper {
     pub(crate) fn life(&self) -> Result<Life> {
         match self.saved.and_then(|delivered| delivered.life) {
             Some(life) => Ok(life),
-            None => Ok(self.proposed.map_or_else(output::new_life, Ok)?),
+            None => Ok(self.proposed.map_or_else(new_life, Ok)?),
         }
     }
 
@@ -205,13 +206,13 @@ impl Keeper {
             }) if !is_another => Ok(life),
             // There is another log now than the one that was read, and the next reading says so.
             Some(Delivered { cursor: Some(_), next_life, .. }) => {
-                let life = next_life.or(self.proposed).map_or_else(output::new_life, Ok)?;
+                let life = next_life.or(self.proposed).map_or_else(new_life, Ok)?;
                 self.name(life, size)?;
                 Ok(life)
             }
             _ => {
                 let life = known.and_then(|known| known.life).or(self.proposed);
-                let life = life.map_or_else(output::new_life, Ok)?;
+                let life = life.map_or_else(new_life, Ok)?;
                 let cursor = Some(Cursor { sequence: 0, is_exact: true, anchor: None });
                 let next_life = None;
                 let erased = None;
@@ -237,7 +238,7 @@ impl Keeper {
         if is_whole {
             let erased = cursor.anchor.or(self.saved.and_then(|saved| saved.erased));
             let cursor = Some(Cursor { sequence: 0, is_exact: true, anchor: None });
-            let life = self.proposed.map_or_else(output::new_life, Ok)?;
+            let life = self.proposed.map_or_else(new_life, Ok)?;
             let (size, life) = (self.size().unwrap_or(0), Some(life));
             self.unsaved =
                 Some(Delivered { cursor, size, life, next_life: None, erased, log: None });

@@ -223,7 +223,7 @@ mod tests {
     use ser_evidence::record::{Life, LifeRecord, Watched};
 
     use super::*;
-    use crate::host_reading;
+    use ser_observer::host_reading;
 
     fn kept_in(directory: &Path) -> KeptRecords {
         let name = |name: &str| UnitName {

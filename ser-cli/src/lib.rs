@@ -5,7 +5,6 @@
 
 mod buses;
 mod cli;
-mod clock_look;
 mod closed_stdout;
 mod commands;
 mod connection;
@@ -15,19 +14,16 @@ mod error;
 mod extension;
 mod filter_text;
 mod gather;
-mod host_reading;
 mod interrupt;
 mod keeper;
 mod kept;
 mod log_identity;
-mod log_look;
 mod new_files;
 mod original;
 mod outage;
 mod outlet;
 mod output;
 mod progress;
-mod setting;
 mod site_file;
 mod state;
 mod suppressed;

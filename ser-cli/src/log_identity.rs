@@ -4,19 +4,16 @@
 //! A recorder with our extension counts the lives of its log. Where the numbers are others, the log
 //! is another one. Where they are the same, it is the same only if the counts outlive a power cut.
 
-use ser_client::{RequestError, Unit};
+use ser_client::Unit;
 use ser_evidence::record::Life;
-use ser_proto::{Capabilities, Identity};
+use ser_observer::{LogLook, life_of_recorder};
+use ser_proto::Identity;
 
 use crate::connection::ConnectionArgs;
 use crate::error::Result;
 use crate::keeper::{self, Keeper, StateArgs};
-use crate::log_look::LogLook;
 use crate::original::Originals;
 use crate::state::LogIdentity;
-
-/// The highest sequence at which totals have not gone round.
-const FIRST_WRAP: u64 = 1 << 16;
 
 /// A log that a run is about to read, as the recorder itself says.
 #[derive(Clone, Copy, Debug, Default)]
@@ -33,7 +30,7 @@ pub(crate) fn meet(unit: &mut Unit, keeper: &mut Keeper, originals: &Originals) 
     let log = LogIdentity::from(&identity);
     let is_another = keeper.is_of_another_log(log);
     if is_another || keeper.has_no_life() {
-        keeper.propose(name(unit, &identity)?);
+        keeper.propose(life_of_recorder(unit, &identity)?);
     }
     Ok(Met { log: Some(log), is_another })
 }
@@ -51,7 +48,7 @@ pub(crate) fn named(
     let mut life_of_empty_log = || -> Result<Life> {
         let mut keeper = Keeper::load(state, connection)?;
         if let Some(identity) = identity {
-            keeper.propose(name(unit, identity)?);
+            keeper.propose(life_of_recorder(unit, identity)?);
         }
         keeper.life_of_empty_log(log)
     };
@@ -64,7 +61,7 @@ pub(crate) fn named(
 /// Asks which log this is that has begun anew under a reading, and how it is called.
 pub(crate) fn begun_anew(unit: &mut Unit) -> Result<(Option<LogIdentity>, Option<Life>)> {
     let Some(identity) = unit.identity_again()? else { return Ok((None, None)) };
-    let name = name(unit, &identity)?;
+    let name = life_of_recorder(unit, &identity)?;
     Ok((Some(LogIdentity::from(&identity)), name))
 }
 
@@ -80,24 +77,4 @@ pub(crate) fn remember(
         Ok(Some(identity)) if LogIdentity::from(&identity) == log => keeper.read_from(log),
         _ => Ok(()),
     }
-}
-
-/// The name of the life that the log of this recorder is in. `None` where it cannot have one that
-/// everybody gives it: the recorder has no number, its counts begin anew with the power, or its
-/// entries may be counted differently by who has not seen all of them.
-fn name(unit: &mut Unit, identity: &Identity) -> std::result::Result<Option<Life>, RequestError> {
-    let Some(id) = identity.id else { return Ok(None) };
-    if !identity.capabilities.contains(Capabilities::LASTING_COUNTS) {
-        return Ok(None);
-    }
-    let look = match unit.clock_look() {
-        Ok(look) => look,
-        Err(RequestError::NoReply { .. }) => None,
-        Err(error) => return Err(error),
-    };
-    let is_countable = |reading: &ser_proto::ClockReading| {
-        reading.life == identity.life && reading.next_sequence <= FIRST_WRAP
-    };
-    let is_known = look.is_some_and(|look| is_countable(&look.reading));
-    Ok(is_known.then(|| Life::of_recorder(&id.bytes(), identity.power_ups, identity.life)))
 }

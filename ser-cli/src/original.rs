@@ -14,9 +14,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::connection::{self, ConnectionArgs};
 use crate::error::Result;
-use crate::host_reading;
 use crate::keeper::StateArgs;
 use crate::state::{StateFile, read_ours, write_anew};
+use ser_observer::host_reading;
 
 /// For how long a recorder is taken for an original one without being asked.
 const BELIEVED_FOR_S: i64 = 30 * 86_400;

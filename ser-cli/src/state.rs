@@ -490,7 +490,7 @@ mod tests {
         let mut last = entry("00.250", &[3, 32], &[32]);
         last.time.month = 200;
         let cursor = |sequence, is_exact, anchor| Some(Cursor { sequence, is_exact, anchor });
-        let drawn = || Some(crate::output::new_life().unwrap());
+        let drawn = || Some(ser_observer::new_life().unwrap());
         for delivered in [
             Delivered {
                 cursor: cursor(u64::MAX, false, Some(last)),

@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 
 use ser_client::{RequestError, Unit};
 use ser_evidence::record::{Record, Suppressed};
+use ser_observer::left_out;
 
 use crate::error::{advise, warn};
 use crate::filter_text;
-use crate::host_reading;
 use crate::kept::KeptRecords;
 use crate::output::Points;
 
@@ -20,18 +20,6 @@ const LOOK_EVERY: Duration = Duration::from_secs(60);
 
 /// A look must not take a larger part of the line than one in so many, however slow that is.
 const PART_OF_LINE: u32 = 30;
-
-/// What the recorder counts now; `None` where it cannot be asked.
-pub(crate) fn look(unit: &mut Unit) -> Result<Option<Suppressed>, RequestError> {
-    let Some(clock) = unit.clock_look()? else { return Ok(None) };
-    let Some(counts) = unit.suppressed_changes()? else { return Ok(None) };
-    Ok(Some(Suppressed {
-        from: host_reading::at(clock.between.0),
-        to: host_reading::now(),
-        on_for_us: clock.reading.tick_us,
-        left_out: counts.into_iter().filter(|(_, count)| *count > 0).collect(),
-    }))
-}
 
 /// Looks during the readings of one log.
 pub(crate) struct LeftOut {
@@ -69,7 +57,7 @@ impl LeftOut {
         }
         let (is_first, before) = (!self.has_looked, self.before.clone());
         // What fails now may be an outage, of which others tell; the next look comes soon.
-        let record = look(unit).ok().flatten().map(|look| self.take(look));
+        let record = left_out(unit).ok().flatten().map(|look| self.take(look));
         self.due = Instant::now() + LOOK_EVERY.max(began.elapsed() * PART_OF_LINE);
         record.filter(|record| match record {
             Record::Suppressed(look) => is_first || !look.since(before.as_ref()).is_empty(),
@@ -80,7 +68,7 @@ impl LeftOut {
     /// Looks and tells what is new. The entries are what the recorder was read for, so a look that
     /// fails ends nothing.
     pub(crate) fn look(&mut self, unit: &mut Unit) -> Option<Record> {
-        match look(unit) {
+        match left_out(unit) {
             Ok(look) => look.map(|look| self.take(look)),
             Err(error) => {
                 self.tell_failure(&error);

@@ -8,22 +8,14 @@
 use std::time::Duration;
 
 use ser_client::Cursor;
-use ser_evidence::record::{
-    ClockObservation, EntryRecord, HostReading, How, Life, LifeRecord, Place, Record, Reference,
-    Watched,
-};
-use ser_evidence::time::{Bound, Host, Moment, shown};
+use ser_evidence::record::{ClockObservation, HostReading, Life, LifeRecord, Record, Watched};
+use ser_evidence::time::{Host, Moment};
+use ser_observer::{host_reading, seen_at};
 use ser_proto::Model;
 
-use crate::delivery::{Arrived, NewEntries, Outlet};
+use crate::delivery::{NewEntries, Outlet};
 use crate::error::Result;
-use crate::host_reading;
 use crate::kept::KeptRecords;
-
-/// How long before it is in the log a change may have happened, in microseconds. A recorder holds a
-/// change back for up to 320 ms, debounce included, so that changes get into order. The rest is for
-/// original recorders, of which this is not known.
-const HOLD_BACK_US: i64 = 1_000_000;
 
 /// How often entries are taken for observations of the clock.
 const OBSERVE_EVERY_US: i64 = 60_000_000;
@@ -164,7 +156,9 @@ impl Witness {
         }
         let last = new.last.filter(|last| new.first != Some(*last));
         for arrived in new.first.into_iter().chain(last) {
-            let Some(observation) = observation(complete_at, &arrived) else { continue };
+            let Some(observation) = seen_at(&arrived.record, complete_at, arrived.at) else {
+                continue;
+            };
             self.observed_at = Some(host_reading::moment(arrived.at));
             self.tell(Record::Clock(observation), outlet)?;
         }
@@ -218,22 +212,4 @@ fn erased(record: &Record) -> Option<(Life, Life)> {
 fn life(record: &Record) -> Option<LifeRecord> {
     let Record::Life(life) = record else { return None };
     Some(*life)
-}
-
-/// What the recorder's clock showed at an entry that was not in the log at `complete_at`.
-fn observation(complete_at: Moment<Host>, arrived: &Arrived) -> Option<ClockObservation> {
-    let Arrived { record: EntryRecord { life, sequence, entry, .. }, at } = *arrived;
-    let bound = Bound::new(Some(complete_at.after(-HOLD_BACK_US)), Some(host_reading::moment(at)));
-    Some(ClockObservation {
-        how: How::Event,
-        shown: shown(&entry.time)?,
-        at: Reference::Host { bound, reading: host_reading::at(at) },
-        place: Place {
-            life,
-            after: Some(sequence?),
-            before: sequence,
-            newest: Some(entry),
-            fellow: None,
-        },
-    })
 }

@@ -1,25 +1,21 @@
 //! `clock`: the recorder's clock.
 
 use std::io::{self, Write};
-use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
-use ser_client::{RequestError, Unit};
-use ser_evidence::record::{ClockObservation, How, Record};
-use ser_evidence::time::shown;
+use ser_evidence::record::{ClockObservation, Record};
+use ser_observer::LogLook;
+use ser_observer::setting::{self, Setting, set_clock};
 use ser_proto::TimeStamp;
 
-use crate::clock_look;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, advise, inform, warn};
 use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
 use crate::log_identity;
-use crate::log_look::LogLook;
 use crate::original::Originals;
 use crate::output;
-use crate::setting;
 use crate::time::{local_time_in, parse_time, time_after};
 
 const EXAMPLES: &str = "\
@@ -37,9 +33,6 @@ Formats:
   text    the time that was sent
   jsonl   what was seen of the clock, an object per record (record \"clock\": \"set\", or \"query\" where \
 it was asked; record \"step\" if nobody knows to what it was set), as read writes them";
-
-/// How long after a setting the clock is asked, so that nobody can take it for what was before.
-const AFTER_SETTING: Duration = Duration::from_millis(10);
 
 /// Set the recorder's clock.
 #[derive(Debug, clap::Args)]
@@ -163,58 +156,30 @@ pub(super) fn set_and_remember(
     let look = LogLook::take(&mut unit)?;
     let life = identity.as_ref().map(|identity| identity.life);
     let before = log_identity::named(look, &mut unit, identity.as_ref(), (state, connection));
-    let mut records = Vec::new();
-    records.extend(life.and_then(|life| asked(&mut unit, &before, life)));
-    let sent = match set(&mut unit, at, &time_in) {
-        Ok(sent) => sent,
-        Err(error) => {
-            if matches!(error, RequestError::NoReply { may_have_been_done: true, .. }) {
-                records.push(setting::step(before.place(None)));
-            }
-            kept.add(&records);
-            return Err(NotSet { failure: error.into(), records });
-        }
-    };
-    let observed = observed(&mut unit, sent, &before);
-    records.push(observed.map_or_else(|| setting::step(before.place(None)), Record::Clock));
-    if let Some(life) = life {
-        thread::sleep(AFTER_SETTING);
-        records.extend(asked(&mut unit, &before, life));
-    }
+    let time_at = &mut time_at(at, &time_in);
+    let Setting { sent, observed, records } = set_clock(&mut unit, &before, life, time_at);
     kept.add(&records);
-    Ok(Set { sent, observed, records })
+    match sent {
+        Ok(sent) => Ok(Set { sent, observed, records }),
+        Err(error) => Err(NotSet { failure: error.into(), records }),
+    }
 }
 
-/// What the recorder says of its clock, if it can be asked and its log has a name. A setting is
-/// worth more, so no failure is one here.
-fn asked(unit: &mut Unit, before: &LogLook, life: u32) -> Option<Record> {
-    let looks = clock_look::take(unit).ok()??;
-    let place = before.place_before(looks.last_total(life)?)?;
-    looks.observation(place).map(Record::Clock)
-}
-
-fn set(
-    unit: &mut Unit,
+/// The time to send so that it is right when it arrives that much later: the given one, or the
+/// present.
+fn time_at<'t>(
     at: Option<TimeStamp>,
-    time_in: &dyn Fn(Duration) -> std::result::Result<TimeStamp, i32>,
-) -> std::result::Result<TimeStamp, RequestError> {
+    time_in: &'t dyn Fn(Duration) -> std::result::Result<TimeStamp, i32>,
+) -> impl FnMut(Duration) -> TimeStamp + 't {
     let mut asked_first = None;
-    unit.set_clock(|ahead| match at {
+    move |ahead| match at {
         // A repeated attempt sets the time that has been reached since the first one.
         Some(at) => {
             let now = Instant::now();
             time_after(at, now.duration_since(*asked_first.get_or_insert(now)))
         }
-        None => time_in(ahead).unwrap_or(NO_TIME),
-    })
-}
-
-/// What the clock showed when it was set just now.
-fn observed(unit: &mut Unit, sent: TimeStamp, before: &LogLook) -> Option<ClockObservation> {
-    let exchange = unit.last_exchange().filter(|exchange| exchange.attempts == 1)?;
-    let after = unit.log_position().ok().map(|position| position.total);
-    let how = How::Set { broadcast: None };
-    Some(setting::observation(how, shown(&sent)?, exchange.carried_out(), before.place(after)))
+        None => time_in(ahead).unwrap_or(setting::NO_TIME),
+    }
 }
 
 /// Says how exact the setting was.
@@ -232,7 +197,3 @@ fn tell(observed: Option<&ClockObservation>) {
         }
     }
 }
-
-/// Neither a recorder nor a client accepts this as a date.
-const NO_TIME: TimeStamp =
-    TimeStamp { year: 0, month: 0, day: 0, hour: 0, minute: 0, second: 0, millisecond: 0 };

@@ -15,7 +15,7 @@ use super::report::{self, Shown};
 use crate::error::{Failure, Result};
 use crate::new_files::NewFiles;
 use crate::outlet::{Outlet, file_named};
-use crate::setting;
+use ser_observer::setting;
 
 const EXAMPLES: &str = "\
 Examples:

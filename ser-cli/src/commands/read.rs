@@ -7,7 +7,6 @@ use std::time::Duration;
 use ser_client::{Cursor, Delivery, LogFollower, RangeReader, RequestError, Unit};
 use ser_proto::{Code, Command, MAX_SIZE, Reply};
 
-use crate::clock_look;
 use crate::connection::{self, ConnectionArgs};
 use crate::delivery::Outlet;
 use crate::error::{Failure, Result, advise, inform, warn};
@@ -15,13 +14,14 @@ use crate::interrupt;
 use crate::keeper::{Keeper, StateArgs};
 use crate::kept::{KeptRecords, Since};
 use crate::log_identity::{self, Met};
-use crate::log_look;
 use crate::original::Originals;
 use crate::output::{Format, Life};
 use crate::state::LogIdentity;
 use crate::suppressed::LeftOut;
 use crate::values;
 use crate::witness::Witness;
+use ser_observer::clock_look;
+use ser_observer::nothing_after;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -172,7 +172,7 @@ fn read_by_cursor(
     })?;
     let cursor = follower.cursor();
     let looked_at = match cursor.filter(|_| witness.is_wanted(outlet)) {
-        Some(cursor) => log_look::nothing_after(unit, cursor)?,
+        Some(cursor) => nothing_after(unit, cursor)?,
         None => None,
     };
     witness.read(outlet, cursor, follower.size(), looked_at.max(follower.complete_at()))?;

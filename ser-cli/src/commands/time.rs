@@ -13,12 +13,12 @@ use clap::ValueEnum;
 use crate::buses::Buses;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, advise};
-use crate::host_reading;
 use crate::interrupt::Caught;
 use crate::keeper::StateArgs;
 use crate::output;
 use crate::values;
 use ask::{Answer, Asking};
+use ser_observer::host_reading;
 use show::{HostDoubt, Row};
 
 const EXAMPLES: &str = "\

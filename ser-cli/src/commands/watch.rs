@@ -10,7 +10,6 @@ use std::time::{Duration, Instant};
 use ser_client::{Delivery, LogFollower, LogWatcher, Lost, ReportSwitch, Unit};
 use ser_proto::{AutoReport, Configuration, Configure};
 
-use crate::clock_look::{self, NowAndThen};
 use crate::closed_stdout;
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::delivery::Outlet;
@@ -26,6 +25,7 @@ use crate::state::LogIdentity;
 use crate::suppressed::LeftOut;
 use crate::values;
 use crate::witness::Witness;
+use ser_observer::clock_look::{self, NowAndThen};
 
 const EXAMPLES: &str = "\
 Examples:

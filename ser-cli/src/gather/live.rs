@@ -13,18 +13,17 @@ use ser_evidence::time::{Bound, shown};
 use ser_files::NotReached;
 
 use crate::buses::Buses;
-use crate::clock_look;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
-use crate::host_reading;
 use crate::interrupt::Caught;
 use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
-use crate::log_look;
 use crate::original::Originals;
 use crate::output::Loss;
 use crate::state::{Delivered, LogIdentity, StateFile};
-use crate::suppressed;
+use ser_observer::clock_look;
+use ser_observer::host_reading;
+use ser_observer::nothing_after;
 
 /// Reads all recorders that have a port. Returns those that could not be read.
 pub(super) fn read(
@@ -150,7 +149,7 @@ fn read_one(
         };
         records.push(Record::Life(life));
         let through = named.sequence(cursor.sequence);
-        let looked_at = log_look::nothing_after(&mut unit, cursor)?;
+        let looked_at = nothing_after(&mut unit, cursor)?;
         if let Some(complete_at) = looked_at.max(follower.complete_at()) {
             let to = host_reading::at(complete_at);
             records.push(Record::Watched(Watched { life: named.life, from, to, through }));
@@ -166,7 +165,7 @@ fn read_one(
         records.push(looked);
     }
     // The entries are there, whatever becomes of this.
-    records.extend(suppressed::look(&mut unit).ok().flatten().map(Record::Suppressed));
+    records.extend(ser_observer::left_out(&mut unit).ok().flatten().map(Record::Suppressed));
     records.extend(kept.load());
     Ok(records)
 }

@@ -2,8 +2,7 @@
 
 use std::io::{self, Write};
 
-use ser_client::Lost as Missing;
-use ser_evidence::record::{EntryRecord, Gap, Lost, Record, Why};
+use ser_evidence::record::{EntryRecord, Gap, Record};
 use ser_files::jsonl::Writer;
 
 use super::{EventWriter, Loss, Rows};
@@ -70,13 +69,7 @@ impl From<&super::Event> for EntryRecord {
 
 impl From<&Loss> for Gap {
     fn from(loss: &Loss) -> Gap {
-        let (lost, why) = match loss.lost {
-            Missing::Overwritten { count } => (Lost::Exactly(count), Why::Overwritten),
-            Missing::OverwrittenAtLeast { count } => (Lost::AtLeast(count), Why::Overwritten),
-            Missing::LogRestarted => (Lost::Unknown, Why::LogBeganAnew),
-            Missing::Unrecorded { inputs } => (Lost::Unknown, Why::not_recorded(inputs)),
-        };
-        Gap { life: loss.life, after: loss.after, lost, why }
+        ser_observer::gap(loss.life, loss.after, loss.lost)
     }
 }
 
@@ -127,7 +120,7 @@ mod tests {
         let lines = written(true, |lines| {
             lines.event(&event(2048, entry("00.250", &[3, 17], &[1, 3]))).unwrap();
             lines.lost(&four_lost()).unwrap();
-            let lost = Missing::Unrecorded { inputs };
+            let lost = ser_client::Lost::Unrecorded { inputs };
             lines.lost(&Loss { lost, ..four_lost() }).unwrap();
             lines.event(&odd(event(1, entry("00.251", &[], &[])))).unwrap();
         });

@@ -6,9 +6,10 @@ use std::io;
 use ser_client::{Delivery, Lost};
 use ser_evidence::record::Gap;
 use ser_files::csv::loss_note;
+use ser_observer::new_life;
 use ser_proto::{Entry, Model};
 
-use super::{EventWriter, Life, new_life};
+use super::{EventWriter, Life};
 use crate::time::ClockStep;
 
 /// An event, with its notes.

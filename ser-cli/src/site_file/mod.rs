@@ -1,7 +1,6 @@
 //! Site files: from a path to the site, and what is wrong with it drawn for people.
 
 mod choice;
-mod clock;
 mod draw;
 mod ports;
 mod source;
@@ -17,7 +16,6 @@ use ser_proto::Model;
 #[cfg(unix)]
 pub(crate) use choice::bus_name;
 pub(crate) use choice::{Chosen, choose};
-pub(crate) use clock::ClockSetting;
 
 use crate::error::{Failure, Result};
 

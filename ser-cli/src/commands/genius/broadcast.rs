@@ -14,9 +14,9 @@ use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result, inform, warn};
 use crate::keeper::StateArgs;
 use crate::output;
-use crate::setting;
-use crate::site_file::ClockSetting;
 use crate::time::{local_time_in, parse_time};
+use ser_observer::ClockSetting;
+use ser_observer::setting;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::Subcommand)]
 pub(super) enum What {

@@ -13,9 +13,9 @@ use crate::error::Result;
 use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
 use crate::log_identity;
-use crate::log_look::LogLook;
 use crate::original::Originals;
-use crate::setting;
+use ser_observer::LogLook;
+use ser_observer::setting;
 
 /// What a recorder last received as a broadcast, or why that is not known.
 pub(super) type Answer = std::result::Result<Option<LastBroadcast>, String>;

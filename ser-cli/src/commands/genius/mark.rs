@@ -15,11 +15,11 @@ use super::super::clock::Format;
 use super::check::{Check, Heard};
 use crate::connection::ConnectionArgs;
 use crate::error::{Result, advise, inform};
-use crate::host_reading;
 use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
 use crate::output;
 use crate::time::{Delta, local_time_in};
+use ser_observer::host_reading;
 
 const DAY_US: i64 = 86_400_000_000;
 

@@ -3,10 +3,10 @@
 use ser_client::Unit;
 use ser_proto::{ClockReading, ClockSource};
 
-use crate::clock_look;
 use crate::connection::ConnectionArgs;
 use crate::error::Result;
-use crate::site_file::ClockSetting;
+use ser_observer::ClockSetting;
+use ser_observer::clock_look;
 
 /// A recorder's clock, as this computer sees it.
 #[derive(Clone, Debug, PartialEq)]

@@ -235,7 +235,7 @@ mod tests {
 
     use super::*;
     use crate::output::testing::{entry, points};
-    use crate::site_file::ClockSetting;
+    use ser_observer::ClockSetting;
 
     fn text(facts: &Facts, points: &Points) -> String {
         let mut out = Vec::new();

@@ -11,16 +11,16 @@ use ser_proto::{Capabilities, ClockReading, ClockSource, Identity};
 
 use super::drift::{self, Rate, Sight};
 use crate::buses::Buses;
-use crate::clock_look::{self, Looks};
 use crate::connection::{ConnectionArgs, HEARTBEAT};
 use crate::error::Result;
-use crate::host_reading;
 use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
 use crate::log_identity;
-use crate::log_look::LogLook;
 use crate::original::Originals;
-use crate::site_file::ClockSetting;
+use ser_observer::ClockSetting;
+use ser_observer::LogLook;
+use ser_observer::clock_look::{self, Looks};
+use ser_observer::host_reading;
 
 /// How often a clock is asked for that is looked at for a while.
 const SAMPLE_EVERY: Duration = Duration::from_secs(1);

@@ -11,7 +11,6 @@ use ser_client::{Delivery, LogFollower, LogWatcher};
 use super::super::{Args, POLL_EVERY};
 use super::Batch;
 use crate::buses::Buses;
-use crate::clock_look::NowAndThen;
 use crate::closed_stdout;
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::error::{Failure, Result, inform};
@@ -22,6 +21,7 @@ use crate::original::Originals;
 use crate::output::{Annotator, Event, EventWriter, Loss, Record, RecorderColumn};
 use crate::suppressed::LeftOut;
 use ser_evidence::record::{self as evidence, EntryRecord};
+use ser_observer::clock_look::NowAndThen;
 
 /// How long a recorder that has failed is left alone.
 const ASK_AGAIN: Duration = Duration::from_secs(10);

@@ -177,8 +177,8 @@ mod tests {
     use ser_evidence::time::{Bound, Moment, shown};
 
     use super::*;
-    use crate::host_reading;
     use crate::output::testing::{entry, event, four_lost};
+    use ser_observer::host_reading;
 
     fn at(number: u16, time: &str) -> Record {
         let mut event = event(number, entry(time, &[1], &[1]));

@@ -7,17 +7,17 @@ use ser_evidence::record::{Boot, HostReading};
 use ser_evidence::time::{Host, Moment};
 
 /// Both clocks now.
-pub(crate) fn now() -> HostReading {
+pub fn now() -> HostReading {
     reading(HostTime::now())
 }
 
 /// Both clocks at a time of the monotonic one, not long ago.
-pub(crate) fn at(time: Duration) -> HostReading {
+pub fn at(time: Duration) -> HostReading {
     reading(HostTime::now().at(time))
 }
 
 /// A time of the monotonic clock.
-pub(crate) fn moment(time: Duration) -> Moment<Host> {
+pub fn moment(time: Duration) -> Moment<Host> {
     Moment::from_us(i64::try_from(time.as_micros()).unwrap_or(i64::MAX))
 }
 

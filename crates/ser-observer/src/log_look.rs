@@ -11,11 +11,11 @@ const TRIES: u32 = 3;
 
 /// The log at one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct LogLook {
+pub struct LogLook {
     /// Events since the log was erased, modulo 65536.
     total: u16,
     /// The newest entry, if there is one and it could be had.
-    pub(crate) newest: Option<Entry>,
+    pub newest: Option<Entry>,
     /// The life of the log, where somebody has named it.
     life: Life,
     /// The sequence of the newest entry in that life, if it is known beyond 65536.
@@ -29,10 +29,7 @@ const WRAP: u64 = 1 << 16;
 ///
 /// A report that was on its way may pass for the answer to one look. It has a total of its own, so
 /// of two looks at the same total at least one was answered.
-pub(crate) fn nothing_after(
-    unit: &mut Unit,
-    cursor: Cursor,
-) -> Result<Option<Duration>, RequestError> {
+pub fn nothing_after(unit: &mut Unit, cursor: Cursor) -> Result<Option<Duration>, RequestError> {
     let asked_at = RealTime.now();
     let looks = [unit.log_position()?.total, unit.log_position()?.total];
     Ok((looks == [cursor.total(); 2]).then_some(asked_at))
@@ -40,7 +37,7 @@ pub(crate) fn nothing_after(
 
 impl LogLook {
     /// Looks now.
-    pub(crate) fn take(unit: &mut Unit) -> Result<LogLook, RequestError> {
+    pub fn take(unit: &mut Unit) -> Result<LogLook, RequestError> {
         let mut position = unit.log_position()?;
         for _ in 0..TRIES {
             // The newest entry is before the next one. Before the first comes the last, and only
@@ -69,7 +66,7 @@ impl LogLook {
 
     /// Names the life of an empty log. Of another one the newest entry tells which it is, and if
     /// that is the one that was delivered last, its life has a name.
-    pub(crate) fn named(
+    pub fn named(
         self,
         life_of_empty_log: impl FnOnce() -> Life,
         last_delivered: impl FnOnce() -> Option<EntryRecord>,
@@ -88,13 +85,13 @@ impl LogLook {
     }
 
     /// The same where it can be found again; `None` if nothing tells which log it was.
-    pub(crate) fn place_before(&self, total_after: u16) -> Option<Place> {
+    pub fn place_before(&self, total_after: u16) -> Option<Place> {
         let is_found = self.life.is_known() || self.newest.is_some();
         is_found.then(|| self.place(Some(total_after)))
     }
 
     /// The place of something that happened after this look, and before the log had this total.
-    pub(crate) fn place(&self, total_after: Option<u16>) -> Place {
+    pub fn place(&self, total_after: Option<u16>) -> Place {
         let after = self.sequence.unwrap_or(self.total.into());
         let before = total_after.map(|total| {
             let more = u64::from(total.wrapping_sub(self.total));

@@ -12,8 +12,8 @@ use ser_evidence::record::{ClockObservation, How, Life, Place, Reference};
 use ser_evidence::time::{Bound, Host, Moment, Shown, stamp};
 use ser_proto::ClockReading;
 
+use crate::clock_setting::ClockSetting;
 use crate::host_reading;
-use crate::site_file::ClockSetting;
 
 /// How many answers are wanted.
 const ROUNDS: u32 = 4;
@@ -37,7 +37,7 @@ const MS_US: i64 = 1000;
 
 /// Questions about a clock, one after the other.
 #[derive(Debug, Default)]
-pub(crate) struct Questions {
+pub struct Questions {
     asked: u32,
     last_asked: Option<Duration>,
     looks: Vec<ClockLook>,
@@ -46,10 +46,10 @@ pub(crate) struct Questions {
 
 /// Answers about one clock that was not set between them, in their order; at least one.
 #[derive(Clone, Debug)]
-pub(crate) struct Looks(Vec<ClockLook>);
+pub struct Looks(Vec<ClockLook>);
 
 /// Asks until enough is known; `None` where the recorder cannot be asked or does not answer.
-pub(crate) fn take(unit: &mut Unit) -> Result<Option<Looks>, RequestError> {
+pub fn take(unit: &mut Unit) -> Result<Option<Looks>, RequestError> {
     let mut questions = Questions::default();
     while !questions.is_over() {
         thread::sleep(questions.wait(unit.now()));
@@ -60,7 +60,7 @@ pub(crate) fn take(unit: &mut Unit) -> Result<Option<Looks>, RequestError> {
 
 /// Asks now and then, a question at a time, so that nothing else waits.
 #[derive(Debug)]
-pub(crate) struct NowAndThen {
+pub struct NowAndThen {
     /// The questions under way, and how far the log had been read before the first of them.
     under_way: Option<(Questions, (Life, Cursor))>,
     /// When the next ones begin.
@@ -73,13 +73,13 @@ pub(crate) struct NowAndThen {
 
 impl NowAndThen {
     /// Begins at once, in the life of which the recorder `said` this number.
-    pub(crate) const fn new(said: u32) -> NowAndThen {
+    pub const fn new(said: u32) -> NowAndThen {
         NowAndThen { under_way: None, due: Duration::ZERO, said, called: None }
     }
 
     /// Asks if it is time to; the log has been read as far as `place` says. Returns what was
     /// observed in the end.
-    pub(crate) fn step(
+    pub fn step(
         &mut self,
         unit: &mut Unit,
         (life, cursor): (Life, Cursor),
@@ -122,19 +122,19 @@ impl NowAndThen {
 
 impl Questions {
     /// Whether nothing more is asked.
-    pub(crate) const fn is_over(&self) -> bool {
+    pub const fn is_over(&self) -> bool {
         self.is_over
     }
 
     /// How long to wait until the next question, so that the last one comes late enough.
-    pub(crate) fn wait(&self, now: Duration) -> Duration {
+    pub fn wait(&self, now: Duration) -> Duration {
         let pause = HOLD_BACK / (ROUNDS - 1);
         let due = self.last_asked.map_or(Duration::ZERO, |asked| asked + pause);
         due.saturating_sub(now)
     }
 
     /// Asks once.
-    pub(crate) fn ask(&mut self, unit: &mut Unit) -> Result<(), RequestError> {
+    pub fn ask(&mut self, unit: &mut Unit) -> Result<(), RequestError> {
         self.last_asked = Some(unit.now());
         self.asked += 1;
         match unit.clock_look() {
@@ -161,7 +161,7 @@ impl Questions {
     }
 
     /// What was answered.
-    pub(crate) fn answers(self) -> Option<Looks> {
+    pub fn answers(self) -> Option<Looks> {
         (!self.looks.is_empty()).then_some(Looks(self.looks))
     }
 }
@@ -182,19 +182,19 @@ const fn rate_us(elapsed_us: u64) -> u64 {
 
 impl Looks {
     /// The first answer, of whose moment the others tell more.
-    pub(crate) fn first(&self) -> Option<&ClockReading> {
+    pub fn first(&self) -> Option<&ClockReading> {
         self.0.first().map(|look| &look.reading)
     }
 
     /// The last answer.
-    pub(crate) fn last(&self) -> Option<&ClockReading> {
+    pub fn last(&self) -> Option<&ClockReading> {
         self.0.last().map(|look| &look.reading)
     }
 
     /// The recorder's total in this life when it answered last, as other replies show it. `None` if
     /// the log is another one by then, or if that was so soon that changes from before the first
     /// answer may not have been in the log yet.
-    pub(crate) fn last_total(&self, life: u32) -> Option<u16> {
+    pub fn last_total(&self, life: u32) -> Option<u16> {
         // Modulo 65536 is what totals are.
         let last = self.last().filter(|_| self.lasted() >= HOLD_BACK)?;
         if last.life != life {
@@ -213,7 +213,7 @@ impl Looks {
 
     /// The millisecond that the clock showed at the first answer, and when it began to show it.
     /// `None` if a stamp cannot express it.
-    pub(crate) fn shown(&self) -> Option<(Moment<Shown>, Bound<Host>)> {
+    pub fn shown(&self) -> Option<(Moment<Shown>, Bound<Host>)> {
         let first = self.first()?;
         let into_ms = first.clock_us.rem_euclid(MS_US);
         let shown = Moment::from_us(first.clock_us.checked_sub(into_ms)?);
@@ -228,13 +228,13 @@ impl Looks {
     }
 
     /// How many answers there are.
-    pub(crate) fn rounds(&self) -> usize {
+    pub fn rounds(&self) -> usize {
         self.0.len()
     }
 
     /// How far the clock was ahead of this computer's monotonic one at each answer, at least and at
     /// most, and when that was; in microseconds.
-    pub(crate) fn ahead(&self) -> impl Iterator<Item = (i64, (i64, i64))> {
+    pub fn ahead(&self) -> impl Iterator<Item = (i64, (i64, i64))> {
         self.0.iter().map(|look| {
             let us = |time: Duration| host_reading::moment(time).us();
             let (from, to) = (us(look.between.0), us(look.between.1).saturating_add(1));
@@ -246,7 +246,7 @@ impl Looks {
 
     /// How far the clock was ahead of what it should show when it was asked last, at least and at
     /// most, in microseconds. `None` where that cannot be told.
-    pub(crate) fn ahead_of(&self, setting: &ClockSetting) -> Option<(i64, i64)> {
+    pub fn ahead_of(&self, setting: &ClockSetting) -> Option<(i64, i64)> {
         let (asked_us, last) = self.ahead().last()?;
         let known = |(least, most): (i64, i64)| Bound::<Host>::from_us(least, most);
         let each = self.ahead().map(|(at_us, (least, most))| {
@@ -265,7 +265,7 @@ impl Looks {
     }
 
     /// With later answers; without these, if the clock was set in between.
-    pub(crate) fn and(mut self, later: Looks) -> Looks {
+    pub fn and(mut self, later: Looks) -> Looks {
         let is_same = match (self.last(), later.first()) {
             (Some(last), Some(first)) => is_same_clock(last, first),
             _ => false,
@@ -278,7 +278,7 @@ impl Looks {
     }
 
     /// The observation that they are, at this place.
-    pub(crate) fn observation(&self, place: Place) -> Option<ClockObservation> {
+    pub fn observation(&self, place: Place) -> Option<ClockObservation> {
         let (shown, bound) = self.shown()?;
         let asked = self.0.first()?.between.1;
         let at = Reference::Host { bound, reading: host_reading::at(asked) };
@@ -290,7 +290,7 @@ impl Looks {
     ///
     /// `None` if this may be another log, where nothing tells which log it is, or if the last answer
     /// came too soon: an entry from before the first one may then have been held back beyond it.
-    pub(crate) fn place(&self, life: Life, cursor: Cursor, said: Option<u32>) -> Option<Place> {
+    pub fn place(&self, life: Life, cursor: Cursor, said: Option<u32>) -> Option<Place> {
         let (first, last) = (self.first()?, self.last()?);
         if self.lasted() < HOLD_BACK {
             return None;

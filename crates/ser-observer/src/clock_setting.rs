@@ -10,13 +10,13 @@ use ser_proto::TimeStamp;
 
 /// A time zone for a clock that has none.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct ClockSetting {
+pub struct ClockSetting {
     zone: TimeZone,
 }
 
 impl ClockSetting {
     /// What the rule means at this site.
-    pub(crate) fn of(rule: ClockRule, site: &Site) -> ClockSetting {
+    pub fn of(rule: ClockRule, site: &Site) -> ClockSetting {
         let zone = match rule {
             ClockRule::Utc => TimeZone::UTC,
             ClockRule::Local => site.time_zone.clone(),
@@ -29,13 +29,13 @@ impl ClockSetting {
     }
 
     /// The local time of this computer.
-    pub(crate) fn of_this_computer() -> ClockSetting {
+    pub fn of_this_computer() -> ClockSetting {
         ClockSetting { zone: TimeZone::system() }
     }
 
     /// What the clock should show at a time in UTC, both in microseconds since 1970; `None` beyond
     /// the years that there are.
-    pub(crate) fn shown_us(&self, utc_us: i64) -> Option<i64> {
+    pub fn shown_us(&self, utc_us: i64) -> Option<i64> {
         let time = Timestamp::from_microsecond(utc_us).ok()?;
         let offset_s = self.zone.to_offset(time).seconds();
         utc_us.checked_add(i64::from(offset_s) * 1_000_000)
@@ -43,7 +43,7 @@ impl ClockSetting {
 
     /// The time `ahead` from now, as the clock should show it. An error with its year if the two
     /// digits of a stamp cannot express it.
-    pub(crate) fn time_in(&self, ahead: Duration) -> Result<TimeStamp, i32> {
+    pub fn time_in(&self, ahead: Duration) -> Result<TimeStamp, i32> {
         self.time_at(Timestamp::now(), ahead)
     }
 
