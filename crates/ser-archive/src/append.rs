@@ -53,9 +53,11 @@ impl Archive {
     /// Adds a batch behind a position.
     fn append_one(&mut self, batch: &Batch, position: i64) -> Result<Appended> {
         let chain = self.chain(&batch.collector, &batch.recorder)?;
-        let before = Before::find(&mut *self.sql, chain, &batch.records, &batch.recorder)?;
+        let joined = batch.joins.then(|| self.joined(chain, &batch.records)).transpose()?;
+        let records = joined.as_ref().unwrap_or(&batch.records);
+        let before = Before::find(&mut *self.sql, chain, records, &batch.recorder)?;
         let mut rows = NewRows::new(chain, position);
-        for record in &batch.records {
+        for record in records {
             let archive = self.sql.name();
             match record {
                 Record::Entry(entry) => {
@@ -103,12 +105,12 @@ impl Archive {
 
     fn set_bookmark(&mut self, chain: i64, bookmark: &Bookmark) -> Result<()> {
         const SET: &str = "INSERT INTO bookmark \
-            (chain, life, sequence, exact, log_size, stamp, changed, state) \
-            VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT (chain) DO UPDATE SET \
+            (chain, life, sequence, exact, log_size, stamp, changed, state, log) \
+            VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9) ON CONFLICT (chain) DO UPDATE SET \
             life = excluded.life, sequence = excluded.sequence, exact = excluded.exact, \
             log_size = excluded.log_size, stamp = excluded.stamp, changed = excluded.changed, \
-            state = excluded.state";
-        let Bookmark { life, sequence, is_exact, anchor, log_size } = bookmark;
+            state = excluded.state, log = excluded.log";
+        let Bookmark { life, sequence, is_exact, anchor, log_size, log } = bookmark;
         let of_anchor = |mask: fn(&ser_proto::Entry) -> i64| Value::from(anchor.as_ref().map(mask));
         let values = [
             Value::Int(chain),
@@ -119,6 +121,7 @@ impl Archive {
             of_anchor(|entry| stamp_number(&entry.time)),
             of_anchor(|entry| entry.changed.0.into()),
             of_anchor(|entry| entry.state.0.into()),
+            Value::from(log.as_ref().map_or(&[][..], |log| &log[..])),
         ];
         self.sql.run(SET, &values).map(|_| ())
     }

@@ -4,7 +4,6 @@ use std::path::Path;
 use std::time::Duration;
 
 use ser_evidence::record::Life;
-use ser_evidence::time::{Moment, shown};
 use ser_proto::{Entry, Inputs};
 
 use crate::batch::Bookmark;
@@ -13,7 +12,7 @@ use crate::place::Place;
 use crate::schema::{self, About};
 use crate::sql::{Columns, Sql, Value, first};
 use crate::sqlite::Sqlite;
-use crate::stored::{stamp_number, stamp_of};
+use crate::stored::stamp_of;
 
 /// What an archive is opened for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,7 +105,8 @@ impl Archive {
     /// # Errors
     /// If the archive cannot be read.
     pub fn bookmark(&mut self, collector: &str, recorder: &str) -> Result<Option<Bookmark>> {
-        const BOOKMARK: &str = "SELECT life, sequence, exact, log_size, stamp, changed, state \
+        const BOOKMARK: &str = "SELECT life, sequence, exact, log_size, stamp, changed, state, \
+            log \
             FROM bookmark JOIN chain ON chain.id = bookmark.chain \
             JOIN recorder ON recorder.id = chain.recorder \
             WHERE chain.collector = ?1 AND recorder.name = ?2";
@@ -118,42 +118,8 @@ impl Archive {
                 is_exact: row.int(2)? != 0,
                 log_size: row.maybe_int(3)?.and_then(|size| u16::try_from(size).ok()),
                 anchor: anchor(row)?,
+                log: row.bytes(7)?.try_into().ok(),
             })
-        })
-    }
-
-    /// The life in which a recorder has had this entry, with the sequence that it has there, given
-    /// modulo 65536. So a collector that never read this log finds the name that another one has
-    /// given it. `None` if none has it; the lowest name if several have.
-    ///
-    /// # Errors
-    /// If the archive cannot be read.
-    pub fn life_of(
-        &mut self,
-        recorder: &str,
-        sequence: u64,
-        entry: &Entry,
-    ) -> Result<Option<(Life, u64)>> {
-        const LIFE: &str = "SELECT life, sequence FROM entry \
-            JOIN recorder ON recorder.id = entry.recorder \
-            WHERE recorder.name = ?1 AND stamp = ?2 AND shown_us = ?3 AND changed = ?4 \
-            AND state = ?5 AND sequence % 65536 = ?6 ORDER BY life, sequence DESC LIMIT 1";
-        // PostgreSQL uses the index for either form, and for none that says both.
-        const LIFE_WITHOUT_TIME: &str = "SELECT life, sequence FROM entry \
-            JOIN recorder ON recorder.id = entry.recorder \
-            WHERE recorder.name = ?1 AND stamp = ?2 AND shown_us IS NULL AND changed = ?3 \
-            AND state = ?4 AND sequence % 65536 = ?5 ORDER BY life, sequence DESC LIMIT 1";
-        let shown_us = shown(&entry.time).map(Moment::us);
-        let mut values = vec![Value::from(recorder), Value::Int(stamp_number(&entry.time))];
-        values.extend(shown_us.map(Value::Int));
-        values.extend([
-            Value::Int(entry.changed.0.into()),
-            Value::Int(entry.state.0.into()),
-            Value::Int((sequence % WRAP).cast_signed()),
-        ]);
-        let statement = if shown_us.is_some() { LIFE } else { LIFE_WITHOUT_TIME };
-        first(&mut *self.sql, statement, &values, |row| {
-            Ok((Life::from_bits(row.int(0)?.cast_unsigned()), row.int(1)?.cast_unsigned()))
         })
     }
 

@@ -15,6 +15,11 @@ pub struct Batch {
     pub records: Vec<Record>,
     /// Where reading goes on, if that has moved.
     pub bookmark: Option<Bookmark>,
+    /// Whether a life that this collector brings for the first time may be one that another collector
+    /// has brought under another name. If an entry of it is there under that name and none
+    /// contradicts it, all records are filed under that name, now and later. Names that recorders
+    /// themselves give to their lives need no such thing.
+    pub joins: bool,
     /// When it is written, by the clock of the computer.
     pub at: Moment<Utc>,
 }
@@ -32,6 +37,8 @@ pub struct Bookmark {
     pub anchor: Option<Entry>,
     /// How many entries the log holds, if that is known.
     pub log_size: Option<u16>,
+    /// What the recorder said which log it is, if it can: bytes that only collectors understand.
+    pub log: Option<[u8; 20]>,
 }
 
 /// What was written of a batch.

@@ -7,11 +7,12 @@
 //!
 //! # The files
 //!
-//! [`Archive`] is the way in: `archive` opens, `append` adds, `reading` gives back, `check` says what
-//! is missing, `verify` whether anybody has changed something, and `retention` lets go of what is
-//! old; `numbers` are ranges of entries. [`Writer`] lets many threads add to one archive. Below these, `chain` reckons digests,
-//! `stored` makes columns of records, `schema` makes tables, and `sql` is what a database must do;
-//! `sqlite` does it, and `postgres` where the feature of this name is on.
+//! [`Archive`] is the way in: `archive` opens, `append` adds (with `joining`, where one log has
+//! several names), `reading` gives back, `outlet` notes who was given it, `check` says what is
+//! missing, `verify` whether anybody has changed something, and `retention` lets go of what is old;
+//! `numbers` are ranges of entries. [`Writer`] lets many threads use one archive. Below these, `chain`
+//! reckons digests, `stored` makes columns of records, `schema` makes tables, and `sql` is what a
+//! database must do; `sqlite` does it, and `postgres` where the feature of this name is on.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
@@ -23,7 +24,9 @@ mod batch;
 mod chain;
 mod check;
 mod error;
+mod joining;
 mod numbers;
+mod outlet;
 mod place;
 #[cfg(feature = "postgres")]
 mod postgres;

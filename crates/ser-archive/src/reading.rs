@@ -25,6 +25,8 @@ pub struct Window {
 pub struct Archived {
     /// Positions rise in the order in which records were added.
     pub position: i64,
+    /// Who has added it.
+    pub collector: String,
     /// Whose record it is.
     pub recorder: String,
     /// What was read.
@@ -118,16 +120,16 @@ impl Archive {
 
     fn since_now(&mut self, position: i64, limit: u32) -> Result<Vec<Archived>> {
         const ENTRIES: &str = "SELECT life, sequence, number, stamp, shown_us, changed, state, \
-            known, position, recorder.name FROM entry \
-            JOIN recorder ON recorder.id = entry.recorder \
+            known, position, recorder.name, collector FROM entry \
+            JOIN recorder ON recorder.id = entry.recorder JOIN chain ON chain.id = entry.chain \
             WHERE position > ?1 ORDER BY position LIMIT ?2";
         const CONFLICTS: &str = "SELECT life, sequence, number, stamp, shown_us, changed, state, \
-            known, position, recorder.name FROM conflict \
+            known, position, recorder.name, collector FROM conflict \
             JOIN recorder ON recorder.id = conflict.recorder \
-            WHERE position > ?1 ORDER BY position LIMIT ?2";
-        const EVIDENCE: &str = "SELECT position, line, recorder.name FROM evidence \
+            JOIN chain ON chain.id = conflict.chain WHERE position > ?1 ORDER BY position LIMIT ?2";
+        const EVIDENCE: &str = "SELECT position, line, recorder.name, collector FROM evidence \
             JOIN recorder ON recorder.id = evidence.recorder \
-            WHERE position > ?1 ORDER BY position LIMIT ?2";
+            JOIN chain ON chain.id = evidence.chain WHERE position > ?1 ORDER BY position LIMIT ?2";
         let archive = self.sql.name().to_owned();
         let values = [Value::Int(position), Value::Int(limit.into())];
         let mut found: BTreeMap<i64, Archived> = BTreeMap::new();
@@ -135,14 +137,16 @@ impl Archive {
             self.sql.query(statement, &values, &mut |row| {
                 let record = Record::Entry(StoredEntry::from_row(row, 0, &archive)?.record());
                 let (position, recorder) = (row.int(8)?, row.text(9)?.to_owned());
-                found.insert(position, Archived { position, recorder, record });
+                let collector = row.text(10)?.to_owned();
+                found.insert(position, Archived { position, collector, recorder, record });
                 Ok(())
             })?;
         }
         self.sql.query(EVIDENCE, &values, &mut |row| {
             let (position, recorder) = (row.int(0)?, row.text(2)?.to_owned());
             let record = StoredEvidence::record(row.text(1)?, position, &archive)?;
-            found.insert(position, Archived { position, recorder, record });
+            let collector = row.text(3)?.to_owned();
+            found.insert(position, Archived { position, collector, recorder, record });
             Ok(())
         })?;
         let limit = usize::try_from(limit).unwrap_or(usize::MAX);

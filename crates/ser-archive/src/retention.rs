@@ -34,6 +34,8 @@ pub struct Expired {
     pub entries: u64,
     /// Gaps that say so.
     pub gaps: u64,
+    /// Whether more would have gone, had everybody who is given it said that it is safe.
+    pub is_held_back: bool,
 }
 
 /// How much of an archive that is too large goes at a time: a part in this many.
@@ -120,14 +122,32 @@ impl Archive {
             chains.extend(row.maybe_int(1)?.map(|to| Ok((row.int(0)?, to))).transpose()?);
             Ok(())
         })?;
+        let is_held_back = self.hold_back(&mut chains)?;
         let last = chains.values().copied().max().unwrap_or(0);
-        let (mut expired, mut from) = (Expired::default(), 0);
+        let (mut expired, mut from) = (Expired { is_held_back, ..Expired::default() }, 0);
         while let Some(through) = self.step_after(&mut from, last)? {
             let range = Range { from, through };
             expired.add(self.in_transaction(|archive| archive.step(&chains, range, now))?);
             from = through;
         }
         Ok(expired)
+    }
+
+    /// Ends each chain where all outlets are by now. Returns whether that is before the end of any.
+    fn hold_back(&mut self, chains: &mut BTreeMap<i64, i64>) -> Result<bool> {
+        const SAFE: &str = "SELECT max(position) FROM link WHERE chain = ?1 AND position <= ?2";
+        let Some(safe) = self.safe_elsewhere()? else { return Ok(false) };
+        let late: Vec<i64> =
+            chains.iter().filter(|(_, to)| **to > safe).map(|(&chain, _)| chain).collect();
+        for &chain in &late {
+            let values = [chain, safe].map(Value::Int);
+            let to = first(&mut *self.sql, SAFE, &values, |row| row.maybe_int(0))?.flatten();
+            match to {
+                Some(to) => chains.insert(chain, to),
+                None => chains.remove(&chain),
+            };
+        }
+        Ok(!late.is_empty())
     }
 
     /// The end of the step that begins with the first entry after a position, which moves there.
@@ -178,7 +198,7 @@ impl Archive {
         })?;
         let (collector, recorder) =
             names.ok_or_else(|| Error::damaged(self.name(), "a recorder has no chain"))?;
-        let batch = Batch { collector, recorder, records, bookmark: None, at: now };
+        let batch = Batch { collector, recorder, records, bookmark: None, joins: false, at: now };
         Ok(self.append_within(&batch)?.evidence)
     }
 
@@ -322,6 +342,7 @@ impl Expired {
     fn add(&mut self, other: Expired) {
         self.entries += other.entries;
         self.gaps += other.gaps;
+        self.is_held_back |= other.is_held_back;
     }
 }
 

@@ -152,9 +152,14 @@ fn a_file_in_which_somebody_has_put_statements_is_refused() {
 #[test]
 fn who_has_waited_long_enough_for_another_program_is_told_so() {
     let home = Home::new();
-    let mut archive = home.open();
-    archive.set_patience(std::time::Duration::from_millis(20)).unwrap();
-    let writer = Writer::start(archive, 16).unwrap();
+    let place = home.place();
+    let open = move || {
+        let mut archive = Archive::open(&place, Access::Write { program: PROGRAM })?;
+        archive.set_patience(std::time::Duration::from_millis(20))?;
+        Ok(archive)
+    };
+    let writer = Writer::start(open, 16).unwrap();
+    writer.with(Archive::position).unwrap();
     let raw = home.raw();
     raw.execute_batch("BEGIN IMMEDIATE").unwrap();
     let tickets: Vec<_> =

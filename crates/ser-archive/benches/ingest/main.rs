@@ -131,7 +131,9 @@ fn fill(place: &Place, entries: u64, batch: u64) -> Result<()> {
                     is_exact: true,
                     anchor,
                     log_size: None,
+                    log: None,
                 }),
+                joins: false,
                 at: Moment::from_us(BEGIN_US),
             }])?;
         }

@@ -95,7 +95,25 @@ CREATE TABLE bookmark (
     log_size BIGINT,
     stamp BIGINT,
     changed BIGINT,
-    state BIGINT
+    state BIGINT,
+    log BYTEA NOT NULL
+);
+
+-- A life as one collector calls it, and as it is filed: another collector may have read the same log
+-- before and given it another name. `shift` is added to the sequences that this collector gives.
+CREATE TABLE alias (
+    chain BIGINT NOT NULL REFERENCES chain (id),
+    life BIGINT NOT NULL,
+    joined BIGINT NOT NULL,
+    shift BIGINT NOT NULL,
+    PRIMARY KEY (chain, life)
+);
+
+-- Up to where somebody has been given what is here, and has said that it is safe there. Retention
+-- lets nothing go beyond that.
+CREATE TABLE outlet (
+    name TEXT PRIMARY KEY,
+    position BIGINT NOT NULL
 );
 
 -- Where rows were let go by retention: those of a chain up to `to_position`. `rows` and `digest` are

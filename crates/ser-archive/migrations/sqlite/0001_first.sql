@@ -95,8 +95,26 @@ CREATE TABLE bookmark (
     log_size INTEGER,
     stamp INTEGER,
     changed INTEGER,
-    state INTEGER
+    state INTEGER,
+    log BLOB NOT NULL
 ) STRICT;
+
+-- A life as one collector calls it, and as it is filed: another collector may have read the same log
+-- before and given it another name. `shift` is added to the sequences that this collector gives.
+CREATE TABLE alias (
+    chain INTEGER NOT NULL REFERENCES chain (id),
+    life INTEGER NOT NULL,
+    joined INTEGER NOT NULL,
+    shift INTEGER NOT NULL,
+    PRIMARY KEY (chain, life)
+) STRICT, WITHOUT ROWID;
+
+-- Up to where somebody has been given what is here, and has said that it is safe there. Retention
+-- lets nothing go beyond that.
+CREATE TABLE outlet (
+    name TEXT PRIMARY KEY,
+    position INTEGER NOT NULL
+) STRICT, WITHOUT ROWID;
 
 -- Where rows were let go by retention: those of a chain up to `to_position`. `rows` and `digest` are
 -- where the chain was by then, and `kept` is a digest over the evidence that is left of them. `conflicts`

@@ -1,8 +1,8 @@
 //! What is added is there, once, and given back as it was.
 
 use crate::common::*;
-use ser_archive::{Access, Archive, Error, Window};
-use ser_evidence::record::{PointRecord, Record};
+use ser_archive::{Access, Archive, Batch, Error, Keep, Window};
+use ser_evidence::record::{EntryRecord, Life, PointRecord, Record};
 use ser_evidence::time::shown;
 use ser_proto::{Inputs, TimeStamp};
 
@@ -147,21 +147,100 @@ pub(crate) fn a_window_is_by_what_the_recorder_showed_and_an_impossible_stamp_is
     assert_eq!(read(window(Some(8), None)), with(vec![], entries(LIFE, 8..=9)));
 }
 
-pub(crate) fn a_life_is_found_by_an_entry_of_it(home: &Home) {
+/// A batch of another collector, which has drawn other names for lives.
+fn elsewhere(records: Vec<Record>) -> Batch {
+    Batch { collector: "control room".to_owned(), joins: true, ..batch(records) }
+}
+
+/// The same entries in a life of another name, counted from elsewhere.
+fn renamed(life: Life, sequences: impl IntoIterator<Item = u64>, back: u64) -> Vec<Record> {
+    let renamed = |sequence| {
+        let entry = entry(LIFE, sequence);
+        Record::Entry(EntryRecord { life, sequence: Some(sequence - back), ..entry })
+    };
+    sequences.into_iter().map(renamed).collect()
+}
+
+pub(crate) fn a_life_with_two_names_is_filed_once(home: &Home) {
     let mut archive = home.open();
-    let far = 3 * 65_536 + 7;
-    archive.append(&[batch(entries(LIFE, [1, 2, far]))]).unwrap();
-    let mut life_of = |sequence, entry| archive.life_of("U1-SER1", sequence, &entry).unwrap();
-    assert_eq!(life_of(2, entry(LIFE, 2).entry), Some((LIFE, 2)));
-    assert_eq!(life_of(7, entry(LIFE, far).entry), Some((LIFE, far)));
-    assert_eq!(life_of(3, entry(LIFE, 2).entry), None);
-    assert_eq!(life_of(2, entry(LIFE, 1).entry), None);
-    let mut impossible = entry(LIFE, 3);
-    impossible.entry.time.month = 13;
-    archive.append(&[batch(vec![Record::Entry(impossible)])]).unwrap();
-    let mut life_of = |sequence, entry| archive.life_of("U1-SER1", sequence, &entry).unwrap();
-    assert_eq!(life_of(3, impossible.entry), Some((LIFE, 3)));
-    assert_eq!(life_of(3, entry(LIFE, 3).entry), None);
+    let far = 3 * 65_536;
+    archive.append(&[batch(entries(LIFE, far + 1..=far + 5))]).unwrap();
+    // The other collector has seen the log later, and does not know that its total had wrapped.
+    let other = Life::from_bits(77);
+    let seen = [vec![life(other), gap(other, 0, 2)], renamed(other, far + 3..=far + 7, far)];
+    let appended = archive.append(&[elsewhere(seen.concat())]).unwrap()[0];
+    assert_eq!((appended.entries, appended.known, appended.conflicts), (2, 3, 0));
+    // Later batches have no entry in common any more, and none at all.
+    let later = [renamed(other, [far + 8], far), vec![gap(other, 8, 2), watched(other, 10)]];
+    archive.append(&[elsewhere(later.concat())]).unwrap();
+    assert_eq!(
+        everything(&mut archive, "U1-SER1"),
+        [
+            vec![life(LIFE), gap(LIFE, 0, 2), gap(LIFE, far + 8, 2), watched(LIFE, far + 10)],
+            entries(LIFE, far + 1..=far + 8)
+        ]
+        .concat()
+    );
+    assert!(archive.verify().unwrap().1.is_empty());
+}
+
+pub(crate) fn a_life_that_contradicts_another_is_not_that_one(home: &Home) {
+    let mut archive = home.open();
+    archive.append(&[batch(entries(LIFE, 1..=5))]).unwrap();
+    let other = Life::from_bits(77);
+    let mut seen = renamed(other, 1..=5, 0);
+    let Some(Record::Entry(last)) = seen.last_mut() else { unreachable!() };
+    last.entry.state = Inputs(0x8000_0000);
+    let appended = archive.append(&[elsewhere(seen)]).unwrap()[0];
+    assert_eq!((appended.entries, appended.conflicts), (5, 0));
+}
+
+pub(crate) fn what_one_collector_tells_apart_stays_apart(home: &Home) {
+    let mut archive = home.open();
+    // A recorder without a clock: the log begins with the same entry after each power failure.
+    for name in [77, 78] {
+        let entries = renamed(Life::from_bits(name), [1], 0);
+        let appended = archive.append(&[elsewhere(entries)]).unwrap()[0];
+        assert_eq!((appended.entries, appended.conflicts), (1, 0));
+    }
+    // For another collector it may be either, and is one of them.
+    let third = Batch { collector: "tower".to_owned(), ..elsewhere(renamed(NEXT_LIFE, [1], 0)) };
+    assert_eq!(archive.append(&[third]).unwrap()[0].known, 1);
+}
+
+pub(crate) fn an_impossible_stamp_tells_a_life_as_well(home: &Home) {
+    let mut archive = home.open();
+    let impossible = |life| {
+        let mut entry = entry(life, 3);
+        entry.entry.time.month = 13;
+        vec![Record::Entry(entry)]
+    };
+    archive.append(&[batch(impossible(LIFE))]).unwrap();
+    let again = elsewhere(impossible(NEXT_LIFE));
+    assert_eq!(archive.append(&[again]).unwrap()[0].known, 1);
+}
+
+pub(crate) fn what_an_outlet_does_not_have_is_not_let_go(home: &Home) {
+    let mut archive = home.open();
+    for second in 0..4 {
+        let first = second * 5 + 1;
+        let sequences = first.try_into().unwrap()..=(first + 4).try_into().unwrap();
+        archive.append(&[Batch { at: at_s(second), ..batch(entries(LIFE, sequences)) }]).unwrap();
+    }
+    assert_eq!(archive.outlet("plant database").unwrap(), 0);
+    for (given, kept) in [(12, 12), (7, 12)] {
+        archive.set_outlet("plant database", given).unwrap();
+        assert_eq!(archive.outlet("plant database").unwrap(), kept, "it never moves back");
+    }
+    assert_eq!(archive.outlets().unwrap(), [("plant database".to_owned(), 12)]);
+    let keep = Keep { since: Some(at_s(100)), bytes: None };
+    let expired = archive.expire(keep, at_s(200)).unwrap();
+    assert_eq!((expired.entries, expired.is_held_back), (10, true), "whole batches");
+    assert!(archive.forget_outlet("plant database").unwrap());
+    assert!(!archive.forget_outlet("plant database").unwrap());
+    let expired = archive.expire(keep, at_s(200)).unwrap();
+    assert_eq!((expired.entries, expired.is_held_back), (10, false));
+    assert!(archive.verify().unwrap().1.is_empty());
 }
 
 pub(crate) fn who_reads_while_others_write_misses_nothing_and_sees_no_contradiction(home: &Home) {

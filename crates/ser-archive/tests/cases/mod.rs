@@ -28,9 +28,47 @@ macro_rules! cases {
 }
 
 cases! {
-    kept: [what_was_added_is_given_back_and_added_again_changes_nothing, two_collectors_that_read_the_same_add_it_once, another_content_at_the_same_place_is_kept_beside_it, a_conflict_within_one_batch_is_one_too, the_number_in_the_ring_is_no_part_of_what_an_entry_is, a_bookmark_moves_with_what_was_read_or_not_at_all, what_could_not_be_read_again_is_not_added, a_window_is_by_what_the_recorder_showed_and_an_impossible_stamp_is_in_each, a_life_is_found_by_an_entry_of_it, who_reads_while_others_write_misses_nothing_and_sees_no_contradiction, an_archive_of_a_newer_program_is_refused_by_name],
-    sound: [a_number_that_is_not_there_is_a_hole_unless_it_was_told, what_was_watched_must_be_there, where_a_log_began_is_not_known_if_its_total_had_wrapped, a_tail_that_is_taken_away_shows_in_the_head_that_was_written_down, what_is_let_go_is_told_and_the_rest_stays_proven, what_another_collector_adds_late_is_no_contradiction, entries_that_collectors_add_in_turn_become_one_gap, neighbouring_gaps_become_one_in_time, a_conflict_that_was_let_go_is_one_still, all_may_be_let_go, a_life_of_which_nothing_is_left_has_no_hole_before_its_first_entry, an_archive_that_is_too_large_loses_its_oldest, evidence_that_is_too_large_alone_takes_no_entry_with_it, a_clock_that_was_wrong_takes_no_more_than_is_too_much, many_small_batches_are_let_go, numbers_that_no_log_has_are_damage_and_no_more, a_row_that_somebody_changed_is_found],
-    writer: [what_many_threads_add_is_there_when_they_are_told_so, one_that_cannot_be_written_keeps_nobody_else_from_it, who_asked_may_go_away_and_it_is_written_all_the_same],
+    kept: [
+        what_was_added_is_given_back_and_added_again_changes_nothing,
+        two_collectors_that_read_the_same_add_it_once,
+        another_content_at_the_same_place_is_kept_beside_it,
+        a_conflict_within_one_batch_is_one_too,
+        the_number_in_the_ring_is_no_part_of_what_an_entry_is,
+        a_bookmark_moves_with_what_was_read_or_not_at_all,
+        what_could_not_be_read_again_is_not_added,
+        a_window_is_by_what_the_recorder_showed_and_an_impossible_stamp_is_in_each,
+        a_life_with_two_names_is_filed_once,
+        a_life_that_contradicts_another_is_not_that_one,
+        what_one_collector_tells_apart_stays_apart,
+        an_impossible_stamp_tells_a_life_as_well,
+        what_an_outlet_does_not_have_is_not_let_go,
+        who_reads_while_others_write_misses_nothing_and_sees_no_contradiction,
+        an_archive_of_a_newer_program_is_refused_by_name,
+    ],
+    sound: [
+        a_number_that_is_not_there_is_a_hole_unless_it_was_told,
+        what_was_watched_must_be_there,
+        where_a_log_began_is_not_known_if_its_total_had_wrapped,
+        a_tail_that_is_taken_away_shows_in_the_head_that_was_written_down,
+        what_is_let_go_is_told_and_the_rest_stays_proven,
+        what_another_collector_adds_late_is_no_contradiction,
+        entries_that_collectors_add_in_turn_become_one_gap,
+        neighbouring_gaps_become_one_in_time,
+        a_conflict_that_was_let_go_is_one_still,
+        all_may_be_let_go,
+        a_life_of_which_nothing_is_left_has_no_hole_before_its_first_entry,
+        an_archive_that_is_too_large_loses_its_oldest,
+        evidence_that_is_too_large_alone_takes_no_entry_with_it,
+        a_clock_that_was_wrong_takes_no_more_than_is_too_much,
+        many_small_batches_are_let_go,
+        numbers_that_no_log_has_are_damage_and_no_more,
+        a_row_that_somebody_changed_is_found,
+    ],
+    writer: [
+        what_many_threads_add_is_there_when_they_are_told_so,
+        one_that_cannot_be_written_keeps_nobody_else_from_it,
+        who_asked_may_go_away_and_it_is_written_all_the_same,
+    ],
 }
 
 /// A case that is in no list would never be tried.

@@ -2,12 +2,18 @@
 
 use std::thread;
 
-use ser_archive::{Error, Writer};
+use ser_archive::{Access, Archive, Error, Writer};
 
 use crate::common::*;
 
+fn writer(at: &Home, waiting: usize) -> Writer {
+    let place = at.place();
+    let open = move || Archive::open(&place, Access::Write { program: PROGRAM });
+    Writer::start(open, waiting).unwrap()
+}
+
 pub(crate) fn what_many_threads_add_is_there_when_they_are_told_so(home: &Home) {
-    let writer = Writer::start(home.open(), 4).unwrap();
+    let writer = writer(home, 4);
     thread::scope(|scope| {
         for recorder in 0..8 {
             let writer = &writer;
@@ -22,7 +28,7 @@ pub(crate) fn what_many_threads_add_is_there_when_they_are_told_so(home: &Home) 
             });
         }
     });
-    let mut archive = writer.end().unwrap();
+    let mut archive = writer.end().unwrap().unwrap();
     for recorder in 0..8 {
         let name = format!("SER{recorder}");
         assert_eq!(everything(&mut archive, &name), entries(LIFE, 1..=200));
@@ -32,7 +38,7 @@ pub(crate) fn what_many_threads_add_is_there_when_they_are_told_so(home: &Home) 
 }
 
 pub(crate) fn one_that_cannot_be_written_keeps_nobody_else_from_it(home: &Home) {
-    let writer = Writer::start(home.open(), 64).unwrap();
+    let writer = writer(home, 64);
     let mut nowhere = entry(LIFE, 7);
     nowhere.sequence = None;
     let tickets: Vec<_> = (1..=30_u64)
@@ -51,13 +57,13 @@ pub(crate) fn one_that_cannot_be_written_keeps_nobody_else_from_it(home: &Home) 
             Err(error) => panic!("{error}"),
         }
     }
-    let mut archive = writer.end().unwrap();
+    let mut archive = writer.end().unwrap().unwrap();
     let good = (1..=30).filter(|part| part % 3 != 0);
     assert_eq!(everything(&mut archive, "U1-SER1"), entries(LIFE, good));
 }
 
 pub(crate) fn who_asked_may_go_away_and_it_is_written_all_the_same(home: &Home) {
-    let writer = Writer::start(home.open(), 2).unwrap();
+    let writer = writer(home, 2);
     for part in 1..=10 {
         drop(writer.append(batch(entries(LIFE, [part]))).unwrap());
     }

@@ -103,6 +103,7 @@ pub(crate) fn batch(records: Vec<Record>) -> Batch {
         recorder: "U1-SER1".to_owned(),
         records,
         bookmark: None,
+        joins: false,
         at: at_s(0),
     }
 }
@@ -114,6 +115,7 @@ pub(crate) fn bookmark(life: Life, sequence: u64) -> Bookmark {
         is_exact: true,
         anchor: (sequence > 0).then(|| entry(life, sequence).entry),
         log_size: Some(2048),
+        log: (sequence > 2).then_some([7; 20]),
     }
 }
 

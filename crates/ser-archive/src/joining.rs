@@ -1,0 +1,220 @@
+//! One log, and several names for its life.
+//!
+//! A recorder that cannot say which log it has gets a name for each life from whoever reads it. Two
+//! collectors draw two names. So a life that a collector brings for the first time is looked for by
+//! its content, and where another collector has archived it already, everything is filed there.
+//! Which name stands for which is remembered, because later entries alone need not tell.
+
+use std::collections::BTreeMap;
+
+use ser_evidence::record::{Life, Place, Record};
+use ser_evidence::time::{Moment, shown};
+
+use crate::append::Chain;
+use crate::archive::{Archive, WRAP};
+use crate::error::{Error, Result};
+use crate::sql::{Value, first};
+use crate::stored::{StoredEntry, stamp_number};
+
+/// A life as it is called here, and what is added to the sequences that its collector gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Filed {
+    life: Life,
+    shift: i64,
+}
+
+/// By the name that a collector gives.
+#[derive(Debug, Default)]
+struct Names(BTreeMap<Life, Filed>);
+
+impl Archive {
+    /// The records of a batch, with the names and sequences under which their lives are filed here.
+    pub(crate) fn joined(&mut self, chain: Chain, records: &[Record]) -> Result<Vec<Record>> {
+        let mut names = Names::default();
+        for life in lives(records) {
+            if let Some(filed) = self.filed(chain, life, records)? {
+                names.0.insert(life, filed);
+            }
+        }
+        let archive = self.sql.name();
+        records.iter().map(|record| names.renamed(record, archive)).collect()
+    }
+
+    /// Where a life is filed; `None` if no entry of it has told yet.
+    fn filed(&mut self, chain: Chain, life: Life, records: &[Record]) -> Result<Option<Filed>> {
+        const KNOWN: &str = "SELECT joined, shift FROM alias WHERE chain = ?1 AND life = ?2";
+        const NOTE: &str = "INSERT INTO alias (chain, life, joined, shift) VALUES (?1, ?2, ?3, ?4)";
+        let bits = |life: Life| Value::Int(life.bits().cast_signed());
+        let known = first(&mut *self.sql, KNOWN, &[Value::Int(chain.id), bits(life)], |row| {
+            Ok(Filed { life: Life::from_bits(row.int(0)?.cast_unsigned()), shift: row.int(1)? })
+        })?;
+        if known.is_some() {
+            return Ok(known);
+        }
+        let entries: Vec<StoredEntry> = records
+            .iter()
+            .filter_map(|record| match record {
+                Record::Entry(entry) if entry.life == life => StoredEntry::of(entry),
+                _ => None,
+            })
+            .collect();
+        if entries.is_empty() {
+            return Ok(None);
+        }
+        let filed = match self.is_filed(chain, life)? {
+            true => None,
+            false => self.same_elsewhere(chain, &entries)?,
+        };
+        let filed = filed.unwrap_or(Filed { life, shift: 0 });
+        let values = [Value::Int(chain.id), bits(life), bits(filed.life), Value::Int(filed.shift)];
+        self.sql.run(NOTE, &values)?;
+        Ok(Some(filed))
+    }
+
+    /// Whether the recorder has entries of a life of this name.
+    fn is_filed(&mut self, chain: Chain, life: Life) -> Result<bool> {
+        const ANY: &str = "SELECT 1 FROM entry WHERE recorder = ?1 AND life = ?2 LIMIT 1";
+        let values = [Value::Int(chain.recorder), Value::Int(life.bits().cast_signed())];
+        Ok(first(&mut *self.sql, ANY, &values, |_| Ok(()))?.is_some())
+    }
+
+    /// The life that has one of these entries and contradicts none. It is none that this collector
+    /// itself has told from this one.
+    fn same_elsewhere(&mut self, chain: Chain, entries: &[StoredEntry]) -> Result<Option<Filed>> {
+        let mut refused: Vec<Filed> = Vec::new();
+        for entry in entries {
+            for filed in self.with_entry(chain, entry)? {
+                if refused.contains(&filed) {
+                    continue;
+                }
+                if self.agrees(chain, filed, entries)? {
+                    return Ok(Some(filed));
+                }
+                refused.push(filed);
+            }
+        }
+        Ok(None)
+    }
+
+    /// The lives that have this entry.
+    fn with_entry(&mut self, chain: Chain, entry: &StoredEntry) -> Result<Vec<Filed>> {
+        const LIVES: &str = "SELECT life, sequence FROM entry \
+            WHERE recorder = ?1 AND stamp = ?2 AND shown_us = ?3 AND changed = ?4 \
+            AND state = ?5 AND sequence % 65536 = ?6 \
+            AND life NOT IN (SELECT joined FROM alias WHERE chain = ?7) ORDER BY life, sequence";
+        // PostgreSQL uses the index for either form, and for none that says both.
+        const LIVES_WITHOUT_TIME: &str = "SELECT life, sequence FROM entry \
+            WHERE recorder = ?1 AND stamp = ?2 AND shown_us IS NULL AND changed = ?3 \
+            AND state = ?4 AND sequence % 65536 = ?5 \
+            AND life NOT IN (SELECT joined FROM alias WHERE chain = ?6) ORDER BY life, sequence";
+        let StoredEntry { sequence, entry: read, .. } = entry;
+        let shown_us = shown(&read.time).map(Moment::us);
+        let mut values = vec![Value::Int(chain.recorder), Value::Int(stamp_number(&read.time))];
+        values.extend(shown_us.map(Value::Int));
+        values.extend([
+            Value::Int(read.changed.0.into()),
+            Value::Int(read.state.0.into()),
+            Value::Int((sequence % WRAP).cast_signed()),
+            Value::Int(chain.id),
+        ]);
+        let statement = if shown_us.is_some() { LIVES } else { LIVES_WITHOUT_TIME };
+        let mut found = Vec::new();
+        self.sql.query(statement, &values, &mut |row| {
+            let life = Life::from_bits(row.int(0)?.cast_unsigned());
+            found.push(Filed { life, shift: row.int(1)?.wrapping_sub(sequence.cast_signed()) });
+            Ok(())
+        })?;
+        Ok(found)
+    }
+
+    /// Whether nothing that is filed there contradicts these entries.
+    fn agrees(&mut self, chain: Chain, filed: Filed, entries: &[StoredEntry]) -> Result<bool> {
+        const ENTRY: &str = "SELECT life, sequence, number, stamp, shown_us, changed, state, \
+            known FROM entry WHERE recorder = ?1 AND life = ?2 AND sequence = ?3";
+        let archive = self.sql.name().to_owned();
+        for entry in entries {
+            let Some(sequence) = entry.sequence.checked_add_signed(filed.shift) else {
+                return Ok(false);
+            };
+            let values = [
+                Value::Int(chain.recorder),
+                Value::Int(filed.life.bits().cast_signed()),
+                Value::Int(sequence.cast_signed()),
+            ];
+            let there = first(&mut *self.sql, ENTRY, &values, |row| {
+                StoredEntry::from_row(row, 0, &archive)
+            })?;
+            if there.is_some_and(|there| !there.is_same(entry)) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// The lives of which these records are, each once.
+fn lives(records: &[Record]) -> Vec<Life> {
+    let mut lives: Vec<Life> = Vec::new();
+    for record in records {
+        let life = crate::stored::StoredEvidence::kind_of(record).1;
+        if life.is_known() && lives.last() != Some(&life) && !lives.contains(&life) {
+            lives.push(life);
+        }
+    }
+    lives
+}
+
+impl Names {
+    fn renamed(&self, record: &Record, archive: &str) -> Result<Record> {
+        let mut record = record.clone();
+        match &mut record {
+            Record::Entry(entry) => self.place(&mut entry.life, [&mut entry.sequence], archive)?,
+            Record::Gap(gap) => self.gap(gap, archive)?,
+            Record::Clock(seen) => self.of_place(&mut seen.place, archive)?,
+            Record::Step(step) => self.of_place(&mut step.place, archive)?,
+            Record::Life(life) => {
+                self.place(&mut life.life, [], archive)?;
+                if let Some(erased) = &mut life.erased {
+                    self.place(erased, [], archive)?;
+                }
+            }
+            Record::Watched(watched) => {
+                let mut through = Some(watched.through);
+                self.place(&mut watched.life, [&mut through], archive)?;
+                watched.through = through.unwrap_or_default();
+            }
+            Record::Suppressed(_) | Record::Point(_) | Record::Recorder(_) => {}
+        }
+        Ok(record)
+    }
+
+    /// A gap at the beginning of a log stays there.
+    fn gap(&self, gap: &mut ser_evidence::record::Gap, archive: &str) -> Result<()> {
+        match gap.after {
+            Some(0) => self.place(&mut gap.life, [], archive),
+            _ => self.place(&mut gap.life, [&mut gap.after], archive),
+        }
+    }
+
+    fn of_place(&self, place: &mut Place, archive: &str) -> Result<()> {
+        let Place { life, after, before, .. } = place;
+        self.place(life, [after, before], archive)
+    }
+
+    fn place<const N: usize>(
+        &self,
+        life: &mut Life,
+        sequences: [&mut Option<u64>; N],
+        archive: &str,
+    ) -> Result<()> {
+        let Some(filed) = self.0.get(life) else { return Ok(()) };
+        *life = filed.life;
+        for sequence in sequences.into_iter().filter_map(Option::as_mut) {
+            let moved = sequence.checked_add_signed(filed.shift);
+            *sequence = moved.ok_or_else(|| {
+                Error::damaged(archive, "two names of one life do not count alike")
+            })?;
+        }
+        Ok(())
+    }
+}
