@@ -10,7 +10,8 @@ use ser_observer::new_life;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::Result;
 use crate::output::{self, Before, Life};
-use crate::state::{Delivered, LogIdentity, StateFile, StateLock};
+use crate::state::{Delivered, StateFile, StateLock};
+use ser_observer::LogIdentity;
 
 /// How much a crash may repeat, as a time. Writing the file after every event would wear out a
 /// memory card.

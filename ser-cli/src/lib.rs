@@ -36,7 +36,8 @@ use std::process::ExitCode;
 
 pub use decoding::{CaptureFormat, CaptureOptions, Listing, Side, Tally};
 pub use output::Life;
-pub use state::{Delivered, LogIdentity, NotDelivered};
+pub use ser_observer::LogIdentity;
+pub use state::{Delivered, NotDelivered};
 
 /// Does what the command line says.
 #[must_use]

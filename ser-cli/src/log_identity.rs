@@ -13,7 +13,7 @@ use crate::connection::ConnectionArgs;
 use crate::error::Result;
 use crate::keeper::{self, Keeper, StateArgs};
 use crate::original::Originals;
-use crate::state::LogIdentity;
+use ser_observer::LogIdentity;
 
 /// A log that a run is about to read, as the recorder itself says.
 #[derive(Clone, Copy, Debug, Default)]

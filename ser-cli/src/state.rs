@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 
 use crc::{CRC_64_XZ, Crc};
 use ser_client::Cursor;
-use ser_proto::{Entry, Identity, Inputs, RecorderId, TimeStamp};
+use ser_observer::LogIdentity;
+use ser_proto::{Entry, Inputs, TimeStamp};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Failure, Result};
@@ -52,30 +53,6 @@ pub struct Delivered {
     /// What the recorder said of the log; `None` if it says nothing, or the log may have begun anew
     /// since.
     pub log: Option<LogIdentity>,
-}
-
-/// What a recorder says of its log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct LogIdentity {
-    /// The number that no other recorder has, all zero if it has none.
-    id: [u8; RecorderId::LEN],
-    power_ups: u32,
-    life: u32,
-}
-
-impl LogIdentity {
-    /// The number of the life, as the recorder counts them.
-    pub(crate) const fn life(&self) -> u32 {
-        self.life
-    }
-}
-
-impl From<&Identity> for LogIdentity {
-    fn from(identity: &Identity) -> LogIdentity {
-        let Identity { id, power_ups, life, .. } = identity;
-        let id = id.map_or([0; RecorderId::LEN], |id| id.bytes());
-        LogIdentity { id, power_ups: *power_ups, life: *life }
-    }
 }
 
 /// A text that does not say what was delivered, and the reason.

@@ -72,6 +72,35 @@ enum Step<'r> {
 }
 
 impl Archive {
+    /// Where each chain ends, as it was noted when the last row was added. Nothing is reckoned.
+    ///
+    /// # Errors
+    /// If the archive cannot be read.
+    pub fn heads(&mut self) -> Result<Vec<ChainHead>> {
+        const HEADS: &str = "SELECT collector, recorder.name, position, rows, digest, \
+            (SELECT max(to_position) FROM checkpoint WHERE checkpoint.chain = chain.id) \
+            FROM chain JOIN recorder ON recorder.id = chain.recorder \
+            JOIN link ON link.chain = chain.id AND link.position = \
+            (SELECT max(position) FROM link WHERE link.chain = chain.id) \
+            ORDER BY recorder.name, collector";
+        let archive = self.sql.name().to_owned();
+        let mut heads = Vec::new();
+        self.sql.query(HEADS, &[], &mut |row| {
+            let digest = row.bytes(4)?.try_into();
+            heads.push(ChainHead {
+                collector: row.text(0)?.to_owned(),
+                recorder: row.text(1)?.to_owned(),
+                position: row.int(2)?,
+                rows: row.int(3)?.cast_unsigned(),
+                digest: digest
+                    .map_err(|_| Error::damaged(&archive, "a digest has another length"))?,
+                expired_to: row.maybe_int(5)?,
+            });
+            Ok(())
+        })?;
+        Ok(heads)
+    }
+
     /// Reckons all chains again. Returns where each ends, and where any is broken first.
     ///
     /// # Errors

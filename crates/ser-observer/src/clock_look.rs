@@ -65,6 +65,7 @@ pub struct NowAndThen {
     under_way: Option<(Questions, (Life, Cursor))>,
     /// When the next ones begin.
     due: Duration,
+    every: Duration,
     /// The number that the recorder gives to the life of the log that is read, as it said last.
     said: u32,
     /// How that life is called, once there was an answer in it.
@@ -74,7 +75,18 @@ pub struct NowAndThen {
 impl NowAndThen {
     /// Begins at once, in the life of which the recorder `said` this number.
     pub const fn new(said: u32) -> NowAndThen {
-        NowAndThen { under_way: None, due: Duration::ZERO, said, called: None }
+        NowAndThen::every(said, LOOK_EVERY)
+    }
+
+    /// The same, so often.
+    #[must_use]
+    pub const fn every(said: u32, every: Duration) -> NowAndThen {
+        NowAndThen { under_way: None, due: Duration::ZERO, every, said, called: None }
+    }
+
+    /// Asks at the next step.
+    pub const fn soon(&mut self) {
+        self.due = Duration::ZERO;
     }
 
     /// Asks if it is time to; the log has been read as far as `place` says. Returns what was
@@ -91,7 +103,7 @@ impl NowAndThen {
         let (questions, _) =
             self.under_way.get_or_insert_with(|| (Questions::default(), (life, cursor)));
         if questions.wait(now).is_zero() {
-            self.due = now + LOOK_EVERY;
+            self.due = now + self.every;
             let asked = questions.ask(unit);
             if asked.is_err() {
                 self.under_way = None;

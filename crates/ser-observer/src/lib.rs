@@ -8,7 +8,7 @@
 //!
 //! `host_reading` is this computer's clocks and `clock_setting` what a recorder's should show.
 //! `clock_look` asks a clock, `setting` is what setting one says, and `log_look` where in the log
-//! that was. `life_name` names lives, `arrival` is about entries that come, and `left_out` about
+//! that was. `log_identity` is which log a recorder says that it has, `life_name` names its lives, `arrival` is about entries that come, and `left_out` about
 //! changes that do not.
 #![cfg_attr(
     not(test),
@@ -21,6 +21,7 @@ mod clock_setting;
 pub mod host_reading;
 mod left_out;
 mod life_name;
+mod log_identity;
 mod log_look;
 pub mod setting;
 
@@ -28,4 +29,5 @@ pub use arrival::{HOLD_BACK_US, gap, seen_at};
 pub use clock_setting::ClockSetting;
 pub use left_out::left_out;
 pub use life_name::{life_of_recorder, new_life};
+pub use log_identity::LogIdentity;
 pub use log_look::{LogLook, nothing_after};

@@ -16,10 +16,10 @@ use crate::kept::{KeptRecords, Since};
 use crate::log_identity::{self, Met};
 use crate::original::Originals;
 use crate::output::{Format, Life};
-use crate::state::LogIdentity;
 use crate::suppressed::LeftOut;
 use crate::values;
 use crate::witness::Witness;
+use ser_observer::LogIdentity;
 use ser_observer::clock_look;
 use ser_observer::nothing_after;
 
@@ -194,7 +194,7 @@ fn look_at_clock(
         return Ok(());
     }
     let Ok(Some(looks)) = clock_look::take(unit) else { return Ok(()) };
-    let place = looks.place(outlet.life(), cursor, log.map(|log| log.life()));
+    let place = looks.place(outlet.life(), cursor, log.map(|log| log.life));
     match place.and_then(|place| looks.observation(place)) {
         Some(observation) => witness.asked(outlet, observation),
         None => Ok(()),

@@ -21,10 +21,10 @@ use crate::log_identity;
 use crate::original::Originals;
 use crate::outage::Outage;
 use crate::output::Format;
-use crate::state::LogIdentity;
 use crate::suppressed::LeftOut;
 use crate::values;
 use crate::witness::Witness;
+use ser_observer::LogIdentity;
 use ser_observer::clock_look::{self, NowAndThen};
 
 const EXAMPLES: &str = "\
@@ -127,7 +127,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
             Some(LeftOut::new(Some(kept), connection.points()))
         }
     };
-    let clock = met.log.map(|log| NowAndThen::new(log.life()));
+    let clock = met.log.map(|log| NowAndThen::new(log.life));
     let (log, is_named) = (met.log, met.is_another || met.log.is_none());
     let mut watch = Watch {
         unit,
@@ -367,7 +367,7 @@ impl Watch {
         let Watch { unit, watcher, outlet, witness, clock, log, .. } = self;
         let (Some(_), Some(cursor)) = (clock, watcher.cursor()) else { return Ok(()) };
         let Ok(Some(looks)) = clock_look::take(unit) else { return Ok(()) };
-        let place = looks.place(outlet.life(), cursor, log.map(|log| log.life()));
+        let place = looks.place(outlet.life(), cursor, log.map(|log| log.life));
         match place.and_then(|place| looks.observation(place)) {
             Some(observation) => witness.asked(outlet, observation),
             None => Ok(()),

@@ -20,7 +20,8 @@ use crate::keeper::StateArgs;
 use crate::kept::KeptRecords;
 use crate::original::Originals;
 use crate::output::Loss;
-use crate::state::{Delivered, LogIdentity, StateFile};
+use crate::state::{Delivered, StateFile};
+use ser_observer::LogIdentity;
 use ser_observer::clock_look;
 use ser_observer::host_reading;
 use ser_observer::nothing_after;
@@ -180,7 +181,7 @@ fn look(
 ) -> Option<Record> {
     originals.identity(unit).ok()??;
     let looks = clock_look::take(unit).ok()??;
-    let place = looks.place(life, cursor, log.map(|log| log.life()))?;
+    let place = looks.place(life, cursor, log.map(|log| log.life))?;
     looks.observation(place).map(Record::Clock)
 }
 

@@ -39,6 +39,7 @@ pub(crate) fn a_tail_that_is_taken_away_shows_in_the_head_that_was_written_down(
     archive.append(&[batch(entries(LIFE, 4..=6))]).unwrap();
     let end = archive.verify().unwrap().0;
     assert_ne!(middle, end);
+    assert_eq!(archive.heads().unwrap(), end);
     home.sql("DELETE FROM entry WHERE position > 3; DELETE FROM link WHERE position > 3");
     assert_eq!(archive.verify().unwrap(), (middle, Vec::new()));
 }
@@ -62,6 +63,7 @@ pub(crate) fn what_is_let_go_is_told_and_the_rest_stays_proven(home: &Home) {
         left = now_left;
         let check = archive.check().unwrap();
         assert!(check.is_sound(), "{check:?}");
+        assert_eq!(archive.heads().unwrap(), archive.verify().unwrap().0);
         assert_eq!(check.recorders[0].entries, left);
         let told: u64 = check.recorders[0]
             .told

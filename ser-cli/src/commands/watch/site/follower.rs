@@ -96,7 +96,7 @@ impl Follower<'_> {
         let mut watcher = LogWatcher::polling(follower, interval, may_shorten);
         let mut annotator = Annotator::new(keeper.life()?, keeper.before());
         let kept = KeptRecords::of(&self.args.state, &self.connection)?;
-        let mut clock = met.log.map(|log| NowAndThen::new(log.life()));
+        let mut clock = met.log.map(|log| NowAndThen::new(log.life));
         let left_out = KeptRecords::of(&self.args.state, &self.connection)?;
         let left_out = LeftOut::new(Some(left_out), self.connection.points()).of(&self.column.name);
         let mut left_out = met.log.map(|_| left_out);

@@ -1,0 +1,118 @@
+//! A visit to a recorder: it is met, and its log is followed until something fails.
+
+use ser_archive::Bookmark;
+use ser_client::{Cursor, LogFollower, LogWatcher, Unit};
+
+use super::Task;
+use super::duties::Duties;
+use super::filing::Filing;
+use super::meet::Memory;
+use super::plan::Plan;
+use crate::pause::HEARTBEAT;
+use crate::trouble::Trouble;
+
+impl Task {
+    /// Visits the recorder until something fails, or reads it once. `all_is_well` is called when it
+    /// was read.
+    pub(super) fn visit(
+        &self,
+        memory: &mut Memory,
+        all_is_well: &mut dyn FnMut(),
+    ) -> Result<(), Trouble> {
+        let shared = &self.shared;
+        let (collector, recorder) = (shared.options.name.clone(), self.recorder.name.clone());
+        let bookmark =
+            shared.writer.with(move |archive| archive.bookmark(&collector, &recorder))?;
+        let mut unit = shared.ports.open(&self.recorder, shared.options.line, &shared.stop)?;
+        let plan = self.plan(&mut unit, bookmark.and_then(|bookmark| bookmark.log_size))?;
+        let met = self.meet(&mut unit, bookmark.as_ref(), memory)?;
+        let follower = LogFollower::new(bookmark.as_ref().map(cursor), plan.size);
+        let follower = if met.is_another { follower.of_another_log() } else { follower };
+        let mut visit = Visit {
+            task: self,
+            watcher: plan.watcher(follower, self),
+            filing: Filing::new(self, &met, bookmark.as_ref(), memory.life.take()),
+            duties: Duties::new(self, &unit, met.log, memory.left_out.take()),
+        };
+        let ended = visit.follow(&mut unit, memory, all_is_well);
+        visit.end(&mut unit, &plan, memory, ended)
+    }
+}
+
+struct Visit<'t> {
+    task: &'t Task,
+    watcher: LogWatcher,
+    filing: Filing<'t>,
+    duties: Duties<'t>,
+}
+
+impl Visit<'_> {
+    fn follow(
+        &mut self,
+        unit: &mut Unit,
+        memory: &mut Memory,
+        all_is_well: &mut dyn FnMut(),
+    ) -> Result<(), Trouble> {
+        let shared = &self.task.shared;
+        loop {
+            if shared.is_stopped() {
+                return Err(Trouble::Stopped);
+            }
+            let Visit { watcher, filing, duties, .. } = self;
+            let mut is_idle = true;
+            let step = watcher.step(unit, HEARTBEAT, &mut |step| {
+                is_idle &= step.deliveries.is_empty();
+                filing.take(step)
+            });
+            if matches!(step, Err(Trouble::NewLog)) {
+                memory.is_of_another_log = true;
+            }
+            step?;
+            // A reading of the log, and not just a look for reports.
+            let has_read = watcher.complete_at().is_some();
+            if has_read && filing.is_holding() {
+                filing.confirm(unit)?;
+            }
+            if has_read {
+                memory.is_of_another_log = false;
+                all_is_well();
+                duties.read(filing, watcher.complete_at());
+                let records = duties.due(unit, filing, is_idle)?;
+                filing.note(records)?;
+                if shared.options.once {
+                    return Ok(());
+                }
+            }
+        }
+    }
+
+    /// Says what is known by now, and leaves the recorder as it was.
+    fn end(
+        &mut self,
+        unit: &mut Unit,
+        plan: &Plan,
+        memory: &mut Memory,
+        ended: Result<(), Trouble>,
+    ) -> Result<(), Trouble> {
+        let mut records = Vec::new();
+        if matches!(ended, Ok(()) | Err(Trouble::Stopped)) {
+            plan.put_back(&self.watcher, unit, &self.task.recorder.name);
+            records = self.duties.last(unit, &self.filing);
+        } else {
+            records.extend(self.duties.vouch());
+        }
+        let is_archive_there = !matches!(ended, Err(Trouble::Archive(_)));
+        // What fails now was not promised to anybody.
+        let noted = match is_archive_there && !self.filing.is_holding() {
+            true => self.filing.note(records),
+            false => Ok(()),
+        };
+        (memory.life, memory.left_out) = (self.filing.told(), self.duties.left_out());
+        ended.and(noted)
+    }
+}
+
+fn cursor(bookmark: &Bookmark) -> Cursor {
+    let Bookmark { sequence, is_exact, anchor, .. } = *bookmark;
+    Cursor { sequence, is_exact, anchor }
+}

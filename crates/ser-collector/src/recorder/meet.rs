@@ -1,0 +1,107 @@
+//! Meeting a recorder: is it the one that it should be, and does it still have the log that was read?
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use ser_archive::Bookmark;
+use ser_client::Unit;
+use ser_evidence::record::{Life, LifeRecord, Suppressed};
+use ser_observer::{LogIdentity, life_of_recorder, new_life};
+
+use super::Task;
+use crate::trouble::Trouble;
+
+/// For how long a recorder is taken for an original one without being asked.
+const BELIEVED_FOR: Duration = Duration::from_secs(30 * 86_400);
+
+/// What a thread remembers from visit to visit.
+#[derive(Debug, Default)]
+pub(super) struct Memory {
+    /// When it was found to be an original recorder.
+    original_since: Option<Instant>,
+    /// Whether entries have shown that there is another log now.
+    pub(super) is_of_another_log: bool,
+    /// What was last archived of the life.
+    pub(super) life: Option<LifeRecord>,
+    /// What its filters had left out.
+    pub(super) left_out: Option<Suppressed>,
+}
+
+/// Which recorder has which number.
+#[derive(Debug, Default)]
+pub(crate) struct Known(Mutex<BTreeMap<[u8; 12], String>>);
+
+impl Known {
+    pub(crate) fn note(&self, log: &LogIdentity, recorder: &str) {
+        if let Some(id) = log.recorder() {
+            let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            known.retain(|_, name| name != recorder);
+            known.insert(id, recorder.to_owned());
+        }
+    }
+
+    /// The other recorder that this is.
+    fn other(&self, log: &LogIdentity, recorder: &str) -> Option<String> {
+        let known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        known.get(&log.recorder()?).filter(|name| *name != recorder).cloned()
+    }
+}
+
+/// A recorder that was met.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Met {
+    /// Which log it says that it has; `None` from an original one.
+    pub(super) log: Option<LogIdentity>,
+    /// Whether that is another log than the one at the bookmark.
+    pub(super) is_another: bool,
+    /// How the life is called that begins with this visit.
+    pub(super) new_life: Life,
+    /// Whether everybody gives that name.
+    pub(super) is_told: bool,
+}
+
+impl Task {
+    /// Asks which log this is before it is read.
+    pub(super) fn meet(
+        &self,
+        unit: &mut Unit,
+        bookmark: Option<&Bookmark>,
+        memory: &mut Memory,
+    ) -> Result<Met, Trouble> {
+        let is_believed = memory.original_since.is_some_and(|at| at.elapsed() < BELIEVED_FOR);
+        if self.recorder.is_original || is_believed {
+            unit.take_for_original();
+        }
+        let identity = unit.identity()?;
+        let Some(identity) = identity else {
+            // On a line that has failed meanwhile, every recorder is silent.
+            unit.log_position()?;
+            memory.original_since = memory.original_since.or(Some(Instant::now()));
+            let (is_another, new_life) = (false, draw()?);
+            return Ok(Met { log: None, is_another, new_life, is_told: false });
+        };
+        memory.original_since = None;
+        let log = LogIdentity::from(&identity);
+        let name = &self.recorder.name;
+        if let Some(other) = self.shared.known.other(&log, name)
+            && !self.shared.options.moved.contains(name)
+        {
+            return Err(Trouble::Elsewhere { other });
+        }
+        self.shared.known.note(&log, name);
+        let read = bookmark.and_then(|bookmark| bookmark.log).map(LogIdentity::from_bytes);
+        let is_another = memory.is_of_another_log || read.is_some_and(|read| read != log);
+        let told = match is_another || bookmark.is_none() {
+            true => life_of_recorder(unit, &identity)?,
+            false => None,
+        };
+        let is_told = told.is_some();
+        Ok(Met { log: Some(log), is_another, new_life: told.map_or_else(draw, Ok)?, is_told })
+    }
+}
+
+/// A name for a life that nobody else knows.
+pub(super) fn draw() -> Result<Life, Trouble> {
+    new_life().map_err(Trouble::NoRandom)
+}
