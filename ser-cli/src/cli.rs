@@ -64,6 +64,8 @@ enum Command {
     Read(commands::read::Args),
     Print(commands::print::Args),
     Watch(commands::watch::Args),
+    #[cfg(feature = "archive")]
+    Collect(commands::collect::Args),
     #[cfg(unix)]
     Genius(commands::genius::Args),
     Decode(commands::decode::Args),
@@ -200,6 +202,8 @@ impl Cli {
             Command::Read(args) => commands::read::run(args, connection),
             Command::Print(args) => commands::print::run(args, connection),
             Command::Watch(args) => commands::watch::run(args, connection),
+            #[cfg(feature = "archive")]
+            Command::Collect(args) => commands::collect::run(args, connection),
             #[cfg(unix)]
             Command::Genius(args) => commands::genius::run(args, connection),
             Command::Decode(args) => commands::decode::run(args),

@@ -8,6 +8,7 @@
 //! # The files
 //!
 //! [`Collector`] starts and ends the threads, which `options` describe and of which `states` tell.
+//! `check` looks whether recorders answer, and leaves it at that.
 //! `recorder` is what a thread does: it visits the recorder, meets it (who is it, which log has it),
 //! follows its log, files deliveries, and has duties besides. `ports` opens ways to recorders,
 //! `pause` waits, and `trouble` is what may go wrong. `forward` gives an archive to another one, and
@@ -17,6 +18,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
 )]
 
+mod check;
 mod collector;
 mod forward;
 mod options;
@@ -27,6 +29,7 @@ mod states;
 mod trouble;
 mod upkeep;
 
+pub use check::{Met, meet_all};
 pub use collector::{Collector, Ended};
 pub use forward::{Forwarded, forward};
 pub use options::{DailyTime, Forward, Open, Options, Times};

@@ -1,6 +1,8 @@
 //! The subcommands, one file each: arguments, help and action.
 
 pub(crate) mod clock;
+#[cfg(feature = "archive")]
+pub(crate) mod collect;
 pub(crate) mod comm_req;
 pub(crate) mod completions;
 pub(crate) mod config;

@@ -1,10 +1,11 @@
 //! How a recorder is going to be read: by its reports, or by asking it.
 
-use ser_client::{Diagnosis, LogFollower, LogWatcher, ReportSwitch, RequestError, Unit};
+use ser_client::{LogFollower, LogWatcher, ReportSwitch, Unit};
 use ser_proto::{AutoReport, Configuration, Configure};
 use tracing::info;
 
 use super::Task;
+use crate::check::settings;
 use crate::trouble::Trouble;
 
 /// How a recorder is going to be read.
@@ -71,19 +72,5 @@ impl Plan {
         if let Err(error) = unit.configure(keep) {
             info!(recorder, "its auto report could not be put back: {error}");
         }
-    }
-}
-
-/// Asks for the settings. `None` from an original recorder, which does not know the question and
-/// stays silent.
-fn settings(unit: &mut Unit) -> Result<Option<Configuration>, RequestError> {
-    use Diagnosis::{Ignored, Silent, SilentOnBus};
-    match unit.configuration() {
-        Ok(found) => Ok(Some(found)),
-        Err(RequestError::NoReply {
-            diagnosis: Silent | SilentOnBus { .. } | Ignored { .. },
-            ..
-        }) => Ok(None),
-        Err(error) => Err(error),
     }
 }

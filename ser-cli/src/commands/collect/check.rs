@@ -1,0 +1,59 @@
+//! `collect --check`: whether everything is as it should be, before a service is left alone with it.
+
+use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use ser_archive::{Archive, Place};
+use ser_collector::{Met, Open, Options, meet_all};
+
+use super::archive_failure;
+use crate::error::{Failure, Result, inform};
+use crate::output::{Grid, Palette};
+
+pub(super) fn run(
+    options: &Options,
+    open: &Open,
+    place: &Place,
+    stop: &Arc<AtomicBool>,
+) -> Result<()> {
+    check_archive(open, place)?;
+    if let Some(forward) = &options.forward {
+        check_archive(&forward.open, &forward.outlet)?;
+    }
+    let met = meet_all(options, stop);
+    let missed = met.iter().filter(|(_, met)| met.is_err()).count();
+    let rows = met.into_iter().map(|(name, met)| row(name, met)).collect();
+    let columns = vec!["recorder", "answers", "log"];
+    let mut out = io::stdout().lock();
+    Grid { title: None, columns, rows }.write(&mut out, Palette::of_stdout())?;
+    out.flush()?;
+    match missed {
+        0 => Ok(()),
+        _ => Err(Failure::new(format!("recorders that do not answer: {missed}"))
+            .hint("ser-cli status --recorder NAME looks closer")),
+    }
+}
+
+fn check_archive(open: &Open, name: impl std::fmt::Display) -> Result<()> {
+    let position = open().and_then(|mut archive| Archive::position(&mut archive));
+    let position = position.map_err(|error| archive_failure(&error))?;
+    inform(format_args!("{name} can be written; rows: {position}"));
+    Ok(())
+}
+
+fn row(name: String, met: std::result::Result<Met, ser_collector::Trouble>) -> Vec<String> {
+    match met {
+        Ok(Met { is_original: true, size }) => {
+            vec![name, "yes, as an original one does".to_owned(), log(size)]
+        }
+        Ok(Met { is_original: false, size }) => {
+            vec![name, "yes, and says which log it has".to_owned(), log(size)]
+        }
+        Err(trouble) => vec![name, format!("no: {trouble}"), String::new()],
+    }
+}
+
+fn log(size: u16) -> String {
+    format!("{size} entries")
+}
