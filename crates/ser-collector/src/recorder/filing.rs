@@ -80,7 +80,7 @@ impl<'t> Filing<'t> {
             held: (is_new && met.log.is_some()).then(Vec::new),
             cursor: None,
             size: 0,
-            model: told.and_then(|told| told.model),
+            model: met.model.or(told.and_then(|told| told.model)),
             told,
             arrivals: Arrivals::default(),
         }

@@ -8,6 +8,7 @@ use ser_archive::Bookmark;
 use ser_client::Unit;
 use ser_evidence::record::{Life, LifeRecord, Suppressed};
 use ser_observer::{LogIdentity, life_of_recorder, new_life};
+use ser_proto::Model;
 
 use super::Task;
 use crate::trouble::Trouble;
@@ -59,6 +60,8 @@ pub(super) struct Met {
     pub(super) new_life: Life,
     /// Whether everybody gives that name.
     pub(super) is_told: bool,
+    /// Its model, if it says so or the site file does.
+    pub(super) model: Option<Model>,
 }
 
 impl Task {
@@ -79,7 +82,8 @@ impl Task {
             unit.log_position()?;
             memory.original_since = memory.original_since.or(Some(Instant::now()));
             let (is_another, new_life) = (false, draw()?);
-            return Ok(Met { log: None, is_another, new_life, is_told: false });
+            let model = self.recorder.model;
+            return Ok(Met { log: None, is_another, new_life, is_told: false, model });
         };
         memory.original_since = None;
         let log = LogIdentity::from(&identity);
@@ -96,8 +100,9 @@ impl Task {
             true => life_of_recorder(unit, &identity)?,
             false => None,
         };
-        let is_told = told.is_some();
-        Ok(Met { log: Some(log), is_another, new_life: told.map_or_else(draw, Ok)?, is_told })
+        let (is_told, model) = (told.is_some(), Some(identity.model));
+        let new_life = told.map_or_else(draw, Ok)?;
+        Ok(Met { log: Some(log), is_another, new_life, is_told, model })
     }
 }
 
