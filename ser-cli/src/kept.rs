@@ -199,7 +199,11 @@ fn is_routine(record: &Record) -> bool {
     match record {
         Record::Clock(ClockObservation { how, .. }) => matches!(how, How::Event | How::Query),
         Record::Watched(_) | Record::Suppressed(_) | Record::Entry(_) | Record::Gap(_) => true,
-        Record::Step(_) | Record::Life(_) | Record::Point(_) | Record::Recorder(_) => false,
+        Record::Step(_)
+        | Record::Life(_)
+        | Record::Point(_)
+        | Record::Recorder(_)
+        | Record::Command(_) => false,
     }
 }
 
