@@ -1,5 +1,6 @@
 //! The subcommands, one file each: arguments, help and action.
 
+pub(crate) mod audit;
 pub(crate) mod clock;
 pub(crate) mod comm_req;
 pub(crate) mod completions;
