@@ -29,7 +29,7 @@ impl Buses {
                 Some(host) => host.clone(),
                 None => open.insert(connection::open_bus(connection)?).clone(),
             };
-            return Ok(host.unit(node, connection::options(connection)));
+            return Ok(connection::on_bus(&host, node, connection));
         }
         connection::open(connection)
     }

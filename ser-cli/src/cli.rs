@@ -1,7 +1,9 @@
 //! The arguments of the command line: those common to all subcommands, and the list of subcommands.
 
+use std::path::PathBuf;
+
 use clap::parser::ValueSource;
-use clap::{Args as _, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{ArgMatches, Args as _, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::closed_stdout;
 use crate::commands;
@@ -25,15 +27,22 @@ Only data goes to standard output; everything else goes to standard error.";
 
 /// Subcommands that talk to no recorder. They accept the options that say how to reach one, but do
 /// not list them in their help.
-const OFFLINE: [&str; 8] =
-    ["ports", "decode", "encode", "comm-req", "import", "sim", "demo", "completions"];
+const OFFLINE: [&str; 9] =
+    ["ports", "decode", "encode", "comm-req", "audit", "import", "sim", "demo", "completions"];
 
-/// Two of these options mean something to `import` as well.
-const OF_IMPORT: [(&str, &str); 2] = [
-    ("recorder", "The recorder's name in the records; the name of the file if not given"),
+/// Some of these options mean something to them as well: subcommand, option, and its help there.
+const OF_OFFLINE: [(&str, &str, &str); 4] = [
+    ("import", "recorder", "The recorder's name in the records; the name of the file if not given"),
     (
+        "import",
         "site",
         "The site file: its points may be named in a --map, and its recorders that are read get no list",
+    ),
+    ("audit", "recorder", "Only what was done to this recorder, by its name or its port"),
+    (
+        "audit",
+        "site",
+        "The site file: its time zone is used, and its recorders are known by their ports",
     ),
 ];
 
@@ -61,6 +70,7 @@ enum Command {
     Stop(commands::recording::StopArgs),
     Erase(commands::erase::Args),
     LastBroadcast(commands::last_broadcast::Args),
+    Audit(commands::audit::Args),
     Read(commands::read::Args),
     Print(commands::print::Args),
     Watch(commands::watch::Args),
@@ -84,9 +94,11 @@ enum Command {
 impl Command {
     /// Whether the command only prints.
     fn is_for_its_output(&self) -> bool {
-        use Command::{CommReq, Completions, Decode, Encode, Merge, Print, Read, Time, Watch};
+        use Command::{
+            Audit, CommReq, Completions, Decode, Encode, Merge, Print, Read, Time, Watch,
+        };
         match self {
-            Read(_) | Print(_) | Watch(_) | Merge(_) | Time(_) => true,
+            Read(_) | Print(_) | Watch(_) | Merge(_) | Time(_) | Audit(_) => true,
             Decode(_) | Encode(_) | CommReq(_) | Completions(_) => true,
             Command::Export(args) => args.prints(),
             Command::Import(args) => args.prints(),
@@ -102,10 +114,12 @@ impl Command {
 impl Command {
     /// Whether the command talks to recorders that the site file may name.
     fn reaches_a_recorder(&self) -> bool {
-        use Command::{CommReq, Completions, Decode, Demo, Encode, Import, Ports, Sim, Site};
+        use Command::{
+            Audit, CommReq, Completions, Decode, Demo, Encode, Import, Ports, Sim, Site,
+        };
         match self {
             Ports(_) | Decode(_) | Encode(_) | CommReq(_) | Sim(_) | Demo(_) => false,
-            Completions(_) | Site(_) | Import(_) => false,
+            Completions(_) | Site(_) | Import(_) | Audit(_) => false,
             #[cfg(unix)]
             Command::Genius(args) => !args.is_offline(),
             _ => true,
@@ -139,9 +153,10 @@ impl Cli {
         OFFLINE.into_iter().fold(Cli::command(), |definition, name| {
             definition.mut_subcommand(name, |subcommand| {
                 subcommand.args(connection.get_arguments().map(|arg| {
-                    let of_import = OF_IMPORT.iter().find(|(id, _)| arg.get_id() == id);
-                    match of_import.filter(|_| name == "import") {
-                        Some((_, help)) => arg.clone().help(*help).long_help(*help),
+                    let own =
+                        OF_OFFLINE.iter().find(|(of, id, _)| *of == name && arg.get_id() == id);
+                    match own {
+                        Some((_, _, help)) => arg.clone().help(*help).long_help(*help),
                         None => arg.clone().hide(true),
                     }
                 }))
@@ -164,6 +179,7 @@ impl Cli {
         let mut cli = cli.map_err(|error| error.format(&mut definition))?;
         cli.connection.port_is_from_environment =
             matches.value_source("port") == Some(ValueSource::EnvVariable);
+        cli.connection.state_dir = state_dir(&matches);
         Ok(cli)
     }
 
@@ -199,6 +215,7 @@ impl Cli {
             Command::Stop(args) => commands::recording::stop(args, connection),
             Command::Erase(args) => commands::erase::run(args, connection),
             Command::LastBroadcast(args) => commands::last_broadcast::run(args, connection),
+            Command::Audit(args) => commands::audit::run(args, connection),
             Command::Read(args) => commands::read::run(args, connection),
             Command::Print(args) => commands::print::run(args, connection),
             Command::Watch(args) => commands::watch::run(args, connection),
@@ -219,6 +236,19 @@ impl Cli {
             Command::Completions(args) => commands::completions::run(args, &mut Cli::definition()),
         }
     }
+}
+
+/// What `--state-dir` or its variable says, whichever subcommand has it. One that has not, because it
+/// changes nothing, is given that of the variable, so that nothing is ever kept elsewhere.
+fn state_dir(matches: &ArgMatches) -> Option<PathBuf> {
+    let mut deeper = Some(matches);
+    while let Some(matches) = deeper {
+        if let Ok(Some(given)) = matches.try_get_one::<PathBuf>("state_dir") {
+            return Some(given.clone());
+        }
+        deeper = matches.subcommand().map(|(_, matches)| matches);
+    }
+    std::env::var_os("SER_STATE_DIR").filter(|given| !given.is_empty()).map(PathBuf::from)
 }
 
 #[cfg(test)]

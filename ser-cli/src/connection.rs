@@ -12,6 +12,7 @@ use ser_client::{
 };
 use ser_proto::{Baud, Configuration};
 
+use crate::audit;
 use crate::error::{Failure, Result, advise, inform, warn};
 use crate::interrupt::Caught;
 use crate::site_file::Chosen;
@@ -69,6 +70,11 @@ pub(crate) struct ConnectionArgs {
     /// Whether the port is from the environment. A recorder that is named wins over it.
     #[arg(skip)]
     pub(crate) port_is_from_environment: bool,
+
+    /// The folder for state, if the user wants another than the system's: what is done to the
+    /// recorder is written down there.
+    #[arg(skip)]
+    pub(crate) state_dir: Option<PathBuf>,
 }
 
 /// The user's name for the recorder.
@@ -132,7 +138,16 @@ pub(crate) fn open(connection: &ConnectionArgs) -> Result<Unit> {
     if let (false, Some(baud)) = (endpoint.has_baud(), connection.baud) {
         unit.set_line_rate(LineRate::BitsPerSecond(baud.bits_per_second()));
     }
+    audit::of_recorder(&mut unit, connection);
     Ok(unit)
+}
+
+/// The way to the recorder of a connection on a bus that is open.
+#[cfg(unix)]
+pub(crate) fn on_bus(host: &ser_client::GeniHost, node: u8, connection: &ConnectionArgs) -> Unit {
+    let mut unit = host.unit(node, options(connection));
+    audit::of_recorder(&mut unit, connection);
+    unit
 }
 
 /// The rate of the line; by default the one that recorders are delivered with.
@@ -166,7 +181,11 @@ pub(crate) fn open_bus(connection: &ConnectionArgs) -> Result<ser_client::GeniHo
             .hint("no board at hand? ser-cli sim --genius /dev/shm/host --node 5"));
     };
     let patience = options(connection).timeout;
-    unless_interrupted(|stop| ser_client::GeniHost::open_unless(window, patience, stop))
+    let bus = Endpoint::Geni { window: window.clone(), node: None }.to_string();
+    let host =
+        unless_interrupted(|stop| ser_client::GeniHost::open_unless(window, patience, stop))?;
+    audit::of_bus(&host, &bus, connection);
+    Ok(host)
 }
 
 /// Opens the window to a bus. An interrupt has to wait until the bytes written there are put back,

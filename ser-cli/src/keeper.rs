@@ -20,7 +20,7 @@ const SAVE_EVERY: Duration = Duration::from_secs(1);
 /// The place where delivered events are remembered.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct StateArgs {
-    /// Where to remember what was delivered; without it, the user's state directory
+    /// Where to remember what was delivered and done to recorders; without it, the user's state directory
     /// (~/.local/state/ser-cli).
     ///
     /// A recorder is the same however its port is spelled: by a relative path, by a link, by the

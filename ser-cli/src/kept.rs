@@ -6,16 +6,15 @@
 //! oldest records of routine readings are dropped, and far later those of settings.
 
 use std::fmt;
-use std::fs::{self, File, TryLockError};
-use std::io::{self, BufReader, ErrorKind, Read, Write};
+use std::fs::{self, File};
+use std::io::{self, BufReader, ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::thread;
-use std::time::Duration;
 
 use ser_evidence::record::{ClockObservation, How, Record};
 use ser_files::Source;
 use ser_files::jsonl::Writer;
 
+use crate::appending;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Result, advise, warn};
 use crate::keeper::StateArgs;
@@ -34,12 +33,6 @@ const ROUTINE_KEPT: usize = 2_000;
 
 /// Far more than that many records are long.
 const MAX_LEN: u64 = 32 << 20;
-
-/// How long another run may take to write its records.
-const LOCK_PATIENCE: Duration = Duration::from_secs(2);
-
-/// How often the lock is tried.
-const LOCK_EVERY: Duration = Duration::from_millis(20);
 
 /// The records that are kept of one recorder.
 #[derive(Debug)]
@@ -115,7 +108,7 @@ impl KeptRecords {
         if let Some(directory) = self.path.parent() {
             fs::create_dir_all(directory)?;
         }
-        let _lock = self.lock()?;
+        let _lock = appending::lock(&self.path.with_extension("jsonl.lock"))?;
         let before = read(&self.path)?;
         if before.len() + records.len() > MAX_RECORDS {
             let mut all = before;
@@ -125,11 +118,8 @@ impl KeptRecords {
             return write_anew(&self.path, &text);
         }
         let mut file = open_ours(&self.path, File::options().read(true).append(true).create(true))?;
-        let last = last_byte(&mut file)?;
-        // A power cut may have ended the file in the middle of a line.
-        let mut text =
-            if last.is_some_and(|last| last != b'\n') { vec![b'\n'] } else { Vec::new() };
-        self.lines(last.is_none(), records, &mut text)?;
+        let (is_new, mut text) = appending::before_the_next_line(&mut file)?;
+        self.lines(is_new, records, &mut text)?;
         file.write_all(&text)
     }
 
@@ -139,21 +129,6 @@ impl KeptRecords {
             writer.file(PROGRAM)?;
         }
         records.iter().try_for_each(|record| writer.record(&self.recorder, record))
-    }
-
-    fn lock(&self) -> io::Result<File> {
-        let path = self.path.with_extension("jsonl.lock");
-        let file = open_ours(&path, File::options().write(true).create(true).truncate(false))?;
-        let mut waited = Duration::ZERO;
-        loop {
-            match file.try_lock() {
-                Ok(()) => return Ok(file),
-                Err(TryLockError::WouldBlock) if waited < LOCK_PATIENCE => {}
-                Err(error) => return Err(error.into()),
-            }
-            thread::sleep(LOCK_EVERY);
-            waited += LOCK_EVERY;
-        }
     }
 }
 
@@ -183,23 +158,16 @@ fn read(path: &Path) -> io::Result<Vec<Record>> {
     Ok(records)
 }
 
-fn last_byte(file: &mut File) -> io::Result<Option<u8>> {
-    use std::io::{Seek, SeekFrom};
-    if file.metadata()?.len() == 0 {
-        return Ok(None);
-    }
-    let mut last = [0];
-    file.seek(SeekFrom::End(-1))?;
-    file.read_exact(&mut last)?;
-    Ok(last.first().copied())
-}
-
 /// Whether a reading makes such a record each time.
 fn is_routine(record: &Record) -> bool {
     match record {
         Record::Clock(ClockObservation { how, .. }) => matches!(how, How::Event | How::Query),
         Record::Watched(_) | Record::Suppressed(_) | Record::Entry(_) | Record::Gap(_) => true,
-        Record::Step(_) | Record::Life(_) | Record::Point(_) | Record::Recorder(_) => false,
+        Record::Step(_)
+        | Record::Life(_)
+        | Record::Point(_)
+        | Record::Recorder(_)
+        | Record::Command(_) => false,
     }
 }
 

@@ -182,10 +182,7 @@ struct LastEntry {
 impl StateFile {
     /// The file for this recorder, in `directory` or in the system's place for state.
     pub(crate) fn of_unit(unit: &UnitName, directory: Option<&Path>) -> Result<StateFile> {
-        let directory = match directory {
-            Some(directory) => directory.to_path_buf(),
-            None => default_directory()?,
-        };
+        let directory = self::directory(directory)?;
         let path = |name: &String| directory.join(file_name(name));
         let others: Vec<PathBuf> = unit.others.iter().map(path).collect();
         let is_there = |path: &PathBuf| path.symlink_metadata().is_ok();
@@ -355,6 +352,11 @@ fn temporary_file(directory: &Path) -> io::Result<tempfile::NamedTempFile> {
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder.tempfile_in(directory)
+}
+
+/// The folder of all state: the one that is given, or the system's place for state.
+pub(crate) fn directory(given: Option<&Path>) -> Result<PathBuf> {
+    given.map_or_else(default_directory, |directory| Ok(directory.to_path_buf()))
 }
 
 fn default_directory() -> Result<PathBuf> {

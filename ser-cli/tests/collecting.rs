@@ -246,6 +246,10 @@ fn a_recorder_is_made_to_report_and_left_as_it_was_found() {
     collector.signal("-TERM");
     assert_eq!(collector.wait(), Some(0));
     assert_eq!(setting(), before);
+    // Both changes are on record, with who made them.
+    let commands = "SELECT count(*) FROM evidence WHERE kind = 'command' \
+        AND line LIKE '%auto report%' AND line LIKE '%\"user\":%'";
+    assert_eq!(plant.number(commands), 2);
     // For the time that was watched, nothing is missing.
     assert!(plant.number("SELECT count(*) FROM evidence WHERE kind = 'watched'") >= 1);
     assert!(plant.number("SELECT count(*) FROM evidence WHERE kind = 'clock'") >= 1);

@@ -41,7 +41,7 @@ const CALLS: [&str; 27] = [
 ];
 
 /// File, call, how often, and why that is right.
-const JUDGED: [(&str, &str, usize, &str); 42] = [
+const JUDGED: [(&str, &str, usize, &str); 44] = [
     (
         "crates/ser-archive/src/sqlite.rs",
         "open_with_flags(",
@@ -94,10 +94,22 @@ const JUDGED: [(&str, &str, usize, &str); 42] = [
         "only with --force, what is replaced, under a name that nothing has",
     ),
     (
-        "ser-cli/src/kept.rs",
+        "ser-cli/src/appending.rs",
         ".write(true)",
         1,
         "the lock, which is never written to; no link is followed",
+    ),
+    (
+        "ser-cli/src/audit/file.rs",
+        "append(true)",
+        1,
+        "makes the file, or opens one that was read as ours just before; no link is followed",
+    ),
+    (
+        "ser-cli/src/audit/file.rs",
+        "fs::rename(",
+        1,
+        "a file that was opened as ours just before, to a number that no file has, under the lock",
     ),
     (
         "ser-cli/src/kept.rs",

@@ -183,7 +183,8 @@ impl Names {
                 self.place(&mut watched.life, [&mut through], archive)?;
                 watched.through = through.unwrap_or_default();
             }
-            Record::Suppressed(_) | Record::Point(_) | Record::Recorder(_) => {}
+            Record::Suppressed(_) | Record::Point(_) | Record::Recorder(_) | Record::Command(_) => {
+            }
         }
         Ok(record)
     }

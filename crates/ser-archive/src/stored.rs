@@ -159,6 +159,7 @@ impl StoredEvidence {
             Record::Suppressed(_) => ("suppressed", Life::UNKNOWN),
             Record::Point(_) => ("point", Life::UNKNOWN),
             Record::Recorder(_) => ("recorder", Life::UNKNOWN),
+            Record::Command(_) => ("command", Life::UNKNOWN),
         }
     }
 

@@ -4,13 +4,14 @@ mod common;
 
 use std::io::ErrorKind;
 use std::num::NonZeroU8;
+use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use common::unit::{Answers, Bench};
 use common::{Told, told};
 use ser_client::{
-    Cursor, Diagnosis, Disturbed, LogFollower, LogPosition, RequestError, Summary, TransportError,
-    Unit, Unsolicited,
+    Change, Cursor, Diagnosis, Disturbed, LogFollower, LogPosition, Outcome, RequestError, Summary,
+    TransportError, Unit, Unsolicited,
 };
 use ser_proto::{
     AutoReport, Baud, Capabilities, Command, Configure, Counter, Counters, Filters,
@@ -391,6 +392,7 @@ fn a_filter_that_is_not_in_force_afterwards_was_refused() {
         };
         Some(reply.to_body().to_vec())
     };
+    let changes = heard(&mut bench.unit);
     let filter = InputFilter { debounce_ms: 5, chatter: None };
     let input = NonZeroU8::new;
     assert_eq!(bench.unit.set_filter(input(1), filter).unwrap().unwrap().first.get(), 1);
@@ -403,6 +405,15 @@ fn a_filter_that_is_not_in_force_afterwards_was_refused() {
     }
     let beyond = bench.unit.set_filter(input(17), filter).unwrap_err();
     assert!(matches!(beyond, RequestError::UnexpectedReply { .. }), "{beyond}");
+    let changes: Vec<_> =
+        changes.try_iter().map(|(change, outcome)| (change.to_string(), outcome)).collect();
+    let has = "input 2 has: debounce off, chatter filter off".to_owned();
+    let what = |which| format!("set filter of {which}: debounce 5 ms, chatter filter off");
+    assert_eq!(changes[0], (what("input 1"), Outcome::Done));
+    assert_eq!(changes[1], (what("input 2"), Outcome::Refused(has.clone())));
+    assert_eq!(changes[2], (what("all inputs"), Outcome::Refused(has)));
+    assert_eq!(changes[3].0, what("input 17"));
+    assert!(matches!(changes[3].1, Outcome::NotAnswered(_)), "{:?}", changes[3]);
 }
 
 #[test]
@@ -637,4 +648,97 @@ fn a_reading_says_by_when_there_was_nothing_else() {
     let (before, _, complete_at) = read(&mut bench);
     let last = bench.unit.last_exchange().unwrap();
     assert!(before.saturating_sub(delay) <= complete_at && complete_at <= last.answered);
+}
+
+/// Everything that is told of changes by this connection.
+fn heard(unit: &mut Unit) -> Receiver<(Change, Outcome)> {
+    let (told, heard) = channel();
+    unit.on_change(Box::new(move |change, outcome| {
+        told.send((*change, outcome.clone())).unwrap();
+    }));
+    heard
+}
+
+#[test]
+fn each_change_is_told_once_with_its_outcome_and_nothing_else_is() {
+    let mut bench = Bench::new(100);
+    let changes = heard(&mut bench.unit);
+    bench.fake().recorder.append_many(3);
+    bench.unit.mode().unwrap();
+    bench.unit.configuration().unwrap();
+    bench.unit.last_broadcast().unwrap();
+    bench.unit.log_position().unwrap();
+    bench.unit.print(1, 1).unwrap();
+    read_new(&mut bench.unit, &mut None, 100).1.unwrap();
+    assert_eq!(changes.try_iter().next(), None, "whoever only asks changes nothing");
+
+    bench.unit.set_recording(false).unwrap();
+    let settings = Configure { size: Some(50), ..keep_everything() };
+    bench.unit.configure(settings).unwrap();
+    bench.unit.set_clock(|_| NOON).unwrap();
+    bench.unit.erase().unwrap();
+    bench.unit.request(&Command::SetMode { recording: true }).unwrap();
+    let done = [
+        Change::SetRecording(false),
+        Change::Configure(settings),
+        Change::SetClock(NOON),
+        Change::Erase,
+        Change::SetRecording(true),
+    ];
+    assert_eq!(changes.try_iter().collect::<Vec<_>>(), done.map(|change| (change, Outcome::Done)));
+}
+
+#[test]
+fn what_was_repeated_is_one_change_and_has_the_time_that_was_sent_last() {
+    let mut bench = Bench::new(100);
+    let changes = heard(&mut bench.unit);
+    bench.fake().swallow = 2;
+    let mut second = 0;
+    bench
+        .unit
+        .set_clock(|_| {
+            second += 1;
+            TimeStamp { second, ..NOON }
+        })
+        .unwrap();
+    assert_eq!(bench.fake().commands.len(), 3);
+    let set = Change::SetClock(TimeStamp { second: 3, ..NOON });
+    assert_eq!(changes.try_iter().collect::<Vec<_>>(), [(set, Outcome::Done)]);
+}
+
+#[test]
+fn an_outcome_tells_what_is_not_known_from_what_was_refused_and_what_was_never_sent() {
+    let mut bench = Bench::new(100);
+    let changes = heard(&mut bench.unit);
+    let last = || {
+        let all: Vec<_> = changes.try_iter().collect();
+        let [(change, outcome)] = &all[..] else { panic!("{all:?}") };
+        (change.to_string(), outcome.clone())
+    };
+    bench.fake().swallow = 1;
+    assert!(bench.unit.erase().is_err());
+    let (change, outcome) = last();
+    assert_eq!(change, "erase the log");
+    assert!(
+        matches!(&outcome, Outcome::NotAnswered(why) if why.contains("no answer")),
+        "{outcome:?}"
+    );
+
+    let result = bench.unit.configure(Configure { size: Some(2049), ..keep_everything() });
+    assert!(result.is_err());
+    let in_force = "in force are size 100 entries, line 19200 baud, auto report off, report to 0, \
+                    auto print off";
+    assert_eq!(last().1, Outcome::Refused(in_force.to_owned()));
+
+    let no_day = TimeStamp { day: 31, ..NOON };
+    assert!(bench.unit.set_clock(|_| no_day).is_err());
+    let (change, outcome) = last();
+    assert_eq!(change, "set clock");
+    assert!(matches!(outcome, Outcome::NotSent(_)), "{outcome:?}");
+
+    bench.fake().breaks_in = Some(0);
+    assert!(bench.unit.set_recording(false).is_err());
+    assert!(matches!(last().1, Outcome::NotAnswered(why) if why == "the serial port is gone"));
+    assert!(bench.unit.erase().is_err());
+    assert!(matches!(last().1, Outcome::NotSent(why) if why == "the serial port is gone"));
 }

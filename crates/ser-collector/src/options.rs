@@ -16,6 +16,8 @@ pub type Open = Arc<dyn Fn() -> ser_archive::Result<Archive> + Send + Sync>;
 pub struct Options {
     /// Its name, by which the archive tells collectors apart. It must stay the same from run to run.
     pub name: String,
+    /// The program that it is part of, with its version, for the record of each command.
+    pub program: String,
     /// The recorders: those of the site that have a port.
     pub site: Site,
     /// How long a recorder may take to answer, and how often it is asked again.

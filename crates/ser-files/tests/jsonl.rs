@@ -2,9 +2,9 @@
 
 use proptest::prelude::*;
 use ser_evidence::record::{
-    Boot, ClockObservation, ClockStep, EntryRecord, Fellow, Gap, HostReading, How, Life,
-    LifeRecord, Lost, Place, PointRecord, Record, RecorderRecord, Reference, Suppressed, Told,
-    Watched, Why,
+    Boot, ClockObservation, ClockStep, CommandRecord, EntryRecord, Fellow, Gap, HostReading, How,
+    Life, LifeRecord, Lost, Outcome, Place, PointRecord, Record, RecorderRecord, Reference,
+    Suppressed, Told, Watched, Why,
 };
 use ser_evidence::time::{Bound, Moment, Scale};
 use ser_files::jsonl::{Reader, SCHEMA, Writer};
@@ -99,6 +99,23 @@ fn any_gap() -> impl Strategy<Value = Record> {
         .prop_map(|(life, after, lost, why)| Record::Gap(Gap { life, after, lost, why }))
 }
 
+fn any_command() -> impl Strategy<Value = Record> {
+    let outcome = prop_oneof![
+        Just(Outcome::Done),
+        Just(Outcome::Sent),
+        any_name().prop_map(Outcome::Refused),
+        any_name().prop_map(Outcome::NotAnswered),
+        any_name().prop_map(Outcome::NotSent),
+    ];
+    let names = (any_name(), any_name(), any_name(), any_name());
+    (any_reading(), names, any_name(), outcome).prop_map(
+        |(at, (user, host, program, peer), command, outcome)| {
+            let record = CommandRecord { at, user, host, program, peer, command, outcome };
+            Record::Command(record)
+        },
+    )
+}
+
 fn any_record() -> impl Strategy<Value = Record> {
     let entry = (any_life(), any::<(Option<u64>, u16, u32)>(), any_entry());
     let erased = proptest::option::of(any_life());
@@ -132,6 +149,7 @@ fn any_record() -> impl Strategy<Value = Record> {
         }),
         (-86_399..=86_399)
             .prop_map(|utc_offset_s| { Record::Recorder(RecorderRecord { utc_offset_s }) }),
+        any_command(),
     ]
 }
 
@@ -390,4 +408,50 @@ fn a_name_that_cannot_be_shown_is_refused() {
     };
     assert!(read(&offset("-86399"))[0].is_ok());
     assert_eq!(problem(&offset("86400")), "line 1: `utc_offset_s` cannot be `86400`");
+}
+
+const COMMAND: &str = concat!(
+    r#"{"record":"command","recorder":"U1","command":"set clock to 2026-11-22T10:00:00.000","#,
+    r#""outcome":"not answered","why":"no answer","user":"anna","host_name":"desk-7","#,
+    r#""program":"ser-cli 0.1.0","peer":"/dev/ttyUSB0","host":{"#,
+    r#""boot":"51142df50ced42cb8820275946f0d78c","monotonic_us":14219142182,"#,
+    r#""utc_us":1796031150892079,"utc_doubt_us":null}}"#,
+);
+
+#[test]
+fn a_command_is_a_line_that_a_person_can_read() {
+    let read = read(COMMAND);
+    let [Ok(Told { recorder, record: Record::Command(command) })] = &read[..] else {
+        panic!("{read:?}")
+    };
+    assert_eq!((&**recorder, &*command.user, &*command.host), ("U1", "anna", "desk-7"));
+    assert_eq!(command.outcome, Outcome::NotAnswered("no answer".to_owned()));
+    let mut text = Vec::new();
+    Writer::new(&mut text).record(recorder, &Record::Command(command.clone())).unwrap();
+    assert_eq!(std::str::from_utf8(&text).unwrap(), format!("{COMMAND}\n"));
+}
+
+#[test]
+fn every_text_of_a_command_is_bounded_and_can_be_seen() {
+    for field in ["user", "host_name", "program", "peer", "command", "why", "outcome"] {
+        let before = format!("\"{field}\":\"");
+        let (head, tail) = COMMAND.split_once(&before).unwrap();
+        let (_, tail) = tail.split_once('"').unwrap();
+        let with = |text: &str| format!("{head}{before}{text}\"{tail}");
+        let longest = match field {
+            "command" | "why" => CommandRecord::LONGEST_TEXT,
+            _ => CommandRecord::LONGEST_NAME,
+        };
+        let wrong = |text: &str| problem(&with(text));
+        for text in ["", " x", "x ", "x\\u001b[2J", "a\\nb", &"x".repeat(longest + 1)] {
+            assert!(wrong(text).contains(&format!("`{field}` cannot be")), "{}", wrong(text));
+        }
+        if field == "outcome" {
+            assert!(wrong("carried out").contains("`outcome` cannot be `carried out`"));
+        } else {
+            assert!(read(&with(&"x".repeat(longest))).iter().all(Result::is_ok), "{field}");
+        }
+        let missing = problem(&format!("{head}\"x\":\"\"{tail}"));
+        assert!(missing.contains(&format!("`{field}` is missing")), "{missing}");
+    }
 }

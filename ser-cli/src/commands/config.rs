@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use ser_client::{RequestError, Unit};
 use ser_proto::{AutoReport, Baud, Configuration, Configure, MAX_REPORT_ADDRESS};
 
+use crate::audit::AuditArgs;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result};
 use crate::output::field;
@@ -27,6 +28,9 @@ Examples:
 pub(crate) struct Args {
     #[command(flatten)]
     settings: Settings,
+
+    #[command(flatten)]
+    _audit: AuditArgs,
 }
 
 /// The settings that are given.

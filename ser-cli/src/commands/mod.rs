@@ -1,5 +1,6 @@
 //! The subcommands, one file each: arguments, help and action.
 
+pub(crate) mod audit;
 pub(crate) mod clock;
 #[cfg(feature = "archive")]
 pub(crate) mod collect;

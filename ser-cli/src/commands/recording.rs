@@ -1,5 +1,6 @@
 //! `start` and `stop`: switch recording on and off.
 
+use crate::audit::AuditArgs;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Result, inform};
 
@@ -14,12 +15,18 @@ Examples:
 /// Start recording. Changes while the recorder was stopped do not become events.
 #[derive(Debug, clap::Args)]
 #[command(after_help = START_EXAMPLES)]
-pub(crate) struct StartArgs {}
+pub(crate) struct StartArgs {
+    #[command(flatten)]
+    _audit: AuditArgs,
+}
 
 /// Stop recording until `start` or the next power-up. Events recorded so far stay.
 #[derive(Debug, clap::Args)]
 #[command(after_help = STOP_EXAMPLES)]
-pub(crate) struct StopArgs {}
+pub(crate) struct StopArgs {
+    #[command(flatten)]
+    _audit: AuditArgs,
+}
 
 pub(crate) fn start(_args: &StartArgs, connection: &ConnectionArgs) -> Result<()> {
     set_recording(connection, true)

@@ -21,7 +21,7 @@ use crate::keeper::StateArgs;
 
 pub(crate) use choice::ChoiceArgs;
 pub(crate) use files::Damaged;
-pub(crate) use moment::{GivenMoment, parse_moment};
+pub(crate) use moment::{GivenMoment, here, parse_moment};
 
 /// Where entries come from.
 #[derive(Clone, Debug, clap::Args)]

@@ -48,6 +48,17 @@ impl Original {
         })
     }
 
+    /// One that answers reads and, whatever settings it is told, with its own.
+    pub(crate) fn that_keeps_its_settings() -> Original {
+        Original::answering(|body| match (body, Command::parse(body)) {
+            (_, Ok(Command::Read { start, count })) => {
+                Some(FrameEncoder::new(read(start, count.into()).to_body()).collect())
+            }
+            ([b'C', ..], _) => Some(frame(&[b'C', 8, 0, 6, 1, 0, 0])),
+            _ => None,
+        })
+    }
+
     fn answering(answer: fn(&[u8]) -> Option<Vec<u8>>) -> Original {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let port = listener.local_addr().expect("an address").port();

@@ -2,21 +2,27 @@
 
 use crate::common::*;
 use ser_archive::{Access, Archive, Batch, Error, Keep, Window};
-use ser_evidence::record::{EntryRecord, Life, PointRecord, Record};
+use ser_evidence::record::{EntryRecord, Life, Outcome, PointRecord, Record};
 use ser_evidence::time::shown;
 use ser_proto::{Inputs, TimeStamp};
 
 pub(crate) fn what_was_added_is_given_back_and_added_again_changes_nothing(home: &Home) {
     let mut archive = home.open();
-    let known = vec![life(LIFE), observed(LIFE, 3), gap(LIFE, 5, 2), watched(LIFE, 9)];
+    let known = vec![
+        life(LIFE),
+        observed(LIFE, 3),
+        gap(LIFE, 5, 2),
+        watched(LIFE, 9),
+        command(Outcome::Done),
+    ];
     let records = [known.clone(), entries(LIFE, [1, 2, 3, 4, 5, 8, 9])].concat();
     let appended = archive.append(&[batch(records.clone())]).unwrap()[0];
-    assert_eq!((appended.entries, appended.evidence, appended.known), (7, 4, 0));
+    assert_eq!((appended.entries, appended.evidence, appended.known), (7, 5, 0));
     assert_eq!(everything(&mut archive, "U1-SER1"), records);
     assert_eq!(in_order(&mut archive), records);
 
     let again = archive.append(&[batch(records.clone())]).unwrap()[0];
-    assert_eq!((again.entries, again.evidence, again.known), (0, 0, 11));
+    assert_eq!((again.entries, again.evidence, again.known), (0, 0, 12));
     assert_eq!(again.position, appended.position);
     drop(archive);
     let mut archive = home.open_for(Access::Read).unwrap();

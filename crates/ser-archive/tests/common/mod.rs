@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use ser_archive::{Access, Archive, Batch, Bookmark, Place};
 use ser_evidence::record::{
-    self, Boot, ClockObservation, EntryRecord, Gap, HostReading, How, Life, LifeRecord, Lost,
-    Record, Reference, Watched, Why,
+    self, Boot, ClockObservation, CommandRecord, EntryRecord, Gap, HostReading, How, Life,
+    LifeRecord, Lost, Outcome, Record, Reference, Watched, Why,
 };
 use ser_evidence::time::{Bound, Moment, Utc, shown, stamp};
 use ser_proto::{Entry, Inputs, Model};
@@ -146,6 +146,19 @@ pub(crate) fn host_reading(second: i64) -> HostReading {
 pub(crate) fn watched(life: Life, through: u64) -> Record {
     let (from, to) = (host_reading(0), host_reading(60));
     Record::Watched(Watched { life, from, to, through })
+}
+
+/// The clock was set, and this came of it.
+pub(crate) fn command(outcome: Outcome) -> Record {
+    Record::Command(CommandRecord {
+        at: host_reading(1),
+        user: "anna".to_owned(),
+        host: "desk-7".to_owned(),
+        program: PROGRAM.to_owned(),
+        peer: "/dev/ttyUSB0".to_owned(),
+        command: "set clock to 2026-11-22T10:00:00.000".to_owned(),
+        outcome,
+    })
 }
 
 /// The clock was asked after an entry.

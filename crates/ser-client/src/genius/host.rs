@@ -24,6 +24,7 @@ use ser_proto::genius::{
 use super::answers::Answers;
 use super::inboxes::Inboxes;
 use super::window::Window;
+use crate::session::change::{Change, ChangeHook, Outcome};
 use crate::transport::clock::{Clock, RealTime};
 use crate::transport::endpoint::GeniWindow;
 use crate::transport::genius_error::GeniusError;
@@ -72,6 +73,8 @@ pub struct BusDevice {
 pub struct GeniHost {
     shared: Arc<Mutex<Host>>,
     pub(super) clock: Arc<dyn Clock>,
+    /// Is told of everything that changes all recorders.
+    on_change: Arc<Mutex<Option<ChangeHook>>>,
 }
 
 impl GeniHost {
@@ -147,7 +150,7 @@ impl GeniHost {
         let begun = host.begin().and_then(|()| then(&mut host));
         begun.map_err(|error| OpenError::Genius { path: place.file, error })?;
         host.stop = None;
-        Ok(GeniHost { shared: Arc::new(Mutex::new(host)), clock })
+        Ok(GeniHost { shared: Arc::new(Mutex::new(host)), clock, on_change: Arc::default() })
     }
 
     /// The host's own bus address.
@@ -196,12 +199,24 @@ impl GeniHost {
     /// # Errors
     /// When the board cannot send it.
     pub fn broadcast(&self, command: &Command) -> Result<(), GeniusError> {
-        self.lock().deliver(ser_message(Destination::Broadcast, command)?).map_err(|error| {
-            match error {
-                GeniusError::Undelivered(error) => GeniusError::BroadcastFailed(error),
-                other => other,
-            }
-        })
+        let message = ser_message(Destination::Broadcast, command);
+        let sent = message.and_then(|message| self.lock().deliver(message));
+        let sent = sent.map_err(|error| match error {
+            GeniusError::Undelivered(error) => GeniusError::BroadcastFailed(error),
+            other => other,
+        });
+        let mut hook = self.on_change.lock().unwrap_or_else(PoisonError::into_inner);
+        if let (Some(hook), Some(change)) = (&mut *hook, Change::of(command)) {
+            hook(&change, &broadcast_outcome(sent.as_ref().err()));
+        }
+        sent
+    }
+
+    /// Has every change of all recorders by a [broadcast](Self::broadcast) of this host, or of its
+    /// clones, told to `hook`, with what came of it, before the caller learns of it. Changes of one
+    /// recorder are told by [`Unit::on_change`](crate::Unit::on_change).
+    pub fn on_change(&self, hook: ChangeHook) {
+        *self.on_change.lock().unwrap_or_else(PoisonError::into_inner) = Some(hook);
     }
 
     /// Asks a device for one of its force tables.
@@ -301,6 +316,15 @@ pub(super) fn ser_message(
         // No command is longer than a datagram's data.
         data: data.map_err(|_| GeniusError::BoardBusy)?,
     })
+}
+
+/// What came of a broadcast, which nobody answers. A board that fails may have sent it.
+fn broadcast_outcome(error: Option<&GeniusError>) -> Outcome {
+    match error {
+        None => Outcome::Sent,
+        Some(error @ GeniusError::BroadcastFailed(_)) => Outcome::NotSent(error.to_string()),
+        Some(error) => Outcome::NotAnswered(error.to_string()),
+    }
 }
 
 /// A received datagram in the protocol's form.

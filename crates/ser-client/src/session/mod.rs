@@ -53,10 +53,11 @@
 //!
 //! # The files
 //!
-//! `request` knows what may be done with each command, `exchange` when it was sent and answered, `owed` the late answers, and `pace` whether
+//! `request` knows what may be done with each command, `change` which of them change a recorder, `exchange` when it was sent and answered, `owed` the late answers, and `pace` whether
 //! the recorder takes two reads at once. `text_line`, `unsolicited`, `counters` and `diagnosis`
 //! hold what else the line brings. A `link` is what a session needs of a line or a bus.
 
+pub(crate) mod change;
 pub(crate) mod counters;
 pub(crate) mod diagnosis;
 pub(crate) mod exchange;
@@ -96,7 +97,7 @@ const MAX_READS: usize = 2;
 pub(crate) const LONGEST_FRAME: Duration = Duration::from_millis(11_400);
 
 /// A time that no recorder accepts; it stands in until the attempt gets its own.
-const NO_TIME: TimeStamp =
+pub(crate) const NO_TIME: TimeStamp =
     TimeStamp { year: 0, month: 0, day: 0, hour: 0, minute: 0, second: 0, millisecond: 0 };
 
 /// How long to wait and how often to try.

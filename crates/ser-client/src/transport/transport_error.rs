@@ -44,6 +44,16 @@ impl TransportError {
     }
 }
 
+impl TransportError {
+    /// Whether a message that could not be sent for this reason cannot have left this host.
+    pub(crate) const fn is_before_sending(&self) -> bool {
+        matches!(
+            self,
+            TransportError::Genius(GeniusError::NotOnBus { .. } | GeniusError::OwnNumber { .. })
+        )
+    }
+}
+
 impl From<GeniusError> for TransportError {
     fn from(error: GeniusError) -> TransportError {
         TransportError::Genius(error)

@@ -13,6 +13,7 @@ use ser_proto::{
 
 use super::{Unit, unexpected};
 use crate::reading::read_request::ReadRequest;
+use crate::session::change::filter_refused;
 use crate::unit::request_error::RequestError;
 
 /// What is known of a recorder's extension.
@@ -145,10 +146,8 @@ impl Unit {
         if page.filters.is_empty() {
             return Err(unexpected(Code::Filters));
         }
-        let meant = if input.is_some() { 1 } else { usize::MAX };
-        let refused = page.inputs().take(meant).find(|(_, in_force)| **in_force != filter);
-        match refused.map(|(input, &in_force)| RequestError::FilterRefused { input, in_force }) {
-            Some(refused) => Err(refused),
+        match filter_refused(input, &filter, &page) {
+            Some((input, in_force)) => Err(RequestError::FilterRefused { input, in_force }),
             None => Ok(Some(page)),
         }
     }

@@ -19,15 +19,17 @@ use crate::reading::delivery::Delivery;
 use crate::reading::log_position::LogPosition;
 use crate::reading::range_reader::RangeReader;
 use crate::reading::read_request::ReadRequest;
+use crate::session::change::{Change, ChangeHook, Outcome};
 use crate::session::counters::Counters;
 use crate::session::exchange::Exchange;
 use crate::session::link::{Link, SerialLink};
 use crate::session::options::Options;
 use crate::session::unsolicited::Unsolicited;
-use crate::session::{LONGEST_FRAME, NoReply, Session, Timing};
+use crate::session::{LONGEST_FRAME, NO_TIME, NoReply, Session, Timing};
 use crate::transport::Transport;
 use crate::transport::clock::{Clock, RealTime};
 use crate::transport::line_rate::LineRate;
+use crate::transport::transport_error::TransportError;
 use extension::Extension;
 use request_error::RequestError;
 
@@ -42,6 +44,9 @@ const REPORT_ON_BUS: Duration = Duration::from_secs(20);
 /// that the bytes are on the line.
 const SEARCH_TIMEOUT: Duration = Duration::from_millis(250);
 
+/// The time for an attempt to set the clock that arrives after this delay.
+type TimeAt<'a> = &'a mut dyn FnMut(Duration) -> Result<TimeStamp, RequestError>;
+
 /// A connection to a recorder, over a line or a bus.
 pub struct Unit {
     link: Box<dyn Link>,
@@ -49,6 +54,10 @@ pub struct Unit {
     /// Whether the recorder has answered a command of the manual.
     has_answered: bool,
     extension: Extension,
+    /// Is told of everything that changes the recorder.
+    on_change: Option<ChangeHook>,
+    /// Whether anything of the present request may have left this host.
+    may_have_left: bool,
     /// That of the last question about the clock.
     token: u16,
     /// Where the log stood after the last reading by cursor.
@@ -82,6 +91,8 @@ impl Unit {
             session,
             has_answered: false,
             extension: Extension::default(),
+            on_change: None,
+            may_have_left: false,
             token: 0,
             last_position: None,
         }
@@ -100,10 +111,13 @@ impl Unit {
     /// # Errors
     /// If no reply comes or the line fails.
     pub fn request(&mut self, command: &Command) -> Result<Reply, RequestError> {
-        self.prepare()?;
-        // Nothing else is under way now.
-        let _ = self.session.request(*command);
-        self.converse(&mut |_| Err(unexpected(command.code())))
+        self.carry_out(command, None)
+    }
+
+    /// Has every change of the recorder by this connection told to `hook`, with what came of it,
+    /// before the caller learns of it. A command that was repeated is told once.
+    pub fn on_change(&mut self, hook: ChangeHook) {
+        self.on_change = Some(hook);
     }
 
     /// Whether the recorder records, and its version. Original recorders do not answer this query.
@@ -174,15 +188,16 @@ impl Unit {
         &mut self,
         mut time_at: impl FnMut(Duration) -> TimeStamp,
     ) -> Result<TimeStamp, RequestError> {
-        self.prepare()?;
-        let _ = self.session.request_set_clock();
         let mut sent = None;
-        self.converse(&mut |delay| {
-            let time = time_at(delay);
-            time.check().map_err(RequestError::InvalidTime)?;
-            sent = Some(time);
-            Ok(time)
-        })?;
+        self.carry_out(
+            &Command::SetClock(NO_TIME),
+            Some(&mut |delay| {
+                let time = time_at(delay);
+                time.check().map_err(RequestError::InvalidTime)?;
+                sent = Some(time);
+                Ok(time)
+            }),
+        )?;
         sent.ok_or_else(|| unexpected(Code::SetClock))
     }
 
@@ -418,10 +433,49 @@ impl Unit {
         Ok(self.link.receive_waiting(&mut self.session)?)
     }
 
-    fn converse(
+    /// Sends a command and waits for what comes of it. All commands but reads ahead go this way, so
+    /// none that changes the recorder passes [the hook](Self::on_change). With `time_at` the clock
+    /// is set, and each attempt gets its own time.
+    fn carry_out(
         &mut self,
-        time_at: &mut dyn FnMut(Duration) -> Result<TimeStamp, RequestError>,
+        command: &Command,
+        time_at: Option<TimeAt<'_>>,
     ) -> Result<Reply, RequestError> {
+        self.may_have_left = false;
+        let mut command = *command;
+        let result = match time_at {
+            None => self.ask_once(&command),
+            Some(time_at) => self.set_clock_by(&mut |delay| {
+                let time = time_at(delay)?;
+                command = Command::SetClock(time);
+                Ok(time)
+            }),
+        };
+        if let (Some(hook), Some(change)) = (&mut self.on_change, Change::of(&command)) {
+            let outcome = match &result {
+                Ok(reply) => change.answered(reply),
+                Err(error) if self.may_have_left => Outcome::NotAnswered(error.to_string()),
+                Err(error) => Outcome::NotSent(error.to_string()),
+            };
+            hook(&change, &outcome);
+        }
+        result
+    }
+
+    fn ask_once(&mut self, command: &Command) -> Result<Reply, RequestError> {
+        self.prepare()?;
+        // Nothing else is under way now.
+        let _ = self.session.request(*command);
+        self.converse(&mut |_| Err(unexpected(command.code())))
+    }
+
+    fn set_clock_by(&mut self, time_at: TimeAt<'_>) -> Result<Reply, RequestError> {
+        self.prepare()?;
+        let _ = self.session.request_set_clock();
+        self.converse(time_at)
+    }
+
+    fn converse(&mut self, time_at: TimeAt<'_>) -> Result<Reply, RequestError> {
         loop {
             self.send_due(time_at)?;
             match self.session.take_answer() {
@@ -440,16 +494,16 @@ impl Unit {
         }
     }
 
-    fn send_due(
-        &mut self,
-        time_at: &mut dyn FnMut(Duration) -> Result<TimeStamp, RequestError>,
-    ) -> Result<(), RequestError> {
+    fn send_due(&mut self, time_at: TimeAt<'_>) -> Result<(), RequestError> {
         while let Some(mut attempt) = self.session.dispatch(self.link.now()) {
             if attempt.wants_time() {
                 // Without a time nothing is sent, and the next request replaces this one.
                 attempt.set_time(time_at(self.link.delay(&attempt))?);
             }
-            self.link.send(&attempt)?;
+            let sent = self.link.send(&attempt);
+            // A line that fails may have carried everything.
+            self.may_have_left |= !sent.as_ref().is_err_and(TransportError::is_before_sending);
+            sent?;
         }
         Ok(())
     }

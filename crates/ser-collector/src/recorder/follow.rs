@@ -3,6 +3,8 @@
 use ser_archive::Bookmark;
 use ser_client::{Cursor, LogFollower, LogWatcher, Unit};
 
+use ser_evidence::record::Record;
+
 use super::Task;
 use super::duties::Duties;
 use super::filing::Filing;
@@ -24,6 +26,7 @@ impl Task {
         let bookmark =
             shared.writer.with(move |archive| archive.bookmark(&collector, &recorder))?;
         let mut unit = shared.ports.open(&self.recorder, shared.options.line, &shared.stop)?;
+        self.audit(&mut unit, &memory.unfiled);
         let plan = self.plan(&mut unit, bookmark.and_then(|bookmark| bookmark.log_size))?;
         let met = self.meet(&mut unit, bookmark.as_ref(), memory)?;
         let follower = LogFollower::new(bookmark.as_ref().map(cursor), plan.size);
@@ -78,7 +81,7 @@ impl Visit<'_> {
                 all_is_well();
                 duties.read(filing, watcher.complete_at());
                 let records = duties.due(unit, filing, is_idle)?;
-                filing.note(records)?;
+                note(filing, memory, records)?;
                 if shared.options.once {
                     return Ok(());
                 }
@@ -104,12 +107,19 @@ impl Visit<'_> {
         let is_archive_there = !matches!(ended, Err(Trouble::Archive(_)));
         // What fails now was not promised to anybody.
         let noted = match is_archive_there && !self.filing.is_holding() {
-            true => self.filing.note(records),
+            true => note(&mut self.filing, memory, records),
             false => Ok(()),
         };
         (memory.life, memory.left_out) = (self.filing.told(), self.duties.left_out());
         ended.and(noted)
     }
+}
+
+/// Archives what is known besides entries, and commands that still wait for that.
+fn note(filing: &mut Filing<'_>, memory: &Memory, mut records: Vec<Record>) -> Result<(), Trouble> {
+    let waiting = memory.unfiled.take();
+    records.extend(waiting.iter().cloned());
+    filing.note(records).inspect_err(|_| memory.unfiled.add(waiting))
 }
 
 fn cursor(bookmark: &Bookmark) -> Cursor {

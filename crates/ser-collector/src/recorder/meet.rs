@@ -11,6 +11,7 @@ use ser_observer::{LogIdentity, life_of_recorder, new_life};
 use ser_proto::Model;
 
 use super::Task;
+use super::audit::Unfiled;
 use crate::trouble::Trouble;
 
 /// For how long a recorder is taken for an original one without being asked.
@@ -27,6 +28,8 @@ pub(super) struct Memory {
     pub(super) life: Option<LifeRecord>,
     /// What its filters had left out.
     pub(super) left_out: Option<Suppressed>,
+    /// Commands that could not be archived yet.
+    pub(super) unfiled: Unfiled,
 }
 
 /// Which recorder has which number.

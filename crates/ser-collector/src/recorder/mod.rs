@@ -1,5 +1,6 @@
 //! What the thread of a recorder does: it visits it, again and again.
 
+mod audit;
 mod duties;
 mod filing;
 mod follow;

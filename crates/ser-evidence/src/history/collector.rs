@@ -84,8 +84,12 @@ impl Collector {
         }
     }
 
-    /// Takes a record of the recorder of this name.
+    /// Takes a record of the recorder of this name. Commands are passed over: they tell nothing of
+    /// a log or a clock that other records do not tell, and may be of a bus instead of a recorder.
     pub fn add(&mut self, recorder: &str, record: &Record) {
+        if matches!(record, Record::Command(_)) {
+            return;
+        }
         self.turn_to(recorder);
         if let Some(collected) = self.recorders.get_mut(self.current) {
             collected.add(record);
@@ -164,6 +168,7 @@ impl Collected {
             Record::Suppressed(ref look) => self.suppressed.push(look.clone()),
             Record::Point(ref point) => _ = self.points.insert(point.clone()),
             Record::Recorder(stamps) => self.stamps = self.stamps.max(Some(stamps)),
+            Record::Command(_) => {}
         }
     }
 
@@ -286,4 +291,38 @@ fn sorted<T: std::fmt::Debug + PartialEq>(records: Vec<T>) -> Vec<T> {
     keyed.sort_by(|one, other| one.0.cmp(&other.0));
     keyed.dedup_by(|one, other| one.1 == other.1);
     keyed.into_iter().map(|(_, record)| record).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{Boot, CommandRecord, HostReading, Outcome};
+    use crate::time::Moment;
+
+    #[test]
+    fn a_command_is_no_news_of_a_recorder_and_a_bus_becomes_none() {
+        let at = HostReading {
+            boot: Boot(1),
+            monotonic: Moment::from_us(1),
+            utc: Moment::from_us(1),
+            utc_doubt_us: None,
+        };
+        let text = || "a text".to_owned();
+        let command = CommandRecord {
+            at,
+            user: text(),
+            host: text(),
+            program: text(),
+            peer: text(),
+            command: text(),
+            outcome: Outcome::Sent,
+        };
+        let mut collector = Collector::new();
+        collector.add("geni:/dev/shm/host", &Record::Command(command.clone()));
+        assert!(collector.finish(&Site::unknown()).recorders.is_empty());
+        let mut collector = Collector::new();
+        collector.add("U1", &Record::Gap(Gap::NOT_REACHED));
+        collector.add("U1", &Record::Command(command));
+        assert!(collector.finish(&Site::unknown()).recorders[0].is_not_reached);
+    }
 }

@@ -4,6 +4,7 @@
 //! any order, from any number of files, give the same timeline.
 
 mod clock;
+mod command;
 mod entry;
 mod gap;
 mod life;
@@ -12,6 +13,7 @@ mod suppressed;
 mod watched;
 
 pub use clock::{Boot, ClockObservation, ClockStep, Fellow, HostReading, How, Place, Reference};
+pub use command::{CommandRecord, Outcome};
 pub use entry::EntryRecord;
 pub use gap::{Gap, Lost, Why};
 pub use life::{Life, LifeRecord};
@@ -40,6 +42,8 @@ pub enum Record {
     Point(PointRecord),
     /// In what time the stamps are.
     Recorder(RecorderRecord),
+    /// A command that changed the recorder, or may have. It takes no part in a timeline.
+    Command(CommandRecord),
 }
 
 /// A record and the recorder that it is about.

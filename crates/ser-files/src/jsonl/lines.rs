@@ -78,6 +78,16 @@ pub(super) struct Line<'a> {
     pub(super) utc_offset_s: Option<i32>,
     #[serde(borrow)]
     pub(super) note: Option<Text<'a>>,
+    #[serde(borrow)]
+    pub(super) user: Option<Text<'a>>,
+    #[serde(borrow)]
+    pub(super) host_name: Option<Text<'a>>,
+    #[serde(borrow)]
+    pub(super) peer: Option<Text<'a>>,
+    #[serde(borrow)]
+    pub(super) command: Option<Text<'a>>,
+    #[serde(borrow)]
+    pub(super) outcome: Option<Text<'a>>,
 }
 
 /// Both clocks of a host.

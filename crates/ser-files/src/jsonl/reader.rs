@@ -3,15 +3,15 @@
 use std::io::BufRead;
 
 use ser_evidence::record::{
-    ClockObservation, ClockStep, EntryRecord, Gap, How, Life, LifeRecord, Lost, Place, PointRecord,
-    Record, RecorderRecord, Reference, Suppressed, Told, Watched, Why,
+    ClockObservation, ClockStep, CommandRecord, EntryRecord, Gap, How, Life, LifeRecord, Lost,
+    Outcome, Place, PointRecord, Record, RecorderRecord, Reference, Suppressed, Told, Watched, Why,
 };
 use ser_evidence::time::{Bound, Scale, shown};
 use ser_proto::Entry;
 
 use super::SCHEMA;
 use super::lines::{HostLine, Line, PlaceLine, Result, moment, needed, stamp, understood, wrong};
-use super::texts::{Text, broadcast_named, fit_to_show, life_named, model_named};
+use super::texts::{Text, broadcast_named, fit_to_show, is_line_of, life_named, model_named};
 use crate::error::{Problem, ReadError, quoted};
 use crate::lines::Lines;
 use crate::missing::why_named;
@@ -152,6 +152,7 @@ fn item(line: &Line<'_>) -> std::result::Result<Item, Problem> {
         Some("suppressed") => suppressed(line),
         Some("point") => point(line),
         Some("recorder") => recorder(line),
+        Some("command") => command(line),
         // Evidence that is passed over in silence would be lost.
         Some(kind) => Err(format!("there is no record {}", quoted(kind.as_bytes()))),
         None if line.entry.is_some() => entry(line),
@@ -315,4 +316,34 @@ fn recorder(line: &Line<'_>) -> Result<Record> {
         return Err(wrong("utc_offset_s", &utc_offset_s.to_string()));
     }
     Ok(Record::Recorder(RecorderRecord { utc_offset_s }))
+}
+
+fn command(line: &Line<'_>) -> Result<Record> {
+    let text = |field: &Option<Text<'_>>, name, longest| {
+        let Text(text) = needed(field.as_ref(), name)?;
+        match is_line_of(text, longest) {
+            true => Ok(text.to_string()),
+            false => Err(wrong(name, text)),
+        }
+    };
+    let name = |field, name| text(field, name, CommandRecord::LONGEST_NAME);
+    let why = || text(&line.why, "why", CommandRecord::LONGEST_TEXT);
+    let Text(outcome) = needed(line.outcome.as_ref(), "outcome")?;
+    let outcome = match &**outcome {
+        "done" => Outcome::Done,
+        "sent" => Outcome::Sent,
+        "refused" => Outcome::Refused(why()?),
+        "not answered" => Outcome::NotAnswered(why()?),
+        "not sent" => Outcome::NotSent(why()?),
+        other => return Err(wrong("outcome", other)),
+    };
+    Ok(Record::Command(CommandRecord {
+        at: needed(line.host.as_ref(), "host")?.reading()?,
+        user: name(&line.user, "user")?,
+        host: name(&line.host_name, "host_name")?,
+        program: name(&line.program, "program")?,
+        peer: name(&line.peer, "peer")?,
+        command: text(&line.command, "command", CommandRecord::LONGEST_TEXT)?,
+        outcome,
+    }))
 }

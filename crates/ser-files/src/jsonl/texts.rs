@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::fmt;
 
 use ser_console::is_obeyed;
-use ser_evidence::record::{How, Life, PointRecord};
+use ser_evidence::record::{How, Life, Outcome, PointRecord};
 use ser_proto::{Inputs, Model};
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::ser::SerializeSeq;
@@ -85,9 +85,25 @@ pub(super) fn life_named(name: Option<&str>) -> Option<Life> {
     name.map_or(Some(Life::UNKNOWN), Life::from_name)
 }
 
-/// Whether this may be the name of a point, or what a state is called: one line that can be seen.
+/// What came of a command, without the reason.
+pub(super) const fn outcome_name(outcome: &Outcome) -> &'static str {
+    match outcome {
+        Outcome::Done => "done",
+        Outcome::Sent => "sent",
+        Outcome::Refused(_) => "refused",
+        Outcome::NotAnswered(_) => "not answered",
+        Outcome::NotSent(_) => "not sent",
+    }
+}
+
+/// Whether this may be the name of a point, or what a state is called.
 pub(super) fn fit_to_show(text: &str) -> bool {
+    is_line_of(text, PointRecord::LONGEST)
+}
+
+/// Whether this is one line that can be seen, of at most so many characters.
+pub(super) fn is_line_of(text: &str, longest: usize) -> bool {
     text.trim() == text
-        && (1..=PointRecord::LONGEST).contains(&text.chars().count())
+        && (1..=longest).contains(&text.chars().count())
         && !text.chars().any(is_obeyed)
 }

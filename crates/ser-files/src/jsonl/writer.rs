@@ -6,8 +6,9 @@ use std::io::{self, Write};
 
 use ser_console::is_obeyed;
 use ser_evidence::record::{
-    Boot, ClockObservation, ClockStep, EntryRecord, Fellow, Gap, HostReading, Life, LifeRecord,
-    Lost, Place, PointRecord, Record, RecorderRecord, Reference, Suppressed, Watched, Why,
+    Boot, ClockObservation, ClockStep, CommandRecord, EntryRecord, Fellow, Gap, HostReading, Life,
+    LifeRecord, Lost, Place, PointRecord, Record, RecorderRecord, Reference, Suppressed, Watched,
+    Why,
 };
 use ser_evidence::time::{Moment, stamp};
 use ser_proto::{Entry, Inputs, TimeStamp};
@@ -15,7 +16,7 @@ use serde::{Serialize, Serializer};
 use serde_json::ser::Formatter;
 
 use super::SCHEMA;
-use super::texts::{Numbers, how_name, model_name};
+use super::texts::{Numbers, how_name, model_name, outcome_name};
 use crate::missing::why_name;
 use crate::stamp::untold_year;
 
@@ -53,6 +54,7 @@ impl<W: Write> Writer<W> {
             Record::Suppressed(look) => self.line(&SuppressedLine::of(recorder, look)),
             Record::Point(point) => self.line(&PointLine::of(recorder, point)),
             Record::Recorder(stamps) => self.line(&RecorderLine::of(recorder, stamps)),
+            Record::Command(command) => self.line(&CommandLine::of(recorder, command)),
         }
     }
 
@@ -374,6 +376,39 @@ struct RecorderLine<'a> {
 impl<'a> RecorderLine<'a> {
     fn of(recorder: &'a str, stamps: &RecorderRecord) -> RecorderLine<'a> {
         RecorderLine { record: "recorder", recorder, utc_offset_s: stamps.utc_offset_s }
+    }
+}
+
+#[derive(Serialize)]
+struct CommandLine<'a> {
+    record: &'static str,
+    recorder: &'a str,
+    command: &'a str,
+    outcome: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    why: Option<&'a str>,
+    user: &'a str,
+    host_name: &'a str,
+    program: &'a str,
+    peer: &'a str,
+    host: HostFields,
+}
+
+impl<'a> CommandLine<'a> {
+    fn of(recorder: &'a str, record: &'a CommandRecord) -> CommandLine<'a> {
+        let CommandRecord { at, user, host: host_name, program, peer, command, outcome } = record;
+        CommandLine {
+            record: "command",
+            recorder,
+            command,
+            outcome: outcome_name(outcome),
+            why: outcome.why(),
+            user,
+            host_name,
+            program,
+            peer,
+            host: at.into(),
+        }
     }
 }
 

@@ -15,6 +15,8 @@ use ser_archive::{Access, Archive, Place};
 use ser_collector::{Collector, DailyTime, Ended, Forward, Open, Options, Times};
 use ser_evidence::site::Site;
 
+use ser_observer::Author;
+
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::error::{Failure, Result, inform};
 use crate::interrupt;
@@ -236,6 +238,7 @@ fn options(args: &Args, connection: &ConnectionArgs, site: Site) -> Result<Optio
         .map(|place| Forward { outlet: place.to_string(), open: opener(place) });
     Ok(Options {
         name,
+        program: PROGRAM.to_owned(),
         site,
         line: connection::options(connection),
         may_configure: !args.poll,
@@ -251,12 +254,8 @@ fn options(args: &Args, connection: &ConnectionArgs, site: Site) -> Result<Optio
 
 /// The name of this computer.
 fn computer() -> Result<String> {
-    #[cfg(unix)]
-    let name = rustix::system::uname().nodename().to_str().map(str::to_owned).ok();
-    #[cfg(not(unix))]
-    let name = std::env::var("COMPUTERNAME").ok();
-    let name = name.and_then(|name| collector_name(&name).ok());
-    name.ok_or_else(|| {
+    let name = Author::of_this_program(PROGRAM).host().map(str::to_owned);
+    name.and_then(|name| collector_name(&name).ok()).ok_or_else(|| {
         Failure::new("this computer has no name by which the collector could be called")
             .hint("give one with --name")
     })

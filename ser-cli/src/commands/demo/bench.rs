@@ -67,7 +67,11 @@ impl Bench {
     }
 
     fn state(&self) -> StateArgs {
-        StateArgs::in_directory(self.folder.path().join("state"))
+        StateArgs::in_directory(self.state_folder())
+    }
+
+    fn state_folder(&self) -> PathBuf {
+        self.folder.path().join("state")
     }
 
     /// The connection of somebody who names the site, and perhaps a recorder of it.
@@ -76,6 +80,8 @@ impl Bench {
             site: Some(self.site()),
             recorder: recorder.map(|recorder| recorder.name.to_owned()),
             timeout: Some(Duration::from_secs(5)),
+            // What is done to the demo's recorders is nobody's business afterwards.
+            state_dir: Some(self.state_folder()),
             ..ConnectionArgs::default()
         };
         site_file::choose(&named, false)

@@ -13,6 +13,7 @@ use ser_proto::{Capabilities, InputFilter};
 use self::set::Target;
 pub(super) use self::shown::Shown;
 use self::values::{Chatter, Wish};
+use crate::audit::AuditArgs;
 use crate::connection::{self, ConnectionArgs};
 use crate::error::{Failure, Result};
 use crate::extension;
@@ -87,6 +88,9 @@ enum What {
         /// as before, or twice the window where there was no chatter filter.
         #[arg(long, value_name = "TIME", value_parser = values::rearm)]
         rearm: Option<u16>,
+
+        #[command(flatten)]
+        audit: AuditArgs,
     },
 
     /// Switch filters off: every change counts at once.
@@ -94,6 +98,9 @@ enum What {
     Clear {
         #[command(flatten)]
         target: Target,
+
+        #[command(flatten)]
+        audit: AuditArgs,
     },
 }
 
@@ -110,11 +117,11 @@ enum Format {
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let (target, wish) = match &args.what {
         None => return show(args.format, connection),
-        Some(What::Set { target, debounce, chatter, rearm }) => {
+        Some(What::Set { target, debounce, chatter, rearm, .. }) => {
             let wish = Wish { debounce_ms: *debounce, chatter: *chatter, rearm_ms: *rearm };
             (target, wish)
         }
-        Some(What::Clear { target }) => {
+        Some(What::Clear { target, .. }) => {
             let off = Some(Chatter::Off);
             (target, Wish { debounce_ms: Some(0), chatter: off, rearm_ms: None })
         }

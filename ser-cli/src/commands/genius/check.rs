@@ -42,10 +42,11 @@ impl Asked {
         connection: &ConnectionArgs,
         looks: Option<&StateArgs>,
     ) -> Asked {
-        let mut unit = host.unit(node, connection::options(connection));
+        let to_node = connection::to_node(connection, node).ok();
+        let mut unit = connection::on_bus(host, node, to_node.as_ref().unwrap_or(connection));
         // The same command may have been broadcast before.
         let before = last_broadcast(&mut unit);
-        let connection = connection::to_node(connection, node).ok();
+        let connection = to_node;
         let wanted = looks.zip(connection).filter(|_| before.is_ok());
         let look = wanted.as_ref().and_then(|_| LogLook::take(&mut unit).ok());
         let identity = wanted.as_ref().and_then(|(state, connection)| {
