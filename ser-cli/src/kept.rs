@@ -200,6 +200,7 @@ fn is_routine(record: &Record) -> bool {
         Record::Clock(ClockObservation { how, .. }) => matches!(how, How::Event | How::Query),
         Record::Watched(_) | Record::Suppressed(_) | Record::Entry(_) | Record::Gap(_) => true,
         Record::Step(_) | Record::Life(_) | Record::Point(_) | Record::Recorder(_) => false,
+        Record::Note(_) | Record::Site(_) => false,
     }
 }
 

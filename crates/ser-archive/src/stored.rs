@@ -159,6 +159,8 @@ impl StoredEvidence {
             Record::Suppressed(_) => ("suppressed", Life::UNKNOWN),
             Record::Point(_) => ("point", Life::UNKNOWN),
             Record::Recorder(_) => ("recorder", Life::UNKNOWN),
+            Record::Note(note) => ("note", note.life),
+            Record::Site(_) => ("site", Life::UNKNOWN),
         }
     }
 

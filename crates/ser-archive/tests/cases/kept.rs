@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use ser_archive::{Access, Archive, Error, Window};
-use ser_evidence::record::{PointRecord, Record};
+use ser_evidence::record::{NoteRecord, PointRecord, Record, SiteRecord};
 use ser_evidence::time::shown;
 use ser_proto::{Inputs, TimeStamp};
 
@@ -115,6 +115,37 @@ pub(crate) fn what_could_not_be_read_again_is_not_added(home: &Home) {
     assert_eq!(archive.bookmark("cellar", "U1-SER1").unwrap(), None);
     archive.append(&[batch(vec![named("pump")])]).unwrap();
     assert_eq!(everything(&mut archive, "U1-SER1"), [named("pump")]);
+}
+
+pub(crate) fn remarks_and_versions_of_the_site_file_are_kept_as_they_are(home: &Home) {
+    let mut archive = home.open();
+    let note = |text: &str, closes| {
+        Record::Note(NoteRecord {
+            at: host_reading(90),
+            user: "ada".to_owned(),
+            host: "desk-7".to_owned(),
+            life: LIFE,
+            sequence: 2,
+            text: text.to_owned(),
+            closes,
+        })
+    };
+    let site = |text: &str| Record::Site(SiteRecord { at: host_reading(0), text: text.to_owned() });
+    let records = [
+        site("[[recorder]]\n\tname = \"Süd\"\r\n"),
+        note("test of the relay", false),
+        note("", true),
+        site(&"# long\n".repeat(100_000)),
+    ];
+    archive.append(&[batch([&records[..], &entries(LIFE, 1..=3)].concat())]).unwrap();
+    let appended = archive.append(&[batch(records.to_vec())]).unwrap();
+    assert_eq!(appended[0].known, 4);
+    assert_eq!(everything(&mut archive, "U1-SER1"), [&records[..], &entries(LIFE, 1..=3)].concat());
+    assert!(archive.check().unwrap().is_sound());
+    assert_eq!(archive.verify().unwrap().1, []);
+
+    let control = site("\u{1b}");
+    assert!(archive.append(&[batch(vec![control])]).is_err());
 }
 
 pub(crate) fn a_window_is_by_what_the_recorder_showed_and_an_impossible_stamp_is_in_each(

@@ -164,6 +164,8 @@ impl Collected {
             Record::Suppressed(ref look) => self.suppressed.push(look.clone()),
             Record::Point(ref point) => _ = self.points.insert(point.clone()),
             Record::Recorder(stamps) => self.stamps = self.stamps.max(Some(stamps)),
+            // Neither says anything of the log or its clock.
+            Record::Note(_) | Record::Site(_) => {}
         }
     }
 

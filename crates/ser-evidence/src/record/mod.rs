@@ -8,6 +8,8 @@ mod entry;
 mod gap;
 mod life;
 mod names;
+mod note;
+mod site;
 mod suppressed;
 mod watched;
 
@@ -16,6 +18,8 @@ pub use entry::EntryRecord;
 pub use gap::{Gap, Lost, Why};
 pub use life::{Life, LifeRecord};
 pub use names::{PointRecord, RecorderRecord};
+pub use note::NoteRecord;
+pub use site::SiteRecord;
 pub use suppressed::Suppressed;
 pub use watched::Watched;
 
@@ -40,6 +44,10 @@ pub enum Record {
     Point(PointRecord),
     /// In what time the stamps are.
     Recorder(RecorderRecord),
+    /// What a person says about an incident.
+    Note(NoteRecord),
+    /// A version of the site file.
+    Site(SiteRecord),
 }
 
 /// A record and the recorder that it is about.

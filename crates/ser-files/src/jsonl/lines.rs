@@ -77,6 +77,15 @@ pub(super) struct Line<'a> {
     pub(super) off: Option<Text<'a>>,
     pub(super) utc_offset_s: Option<i32>,
     #[serde(borrow)]
+    pub(super) at: Option<HostLine<'a>>,
+    #[serde(borrow)]
+    pub(super) user: Option<Text<'a>>,
+    #[serde(borrow)]
+    pub(super) computer: Option<Text<'a>>,
+    #[serde(borrow)]
+    pub(super) text: Option<Text<'a>>,
+    pub(super) closes: Option<bool>,
+    #[serde(borrow)]
     pub(super) note: Option<Text<'a>>,
 }
 

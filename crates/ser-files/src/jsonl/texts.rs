@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use ser_console::is_obeyed;
 use ser_evidence::record::{How, Life, PointRecord};
@@ -87,7 +88,10 @@ pub(super) fn life_named(name: Option<&str>) -> Option<Life> {
 
 /// Whether this may be the name of a point, or what a state is called: one line that can be seen.
 pub(super) fn fit_to_show(text: &str) -> bool {
-    text.trim() == text
-        && (1..=PointRecord::LONGEST).contains(&text.chars().count())
-        && !text.chars().any(is_obeyed)
+    is_line(text, 1..=PointRecord::LONGEST)
+}
+
+/// Whether this is one line that can be seen, with so many characters.
+pub(super) fn is_line(text: &str, length: RangeInclusive<usize>) -> bool {
+    text.trim() == text && length.contains(&text.chars().count()) && !text.chars().any(is_obeyed)
 }

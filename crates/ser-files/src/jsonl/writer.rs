@@ -7,7 +7,8 @@ use std::io::{self, Write};
 use ser_console::is_obeyed;
 use ser_evidence::record::{
     Boot, ClockObservation, ClockStep, EntryRecord, Fellow, Gap, HostReading, Life, LifeRecord,
-    Lost, Place, PointRecord, Record, RecorderRecord, Reference, Suppressed, Watched, Why,
+    Lost, NoteRecord, Place, PointRecord, Record, RecorderRecord, Reference, SiteRecord,
+    Suppressed, Watched, Why,
 };
 use ser_evidence::time::{Moment, stamp};
 use ser_proto::{Entry, Inputs, TimeStamp};
@@ -53,6 +54,8 @@ impl<W: Write> Writer<W> {
             Record::Suppressed(look) => self.line(&SuppressedLine::of(recorder, look)),
             Record::Point(point) => self.line(&PointLine::of(recorder, point)),
             Record::Recorder(stamps) => self.line(&RecorderLine::of(recorder, stamps)),
+            Record::Note(note) => self.line(&NoteLine::of(recorder, note)),
+            Record::Site(site) => self.line(&SiteLine::of(recorder, site)),
         }
     }
 
@@ -374,6 +377,50 @@ struct RecorderLine<'a> {
 impl<'a> RecorderLine<'a> {
     fn of(recorder: &'a str, stamps: &RecorderRecord) -> RecorderLine<'a> {
         RecorderLine { record: "recorder", recorder, utc_offset_s: stamps.utc_offset_s }
+    }
+}
+
+#[derive(Serialize)]
+struct NoteLine<'a> {
+    record: &'static str,
+    recorder: &'a str,
+    at: HostFields,
+    user: &'a str,
+    computer: &'a str,
+    life: AsText<Life>,
+    sequence: u64,
+    text: &'a str,
+    closes: bool,
+}
+
+impl<'a> NoteLine<'a> {
+    fn of(recorder: &'a str, note: &'a NoteRecord) -> NoteLine<'a> {
+        let NoteRecord { at, user, host, life, sequence, text, closes } = note;
+        NoteLine {
+            record: "note",
+            recorder,
+            at: at.into(),
+            user,
+            computer: host,
+            life: AsText(*life),
+            sequence: *sequence,
+            text,
+            closes: *closes,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct SiteLine<'a> {
+    record: &'static str,
+    recorder: &'a str,
+    at: HostFields,
+    text: &'a str,
+}
+
+impl<'a> SiteLine<'a> {
+    fn of(recorder: &'a str, site: &'a SiteRecord) -> SiteLine<'a> {
+        SiteLine { record: "site", recorder, at: (&site.at).into(), text: &site.text }
     }
 }
 
