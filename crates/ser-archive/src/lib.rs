@@ -7,11 +7,12 @@
 //!
 //! # The files
 //!
-//! [`Archive`] is the way in: `archive` opens, `append` adds, `reading` gives back, `check` says what
-//! is missing, `verify` whether anybody has changed something, and `retention` lets go of what is
-//! old; `numbers` are ranges of entries. [`Writer`] lets many threads add to one archive. Below these, `chain` reckons digests,
-//! `stored` makes columns of records, `schema` makes tables, and `sql` is what a database must do;
-//! `sqlite` does it, and `postgres` where the feature of this name is on.
+//! [`Archive`] is the way in: `archive` opens, `append` adds, `reading` gives back and `excerpt` a
+//! part, `check` says what is missing, `verify` whether anybody has changed something, and `retention`
+//! lets go of what is old; `numbers` are ranges of entries. [`Writer`] lets many threads add to one
+//! archive. Below these, `chain` reckons digests, `stored` makes columns of records, `schema` makes
+//! tables, and `sql` is what a database must do; `sqlite` does it, and `postgres` where the feature of
+//! this name is on.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
@@ -23,6 +24,7 @@ mod batch;
 mod chain;
 mod check;
 mod error;
+mod excerpt;
 mod numbers;
 mod place;
 #[cfg(feature = "postgres")]
@@ -40,6 +42,7 @@ pub use archive::{Access, Archive};
 pub use batch::{Appended, Batch, Bookmark};
 pub use check::{Check, Hole, RecorderCheck};
 pub use error::{Error, Result};
+pub use excerpt::{LeftOut, Wanted};
 pub use place::{NoPlace, Place};
 pub use reading::{Archived, Window};
 pub use retention::{Expired, Keep};
