@@ -3,6 +3,8 @@
 //! The readers of untrusted files can be used separately, so that tests and fuzzers reach them:
 //! captures of a line ([`CaptureOptions`]), and the notes of an earlier run ([`Delivered`]).
 
+#[cfg(feature = "archive")]
+mod archive;
 mod buses;
 mod cli;
 mod clock_look;

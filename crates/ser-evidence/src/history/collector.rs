@@ -18,7 +18,7 @@ use crate::site::{ClockRule, Delays, Recorder, Site};
 ///
 /// A source is one reading or one file. Entries whose life has no name belong together only within
 /// a source, so say where the next one [begins](Self::begin_source).
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Collector {
     recorders: Vec<Collected>,
     /// Where each is in that list.
@@ -28,7 +28,7 @@ pub struct Collector {
 }
 
 /// What was collected of one recorder.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Collected {
     name: String,
     lives: BTreeMap<Life, Vec<Held>>,

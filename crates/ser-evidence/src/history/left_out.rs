@@ -6,7 +6,7 @@ use super::LifeHistory;
 use crate::record::Life;
 
 /// Between which sequences entries were left out.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct LeftOut {
     by_place: BTreeMap<(Life, u64), u64>,
 }
