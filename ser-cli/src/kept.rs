@@ -199,8 +199,12 @@ fn is_routine(record: &Record) -> bool {
     match record {
         Record::Clock(ClockObservation { how, .. }) => matches!(how, How::Event | How::Query),
         Record::Watched(_) | Record::Suppressed(_) | Record::Entry(_) | Record::Gap(_) => true,
-        Record::Step(_) | Record::Life(_) | Record::Point(_) | Record::Recorder(_) => false,
-        Record::Note(_) | Record::Site(_) => false,
+        Record::Step(_)
+        | Record::Life(_)
+        | Record::Point(_)
+        | Record::Recorder(_)
+        | Record::Note(_)
+        | Record::Site(_) => false,
     }
 }
 

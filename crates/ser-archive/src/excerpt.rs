@@ -108,6 +108,26 @@ impl Archive {
         })
     }
 
+    /// The lives of a recorder's log of which there are entries.
+    ///
+    /// # Errors
+    /// If the archive cannot be read.
+    pub fn lives(&mut self, recorder: &str) -> Result<Vec<Life>> {
+        const LIVES: &str = "WITH RECURSIVE own (id) AS (\
+            SELECT id FROM recorder WHERE name = ?1), lives (life) AS (\
+            SELECT min(life) FROM entry WHERE recorder = (SELECT id FROM own) UNION ALL \
+            SELECT (SELECT min(entry.life) FROM entry \
+            WHERE recorder = (SELECT id FROM own) AND entry.life > lives.life) \
+            FROM lives WHERE lives.life IS NOT NULL) \
+            SELECT life FROM lives WHERE life IS NOT NULL";
+        let mut lives = Vec::new();
+        self.sql.query(LIVES, &[Value::from(recorder)], &mut |row| {
+            lives.push(Life::from_bits(row.int(0)?.cast_unsigned()));
+            Ok(())
+        })?;
+        Ok(lives)
+    }
+
     /// The last entries of a recorder in which one of these inputs (bit 0 is input 1) went on, or may
     /// have: the last one by what its clock showed, and of each life the last one that was added
     /// after that.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::archive::Archive;
 use crate::chain::{self, Checkpoint, Digest, Link, NOTHING_KEPT};
 use crate::error::{Error, Result};
-use crate::sql::{Columns, Value};
+use crate::sql::{Columns, Value, first};
 use crate::stored::{StoredEntry, StoredEvidence};
 
 /// The end of the chain of one collector and one recorder. Written down elsewhere, it shows later
@@ -78,6 +78,51 @@ impl Archive {
     /// If the archive cannot be read. What cannot be understood is damage.
     pub fn verify(&mut self) -> Result<(Vec<ChainHead>, Vec<Broken>)> {
         self.in_snapshot(Archive::verify_now)
+    }
+
+    /// Where each chain ends, without looking whether it is sound.
+    ///
+    /// # Errors
+    /// If the archive cannot be read.
+    pub fn heads(&mut self) -> Result<Vec<ChainHead>> {
+        const HEADS: &str = "SELECT collector, recorder.name, position, rows, digest, \
+            (SELECT max(to_position) FROM checkpoint WHERE checkpoint.chain = link.chain) \
+            FROM link JOIN chain ON chain.id = link.chain \
+            JOIN recorder ON recorder.id = chain.recorder WHERE position = \
+            (SELECT max(position) FROM link AS later WHERE later.chain = link.chain) \
+            ORDER BY collector, recorder.name";
+        let archive = self.sql.name().to_owned();
+        let mut heads = Vec::new();
+        self.sql.query(HEADS, &[], &mut |row| {
+            heads.push(ChainHead {
+                collector: row.text(0)?.to_owned(),
+                recorder: row.text(1)?.to_owned(),
+                position: row.int(2)?,
+                rows: row.int(3)?.cast_unsigned(),
+                digest: Digest::try_from(row.bytes(4)?)
+                    .map_err(|_| Error::damaged(&archive, "a digest has another length"))?,
+                expired_to: row.maybe_int(5)?,
+            });
+            Ok(())
+        })?;
+        Ok(heads)
+    }
+
+    /// Whether this was once the head of a chain that is still the beginning of one here. What
+    /// retention has let go is not known any more.
+    ///
+    /// # Errors
+    /// If the archive cannot be read.
+    pub fn has_head(&mut self, digest: &[u8; 32]) -> Result<bool> {
+        const LINK: &str = "SELECT position FROM link WHERE digest = ?1";
+        const CHECKPOINT: &str = "SELECT position FROM checkpoint WHERE digest = ?1";
+        for statement in [LINK, CHECKPOINT] {
+            let values = [Value::from(&digest[..])];
+            if first(&mut *self.sql, statement, &values, |row| row.int(0))?.is_some() {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     fn verify_now(&mut self) -> Result<(Vec<ChainHead>, Vec<Broken>)> {

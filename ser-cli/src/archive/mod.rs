@@ -1,5 +1,7 @@
 //! Archives as commands use them: opening one, and what its errors mean for the user.
 
+mod incidents;
+mod person;
 mod sites;
 mod zone;
 
@@ -12,13 +14,15 @@ use ser_console::Harmless;
 use crate::error::{Failure, Result};
 use crate::output::PROGRAM;
 
+pub(crate) use incidents::{IncidentName, NamedEntry};
+pub(crate) use person::Person;
 pub(crate) use sites::Versions;
-pub(crate) use zone::{site_of, utc_text};
+pub(crate) use zone::{given_site, utc_text};
 
 /// The archive that a command is about.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct ArchiveArgs {
-    /// The archive: a file, or postgres://USER@HOST/DATABASE.
+    /// The archive: a file, or `postgres://USER@HOST/DATABASE`.
     #[arg(
         long,
         env = "SER_ARCHIVE",

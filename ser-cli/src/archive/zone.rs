@@ -1,23 +1,16 @@
 //! The site that an archive is shown with, and times in its zone.
 
-use ser_archive::Archive;
 use ser_evidence::site::Site;
 use ser_evidence::time::{Moment, Utc};
 use ser_files::report::Clock;
 
-use super::Versions;
 use crate::connection::ConnectionArgs;
 use crate::error::Result;
-use crate::gather;
 use crate::site_file;
 
-/// The site of the command line, else the newest one in the archive, else one of which only the zone
-/// of this computer is known.
-pub(crate) fn site_of(connection: &ConnectionArgs, archive: &mut Archive) -> Result<Site> {
-    if let Some(path) = &connection.site {
-        return site_file::load(path);
-    }
-    Ok(Versions::of(archive)?.newest().unwrap_or_else(gather::nameless_site))
+/// The site of the command line.
+pub(crate) fn given_site(connection: &ConnectionArgs) -> Result<Option<Site>> {
+    connection.site.as_deref().map(site_file::load).transpose()
 }
 
 /// A time as people of the site read it, to the millisecond, with its offset from UTC.

@@ -1,5 +1,7 @@
 //! The subcommands, one file each: arguments, help and action.
 
+#[cfg(feature = "archive")]
+pub(crate) mod archive;
 pub(crate) mod clock;
 pub(crate) mod comm_req;
 pub(crate) mod completions;
@@ -9,11 +11,15 @@ pub(crate) mod demo;
 pub(crate) mod diagnostics;
 pub(crate) mod encode;
 pub(crate) mod erase;
+#[cfg(feature = "archive")]
+pub(crate) mod events;
 pub(crate) mod export;
 pub(crate) mod filter;
 #[cfg(unix)]
 pub(crate) mod genius;
 pub(crate) mod import;
+#[cfg(feature = "archive")]
+pub(crate) mod incident;
 pub(crate) mod last_broadcast;
 pub(crate) mod merge;
 pub(crate) mod ports;

@@ -90,6 +90,14 @@ impl Excerpts {
         Ok(())
     }
 
+    /// Wants an entry, wherever it is.
+    pub(super) fn want_entry(&mut self, recorder: &str, life: Life, sequence: u64) {
+        let found = self.recorders.iter_mut().find(|found| found.name == recorder);
+        if let Some(found) = found {
+            found.wanted.places.push((life, sequence));
+        }
+    }
+
     /// Whoever set a clock may not have known in which life that was. The entry that was the newest
     /// tells it.
     fn resolve_places(&mut self) -> Result<()> {

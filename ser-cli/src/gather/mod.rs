@@ -38,7 +38,7 @@ pub(crate) use moment::{GivenMoment, parse_moment};
 
 /// Where entries come from.
 #[derive(Clone, Debug, clap::Args)]
-#[command(next_help_heading = "Sources")]
+#[command(next_help_heading = "Sources", group = clap::ArgGroup::new("kept").multiple(true))]
 pub(crate) struct SourceArgs {
     /// Files with entries, written by `read` or `watch` with --format jsonl or csv, in any order.
     ///
@@ -49,7 +49,7 @@ pub(crate) struct SourceArgs {
     #[arg(long, value_name = "FILE", num_args = 1.., group = "kept")]
     input: Vec<PathBuf>,
 
-    /// The archive that ser-cli collect has filled: a file, or postgres://USER@HOST/DATABASE.
+    /// The archive that ser-cli collect has filled: a file, or `postgres://USER@HOST/DATABASE`.
     ///
     /// It takes the place of the recorders, which are read only with --live. Of millions of entries
     /// only those are read that the choice of time needs. Without --site, names are those of the site
@@ -185,7 +185,9 @@ pub(crate) fn gather(
     }
     #[cfg(feature = "archive")]
     if let Some(place) = &args.archive {
-        return from_archive(args, connection, part, place);
+        let given = connection.chosen.as_deref().map(|chosen| chosen.site.clone());
+        let others = |site: &Site| Read::now(args, connection, site);
+        return from_archive(place, given, part, &others);
     }
     #[cfg(not(feature = "archive"))]
     let _ = part;
@@ -242,24 +244,39 @@ impl Read {
     }
 }
 
+/// Reads what stands beside an archive.
+#[cfg(feature = "archive")]
+type Others<'a> = &'a dyn Fn(&Site) -> Result<(Collector, Read)>;
+
+/// What an archive has of a part, with the site that is given, or else with that of its time.
+#[cfg(feature = "archive")]
+pub(crate) fn archived(
+    place: &ser_archive::Place,
+    given: Option<Site>,
+    part: Part<'_>,
+) -> Result<Gathered> {
+    let nothing =
+        |_: &Site| Ok((Collector::new(), Read { damaged: Damaged::default(), missed_now: vec![] }));
+    from_archive(place, given, part, &nothing)
+}
+
 /// Reads an archive, and what stands beside it. What is wanted of it depends on what it says of
 /// clocks, so it is read until nothing more can belong to that.
 #[cfg(feature = "archive")]
 fn from_archive(
-    args: &SourceArgs,
-    connection: &ConnectionArgs,
-    part: Part<'_>,
     place: &ser_archive::Place,
+    given: Option<Site>,
+    part: Part<'_>,
+    others: Others<'_>,
 ) -> Result<Gathered> {
     let mut archive = crate::archive::read(place)?;
-    let given = connection.chosen.as_deref().map(|chosen| chosen.site.clone());
     let versions = match given {
         Some(_) => Versions::default(),
         None => Versions::of(&mut archive)?,
     };
     let mut site = given.or_else(|| versions.newest()).unwrap_or_else(nameless_site);
     let which = part(&site)?;
-    let (others, read) = Read::now(args, connection, &site)?;
+    let (others, read) = others(&site)?;
     let mut excerpts = Excerpts::begin(archive)?;
     excerpts.want(&site, which)?;
     let (mut round, mut is_of_then) = (0, false);
@@ -287,9 +304,33 @@ fn from_archive(
     }
 }
 
+/// When an entry of an archive was, as well as that is known without the entries around it.
+#[cfg(feature = "archive")]
+pub(crate) fn time_of(
+    place: &ser_archive::Place,
+    site: &Site,
+    entry: &crate::archive::NamedEntry,
+) -> Result<Moment<Utc>> {
+    let mut excerpts = Excerpts::begin(crate::archive::read(place)?)?;
+    excerpts.want(site, Some(Which::Last))?;
+    excerpts.want_entry(&entry.recorder, entry.life, entry.sequence);
+    let mut collector = Collector::new();
+    excerpts.collect(&mut collector)?;
+    let history = collector.finish(site);
+    let timeline = Timeline::new(site, &history);
+    let event = entry.find(&timeline).ok_or_else(|| {
+        Failure::usage("the archive has no such entry")
+            .hint("ser-cli incident list shows the names of incidents")
+    })?;
+    timeline.sort_key(event).map(Moment::from_us).ok_or_else(|| {
+        Failure::new("nobody knows when this entry was: the clock was never set")
+            .hint("ser-cli merge --archive lists everything, also without a time")
+    })
+}
+
 /// When the incident began that is meant.
 #[cfg(feature = "archive")]
-fn began(timeline: &Timeline<'_>, which: Which) -> Option<Moment<Utc>> {
+pub(crate) fn began(timeline: &Timeline<'_>, which: Which) -> Option<Moment<Utc>> {
     let incident = Incident::pick(timeline, which)?;
     let first = incident.events.iter().find_map(|&event| timeline.sort_key(event));
     first.map(Moment::from_us)

@@ -116,7 +116,7 @@ impl Log {
     }
 
     /// Entries that nobody could read.
-    fn loses(&mut self, life: Life, count: u32) {
+    pub(crate) fn loses(&mut self, life: Life, count: u32) {
         let (after, lost) = (Some(self.sequence), Lost::Exactly(count));
         self.records.push(Record::Gap(Gap { life, after, lost, why: Why::Overwritten }));
         self.sequence += u64::from(count);

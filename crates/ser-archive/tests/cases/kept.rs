@@ -231,6 +231,8 @@ pub(crate) fn an_excerpt_shows_what_is_missing_beside_it_and_says_what_it_leaves
     assert_eq!(found.iter().filter(|(life, _)| *life == NEXT_LIFE).count(), 11);
     assert!(left_out.iter().all(|left_out| left_out.life == LIFE));
     assert_eq!(archive.excerpt("U9", &wanted, &mut |_| panic!()).unwrap(), []);
+    assert_eq!(archive.lives("U1-SER1").unwrap(), [NEXT_LIFE, LIFE], "as signed numbers");
+    assert_eq!(archive.lives("U9").unwrap(), []);
 }
 
 pub(crate) fn the_last_time_that_an_input_went_on_is_found_whatever_clocks_showed(home: &Home) {
