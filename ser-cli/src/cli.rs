@@ -27,11 +27,26 @@ Only data goes to standard output; everything else goes to standard error.";
 
 /// Subcommands that talk to no recorder. They accept the options that say how to reach one, but do
 /// not list them in their help.
-const OFFLINE: [&str; 9] =
-    ["ports", "decode", "encode", "comm-req", "audit", "import", "sim", "demo", "completions"];
+const OFFLINE: &[&str] = &[
+    "ports",
+    "decode",
+    "encode",
+    "comm-req",
+    "audit",
+    "import",
+    "sim",
+    "demo",
+    "completions",
+    #[cfg(feature = "archive")]
+    "events",
+    #[cfg(feature = "archive")]
+    "incident",
+    #[cfg(feature = "archive")]
+    "archive",
+];
 
-/// Some of these options mean something to them as well: subcommand, option, and its help there.
-const OF_OFFLINE: [(&str, &str, &str); 4] = [
+/// Some of these options mean something to a few of them as well: the command, the option, its help.
+const MEANT: &[(&str, &str, &str)] = &[
     ("import", "recorder", "The recorder's name in the records; the name of the file if not given"),
     (
         "import",
@@ -44,7 +59,17 @@ const OF_OFFLINE: [(&str, &str, &str); 4] = [
         "site",
         "The site file: its time zone is used, and its recorders are known by their ports",
     ),
+    #[cfg(feature = "archive")]
+    ("events", "recorder", "Only the events of this recorder"),
+    #[cfg(feature = "archive")]
+    ("events", "site", SITE_OF_ARCHIVE),
+    #[cfg(feature = "archive")]
+    ("incident", "site", SITE_OF_ARCHIVE),
 ];
+
+#[cfg(feature = "archive")]
+const SITE_OF_ARCHIVE: &str =
+    "The site file: names of recorders and inputs; that in the archive if not given";
 
 /// Reads, configures, watches and simulates sequential event recorders (HE660SER160, HE660SER320).
 #[derive(Debug, Parser)]
@@ -88,6 +113,12 @@ enum Command {
     Import(commands::import::Args),
     Sim(commands::sim::Args),
     Demo(commands::demo::Args),
+    #[cfg(feature = "archive")]
+    Events(commands::events::Args),
+    #[cfg(feature = "archive")]
+    Incident(commands::incident::Args),
+    #[cfg(feature = "archive")]
+    Archive(commands::archive::Args),
     Completions(commands::completions::Args),
 }
 
@@ -100,6 +131,8 @@ impl Command {
         match self {
             Read(_) | Print(_) | Watch(_) | Merge(_) | Time(_) | Audit(_) => true,
             Decode(_) | Encode(_) | CommReq(_) | Completions(_) => true,
+            #[cfg(feature = "archive")]
+            Command::Events(_) => true,
             Command::Export(args) => args.prints(),
             Command::Import(args) => args.prints(),
             Command::Report(args) => args.prints(),
@@ -120,6 +153,8 @@ impl Command {
         match self {
             Ports(_) | Decode(_) | Encode(_) | CommReq(_) | Sim(_) | Demo(_) => false,
             Completions(_) | Site(_) | Import(_) | Audit(_) => false,
+            #[cfg(feature = "archive")]
+            Command::Events(_) | Command::Incident(_) | Command::Archive(_) => false,
             #[cfg(unix)]
             Command::Genius(args) => !args.is_offline(),
             _ => true,
@@ -150,13 +185,13 @@ impl Cli {
     /// The definition of all arguments.
     pub(crate) fn definition() -> clap::Command {
         let connection = ConnectionArgs::augment_args(clap::Command::new("connection"));
-        OFFLINE.into_iter().fold(Cli::command(), |definition, name| {
+        OFFLINE.iter().fold(Cli::command(), |definition, name| {
             definition.mut_subcommand(name, |subcommand| {
                 subcommand.args(connection.get_arguments().map(|arg| {
-                    let own =
-                        OF_OFFLINE.iter().find(|(of, id, _)| *of == name && arg.get_id() == id);
-                    match own {
-                        Some((_, _, help)) => arg.clone().help(*help).long_help(*help),
+                    let meant =
+                        |(of, id, _): &&(&str, &str, &str)| of == name && arg.get_id() == id;
+                    match MEANT.iter().find(meant) {
+                        Some((.., help)) => arg.clone().help(*help).long_help(*help),
                         None => arg.clone().hide(true),
                     }
                 }))
@@ -233,6 +268,12 @@ impl Cli {
             Command::Import(args) => commands::import::run(args, connection),
             Command::Sim(args) => commands::sim::run(args),
             Command::Demo(args) => commands::demo::run(args),
+            #[cfg(feature = "archive")]
+            Command::Events(args) => commands::events::run(args, connection),
+            #[cfg(feature = "archive")]
+            Command::Incident(args) => commands::incident::run(args, connection),
+            #[cfg(feature = "archive")]
+            Command::Archive(args) => commands::archive::run(args),
             Command::Completions(args) => commands::completions::run(args, &mut Cli::definition()),
         }
     }

@@ -167,7 +167,9 @@ fn is_routine(record: &Record) -> bool {
         | Record::Life(_)
         | Record::Point(_)
         | Record::Recorder(_)
-        | Record::Command(_) => false,
+        | Record::Command(_)
+        | Record::Note(_)
+        | Record::Site(_) => false,
     }
 }
 

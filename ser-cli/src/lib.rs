@@ -4,6 +4,8 @@
 //! captures of a line ([`CaptureOptions`]), and the notes of an earlier run ([`Delivered`]).
 
 mod appending;
+#[cfg(feature = "archive")]
+mod archive;
 mod audit;
 mod buses;
 mod cli;

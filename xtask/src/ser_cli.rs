@@ -5,10 +5,11 @@ use std::process::Command;
 use crate::places;
 use crate::steps::{self, Result, heading};
 
-/// Builds `ser-cli`, showing the progress; the first time takes a while.
+/// Builds `ser-cli`, showing the progress; the first time takes a while, so archives are left out.
+/// [`command`] runs the same.
 pub(crate) fn build() -> Result<()> {
     heading("ser-cli");
-    steps::run(steps::cargo().args(["build", "--package", "ser-cli"]))?;
+    steps::run(steps::cargo().args(["build", "--package", "ser-cli", "--no-default-features"]))?;
     steps::say(&"");
     Ok(())
 }
@@ -19,7 +20,8 @@ pub(crate) fn command(subcommand: &str) -> Command {
     if let Ok(here) = std::env::current_dir() {
         command.current_dir(here);
     }
-    command.args(["run", "--quiet", "--package", "ser-cli", "--manifest-path"]);
+    command.args(["run", "--quiet", "--package", "ser-cli", "--no-default-features"]);
+    command.arg("--manifest-path");
     command.arg(places::root().join("Cargo.toml"));
     command.args(["--", subcommand]);
     command

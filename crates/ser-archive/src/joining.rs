@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 
 use ser_evidence::record::{Life, Place, Record};
 use ser_evidence::time::{Moment, shown};
+use ser_proto::Entry;
 
 use crate::append::Chain;
 use crate::archive::{Archive, WRAP};
@@ -28,6 +29,40 @@ struct Filed {
 struct Names(BTreeMap<Life, Filed>);
 
 impl Archive {
+    /// The life in which a recorder has had this entry, with the sequence that it has there, given
+    /// modulo 65536: where something belongs of which only an entry is known. `None` if none has it; the lowest name if several have.
+    ///
+    /// # Errors
+    /// If the archive cannot be read.
+    pub fn life_of(
+        &mut self,
+        recorder: &str,
+        sequence: u64,
+        entry: &Entry,
+    ) -> Result<Option<(Life, u64)>> {
+        const LIFE: &str = "SELECT life, sequence FROM entry \
+            JOIN recorder ON recorder.id = entry.recorder \
+            WHERE recorder.name = ?1 AND stamp = ?2 AND shown_us = ?3 AND changed = ?4 \
+            AND state = ?5 AND sequence % 65536 = ?6 ORDER BY life, sequence DESC LIMIT 1";
+        // PostgreSQL uses the index for either form, and for none that says both.
+        const LIFE_WITHOUT_TIME: &str = "SELECT life, sequence FROM entry \
+            JOIN recorder ON recorder.id = entry.recorder \
+            WHERE recorder.name = ?1 AND stamp = ?2 AND shown_us IS NULL AND changed = ?3 \
+            AND state = ?4 AND sequence % 65536 = ?5 ORDER BY life, sequence DESC LIMIT 1";
+        let shown_us = shown(&entry.time).map(Moment::us);
+        let mut values = vec![Value::from(recorder), Value::Int(stamp_number(&entry.time))];
+        values.extend(shown_us.map(Value::Int));
+        values.extend([
+            Value::Int(entry.changed.0.into()),
+            Value::Int(entry.state.0.into()),
+            Value::Int((sequence % WRAP).cast_signed()),
+        ]);
+        let statement = if shown_us.is_some() { LIFE } else { LIFE_WITHOUT_TIME };
+        first(&mut *self.sql, statement, &values, |row| {
+            Ok((Life::from_bits(row.int(0)?.cast_unsigned()), row.int(1)?.cast_unsigned()))
+        })
+    }
+
     /// The records of a batch, with the names and sequences under which their lives are filed here.
     pub(crate) fn joined(&mut self, chain: Chain, records: &[Record]) -> Result<Vec<Record>> {
         let mut names = Names::default();
@@ -183,8 +218,16 @@ impl Names {
                 self.place(&mut watched.life, [&mut through], archive)?;
                 watched.through = through.unwrap_or_default();
             }
-            Record::Suppressed(_) | Record::Point(_) | Record::Recorder(_) | Record::Command(_) => {
+            Record::Note(note) => {
+                let mut sequence = Some(note.sequence);
+                self.place(&mut note.life, [&mut sequence], archive)?;
+                note.sequence = sequence.unwrap_or_default();
             }
+            Record::Suppressed(_)
+            | Record::Point(_)
+            | Record::Recorder(_)
+            | Record::Command(_)
+            | Record::Site(_) => {}
         }
         Ok(record)
     }

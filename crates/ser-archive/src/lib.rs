@@ -8,11 +8,11 @@
 //! # The files
 //!
 //! [`Archive`] is the way in: `archive` opens, `append` adds (with `joining`, where one log has
-//! several names), `reading` gives back, `outlet` notes who was given it, `check` says what is
-//! missing, `verify` whether anybody has changed something, and `retention` lets go of what is old;
-//! `numbers` are ranges of entries. [`Writer`] lets many threads use one archive. Below these, `chain`
-//! reckons digests, `stored` makes columns of records, `schema` makes tables, and `sql` is what a
-//! database must do; `sqlite` does it, and `postgres` where the feature of this name is on.
+//! several names), `reading` gives back and `excerpt` a part, `outlet` notes who was given it, `check`
+//! says what is missing, `verify` whether anybody has changed something, and `retention` lets go of
+//! what is old; `numbers` are ranges of entries. [`Writer`] lets many threads use one archive. Below
+//! these, `chain` reckons digests, `stored` makes columns of records, `schema` makes tables, and `sql`
+//! is what a database must do; `sqlite` does it, and `postgres` where the feature of this name is on.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
@@ -24,6 +24,7 @@ mod batch;
 mod chain;
 mod check;
 mod error;
+mod excerpt;
 mod joining;
 mod numbers;
 mod outlet;
@@ -43,6 +44,7 @@ pub use archive::{Access, Archive};
 pub use batch::{Appended, Batch, Bookmark};
 pub use check::{Check, Hole, RecorderCheck};
 pub use error::{Error, Result};
+pub use excerpt::{LeftOut, Wanted};
 pub use place::{NoPlace, Place};
 pub use reading::{Archived, Window};
 pub use retention::{Expired, Keep};

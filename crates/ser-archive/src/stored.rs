@@ -160,6 +160,8 @@ impl StoredEvidence {
             Record::Point(_) => ("point", Life::UNKNOWN),
             Record::Recorder(_) => ("recorder", Life::UNKNOWN),
             Record::Command(_) => ("command", Life::UNKNOWN),
+            Record::Note(note) => ("note", note.life),
+            Record::Site(_) => ("site", Life::UNKNOWN),
         }
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::archive::Archive;
 use crate::chain::{self, Checkpoint, Digest, Link, NOTHING_KEPT};
 use crate::error::{Error, Result};
-use crate::sql::{Columns, Value};
+use crate::sql::{Columns, Value, first};
 use crate::stored::{StoredEntry, StoredEvidence};
 
 /// The end of the chain of one collector and one recorder. Written down elsewhere, it shows later
@@ -82,7 +82,7 @@ impl Archive {
             FROM chain JOIN recorder ON recorder.id = chain.recorder \
             JOIN link ON link.chain = chain.id AND link.position = \
             (SELECT max(position) FROM link WHERE link.chain = chain.id) \
-            ORDER BY recorder.name, collector";
+            ORDER BY collector, recorder.name";
         let archive = self.sql.name().to_owned();
         let mut heads = Vec::new();
         self.sql.query(HEADS, &[], &mut |row| {
@@ -107,6 +107,23 @@ impl Archive {
     /// If the archive cannot be read. What cannot be understood is damage.
     pub fn verify(&mut self) -> Result<(Vec<ChainHead>, Vec<Broken>)> {
         self.in_snapshot(Archive::verify_now)
+    }
+
+    /// Whether this was once the head of a chain that is still the beginning of one here. What
+    /// retention has let go is not known any more.
+    ///
+    /// # Errors
+    /// If the archive cannot be read.
+    pub fn has_head(&mut self, digest: &[u8; 32]) -> Result<bool> {
+        const LINK: &str = "SELECT position FROM link WHERE digest = ?1";
+        const CHECKPOINT: &str = "SELECT position FROM checkpoint WHERE digest = ?1";
+        for statement in [LINK, CHECKPOINT] {
+            let values = [Value::from(&digest[..])];
+            if first(&mut *self.sql, statement, &values, |row| row.int(0))?.is_some() {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     fn verify_now(&mut self) -> Result<(Vec<ChainHead>, Vec<Broken>)> {

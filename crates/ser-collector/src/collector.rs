@@ -1,12 +1,14 @@
 //! Starting the threads of a collector, and ending them.
 
+use std::collections::BTreeMap;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
-use ser_archive::{Archive, Error, Writer};
-use ser_observer::LogIdentity;
+use ser_archive::{Archive, Batch, Error, Writer};
+use ser_evidence::record::{Record, SiteRecord};
+use ser_observer::{LogIdentity, host_reading};
 
 use crate::forward::keep_forwarding;
 use crate::options::{Open, Options};
@@ -73,6 +75,7 @@ impl Collector {
             is_read: Arc::default(),
         };
         collector.remember_numbers(recorders.iter().map(|recorder| recorder.name.clone()))?;
+        collector.archive_site(recorders.iter().map(|recorder| recorder.name.clone()))?;
         for (place, recorder) in recorders.into_iter().enumerate() {
             let task = Task { place, recorder, shared: Arc::clone(&shared) };
             let thread = Builder::new().name(task.recorder.name.clone());
@@ -111,6 +114,14 @@ impl Collector {
             }
         }
         Ok(())
+    }
+
+    /// Archives the site file for each recorder of which the archive has another version, or none.
+    fn archive_site(&self, recorders: impl Iterator<Item = String>) -> Result<(), Error> {
+        let text = self.shared.options.site_text.clone();
+        let Some(text) = text.filter(|text| SiteRecord::holds(text)) else { return Ok(()) };
+        let (collector, recorders) = (self.shared.options.name.clone(), recorders.collect());
+        self.shared.writer.with(move |archive| site_to(archive, &collector, recorders, &text))
     }
 
     /// How each recorder is.
@@ -159,6 +170,33 @@ impl Collector {
             _ = thread.join();
         }
     }
+}
+
+/// Adds a version of the site file for each recorder whose last one is another.
+fn site_to(
+    archive: &mut Archive,
+    collector: &str,
+    mut recorders: Vec<String>,
+    text: &str,
+) -> Result<(), Error> {
+    let mut last = BTreeMap::new();
+    archive.of_kind("site", &mut |recorder, record| {
+        if let Record::Site(site) = record {
+            last.insert(recorder.to_owned(), site.text);
+        }
+        Ok(())
+    })?;
+    recorders.retain(|recorder| last.get(recorder).is_none_or(|last| last != text));
+    let at = host_reading::now();
+    let batch = |recorder| Batch {
+        collector: collector.to_owned(),
+        recorder,
+        records: vec![Record::Site(SiteRecord { at, text: text.to_owned() })],
+        bookmark: None,
+        joins: false,
+        at: at.utc,
+    };
+    archive.append(&recorders.into_iter().map(batch).collect::<Vec<_>>()).map(|_| ())
 }
 
 impl Ended {

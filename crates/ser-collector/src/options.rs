@@ -20,6 +20,8 @@ pub struct Options {
     pub program: String,
     /// The recorders: those of the site that have a port.
     pub site: Site,
+    /// The site file, to be archived with what is read.
+    pub site_text: Option<String>,
     /// How long a recorder may take to answer, and how often it is asked again.
     pub line: ser_client::Options,
     /// Whether recorders may be made to report by themselves; their setting is put back at the end.

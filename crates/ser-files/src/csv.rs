@@ -18,7 +18,7 @@ use std::io::BufRead;
 use ser_evidence::record::{EntryRecord, Gap, Life, Lost, Record, Told, Why};
 use ser_proto::{Entry, Inputs, TimeStamp};
 
-use crate::error::{ReadError, quoted};
+use crate::error::{MAX_LINE_LEN, ReadError, quoted};
 use crate::fields::Fields;
 use crate::lines::Lines;
 use crate::merged::without_apostrophe;
@@ -64,7 +64,7 @@ impl<R: BufRead> Reader<R> {
     /// Reads `input`, the file of this recorder.
     pub fn new(input: R, recorder: &str) -> Reader<R> {
         Reader {
-            lines: Lines::new(input),
+            lines: Lines::new(input, MAX_LINE_LEN),
             recorders: Recorders::new(recorder),
             told: 0,
             fields: Fields::new(),

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::fmt;
 use std::io;
 
-/// The longest line that is read, in bytes. Ours have a few hundred.
+/// The longest line of CSV that is read, in bytes. Ours have a few dozen.
 pub const MAX_LINE_LEN: usize = 65_536;
 
 /// How much of a file's text is quoted in an error, in characters.
@@ -39,7 +39,10 @@ pub enum Problem {
     /// Lines end with a carriage return alone, which ends no line of ours.
     LoneReturns,
     /// The line is longer than any of ours.
-    TooLong,
+    TooLong {
+        /// The longest that is read, in bytes.
+        longest: usize,
+    },
     /// The line holds something else than it has to, for this reason.
     Damaged(String),
 }
@@ -56,7 +59,7 @@ impl ReadError {
     /// Whether only this line is lost, and the lines after it can be read.
     #[must_use]
     pub const fn is_of_one_line(&self) -> bool {
-        matches!(self.problem, Problem::TooLong | Problem::Damaged(_))
+        matches!(self.problem, Problem::TooLong { .. } | Problem::Damaged(_))
     }
 }
 
@@ -88,7 +91,7 @@ impl fmt::Display for Problem {
                 "its lines end with CR alone, as those of old Macintosh computers do; save it with \
                  lines that end with LF or CR LF",
             ),
-            Problem::TooLong => write!(f, "longer than {MAX_LINE_LEN} bytes"),
+            Problem::TooLong { longest } => write!(f, "longer than {longest} bytes"),
             Problem::Damaged(why) => f.write_str(why),
         }
     }

@@ -30,5 +30,5 @@ mod span;
 mod stamp;
 
 pub use error::{MAX_LINE_LEN, Problem, ReadError};
-pub use missing::NotReached;
+pub use missing::{NotReached, missing as missing_text};
 pub use source::Source;

@@ -2,21 +2,22 @@
 
 use std::io::{self, BufRead, Read};
 
-use crate::error::{MAX_LINE_LEN, NO_LINE_END, Problem, ReadError};
-
-const LIMIT: u64 = MAX_LINE_LEN as u64 + 1;
+use crate::error::{NO_LINE_END, Problem, ReadError};
 
 /// Takes a file apart.
 pub(crate) struct Lines<R> {
     input: R,
     line: Vec<u8>,
+    /// The longest line that is read, in bytes.
+    longest: usize,
     number: u64,
     is_ended: bool,
 }
 
 impl<R: BufRead> Lines<R> {
-    pub(crate) fn new(input: R) -> Lines<R> {
-        Lines { input, line: Vec::new(), number: 0, is_ended: true }
+    /// Takes `input` apart. A line without its end may be as long as `longest`, in bytes.
+    pub(crate) fn new(input: R, longest: usize) -> Lines<R> {
+        Lines { input, line: Vec::new(), longest, number: 0, is_ended: true }
     }
 
     /// The number of the line that was read last, from 1.
@@ -29,13 +30,14 @@ impl<R: BufRead> Lines<R> {
         loop {
             self.line.clear();
             self.number += 1;
-            match Read::by_ref(&mut self.input).take(LIMIT).read_until(b'\n', &mut self.line) {
+            let limit = u64::try_from(self.longest).unwrap_or(u64::MAX).saturating_add(1);
+            match Read::by_ref(&mut self.input).take(limit).read_until(b'\n', &mut self.line) {
                 Ok(0) => return None,
                 Ok(_) => {}
                 Err(error) => return Some(Err(ReadError::at(self.number, Problem::Io(error)))),
             }
             self.is_ended = self.line.last() == Some(&b'\n');
-            if self.line.len() > MAX_LINE_LEN && !self.is_ended {
+            if self.line.len() > self.longest && !self.is_ended {
                 return Some(Err(self.too_long()));
             }
             if !self.line.trim_ascii().is_empty() {
@@ -57,7 +59,7 @@ impl<R: BufRead> Lines<R> {
 
     fn too_long(&mut self) -> ReadError {
         let problem = match skip_line(&mut self.input) {
-            Ok(()) => Problem::TooLong,
+            Ok(()) => Problem::TooLong { longest: self.longest },
             Err(error) => Problem::Io(error),
         };
         ReadError::at(self.number, problem)
@@ -93,8 +95,10 @@ fn skip_line(input: &mut impl BufRead) -> io::Result<()> {
 mod tests {
     use super::*;
 
+    const LONGEST: usize = 1000;
+
     fn all(text: &[u8]) -> Vec<(u64, Option<String>)> {
-        let mut lines = Lines::new(text);
+        let mut lines = Lines::new(text, LONGEST);
         let mut found = Vec::new();
         while let Some(line) = lines.next() {
             let line = line.ok().map(|line| String::from_utf8(line.to_vec()).unwrap());
@@ -117,12 +121,12 @@ mod tests {
 
     #[test]
     fn of_an_overlong_line_nothing_is_kept_and_the_next_one_is_read() {
-        let long = vec![b'x'; 3 * MAX_LINE_LEN];
+        let long = vec![b'x'; 3 * LONGEST];
         let text = [b"a\n", &long[..], b"\nb\n"].concat();
         assert_eq!(all(&text), [line(1, "a"), (2, None), line(3, "b")]);
-        let longest = vec![b'x'; MAX_LINE_LEN];
+        let longest = vec![b'x'; LONGEST];
         let read = all(&[&longest[..], b"\nb"].concat());
-        assert_eq!(read[0].1.as_ref().map(String::len), Some(MAX_LINE_LEN));
+        assert_eq!(read[0].1.as_ref().map(String::len), Some(LONGEST));
         assert_eq!(read[1], line(2, "b"));
         assert_eq!(all(&long), [(1, None)]);
     }

@@ -41,8 +41,9 @@ pub(crate) fn why_text(why: Why) -> String {
     }
 }
 
-/// How many entries are missing, and why.
-pub(crate) fn missing(lost: Lost, why: Why) -> String {
+/// How many entries are missing, and why: `37 entries missing (overwritten)`.
+#[must_use]
+pub fn missing(lost: Lost, why: Why) -> String {
     let why = match why {
         Why::Overwritten => "overwritten",
         Why::LogBeganAnew => "the log began anew",

@@ -3,12 +3,12 @@
 use proptest::prelude::*;
 use ser_evidence::record::{
     Boot, ClockObservation, ClockStep, CommandRecord, EntryRecord, Fellow, Gap, HostReading, How,
-    Life, LifeRecord, Lost, Outcome, Place, PointRecord, Record, RecorderRecord, Reference,
-    Suppressed, Told, Watched, Why,
+    Life, LifeRecord, Lost, NoteRecord, Outcome, Place, PointRecord, Record, RecorderRecord,
+    Reference, SiteRecord, Suppressed, Told, Watched, Why,
 };
 use ser_evidence::time::{Bound, Moment, Scale};
-use ser_files::jsonl::{Reader, SCHEMA, Writer};
-use ser_files::{MAX_LINE_LEN, Problem, ReadError};
+use ser_files::jsonl::{MAX_LINE_LEN, Reader, SCHEMA, Writer};
+use ser_files::{Problem, ReadError};
 use ser_proto::{Entry, Inputs, Model, TimeStamp};
 
 const TRIP: TimeStamp =
@@ -150,7 +150,19 @@ fn any_record() -> impl Strategy<Value = Record> {
         (-86_399..=86_399)
             .prop_map(|utc_offset_s| { Record::Recorder(RecorderRecord { utc_offset_s }) }),
         any_command(),
+        (any_reading(), (any_name(), any_name()), any_life(), any::<u64>(), any_remark()).prop_map(
+            |(at, (user, host), life, sequence, (text, closes))| {
+                Record::Note(NoteRecord { at, user, host, life, sequence, text, closes })
+            }
+        ),
+        (any_reading(), "([^\\p{Cc}]|[\t\r\n]){0,200}")
+            .prop_map(|(at, text)| Record::Site(SiteRecord { at, text })),
     ]
+}
+
+/// The text of a note, and whether it closes.
+fn any_remark() -> impl Strategy<Value = (String, bool)> {
+    prop_oneof![(any_name(), any::<bool>()), Just((String::new(), true))]
 }
 
 /// What a person can see, in any script.
@@ -297,6 +309,13 @@ fn every_field_is_checked() {
         )
     };
     let noon = "2026-11-22T12:00:00.000";
+    let note = |more: &str| {
+        let host = "00000000000000000000000000000001";
+        format!(
+            "{{\"record\":\"note\",\"life\":\"0\",\"sequence\":1,\"host\":{{\"boot\":\"{host}\",\
+             \"monotonic_us\":1,\"utc_us\":1}},{more}}}"
+        )
+    };
     for (line, what) in [
         (entry("noon", "[]", "0"), "`time` cannot be `noon`"),
         (entry(noon, "[33]", "0"), "there is no input 33"),
@@ -317,6 +336,14 @@ fn every_field_is_checked() {
             "`shown` cannot be",
         ),
         (r#"["entry","U1"]"#.to_owned(), "this is not an object"),
+        (note(r#""text":"two\nlines","closes":true"#), "`text` cannot be `two\nlines`"),
+        (note(r#""text":"","closes":false"#), "`text` cannot be ``"),
+        (note(&format!(r#""text":"{}","closes":true"#, "x".repeat(4001))), "`text` cannot be"),
+        (note(r#""text":"fine""#), "`closes` is missing"),
+        (note(r#""text":"fine","closes":true,"user":"a\u001b""#), "`user` cannot be"),
+        (note(r#""text":"fine","closes":true,"user":"ada""#), "`host_name` is missing"),
+        (r#"{"record":"site","text":"\u0007"}"#.to_owned(), "`text` cannot be"),
+        (r#"{"record":"site","text":"","host":null}"#.to_owned(), "`host` is missing"),
     ] {
         assert!(problem(&line).contains(what), "{line}: {}", problem(&line));
     }
@@ -325,9 +352,29 @@ fn every_field_is_checked() {
 #[test]
 fn what_is_quoted_of_a_file_is_short() {
     let long = "x".repeat(MAX_LINE_LEN - 50);
+    assert_eq!(MAX_LINE_LEN, 4 << 20);
     assert!(problem(&format!("{{\"record\":\"{long}\"}}")).len() < 100);
     assert!(problem(&format!("{{\"record\":\"{long}")).len() < 200);
-    assert!(problem(&"x".repeat(2 * MAX_LINE_LEN)).ends_with("longer than 65536 bytes"));
+    assert!(problem(&"x".repeat(2 * MAX_LINE_LEN)).ends_with("longer than 4194304 bytes"));
+}
+
+#[test]
+fn the_longest_site_file_is_read_as_it_was_written_whatever_is_in_it() {
+    let at = HostReading {
+        boot: Boot(1),
+        monotonic: Moment::from_us(1),
+        utc: Moment::from_us(1),
+        utc_doubt_us: None,
+    };
+    for letter in ["\"", "\n", "\u{061C}", "\u{2028}", "é", "x"] {
+        let text = letter.repeat(SiteRecord::LONGEST / letter.len());
+        let record = Record::Site(SiteRecord { at, text });
+        let mut written = Vec::new();
+        Writer::new(&mut written).record("U1", &record).unwrap();
+        assert_eq!(Reader::new(&written[..], "").read().unwrap().unwrap(), record, "{letter:?}");
+    }
+    let line = format!("{{\"record\":\"site\",\"text\":\"{}\"}}", "x".repeat((1 << 20) + 1));
+    assert!(problem(&line).starts_with("line 1: `text` cannot be `xxx"));
 }
 
 #[test]

@@ -17,16 +17,22 @@ impl Author {
     /// and no variable that the user could set. `program` is its name with its version.
     #[must_use]
     pub fn of_this_program(program: &str) -> Author {
-        // What the system does not say is written as not known.
-        let user = whoami::username().unwrap_or_default();
-        let host = whoami::hostname().unwrap_or_default();
+        // What the system does not say is not known.
+        let name = |name: Option<String>| CommandRecord::name(&name.unwrap_or_default());
+        let (user, host) = (name(whoami::username().ok()), name(whoami::hostname().ok()));
         Author { user, host, program: program.to_owned() }
     }
 
-    /// The name of this computer, if the system says it.
+    /// The user, as one line of up to [`CommandRecord::LONGEST_NAME`] characters.
     #[must_use]
-    pub fn host(&self) -> Option<&str> {
-        Some(self.host.as_str()).filter(|host| !host.is_empty())
+    pub fn user(&self) -> &str {
+        &self.user
+    }
+
+    /// The name of this computer, likewise.
+    #[must_use]
+    pub fn host(&self) -> &str {
+        &self.host
     }
 
     /// The record of a command that was sent to `peer` just now, and what came of it.

@@ -60,7 +60,7 @@ impl Args {
 }
 
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
-    let gathered = gather::gather(&args.sources, connection)?;
+    let gathered = gather::gather(&args.sources, connection, gather::EVERYTHING)?;
     let timeline = Timeline::new(&gathered.site, &gathered.history);
     let mut out = io::BufWriter::with_capacity(1 << 18, io::stdout().lock());
     match args.format {

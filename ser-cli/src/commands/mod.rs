@@ -1,5 +1,7 @@
 //! The subcommands, one file each: arguments, help and action.
 
+#[cfg(feature = "archive")]
+pub(crate) mod archive;
 pub(crate) mod audit;
 pub(crate) mod clock;
 #[cfg(feature = "archive")]
@@ -12,11 +14,15 @@ pub(crate) mod demo;
 pub(crate) mod diagnostics;
 pub(crate) mod encode;
 pub(crate) mod erase;
+#[cfg(feature = "archive")]
+pub(crate) mod events;
 pub(crate) mod export;
 pub(crate) mod filter;
 #[cfg(unix)]
 pub(crate) mod genius;
 pub(crate) mod import;
+#[cfg(feature = "archive")]
+pub(crate) mod incident;
 pub(crate) mod last_broadcast;
 pub(crate) mod merge;
 pub(crate) mod ports;

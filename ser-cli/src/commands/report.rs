@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use ser_evidence::history::History;
 use ser_evidence::incident::{Incident, Report, Which};
+use ser_evidence::site::Site;
 use ser_evidence::time::{Moment, Utc};
 use ser_evidence::timeline::Timeline;
 use ser_files::report::{self, Document, PageError, Styles};
@@ -90,8 +91,9 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     let format = format(args)?;
     let files = NewFiles::new(args.force).sparing(args.sources.files(connection));
     let outlet = Outlet::open(file_named(args.output.as_deref()), files)?;
-    let gathered = gather::gather(&args.sources, connection)?;
-    let which = args.choice.which(&gathered.site)?.unwrap_or(Which::LastTrip);
+    let which = |site: &Site| Ok(args.choice.which(site)?.unwrap_or(Which::LastTrip));
+    let gathered = gather::gather(&args.sources, connection, &|site| which(site).map(Some))?;
+    let which = which(&gathered.site)?;
     let shown = Shown { format, unfold: args.unfold };
     let is_complete = write(outlet, &gathered, which, shown)?;
     if args.fail_on_loss {

@@ -1,6 +1,8 @@
 //! A running `ser-cli`, for tests that use it as a user does.
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
+#[cfg(feature = "archive")]
+pub(crate) mod archived;
 #[cfg(unix)]
 pub(crate) mod bench;
 #[cfg(unix)]
@@ -21,6 +23,7 @@ pub(crate) fn ser_cli() -> Command {
         .env_remove("SER_PORT")
         .env_remove("SER_SITE")
         .env_remove("SER_STATE_DIR")
+        .env_remove("SER_ARCHIVE")
         .env("NO_COLOR", "1");
     command
 }

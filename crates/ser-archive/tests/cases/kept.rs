@@ -1,8 +1,10 @@
 //! What is added is there, once, and given back as it was.
 
 use crate::common::*;
-use ser_archive::{Access, Archive, Batch, Error, Keep, Window};
-use ser_evidence::record::{EntryRecord, Life, Outcome, PointRecord, Record};
+use ser_archive::{Access, Archive, Batch, Error, Keep, LeftOut, Wanted, Window};
+use ser_evidence::record::{
+    EntryRecord, Life, NoteRecord, Outcome, PointRecord, Record, SiteRecord,
+};
 use ser_evidence::time::shown;
 use ser_proto::{Inputs, TimeStamp};
 
@@ -123,6 +125,37 @@ pub(crate) fn what_could_not_be_read_again_is_not_added(home: &Home) {
     assert_eq!(everything(&mut archive, "U1-SER1"), [named("pump")]);
 }
 
+pub(crate) fn remarks_and_versions_of_the_site_file_are_kept_as_they_are(home: &Home) {
+    let mut archive = home.open();
+    let note = |text: &str, closes| {
+        Record::Note(NoteRecord {
+            at: host_reading(90),
+            user: "ada".to_owned(),
+            host: "desk-7".to_owned(),
+            life: LIFE,
+            sequence: 2,
+            text: text.to_owned(),
+            closes,
+        })
+    };
+    let site = |text: &str| Record::Site(SiteRecord { at: host_reading(0), text: text.to_owned() });
+    let records = [
+        site("[[recorder]]\n\tname = \"Süd\"\r\n"),
+        note("test of the relay", false),
+        note("", true),
+        site(&"# long\n".repeat(100_000)),
+    ];
+    archive.append(&[batch([&records[..], &entries(LIFE, 1..=3)].concat())]).unwrap();
+    let appended = archive.append(&[batch(records.to_vec())]).unwrap();
+    assert_eq!(appended[0].known, 4);
+    assert_eq!(everything(&mut archive, "U1-SER1"), [&records[..], &entries(LIFE, 1..=3)].concat());
+    assert!(archive.check().unwrap().is_sound());
+    assert_eq!(archive.verify().unwrap().1, []);
+
+    let control = site("\u{1b}");
+    assert!(archive.append(&[batch(vec![control])]).is_err());
+}
+
 pub(crate) fn a_window_is_by_what_the_recorder_showed_and_an_impossible_stamp_is_in_each(
     home: &Home,
 ) {
@@ -151,6 +184,98 @@ pub(crate) fn a_window_is_by_what_the_recorder_showed_and_an_impossible_stamp_is
     assert_eq!(read(window(Some(6), Some(7))), with(vec![], entries(LIFE, 6..=7)));
     assert_eq!(read(window(None, Some(2))), with(entries(LIFE, 1..=2), vec![]));
     assert_eq!(read(window(Some(8), None)), with(vec![], entries(LIFE, 8..=9)));
+}
+
+pub(crate) fn an_excerpt_shows_what_is_missing_beside_it_and_says_what_it_leaves_out(home: &Home) {
+    let mut archive = home.open();
+    let one = [1..=20, 31..=40, 43..=60].into_iter().flatten();
+    let mut conflict = entry(LIFE, 3);
+    conflict.entry.state = Inputs(0);
+    let records = [
+        vec![gap(LIFE, 20, 10), life(LIFE)],
+        entries(LIFE, one),
+        entries(NEXT_LIFE, 70..=80),
+        vec![Record::Entry(conflict)],
+    ];
+    archive.append(&[batch(records.concat())]).unwrap();
+    let moment = |sequence| shown(&entry(LIFE, sequence).entry.time);
+    let mut excerpt = |wanted: &Wanted| {
+        let mut found = Vec::new();
+        let left_out = archive.excerpt("U1-SER1", wanted, &mut |record| {
+            let Record::Entry(entry) = record else { panic!("{record:?}") };
+            found.push((entry.life, entry.sequence.unwrap()));
+            Ok(())
+        });
+        (found, left_out.unwrap())
+    };
+    let in_life = |sequences: &[u64], of_next: &[u64]| -> Vec<(Life, u64)> {
+        let one = sequences.iter().map(|&sequence| (LIFE, sequence));
+        let next = of_next.iter().map(|&sequence| (NEXT_LIFE, sequence));
+        one.chain(next).collect()
+    };
+    let between = |life, after, before| LeftOut { life, after, before };
+    // Nothing is wanted: the ends of each life, what contradicts, and their neighbours.
+    let (found, left_out) = excerpt(&Wanted::default());
+    let mut expected = in_life(&[1, 2, 3, 4, 59, 60], &[70, 71, 79, 80]);
+    expected.push((LIFE, 3));
+    assert_eq!(found, expected);
+    assert_eq!(left_out, [between(LIFE, 4, 59), between(NEXT_LIFE, 71, 79)]);
+    // Both sides of what is missing next to the window are there, and nothing is left out there.
+    let windows = vec![Window { from: moment(38), until: moment(40) }];
+    let (found, left_out) = excerpt(&Wanted { windows, ..Wanted::default() });
+    for sequence in [37, 38, 39, 40, 43] {
+        assert!(found.contains(&(LIFE, sequence)), "{sequence}: {found:?}");
+    }
+    assert!(left_out.iter().all(|left_out| left_out.before <= 37 || left_out.after >= 43));
+    // A window in which nothing is: what is missing over all of it shows.
+    let windows = vec![Window { from: moment(24), until: moment(26) }];
+    let (found, left_out) = excerpt(&Wanted { windows, ..Wanted::default() });
+    assert!(found.contains(&(LIFE, 20)) && found.contains(&(LIFE, 31)));
+    assert!(left_out.iter().all(|left_out| left_out.before <= 20 || left_out.after >= 31));
+    // A place, and what comes after it; a whole life.
+    let wanted = Wanted { places: vec![(LIFE, 20)], lives: vec![NEXT_LIFE], ..Wanted::default() };
+    let (found, left_out) = excerpt(&wanted);
+    assert!(found.contains(&(LIFE, 20)) && found.contains(&(LIFE, 31)));
+    assert_eq!(found.iter().filter(|(life, _)| *life == NEXT_LIFE).count(), 11);
+    assert!(left_out.iter().all(|left_out| left_out.life == LIFE));
+    assert_eq!(archive.excerpt("U9", &wanted, &mut |_| panic!()).unwrap(), []);
+    assert_eq!(archive.lives("U1-SER1").unwrap(), [NEXT_LIFE, LIFE], "as signed numbers");
+    assert_eq!(archive.lives("U9").unwrap(), []);
+}
+
+pub(crate) fn the_last_time_that_an_input_went_on_is_found_whatever_clocks_showed(home: &Home) {
+    let mut archive = home.open();
+    // Input 3 changes in each 32nd entry; it goes on there, but for the last one.
+    let mut off = entry(LIFE, 66);
+    off.entry.state = Inputs(0);
+    let old = |sequence| {
+        let mut old = entry(NEXT_LIFE, sequence);
+        old.entry.time.year = 0;
+        Record::Entry(old)
+    };
+    archive.append(&[batch(entries(LIFE, 1..=65))]).unwrap();
+    archive.append(&[batch(vec![Record::Entry(off)])]).unwrap();
+    assert_eq!(archive.last_on("U1-SER1", 1 << 2).unwrap(), [(LIFE, 34)]);
+    assert_eq!(archive.last_on("U1-SER2", 1 << 2).unwrap(), []);
+    archive.append(&[batch((1..=3).map(old).collect())]).unwrap();
+    assert_eq!(archive.last_on("U1-SER1", 1 << 2).unwrap(), [(LIFE, 34), (NEXT_LIFE, 2)]);
+}
+
+pub(crate) fn a_life_is_found_by_an_entry_of_it(home: &Home) {
+    let mut archive = home.open();
+    let far = 3 * 65_536 + 7;
+    archive.append(&[batch(entries(LIFE, [1, 2, far]))]).unwrap();
+    let mut life_of = |sequence, entry| archive.life_of("U1-SER1", sequence, &entry).unwrap();
+    assert_eq!(life_of(2, entry(LIFE, 2).entry), Some((LIFE, 2)));
+    assert_eq!(life_of(7, entry(LIFE, far).entry), Some((LIFE, far)));
+    assert_eq!(life_of(3, entry(LIFE, 2).entry), None);
+    assert_eq!(life_of(2, entry(LIFE, 1).entry), None);
+    let mut impossible = entry(LIFE, 3);
+    impossible.entry.time.month = 13;
+    archive.append(&[batch(vec![Record::Entry(impossible)])]).unwrap();
+    let mut life_of = |sequence, entry| archive.life_of("U1-SER1", sequence, &entry).unwrap();
+    assert_eq!(life_of(3, impossible.entry), Some((LIFE, 3)));
+    assert_eq!(life_of(3, entry(LIFE, 3).entry), None);
 }
 
 /// A batch of another collector, which has drawn other names for lives.

@@ -32,6 +32,23 @@ pub(crate) fn where_a_log_began_is_not_known_if_its_total_had_wrapped(home: &Hom
     assert!(archive.check().unwrap().is_sound());
 }
 
+pub(crate) fn heads_are_what_verification_finds_and_earlier_ones_are_known_again(home: &Home) {
+    let mut archive = home.open();
+    archive.append(&[batch(entries(LIFE, 1..=3))]).unwrap();
+    let early = archive.heads().unwrap();
+    archive.append(&[batch(entries(LIFE, 4..=5))]).unwrap();
+    let mut other = batch(entries(NEXT_LIFE, [1]));
+    other.collector = "attic".to_owned();
+    archive.append(&[other]).unwrap();
+    let heads = archive.heads().unwrap();
+    let mut verified = archive.verify().unwrap().0;
+    verified.sort_by(|one, other| one.collector.cmp(&other.collector));
+    assert_eq!(heads, verified);
+    assert_eq!(heads.len(), 2);
+    assert!(archive.has_head(&early[0].digest).unwrap());
+    assert!(!archive.has_head(&[7; 32]).unwrap());
+}
+
 pub(crate) fn a_tail_that_is_taken_away_shows_in_the_head_that_was_written_down(home: &Home) {
     let mut archive = home.open();
     archive.append(&[batch(entries(LIFE, 1..=3))]).unwrap();

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::gaps::{self, ToldGaps};
 use super::join::{self, Segment};
+use super::left_out::LeftOut;
 use super::names::{self, TwoNames};
 use super::{Held, History, LifeHistory, RecorderHistory};
 use crate::record::{
@@ -17,7 +18,7 @@ use crate::site::{ClockRule, Delays, Recorder, Site};
 ///
 /// A source is one reading or one file. Entries whose life has no name belong together only within
 /// a source, so say where the next one [begins](Self::begin_source).
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Collector {
     recorders: Vec<Collected>,
     /// Where each is in that list.
@@ -27,7 +28,7 @@ pub struct Collector {
 }
 
 /// What was collected of one recorder.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Collected {
     name: String,
     lives: BTreeMap<Life, Vec<Held>>,
@@ -44,6 +45,7 @@ struct Collected {
     reach: Reach,
     points: BTreeSet<PointRecord>,
     stamps: Option<RecorderRecord>,
+    left_out: LeftOut,
 }
 
 /// Whether the recorder was read.
@@ -93,6 +95,15 @@ impl Collector {
         self.turn_to(recorder);
         if let Some(collected) = self.recorders.get_mut(self.current) {
             collected.add(record);
+        }
+    }
+
+    /// Says that a source has entries of a life between these two sequences, which were left out
+    /// because nobody asked for them. They are not missing.
+    pub fn leave_out(&mut self, recorder: &str, life: Life, after: u64, before: u64) {
+        self.turn_to(recorder);
+        if let Some(collected) = self.recorders.get_mut(self.current) {
+            collected.left_out.add(life, after, before);
         }
     }
 
@@ -168,7 +179,8 @@ impl Collected {
             Record::Suppressed(ref look) => self.suppressed.push(look.clone()),
             Record::Point(ref point) => _ = self.points.insert(point.clone()),
             Record::Recorder(stamps) => self.stamps = self.stamps.max(Some(stamps)),
-            Record::Command(_) => {}
+            // None of them says anything of the log or its clock.
+            Record::Command(_) | Record::Note(_) | Record::Site(_) => {}
         }
     }
 
@@ -195,6 +207,7 @@ impl Collected {
         self.suppressed.extend(other.suppressed);
         self.points.extend(other.points);
         self.stamps = self.stamps.max(other.stamps);
+        self.left_out.merge(other.left_out);
     }
 
     fn add_entry(&mut self, record: &EntryRecord) {
@@ -246,6 +259,7 @@ impl Collected {
         }
         let told = ToldGaps::new(self.gaps);
         for life in &mut lives {
+            life.left_out = self.left_out.places(life);
             life.gaps = gaps::of_life(life, &told, self.stamps.is_some());
         }
         conflicts.sort_unstable_by_key(|conflict| (conflict.life, conflict.sequence));

@@ -69,7 +69,8 @@ impl ToldGaps {
 
 /// Everything that is missing in a life. Entries of a recorder are counted by it, so nothing is
 /// missing between two that follow each other. Those of a list of another device (`is_list`) are
-/// counted by whoever read the list: what was told there is in no other source.
+/// counted by whoever read the list: what was told there is in no other source. What was left out is
+/// not missing.
 pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps, is_list: bool) -> Vec<LogGap> {
     if life.is_by_number {
         return Vec::new();
@@ -84,6 +85,9 @@ pub(super) fn of_life(life: &LifeHistory, told: &ToldGaps, is_list: bool) -> Vec
     for (place, pair) in life.entries.windows(2).enumerate() {
         let [before, after] = pair else { continue };
         let missing = after.sequence - before.sequence - 1;
+        if missing > 0 && life.left_out.binary_search(&(place + 1)).is_ok() {
+            continue;
+        }
         if missing > 0 {
             gaps.push(hole(life, told, place + 1, before.sequence, missing));
         } else if let Some(inputs) = unrecorded(before, after) {

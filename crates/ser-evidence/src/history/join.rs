@@ -9,7 +9,7 @@ use crate::record::Life;
 use crate::time::shown;
 
 /// A reading that does not know which life it read.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Segment {
     /// In the order of the reading.
     pub(super) entries: Vec<Held>,

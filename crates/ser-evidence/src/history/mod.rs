@@ -7,6 +7,7 @@
 mod collector;
 mod gaps;
 mod join;
+mod left_out;
 mod names;
 
 use ser_proto::{Entry, Inputs};
@@ -70,6 +71,9 @@ pub struct LifeHistory {
     pub entries: Vec<Held>,
     /// What is missing, by place.
     pub gaps: Vec<LogGap>,
+    /// Ahead of which places there are entries that were left out, since nobody asked for them. They
+    /// are not missing; whether anything between them is, nobody says.
+    pub left_out: Vec<usize>,
 }
 
 /// An entry in its place.
@@ -137,6 +141,13 @@ impl LifeHistory {
     #[must_use]
     pub fn entry(&self, sequence: u64) -> Option<&Held> {
         self.entries.get(self.place_of(sequence)).filter(|held| held.sequence == sequence)
+    }
+
+    /// Whether the entries of a life are not known without a break right ahead of a place.
+    #[must_use]
+    pub fn is_broken_ahead_of(&self, place: usize) -> bool {
+        self.gaps.binary_search_by_key(&place, |gap| gap.place).is_ok()
+            || self.left_out.binary_search(&place).is_ok()
     }
 
     /// The life's name.

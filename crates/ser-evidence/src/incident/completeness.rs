@@ -132,9 +132,14 @@ fn last_before(timeline: &Timeline<'_>, incident: &Incident, recorder: u32) -> O
 fn unbroken(timeline: &Timeline<'_>, event: EventId) -> Option<(StretchEnd, StretchEnd)> {
     let life = timeline.life(event)?;
     let place = event.place as usize;
-    let next = life.gaps.partition_point(|gap| gap.place <= place);
-    let first = next.checked_sub(1).and_then(|gap| life.gaps.get(gap)).map_or(0, |gap| gap.place);
-    let end = life.gaps.get(next).map_or(life.entries.len(), |gap| gap.place);
+    let gap = life.gaps.partition_point(|gap| gap.place <= place);
+    let left_out = life.left_out.partition_point(|&left_out| left_out <= place);
+    let gap_before = gap.checked_sub(1).and_then(|gap| life.gaps.get(gap)).map(|gap| gap.place);
+    let left_out_before = left_out.checked_sub(1).and_then(|before| life.left_out.get(before));
+    let first = gap_before.max(left_out_before.copied()).unwrap_or(0);
+    let gap_after = life.gaps.get(gap).map(|gap| gap.place);
+    let ends = [gap_after, life.left_out.get(left_out).copied(), Some(life.entries.len())];
+    let end = ends.into_iter().flatten().min().unwrap_or(0);
     let at = |place: usize| {
         let event = EventId { place: u32::try_from(place).ok()?, ..event };
         Some(StretchEnd { event, clock: clock(timeline, event) })

@@ -49,7 +49,14 @@ impl Incident {
         Some(incident)
     }
 
-    /// Adds what is missing over the whole incident: the entries on both sides are outside of it.
+    /// The same with what is missing over the whole incident: the entries on both sides are outside
+    /// of it.
+    #[must_use]
+    pub fn completed(mut self, timeline: &Timeline<'_>) -> Incident {
+        self.add_spanning_gaps(timeline);
+        self
+    }
+
     fn add_spanning_gaps(&mut self, timeline: &Timeline<'_>) {
         let (Some(&first), Some(&last)) = (self.events.first(), self.events.last()) else { return };
         let (Some(first), Some(last)) = (earliest(timeline, first), latest(timeline, last)) else {
@@ -110,7 +117,8 @@ fn best(timeline: &Timeline<'_>, which: Which) -> Option<Incident> {
 }
 
 impl Incident {
-    /// All incidents, in order.
+    /// All incidents, in order. What is missing over a whole one is only in one that was
+    /// [completed](Self::completed).
     #[must_use]
     pub fn all(timeline: &Timeline<'_>) -> Vec<Incident> {
         let mut all = Vec::new();

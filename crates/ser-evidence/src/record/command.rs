@@ -53,17 +53,22 @@ impl CommandRecord {
     /// What stands where a name is not known: none may be empty.
     pub const NOT_KNOWN: &str = "not known";
 
+    /// A name as a record takes it: one line that can be seen, not empty, cut off where it is too long.
+    #[must_use]
+    pub fn name(text: &str) -> String {
+        fitted(text, CommandRecord::LONGEST_NAME)
+    }
+
     /// The same with texts that a file takes: each on one line, with nothing that a terminal would
     /// obey, not empty, and cut off where it is too long.
     #[must_use]
     pub fn fitted(self) -> CommandRecord {
-        let name = |text: &str| fitted(text, Self::LONGEST_NAME);
         CommandRecord {
             at: self.at,
-            user: name(&self.user),
-            host: name(&self.host),
-            program: name(&self.program),
-            peer: name(&self.peer),
+            user: Self::name(&self.user),
+            host: Self::name(&self.host),
+            program: Self::name(&self.program),
+            peer: Self::name(&self.peer),
             command: fitted(&self.command, Self::LONGEST_TEXT),
             outcome: self.outcome.fitted(),
         }

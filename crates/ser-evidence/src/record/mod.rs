@@ -9,6 +9,8 @@ mod entry;
 mod gap;
 mod life;
 mod names;
+mod note;
+mod site;
 mod suppressed;
 mod watched;
 
@@ -18,6 +20,8 @@ pub use entry::EntryRecord;
 pub use gap::{Gap, Lost, Why};
 pub use life::{Life, LifeRecord};
 pub use names::{PointRecord, RecorderRecord};
+pub use note::NoteRecord;
+pub use site::SiteRecord;
 pub use suppressed::Suppressed;
 pub use watched::Watched;
 
@@ -44,6 +48,10 @@ pub enum Record {
     Recorder(RecorderRecord),
     /// A command that changed the recorder, or may have. It takes no part in a timeline.
     Command(CommandRecord),
+    /// What a person says about an incident.
+    Note(NoteRecord),
+    /// A version of the site file.
+    Site(SiteRecord),
 }
 
 /// A record and the recorder that it is about.

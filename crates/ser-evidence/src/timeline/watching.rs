@@ -36,7 +36,7 @@ impl Side {
                 Side::Before => (start.checked_sub(steps)?, start + 1 - steps),
                 Side::After => (start + steps, start + steps),
             };
-            let held = life.entries.get(place).filter(|_| !is_gap(life, gap))?;
+            let held = life.entries.get(place).filter(|_| !life.is_broken_ahead_of(gap))?;
             Some((EventId { place: u32::try_from(place).ok()?, ..from }, held))
         })
     }
@@ -92,11 +92,6 @@ fn may_be_one(timeline: &Timeline<'_>, one: ChangeId, other: ChangeId) -> bool {
     delta.lo_us.is_none_or(|lo| lo <= 0) && delta.hi_us.is_none_or(|hi| 0 <= hi)
 }
 
-/// Whether something is missing before the entry at this place.
-fn is_gap(life: &LifeHistory, place: usize) -> bool {
-    life.gaps.binary_search_by_key(&place, |gap| gap.place).is_ok()
-}
-
 /// Whether the recorder of a point has an entry that is proven to be earlier than a change and one
 /// that is proven to be later, and between them neither a gap nor a change of the point. `key` is
 /// where the change is in the list.
@@ -132,7 +127,9 @@ fn covers(
     let after =
         (near..life.entries.len()).take(MOST_NEAR).find(|&place| order(place) == Order::After);
     let Some((before, after)) = before.zip(after) else { return false };
-    let is_gap = life.gaps.iter().any(|gap| (before + 1..=after).contains(&gap.place));
+    let within = before + 1..=after;
+    let is_gap = life.gaps.iter().any(|gap| within.contains(&gap.place))
+        || life.left_out.iter().any(|place| within.contains(place));
     let between = life.entries.get(before + 1..after).unwrap_or_default();
     !is_gap && !between.iter().any(|held| held.entry.changed.contains(input))
 }

@@ -241,14 +241,17 @@ fn everything_that_can_happen_does() {
                 Record::Entry(entry) if entry.known == entry.entry.changed => {
                     count("changes only", 1);
                 }
-                // No recorder of ours knows a name, none of this world leaves anything out, and nobody
-                // writes down who sent a command: the last four are never there.
+                // No recorder of ours knows a name, and none of this world leaves anything out, nor
+                // does anybody write to an archive or write down who sent a command: the last six
+                // are never there.
                 Record::Entry(_)
                 | Record::Life(_)
                 | Record::Point(_)
                 | Record::Recorder(_)
                 | Record::Suppressed(_)
-                | Record::Command(_) => {}
+                | Record::Command(_)
+                | Record::Note(_)
+                | Record::Site(_) => {}
             }
         }
         count("shifts", story.world.site.shifts.len());

@@ -77,6 +77,9 @@ pub(super) struct Line<'a> {
     pub(super) off: Option<Text<'a>>,
     pub(super) utc_offset_s: Option<i32>,
     #[serde(borrow)]
+    pub(super) text: Option<Text<'a>>,
+    pub(super) closes: Option<bool>,
+    #[serde(borrow)]
     pub(super) note: Option<Text<'a>>,
     #[serde(borrow)]
     pub(super) user: Option<Text<'a>>,

@@ -12,8 +12,14 @@ mod reader;
 mod texts;
 mod writer;
 
+use ser_evidence::record::SiteRecord;
+
 pub use reader::Reader;
 pub use writer::Writer;
 
 /// The version of this layout.
 pub const SCHEMA: u32 = 1;
+
+/// The longest line that is read, in bytes. Most have a few hundred; a site file is in one, and its
+/// letters may be written with up to three times as many bytes.
+pub const MAX_LINE_LEN: usize = 4 * SiteRecord::LONGEST;

@@ -4,14 +4,15 @@ use std::io::BufRead;
 
 use ser_evidence::record::{
     ClockObservation, ClockStep, CommandRecord, EntryRecord, Gap, How, Life, LifeRecord, Lost,
-    Outcome, Place, PointRecord, Record, RecorderRecord, Reference, Suppressed, Told, Watched, Why,
+    NoteRecord, Outcome, Place, PointRecord, Record, RecorderRecord, Reference, SiteRecord,
+    Suppressed, Told, Watched, Why,
 };
 use ser_evidence::time::{Bound, Scale, shown};
 use ser_proto::Entry;
 
-use super::SCHEMA;
 use super::lines::{HostLine, Line, PlaceLine, Result, moment, needed, stamp, understood, wrong};
-use super::texts::{Text, broadcast_named, fit_to_show, is_line_of, life_named, model_named};
+use super::texts::{Text, broadcast_named, fit_to_show, is_line, life_named, model_named};
+use super::{MAX_LINE_LEN, SCHEMA};
 use crate::error::{Problem, ReadError, quoted};
 use crate::lines::Lines;
 use crate::missing::why_named;
@@ -34,7 +35,7 @@ impl<R: BufRead> Reader<R> {
     /// Reads `input`. `recorder` is the name for lines that name none, as earlier versions wrote
     /// them.
     pub fn new(input: R, recorder: &str) -> Reader<R> {
-        let lines = Lines::new(input);
+        let lines = Lines::new(input, MAX_LINE_LEN);
         let (unnamed, recorder) = (recorder.to_owned(), recorder.to_owned());
         Reader { lines, unnamed, recorder, note: None, program: None, is_over: false }
     }
@@ -153,6 +154,8 @@ fn item(line: &Line<'_>) -> std::result::Result<Item, Problem> {
         Some("point") => point(line),
         Some("recorder") => recorder(line),
         Some("command") => command(line),
+        Some("note") => note(line),
+        Some("site") => site(line),
         // Evidence that is passed over in silence would be lost.
         Some(kind) => Err(format!("there is no record {}", quoted(kind.as_bytes()))),
         None if line.entry.is_some() => entry(line),
@@ -321,7 +324,7 @@ fn recorder(line: &Line<'_>) -> Result<Record> {
 fn command(line: &Line<'_>) -> Result<Record> {
     let text = |field: &Option<Text<'_>>, name, longest| {
         let Text(text) = needed(field.as_ref(), name)?;
-        match is_line_of(text, longest) {
+        match is_line(text, 1..=longest) {
             true => Ok(text.to_string()),
             false => Err(wrong(name, text)),
         }
@@ -346,4 +349,36 @@ fn command(line: &Line<'_>) -> Result<Record> {
         command: text(&line.command, "command", CommandRecord::LONGEST_TEXT)?,
         outcome,
     }))
+}
+
+fn note(line: &Line<'_>) -> Result<Record> {
+    let name = |field: &Option<Text<'_>>, name| {
+        let Text(text) = needed(field.as_ref(), name)?;
+        let is_fit = is_line(text, 1..=NoteRecord::LONGEST_NAME);
+        is_fit.then(|| text.to_string()).ok_or_else(|| wrong(name, text))
+    };
+    let closes = needed(line.closes, "closes")?;
+    let Text(text) = needed(line.text.as_ref(), "text")?;
+    if !is_line(text, usize::from(!closes)..=NoteRecord::LONGEST) {
+        return Err(wrong("text", text));
+    }
+    let life = life_of(line)?;
+    Ok(Record::Note(NoteRecord {
+        at: needed(line.host.as_ref(), "host")?.reading()?,
+        user: name(&line.user, "user")?,
+        host: name(&line.host_name, "host_name")?,
+        life,
+        sequence: needed(line.sequence, "sequence")?,
+        text: text.to_string(),
+        closes,
+    }))
+}
+
+fn site(line: &Line<'_>) -> Result<Record> {
+    let Text(text) = needed(line.text.as_ref(), "text")?;
+    if !SiteRecord::holds(text) {
+        return Err(wrong("text", text));
+    }
+    let at = needed(line.host.as_ref(), "host")?.reading()?;
+    Ok(Record::Site(SiteRecord { at, text: text.to_string() }))
 }

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use ser_console::is_obeyed;
 use ser_evidence::record::{How, Life, Outcome, PointRecord};
@@ -98,12 +99,10 @@ pub(super) const fn outcome_name(outcome: &Outcome) -> &'static str {
 
 /// Whether this may be the name of a point, or what a state is called.
 pub(super) fn fit_to_show(text: &str) -> bool {
-    is_line_of(text, PointRecord::LONGEST)
+    is_line(text, 1..=PointRecord::LONGEST)
 }
 
-/// Whether this is one line that can be seen, of at most so many characters.
-pub(super) fn is_line_of(text: &str, longest: usize) -> bool {
-    text.trim() == text
-        && (1..=longest).contains(&text.chars().count())
-        && !text.chars().any(is_obeyed)
+/// Whether this is one line that can be seen, with so many characters.
+pub(super) fn is_line(text: &str, length: RangeInclusive<usize>) -> bool {
+    text.trim() == text && length.contains(&text.chars().count()) && !text.chars().any(is_obeyed)
 }

@@ -7,8 +7,8 @@ use std::io::{self, Write};
 use ser_console::is_obeyed;
 use ser_evidence::record::{
     Boot, ClockObservation, ClockStep, CommandRecord, EntryRecord, Fellow, Gap, HostReading, Life,
-    LifeRecord, Lost, Place, PointRecord, Record, RecorderRecord, Reference, Suppressed, Watched,
-    Why,
+    LifeRecord, Lost, NoteRecord, Place, PointRecord, Record, RecorderRecord, Reference,
+    SiteRecord, Suppressed, Watched, Why,
 };
 use ser_evidence::time::{Moment, stamp};
 use ser_proto::{Entry, Inputs, TimeStamp};
@@ -55,6 +55,8 @@ impl<W: Write> Writer<W> {
             Record::Point(point) => self.line(&PointLine::of(recorder, point)),
             Record::Recorder(stamps) => self.line(&RecorderLine::of(recorder, stamps)),
             Record::Command(command) => self.line(&CommandLine::of(recorder, command)),
+            Record::Note(note) => self.line(&NoteLine::of(recorder, note)),
+            Record::Site(site) => self.line(&SiteLine::of(recorder, site)),
         }
     }
 
@@ -409,6 +411,50 @@ impl<'a> CommandLine<'a> {
             peer,
             host: at.into(),
         }
+    }
+}
+
+#[derive(Serialize)]
+struct NoteLine<'a> {
+    record: &'static str,
+    recorder: &'a str,
+    host: HostFields,
+    user: &'a str,
+    host_name: &'a str,
+    life: AsText<Life>,
+    sequence: u64,
+    text: &'a str,
+    closes: bool,
+}
+
+impl<'a> NoteLine<'a> {
+    fn of(recorder: &'a str, note: &'a NoteRecord) -> NoteLine<'a> {
+        let NoteRecord { at, user, host: host_name, life, sequence, text, closes } = note;
+        NoteLine {
+            record: "note",
+            recorder,
+            host: at.into(),
+            user,
+            host_name,
+            life: AsText(*life),
+            sequence: *sequence,
+            text,
+            closes: *closes,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct SiteLine<'a> {
+    record: &'static str,
+    recorder: &'a str,
+    host: HostFields,
+    text: &'a str,
+}
+
+impl<'a> SiteLine<'a> {
+    fn of(recorder: &'a str, site: &'a SiteRecord) -> SiteLine<'a> {
+        SiteLine { record: "site", recorder, host: (&site.at).into(), text: &site.text }
     }
 }
 

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use ser_evidence::history::Held;
 use ser_evidence::record::Gap;
 use ser_evidence::time::Moment;
-use ser_evidence::timeline::{EventId, Item, Timeline};
+use ser_evidence::timeline::{ChangeId, EventId, Item, Timeline};
 
 use super::dialect::{Dialect, field};
 use crate::csv::loss_note;
@@ -39,12 +39,37 @@ pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>) -> io::Result<()> {
     write_items(out, timeline, timeline.items(), CsvStyle::default())
 }
 
+/// As [`write`], with these entries and gaps only, and of the entries with these changes only; with
+/// columns for the names of points and states.
+///
+/// # Errors
+/// If `out` does not take it.
+pub fn write_chosen(
+    out: &mut dyn Write,
+    timeline: &Timeline<'_>,
+    items: impl Iterator<Item = Item>,
+    wants: &dyn Fn(ChangeId) -> bool,
+) -> io::Result<()> {
+    let style = CsvStyle { has_names: true, ..CsvStyle::default() };
+    write_wanted(out, timeline, items, style, wants)
+}
+
 /// As [`write`], with these entries and gaps only, and in this style.
 pub(crate) fn write_items(
     out: &mut dyn Write,
     timeline: &Timeline<'_>,
     items: impl Iterator<Item = Item>,
     style: CsvStyle,
+) -> io::Result<()> {
+    write_wanted(out, timeline, items, style, &|_| true)
+}
+
+fn write_wanted(
+    out: &mut dyn Write,
+    timeline: &Timeline<'_>,
+    items: impl Iterator<Item = Item>,
+    style: CsvStyle,
+    wants: &dyn Fn(ChangeId) -> bool,
 ) -> io::Result<()> {
     let mut rows = Rows::of(timeline, style);
     out.write_all(&rows.header())?;
@@ -53,7 +78,7 @@ pub(crate) fn write_items(
         match item {
             Item::Entry(event) => {
                 let is_after_set = std::mem::take(&mut is_after_set);
-                out.write_all(rows.entry(timeline, event, is_after_set))?;
+                out.write_all(rows.entry(timeline, event, is_after_set, wants))?;
             }
             Item::Gap(event, index) => out.write_all(&rows.gap(timeline, event, index))?,
             Item::ClockSet(_) => is_after_set = true,
@@ -112,7 +137,13 @@ impl Rows {
     }
 
     /// The rows of an entry.
-    fn entry(&mut self, timeline: &Timeline<'_>, event: EventId, is_after_set: bool) -> &[u8] {
+    fn entry(
+        &mut self,
+        timeline: &Timeline<'_>,
+        event: EventId,
+        is_after_set: bool,
+        wants: &dyn Fn(ChangeId) -> bool,
+    ) -> &[u8] {
         self.rows.clear();
         let Some(held) = timeline.held(event) else { return &self.rows };
         let Held { sequence, entry, number, .. } = *held;
@@ -133,7 +164,8 @@ impl Rows {
             [&*self.head, &none, &*self.tail].iter().for_each(|part| self.rows.extend(*part));
             self.end_row(None);
         }
-        for input in entry.changed.numbers() {
+        let changes = entry.changed.numbers();
+        for input in changes.filter(|&input| wants(ChangeId { event, input })) {
             self.rows.extend_from_slice(&self.head);
             push_number(&mut self.rows, input.into());
             let on = held.state_of(input);

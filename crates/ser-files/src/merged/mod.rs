@@ -5,10 +5,10 @@ mod dialect;
 mod jsonl;
 mod table;
 
-pub use csv::{CsvStyle, HEADER, write as write_csv};
+pub use csv::{CsvStyle, HEADER, write as write_csv, write_chosen as write_chosen_csv};
 pub use dialect::Dialect;
 pub use jsonl::write as write_jsonl;
-pub use table::write as write_table;
+pub use table::{write as write_table, write_chosen as write_chosen_table};
 
 pub(crate) use csv::write_items as write_csv_items;
 pub(crate) use dialect::{field, without_apostrophe};

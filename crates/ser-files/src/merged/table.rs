@@ -16,11 +16,25 @@ use crate::{names, span};
 /// # Errors
 /// If `out` does not take it.
 pub fn write(out: &mut dyn Write, timeline: &Timeline<'_>, styles: Styles) -> io::Result<()> {
+    write_chosen(out, timeline, styles, timeline.items(), &|_| true)
+}
+
+/// As [`write`], with these entries and gaps only, and of the entries with these changes only.
+///
+/// # Errors
+/// If `out` does not take it.
+pub fn write_chosen(
+    out: &mut dyn Write,
+    timeline: &Timeline<'_>,
+    styles: Styles,
+    items: impl Iterator<Item = Item>,
+    wants: &dyn Fn(ChangeId) -> bool,
+) -> io::Result<()> {
     let mut table = Table::new(timeline, styles);
     table.header(out)?;
-    for item in timeline.items() {
+    for item in items {
         match item {
-            Item::Entry(event) => table.entry(out, event)?,
+            Item::Entry(event) => table.entry(out, event, wants)?,
             Item::Gap(event, index) => table.gap(out, event, index)?,
             Item::ClockSet(event) => {
                 table.remark(out, &names::recorder(timeline, event), "the clock was set here")?;
@@ -74,7 +88,12 @@ impl<'t> Table<'t> {
         )
     }
 
-    fn entry(&mut self, out: &mut dyn Write, event: EventId) -> io::Result<()> {
+    fn entry(
+        &mut self,
+        out: &mut dyn Write,
+        event: EventId,
+        wants: &dyn Fn(ChangeId) -> bool,
+    ) -> io::Result<()> {
         let Some(held) = self.timeline.held(event) else { return Ok(()) };
         let key = self.timeline.time(event).map(ser_evidence::time::Moment::us);
         if key.is_none() && !std::mem::replace(&mut self.is_timeless, true) {
@@ -99,7 +118,8 @@ impl<'t> Table<'t> {
         if held.entry.changed.is_empty() {
             writeln!(out, "{head}  no input changed")?;
         }
-        for input in held.entry.changed.numbers() {
+        let changes = held.entry.changed.numbers();
+        for input in changes.filter(|&input| wants(ChangeId { event, input })) {
             let point: Option<PointId> = self.points.of(ChangeId { event, input });
             let on = held.state_of(input);
             let name = names::point(self.timeline, point, input);

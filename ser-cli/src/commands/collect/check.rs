@@ -7,7 +7,6 @@ use std::sync::atomic::AtomicBool;
 use ser_archive::{Archive, Place};
 use ser_collector::{Met, Open, Options, meet_all};
 
-use super::archive_failure;
 use crate::error::{Failure, Result, inform};
 use crate::output::{Grid, Palette};
 
@@ -37,7 +36,7 @@ pub(super) fn run(
 
 fn check_archive(open: &Open, name: impl std::fmt::Display) -> Result<()> {
     let position = open().and_then(|mut archive| Archive::position(&mut archive));
-    let position = position.map_err(|error| archive_failure(&error))?;
+    let position = position?;
     inform(format_args!("{name} can be written; rows: {position}"));
     Ok(())
 }

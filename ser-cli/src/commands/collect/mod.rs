@@ -12,16 +12,17 @@ use std::thread;
 use std::time::Duration;
 
 use ser_archive::{Access, Archive, Place};
-use ser_collector::{Collector, DailyTime, Ended, Forward, Open, Options, Times};
+use ser_collector::{Collector, DailyTime, Ended, Forward, Open, Options, Times, Trouble};
 use ser_evidence::site::Site;
 
 use ser_observer::Author;
 
+use crate::archive::{PlaceParser, parse_keep, parse_size};
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::error::{Failure, Result, inform};
 use crate::interrupt;
 use crate::output::PROGRAM;
-use crate::site_file::Chosen;
+use crate::site_file::{self, Chosen};
 use service::Service;
 
 const EXAMPLES: &str = "\
@@ -39,8 +40,8 @@ nothing was missed. Nothing counts as read before it is on the disk, so the comm
 at any time. A recorder that does not answer is asked again, after pauses of up to a minute.
 With --forward everything is also given to a database of PostgreSQL. While that cannot be \
 reached, it waits in the archive here.
-What happens is told on standard error: outages, and once a day the heads of the chains, by which \
-ser-cli archive verify can show later that nothing was taken away. As a service of systemd the \
+What happens is told on standard error: outages, and once a day the heads of the chains, with \
+which `archive verify` shows later that nothing was taken away. As a service of systemd the \
 command says when it is ready and alive; docs/operations.md has a unit.
 Recorders whose auto report is off are made to report while they are read, unless --poll is given.";
 
@@ -50,7 +51,13 @@ Recorders whose auto report is off are made to report while they are read, unles
 pub(crate) struct Args {
     /// The archive: a file, or the address of a database as above; without it the site file's name
     /// with .db. The password of a database is in ~/.pgpass or PGPASSWORD.
-    #[arg(long, env = "SER_ARCHIVE", hide_env_values = true, value_name = "PLACE")]
+    #[arg(
+        long,
+        env = "SER_ARCHIVE",
+        hide_env_values = true,
+        value_name = "PLACE",
+        value_parser = PlaceParser
+    )]
     archive: Option<Place>,
 
     /// Read each recorder once, and end. Exit code 1 if any could not be read.
@@ -63,7 +70,7 @@ pub(crate) struct Args {
     check: bool,
 
     /// Give everything to this database as well.
-    #[arg(long, value_name = "ADDRESS")]
+    #[arg(long, value_name = "ADDRESS", value_parser = PlaceParser)]
     forward: Option<Place>,
 
     /// How this collector is called in the archive; the name of this computer if not given.
@@ -77,6 +84,14 @@ pub(crate) struct Args {
     /// Set all clocks each day at this time, in the time zone of the site.
     #[arg(long, value_name = "HH:MM")]
     set_clocks: Option<DailyTime>,
+
+    /// Let go of entries once they have been kept for so long: 90d, 26w, 5y.
+    #[arg(long, value_name = "TIME", value_parser = parse_keep)]
+    keep: Option<Duration>,
+
+    /// Let go of the oldest entries when the archive takes more than this: 500MB, 10GB.
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    max_size: Option<u64>,
 
     /// This recorder was moved to another port, or is another unit now, on purpose. Otherwise what
     /// answers there and belongs elsewhere is not read.
@@ -107,7 +122,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     telling::begin();
     let stop = interrupt::catch()?;
     let options = options(args, connection, site)?;
-    let open = opener(&place);
+    let open = opener(&place, args.hasten);
     if args.check {
         return check::run(&options, &open, &place, &stop);
     }
@@ -118,8 +133,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         if args.once { "" } else { " until Ctrl-C" }
     ));
     let (is_once, hasten) = (args.once, args.hasten);
-    let collector = Collector::start(options, open, Arc::clone(&stop))
-        .map_err(|error| archive_failure(&error))?;
+    let collector = Collector::start(options, open, Arc::clone(&stop))?;
     let mut service = Service::begin();
     while !collector.is_over() && !stop.load(Ordering::Relaxed) {
         service.is_alive(&collector);
@@ -130,13 +144,16 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     if is_once {
         shown::write(&ended)?;
     }
-    outcome(args, &ended)
+    outcome(args, ended)
 }
 
 /// How it went, as an exit code.
-fn outcome(args: &Args, ended: &Ended) -> Result<()> {
-    if let Some(trouble) = &ended.failed {
-        return Err(Failure::new(trouble).hint(ARCHIVE_HINT));
+fn outcome(args: &Args, ended: Ended) -> Result<()> {
+    if let Some(trouble) = ended.failed {
+        return Err(match trouble {
+            Trouble::Archive(error) => error.into(),
+            other => Failure::new(other).hint("ser-cli collect --check looks at everything"),
+        });
     }
     if args.once {
         let missed: Vec<&str> = ended.not_reached().map(|state| state.recorder.as_str()).collect();
@@ -149,24 +166,6 @@ fn outcome(args: &Args, ended: &Ended) -> Result<()> {
     match args.fail_on_loss && gaps > 0 {
         true => Err(Failure::incomplete(format_args!("losses: {gaps}"))),
         false => Ok(()),
-    }
-}
-
-const ARCHIVE_HINT: &str = "ser-cli archive check says what is wrong with an archive";
-
-/// A failure of the archive.
-pub(super) fn archive_failure(error: &ser_archive::Error) -> Failure {
-    use ser_archive::Error::{Busy, Database, Full, Newer, NotOurs};
-    let failure = Failure::new(error);
-    match error {
-        Busy { .. } => failure.hint("another program holds it for long; look for one that hangs"),
-        Full { .. } => failure.hint("make room, or let go of what is old: ser-cli archive retain"),
-        Newer { .. } => failure.hint("upgrade this program; the archive stays as it is"),
-        NotOurs { .. } => failure.hint("name another file; this one stays as it is"),
-        Database { .. } => {
-            failure.hint("is the name right, is the server there, and may this user write there?")
-        }
-        _ => failure.hint(ARCHIVE_HINT),
     }
 }
 
@@ -225,9 +224,16 @@ fn place(args: &Args, connection: &ConnectionArgs) -> Result<Place> {
     }
 }
 
-fn opener(place: &Place) -> Open {
+/// Opens the archive. Who hastens does not wait as long for others either.
+fn opener(place: &Place, hasten: u32) -> Open {
     let place = place.clone();
-    Arc::new(move || Archive::open(&place, Access::Write { program: PROGRAM }))
+    Arc::new(move || {
+        let mut archive = Archive::open(&place, Access::Write { program: PROGRAM })?;
+        if hasten > 1 {
+            archive.set_patience(Duration::from_secs(10) / hasten)?;
+        }
+        Ok(archive)
+    })
 }
 
 fn options(args: &Args, connection: &ConnectionArgs, site: Site) -> Result<Options> {
@@ -235,29 +241,35 @@ fn options(args: &Args, connection: &ConnectionArgs, site: Site) -> Result<Optio
     let forward = args
         .forward
         .as_ref()
-        .map(|place| Forward { outlet: place.to_string(), open: opener(place) });
+        .map(|place| Forward { outlet: place.to_string(), open: opener(place, args.hasten) });
     Ok(Options {
         name,
         program: PROGRAM.to_owned(),
         site,
+        site_text: site_text(connection)?,
         line: connection::options(connection),
         may_configure: !args.poll,
         set_clocks: args.set_clocks,
         moved: args.moved.iter().cloned().collect::<BTreeSet<_>>(),
         forward,
-        keep_for: None,
-        keep_bytes: None,
+        keep_for: args.keep,
+        keep_bytes: args.max_size,
         once: args.once,
         times: Times::default().faster(args.hasten),
     })
 }
 
+/// The site file as it is, so that an old incident is shown with the names of its time.
+fn site_text(connection: &ConnectionArgs) -> Result<Option<String>> {
+    let path = connection.site.as_deref();
+    path.map(|path| site_file::text_of(path, "ser-cli site new writes a site file")).transpose()
+}
+
 /// The name of this computer.
 fn computer() -> Result<String> {
-    let name = Author::of_this_program(PROGRAM).host().map(str::to_owned);
-    name.and_then(|name| collector_name(&name).ok()).ok_or_else(|| {
-        Failure::new("this computer has no name by which the collector could be called")
-            .hint("give one with --name")
+    collector_name(Author::of_this_program(PROGRAM).host()).map_err(|why| {
+        Failure::new(format!("the collector cannot be called as this computer is: {why}"))
+            .hint("give it a name with --name")
     })
 }
 

@@ -139,7 +139,11 @@ impl Bench {
     }
 
     fn gather(&self, files: Vec<PathBuf>) -> Result<Gathered> {
-        gather::gather(&SourceArgs::live_and(files, self.state()), &self.connection(None)?)
+        gather::gather(
+            &SourceArgs::live_and(files, self.state()),
+            &self.connection(None)?,
+            gather::EVERYTHING,
+        )
     }
 
     /// Switches the recorders off.

@@ -1,6 +1,7 @@
 //! Which part of the timeline is wanted.
 
 use ser_evidence::incident::{Incident, Which};
+use ser_evidence::site::Site;
 use ser_evidence::timeline::Timeline;
 use ser_files::export::Selection;
 
@@ -19,11 +20,14 @@ pub(super) struct Choice {
 }
 
 impl Choice {
+    /// What is wanted, if the user says anything.
+    pub(super) fn which(&self, site: &Site) -> Result<Option<Which>> {
+        Ok(self.choice.which(site)?.or(self.last_trip.then_some(Which::LastTrip)))
+    }
+
     /// The part of this timeline.
     pub(super) fn selection(&self, timeline: &Timeline<'_>) -> Result<Selection> {
-        let which = self.choice.which(timeline.site())?;
-        let which = which.or(self.last_trip.then_some(Which::LastTrip));
-        let Some(which) = which else { return Ok(Selection::everything()) };
+        let Some(which) = self.which(timeline.site())? else { return Ok(Selection::everything()) };
         let incident = Incident::pick(timeline, which).ok_or_else(|| {
             Failure::new("there is no entry with a time in this part")
                 .hint("without a choice of time everything is exported")

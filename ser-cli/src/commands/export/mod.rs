@@ -106,7 +106,7 @@ fn line_frequency(text: &str) -> std::result::Result<u8, String> {
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     fits(args)?;
     let destination = write::Destination::of(args, args.sources.files(connection))?;
-    let gathered = gather::gather(&args.sources, connection)?;
+    let gathered = gather::gather(&args.sources, connection, &|site| args.choice.which(site))?;
     let timeline = Timeline::new(&gathered.site, &gathered.history);
     let selection = args.choice.selection(&timeline)?;
     let counted = write::write(args, destination, &gathered, &timeline, &selection)?;
