@@ -155,6 +155,7 @@ impl Command {
             Completions(_) | Site(_) | Import(_) | Audit(_) => false,
             #[cfg(feature = "archive")]
             Command::Events(_) | Command::Incident(_) | Command::Archive(_) => false,
+            Command::Report(args) => !args.is_of_signatures(),
             #[cfg(unix)]
             Command::Genius(args) => !args.is_offline(),
             _ => true,
@@ -164,6 +165,7 @@ impl Command {
     /// Where entries come from, if the command takes files of them.
     const fn sources(&self) -> Option<&SourceArgs> {
         match self {
+            Command::Report(args) if args.is_of_signatures() => None,
             Command::Report(args) => Some(args.sources()),
             Command::Merge(args) => Some(args.sources()),
             Command::Export(args) => Some(args.sources()),
@@ -185,7 +187,16 @@ impl Cli {
     /// The definition of all arguments.
     pub(crate) fn definition() -> clap::Command {
         let connection = ConnectionArgs::augment_args(clap::Command::new("connection"));
-        OFFLINE.iter().fold(Cli::command(), |definition, name| {
+        let whole = Cli::command();
+        // How to reach a recorder is of no use where a signature is looked at.
+        #[cfg(feature = "sign")]
+        let whole = whole.mut_subcommand("report", |report| {
+            let hidden = || connection.get_arguments().map(|arg| arg.clone().hide(true));
+            ["verify", "key"].into_iter().fold(report, |report, name| {
+                report.mut_subcommand(name, |subcommand| subcommand.args(hidden()))
+            })
+        });
+        OFFLINE.iter().fold(whole, |definition, name| {
             definition.mut_subcommand(name, |subcommand| {
                 subcommand.args(connection.get_arguments().map(|arg| {
                     let meant =
@@ -432,6 +443,12 @@ mod tests {
             let (name, help) =
                 (command.get_name().to_string(), command.render_long_help().to_string());
             assert_eq!(help.contains("--retries"), !OFFLINE.contains(&&*name), "{name}");
+        }
+        #[cfg(feature = "sign")]
+        for name in ["verify", "key"] {
+            let report = definition.find_subcommand_mut("report").expect("there");
+            let help = report.find_subcommand_mut(name).expect("there").render_long_help();
+            assert!(!help.to_string().contains("--retries"), "{name}");
         }
         assert!(Cli::try_from_words(["ser-cli", "-p", "COM3", "demo"]).is_ok());
     }

@@ -22,6 +22,9 @@ static LEFT_BEHIND: Mutex<Option<&str>> = Mutex::new(None);
 /// What removes everything that is not whole before the program ends.
 static CLEAN_UP: OnceLock<fn()> = OnceLock::new();
 
+/// What writes down what the interrupt has cut short.
+static WRITE_DOWN: OnceLock<fn()> = OnceLock::new();
+
 /// Set by an interrupt, once somebody checks for interrupts.
 static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
@@ -47,6 +50,12 @@ pub(crate) fn clean_up_with(clean_up: fn()) -> Result<()> {
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())
         .map_err(not_caught)?;
     Ok(())
+}
+
+/// From now on the program calls this as well, before it cleans up and an interrupt ends it.
+pub(crate) fn write_down_with(write_down: fn()) -> Result<()> {
+    WRITE_DOWN.get_or_init(|| write_down);
+    flag().map(drop)
 }
 
 /// Checks the flag for as long as this exists.
@@ -91,8 +100,8 @@ fn flag() -> Result<Arc<AtomicBool>> {
             if let Some(hint) = *LEFT_BEHIND.lock().unwrap_or_else(PoisonError::into_inner) {
                 advise(hint);
             }
-            if let Some(clean_up) = CLEAN_UP.get() {
-                clean_up();
+            for before_the_end in [WRITE_DOWN.get(), CLEAN_UP.get()].into_iter().flatten() {
+                before_the_end();
             }
             std::process::exit(EXIT_FAILURE.into());
         }

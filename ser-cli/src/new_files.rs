@@ -22,6 +22,16 @@ use crate::interrupt;
 /// Files that are being written and have no names yet, for an interrupt to remove.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
+/// Who may read a new file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Readers {
+    /// As with any new file.
+    AsTheUserSays,
+    /// Nobody else.
+    #[cfg(feature = "sign")]
+    TheUserAlone,
+}
+
 /// Files that are being written.
 #[derive(Debug)]
 pub(crate) struct NewFiles {
@@ -45,6 +55,16 @@ impl NewFiles {
 
     /// Begins the file of this name.
     pub(crate) fn create(&mut self, path: &Path) -> Result<File> {
+        self.begin(path, Readers::AsTheUserSays)
+    }
+
+    /// Begins the file of this name, which nobody but the user may ever read.
+    #[cfg(feature = "sign")]
+    pub(crate) fn create_private(&mut self, path: &Path) -> Result<File> {
+        self.begin(path, Readers::TheUserAlone)
+    }
+
+    fn begin(&mut self, path: &Path, readers: Readers) -> Result<File> {
         match fs::symlink_metadata(path) {
             Ok(found) if found.is_dir() => {
                 return Err(Failure::new(format!("{} is a folder", path.display()))
@@ -68,7 +88,7 @@ impl NewFiles {
         interrupt::clean_up_with(remove_unfinished)?;
         // An interrupt waits, so that it knows of the file.
         let mut unfinished = unfinished();
-        let file = temporary(folder_of(path)).map_err(|error| not_begun(path, &error))?;
+        let file = temporary(folder_of(path), readers).map_err(|error| not_begun(path, &error))?;
         let handle = file.as_file().try_clone();
         let handle = handle.map_err(|error| Failure::writing(path.display(), &error))?;
         unfinished.push(file.path().to_owned());
@@ -250,12 +270,17 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
+fn temporary(folder: &Path, readers: Readers) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".ser-cli-").suffix(".part");
-    // As any program makes files: the user's mask takes away what others may not do.
+    // As any program makes files: the user's mask takes away what others may not do. Without this,
+    // only the user may read it.
     #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    if readers == Readers::AsTheUserSays {
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    }
+    #[cfg(not(unix))]
+    let _ = readers;
     builder.tempfile_in(folder)
 }
 

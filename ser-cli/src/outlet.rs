@@ -56,13 +56,24 @@ impl Outlet {
         self,
         write: impl FnOnce(&mut (dyn Write + Send)) -> std::result::Result<T, NotWritten>,
     ) -> Result<T> {
+        self.write_and(write, |_| Ok(()))
+    }
+
+    /// The same, and then does something with the file, which is whole and has no name yet. If that
+    /// fails, no file appears. On standard output there is nothing to do it with.
+    pub(crate) fn write_and<T>(
+        self,
+        write: impl FnOnce(&mut (dyn Write + Send)) -> std::result::Result<T, NotWritten>,
+        then: impl FnOnce(&mut File) -> Result<()>,
+    ) -> Result<T> {
         match self {
             Outlet::Stdout => {
                 to(&mut BufWriter::with_capacity(BUFFER, io::stdout()), &"standard output", write)
             }
-            Outlet::File(files, part) => {
+            Outlet::File(files, mut part) => {
                 let path = part.path.clone();
-                let written = part.write(write)?;
+                let written = to(&mut part.out, &path.display(), write)?;
+                then(part.out.get_mut())?;
                 finish(files, &path)?;
                 Ok(written)
             }

@@ -109,6 +109,26 @@ fn what_may_have_been_carried_out_and_what_was_refused_are_told_apart() {
 }
 
 #[test]
+fn an_interrupt_before_the_answer_leaves_a_record() {
+    let recorder = Original::that_says_who_it_is();
+    let folder = tempfile::tempdir().unwrap();
+    let command = |arguments: &str| {
+        let mut command = ser_cli();
+        command.env("SER_PORT", recorder.port()).env("SER_STATE_DIR", folder.path());
+        command.args(["--timeout", "60s"]).args(arguments.split_whitespace());
+        command
+    };
+    let mut erase = command("erase --yes");
+    let mut erase = Running::start(erase.stdout(Stdio::null()).stderr(Stdio::null()));
+    wait_until("the recorder has heard it", || recorder.heard().contains('E'));
+    assert_eq!(erase.interrupt(), Some(1));
+    let table = text(&command("audit").output().expect("it runs").stdout);
+    assert_eq!(table.lines().count(), 2, "{table}");
+    let outcome = "not answered, may have been carried out: interrupted before an answer came";
+    assert!(table.contains("erase the log") && table.trim_end().ends_with(outcome), "{table}");
+}
+
+#[test]
 fn the_list_is_cut_by_time_and_by_recorder() {
     let bench = Bench::start(Kind::Native, &[]);
     bench.ok("stop");

@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 use common::bench::{Bench, text};
-use common::{Running, events, ser_cli};
+use common::{Running, events, is_kept, ser_cli};
 use ser_evidence::record::{ClockObservation, How, Life, LifeRecord, Record, Reference, Watched};
 use ser_evidence::time::{Host, Moment, shown};
 use ser_files::Source;
@@ -34,9 +34,8 @@ fn kept(bench: &Bench) -> Vec<Record> {
 }
 
 fn kept_in(folder: &Path) -> Vec<Record> {
-    let is_kept = |path: &std::path::PathBuf| path.extension().is_some_and(|end| end == "jsonl");
     let files = fs::read_dir(folder).expect("a folder").map(|file| file.expect("a file").path());
-    let file = files.into_iter().find(is_kept).expect("what was kept");
+    let file = files.into_iter().find(|path| is_kept(path)).expect("what was kept");
     let file = fs::File::open(file).expect("opened");
     let source = Source::new(BufReader::new(file), "").expect("JSON lines");
     source.map(|told| told.expect("a record").record).collect()

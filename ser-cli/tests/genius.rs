@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 use std::sync::mpsc::Receiver;
 
-use common::{Running, events, ser_cli, wait_until};
+use common::{Running, events, is_kept, ser_cli, wait_until};
 use ser_evidence::record::{ClockObservation, How, Record, Reference, Told};
 use ser_files::Source;
 use ser_sim::testing::{PATIENCE, image};
@@ -237,7 +237,7 @@ fn kept_clocks(bench: &Bench) -> Vec<(String, ClockObservation)> {
     // The folder is made for the first thing that is kept.
     let files = fs::read_dir(bench.folder.path().join("state")).into_iter().flatten();
     let mut files: Vec<_> = files.map(|file| file.expect("a file").path()).collect();
-    files.retain(|path| path.extension().is_some_and(|end| end == "jsonl"));
+    files.retain(|path| is_kept(path));
     files.sort();
     files.iter().flat_map(|path| clocks_of(&fs::read(path).expect("a file"))).collect()
 }
@@ -255,7 +255,7 @@ fn clocks_of(jsonl: &[u8]) -> Vec<(String, ClockObservation)> {
 fn forget(bench: &Bench) {
     for file in fs::read_dir(bench.folder.path().join("state")).expect("a folder") {
         let path = file.expect("a file").path();
-        if path.extension().is_some_and(|end| end == "jsonl") {
+        if is_kept(&path) {
             fs::remove_file(path).expect("forgotten");
         }
     }

@@ -7,6 +7,7 @@ use std::fs;
 use std::process::Output;
 
 use common::bench::{Bench, text};
+use common::is_kept;
 use ser_sim::testing::Kind;
 use serde_json::Value;
 
@@ -91,7 +92,7 @@ fn a_longer_look_tells_the_drift_and_keeps_what_it_saw() {
     let state = fs::read_dir(bench.folder.path().join("state")).expect("a folder");
     let kept: String = state
         .map(|file| file.expect("a file").path())
-        .filter(|path| path.extension().is_some_and(|end| end == "jsonl"))
+        .filter(|path| is_kept(path))
         .map(|path| fs::read_to_string(path).expect("text"))
         .collect();
     assert!(kept.contains(told.lines().nth(1).expect("a record")), "{kept}");

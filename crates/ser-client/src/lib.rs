@@ -41,7 +41,7 @@ pub use reading::range_reader::RangeReader;
 pub use reading::read_request::ReadRequest;
 pub use reading::reader::{self, LogReader};
 pub use reading::summary::Summary;
-pub use session::change::{Change, ChangeHook, Outcome};
+pub use session::change::{Change, ChangeHook, Outcome, Stage};
 pub use session::counters::Counters;
 pub use session::diagnosis::Diagnosis;
 pub use session::exchange::Exchange;

@@ -10,8 +10,8 @@ use std::time::Duration;
 use common::unit::{Answers, Bench};
 use common::{Told, told};
 use ser_client::{
-    Change, Cursor, Diagnosis, Disturbed, LogFollower, LogPosition, Outcome, RequestError, Summary,
-    TransportError, Unit, Unsolicited,
+    Change, Cursor, Diagnosis, Disturbed, LogFollower, LogPosition, Outcome, RequestError, Stage,
+    Summary, TransportError, Unit, Unsolicited,
 };
 use ser_proto::{
     AutoReport, Baud, Capabilities, Command, Configure, Counter, Counters, Filters,
@@ -650,13 +650,38 @@ fn a_reading_says_by_when_there_was_nothing_else() {
     assert!(before.saturating_sub(delay) <= complete_at && complete_at <= last.answered);
 }
 
-/// Everything that is told of changes by this connection.
+/// Every change by this connection with its outcome. Each was told before as one that begins.
 fn heard(unit: &mut Unit) -> Receiver<(Change, Outcome)> {
     let (told, heard) = channel();
-    unit.on_change(Box::new(move |change, outcome| {
-        told.send((*change, outcome.clone())).unwrap();
+    let mut begun: Option<Change> = None;
+    unit.on_change(Box::new(move |change, stage| match stage {
+        Stage::Begins => assert_eq!(begun.replace(*change), None, "one after the other"),
+        Stage::Ended(outcome) => {
+            let begun = begun.take().expect("it has begun");
+            let sets_clock = |change: &Change| matches!(change, Change::SetClock(_));
+            assert!(begun == *change || sets_clock(&begun) && sets_clock(change), "{begun}");
+            told.send((*change, outcome.clone())).unwrap();
+        }
     }));
     heard
+}
+
+#[test]
+fn a_change_is_told_before_anything_of_it_is_sent() {
+    let mut bench = Bench::new(100);
+    let (told, heard) = channel();
+    bench.unit.on_change(Box::new(move |_, stage| {
+        if stage == Stage::Begins {
+            told.send(()).unwrap();
+        }
+    }));
+    let heard = std::sync::Mutex::new(heard);
+    bench.fake().meanwhile = Box::new(move |_, _, _| {
+        assert!(heard.lock().unwrap().try_recv().is_ok(), "a command that nobody was told of");
+    });
+    bench.unit.erase().unwrap();
+    bench.unit.set_clock(|_| NOON).unwrap();
+    bench.unit.configure(keep_everything()).unwrap();
 }
 
 #[test]

@@ -2,17 +2,19 @@
 //!
 //! Every connection that this program opens gets a hook here. It adds a record to `audit.jsonl` in
 //! the state directory for each command that changes a recorder, once what came of it is known and
-//! before the command itself learns of it. What a user wanted done is worth more than the record: if
+//! before the command itself learns of it. An interrupt that ends the program meanwhile writes down
+//! that no answer came. What a user wanted done is worth more than the record: if
 //! that cannot be written, it is told, and the command goes on.
 
 mod file;
+mod under_way;
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 #[cfg(unix)]
 use ser_client::GeniHost;
-use ser_client::{Change, Outcome, Unit};
+use ser_client::{Outcome, Stage, Unit};
 use ser_evidence::record::{Record, Told};
 use ser_observer::Author;
 
@@ -22,6 +24,7 @@ use crate::output::PROGRAM;
 use crate::state;
 use file::AuditFile;
 pub(crate) use file::{Position, Since};
+use under_way::UnderWay;
 
 /// Where commands are written down, for subcommands that keep nothing else. The command line finds it
 /// by its name in every subcommand, so nobody passes it on.
@@ -37,36 +40,53 @@ pub(crate) struct AuditArgs {
 pub(crate) fn of_recorder(unit: &mut Unit, connection: &ConnectionArgs) {
     let peer = connection::port_text(connection).unwrap_or_default().to_owned();
     let recorder = connection::recorder_name(connection).unwrap_or_else(|_| peer.clone());
-    let directory = connection.state_dir.clone();
-    unit.on_change(Box::new(move |change, outcome| {
-        write(directory.as_deref(), (&recorder, &peer), change.to_string(), outcome);
+    let place = Place { directory: connection.state_dir.clone(), recorder, peer };
+    let mut under_way = None;
+    unit.on_change(Box::new(move |change, stage| {
+        follow(&place, &mut under_way, change.to_string(), stage);
     }));
 }
 
 /// Writes down what this host changes in all recorders on its bus.
 #[cfg(unix)]
 pub(crate) fn of_bus(host: &GeniHost, bus: &str, connection: &ConnectionArgs) {
-    let (bus, directory) = (bus.to_owned(), connection.state_dir.clone());
-    host.on_change(Box::new(move |change: &Change, outcome: &Outcome| {
-        write(directory.as_deref(), (&bus, &bus), format!("broadcast: {change}"), outcome);
+    let (recorder, peer) = (bus.to_owned(), bus.to_owned());
+    let place = Place { directory: connection.state_dir.clone(), recorder, peer };
+    let mut under_way = None;
+    host.on_change(Box::new(move |change, stage| {
+        follow(&place, &mut under_way, format!("broadcast: {change}"), stage);
     }));
 }
 
-fn write(
-    directory: Option<&Path>,
-    (recorder, peer): (&str, &str),
-    command: String,
-    outcome: &Outcome,
-) {
-    let record = Author::of_this_program(PROGRAM).record(peer, command, outcome);
-    let file = match file(directory) {
+/// Where commands go, and where they are written down.
+#[derive(Clone, Debug)]
+struct Place {
+    directory: Option<PathBuf>,
+    recorder: String,
+    peer: String,
+}
+
+fn follow(place: &Place, under_way: &mut Option<UnderWay>, command: String, stage: Stage<'_>) {
+    match stage {
+        Stage::Begins => *under_way = Some(UnderWay::begin(place.clone(), command, write)),
+        Stage::Ended(outcome) => {
+            if let Some(begun) = under_way.take() {
+                begun.end(command, outcome);
+            }
+        }
+    }
+}
+
+fn write(place: &Place, command: String, outcome: &Outcome) {
+    let record = Author::of_this_program(PROGRAM).record(&place.peer, command, outcome);
+    let file = match file(place.directory.as_deref()) {
         Ok(file) => file,
         Err(failure) => {
             failure.warn();
             return tell_unwritten();
         }
     };
-    let told = Told { recorder: recorder.to_owned(), record: Record::Command(record) };
+    let told = Told { recorder: place.recorder.clone(), record: Record::Command(record) };
     if let Err(error) = file.append(&told) {
         warn(format_args!("cannot write {}: {error}", file.path().display()));
         tell_unwritten();

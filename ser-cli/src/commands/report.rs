@@ -1,6 +1,17 @@
-//! `report`: the answer after a trip.
+//! `report`: the answer after a trip, and signatures of it.
 
-use std::path::PathBuf;
+#[cfg(feature = "sign")]
+mod key;
+#[cfg(feature = "sign")]
+mod keys;
+#[cfg(feature = "sign")]
+mod sign;
+#[cfg(feature = "sign")]
+mod verify;
+
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use ser_evidence::history::History;
@@ -33,8 +44,16 @@ is not certain is a set, and entries that are missing are a row of their own.";
 
 /// Say what happened in an incident: what moved first, what operated, what is wrong or missing.
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(
+    after_help = EXAMPLES,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true
+)]
 pub(crate) struct Args {
+    #[cfg(feature = "sign")]
+    #[command(subcommand)]
+    signature: Option<Signature>,
+
     #[command(flatten)]
     choice: ChoiceArgs,
 
@@ -51,6 +70,15 @@ pub(crate) struct Args {
     #[arg(long, requires = "output")]
     force: bool,
 
+    /// Sign the file with this secret key: its signature is FILE.minisig, beside it.
+    ///
+    /// Both files appear, or none. ser-cli report key makes a key, and report verify checks the
+    /// signature; minisign does, too. The password is asked for on the terminal, unless
+    /// the variable `SER_SIGN_PASSWORD` is set.
+    #[cfg(feature = "sign")]
+    #[arg(long, value_name = "KEY")]
+    sign: Option<PathBuf>,
+
     /// Show each change of a chattering contact.
     #[arg(long)]
     unfold: bool,
@@ -61,6 +89,14 @@ pub(crate) struct Args {
 
     #[command(flatten)]
     sources: SourceArgs,
+}
+
+/// What is done with signatures of reports.
+#[cfg(feature = "sign")]
+#[derive(Debug, clap::Subcommand)]
+enum Signature {
+    Verify(verify::Args),
+    Key(key::Args),
 }
 
 /// The format of a report.
@@ -83,19 +119,48 @@ impl Args {
 
     /// Whether the report goes to standard output.
     pub(crate) fn prints(&self) -> bool {
-        file_named(self.output.as_deref()).is_none()
+        !self.is_of_signatures() && file_named(self.output.as_deref()).is_none()
+    }
+
+    /// Whether this is about a signature, and no recorder is read.
+    #[cfg(feature = "sign")]
+    pub(crate) const fn is_of_signatures(&self) -> bool {
+        self.signature.is_some()
+    }
+
+    /// Nothing is, in a build without signatures.
+    #[cfg(not(feature = "sign"))]
+    #[allow(clippy::unused_self, reason = "as in a build with them")]
+    pub(crate) const fn is_of_signatures(&self) -> bool {
+        false
     }
 }
 
+/// What signs a report.
+#[cfg(feature = "sign")]
+type Signer = sign::Signer;
+
+/// Nothing does, in a build without signatures.
+#[cfg(not(feature = "sign"))]
+enum Signer {}
+
 pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
+    #[cfg(feature = "sign")]
+    match &args.signature {
+        Some(Signature::Verify(args)) => return verify::run(args),
+        Some(Signature::Key(args)) => return key::run(args),
+        None => {}
+    }
     let format = format(args)?;
-    let files = NewFiles::new(args.force).sparing(args.sources.files(connection));
-    let outlet = Outlet::open(file_named(args.output.as_deref()), files)?;
+    let path = file_named(args.output.as_deref());
+    let mut files = NewFiles::new(args.force).sparing(args.sources.files(connection));
+    let signer = signer(args, path, &mut files)?;
+    let outlet = Outlet::open(path, files)?;
     let which = |site: &Site| Ok(args.choice.which(site)?.unwrap_or(Which::LastTrip));
     let gathered = gather::gather(&args.sources, connection, &|site| which(site).map(Some))?;
     let which = which(&gathered.site)?;
     let shown = Shown { format, unfold: args.unfold };
-    let is_complete = write(outlet, &gathered, which, shown)?;
+    let is_complete = write_signed(outlet, &gathered, which, shown, signer)?;
     if args.fail_on_loss {
         gathered.require_complete()?;
         if !is_complete {
@@ -103,6 +168,23 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// The key, if the report is to be signed, which needs a file.
+#[cfg(feature = "sign")]
+fn signer(args: &Args, path: Option<&Path>, files: &mut NewFiles) -> Result<Option<Signer>> {
+    match (&args.sign, path) {
+        (None, _) => Ok(None),
+        (Some(key), Some(path)) => Signer::new(key, path, files).map(Some),
+        (Some(_), None) => Err(Failure::usage("a report on standard output cannot be signed")
+            .hint("name a file with -o: the signature is another file beside it")
+            .hint("minisign -S signs a file of any program")),
+    }
+}
+
+#[cfg(not(feature = "sign"))]
+fn signer(_: &Args, _: Option<&Path>, _: &mut NewFiles) -> Result<Option<Signer>> {
+    Ok(None)
 }
 
 /// How a report is shown; by default as text for people, with chatter folded.
@@ -123,6 +205,17 @@ pub(super) fn write(
     gathered: &Gathered,
     which: Which,
     shown: Shown,
+) -> Result<bool> {
+    write_signed(outlet, gathered, which, shown, None)
+}
+
+/// The same with a signature, if there is anything to sign with.
+fn write_signed(
+    outlet: Outlet,
+    gathered: &Gathered,
+    which: Which,
+    shown: Shown,
+    signer: Option<Signer>,
 ) -> Result<bool> {
     // Colours are for terminals.
     let styles = match outlet {
@@ -146,7 +239,7 @@ pub(super) fn write(
         doubtful_hours: gathered.damaged.doubtful_hours,
         unfold: shown.unfold,
     };
-    outlet.write(|out| match shown.format {
+    let write = |out: &mut (dyn Write + Send)| match shown.format {
         Format::Text => Ok(report::write_text(out, &document, styles)?),
         Format::Html => report::write_html(out, &document).map_err(|error| match error {
             PageError::Io(error) => NotWritten::Io(error),
@@ -157,8 +250,31 @@ pub(super) fn write(
             ),
         }),
         Format::Json => Ok(report::write_json(out, &document)?),
-    })?;
+    };
+    outlet.write_and(write, |file| signed(signer, file, &document))?;
     Ok(!document.is_incomplete())
+}
+
+/// Signs the report in a file, if it is to be.
+#[cfg(feature = "sign")]
+fn signed(signer: Option<Signer>, file: &mut File, document: &Document<'_>) -> Result<()> {
+    let Some(signer) = signer else { return Ok(()) };
+    signer.sign(
+        file,
+        &sign::About {
+            site: &document.timeline.site().name,
+            site_digest: document.site_digest.as_deref(),
+            entries_digest: &document.report.digest,
+        },
+    )
+}
+
+#[cfg(not(feature = "sign"))]
+fn signed(signer: Option<Signer>, _: &mut File, _: &Document<'_>) -> Result<()> {
+    match signer {
+        None => Ok(()),
+        Some(signer) => match signer {},
+    }
 }
 
 /// The format that the user wants, or that of the file's name.

@@ -9,6 +9,7 @@ pub(crate) mod bench;
 pub(crate) mod original;
 
 use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread;
@@ -95,6 +96,12 @@ impl Drop for Running {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
+}
+
+/// Whether a file in a state directory holds what is kept of one recorder's clock and lives.
+pub(crate) fn is_kept(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with("port-") && name.ends_with(".jsonl")
 }
 
 /// The entries and losses among JSON lines, each from its first field of its own on.

@@ -53,12 +53,18 @@ const fn program(
 }
 
 /// All programs. Sizes are those of Debian 12.
-static PROGRAMS: [Program; 8] = [
+static PROGRAMS: [Program; 9] = [
     program(
         "sqlite3",
         "the test that imports a log into SQLite",
         (2, 3),
         Source::Debian("sqlite3"),
+    ),
+    program(
+        "minisign",
+        "the tests that check signatures of reports with minisign",
+        (1, 2),
+        Source::Debian("minisign"),
     ),
     program(
         "vcd2fst",

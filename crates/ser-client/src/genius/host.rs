@@ -24,7 +24,7 @@ use ser_proto::genius::{
 use super::answers::Answers;
 use super::inboxes::Inboxes;
 use super::window::Window;
-use crate::session::change::{Change, ChangeHook, Outcome};
+use crate::session::change::{Change, ChangeHook, Outcome, Stage};
 use crate::transport::clock::{Clock, RealTime};
 use crate::transport::endpoint::GeniWindow;
 use crate::transport::genius_error::GeniusError;
@@ -199,22 +199,26 @@ impl GeniHost {
     /// # Errors
     /// When the board cannot send it.
     pub fn broadcast(&self, command: &Command) -> Result<(), GeniusError> {
+        // One broadcast at a time, so that the two that are told of one follow each other.
+        let mut hook = self.on_change.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut told = hook.as_mut().zip(Change::of(command));
+        if let Some((hook, change)) = &mut told {
+            hook(change, Stage::Begins);
+        }
         let message = ser_message(Destination::Broadcast, command);
         let sent = message.and_then(|message| self.lock().deliver(message));
         let sent = sent.map_err(|error| match error {
             GeniusError::Undelivered(error) => GeniusError::BroadcastFailed(error),
             other => other,
         });
-        let mut hook = self.on_change.lock().unwrap_or_else(PoisonError::into_inner);
-        if let (Some(hook), Some(change)) = (&mut *hook, Change::of(command)) {
-            hook(&change, &broadcast_outcome(sent.as_ref().err()));
+        if let Some((hook, change)) = &mut told {
+            hook(change, Stage::Ended(&broadcast_outcome(sent.as_ref().err())));
         }
         sent
     }
 
     /// Has every change of all recorders by a [broadcast](Self::broadcast) of this host, or of its
-    /// clones, told to `hook`, with what came of it, before the caller learns of it. Changes of one
-    /// recorder are told by [`Unit::on_change`](crate::Unit::on_change).
+    /// clones, told to `hook`: before it is sent, and with what came of it. Changes of one recorder are told by [`Unit::on_change`](crate::Unit::on_change).
     pub fn on_change(&self, hook: ChangeHook) {
         *self.on_change.lock().unwrap_or_else(PoisonError::into_inner) = Some(hook);
     }

@@ -8,8 +8,18 @@ use std::num::NonZeroU8;
 
 use ser_proto::{AutoReport, Command, Configure, Filters, InputFilter, Reply, TimeStamp};
 
-/// Is told of each change and its outcome, before whoever asked for it.
-pub type ChangeHook = Box<dyn FnMut(&Change, &Outcome) + Send>;
+/// Is told of each change twice: before anything is sent, and when its outcome is known, before
+/// whoever asked for it. Who is told of a beginning alone knows that it may have been carried out.
+pub type ChangeHook = Box<dyn FnMut(&Change, Stage<'_>) + Send>;
+
+/// How far a change is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage<'a> {
+    /// It is about to be sent. A clock that is set gets its time only then, so none is known yet.
+    Begins,
+    /// It has ended.
+    Ended(&'a Outcome),
+}
 
 /// A command that changes a recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

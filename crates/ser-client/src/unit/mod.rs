@@ -19,7 +19,7 @@ use crate::reading::delivery::Delivery;
 use crate::reading::log_position::LogPosition;
 use crate::reading::range_reader::RangeReader;
 use crate::reading::read_request::ReadRequest;
-use crate::session::change::{Change, ChangeHook, Outcome};
+use crate::session::change::{Change, ChangeHook, Outcome, Stage};
 use crate::session::counters::Counters;
 use crate::session::exchange::Exchange;
 use crate::session::link::{Link, SerialLink};
@@ -114,8 +114,8 @@ impl Unit {
         self.carry_out(command, None)
     }
 
-    /// Has every change of the recorder by this connection told to `hook`, with what came of it,
-    /// before the caller learns of it. A command that was repeated is told once.
+    /// Has every change of the recorder by this connection told to `hook`: before it is sent, and with
+    /// what came of it, before the caller learns of that. A command that is repeated is one change.
     pub fn on_change(&mut self, hook: ChangeHook) {
         self.on_change = Some(hook);
     }
@@ -443,6 +443,9 @@ impl Unit {
     ) -> Result<Reply, RequestError> {
         self.may_have_left = false;
         let mut command = *command;
+        if let (Some(hook), Some(change)) = (&mut self.on_change, Change::of(&command)) {
+            hook(&change, Stage::Begins);
+        }
         let result = match time_at {
             None => self.ask_once(&command),
             Some(time_at) => self.set_clock_by(&mut |delay| {
@@ -457,7 +460,7 @@ impl Unit {
                 Err(error) if self.may_have_left => Outcome::NotAnswered(error.to_string()),
                 Err(error) => Outcome::NotSent(error.to_string()),
             };
-            hook(&change, &outcome);
+            hook(&change, Stage::Ended(&outcome));
         }
         result
     }

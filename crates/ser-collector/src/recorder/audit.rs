@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ser_archive::Batch;
-use ser_client::Unit;
+use ser_client::{Stage, Unit};
 use ser_evidence::record::Record;
 use ser_observer::{Author, host_reading};
 use tracing::warn;
@@ -33,7 +33,9 @@ impl Task {
         let (shared, unfiled) = (Arc::clone(&self.shared), unfiled.clone());
         let recorder = self.recorder.name.clone();
         let peer = self.recorder.port.clone().unwrap_or_default();
-        unit.on_change(Box::new(move |change, outcome| {
+        unit.on_change(Box::new(move |change, stage| {
+            // A collector that is told to stop ends the command first.
+            let Stage::Ended(outcome) = stage else { return };
             let record = Record::Command(author.record(&peer, change.to_string(), outcome));
             if let Err(error) = file(&shared, &recorder, record.clone()) {
                 warn!(recorder, "a command is archived later: {error}");
