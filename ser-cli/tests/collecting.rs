@@ -186,7 +186,11 @@ fn mistakes_are_told_with_what_to_try() {
     fs::write(plant.archive(), "a letter").unwrap();
     let output = plant.run("--once");
     assert_eq!(output.status.code(), Some(1));
-    assert!(text(&output.stderr).contains("hint: name another file"), "{}", text(&output.stderr));
+    assert!(
+        text(&output.stderr).contains("is no archive") && text(&output.stderr).contains("hint: "),
+        "{}",
+        text(&output.stderr)
+    );
     assert_eq!(fs::read(plant.archive()).unwrap(), b"a letter");
 }
 
