@@ -14,6 +14,7 @@ use ser_evidence::site::{Role, Site};
 use ser_evidence::time::{Moment, shown};
 use ser_evidence::timeline::{EventId, Timeline};
 
+use super::routine;
 use crate::error::Result;
 
 /// How far a clock may show another time than it is known to, in microseconds: a day and a half, so
@@ -138,8 +139,8 @@ impl Excerpts {
         for recorder in &mut self.recorders {
             let name = &recorder.name;
             collector.begin_source();
-            recorder.evidence.iter().for_each(|record| collector.add(name, record));
             if self.is_whole {
+                recorder.evidence.iter().for_each(|record| collector.add(name, record));
                 self.archive.read(name, Window::default(), &mut |record| {
                     if matches!(record, Record::Entry(_)) {
                         collector.add(name, record);
@@ -148,6 +149,8 @@ impl Excerpts {
                 })?;
                 continue;
             }
+            let needed = routine::needed(&recorder.evidence, self.span);
+            needed.into_iter().for_each(|record| collector.add(name, record));
             recorder.wanted.windows =
                 self.span.map_or_else(Vec::new, |span| windows(&recorder.ahead, span));
             let left_out = self.archive.excerpt(name, &recorder.wanted, &mut |record| {
