@@ -48,11 +48,14 @@ pub(crate) fn host(strict: bool) -> Result<()> {
         let deny = ["--", "-D", "warnings"];
         steps::run(steps::cargo().args(["clippy", "--workspace", "--all-targets"]).args(deny))?;
         for (package, feature) in
-            [("xtask", "log"), ("ser-cli", "parquet"), ("ser-archive", "postgres")]
+            [("xtask", "log"), ("ser-cli", "parquet,postgres"), ("ser-archive", "postgres")]
         {
             let with = ["clippy", "--package", package, "--features", feature, "--all-targets"];
             steps::run(steps::cargo().args(with).args(deny))?;
         }
+        // What `xtask demo` builds.
+        let plain = ["clippy", "--package", "ser-cli", "--no-default-features", "--all-targets"];
+        steps::run(steps::cargo().args(plain).args(deny))?;
     }
 
     heading("Documentation");

@@ -483,6 +483,7 @@ fn more_points_than_inputs_become_several_recorders_of_one_clock() {
         report: &report,
         program: "test",
         site_digest: None,
+        archive_heads: &[],
         not_reached: &[],
         damaged_lines: 0,
         doubtful_hours: 0,

@@ -132,6 +132,7 @@ impl Told {
             report: &report,
             program: "ser-files",
             site_digest: None,
+            archive_heads: &[],
             not_reached: &[],
             damaged_lines: 0,
             doubtful_hours: 0,

@@ -10,6 +10,7 @@ use std::ffi::OsStr;
 use clap::builder::{StringValueParser, TypedValueParser};
 use ser_archive::{Access, Archive, Error, Place};
 use ser_console::Harmless;
+use ser_files::report::ArchiveHead;
 
 use crate::error::{Failure, Result};
 use crate::output::PROGRAM;
@@ -81,6 +82,21 @@ impl ArchiveArgs {
 /// Opens an archive to read.
 pub(crate) fn read(place: &Place) -> Result<Archive> {
     Ok(Archive::open(place, Access::Read)?)
+}
+
+/// Where the chains of an archive end.
+pub(crate) fn heads(archive: &mut Archive) -> Result<Vec<ArchiveHead>> {
+    let heads = archive.heads()?.into_iter().map(|head| ArchiveHead {
+        recorder: head.recorder,
+        collector: head.collector,
+        digest: hex(&head.digest),
+    });
+    Ok(heads.collect())
+}
+
+/// A digest as 64 hexadecimal digits.
+pub(crate) fn hex(digest: &[u8; 32]) -> String {
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 impl From<Error> for Failure {

@@ -234,6 +234,7 @@ fn write_signed(
         report: &report,
         program: PROGRAM,
         site_digest: gathered.site_digest.clone(),
+        archive_heads: &gathered.archive_heads,
         not_reached: &gathered.not_reached,
         damaged_lines: gathered.damaged.lines,
         doubtful_hours: gathered.damaged.doubtful_hours,

@@ -14,6 +14,7 @@ use ser_evidence::site::{Role, Site};
 use ser_evidence::time::{Moment, shown};
 use ser_evidence::timeline::{EventId, Timeline};
 
+use super::routine;
 use crate::error::Result;
 
 /// How far a clock may show another time than it is known to, in microseconds: a day and a half, so
@@ -138,8 +139,8 @@ impl Excerpts {
         for recorder in &mut self.recorders {
             let name = &recorder.name;
             collector.begin_source();
-            recorder.evidence.iter().for_each(|record| collector.add(name, record));
             if self.is_whole {
+                recorder.evidence.iter().for_each(|record| collector.add(name, record));
                 self.archive.read(name, Window::default(), &mut |record| {
                     if matches!(record, Record::Entry(_)) {
                         collector.add(name, record);
@@ -148,6 +149,8 @@ impl Excerpts {
                 })?;
                 continue;
             }
+            let needed = routine::needed(&recorder.evidence, self.span);
+            needed.into_iter().for_each(|record| collector.add(name, record));
             recorder.wanted.windows =
                 self.span.map_or_else(Vec::new, |span| windows(&recorder.ahead, span));
             let left_out = self.archive.excerpt(name, &recorder.wanted, &mut |record| {
@@ -179,8 +182,9 @@ impl Excerpts {
         let Some(incident) = Incident::pick(timeline, which) else {
             return self.is_closed(timeline);
         };
+        // Where more time is wanted, nobody has looked there yet for what was left out.
         let is_within = matches!(which, Which::Between(..)) || self.holds(timeline, &incident);
-        self.is_closed(timeline) && is_within
+        is_within && self.is_closed(timeline)
     }
 
     /// Whether an incident, and a quiet time around it, is in the time that was read; widens it
@@ -240,7 +244,7 @@ impl Recorder {
     fn want_more(&mut self, ahead: [Option<i64>; 2], life: Life) -> bool {
         let mut is_more = false;
         for ahead in ahead.into_iter().flatten() {
-            is_more |= self.ahead.insert(ahead.div_euclid(ALIKE_US));
+            is_more |= self.ahead.insert(ahead.saturating_add(ALIKE_US / 2).div_euclid(ALIKE_US));
         }
         if !is_more && !self.wanted.lives.contains(&life) {
             self.wanted.lives.push(life);
@@ -265,7 +269,8 @@ fn windows(ahead: &BTreeSet<i64>, (from, until): (i64, i64)) -> Vec<Window> {
             i64::MIN | i64::MAX => us,
             us => us.saturating_add(ahead).saturating_add(by),
         };
-        let (from, until) = (moved(from, -CLOCK_US), moved(until, CLOCK_US + ALIKE_US));
+        let around_us = CLOCK_US + ALIKE_US / 2;
+        let (from, until) = (moved(from, -around_us), moved(until, around_us));
         match windows.last_mut() {
             Some(last) if from <= last.1 => last.1 = until.max(last.1),
             _ => windows.push((from, until)),
@@ -291,9 +296,9 @@ mod tests {
         let of = |ahead: &[i64], span| -> Vec<_> {
             windows(&ahead.iter().copied().collect(), span).iter().map(hours).collect()
         };
-        assert_eq!(of(&[0], (0, 0)), [(Some(-36), Some(48))]);
-        assert_eq!(of(&[0, 1], (0, 0)), [(Some(-36), Some(60))]);
-        assert_eq!(of(&[0, 20], (0, 0)), [(Some(-36), Some(48)), (Some(204), Some(288))]);
-        assert_eq!(of(&[0, 20], (0, i64::MAX)), [(Some(-36), None)]);
+        assert_eq!(of(&[0], (0, 0)), [(Some(-42), Some(42))]);
+        assert_eq!(of(&[0, 1], (0, 0)), [(Some(-42), Some(54))]);
+        assert_eq!(of(&[0, 20], (0, 0)), [(Some(-42), Some(42)), (Some(198), Some(282))]);
+        assert_eq!(of(&[0, 20], (0, i64::MAX)), [(Some(-42), None)]);
     }
 }

@@ -9,6 +9,8 @@ mod live;
 mod moment;
 mod names;
 mod readings;
+#[cfg(feature = "archive")]
+mod routine;
 mod twins;
 
 use std::path::PathBuf;
@@ -23,6 +25,7 @@ use ser_evidence::time::{Moment, Utc};
 #[cfg(feature = "archive")]
 use ser_evidence::timeline::Timeline;
 use ser_files::NotReached;
+use ser_files::report::ArchiveHead;
 
 #[cfg(feature = "archive")]
 use crate::archive::Versions;
@@ -133,6 +136,8 @@ pub(crate) struct Gathered {
     pub(crate) history: History,
     /// SHA-256 of the site file.
     pub(crate) site_digest: Option<String>,
+    /// Where the chains of the archive end, if there is one.
+    pub(crate) archive_heads: Vec<ArchiveHead>,
     pub(crate) not_reached: Vec<NotReached>,
     /// Lines of files that could not be read.
     pub(crate) damaged: Damaged,
@@ -196,9 +201,11 @@ pub(crate) fn gather(
     read.finish(collector, site)
 }
 
-/// What was read besides archives.
+/// What was read besides archives, and where those end.
+#[derive(Default)]
 struct Read {
     damaged: Damaged,
+    archive_heads: Vec<ArchiveHead>,
     missed_now: Vec<NotReached>,
 }
 
@@ -229,18 +236,20 @@ impl Read {
                 )
                 .hint("files that were written before can be given with --input FILE…"));
         }
-        Ok((collector, Read { damaged, missed_now }))
+        let archive_heads = Vec::new();
+        Ok((collector, Read { damaged, archive_heads, missed_now }))
     }
 
     /// Puts everything together, and tells what is doubtful in it.
-    fn finish(self, collector: Collector, mut site: Site) -> Result<Gathered> {
+    fn finish(mut self, collector: Collector, mut site: Site) -> Result<Gathered> {
         let site_digest = site.digest.map(|digest| digest.to_string());
         names::take_over(&collector, &mut site);
         let mut history = collector.finish(&site);
-        let not_reached = readings::not_reached(self.missed_now, &mut history);
+        let not_reached = readings::not_reached(std::mem::take(&mut self.missed_now), &mut history);
         readings::tell(&history);
         twins::tell(&history);
-        Ok(Gathered { site, history, site_digest, not_reached, damaged: self.damaged })
+        let Read { damaged, archive_heads, .. } = self;
+        Ok(Gathered { site, history, site_digest, archive_heads, not_reached, damaged })
     }
 }
 
@@ -255,8 +264,7 @@ pub(crate) fn archived(
     given: Option<Site>,
     part: Part<'_>,
 ) -> Result<Gathered> {
-    let nothing =
-        |_: &Site| Ok((Collector::new(), Read { damaged: Damaged::default(), missed_now: vec![] }));
+    let nothing = |_: &Site| Ok((Collector::new(), Read::default()));
     from_archive(place, given, part, &nothing)
 }
 
@@ -276,7 +284,8 @@ fn from_archive(
     };
     let mut site = given.or_else(|| versions.newest()).unwrap_or_else(nameless_site);
     let which = part(&site)?;
-    let (others, read) = others(&site)?;
+    let (others, mut read) = others(&site)?;
+    read.archive_heads = crate::archive::heads(&mut archive)?;
     let mut excerpts = Excerpts::begin(archive)?;
     excerpts.want(&site, which)?;
     let (mut round, mut is_of_then) = (0, false);

@@ -15,6 +15,7 @@ mod table;
 use std::io::{self, Write};
 
 use clap::ValueEnum;
+use ser_console::is_obeyed;
 
 pub(crate) use csv::Csv;
 pub(crate) use elapsed::Elapsed;
@@ -94,10 +95,18 @@ pub(crate) fn field(
     writeln!(out, "{name:<16}{value}")
 }
 
-/// Writes one JSON object over several lines.
+/// Writes one JSON object over several lines. Inside of texts nothing is left that a terminal would
+/// obey: it is escaped, and read back as it was.
 pub(crate) fn json_to(out: &mut dyn Write, json: &serde_json::Value) -> io::Result<()> {
-    serde_json::to_writer_pretty(&mut *out, json)?;
-    writeln!(out)
+    let mut harmless = String::new();
+    for letter in serde_json::to_string_pretty(json)?.chars() {
+        match letter != '\n' && is_obeyed(letter) {
+            // All of them are in the first plane.
+            true => harmless += &format!("\\u{:04x}", u32::from(letter)),
+            false => harmless.push(letter),
+        }
+    }
+    writeln!(out, "{harmless}")
 }
 
 #[cfg(test)]

@@ -46,6 +46,11 @@ fn object(document: &Document<'_>) -> Value {
         "site": site.name,
         "site_sha256": document.site_digest,
         "entries_sha256": digest,
+        "archive_heads": document.archive_heads.iter().map(|head| json!({
+            "recorder": head.recorder,
+            "collector": head.collector,
+            "sha256": head.digest,
+        })).collect::<Vec<_>>(),
         "is_incomplete": document.is_incomplete(),
         "damaged_lines": document.damaged_lines,
         "doubtful_hours": document.doubtful_hours,

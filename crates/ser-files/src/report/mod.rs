@@ -44,6 +44,8 @@ pub struct Document<'a> {
     pub program: &'a str,
     /// SHA-256 of the site file, if there is one.
     pub site_digest: Option<String>,
+    /// Where the chains of the archive ended from which it was read; none if it was not.
+    pub archive_heads: &'a [ArchiveHead],
     /// Recorders that were to be read and were not, and why.
     pub not_reached: &'a [NotReached],
     /// How many lines of the sources could not be read.
@@ -53,6 +55,17 @@ pub struct Document<'a> {
     pub doubtful_hours: u64,
     /// Whether chatter is shown row by row.
     pub unfold: bool,
+}
+
+/// The end of a chain of an archive: whoever has it written down can prove later what was there.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ArchiveHead {
+    /// Whose entries they are.
+    pub recorder: String,
+    /// Who has added them.
+    pub collector: String,
+    /// The SHA-256 over all of them, as 64 hexadecimal digits.
+    pub digest: String,
 }
 
 impl Document<'_> {

@@ -245,6 +245,24 @@ pub(super) fn entries(document: &Document<'_>) -> String {
     }
 }
 
+/// As `archive head of U1-SER1 by cellar: sha256 5f1c…`, for each chain of a recorder with entries in
+/// the incident.
+pub(super) fn archive_heads(document: &Document<'_>) -> Vec<String> {
+    let timeline = document.timeline;
+    let has_entries = |head: &&super::ArchiveHead| {
+        document.report.completeness.iter().any(|of| {
+            let history = timeline.history().recorders.get(of.recorder as usize);
+            of.entries > 0 && history.is_some_and(|found| found.recorder.name == head.recorder)
+        })
+    };
+    let line = |head: &super::ArchiveHead| {
+        let [recorder, collector] =
+            [&head.recorder, &head.collector].map(|name| names::harmless(name));
+        format!("archive head of {recorder} by {collector}: sha256 {}", head.digest)
+    };
+    document.archive_heads.iter().filter(has_entries).map(line).collect()
+}
+
 /// The program and the site file, with their versions.
 pub(super) fn made_by(document: &Document<'_>) -> String {
     let site = document.site_digest.as_ref();

@@ -7,6 +7,7 @@ use ser_console::Harmless;
 use serde_json::{Value, json};
 
 use super::{Format, LookArgs, SCHEMA};
+use crate::archive::hex;
 use crate::error::{Failure, Result, warn};
 use crate::output::{Grid, PROGRAM, Palette, json_to};
 
@@ -127,10 +128,6 @@ fn as_json(heads: &[ChainHead], broken: &[Broken], gone: &[String]) -> Value {
         "broken": broken.iter().map(fault).collect::<Vec<_>>(),
         "heads_gone": gone,
     })
-}
-
-fn hex(digest: &[u8; 32]) -> String {
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

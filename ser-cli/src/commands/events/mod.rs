@@ -197,7 +197,8 @@ fn write(
     }
     out.flush()?;
     if let Some(limit) = limit.filter(|limit| *limit < count) {
-        inform(format_args!("{} older events are not shown", count - limit));
+        // How many there are is not known where only the newest were looked for.
+        inform(format_args!("the newest {limit} are shown, and not those before"));
         advise("choose a time with --since and --until, or show more with --limit");
     }
     let is_missing = shown.iter().any(|item| matches!(item, Item::Gap(..)));

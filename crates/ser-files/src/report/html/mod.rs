@@ -121,6 +121,7 @@ fn content(document: &Document<'_>, clock: &Clock) -> Markup {
         }
         footer {
             p { (super::sources::entries(document)) }
+            @for head in super::sources::archive_heads(document) { p { (head) } }
             p { (super::sources::made_by(document)) }
         }
     }

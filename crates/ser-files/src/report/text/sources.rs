@@ -47,5 +47,8 @@ pub(super) fn write(
         writeln!(out, "shifted by hand: {shift}")?;
     }
     writeln!(out, "{faint}{}{faint:#}", sources::entries(document))?;
+    for head in sources::archive_heads(document) {
+        writeln!(out, "{faint}{head}{faint:#}")?;
+    }
     writeln!(out, "{faint}{}{faint:#}", sources::made_by(document))
 }
