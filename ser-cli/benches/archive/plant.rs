@@ -122,6 +122,7 @@ pub(crate) fn write(folder: &Path, plan: Plan) -> Result<Written> {
                 recorder: recorder.name.clone(),
                 records,
                 bookmark: None,
+                joins: false,
                 at: Moment::from_us(begins + DAY_US),
             });
         }
