@@ -5,7 +5,8 @@
 //! to forget afterwards must not be lost by a power cut.
 
 use std::path::Path;
-use std::time::Duration;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use rusqlite::backup::{Backup, StepResult};
 use rusqlite::config::DbConfig;
@@ -20,6 +21,9 @@ const APPLICATION_ID: i64 = 0x5345_5261;
 
 /// How long a writer waits for another one, unless somebody says otherwise.
 const PATIENCE: Duration = Duration::from_secs(10);
+
+/// How soon it is tried again where SQLite does not wait by itself.
+const LOOK_AGAIN: Duration = Duration::from_millis(10);
 
 /// How many prepared statements are kept.
 const STATEMENTS: usize = 64;
@@ -56,9 +60,8 @@ impl Sqlite {
         // Another program's file stays as it is.
         file.is_ours()?;
         file.keep_log(false)?;
-        for (pragma, value) in [("journal_mode", "WAL"), ("synchronous", "FULL")] {
-            file.pragma(pragma, value)?;
-        }
+        file.write_beside()?;
+        file.pragma("synchronous", "FULL")?;
         file.pragma("foreign_keys", 1)?;
         file.pragma("journal_size_limit", LOG_LEFT)?;
         Ok(file)
@@ -92,6 +95,18 @@ impl Sqlite {
         set.map(|_| ()).map_err(|error| self.failed(error))
     }
 
+    /// Lets changes go to the log beside the file. While another program does the same to a new file,
+    /// SQLite does not wait by itself.
+    fn write_beside(&self) -> Result<()> {
+        let until = Instant::now() + PATIENCE;
+        loop {
+            match self.pragma("journal_mode", "WAL") {
+                Err(Error::Busy { .. }) if Instant::now() < until => thread::sleep(LOOK_AGAIN),
+                done => return done,
+            }
+        }
+    }
+
     fn pragma(&self, pragma: &str, value: impl ToSql) -> Result<()> {
         // Some of them answer, and the answer is of no interest.
         let done = self.connection.pragma_update_and_check(None, pragma, value, |_| Ok(()));
@@ -103,11 +118,12 @@ impl Sqlite {
 
     /// Whether this is an archive; a file without any table is none yet.
     fn is_ours(&self) -> Result<bool> {
-        let number = |sql| self.connection.query_row(sql, (), |row| row.get::<_, i64>(0));
-        let id = number("PRAGMA application_id").map_err(|error| self.failed(error))?;
-        let tables = number("SELECT count(*) FROM sqlite_schema");
-        let tables = tables.map_err(|error| self.failed(error))?;
-        match (id, tables) {
+        // Both at one moment: another program may be making the archive right now.
+        const ABOUT: &str = "SELECT application_id, (SELECT count(*) FROM sqlite_schema) \
+            FROM pragma_application_id";
+        let both = |row: &rusqlite::Row<'_>| Ok((row.get::<_, i64>(0)?, row.get::<_, i64>(1)?));
+        let about = self.connection.query_row(ABOUT, (), both);
+        match about.map_err(|error| self.failed(error))? {
             (APPLICATION_ID, _) => self.has_only_tables().map(|()| true),
             (0, 0) => Ok(false),
             _ => Err(self.not_ours("it is a database of another program")),

@@ -321,3 +321,23 @@ proptest! {
         prop_assert!(archive.verify().unwrap().1.is_empty());
     }
 }
+
+/// Each finds no archive, or the whole one.
+#[test]
+fn programs_that_make_the_same_archive_at_once_all_have_it() {
+    const PROGRAMS: usize = 6;
+    for _ in 0..20 {
+        let folder = tempfile::tempdir().unwrap();
+        let place = Place::File(folder.path().join("plant.db"));
+        let together = std::sync::Barrier::new(PROGRAMS);
+        std::thread::scope(|scope| {
+            for _ in 0..PROGRAMS {
+                scope.spawn(|| {
+                    together.wait();
+                    let made = Archive::open(&place, Access::Write { program: "a test" });
+                    assert_eq!(made.and_then(|mut archive| archive.position()).unwrap(), 0);
+                });
+            }
+        });
+    }
+}
