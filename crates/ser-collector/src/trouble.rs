@@ -18,6 +18,8 @@ pub enum Trouble {
         /// The recorder that is there.
         other: String,
     },
+    /// What is at its port does not say which recorder it is, and this one has done so before.
+    Nameless,
     /// Nobody knows how many entries its log holds.
     SizeUnknown,
     /// What it says cannot be archived.
@@ -26,6 +28,8 @@ pub enum Trouble {
     NoRandom(std::io::Error),
     /// It has begun another log, and is met anew.
     NewLog,
+    /// Nothing shows that its log is still the one that was read, so it is met anew.
+    Unproven,
     /// The collector is to end.
     Stopped,
 }
@@ -51,6 +55,11 @@ impl Trouble {
                 "are two cables exchanged? If the recorder was moved on purpose, say so with --moved"
                     .to_owned(),
             ),
+            Trouble::Nameless => Some(
+                "is the line disturbed? If an original recorder is there now on purpose, say so with \
+                 --moved"
+                    .to_owned(),
+            ),
             Trouble::SizeUnknown => Some(
                 "say in the site file how many entries its log has: log_size (2048 as delivered)"
                     .to_owned(),
@@ -70,10 +79,15 @@ impl fmt::Display for Trouble {
                 f,
                 "the recorder at its port is {other}, so nothing of it is filed under this name"
             ),
+            Trouble::Nameless => f.write_str(
+                "the recorder at its port does not say which it is, as it did before, so nothing of it \
+                 is filed",
+            ),
             Trouble::SizeUnknown => f.write_str("it does not say how many entries its log holds"),
             Trouble::Archive(error) => error.fmt(f),
             Trouble::NoRandom(error) => write!(f, "there are no random numbers: {error}"),
             Trouble::NewLog => f.write_str("its log has begun anew"),
+            Trouble::Unproven => f.write_str("nothing shows that its log is still the same"),
             Trouble::Stopped => f.write_str("the collector ends"),
         }
     }

@@ -3,6 +3,10 @@
 //! A new log of a recorder that says which it has is not filed at once. Between the question and the
 //! reading it may have been erased, and then its name would be that of another life. So its first
 //! reading is held back until the recorder has said the same again.
+//!
+//! So is a reading that does not begin with the last entry that was read: nothing in the log was read
+//! yet, or what was read is overwritten. What is there now may be of another log or, where somebody
+//! has exchanged two cables behind a terminal server, of another recorder.
 
 use std::time::Duration;
 
@@ -48,9 +52,16 @@ pub(super) struct Filing<'t> {
     /// Whether the recorder has said that since the log was read.
     is_confirmed: bool,
     held: Option<Vec<Record>>,
+    /// Whether nothing of the log had been read before what is held.
+    is_new: bool,
+    /// Whether the next reading begins with an entry by which the log is known again.
+    has_anchor: bool,
     cursor: Option<Cursor>,
     size: u16,
     model: Option<Model>,
+    /// What is known of the life.
+    known: Option<LifeRecord>,
+    /// What of that is archived.
     told: Option<LifeRecord>,
     arrivals: Arrivals,
 }
@@ -78,9 +89,12 @@ impl<'t> Filing<'t> {
             log: met.log,
             is_confirmed: was_confirmed && !met.is_another,
             held: (is_new && met.log.is_some()).then(Vec::new),
+            is_new,
+            has_anchor: bookmark.is_some_and(|bookmark| bookmark.anchor.is_some()),
             cursor: None,
             size: 0,
             model: met.model.or(told.and_then(|told| told.model)),
+            known: told,
             told,
             arrivals: Arrivals::default(),
         }
@@ -106,6 +120,11 @@ impl<'t> Filing<'t> {
         self.held.is_some()
     }
 
+    /// Whether the log is known again by an entry that was read.
+    pub(super) const fn has_anchor(&self) -> bool {
+        self.has_anchor
+    }
+
     /// The entries since the last call.
     pub(super) fn take_arrivals(&mut self) -> Arrivals {
         std::mem::take(&mut self.arrivals)
@@ -117,17 +136,25 @@ impl<'t> Filing<'t> {
             // What is held back will be read again.
             return Err(Trouble::Stopped);
         }
+        if self.log.is_some() && self.held.is_none() && !self.is_proven(step.deliveries) {
+            (self.held, self.is_new) = (Some(Vec::new()), false);
+        }
         let mut records = Vec::with_capacity(step.deliveries.len() + 1);
         for delivery in step.deliveries {
             self.add(delivery, &mut records)?;
         }
         let has_moved = self.cursor != step.cursor || self.size != step.size;
         (self.cursor, self.size) = (step.cursor, step.size);
+        self.has_anchor = step.cursor.is_some_and(|cursor| cursor.anchor.is_some());
         records.extend(self.life_record());
         if let Some(held) = &mut self.held {
             held.append(&mut records);
             if held.len() <= HELD {
                 return Ok(());
+            }
+            if !self.is_new {
+                // The first reading of a visit ends soon, and is confirmed then.
+                return Err(Trouble::Unproven);
             }
             // Nobody else gives this name, so it is wrong of no other life.
             let name = draw()?;
@@ -139,6 +166,17 @@ impl<'t> Filing<'t> {
             true => self.file(records),
             false => Ok(()),
         }
+    }
+
+    /// Whether these come after what was read before, by what the log itself shows.
+    fn is_proven(&self, deliveries: &[Delivery]) -> bool {
+        let is_loss = |delivery: &Delivery| {
+            use Lost::{Overwritten, OverwrittenAtLeast};
+            let is_overwritten =
+                |lost| matches!(lost, Overwritten { .. } | OverwrittenAtLeast { .. });
+            matches!(delivery, Delivery::Lost { lost, .. } if is_overwritten(*lost))
+        };
+        deliveries.is_empty() || (self.has_anchor && !deliveries.iter().any(is_loss))
     }
 
     fn add(&mut self, delivery: &Delivery, records: &mut Vec<Record>) -> Result<(), Trouble> {
@@ -174,22 +212,31 @@ impl<'t> Filing<'t> {
         let (life, is_exact, model) = (self.life, cursor.is_exact, self.model);
         let size = Some(self.size);
         let record = LifeRecord { life, is_exact, model, size, erased: None };
-        (self.told != Some(record)).then(|| {
-            self.told = Some(record);
+        (self.known != Some(record)).then(|| {
+            self.known = Some(record);
             Record::Life(record)
         })
     }
 
-    /// After the first reading of a new log: the recorder says again which log it has, and then the
+    /// After a reading that is held back: the recorder says again which log it has, and then the
     /// reading is filed. If it is another one by now, the reading begins anew.
     pub(super) fn confirm(&mut self, unit: &mut Unit) -> Result<(), Trouble> {
-        let Some(held) = self.held.take() else { return Ok(()) };
-        let now = unit.identity_again()?.map(|identity| LogIdentity::from(&identity));
-        if now != self.log {
-            return Err(Trouble::NewLog);
+        if self.held.is_none() {
+            return Ok(());
         }
+        self.is_still_there(unit)?;
+        let held = self.held.take().unwrap_or_default();
         self.is_confirmed = true;
         self.file(held)
+    }
+
+    /// Asks once more which log this is, if the recorder can say that.
+    pub(super) fn is_still_there(&self, unit: &mut Unit) -> Result<(), Trouble> {
+        if self.log.is_none() {
+            return Ok(());
+        }
+        let now = unit.identity_again()?.map(|identity| LogIdentity::from(&identity));
+        if now == self.log { Ok(()) } else { Err(Trouble::Unproven) }
     }
 
     /// Archives what is known besides entries.
@@ -207,6 +254,11 @@ impl<'t> Filing<'t> {
             log_size: Some(self.size),
             log: self.log.filter(|_| self.is_confirmed).map(|log| log.to_bytes()),
         });
+        let of_life = |record: &Record| match record {
+            Record::Life(life) => Some(*life),
+            _ => None,
+        };
+        let life = records.iter().rev().find_map(of_life);
         let gaps = records.iter().filter(|record| matches!(record, Record::Gap(_))).count();
         let batch = Batch {
             collector: shared.options.name.clone(),
@@ -217,6 +269,7 @@ impl<'t> Filing<'t> {
             at: host_reading::now().utc,
         };
         let appended = shared.writer.append(batch)?.wait()?;
+        self.told = life.or(self.told);
         shared.states.change(self.task.place, |state| {
             state.entries += appended.entries;
             state.conflicts += appended.conflicts;

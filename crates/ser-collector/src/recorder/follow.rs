@@ -3,8 +3,6 @@
 use ser_archive::Bookmark;
 use ser_client::{Cursor, LogFollower, LogWatcher, Unit};
 
-use ser_evidence::record::Record;
-
 use super::Task;
 use super::duties::Duties;
 use super::filing::Filing;
@@ -30,6 +28,10 @@ impl Task {
         let plan = self.plan(&mut unit, bookmark.and_then(|bookmark| bookmark.log_size))?;
         let met = self.meet(&mut unit, bookmark.as_ref(), memory)?;
         let follower = LogFollower::new(bookmark.as_ref().map(cursor), plan.size);
+        if memory.unproven_of != met.log {
+            memory.unproven.clear();
+        }
+        memory.unproven_of = met.log;
         let follower = if met.is_another { follower.of_another_log() } else { follower };
         let mut visit = Visit {
             task: self,
@@ -68,7 +70,8 @@ impl Visit<'_> {
                 filing.take(step)
             });
             if matches!(step, Err(Trouble::NewLog)) {
-                memory.is_of_another_log = true;
+                // It may also be that for a while there was another recorder here.
+                memory.is_of_another_log = filing.is_still_there(unit).is_ok();
             }
             step?;
             // A reading of the log, and not just a look for reports.
@@ -78,10 +81,15 @@ impl Visit<'_> {
             }
             if has_read {
                 memory.is_of_another_log = false;
-                all_is_well();
                 duties.read(filing, watcher.complete_at());
-                let records = duties.due(unit, filing, is_idle)?;
-                note(filing, memory, records)?;
+                memory.unproven.extend(duties.due(unit, filing, is_idle)?);
+                if !memory.unproven.is_empty() {
+                    // What a clock showed must not be said of another recorder.
+                    filing.is_still_there(unit)?;
+                    memory.unsaid.append(&mut memory.unproven);
+                }
+                note(filing, memory)?;
+                all_is_well();
                 if shared.options.once {
                     return Ok(());
                 }
@@ -97,29 +105,43 @@ impl Visit<'_> {
         memory: &mut Memory,
         ended: Result<(), Trouble>,
     ) -> Result<(), Trouble> {
-        let mut records = Vec::new();
         if matches!(ended, Ok(()) | Err(Trouble::Stopped)) {
-            plan.put_back(&self.watcher, unit, &self.task.recorder.name);
-            records = self.duties.last(unit, &self.filing);
-        } else {
-            records.extend(self.duties.vouch());
+            let is_there = self.filing.is_still_there(unit);
+            // The setting of another recorder is left alone.
+            if !matches!(is_there, Err(Trouble::Unproven)) {
+                plan.put_back(&self.watcher, unit, &self.task.recorder.name);
+            }
+            if is_there.is_ok() {
+                let last = self.duties.last(unit, &self.filing);
+                if self.filing.is_still_there(unit).is_ok() {
+                    memory.unsaid.append(&mut memory.unproven);
+                    memory.unsaid.extend(last);
+                }
+            }
+        } else if self.filing.has_anchor() {
+            memory.unsaid.extend(self.duties.vouch());
         }
         let is_archive_there = !matches!(ended, Err(Trouble::Archive(_)));
         // What fails now was not promised to anybody.
         let noted = match is_archive_there && !self.filing.is_holding() {
-            true => note(&mut self.filing, memory, records),
+            true => note(&mut self.filing, memory),
             false => Ok(()),
         };
-        (memory.life, memory.left_out) = (self.filing.told(), self.duties.left_out());
+        memory.life = self.filing.told();
+        // What is not archived yet is news when it is seen again.
+        let is_said = memory.unsaid.is_empty() && memory.unproven.is_empty();
+        memory.left_out = self.duties.left_out().filter(|_| is_said);
         ended.and(noted)
     }
 }
 
-/// Archives what is known besides entries, and commands that still wait for that.
-fn note(filing: &mut Filing<'_>, memory: &Memory, mut records: Vec<Record>) -> Result<(), Trouble> {
+/// Archives what is known besides entries, and commands that still wait for that. What fails waits.
+fn note(filing: &mut Filing<'_>, memory: &mut Memory) -> Result<(), Trouble> {
     let waiting = memory.unfiled.take();
-    records.extend(waiting.iter().cloned());
-    filing.note(records).inspect_err(|_| memory.unfiled.add(waiting))
+    let records = memory.unsaid.iter().chain(&waiting).cloned().collect();
+    filing.note(records).inspect_err(|_| memory.unfiled.add(waiting))?;
+    memory.unsaid.clear();
+    Ok(())
 }
 
 fn cursor(bookmark: &Bookmark) -> Cursor {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use ser_archive::Bookmark;
 use ser_client::Unit;
-use ser_evidence::record::{Life, LifeRecord, Suppressed};
+use ser_evidence::record::{Life, LifeRecord, Record, Suppressed};
 use ser_observer::{LogIdentity, life_of_recorder, new_life};
 use ser_proto::Model;
 
@@ -30,6 +30,12 @@ pub(super) struct Memory {
     pub(super) left_out: Option<Suppressed>,
     /// Commands that could not be archived yet.
     pub(super) unfiled: Unfiled,
+    /// What was learnt besides entries, and may be of another recorder.
+    pub(super) unproven: Vec<Record>,
+    /// Which log the recorder said that it has when that was learnt.
+    pub(super) unproven_of: Option<LogIdentity>,
+    /// What is still to be archived of that.
+    pub(super) unsaid: Vec<Record>,
 }
 
 /// Which recorder has which number.
@@ -80,7 +86,13 @@ impl Task {
             unit.take_for_original();
         }
         let identity = unit.identity()?;
+        let name = &self.recorder.name;
+        let is_moved = self.shared.options.moved.contains(name);
         let Some(identity) = identity else {
+            let has_said = bookmark.is_some_and(|bookmark| bookmark.log.is_some());
+            if has_said && !self.recorder.is_original && !is_moved {
+                return Err(Trouble::Nameless);
+            }
             // On a line that has failed meanwhile, every recorder is silent.
             unit.log_position()?;
             memory.original_since = memory.original_since.or(Some(Instant::now()));
@@ -90,9 +102,8 @@ impl Task {
         };
         memory.original_since = None;
         let log = LogIdentity::from(&identity);
-        let name = &self.recorder.name;
         if let Some(other) = self.shared.known.other(&log, name)
-            && !self.shared.options.moved.contains(name)
+            && !is_moved
         {
             return Err(Trouble::Elsewhere { other });
         }

@@ -69,8 +69,8 @@ impl Task {
                     return;
                 }
                 Err(Trouble::Stopped) => return,
-                Err(Trouble::NewLog) => {
-                    debug!(recorder = self.recorder.name, "its log has begun anew");
+                Err(trouble @ (Trouble::NewLog | Trouble::Unproven)) => {
+                    debug!(recorder = self.recorder.name, "{trouble}");
                     continue;
                 }
                 Err(trouble) => trouble,
