@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 
 use ser_tests::pages::{self, Row};
 
-/// What the numbers of promises begin with: order, stamps, losses, recovery.
-const PARTS: [&str; 5] = ["O", "S", "L", "R", "E"];
+/// What the numbers of promises begin with: order, stamps, losses, recovery, archives, evidence.
+const PARTS: [&str; 6] = ["O", "S", "L", "R", "A", "E"];
 
 fn wrong_with_promise(row: &Row<'_>) -> Vec<String> {
     let [number, promise] = row.cells[..] else {

@@ -109,7 +109,11 @@ fn optional_parts() -> Result<()> {
     let mut archives = steps::cargo();
     archives.args(["test", "--package", "ser-archive", "--features", "postgres"]);
     archives.args(["--", "--include-ignored", "postgres"]);
-    steps::run(archives.args(programs::skipped()))
+    steps::run(archives.args(programs::skipped()))?;
+    let mut forwarded = steps::cargo();
+    forwarded.args(["test", "--package", "ser-cli", "--features", "postgres"]);
+    forwarded.args(["--test", "collect_faults", "--", "--include-ignored", "postgres"]);
+    steps::run(forwarded.args(programs::skipped()))
 }
 
 /// All tests except those whose programs are missing.
