@@ -194,6 +194,37 @@ fn mistakes_are_told_with_what_to_try() {
     assert_eq!(fs::read(plant.archive()).unwrap(), b"a letter");
 }
 
+#[test]
+fn what_was_done_with_the_command_line_is_archived_too() {
+    let plant = Plant::start(1);
+    let set_clock = |archive: Option<PathBuf>| {
+        let mut command = ser_cli();
+        command.env("SER_STATE_DIR", plant.folder.path().join("state"));
+        command.envs(archive.map(|archive| ("SER_ARCHIVE", archive)));
+        command.args(["--port", plant.recorders[0].port(), "clock", "set"]);
+        command.output().unwrap()
+    };
+    let archived = || plant.number("SELECT count(*) FROM evidence WHERE kind = 'command'");
+    // Without an archive it is in the state directory until somebody collects.
+    assert_eq!(set_clock(None).status.code(), Some(0));
+    for _ in 0..2 {
+        assert_eq!(plant.run("--once").status.code(), Some(0));
+        assert_eq!(archived(), 1);
+    }
+    let names = "SELECT count(*) FROM recorder";
+    // With one it is there at once, also under the recorder's name, and with one that is not there it is told and kept.
+    assert_eq!(set_clock(Some(plant.archive())).status.code(), Some(0));
+    assert_eq!(archived(), 2);
+    let elsewhere = set_clock(Some(plant.folder.path().join("nothing.db")));
+    assert_eq!(elsewhere.status.code(), Some(0));
+    let told = text(&elsewhere.stderr);
+    assert!(told.contains("there is no archive") && told.contains("state directory"), "{told}");
+    assert_eq!(plant.run("--once").status.code(), Some(0));
+    assert_eq!(archived(), 3);
+    assert!(!plant.folder.path().join("nothing.db").exists());
+    assert_eq!(plant.number(names), 1);
+}
+
 /// What the service says, word by word.
 fn words(manager: &UnixDatagram) -> Vec<String> {
     let mut buffer = [0; 4096];
@@ -250,6 +281,11 @@ fn a_recorder_is_made_to_report_and_left_as_it_was_found() {
     collector.signal("-TERM");
     assert_eq!(collector.wait(), Some(0));
     assert_eq!(setting(), before);
+    // The log was looked at once more, so nothing can be missing at the end of what happened.
+    let mut command = ser_cli();
+    let report = command.args(["report", "--archive"]).arg(plant.archive()).output().unwrap();
+    let report = text(&report.stdout);
+    assert!(report.contains("8 entries") && !report.contains("not known to be read"), "{report}");
     // Both changes are on record, with who made them.
     let commands = "SELECT count(*) FROM evidence WHERE kind = 'command' \
         AND line LIKE '%auto report%' AND line LIKE '%\"user\":%'";

@@ -3,9 +3,12 @@
 //! Every connection that this program opens gets a hook here. It adds a record to `audit.jsonl` in
 //! the state directory for each command that changes a recorder, once what came of it is known and
 //! before the command itself learns of it. An interrupt that ends the program meanwhile writes down
-//! that no answer came. What a user wanted done is worth more than the record: if
-//! that cannot be written, it is told, and the command goes on.
+//! that no answer came. What a user wanted done is worth more than the record: if that cannot be
+//! written, it is told, and the command goes on. Where `SER_ARCHIVE` names an archive, the record goes
+//! there instead.
 
+#[cfg(feature = "archive")]
+mod archived;
 mod file;
 mod under_way;
 
@@ -22,6 +25,8 @@ use crate::connection::{self, ConnectionArgs};
 use crate::error::{Result, advise, warn};
 use crate::output::PROGRAM;
 use crate::state;
+#[cfg(feature = "archive")]
+pub(crate) use archived::{collector, named};
 use file::AuditFile;
 pub(crate) use file::{Position, Since};
 use under_way::UnderWay;
@@ -34,6 +39,14 @@ pub(crate) struct AuditArgs {
     /// directory (~/.local/state/ser-cli).
     #[arg(long, env = "SER_STATE_DIR", hide_env_values = true, value_name = "DIR")]
     state_dir: Option<PathBuf>,
+}
+
+impl AuditArgs {
+    /// The directory, if the user wants another than the system's place for state.
+    #[cfg(feature = "archive")]
+    pub(crate) fn directory(&self) -> Option<&Path> {
+        self.state_dir.as_deref()
+    }
 }
 
 /// Writes down what this connection changes in its recorder.
@@ -79,6 +92,11 @@ fn follow(place: &Place, under_way: &mut Option<UnderWay>, command: String, stag
 
 fn write(place: &Place, command: String, outcome: &Outcome) {
     let record = Author::of_this_program(PROGRAM).record(&place.peer, command, outcome);
+    let told = Told { recorder: place.recorder.clone(), record: Record::Command(record) };
+    #[cfg(feature = "archive")]
+    if archived::add(&told) {
+        return;
+    }
     let file = match file(place.directory.as_deref()) {
         Ok(file) => file,
         Err(failure) => {
@@ -86,7 +104,6 @@ fn write(place: &Place, command: String, outcome: &Outcome) {
             return tell_unwritten();
         }
     };
-    let told = Told { recorder: place.recorder.clone(), record: Record::Command(record) };
     if let Err(error) = file.append(&told) {
         warn(format_args!("cannot write {}: {error}", file.path().display()));
         tell_unwritten();

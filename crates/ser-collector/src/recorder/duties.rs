@@ -5,12 +5,14 @@ use std::time::{Duration, Instant};
 
 use jiff::civil;
 use jiff::tz::TimeZone;
-use ser_client::{RequestError, Unit};
+use ser_client::{Cursor, RequestError, Unit};
 use ser_evidence::record::{EntryRecord, HostReading, Life, Record, Suppressed, Watched};
 use ser_evidence::time::{Host, Moment};
 use ser_observer::clock_look::{self, NowAndThen};
 use ser_observer::setting::{self, set_clock};
-use ser_observer::{ClockSetting, LogIdentity, LogLook, host_reading, left_out, seen_at};
+use ser_observer::{
+    ClockSetting, LogIdentity, LogLook, host_reading, left_out, nothing_after, seen_at,
+};
 use tracing::{info, warn};
 
 use super::Task;
@@ -115,9 +117,23 @@ impl<'t> Duties<'t> {
             records.extend(self.set_clock(unit, filing));
         }
         if is_over || Instant::now() >= self.vouch_due {
+            self.look_at_end(unit, place)?;
             records.extend(self.vouch());
         }
         Ok(records)
+    }
+
+    /// Looks whether the log holds nothing else right now. A reading proves that for a time as long
+    /// ago as a report may have been on the line, which may be before the end of an incident.
+    fn look_at_end(
+        &mut self,
+        unit: &mut Unit,
+        (life, cursor): (Life, Cursor),
+    ) -> Result<(), RequestError> {
+        if let Some(at) = nothing_after(unit, cursor)? {
+            self.complete = Some((host_reading::moment(at), life, cursor.sequence));
+        }
+        Ok(())
     }
 
     /// The last looks before the end. No failure is one here.
@@ -129,6 +145,10 @@ impl<'t> Duties<'t> {
                 .and_then(|looks| looks.observation(looks.place(life, cursor, Some(log.life))?));
             records.extend(seen.map(Record::Clock));
             records.extend(self.look_at_left_out(unit).ok().flatten());
+        }
+        if let Some(place) = filing.place() {
+            // Then it is what was known before.
+            _ = self.look_at_end(unit, place);
         }
         records.extend(self.vouch());
         records

@@ -1,6 +1,7 @@
 //! `collect`: recorders are read for years, and everything they say is archived.
 
 mod check;
+mod commands;
 mod service;
 mod shown;
 mod telling;
@@ -18,6 +19,7 @@ use ser_evidence::site::Site;
 use ser_observer::Author;
 
 use crate::archive::{PlaceParser, parse_keep, parse_size};
+use crate::audit::AuditArgs;
 use crate::connection::{self, ConnectionArgs, HEARTBEAT};
 use crate::error::{Failure, Result, inform};
 use crate::interrupt;
@@ -102,6 +104,9 @@ pub(crate) struct Args {
     #[arg(long)]
     fail_on_loss: bool,
 
+    #[command(flatten)]
+    audit: AuditArgs,
+
     /// How much faster everything is than it should be. For tests.
     #[arg(long, hide = true, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     hasten: u32,
@@ -126,6 +131,7 @@ pub(crate) fn run(args: &Args, connection: &ConnectionArgs) -> Result<()> {
     if args.check {
         return check::run(&options, &open, &place, &stop);
     }
+    commands::take_over(&mut open()?, &options.site, args.audit.directory())?;
     let names: Vec<&str> = with_port(&options.site).collect();
     inform(format_args!(
         "collecting {} into {place}{}",

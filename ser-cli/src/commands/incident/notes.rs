@@ -9,6 +9,7 @@ use super::known::Notes;
 use ser_observer::Author;
 
 use crate::archive::NamedEntry;
+use crate::audit;
 use crate::error::{Failure, Result, inform};
 use crate::output::PROGRAM;
 use ser_observer::host_reading;
@@ -32,7 +33,7 @@ pub(super) fn add(on: &OnArgs, text: &str, closes: bool) -> Result<()> {
         return Ok(());
     }
     let at = host_reading::now();
-    let collector = format!("cli/{host}");
+    let collector = audit::collector();
     let NamedEntry { recorder, life, sequence } = entry;
     let note = NoteRecord { at, user, host, life, sequence, text: text.to_owned(), closes };
     let records = vec![Record::Note(note)];

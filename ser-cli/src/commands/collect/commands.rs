@@ -1,0 +1,34 @@
+//! Commands that were written down in the state directory, moved to the archive.
+
+use std::path::Path;
+
+use ser_archive::{Archive, Batch};
+use ser_evidence::record::Told;
+use ser_evidence::site::Site;
+use ser_observer::host_reading;
+
+use crate::audit;
+use crate::error::{Result, inform};
+
+/// Adds all commands to recorders of the site that are on record in the state directory. What is in
+/// the archive already changes nothing there, and the files stay as they are.
+pub(super) fn take_over(archive: &mut Archive, site: &Site, state: Option<&Path>) -> Result<()> {
+    let since = audit::since(state, None)?;
+    let mut new = 0;
+    for Told { recorder, record } in since.records {
+        let Some(recorder) = audit::named(site, &recorder) else { continue };
+        let appended = archive.append(&[Batch {
+            collector: audit::collector(),
+            recorder,
+            records: vec![record],
+            bookmark: None,
+            joins: false,
+            at: host_reading::now().utc,
+        }])?;
+        new += appended.iter().map(|appended| appended.evidence).sum::<u64>();
+    }
+    if new > 0 {
+        inform(format_args!("commands from the state directory that are archived now: {new}"));
+    }
+    Ok(())
+}
