@@ -22,7 +22,7 @@ const APPLICATION_ID: i64 = 0x5345_5261;
 /// How long a writer waits for another one, unless somebody says otherwise.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// How soon it is tried again where the database does not wait by itself.
+/// How soon it is tried again where `SQLite` does not wait by itself.
 const LOOK_AGAIN: Duration = Duration::from_millis(10);
 
 /// How many prepared statements are kept.
@@ -96,7 +96,7 @@ impl Sqlite {
     }
 
     /// Lets changes go to the log beside the file. While another program does the same to a new file,
-    /// the database does not wait by itself.
+    /// `SQLite` does not wait by itself.
     fn write_beside(&self) -> Result<()> {
         let until = Instant::now() + PATIENCE;
         loop {

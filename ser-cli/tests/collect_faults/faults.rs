@@ -12,7 +12,7 @@ use crate::collector::Collector;
 use crate::disk::Disk;
 use crate::judge::{Filled, Verdict, has_read_all, judge};
 use crate::link::Wiring;
-use crate::plant::Plant;
+use crate::plant::{Plant, Recorder};
 use crate::tables::Tables;
 
 /// How many things happen in a round.
@@ -170,9 +170,9 @@ impl Trial {
         }
         let collector = &mut self.collectors[place];
         if is_killed {
-            collector.kill()
+            collector.kill();
         } else {
-            collector.end()
+            collector.end();
         }
         if is_back {
             collector.start(is_polling);
@@ -344,7 +344,7 @@ impl Trial {
                 self.play(place, moves, 3);
             }
         }
-        self.plant.recorders.iter().for_each(|recorder| recorder.wait());
+        self.plant.recorders.iter().for_each(Recorder::wait);
         let deadline = Instant::now() + PATIENCE;
         loop {
             self.collectors.iter_mut().for_each(Collector::look);

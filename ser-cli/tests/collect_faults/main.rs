@@ -7,6 +7,7 @@
 //! names its seed; `SER_COLLECT_SEED` begins there, and `SER_COLLECT_ROUNDS` says how many rounds there
 //! are.
 #![cfg(all(unix, feature = "archive"))]
+#![allow(clippy::cast_possible_truncation, reason = "numbers that were drawn from a small range")]
 
 mod chains;
 mod collector;
